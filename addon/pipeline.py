@@ -435,27 +435,25 @@ def clearance_of(
     rig: Rig, motion: Motion, colliders: tuple[PosedCollider, ...], settings: DynamicsSettings
 ) -> Clearance | None:
     """How far strands stay from colliders, from the first frame on that has any: as far as guides
-    do at their roots, but no farther than they were at its begin."""
+    do at their roots, but no farther than their roots carried them at its begin."""
     kept = settings.radius_root * motion.dynamics.rest.size
     known = motion.clearance
     if not colliders or (known is not None and known.kept == kept):
         return known
     before = tuple(posed.at_begin() for posed in colliders)
-    return clearance_at(strands_now(rig, motion), rig.strands.offsets, before, kept)
-
-
-def strands_now(rig: Rig, motion: Motion) -> Floats:
-    """All strands at this moment of a running motion, (point_count, 3) [m]."""
-    return strands_and_led(rig, motion)[0]
+    return clearance_at(carried(rig, motion.pose), rig.strands.offsets, before, kept)
 
 
 def strands_and_led(rig: Rig, motion: Motion) -> tuple[Floats, LedOut]:
-    """The same, and those that were led out of colliders."""
-    points, offsets = _riding(rig, motion.pose, motion.guides), rig.strands.offsets
+    """All strands at this moment of a running motion, (point_count, 3) [m], and those of them that
+    were led out of colliders."""
+    pose, offsets = motion.pose, rig.strands.offsets
+    by_roots = carried(rig, pose)
+    points = ride(by_roots, rig.riders, carried_guides(rig, pose), motion.guides)
     if motion.clearance is None:
-        return held_strands(rig, motion.pose, points), NOT_LED
-    led = lead_out(points, offsets, motion.colliders, motion.clearance)
-    points = held_strands(rig, motion.pose, points)
+        return held_strands(rig, pose, points), NOT_LED
+    led = lead_out(points, by_roots, offsets, motion.colliders, motion.clearance)
+    points = held_strands(rig, pose, points)
     return points, LedOut.of(led, points, offsets)
 
 
@@ -466,13 +464,10 @@ def strands_at(rig: Rig, pose: Pose, guides_now: Floats, led: LedOut = NOT_LED) 
         guides_now: (guide_count, cv_count, 3) [m], simulated or baked, world space.
         led: strands that were led out of colliders.
     """
-    points = held_strands(rig, pose, _riding(rig, pose, guides_now))
+    points = ride(carried(rig, pose), rig.riders, carried_guides(rig, pose), guides_now)
+    points = held_strands(rig, pose, points)
     led.put(points, rig.strands.offsets)
     return points
-
-
-def _riding(rig: Rig, pose: Pose, guides_now: Floats) -> Floats:
-    return ride(carried(rig, pose), rig.riders, carried_guides(rig, pose), guides_now)
 
 
 def strands_at_rest(rig: Rig, pose: Pose) -> Floats:

@@ -122,7 +122,9 @@ def main() -> None:
                 rig, m, p, (), DynamicsSettings(), GRAVITY, 1.0 / 60.0
             ),
         )
-        points = watch.measure("interpolate_ms", lambda m=motion: pipeline.strands_now(rig, m))
+        points = watch.measure(
+            "interpolate_ms", lambda m=motion: pipeline.strands_and_led(rig, m)[0]
+        )
         points = points.reshape(shape)
         snapshot = Snapshot(points=points, radius=radius, lights=lights)
         watch.measure(

@@ -124,7 +124,7 @@ def shaken(rig: Rig, shake: Any, fps: float) -> dict[str, float]:
     segments, rest_lengths = steps(rest, offsets), lengths(rest, offsets)
     change, depth, worst = (np.zeros(rig.strands.strand_count) for _ in range(3))
     for motion, matrix in played(rig, collider, shake, fps):
-        points = pipeline.strands_now(rig, motion)
+        points = pipeline.strands_and_led(rig, motion)[0]
         assert np.isfinite(points).all()
         np.maximum(change, length_changes(points, offsets, rest_lengths), out=change)
         off = np.abs(steps(points, offsets) - segments) / np.maximum(segments, 1.0e-5)
@@ -180,7 +180,7 @@ def coil_figures(rig: Rig, made_of: StrandSet) -> dict[str, float]:
     assert rig.head is not None
     collider = field_of(rig.head, DynamicsSettings(), place="head")
     motion = list(played(rig, collider, shake_at, FPS))[-1][0]
-    points, offsets = pipeline.strands_now(rig, motion), rig.strands.offsets
+    points, offsets = pipeline.strands_and_led(rig, motion)[0], rig.strands.offsets
     kept = lengths(points, offsets) / lengths(made_of.points, made_of.offsets)
     grid = points.reshape(rig.strands.strand_count, -1, 3).astype(np.float64)
     a_turn = grid.shape[1] // TURNS

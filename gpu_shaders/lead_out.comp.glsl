@@ -3,7 +3,7 @@
 // each strand: software drivers end a shader after 65,535 rounds of all its loops.
 //
 //   IS_BEGIN  clearance_at: writes `clearances`
-//   IS_NEAR   which strands are too near: writes `states`
+//   IS_NEAR   which strands are too near: writes `states`, and `wanted` for each point
 //   IS_LED    leads them: writes `led_points`, which `put` copies into cv_points
 //   IS_PUT    does so
 //
@@ -34,22 +34,26 @@ void take(int strand, StrandSpan span, int end)
 }
 #endif
 
-#if defined(IS_NEAR) || defined(IS_LED)
-float wanted_at(StrandSpan span, int point)
-{
-  return texelFetch(clearances, span_texel(span, point), 0).x;
-}
-#endif
-
 #ifdef IS_NEAR
+#include "lib_root_frame.glsl"
+
 void take(int strand, StrandSpan span, int end)
 {
   vec4 state = imageLoad(states, strand_texel(strand, 0, 1));
   state = first_point == 0 ? vec4(0.0) : state;
+  int mover = min(strand, mover_count - 1);
+  RootMotion motion = unpacked_motion(texelFetch(root_motions, strand_texel(mover, 0, 4), 0),
+                                      texelFetch(root_motions, strand_texel(mover, 1, 4), 0),
+                                      texelFetch(root_motions, strand_texel(mover, 2, 4), 0),
+                                      texelFetch(root_motions, strand_texel(mover, 3, 4), 0));
   for (int point = max(first_point, 1); point < end; point++) {
     vec3 here = riding_at(span, point);
     state.y += distance(riding_at(span, point - 1), here);
-    float lack = wanted_at(span, point) - signed_distance(here, kept).w;
+    ivec2 texel = span_texel(span, point);
+    float away = distance(here, follow(texelFetch(rest_points, texel, 0).xyz, motion));
+    float goal = min(texelFetch(clearances, texel, 0).x + away, kept);
+    imageStore(wanted, texel, vec4(goal));
+    float lack = goal - signed_distance(here, kept).w;
     state.x = lack > {{lead_slack}} * kept ? 1.0 : state.x;
   }
   imageStore(states, strand_texel(strand, 0, 1), state);
@@ -102,10 +106,10 @@ vec3 turned_out(vec3 start, vec3 arm, float size, float goal)
 
 // xyz: the end of a segment that is led out farther than it must be; w: by how much [m] it is nearer
 // than it must be all the same.
-vec4 led_out(vec3 start, vec3 segment, float wanted, float farther)
+vec4 led_out(vec3 start, vec3 segment, float needed, float farther)
 {
   float size = length(segment);
-  float goal = wanted + farther;
+  float goal = needed + farther;
   vec3 end = start + segment;
   for (int sweep = 0; sweep <= SWEEPS; sweep++) {
     vec4 found = signed_distance(end, kept + farther);
@@ -118,7 +122,7 @@ vec4 led_out(vec3 start, vec3 segment, float wanted, float farther)
     }
   }
   end = turned_out(start, end - start, size, goal);
-  return vec4(end, max(wanted - signed_distance(end, kept).w, 0.0));
+  return vec4(end, max(needed - signed_distance(end, kept).w, 0.0));
 }
 
 void take(int strand, StrandSpan span, int end)
@@ -140,7 +144,8 @@ void take(int strand, StrandSpan span, int end)
   vec3 riding_start = riding_at(span, first - 1);
   for (int point = first; point < end; point++) {
     vec3 riding = riding_at(span, point);
-    vec4 led = led_out(start, riding - riding_start, wanted_at(span, point), farther);
+    float goal = texelFetch(wanted, span_texel(span, point), 0).x;
+    vec4 led = led_out(start, riding - riding_start, goal, farther);
     imageStore(led_points, span_texel(span, point), vec4(led.xyz, 0.0));
     state.z = max(state.z, led.w);
     start = led.xyz;

@@ -55,7 +55,7 @@ def moved(rig: Any, dynamics: Any) -> tuple[Any, Any]:
     for angle in angles[1:]:
         pose = turned(rig, angle)
         motion = pipeline.advance(rig, motion, pose, (), dynamics, GRAVITY, DURATION)
-    return motion.pose, pipeline.strands_now(rig, motion)
+    return motion.pose, pipeline.strands_and_led(rig, motion)[0]
 
 
 def main(folder: Path) -> None:

@@ -5,7 +5,7 @@ through it. From root to tip, a point that is too near to a collider goes straig
 along its segment to the length that this had, and so on until both hold. Where they do not, as
 behind an ear, the segment turns towards the nearest direction that leads out, as far as it must.
 What comes after it goes along, in its shape. What was in a collider when the motion began may stay
-as deep as it was.
+as deep as it was where its root carries it, and comes out by as much as it moves away from there.
 
 The twin on the GPU is gpu_shaders/lead_out.comp.glsl.
 """
@@ -37,7 +37,7 @@ _TINY = 1.0e-30
 
 @dataclass(frozen=True, eq=False)
 class Clearance:
-    """How far strands stay from colliders.
+    """How far strands stay from colliders where their roots carry them.
 
     kept: [m], the distance of a point that was at least so far away when the motion began.
     points: (point_count,) float32 [m], that of each: `kept`, or less if it was nearer when the
@@ -82,10 +82,10 @@ NOT_LED = LedOut(np.zeros(0, np.int32), np.zeros((0, 3), np.float32))
 def clearance_at(
     points: Floats, offsets: Ints, colliders: Sequence[PosedCollider], kept: float
 ) -> Clearance:
-    """That of a motion which begins with these strands and colliders.
+    """That of a motion which begins now.
 
     Args:
-        points: (point_count, 3) world [m], strand after strand.
+        points: (point_count, 3) world [m], strand after strand, where their roots carry them.
         offsets: (strand_count + 1,), strand s is points[offsets[s]:offsets[s + 1]].
         colliders: taken where they stand at their frame's end.
         kept: [m].
@@ -96,23 +96,30 @@ def clearance_at(
 
 
 def lead_out(
-    points: Floats, offsets: Ints, colliders: Sequence[PosedCollider], clearance: Clearance
+    points: Floats,
+    carried: Floats,
+    offsets: Ints,
+    colliders: Sequence[PosedCollider],
+    clearance: Clearance,
 ) -> Ints:
     """Lead strands out of colliders, in place.
 
     Args:
+        carried: (point_count, 3) world [m], where their roots carry them.
         points, offsets, colliders: as of `clearance_at`.
 
     Returns:
         (n,) the strands that were too near, ascending.
     """
     distance, _ = signed_distance(points, colliders, clearance.kept)
-    is_near = distance < clearance.points - np.float32(SLACK * clearance.kept)
+    away = np.linalg.norm(points - carried, axis=1)
+    wanted = np.minimum(clearance.points + away, np.float32(clearance.kept))
+    is_near = distance < wanted - np.float32(SLACK * clearance.kept)
     counts = np.diff(offsets)
     strands = np.unique(np.repeat(np.arange(len(counts)), counts)[is_near])
     for count in np.unique(counts[strands]).tolist():
         index = offsets[strands[counts[strands] == count], None] + np.arange(count)
-        points[index] = _led(points[index], clearance.points[index], clearance.kept, colliders)
+        points[index] = _led(points[index], wanted[index], clearance.kept, colliders)
     return strands
 
 

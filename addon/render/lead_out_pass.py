@@ -3,7 +3,9 @@ textures in the layouts of `strand_layout`.
 
     strand_spans  RGBA32F: where the points of each strand lie, see strand_layout.StrandLayout
     solids, rounds, fields: the colliders, see collider_textures.py
-    clearances    R32F: how far from colliders each point stays [m]
+    rest_points, root_motions: where roots carry points, see ride_pass.py
+    clearances    R32F: how far from colliders each point stays where its root carries it [m]
+    wanted        R32F: how far it stays where it is [m]
     states        RGBA32F: of each strand x whether it is led out, see lead_out.comp.glsl
     led_points    RGBA32F: xyz where points are led to [m, world]
     led_texels    RG32F: the texels of points that were led earlier
@@ -33,17 +35,21 @@ _ROUNDS = 60_000
 #: step -> the images that it has, and whether colliders matter to it
 _STEPS = {
     "BEGIN": (("cv_points", "READ"), ("clearances", "WRITE")),
-    "NEAR": (("cv_points", "READ"), ("states", "READ_WRITE")),
+    "NEAR": (("cv_points", "READ"), ("states", "READ_WRITE"), ("wanted", "WRITE")),
     "LED": (("cv_points", "READ"), ("states", "READ_WRITE"), ("led_points", "READ_WRITE")),
     "PUT": (("cv_points", "READ_WRITE"),),
 }
 _INTEGERS = {
     "BEGIN": ("solid_count",),
-    "NEAR": ("solid_count",),
+    "NEAR": ("solid_count", "mover_count"),
     "LED": ("solid_count", "attempt"),
     "PUT": (),
 }
-_TEXTURES = {"BEGIN": (), "NEAR": ("clearances",), "LED": ("clearances",)}
+_TEXTURES = {
+    "BEGIN": (),
+    "NEAR": ("clearances", "rest_points", "root_motions"),
+    "LED": ("wanted",),
+}
 PUT_RECIPE = ShaderRecipe(
     name="put_points",
     compute="put_points.comp.glsl",
@@ -67,7 +73,7 @@ def lead_out_recipe(step: str, *, rounds: bool = False, fields: bool = False) ->
     else:
         names += ["solids", *_TEXTURES[step]]
         names += [name for name, is_there in (("rounds", rounds), ("fields", fields)) if is_there]
-    formats = {"clearances": "R32F"}
+    formats = {"clearances": "R32F", "wanted": "R32F"}
     return ShaderRecipe(
         name=f"lead_out_{step.lower()}",
         compute="lead_out.comp.glsl",
@@ -105,7 +111,7 @@ class LeadOutPass:
         self._given, self._kept = clearance, None if clearance is None else clearance.kept
 
     def begin(self, cv_points: Any, posed: tuple[PosedCollider, ...], kept: float) -> None:
-        """Find the clearance of strands as they are shown, see `refine.lead_out.clearance_at`.
+        """Find the clearance of strands that their roots carry, see `refine.lead_out.clearance_at`.
 
         Raises:
             HairloomError: a collider that the GPU cannot have.
@@ -117,8 +123,18 @@ class LeadOutPass:
             self._textures["clearances"] = _empty(self._layout.size, "R32F")
             self._run("BEGIN", cv_points, posed)
 
-    def lead(self, cv_points: Any, posed: tuple[PosedCollider, ...]) -> None:
+    def lead(
+        self,
+        cv_points: Any,
+        posed: tuple[PosedCollider, ...],
+        carrying: dict[str, Any],
+        mover_count: int,
+    ) -> None:
         """Lead strands out, see `refine.lead_out.lead_out`.
+
+        Args:
+            carrying: the textures rest_points and root_motions.
+            mover_count: how many root motions there are.
 
         Raises:
             HairloomError, ShaderError: as `begin`.
@@ -134,9 +150,10 @@ class LeadOutPass:
             size = strand_rows_size(self._layout.strand_count, 1)
             self._textures["states"] = _empty(size, "RGBA32F")
             self._textures["led_points"] = _empty(self._layout.size, "RGBA32F")
-        self._run("NEAR", cv_points, posed)
+            self._textures["wanted"] = _empty(self._layout.size, "R32F")
+        self._run("NEAR", cv_points, posed, carrying, mover_count=mover_count)
         for attempt in range(ATTEMPTS):
-            self._run("LED", cv_points, posed, attempt)
+            self._run("LED", cv_points, posed, attempt=attempt)
         self._run("PUT", cv_points, posed)
 
     def put(self, cv_points: Any, led: LedOut) -> None:
@@ -187,7 +204,12 @@ class LeadOutPass:
         self._kept = self._given = None
 
     def _run(
-        self, step: str, cv_points: Any, posed: tuple[PosedCollider, ...], attempt: int = 0
+        self,
+        step: str,
+        cv_points: Any,
+        posed: tuple[PosedCollider, ...],
+        carrying: dict[str, Any] | None = None,
+        **integers: int,
     ) -> None:
         """One step over all points of all strands, as many at once as drivers bear."""
         solids = self._colliders.of(posed)
@@ -197,8 +219,8 @@ class LeadOutPass:
         kinds = {"rounds": solids.rounds is not None, "fields": solids.fields is not None}
         recipe = lead_out_recipe(step, **({} if step == "PUT" else kinds))
         taken = {"solids": solids.solids(posed), "rounds": solids.rounds, "fields": solids.fields}
-        taken |= self._textures | {"cv_points": cv_points}
-        integers = {"solid_count": len(posed), "attempt": attempt}
+        taken |= self._textures | (carrying or {}) | {"cv_points": cv_points}
+        integers["solid_count"] = len(posed)
         shader, count = program(recipe), self._layout.strand_count
         most, at_once = int(self._layout.counts.max()), _points_at_once(solids)
         for first in range(0, most, at_once):

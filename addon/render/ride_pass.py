@@ -185,12 +185,24 @@ class RidePass:
         self._run_guides(guides_now)
         self._run_ride("guide_turns", anchors, colliders, led)
 
-    def begin_clearance(self, colliders: tuple[PosedCollider, ...], kept: float) -> None:
-        """From now on strands stay out of colliders; where they are shown, a motion begins.
+    def begin_clearance(
+        self,
+        head_positions: Floats | None,
+        matrix: Floats,
+        colliders: tuple[PosedCollider, ...],
+        kept: float,
+    ) -> None:
+        """From now on strands stay out of colliders; shows them where their roots carry them.
 
         Args:
+            head_positions, matrix: as in `carry`.
             colliders: as they stand now, at their frame's end. kept: see `Clearance`.
+
+        Raises:
+            HairloomError: a collider that the GPU cannot have.
+            ShaderError: a shader does not compile here.
         """
+        self.carry(head_positions, matrix)
         self.leading.begin(self.points.texture, colliders, kept)
 
     def read(self) -> Floats:
@@ -323,7 +335,8 @@ class RidePass:
             },
         )
         _dispatch(shader, count, 1)
-        self.leading.lead(self.points.texture, colliders)
+        carrying = _named(textures, "rest_points", "root_motions")
+        self.leading.lead(self.points.texture, colliders, carrying, self._mover_count)
         if self._held is not None:
             self._held.hold(self.points.texture, textures["rest_points"], anchors)
         self.leading.put(self.points.texture, led)

@@ -68,7 +68,7 @@ def test_numpy_is_the_pipeline(rig: Rig, poses: list[Pose]) -> None:
     advance(solver, poses[1:6])
     assert solver.pose is poses[5]
     assert np.array_equal(solver.guides(), motion.guides)
-    assert np.array_equal(solver.strands(), pipeline.strands_now(rig, motion))
+    assert np.array_equal(solver.strands(), pipeline.strands_and_led(rig, motion)[0])
     solver.rest(poses[3])
     assert np.array_equal(solver.strands(), pipeline.carried(rig, poses[3]))
 

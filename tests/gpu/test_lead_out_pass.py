@@ -60,6 +60,7 @@ def strands(count: int, fewest: int, most: int) -> tuple[np.ndarray, np.ndarray]
 def test_equals_numpy(fewest: int, most: int) -> None:
     from hairloom.addon.render.collider_textures import UploadedColliders
     from hairloom.addon.render.lead_out_pass import LeadOutPass
+    from hairloom.addon.render.ride_pass import matrix_motion
     from hairloom.addon.render.strand_layout import StrandLayout
     from hairloom.addon.render.textures import texture_from, texture_to_array
 
@@ -67,13 +68,20 @@ def test_equals_numpy(fewest: int, most: int) -> None:
     layout = StrandLayout(offsets)
     texels = layout.pixels(np.column_stack([points, np.full(len(points), 1e-4)]))
     now = texture_from(texels, "RGBA32F")
+    matrix = np.eye(4)
+    matrix[:3, 3] = 0.0, 2.0e-4, 0.0
+    carried = points + np.float32([0.0, 2.0e-4, 0.0])
+    carrying = {
+        "rest_points": texture_from(texels, "RGBA32F"),
+        "root_motions": texture_from(matrix_motion(matrix), "RGBA32F"),
+    }
 
     def found() -> np.ndarray:
         return layout.values(texture_to_array(now))
 
     leading = LeadOutPass(layout, UploadedColliders())
     assert leading.read() is None
-    leading.lead(now, posed(moved=0.0))
+    leading.lead(now, posed(moved=0.0), carrying, 1)
     np.testing.assert_array_equal(found()[:, :3], points, "no motion has begun")
 
     leading.begin(now, posed(moved=-0.05), KEPT)
@@ -83,8 +91,8 @@ def test_equals_numpy(fewest: int, most: int) -> None:
     np.testing.assert_allclose(read.points, clearance.points, atol=2e-6)
 
     expected = points.copy()
-    led = lead_out(expected, offsets, posed(moved=0.0), clearance)
-    leading.lead(now, posed(moved=0.0))
+    led = lead_out(expected, carried, offsets, posed(moved=0.0), clearance)
+    leading.lead(now, posed(moved=0.0), carrying, 1)
     assert 100 < len(led) < 550
     assert len(np.setxor1d(led, leading.led())) <= 2, "rounding decides few"
     off = np.maximum.reduceat(np.abs(found()[:, :3] - expected).max(axis=1), offsets[:-1])
@@ -92,8 +100,11 @@ def test_equals_numpy(fewest: int, most: int) -> None:
     assert (off > 1e-4).mean() < 0.05, "where two solids are as near, rounding decides"
     np.testing.assert_array_equal(found()[:, 3], np.float32(1e-4), "radii stay")
 
+    away = np.linalg.norm(points - carried, axis=1)
+    wanted = np.minimum(clearance.points + away, np.float32(KEPT))
+
     def stuck(places: np.ndarray) -> float:
-        lack = clearance.points - signed_distance(places, posed(moved=0.0), KEPT)[0]
+        lack = wanted - signed_distance(places, posed(moved=0.0), KEPT)[0]
         return float((np.maximum.reduceat(lack, offsets[:-1]) > 0.1 * KEPT).mean())
 
     assert abs(stuck(found()[:, :3]) - stuck(expected)) < 0.01
@@ -104,10 +115,10 @@ def test_equals_numpy(fewest: int, most: int) -> None:
     other, again = LeadOutPass(layout, UploadedColliders()), texture_from(texels, "RGBA32F")
     other.take(read)
     assert other.kept == KEPT and other.read() is read
-    other.lead(again, posed(moved=0.0))
+    other.lead(again, posed(moved=0.0), carrying, 1)
     np.testing.assert_array_equal(layout.values(texture_to_array(again)), found())
     np.testing.assert_array_equal(other.led(), leading.led())
-    other.lead(again, ())
+    other.lead(again, (), carrying, 1)
     assert not len(other.led())
 
 

@@ -124,7 +124,7 @@ def test_all_strands_stay_in_a_ring_that_turns_with_the_head(holders: Holders) -
     poses = [pose_at(rig, shaking(frame / 24.0)) for frame in range(30)]
     rest, swung = lengths(rig.strands.grid), 0.0
     for motion in played(rig, poses, DynamicsSettings(), 24.0):
-        strands = grid(rig, pipeline.strands_now(rig, motion))
+        strands = grid(rig, pipeline.strands_and_led(rig, motion)[0])
         assert escape(rig, motion.pose, strands).max() < 1e-4
         away = np.abs(strands - grid(rig, pipeline.strands_at_rest(rig, motion.pose)))
         swung = max(swung, float(away.max()))
@@ -162,7 +162,7 @@ def test_a_tie_that_goes_away_in_mid_motion_lets_go() -> None:
     poses = [pose_at(rig, shaking(frame / 24.0)) for frame in range(24)]
     gone = [replace(pose, anchors=np.full_like(pose.anchors, np.nan)) for pose in poses[12:]]
     motions = list(played(rig, poses[:12] + gone, DynamicsSettings(), 24.0))
-    ends = [grid(rig, pipeline.strands_now(rig, motion)) for motion in motions]
+    ends = [grid(rig, pipeline.strands_and_led(rig, motion)[0]) for motion in motions]
     assert all(np.isfinite(end).all() for end in ends)
     assert escape(rig, poses[11], ends[10]).max() < 1e-4
     assert escape(rig, poses[-1], ends[-1]).max() > 1e-3
@@ -178,7 +178,7 @@ def test_a_tie_that_is_torn_off_leaves_every_length() -> None:
         poses.append(pose_at(rig, np.eye(4), away))
     rest = lengths(rig.strands.grid[rig.guides])
     for motion in played(rig, poses, DynamicsSettings(), 24.0):
-        strands = grid(rig, pipeline.strands_now(rig, motion))
+        strands = grid(rig, pipeline.strands_and_led(rig, motion)[0])
         assert np.isfinite(strands).all()
         assert np.abs(lengths(motion.dynamics.grid) / rest - 1.0).max() < 0.005
 
@@ -233,7 +233,7 @@ def test_the_end_of_a_braid_stays_together() -> None:
         poses.append(pose_at(rig, np.eye(4), swung))
     rest = lengths(rig.strands.grid)
     for motion in played(rig, poses, DynamicsSettings(), 24.0):
-        now = grid(rig, pipeline.strands_now(rig, motion))
+        now = grid(rig, pipeline.strands_and_led(rig, motion)[0])
         assert escape(rig, motion.pose, now).max() < 1e-4
         assert np.abs(lengths(now) / rest - 1.0).max() < 0.002
         assert np.linalg.norm(now[:, -1] - now[:, -1].mean(axis=0), axis=1).max() < 0.008
@@ -264,4 +264,4 @@ def test_strange_strands_in_a_tie_do_no_harm() -> None:
         chosen = DynamicsSettings(length_solver=solver)
         for motion in played(rig, poses, chosen, 24.0):
             assert np.isfinite(motion.dynamics.position).all()
-            assert np.isfinite(pipeline.strands_now(rig, motion)).all()
+            assert np.isfinite(pipeline.strands_and_led(rig, motion)[0]).all()

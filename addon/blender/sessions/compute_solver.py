@@ -149,11 +149,13 @@ class ComputeSolver:
     def _begin_clearance(
         self, colliders: tuple[PosedCollider, ...], settings: DynamicsSettings
     ) -> None:
-        """As pipeline.clearance_of, from what is shown."""
+        """As pipeline.clearance_of."""
         kept = settings.radius_root * self._motion.dynamics.rest.size
         if colliders and self._ride.leading.kept != kept:
-            self._draw()
-            self._ride.begin_clearance(tuple(posed.at_begin() for posed in colliders), kept)
+            before = tuple(posed.at_begin() for posed in colliders)
+            pose = self.pose
+            self._ride.begin_clearance(pose.head_positions, pose.matrix, before, kept)
+            self._is_drawn = False
 
     def _draw(self) -> None:
         """Bring the strands on the GPU to this moment, once."""

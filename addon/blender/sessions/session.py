@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import replace
 from functools import partial
 
 import bpy
@@ -212,7 +213,8 @@ class Session:
         is_same = before is not None and before.rig is groom.rig
         goes_on = before is not None and self.is_playing and _same_guides(groom.rig, before.rig)
         if not is_same:
-            motion = self.solver.motion if goes_on else None
+            # strands are others now, and guides go on
+            motion = replace(self.solver.motion, clearance=None) if goes_on else None
             self.solver = solver_of(groom.rig, self.settings[DynamicsSettings].device, motion)
         self.picture.take_groom(groom, self.settings)
         self.light(depsgraph)

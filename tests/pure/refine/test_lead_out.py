@@ -56,7 +56,7 @@ def test_strands_go_around_a_ball_and_keep_their_segments(across) -> None:
     clearance = clearance_at(points + 10.0, offsets, colliders, KEPT)
     assert (clearance.points[offsets[:-1]] == -np.inf).all()
     now = points.copy()
-    led = lead_out(now, offsets, colliders, clearance)
+    led = lead_out(now, points, offsets, colliders, clearance)
     depth = np.linalg.norm(points, axis=1) - 0.1
     were_near = np.minimum.reduceat(depth, offsets[:-1]) < KEPT * (1.0 - SLACK)
     np.testing.assert_array_equal(led, np.flatnonzero(were_near))
@@ -74,7 +74,8 @@ def test_what_comes_after_goes_along_in_its_shape() -> None:
     points = np.array([[0, 0, 0.102], [0.05, 0, 0.08], [0.1, 0.02, 0.1], [0.12, 0, 0.15]])
     points = points.astype(np.float32)
     now, offsets = points.copy(), np.array([0, 4])
-    led = lead_out(now, offsets, still(BALL), clearance_at(points + 1, offsets, still(BALL), KEPT))
+    clearance = clearance_at(points + 1, offsets, still(BALL), KEPT)
+    led = lead_out(now, points, offsets, still(BALL), clearance)
     assert led.tolist() == [0]
     np.testing.assert_allclose(np.diff(now[1:], axis=0), np.diff(points[1:], axis=0), atol=1e-7)
     assert np.linalg.norm(now[1]) >= 0.1 + KEPT * (1.0 - SLACK)
@@ -85,13 +86,29 @@ def test_what_was_inside_may_stay_as_deep_and_no_deeper(across) -> None:
     colliders = still(BALL)
     clearance = clearance_at(points, offsets, colliders, KEPT)
     now = points.copy()
-    assert not len(lead_out(now, offsets, colliders, clearance))
+    assert not len(lead_out(now, points, offsets, colliders, clearance))
     np.testing.assert_array_equal(now, points)
     moved = still(BALL, 0.02, 0.0, 0.0)
-    led = lead_out(now, offsets, moved, clearance)
+    led = lead_out(now, points, offsets, moved, clearance)
     assert len(led)
     lack = clearance.points - signed_distance(now, moved, KEPT)[0]
     assert lack.max() <= SLACK * KEPT + 1e-7
+
+
+def test_what_was_inside_comes_out_as_it_moves_away() -> None:
+    """It began 2 mm deep, and has swung aside by 1.5 mm, and by 20 mm."""
+    points = np.array([[0, 0, 0.1], [0, 0.01, 0.0975], [0, 0.02, 0.096]], np.float32)
+    offsets, colliders = np.array([0, 3]), still(BALL)
+    clearance = clearance_at(points, offsets, colliders, KEPT)
+    assert clearance.points[1] == pytest.approx(-0.00199, abs=1e-4)
+    for aside in (0.0015, 0.02):
+        now = points + np.array([[0.0, 0.0, 0.0], [aside, 0.0, 0.0], [aside, 0.0, 0.0]])
+        now = now.astype(np.float32)
+        lead_out(now, points, offsets, colliders, clearance)
+        away = np.linalg.norm(now - points, axis=1)[1:]
+        distance = np.linalg.norm(now, axis=1)[1:] - 0.1
+        wanted = np.minimum(clearance.points[1:] + aside, KEPT)
+        assert (distance > wanted - 2.0 * SLACK * KEPT).all(), (away, distance)
 
 
 def test_a_fold_from_which_no_segment_leads_out() -> None:
@@ -110,7 +127,7 @@ def test_a_fold_from_which_no_segment_leads_out() -> None:
     colliders = still(bowl)
     clearance = clearance_at(points + 1.0, offsets, colliders, KEPT)
     now = points.copy()
-    led = lead_out(now, offsets, colliders, clearance)
+    led = lead_out(now, points, offsets, colliders, clearance)
     assert len(led) > 40
     distance = signed_distance(now, colliders, KEPT)[0]
     assert distance.min() > KEPT * (1.0 - 2.0 * SLACK)
@@ -123,12 +140,12 @@ def test_strands_without_length_and_of_two_points_stay_finite() -> None:
     offsets = np.array([0, 2, 5, 9])
     now = points.copy()
     clearance = clearance_at(points + 1.0, offsets, still(BALL), KEPT)
-    lead_out(now, offsets, still(BALL), clearance)
+    lead_out(now, points, offsets, still(BALL), clearance)
     assert np.isfinite(now).all()
     np.testing.assert_allclose(steps(now, offsets), steps(points, offsets), atol=1e-7)
     none = np.zeros((0, 3), np.float32)
     clearance = clearance_at(none, np.array([0]), still(BALL), KEPT)
-    assert not len(lead_out(none, np.array([0]), still(BALL), clearance))
+    assert not len(lead_out(none, none, np.array([0]), still(BALL), clearance))
 
 
 def test_led_strands_are_put_where_they_were(across) -> None:
@@ -168,7 +185,7 @@ def test_a_strand_between_guides_that_part_goes_around() -> None:
         pose = Pose(None, np.eye(4))
         motion = pipeline.advance(rig, motion, pose, posed, settings, np.zeros(3), 1.0 / 30.0)
         before = now
-        points = pipeline.strands_now(rig, motion)
+        points = pipeline.strands_and_led(rig, motion)[0]
         depth = 0.1 - np.linalg.norm(points - now[:3, 3], axis=1)
         assert depth.max() < 1e-6
         np.testing.assert_allclose(
