@@ -18,17 +18,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays import Floats, Ints
-from ..dynamics.colliders import PosedCollider, signed_distance
+from ..dynamics.colliders import Pose, PosedCollider, signed_distance
+from ..dynamics.colliders.signed_distance import distance_to, poses_now
 from ..strands.vectors import GOLDEN_ANGLE
 
 #: How often a point goes straight out and back to its length, at most.
-SWEEPS = 6
+SWEEPS = 4
 #: How much nearer than it should be a point may come before its strand is led out, as a fraction
 #: of the distance that is kept.
 SLACK = 0.05
 #: How many directions are tried for a segment that this does not lead out, and how often the turn
 #: to the one that does is halved.
-TRIES, HALVINGS = 64, 8
+TRIES, HALVINGS = 64, 5
 #: A strand that is stuck all the same, as in a fold, is led from its root again, farther out by
 #: this much of its mean segment; how often it is led at most.
 MARGIN, ATTEMPTS = 0.5, 3
@@ -111,7 +112,8 @@ def lead_out(
     Returns:
         (n,) the strands that were too near, ascending.
     """
-    distance, _ = signed_distance(points, colliders, clearance.kept)
+    poses = poses_now(colliders)
+    distance, _ = distance_to(points, poses, clearance.kept)
     away = np.linalg.norm(points - carried, axis=1)
     wanted = np.minimum(clearance.points + away, np.float32(clearance.kept))
     is_near = distance < wanted - np.float32(SLACK * clearance.kept)
@@ -119,7 +121,7 @@ def lead_out(
     strands = np.unique(np.repeat(np.arange(len(counts)), counts)[is_near])
     for count in np.unique(counts[strands]).tolist():
         index = offsets[strands[counts[strands] == count], None] + np.arange(count)
-        points[index] = _led(points[index], wanted[index], clearance.kept, colliders)
+        points[index] = _led(points[index], wanted[index], clearance.kept, poses)
     return strands
 
 
@@ -139,16 +141,14 @@ def directions() -> Floats:
     return np.stack([radius * np.cos(angle), radius * np.sin(angle), height], axis=1)
 
 
-def _led(some: Floats, wanted: Floats, kept: float, colliders: Sequence[PosedCollider]) -> Floats:
+def _led(some: Floats, wanted: Floats, kept: float, poses: Sequence[Pose]) -> Floats:
     """Strands (n, count, 3) led out; wanted (n, count) [m]."""
     some = some.astype(np.float64)
     lengths = np.linalg.norm(np.diff(some, axis=1), axis=2)
     led, stuck = some.copy(), np.arange(len(some))
     for attempt in range(ATTEMPTS):
         farther = MARGIN * attempt * lengths[stuck].mean(axis=1)
-        led[stuck], lack = _led_by(
-            some[stuck], lengths[stuck], wanted[stuck], farther, kept, colliders
-        )
+        led[stuck], lack = _led_by(some[stuck], lengths[stuck], wanted[stuck], farther, kept, poses)
         stuck = stuck[lack > SLACK * kept]
         if not len(stuck):
             break
@@ -161,7 +161,7 @@ def _led_by(
     wanted: Floats,
     farther: Floats,
     kept: float,
-    colliders: Sequence[PosedCollider],
+    poses: Sequence[Pose],
 ) -> tuple[Floats, Floats]:
     """Strands (n, count, 3) led out farther than they must be, by (n,) [m]; and by how much any
     point of each is nearer than it must be, (n,) [m]."""
@@ -172,7 +172,7 @@ def _led_by(
         goal = wanted[:, point] + farther
         near = np.arange(len(led))
         for sweep in range(SWEEPS + 1):
-            distance, outward = signed_distance(here[near], colliders, kept + float(farther.max()))
+            distance, outward = distance_to(here[near], poses, kept + float(farther.max()))
             lack = goal[near] - distance
             left = np.flatnonzero(lack > 0.0)
             near, lack = near[left], lack[left]
@@ -183,8 +183,8 @@ def _led_by(
         near = near[lack > SLACK * kept]
         if len(near):
             arms = here[near] - start[near], length[near]
-            here[near] = _turned_out(start[near], *arms, goal[near], colliders)
-            distance, _ = signed_distance(here[near], colliders, kept)
+            here[near] = _turned_out(start[near], *arms, goal[near], poses)
+            distance, _ = distance_to(here[near], poses, kept)
             worst[near] = np.maximum(worst[near], wanted[near, point] - distance)
         led[:, point] = here
     return led, worst
@@ -195,13 +195,13 @@ def _turned_out(
     arm: Floats,
     length: Floats,
     wanted: Floats,
-    colliders: Sequence[PosedCollider],
+    poses: Sequence[Pose],
 ) -> Floats:
     """The ends (n, 3) of segments that are turned until they are out."""
     tried = directions()
     ends = start + length[:, None] * tried[:, None]
     reach = float(wanted.max())
-    distance, _ = signed_distance(ends.reshape(-1, 3), colliders, reach)
+    distance, _ = distance_to(ends.reshape(-1, 3), poses, reach)
     lack = np.maximum(wanted - distance.reshape(TRIES, -1), 0.0)
     arm = arm / np.maximum(length, _TINY)[:, None]
     # the nearest that leads out; if none does, the one that lacks least
@@ -210,7 +210,7 @@ def _turned_out(
     for _ in range(HALVINGS):
         middle = (low + high) / 2.0
         end = _at_length(start, arm + middle[:, None] * (out - arm), length)
-        is_near = signed_distance(end, colliders, reach)[0] < wanted
+        is_near = distance_to(end, poses, reach)[0] < wanted
         low, high = np.where(is_near, middle, low), np.where(is_near, high, middle)
     return _at_length(start, arm + high[:, None] * (out - arm), length)
 

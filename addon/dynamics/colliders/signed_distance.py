@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...arrays import Floats
-from .posed import PosedCollider, near_points, world_distance
+from .posed import Pose, PosedCollider, near_points, poses_through, world_distance
 
 #: How long the gradient of a sampled distance counts at least, see `world_distance`.
 FLATTEST = 0.5
@@ -31,13 +31,21 @@ def signed_distance(
         (n,) float32 [m], negative inside, `reach` where nothing is nearer; and the unit direction
         (n, 3) float32 outwards, in which that distance grows; zero where nothing is nearer.
     """
+    return distance_to(points, poses_now(colliders), reach)
+
+
+def poses_now(colliders: Sequence[PosedCollider]) -> list[Pose]:
+    """Where all stand at the frame's end, but for those that are flat then."""
+    (poses,) = poses_through(tuple(colliders), [(0.0, 1.0)])
+    return poses
+
+
+def distance_to(points: Floats, poses: Sequence[Pose], reach: float) -> tuple[Floats, Floats]:
+    """`signed_distance` for whoever asks often."""
     rows = np.ascontiguousarray(np.asarray(points, np.float32).T)
     distance = np.full(rows.shape[1], reach, np.float32)
     outward = np.zeros_like(rows)
-    for posed in colliders if rows.size else ():
-        (pose,) = posed.poses([(0.0, 1.0)])
-        if pose is None:
-            continue
+    for pose in poses if rows.size else ():
         index, local, _ = near_points(pose, rows, np.maximum(distance, _LEAST))
         found, normal = world_distance(pose, local, FLATTEST)
         nearer = (found < distance.take(index)).nonzero()[0]
