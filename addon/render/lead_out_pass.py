@@ -32,7 +32,7 @@ _GROUP = (64, 1)
 _NONE = -1.0e30
 #: Software drivers end a shader after about this many rounds of all its loops.
 _ROUNDS = 60_000
-#: step -> the images that it has, and whether colliders matter to it
+#: step -> its images
 _STEPS = {
     "BEGIN": (("cv_points", "READ"), ("clearances", "WRITE")),
     "NEAR": (("cv_points", "READ"), ("states", "READ_WRITE"), ("wanted", "WRITE")),
