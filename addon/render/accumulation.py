@@ -8,6 +8,7 @@ import gpu
 import numpy as np
 
 from ..arrays import Floats
+from . import gpu_objects
 from .shader_program import ShaderRecipe, program, released_with_shaders
 from .textures import drawing_into, drawing_state, texture_to_array
 
@@ -51,7 +52,7 @@ class Accumulation:
         self.count = 0
         if self._size != (width, height) or self._sum is None:
             self._size = width, height
-            self._sum = gpu.types.GPUTexture(self._size, format="RGBA32F")
+            self._sum = gpu_objects.texture(self._size, format="RGBA32F")
         self._sum.clear(format="FLOAT", value=(0.0, 0.0, 0.0, 0.0))
 
     def add(self, sample: Any) -> None:
@@ -76,7 +77,9 @@ class Accumulation:
         if self._triangle is None:
             layout = gpu.types.GPUVertFormat()
             layout.attr_add(id="unused", comp_type="F32", len=1, fetch_mode="FLOAT")
-            self._triangle = gpu.types.GPUBatch(type="TRIS", buf=gpu.types.GPUVertBuf(layout, 3))
+            self._triangle = gpu_objects.batch(
+                type="TRIS", buf=gpu_objects.vertex_buffer(layout, 3)
+            )
         shader = program(_SHOWING)
         with drawing_state(depth_test="NONE", depth_write=False, blend="ALPHA_PREMULT"):
             shader.bind(
@@ -105,9 +108,9 @@ class Target:
         """This target in that size [pixels]."""
         if self._size != (width, height):
             self._size = width, height
-            self.color = gpu.types.GPUTexture(self._size, format="RGBA32F")
-            self.depth = gpu.types.GPUTexture(self._size, format="DEPTH_COMPONENT32F")
-            self._framebuffer = gpu.types.GPUFrameBuffer(
+            self.color = gpu_objects.texture(self._size, format="RGBA32F")
+            self.depth = gpu_objects.texture(self._size, format="DEPTH_COMPONENT32F")
+            self._framebuffer = gpu_objects.framebuffer(
                 depth_slot=self.depth, color_slots=(self.color,)
             )
         return self

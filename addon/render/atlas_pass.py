@@ -27,6 +27,7 @@ from ..cards.atlas_maps import AtlasMaps
 from ..cards.bake import SAMPLES, Block, blocks_of, min_one_sample
 from ..cards.bake_strands import FlatStrands
 from ..cards.steps import result_of
+from . import gpu_objects
 from .shader_program import ShaderProgram, ShaderRecipe, program
 from .strand_layout import strand_rows
 from .textures import drawing_into, drawing_state, texture_from, texture_to_array
@@ -145,7 +146,7 @@ def _blocks(bake: _Bake) -> Iterator[tuple[Block, Floats]]:
     shape = blocks[0].samples_across, height * SAMPLES
     samples = {name: _texture(*shape, "RGBA16F") for name in _SAMPLES_OF}
     depth = _texture(*shape, "DEPTH_COMPONENT32F")
-    target = gpu.types.GPUFrameBuffer(depth_slot=depth, color_slots=tuple(samples.values()))
+    target = gpu_objects.framebuffer(depth_slot=depth, color_slots=tuple(samples.values()))
     texels = {name: _texture(width, height, "RGBA32F") for name in _TEXELS_OF}
     ribbon = _ribbon(bake.flat.place.shape[1])
     for block in blocks:
@@ -182,12 +183,12 @@ def _bound(bake: _Bake, block: Block, shape: tuple[int, int], first_strand: int)
 
 
 def _texture(width: int, height: int, texture_format: str) -> Any:
-    return gpu.types.GPUTexture((width, height), format=texture_format)
+    return gpu_objects.texture((width, height), format=texture_format)
 
 
 def _ribbon(cv_count: int) -> Any:
     """A strip of vertices without attributes: two a CV."""
     layout = gpu.types.GPUVertFormat()
     layout.attr_add(id="unused", comp_type="F32", len=1, fetch_mode="FLOAT")
-    vertices = gpu.types.GPUVertBuf(layout, 2 * cv_count)
-    return gpu.types.GPUBatch(type="TRI_STRIP", buf=vertices)
+    vertices = gpu_objects.vertex_buffer(layout, 2 * cv_count)
+    return gpu_objects.batch(type="TRI_STRIP", buf=vertices)

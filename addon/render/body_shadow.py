@@ -17,6 +17,7 @@ import gpu
 import numpy as np
 
 from ..strands import Surface
+from . import gpu_objects
 from .camera import Camera
 from .display import Display
 from .feature_programs import UniformBlocks, bound
@@ -92,9 +93,9 @@ def _batch(surface: Surface) -> Any:
     layout = gpu.types.GPUVertFormat()
     for name in ("position", "normal"):
         layout.attr_add(id=name, comp_type="F32", len=3, fetch_mode="FLOAT")
-    vertices = gpu.types.GPUVertBuf(layout, len(surface.positions))
+    vertices = gpu_objects.vertex_buffer(layout, len(surface.positions))
     vertices.attr_fill("position", np.ascontiguousarray(surface.positions, np.float32))
     vertices.attr_fill("normal", np.ascontiguousarray(surface.vertex_normals(), np.float32))
     triangles = np.ascontiguousarray(surface.triangles, np.int32)
-    indices = gpu.types.GPUIndexBuf(type="TRIS", seq=triangles)
-    return gpu.types.GPUBatch(type="TRIS", buf=vertices, elem=indices)
+    indices = gpu_objects.index_buffer(type="TRIS", seq=triangles)
+    return gpu_objects.batch(type="TRIS", buf=vertices, elem=indices)

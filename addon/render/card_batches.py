@@ -11,6 +11,7 @@ import numpy as np
 from ..arrays import Floats, Ints
 from ..cards.card_mesh import CardMesh
 from ..cards.sort import order_from
+from . import gpu_objects
 from .card_snapshot import CardSnapshot
 
 #: vertex attribute of a CardMesh -> its length
@@ -83,10 +84,10 @@ class CardBatches:
         order = self._orders.get(name)
         if order is None or order.triangles is not triangles:
             whole = np.ascontiguousarray(triangles, np.int32)
-            indices = gpu.types.GPUIndexBuf(type="TRIS", seq=whole)
+            indices = gpu_objects.index_buffer(type="TRIS", seq=whole)
             order = self._orders[name] = _Order(triangles, indices)
         if order.batch is None:
-            order.batch = gpu.types.GPUBatch(type="TRIS", buf=self._vertices, elem=order.indices)
+            order.batch = gpu_objects.batch(type="TRIS", buf=self._vertices, elem=order.indices)
         return order.batch
 
 
@@ -94,7 +95,7 @@ def _vertices(mesh: CardMesh) -> Any:
     layout = gpu.types.GPUVertFormat()
     for name, length in ATTRIBUTES.items():
         layout.attr_add(id=name, comp_type="F32", len=length, fetch_mode="FLOAT")
-    vertices = gpu.types.GPUVertBuf(layout, len(mesh.positions))
+    vertices = gpu_objects.vertex_buffer(layout, len(mesh.positions))
     values = {
         "position": mesh.positions,
         "occlusion": mesh.occlusion[:, None],

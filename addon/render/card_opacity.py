@@ -19,6 +19,7 @@ from ..exchange.cards.sidecar import MIN_ALPHA
 from ..shading.lights import kept_lights
 from ..shading.volume.light_frame import Ball, ball_around
 from ..shading.volume.map_size import START_TEXELS
+from . import gpu_objects
 from .card_snapshot import CardSnapshot
 from .card_textures import tiles_of
 from .feature_programs import UniformBlocks, bound
@@ -110,8 +111,8 @@ class _Cards:
 
     def _depths(self, side: int, place: ShaderFeature, depth_test: str, none: float) -> Any:
         """A texture with the depth of the one card in each texel that wins; `none` without any."""
-        depths = gpu.types.GPUTexture((side, side), format="DEPTH_COMPONENT32F")
-        target = gpu.types.GPUFrameBuffer(depth_slot=depths)
+        depths = gpu_objects.texture((side, side), format="DEPTH_COMPONENT32F")
+        target = gpu_objects.framebuffer(depth_slot=depths)
         with drawing_into(target), drawing_state(depth_test=depth_test):
             target.clear(depth=none)
             features, numbers = [place, self.feature], {"min_alpha": MIN_ALPHA}

@@ -28,6 +28,7 @@ from ..refine.detail import PictureView
 from ..refine.settings import DetailSettings
 from ..refine.thinning import Thinning, thinning, width_factor
 from ..strands.arc_length import steps
+from . import gpu_objects
 from .camera import Camera
 from .detail_classes import DetailClass, detail_classes
 from .shader_program import ShaderRecipe, program
@@ -162,8 +163,8 @@ class DetailPass:
             kept = self._order.factors, self._totals
             if [(texture.width, texture.height) for texture in kept] == sizes:
                 return kept
-        factors = gpu.types.GPUTexture(sizes[0], format="RGBA32F")
-        self._totals = gpu.types.GPUTexture(sizes[1], format="RG32F")
+        factors = gpu_objects.texture(sizes[0], format="RGBA32F")
+        self._totals = gpu_objects.texture(sizes[1], format="RG32F")
         return factors, self._totals
 
 

@@ -9,6 +9,7 @@ import gpu
 from ..arrays import Floats
 from ..shading.lights import kept_lights
 from ..shading.mesh_shadow_settings import MeshShadowSettings
+from . import gpu_objects
 from .camera import Camera, frame_camera, look_at, orthographic, perspective
 from .card_pass import CardPass
 from .mesh_pass import MeshPass
@@ -71,9 +72,9 @@ def render_image(
         raise ValueError(f"a picture of {width} x {height} with {samples} samples across")
     mesh_pass, strand_pass = passes or (MeshPass(), StrandPass())
     size = width * samples, height * samples
-    color = gpu.types.GPUTexture(size, format="RGBA32F")
-    depth = gpu.types.GPUTexture(size, format="DEPTH_COMPONENT32F")
-    target = gpu.types.GPUFrameBuffer(depth_slot=depth, color_slots=(color,))
+    color = gpu_objects.texture(size, format="RGBA32F")
+    depth = gpu_objects.texture(size, format="DEPTH_COMPONENT32F")
+    target = gpu_objects.framebuffer(depth_slot=depth, color_slots=(color,))
     card_pass = card_pass or CardPass()
     opacity = strand_pass.opacity(snapshot) or card_pass.opacity(snapshot)
     shadows = None
@@ -97,7 +98,7 @@ def render_image(
 def _averaged(color: Any, samples: int) -> Any:
     """A texture with `samples` x `samples` texels for each pixel, made one texel a pixel."""
     width, height = color.width // samples, color.height // samples
-    picture = gpu.types.GPUTexture((width, height), format="RGBA32F")
+    picture = gpu_objects.texture((width, height), format="RGBA32F")
     shader = program(_BOX_RECIPE)
     shader.bind(
         textures={"samples_of": color},

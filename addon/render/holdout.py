@@ -7,6 +7,7 @@ from typing import Any
 
 import gpu
 
+from . import gpu_objects
 from .accumulation import Target
 from .shader_program import ShaderRecipe, program, released_with_shaders
 from .textures import drawing_into
@@ -40,8 +41,8 @@ class Holdout:
         if self._depth is not target.depth:
             size = target.color.width, target.color.height
             self._depth = target.depth
-            self._holes = gpu.types.GPUTexture(size, format="RGBA32F")
-            self._framebuffer = gpu.types.GPUFrameBuffer(
+            self._holes = gpu_objects.texture(size, format="RGBA32F")
+            self._framebuffer = gpu_objects.framebuffer(
                 depth_slot=self._depth, color_slots=(self._holes,)
             )
         with drawing_into(self._framebuffer):

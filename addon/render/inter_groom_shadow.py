@@ -17,6 +17,7 @@ import numpy as np
 from ..arrays import Floats
 from ..shading.lights import LIGHT_CAPACITY
 from ..shading.volume.light_frame import Ball
+from . import gpu_objects
 from .feature_programs import UniformBlocks, bound
 from .opacity_maps import OpacityMaps
 from .shader_program import ShaderRecipe
@@ -66,7 +67,7 @@ class InterGroomShadow:
         made_of = (serial, light_count, *((number, id(maps)) for number, maps in grooms))
         size = places.width, places.height
         if self._found is None or (self._found.width, self._found.height) != size:
-            self._found = gpu.types.GPUTexture(size, format="RGBA32F")
+            self._found = gpu_objects.texture(size, format="RGBA32F")
         elif serial is not None and made_of == self._made_of:
             return self._found
         self._made_of, self._kept = made_of, grooms

@@ -22,6 +22,7 @@ import numpy as np
 from ..arrays import Ints
 from ..dynamics.colliders import PosedCollider
 from ..refine.lead_out import ATTEMPTS, HALVINGS, SWEEPS, TRIES, Clearance, LedOut
+from . import gpu_objects
 from .collider_textures import ColliderTextures, UploadedColliders
 from .shader_program import ShaderRecipe, program
 from .strand_layout import StrandLayout, from_strand_rows, strand_rows, strand_rows_size
@@ -248,6 +249,6 @@ def _points_at_once(solids: ColliderTextures) -> int:
 
 
 def _empty(size: tuple[int, int], format_name: str) -> Any:
-    texture = gpu.types.GPUTexture(size, format=format_name)
+    texture = gpu_objects.texture(size, format=format_name)
     texture.clear(format="FLOAT", value=(0.0,) * (1 if format_name == "R32F" else 4))
     return texture

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..arrays import Floats, Ints
 from ..shading.skin.layout import SkinLayout
+from . import gpu_objects
 from .mesh_pictures import pictures_of
 from .snapshot import MeshSnapshot
 
@@ -48,15 +49,15 @@ def triangle_batch(values: dict[str, Floats], triangles: Ints | None) -> Any:
     layout = gpu.types.GPUVertFormat()
     for name, array in values.items():
         layout.attr_add(id=name, comp_type="F32", len=array.shape[1], fetch_mode="FLOAT")
-    vertices = gpu.types.GPUVertBuf(layout, len(values["position"]))
+    vertices = gpu_objects.vertex_buffer(layout, len(values["position"]))
     for name, array in values.items():
         # attr_fill checks neither dtype nor order
         vertices.attr_fill(name, np.ascontiguousarray(array, np.float32))
     if triangles is None:
-        return gpu.types.GPUBatch(type="TRIS", buf=vertices)
+        return gpu_objects.batch(type="TRIS", buf=vertices)
     corners = np.ascontiguousarray(triangles, np.int32)
-    indices = gpu.types.GPUIndexBuf(type="TRIS", seq=corners)
-    return gpu.types.GPUBatch(type="TRIS", buf=vertices, elem=indices)
+    indices = gpu_objects.index_buffer(type="TRIS", seq=corners)
+    return gpu_objects.batch(type="TRIS", buf=vertices, elem=indices)
 
 
 def _skin_places(mesh: MeshSnapshot, skin: SkinLayout) -> Floats:

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-import gpu
 import numpy as np
 
 from ..arrays import Floats
 from ..strands import Surface
+from . import gpu_objects
 from .caster_batch import alpha_picture, caster_batch
 from .mesh_pictures import PictureTextures
 from .shader_program import ShaderRecipe, program
@@ -69,7 +69,7 @@ class MeshDepths:
             depths: texture array; what lies in the layer is lost.
             rows: (4, 4) x, y, w and depth of a place (x, y, z, 1) in the map.
         """
-        target = gpu.types.GPUFrameBuffer(depth_slot={"texture": depths, "layer": layer})
+        target = gpu_objects.framebuffer(depth_slot={"texture": depths, "layer": layer})
         of_map = {name: row.astype(float).tolist() for name, row in zip(_ROWS, rows, strict=True)}
         with drawing_into(target), drawing_state(depth_test="LESS_EQUAL"):
             target.clear(depth=1.0)

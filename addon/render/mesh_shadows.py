@@ -24,6 +24,7 @@ from ..shading.volume.mesh_frames import (
     extent_of,
     mesh_frames,
 )
+from . import gpu_objects
 from .hashed_alpha import shifts
 from .mesh_depths import MeshDepths
 from .shader_feature import ShaderFeature
@@ -118,7 +119,7 @@ class MeshShadowPass:
         if self._maps is not None and self._shape == (side, layers):
             return self._maps.depths
         self._shape = side, layers
-        return gpu.types.GPUTexture((side, side), layers=layers, format="DEPTH_COMPONENT32F")
+        return gpu_objects.texture((side, side), layers=layers, format="DEPTH_COMPONENT32F")
 
 
 def mesh_map_side(asked: int, layers: int, most: int) -> int:

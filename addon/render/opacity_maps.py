@@ -30,6 +30,7 @@ from ..shading.volume.map_size import START_TEXELS, MapSize, even_size, fitted_s
 from ..shading.volume.opacity import layer_ends
 from ..shading.volume.settings import VolumeSettings
 from ..shading.volume.shadow_lights import shadow_frames
+from . import gpu_objects
 from .mesh_depths import MeshDepths
 from .shader_feature import ShaderFeature
 from .shader_source import LAYER_TEXEL_CAPACITY
@@ -87,13 +88,13 @@ def new_maps(values: Floats, size: MapSize) -> OpacityMaps:
     # one texture alone would not be an array
     count = max(size.map_count * size.passes, 2)
     slots = range(size.slots)
-    arrays = tuple(gpu.types.GPUTexture(square, layers=count, format="RGBA32F") for _ in slots)
+    arrays = tuple(gpu_objects.texture(square, layers=count, format="RGBA32F") for _ in slots)
     layers = max(size.map_count, 2)
-    meshes = gpu.types.GPUTexture(mesh_square, layers=layers, format="DEPTH_COMPONENT32F")
+    meshes = gpu_objects.texture(mesh_square, layers=layers, format="DEPTH_COMPONENT32F")
     if not size.is_deep:
         return OpacityMaps(values, size, arrays, meshes)
     side = size.side // START_TEXELS
-    starts = gpu.types.GPUTexture((2 * side, side * size.map_count), format="R32UI")
+    starts = gpu_objects.texture((2 * side, side * size.map_count), format="R32UI")
     return OpacityMaps(values, size, arrays, meshes, starts)
 
 
@@ -202,7 +203,7 @@ def _draw_map(maps: OpacityMaps, number: int, light: int, hair: HairInMaps) -> N
     slots = len(maps.slots)
     for turn in range(maps.passes):
         layer = number * maps.passes + turn
-        target = gpu.types.GPUFrameBuffer(
+        target = gpu_objects.framebuffer(
             color_slots=tuple({"texture": slot, "layer": layer} for slot in maps.slots)
         )
         texels = ShaderFeature(

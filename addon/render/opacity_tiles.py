@@ -8,6 +8,7 @@ import numpy as np
 from ..arrays import Floats
 from ..errors import HairloomError
 from ..shading.lights import LIGHT_CAPACITY
+from . import gpu_objects
 from .feature_programs import UniformBlocks, bound
 from .opacity_maps import OpacityMaps
 from .shader_program import ShaderRecipe
@@ -55,7 +56,7 @@ def _tiles(maps: OpacityMaps, number: int, layer_count: int) -> Floats:
     across = -(-maps.slots[0].width // _TILE)
     pitch = maps.slots[0].width // across + TILE_GAP
     width, height = columns * pitch, -(-count // columns) * pitch
-    tiles = gpu.types.GPUTexture((width, height), format="RGBA32F")
+    tiles = gpu_objects.texture((width, height), format="RGBA32F")
     blocks = UniformBlocks()
     shader = bound(
         _RECIPE,

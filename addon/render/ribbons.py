@@ -6,6 +6,8 @@ from typing import Any
 
 import gpu
 
+from . import gpu_objects
+
 
 class Ribbons:
     """Strips by how many pieces they have room for, made on first use."""
@@ -18,6 +20,6 @@ class Ribbons:
         if capacity not in self._batches:
             layout = gpu.types.GPUVertFormat()
             layout.attr_add(id="unused", comp_type="F32", len=1, fetch_mode="FLOAT")
-            vertices = gpu.types.GPUVertBuf(layout, 2 * (capacity + 1))
-            self._batches[capacity] = gpu.types.GPUBatch(type="TRI_STRIP", buf=vertices)
+            vertices = gpu_objects.vertex_buffer(layout, 2 * (capacity + 1))
+            self._batches[capacity] = gpu_objects.batch(type="TRI_STRIP", buf=vertices)
         return self._batches[capacity]

@@ -41,6 +41,7 @@ from ..groom.holds import Holds
 from ..refine.lead_out import NOT_LED, LedOut
 from ..refine.ride import Riders
 from ..strands import StrandSet, Surface
+from . import gpu_objects
 from .collider_textures import UploadedColliders
 from .hold_pass import HoldPass
 from .lead_out_pass import LeadOutPass
@@ -356,7 +357,7 @@ def _empty(strand_count: int, column_count: int) -> Any:
 
 
 def _cleared(size: tuple[int, int]) -> Any:
-    texture = gpu.types.GPUTexture(size, format="RGBA32F")
+    texture = gpu_objects.texture(size, format="RGBA32F")
     texture.clear(format="FLOAT", value=(0.0, 0.0, 0.0, 0.0))
     return texture
 

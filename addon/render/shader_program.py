@@ -22,6 +22,7 @@ import gpu
 
 from ..params import Settings
 from ..params.glsl import struct_source
+from . import gpu_objects
 from .shader_source import SHADER_FOLDER, ShaderError, ShaderText, compose
 
 #: what a compute shader may do with an image, and Blender's words for it
@@ -161,6 +162,7 @@ def release() -> None:
     if _PROGRAMS:
         gpu.shader.unbind()
         _PROGRAMS.clear()
+    gpu_objects.forget()
 
 
 def _compiled(recipe: ShaderRecipe) -> Any:

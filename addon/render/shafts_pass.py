@@ -12,6 +12,7 @@ from ..arrays import Floats
 from ..shading.lights import Light
 from ..shading.shafts import REACH, LightOnScreen, PolarGrid, lights_on_screen
 from ..shading.shafts_settings import ShaftSettings
+from . import gpu_objects
 from .camera import Camera
 from .shader_program import ShaderRecipe, program
 
@@ -85,9 +86,9 @@ def put_under(picture: Any, background: tuple[float, float, float, float]) -> No
 def _add_light(picture: Any, drawn: Any, depth: Any, light: LightOnScreen, samples: int) -> None:
     width, height = picture.width, picture.height
     grid = PolarGrid.over(light.center, width, height, samples)
-    block = gpu.types.GPUUniformBuf(pack_shafts(light, grid))
-    caster = gpu.types.GPUTexture((width, height), format="R32F")
-    rays = gpu.types.GPUTexture((grid.radii, grid.angles), format="R32F")
+    block = gpu_objects.uniform_buffer(pack_shafts(light, grid))
+    caster = gpu_objects.texture((width, height), format="R32F")
+    rays = gpu_objects.texture((grid.radii, grid.angles), format="R32F")
     pixels = -(-width // 8), -(-height // 8)
     steps: tuple[tuple[ShaderRecipe, dict[str, Any], dict[str, Any], tuple[int, int]], ...] = (
         (_CASTER, {"samples_of": drawn, "depth_of": depth}, {"caster": caster}, pixels),

@@ -23,6 +23,7 @@ from ..arrays import Floats, Ints
 from ..shading.skin.layout import SkinLayout
 from ..shading.skin.settings import SkinSettings
 from ..strands import Surface
+from . import gpu_objects
 from .feature_programs import UniformBlocks, bound
 from .mesh_shadows import MeshShadows
 from .opacity_maps import OpacityMaps
@@ -282,7 +283,7 @@ def spread(shadow: Any, textures: dict[str, Any], softness: float, axis: int) ->
 def closing_shifts(shadow: Any, textures: dict[str, Any]) -> Any:
     """A texture with two texels a seam, see skin_corner.comp.glsl."""
     seams = textures["skin_seams"]
-    found = gpu.types.GPUTexture((seams.width // 2, seams.height), format="RGBA32F")
+    found = gpu_objects.texture((seams.width // 2, seams.height), format="RGBA32F")
     shader = program(_CORNER_RECIPE)
     names = ("skin_texels", "skin_seams", "skin_copies")
     shader.bind(
@@ -302,7 +303,7 @@ def _in_rows(values: Floats, across: int) -> Floats:
 
 
 def _like(texture: Any) -> Any:
-    return gpu.types.GPUTexture((texture.width, texture.height), format="RGBA32F")
+    return gpu_objects.texture((texture.width, texture.height), format="RGBA32F")
 
 
 def _dispatch(shader: Any, image: Any) -> None:

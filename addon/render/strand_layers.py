@@ -31,6 +31,7 @@ import numpy as np
 
 from ..arrays import Ints
 from ..shading.volume.transparency import LAYERS
+from . import gpu_objects
 from .pixel_parts import PixelPart, pixel_parts
 from .shader_program import ShaderProgram, ShaderRecipe, program, released_with_shaders
 from .shader_source import LAYER_ROW, ShaderError
@@ -225,8 +226,8 @@ class StrandLayers:
         self._nodes = self._seen = None
         while self._nodes is None:
             try:
-                nodes = gpu.types.GPUTexture((LAYER_ROW, rows), format="RGBA32UI")
-                self._seen = gpu.types.GPUTexture((LAYER_ROW, rows), format="R32UI")
+                nodes = gpu_objects.texture((LAYER_ROW, rows), format="RGBA32UI")
+                self._seen = gpu_objects.texture((LAYER_ROW, rows), format="R32UI")
                 self._nodes = nodes
             except RuntimeError as error:
                 if rows == 1:
@@ -240,16 +241,16 @@ class StrandLayers:
         if is_held and kept[0] * kept[1] <= 4 * max(wanted[0] * wanted[1], 1):
             return
         self._size = size
-        self._count = gpu.types.GPUTexture((4, 1), format="R32UI")
-        self._heads = gpu.types.GPUTexture(size, format="R32UI")
-        self._pixels = gpu.types.GPUTexture(size, format="R32UI")
+        self._count = gpu_objects.texture((4, 1), format="R32UI")
+        self._heads = gpu_objects.texture(size, format="R32UI")
+        self._pixels = gpu_objects.texture(size, format="R32UI")
         self._make_nodes(min(FIRST_ROWS, self._max_rows))
-        self._fronts = gpu.types.GPUTexture(size, format="RG32F")
+        self._fronts = gpu_objects.texture(size, format="RG32F")
         if self._triangle is None:
             layout = gpu.types.GPUVertFormat()
             layout.attr_add(id="unused", comp_type="F32", len=1, fetch_mode="FLOAT")
-            corners = gpu.types.GPUVertBuf(layout, 3)
-            self._triangle = gpu.types.GPUBatch(type="TRIS", buf=corners)
+            corners = gpu_objects.vertex_buffer(layout, 3)
+            self._triangle = gpu_objects.batch(type="TRIS", buf=corners)
 
 
 def is_software() -> bool:

@@ -10,6 +10,7 @@ import gpu
 import numpy as np
 
 from ..arrays import Floats
+from . import gpu_objects
 
 _CHANNELS = {"R16F": 1, "R32F": 1, "RG32F": 2, "RGBA32F": 4, "RGBA16F": 4}
 
@@ -21,7 +22,7 @@ def texture_from(pixels: Floats, texture_format: str) -> Any:
     # The Buffer reads the array's memory as it lies: dtype and order must be right.
     pixels = np.ascontiguousarray(pixels, np.float32)
     data = gpu.types.Buffer("FLOAT", pixels.shape, pixels)
-    return gpu.types.GPUTexture((width, height), format=texture_format, data=data)
+    return gpu_objects.texture((width, height), format=texture_format, data=data)
 
 
 def volume_from(texels: Floats) -> Any:
@@ -30,7 +31,7 @@ def volume_from(texels: Floats) -> Any:
     assert channels == 4, texels.shape
     texels = np.ascontiguousarray(texels, np.float32)
     data = gpu.types.Buffer("FLOAT", texels.shape, texels)
-    return gpu.types.GPUTexture((width, height, depth), format="RGBA32F", data=data)
+    return gpu_objects.texture((width, height, depth), format="RGBA32F", data=data)
 
 
 def texture_to_array(texture: Any) -> Floats:
@@ -51,7 +52,7 @@ class UniformBlock:
         values = np.ascontiguousarray(values, np.float32)
         assert values.size % 4 == 0, values.size
         if self._values is None or self._values.size != values.size:
-            self._buffer = gpu.types.GPUUniformBuf(values)
+            self._buffer = gpu_objects.uniform_buffer(values)
         elif self._values.tobytes() != values.tobytes():
             self._buffer.update(values)
         self._values = values.copy()

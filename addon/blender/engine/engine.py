@@ -9,7 +9,7 @@ from typing import Any
 import bpy
 
 from ...errors import HairloomError
-from ...render import skin_layouts
+from ...render import gpu_objects, skin_layouts
 from ...render.shader_source import ShaderError
 from ..viewport.overlay import ENGINE
 from . import engine_hair
@@ -56,6 +56,8 @@ class HAIRLOOM_RE_engine(bpy.types.RenderEngine):
             # error_set() alone tells nobody in the background
             self.report({"ERROR"}, f"Hairloom: {error}")
             return
+        finally:
+            gpu_objects.hand_over()
         for warning in still.warnings:
             self.report({"WARNING"}, warning)
 

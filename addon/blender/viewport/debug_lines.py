@@ -20,6 +20,7 @@ from ...dynamics.colliders import (
 from ...dynamics.settings import DynamicsSettings
 from ...dynamics.wind import Air, air_of
 from ...errors import HairloomError
+from ...render import gpu_objects
 from ...shading.lights import Light
 from ...strands.affine import moved
 from ..properties.groups import OVERLAYS
@@ -192,9 +193,9 @@ def draw_lines(points: Floats, color: tuple[float, float, float, float]) -> None
         shader.uniform_float("color", color)
         layout = gpu.types.GPUVertFormat()
         layout.attr_add(id="pos", comp_type="F32", len=3, fetch_mode="FLOAT")
-        vertices = gpu.types.GPUVertBuf(layout, len(points))
+        vertices = gpu_objects.vertex_buffer(layout, len(points))
         vertices.attr_fill("pos", points)
-        gpu.types.GPUBatch(type="LINES", buf=vertices).draw(shader)
+        gpu_objects.batch(type="LINES", buf=vertices).draw(shader)
     finally:
         gpu.state.depth_test_set(depth)
         gpu.state.blend_set(blend)
