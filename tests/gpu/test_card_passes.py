@@ -222,21 +222,13 @@ def test_an_order_goes_up_only_when_it_changes(frame: Any, monkeypatch: Any) -> 
     from hairloom.addon.render.card_pass import CardPass
 
     made = []
-    types = card_batches.gpu.types
-    real = types.GPUIndexBuf
+    real = card_batches.gpu_objects.index_buffer
 
-    class Types:
-        def __getattr__(self, name: str) -> Any:
-            return getattr(types, name)
+    def counted(**values: Any) -> Any:
+        made.append(1)
+        return real(**values)
 
-        def GPUIndexBuf(self, **values: Any) -> Any:
-            made.append(1)
-            return real(**values)
-
-    class Gpu:
-        types = Types()
-
-    monkeypatch.setattr(card_batches, "gpu", Gpu())
+    monkeypatch.setattr(card_batches.gpu_objects, "index_buffer", counted)
     drawing, cards = CardDrawingSettings(order="view"), CardPass()
     mesh = mesh_of(*STACK)
     shown = snapshot_of(mesh, hairy(), drawing)
