@@ -12,6 +12,7 @@ from functools import cached_property
 import numpy as np
 
 from .arrays import Floats, Ints
+from .dynamics.clearance import GuideClearance, farthest_kept, guide_clearance
 from .dynamics.colliders import PosedCollider
 from .dynamics.held import Held
 from .dynamics.settings import DynamicsSettings
@@ -100,6 +101,15 @@ class Rig:
         return own.on_lines(self.strands.take(self.guides), cv_count)
 
     @cached_property
+    def held_face(self) -> Held | None:
+        """All of the brows and lashes among other hair: so short, they are too stiff to swing."""
+        is_face = is_face_hair(self.strands.group)
+        chosen = is_face[self.guides] & ~is_face.all()
+        if not chosen.any():
+            return None
+        return Held(np.repeat(chosen[:, None], self.guide_grid.shape[1], axis=1))
+
+    @cached_property
     def curl_room(self) -> Floats | None:
         """How much the curls of guides have to give, see `center_lines.curl_room`."""
         return curl_room(self.strands.take(self.guides).lengths(), self.guide_grid)
@@ -133,6 +143,7 @@ class Motion:
     duration: of the last frame [s]; 0 at the start.
     colliders: as they stand at its end.
     clearance: how far strands stay from these; None before there are any.
+    guide_clearance: the same of guides.
     """
 
     dynamics: DynamicsState
@@ -143,6 +154,7 @@ class Motion:
     duration: float = 0.0
     colliders: tuple[PosedCollider, ...] = ()
     clearance: Clearance | None = None
+    guide_clearance: GuideClearance | None = None
 
     def drive(
         self,
@@ -156,8 +168,10 @@ class Motion:
         """What acts in a frame of `duration` [s] that carries the guides to `target`."""
         earlier = self.carried_earlier if duration else None
         ratio = self.duration / duration if duration else 1.0
-        before = self.carried_guides
-        return Drive(before, target, colliders, gravity, earlier, scene_wind, ratio, held)
+        before, clearance = self.carried_guides, self.guide_clearance
+        return Drive(
+            before, target, colliders, gravity, earlier, scene_wind, ratio, held, clearance
+        )
 
 
 def prepare(
@@ -393,11 +407,12 @@ def held_guides(rig: Rig, pose: Pose) -> Holds | None:
 
 
 def held_cvs(rig: Rig, pose: Pose) -> Held | None:
-    """The same by CVs, as the dynamics takes it."""
+    """The same by CVs, as the dynamics takes it, with brows and lashes, which go with the face."""
     holds = held_guides(rig, pose)
     if holds is None:
-        return None
-    return Held(holds.held_cvs(*rig.guide_grid.shape[:2]))
+        return rig.held_face
+    is_held = holds.held_cvs(*rig.guide_grid.shape[:2])
+    return Held(is_held if rig.held_face is None else is_held | rig.held_face.is_held)
 
 
 def begin(rig: Rig, pose: Pose) -> Motion:
@@ -424,11 +439,22 @@ def advance(
         scene_wind: (3,) [m/s], world space.
     """
     target = style_of_guides(rig, pose)
+    motion = replace(motion, guide_clearance=guide_clearance_of(motion, colliders, settings))
     drive = motion.drive(target, colliders, gravity, duration, scene_wind, held_cvs(rig, pose))
     state = advance_dynamics(motion.dynamics, drive, settings, duration)
     guides, before = grid_at_frame_end(state, drive, duration), motion.carried_guides
     clearance = clearance_of(rig, motion, colliders, settings)
-    return Motion(state, guides, target, pose, before, duration, colliders, clearance)
+    return Motion(
+        state,
+        guides,
+        target,
+        pose,
+        before,
+        duration,
+        colliders,
+        clearance,
+        motion.guide_clearance,
+    )
 
 
 def clearance_of(
@@ -442,6 +468,18 @@ def clearance_of(
         return known
     before = tuple(posed.at_begin() for posed in colliders)
     return clearance_at(carried(rig, motion.pose), rig.strands.offsets, before, kept)
+
+
+def guide_clearance_of(
+    motion: Motion, colliders: tuple[PosedCollider, ...], settings: DynamicsSettings
+) -> GuideClearance | None:
+    """The same of guides, by their style."""
+    reach = farthest_kept(settings, motion.dynamics.rest.size)
+    known = motion.guide_clearance
+    if not colliders or (known is not None and known.reach == reach):
+        return known
+    before = tuple(posed.at_begin() for posed in colliders)
+    return guide_clearance(motion.carried_guides, before, reach)
 
 
 def strands_and_led(rig: Rig, motion: Motion) -> tuple[Floats, LedOut]:

@@ -2,7 +2,7 @@
 //
 // Twin of advance in addon/dynamics/step.py. Defines: CV_COUNT; RELAXATION;
 // HAS_HELD; HAS_SPRINGS; HAS_AIR; CONTACT_SLOTS, 0 where there are no colliders; HAS_ROUNDS and HAS_FIELDS, the
-// kinds of colliders; HAS_SHARP and HAS_FOLLOWED, see lib_contacts.glsl.
+// kinds of colliders; HAS_SHARP, HAS_FOLLOWED and HAS_CLEARANCE, see lib_contacts.glsl.
 //
 // Loops of an unknown number of turns ask at their end: drivers on CPUs go once more through the
 // body of one that asks at its begin, with nothing to do.
@@ -67,6 +67,9 @@ void load_guide(int guide)
     band[i] = frame.band[i + 2];
     bend[i] = frame.own[i + 1].x;
     radius[i] = frame.own[i + 2].y;
+#ifdef HAS_CLEARANCE
+    radius[i] = min(radius[i], texelFetch(clearances, strand_texel(guide, i + 2, CV_COUNT), 0).x);
+#endif
 #ifdef HAS_HELD
     held[i] = texelFetch(held_cvs, strand_texel(guide, i + 2, CV_COUNT), 0).x > 0.0;
     radius[i] = held[i] ? NO_RADIUS : radius[i];

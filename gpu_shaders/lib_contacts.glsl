@@ -2,7 +2,8 @@
 //
 // Twin of addon/dynamics/contacts.py, over the globals of lib_guide.glsl; see there. Defines:
 // CONTACT_SLOTS, how many contacts a CV may have at once; HAS_SHARP, where segments collide too;
-// HAS_FOLLOWED, there and where colliders are fast. Needs the block `frame`, and `moments`.
+// HAS_FOLLOWED, there and where colliders are fast; HAS_CLEARANCE, where guides stay as far as they
+// were at most. Needs the block `frame`, and `moments`.
 #include "lib_lengths.glsl"
 #include "lib_collider.glsl"
 
@@ -248,6 +249,17 @@ bool held_at(int i)
 #endif
 }
 
+// How far [m] points of segment i stay from colliders.
+vec3 between_kept(int i)
+{
+  vec3 kept = vec3(frame.own[i + 2].y * BETWEEN_RADIUS);
+#ifdef HAS_CLEARANCE
+  ivec2 texel = strand_texel(int(gl_GlobalInvocationID.x), i + 2, CV_COUNT);
+  kept = min(kept, texelFetch(clearances, texel, 0).yzw);
+#endif
+  return kept;
+}
+
 vec3 between(vec3 lower, vec3 upper, float along)
 {
   return lower + (upper - lower) * along;
@@ -306,7 +318,7 @@ void find_between_with(Posed posed)
     if (away >= radius[i] + frame.reach + 0.5 * length(upper - lower) + length(path)) {
       continue;
     }
-    float kept = radius[i] * BETWEEN_RADIUS;
+    vec3 kept = between_kept(i);
     float deepest = -frame.reach;
     vec4 plane_there = vec4(0.0);
     vec4 origin_there = vec4(0.0);
@@ -317,13 +329,13 @@ void find_between_with(Posed posed)
       vec3 before = between(previous[i + 1], previous[i + 2], along);
       Met met = followed(posed, here, before, radius[i]);
       float reached = met.was + frame.led_out + posed.sweep.w;
-      float offset = met.surface + min(kept, reached);
+      float offset = met.surface + min(kept[k], reached);
       float gap = offset - dot(met.normal, here);
       if (gap > deepest) {
         vec3 from = before + moved(posed.change, vec4(moved(posed.inverse, vec4(here, 1.0)), 1.0));
         deepest = gap;
         plane_there = vec4(met.normal, offset);
-        origin_there = vec4(from, reached >= kept ? SKIN : NO_PLANE);
+        origin_there = vec4(from, reached >= kept[k] ? SKIN : NO_PLANE);
         along_there = along;
       }
     }
@@ -457,7 +469,10 @@ bool is_deep()
 #ifdef HAS_SHARP
       vec3 here = between(position[i + 1], position[i + 2], between_along[slot][i]);
       gap = dot(between_plane[slot][i], vec4(-here, 1.0));
-      found = found || (between_origin[slot][i].w != NO_PLANE && gap > slack_of(radius[i] * BETWEEN_RADIUS));
+      if (between_origin[slot][i].w != NO_PLANE && gap > 2.0 * SKIN) {
+        int k = int(between_along[slot][i] * float({{between_count}} + 1) - 0.5);
+        found = found || gap > slack_of(between_kept(i)[k]);
+      }
 #endif
     }
   }

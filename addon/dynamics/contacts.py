@@ -240,6 +240,7 @@ def find_between(
     position: Floats,
     previous: Floats,
     radius: Floats,
+    between: Floats,
     poses: list[Pose],
     led_out: float,
     size: float,
@@ -250,11 +251,12 @@ def find_between(
     Args:
         position, previous, radius, poses, led_out, size: as in `find_contacts`, of all CVs in the
             order (cv_count, guide_count).
+        between: (len(BETWEEN), n) float32 [m], what points of the segment that ends at a CV keep.
     """
     cv_count = position.shape[1] // guide_count
     spacing = spacing_of(size, cv_count)
     found = (
-        _between_with(pose, position, previous, radius, led_out, size, guide_count)
+        _between_with(pose, position, previous, radius, between, led_out, size, guide_count)
         for pose in poses
         if cv_count > PINNED and is_sharp(pose, spacing, size)
     )
@@ -381,6 +383,7 @@ def _between_with(
     position: Floats,
     previous: Floats,
     radius: Floats,
+    between: Floats,
     led_out: float,
     size: float,
     guide_count: int,
@@ -407,7 +410,7 @@ def _between_with(
     origin += before
     normal, height, reached = _followed(pose, before, local, own_radius)
     reached += np.float32(led_out + pose.swelling)
-    wanted = own_radius * BETWEEN_RADIUS
+    wanted = between.take(upper, axis=1).ravel()
     offset = np.minimum(wanted, reached)
     offset += height
     # of each segment the point that is deepest below its plane

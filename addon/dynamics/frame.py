@@ -9,8 +9,9 @@ import numpy as np
 
 from ..arrays import Floats
 from ..errors import HairloomError
+from .clearance import GuideClearance
 from .colliders import PosedCollider
-from .contacts import radius_of_all
+from .contacts import BETWEEN, BETWEEN_RADIUS, radius_of_all
 from .forces import carried_fraction, combed_gravity, felt_gravity
 from .held import Held
 from .settings import DynamicsSettings
@@ -35,6 +36,7 @@ class Drive:
     scene_wind: (3,) world [m/s], in addition to that of the settings.
     earlier_ratio: duration of that frame, over that of this one.
     held: the CVs that go with these targets whatever the rest of the guide does; None: none.
+    clearance: how far guides stay from colliders at most; None: as far as their radius says.
 
     Hand the same array on from frame to frame, now to before to earlier: what is known of it then
     need not be worked out again.
@@ -48,6 +50,7 @@ class Drive:
     scene_wind: Floats = field(default_factory=lambda: np.zeros(3))
     earlier_ratio: float = 1.0
     held: Held | None = None
+    clearance: GuideClearance | None = None
 
     @property
     def targets(self) -> tuple[Floats, ...]:
@@ -87,6 +90,17 @@ def check_drive(state: DynamicsState, drive: Drive, known: tuple[Floats, ...] = 
         raise HairloomError(
             f"ties hold {drive.held.is_held.shape} guides and CVs, "
             f"the simulation has {(state.guide_count, state.cv_count)}",
+            place="dynamics",
+            remedy="Start the simulation again",
+        )
+    clearance = drive.clearance
+    if clearance is not None and clearance.distances.shape[:2] != (
+        state.guide_count,
+        state.cv_count,
+    ):
+        raise HairloomError(
+            f"distances from colliders are known of {clearance.distances.shape[:2]} guides and "
+            f"CVs, the simulation has {(state.guide_count, state.cv_count)}",
             place="dynamics",
             remedy="Start the simulation again",
         )
@@ -165,6 +179,7 @@ class Block:
         substep, and how
         that changes while the way of the style bends.
     radius: (cv_count * n,) [m], the distance that each CV keeps from colliders; not to be written.
+    between: (len(BETWEEN), cv_count * n) [m], the same of points of the segment that ends there.
     held: (cv_count, n), see `held.Held.rows`; None where none of these guides is held.
     springs: of the guides that are curled; None where none of these gives.
     """
@@ -178,6 +193,7 @@ class Block:
     impulse: Floats
     impulse_curvature: Floats | None
     radius: Floats
+    between: Floats
     held: Floats | None
     springs: Springs | None
 
@@ -199,9 +215,15 @@ class Block:
         if state.substep and state.substep != dt:
             previous = position - (position - previous) * np.float32(dt / state.substep)
         radius = radius_of_all(settings, state.cv_count, before.shape[2], state.rest.size)
+        between = np.tile(radius * BETWEEN_RADIUS, (len(BETWEEN), 1))
+        if drive.clearance is not None:
+            known = drive.clearance.rows[:, :, guides].reshape(1 + len(BETWEEN), -1)
+            radius, between = np.minimum(radius, known[0]), np.minimum(between, known[1:])
         held = None if drive.held is None else drive.held.rows[:, guides]
         if held is not None and held.any():
-            radius = np.where(held.ravel() > 0.0, np.float32(-np.inf), radius)
+            is_held = held.ravel() > 0.0
+            radius = np.where(is_held, np.float32(-np.inf), radius)
+            between[:, is_held] = -np.inf
         else:
             held = None
         rest = state.rest.part(guides)
@@ -217,6 +239,7 @@ class Block:
             impulse,
             None if bent is None else bent * np.float32(frame.carried_fraction),
             radius,
+            between,
             held,
             springs,
         )

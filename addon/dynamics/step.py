@@ -188,7 +188,9 @@ def _keep_outside(
     spacing = spacing_of(size, position.shape[1])
     contacts = find_contacts(here, was, block.radius, poses, led_out, size, spacing)
     guide_count = position.shape[2]
-    contacts += find_between(here, was, block.radius, poses, led_out, size, guide_count)
+    contacts += find_between(
+        here, was, block.radius, block.between, poses, led_out, size, guide_count
+    )
     passes = settings.contact_passes if frame.drive.colliders else 0
     _solve_in_turn(position, chain, contacts, passes)
     _solve_again(position, chain, contacts)

@@ -13,6 +13,7 @@ strand_layout.strand_rows:
     rest_lengths   R32F: [m] to the next CV
     curl_rooms     R32F: of the segment to the next CV, see Rest.room; only where curls give
     held_cvs       R32F: 1 where a CV is held (held.Held), else 0
+    clearances     RGBA32F: of each CV, see clearance.GuideClearance; only where there are colliders
     beside_root    RGBA32F: xyz [m], see step.displacement_beside_root; both only where CVs are held
 
 Limitations: a CV keeps two contacts at once, the most pressing ones, where numpy keeps one for each
@@ -31,6 +32,7 @@ import gpu
 import numpy as np
 
 from ..arrays import Floats
+from ..dynamics.clearance import GuideClearance, farthest_kept
 from ..dynamics.constraints import PINNED
 from ..dynamics.contacts import REACH
 from ..dynamics.frame import Drive, Frame, check_drive
@@ -81,6 +83,7 @@ def dynamics_recipe(
     fields: bool = False,
     followed: bool = False,
     sharp: bool = False,
+    clearance: bool = False,
 ) -> ShaderRecipe:
     """The program for guides of this many CVs, without what the scene does not need."""
     flags = {
@@ -92,10 +95,11 @@ def dynamics_recipe(
         "HAS_FIELDS": fields,
         "HAS_FOLLOWED": followed and cv_count > PINNED,
         "HAS_SHARP": sharp and cv_count > PINNED,
+        "HAS_CLEARANCE": clearance,
     }
     textures = ["styles_earlier", "styles_before", "styles_now", "rest_shapes", "rest_lengths"]
     textures += ["moments"] + ["held_cvs"] * held + ["curl_rooms"] * springs
-    textures += ["rounds"] * rounds + ["fields"] * fields
+    textures += ["rounds"] * rounds + ["fields"] * fields + ["clearances"] * clearance
     return ShaderRecipe(
         name="dynamics",
         compute="dynamics.comp.glsl",
@@ -178,6 +182,7 @@ class DynamicsPass:
         self._colliders.release()
         self._styles: list[tuple[Floats, Any]] = []  # those of the last frame, and their textures
         self._held: Held | None = None
+        self._clearance: GuideClearance | None = None
 
     def _upload(self, drive: Drive) -> None:
         state, textures = self._state, self._textures
@@ -201,6 +206,10 @@ class DynamicsPass:
             held = drive.held.rows.T[..., None]
             textures["held_cvs"] = texture_from(strand_rows(held), "R32F")
         self._held = drive.held
+        if drive.clearance is not None and drive.clearance is not self._clearance:
+            distances = strand_rows(drive.clearance.distances)
+            textures["clearances"] = texture_from(distances, "RGBA32F")
+        self._clearance = drive.clearance
 
     def _style_texture(self, style: Floats) -> Any:
         known = (texture for other, texture in self._styles if other is style)
@@ -218,7 +227,7 @@ class DynamicsPass:
         spans, is_followed, is_sharp = spans_of(frame, first, count), False, False
         table = moments_of(frame, first, spans)
         if posed:
-            reach = (REACH + max(settings.radius_root, settings.radius_tip)) * frame.size
+            reach = REACH * frame.size + farthest_kept(settings, frame.size)
             poses = colliders.moments(posed, spans, reach, frame.size, state.cv_count)
             limit, sharp = poses.reshape(len(spans), len(posed), -1, 4)[:, :, 12, :2].T
             is_followed, is_sharp = bool((limit < NOT_FOLLOWED).any()), bool(sharp.any())
@@ -236,6 +245,7 @@ class DynamicsPass:
             fields=colliders.fields is not None,
             followed=is_followed,
             sharp=is_sharp,
+            clearance=bool(posed) and frame.drive.clearance is not None,
         )
         block = block_of(frame, state.guide_count, state.cv_count, count, speed_ratio)
         shader = program(recipe)

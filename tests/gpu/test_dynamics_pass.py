@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from tiers import few_by_name
 
+from hairloom.addon.dynamics.clearance import GuideClearance, farthest_kept, guide_clearance
 from hairloom.addon.dynamics.colliders import (
     CapsuleCollider,
     Collider,
@@ -100,6 +101,7 @@ class Scene:
     fps: float = 60.0
     is_bent: bool = True
     is_fast: bool = False  # colliders swing ten times as far
+    is_combed: bool = False  # guides stay no farther from colliders than they are at first
 
     @property
     def settings(self) -> DynamicsSettings:
@@ -153,8 +155,26 @@ class Scene:
         for frame, (before, now) in enumerate(pairwise(grids)):
             earlier = grids[frame - 1] if self.is_bent and frame else None
             colliders = self.colliders(frame)
-            drives.append(Drive(before, now, colliders, gravity, earlier, wind, held=self.held))
+            drives.append(
+                Drive(
+                    before,
+                    now,
+                    colliders,
+                    gravity,
+                    earlier,
+                    wind,
+                    held=self.held,
+                    clearance=self.clearance,
+                )
+            )
         return drives
+
+    @cached_property
+    def clearance(self) -> GuideClearance | None:
+        if not self.is_combed:
+            return None
+        begun = tuple(posed.at_begin() for posed in self.colliders(0))
+        return guide_clearance(self.carried(0.0), begun, farthest_kept(self.settings, 0.2))
 
 
 BALL = SphereCollider(np.array([0.0, 0.0, 0.0]), 0.095)
@@ -219,6 +239,14 @@ AT_COLLIDERS = {
     "head and ball": Scene(on_head=(ball_field(0.095),), standing=(IN_THE_WAY,)),
     "three of all kinds": Scene(on_head=(CLUSTER, ball_field(0.08)), standing=(ROD,)),
     "curls": Scene(LIMP | LOOSE, on_head=(BALL,), is_curled=True),
+    "combed": Scene(
+        {"radius_root": 0.02, "radius_tip": 0.05} | LIMP,
+        on_head=(ball_field(0.095),),
+        is_combed=True,
+    ),
+    "combed at a plate and a finger": Scene(
+        {"radius_tip": 0.05}, guide_count=12, on_head=(plate_field(), FINGER), is_combed=True
+    ),
     "one pass": Scene({"contact_passes": 1, **LIMP}, on_head=(BALL,)),
     "relaxation": Scene({"length_solver": "relaxation"}, on_head=(BALL,)),
     "held": Scene(LIMP, on_head=(BALL,), standing=(IN_THE_WAY,), is_held=True),

@@ -12,6 +12,7 @@ from hairloom.addon.groom.settings import GuideSettings
 from hairloom.addon.groom.ties import Holders, Tie, TipSurface
 from hairloom.addon.pipeline import Pose, Rig
 from hairloom.addon.strands import StrandSet, Surface
+from hairloom.addon.strands.face import BROWS
 from hairloom.addon.strands.resample import resample
 
 GRAVITY = np.array([0.0, 0.0, -9.81])
@@ -265,3 +266,41 @@ def test_strange_strands_in_a_tie_do_no_harm() -> None:
         for motion in played(rig, poses, chosen, 24.0):
             assert np.isfinite(motion.dynamics.position).all()
             assert np.isfinite(pipeline.strands_and_led(rig, motion)[0]).all()
+
+
+def test_brows_go_with_the_face() -> None:
+    """Short strands beside others, one guide each: they are where their roots carry them."""
+    along = np.linspace(0.0, 1.0, 8)[:, None]
+    roots = np.linspace([-0.05, 0.0, 0.0], [0.05, 0.0, 0.0], 6)
+    length = np.where(np.arange(6) < 2, 0.01, 0.2)
+    grid = roots[:, None] + length[:, None, None] * along * [0.0, 0.6, -0.8]
+    group = np.where(np.arange(6) < 2, BROWS, 0)
+    strands = StrandSet(grid.reshape(-1, 3), np.arange(7) * 8, np.full(48, 4e-5), group)
+    settings = GuideSettings(guide_count=6, cv_count=8)
+    rig = pipeline.prepare(strands, None, settings, place="hair")
+    motion = pipeline.begin(rig, rig.rest_pose)
+    for frame in range(12):
+        pose = Pose(None, shaking((frame + 1) / 24.0))
+        motion = pipeline.advance(rig, motion, pose, (), DynamicsSettings(), GRAVITY, 1.0 / 24.0)
+        points = pipeline.strands_and_led(rig, motion)[0].reshape(6, 8, 3)
+        off = np.abs(points - pipeline.carried(rig, pose).reshape(6, 8, 3)).max(axis=(1, 2))
+        assert off[:2].max() < 1e-6
+    assert off[2:].min() > 0.001
+    alone = pipeline.prepare(strands.take(np.arange(2)), None, settings, place="brows")
+    assert pipeline.held_cvs(alone, alone.rest_pose) is None, "hair that is nothing else swings"
+
+
+def test_brows_stay_held_where_ties_hold_other_hair() -> None:
+    strands = ponytail(60)
+    group = np.where(np.arange(60) < 6, BROWS, 0)
+    rig = pipeline.prepare(
+        replace(strands, group=group),
+        None,
+        GuideSettings(guide_count=40, cv_count=CV_COUNT),
+        place="hair",
+        holders=Holders((tie(),)),
+    )
+    held = pipeline.held_cvs(rig, pose_at(rig, np.eye(4)))
+    is_face = rig.strands.group[rig.guides] == BROWS
+    assert is_face.any() and held.is_held[is_face].all()
+    assert held.is_held[~is_face].any() and not held.is_held[~is_face].all(axis=1).any()

@@ -82,7 +82,8 @@ class ComputeSolver:
     ) -> None:
         if self._is_baked:
             self._take(self.motion)
-        motion = self._motion
+        clearance = pipeline.guide_clearance_of(self._motion, colliders, settings)
+        motion = self._motion = replace(self._motion, guide_clearance=clearance)
         if self._dynamics is None:
             self._dynamics = DynamicsPass(motion.dynamics, self._colliders)
         self._begin_clearance(colliders, settings)

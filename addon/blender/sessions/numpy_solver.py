@@ -93,7 +93,9 @@ def carried_motion(rig: Rig, motion: Motion, pose: Pose, guides: Floats) -> Moti
             remedy="Bake again",
         )
     guides = np.ascontiguousarray(guides, np.float32)
-    return replace(motion, pose=pose, guides=guides, colliders=(), clearance=None)
+    return replace(
+        motion, pose=pose, guides=guides, colliders=(), clearance=None, guide_clearance=None
+    )
 
 
 def let_go(rig: Rig, shown: Motion) -> Motion:

@@ -192,9 +192,14 @@ def planes_of(
     settings: DynamicsSettings,
     moment: Moment,
     size: float,
+    clearance: Floats,
 ) -> tuple[list[Plane], list[Plane]]:
-    """Planes for the CVs of x (cv_count, 3) near a collider, and for segments; `size` [m] is the
-    hair's."""
+    """Planes for the CVs of x (cv_count, 3) near a collider, and for segments.
+
+    Args:
+        size: the hair's [m].
+        clearance: (cv_count, 1 + len(BETWEEN)) [m], what each keeps at most.
+    """
     solid = Solid.of(posed, moment, size)
     if solid is None:
         return [], []
@@ -205,12 +210,14 @@ def planes_of(
     for cv in free:
         along = cv / (len(x) - 1)
         radius = size * (settings.radius_root * (1.0 - along) + settings.radius_tip * along)
-        plane = _plane_of_cv(solid, cv, x, previous, radius, led_out, size, is_sharp)
+        own = min(radius, float(clearance[cv, 0]))
+        plane = _plane_of_cv(solid, cv, x, previous, own, led_out, size, is_sharp)
         if plane is not None:
             of_cvs.append(plane)
         if is_sharp:
             is_loose = cv > PINNED and not held[cv - 1]
-            plane = _plane_between(solid, cv, x, previous, radius, led_out, size, is_loose)
+            wanted = np.minimum(radius * float(BETWEEN_RADIUS), clearance[cv, 1:]).tolist()
+            plane = _plane_between(solid, cv, x, previous, own, wanted, led_out, size, is_loose)
             if plane is not None:
                 of_segments.append(plane)
     return of_cvs, of_segments
@@ -249,17 +256,17 @@ def _plane_between(
     x: Floats,
     previous: Floats,
     radius: float,
+    kept: list[float],
     led_out: float,
     size: float,
     is_loose: bool,
 ) -> Plane | None:
     """Of the points of the segment that ends at a CV the deepest one's.
 
-    is_loose: whether the CV before is free too.
+    radius: of that CV. kept: what the points keep. is_loose: whether the CV before is free too.
     """
     deepest: Plane | None = None
-    wanted = radius * float(BETWEEN_RADIUS)
-    for along in BETWEEN:
+    for along, wanted in zip(BETWEEN, kept, strict=True):
         here, before = (rows[cv - 1] + (rows[cv] - rows[cv - 1]) * along for rows in (x, previous))
         normal, surface, was = solid.followed(here, before, radius)
         offset = surface + min(wanted, was + led_out)

@@ -15,7 +15,7 @@ import numpy as np
 from ...arrays import Floats
 from ...params.curve import along as curve_along
 from ..constraints import CONTACT_WEIGHT, HELD, HELD_SWEEPS, PINNED, ROUNDING
-from ..contacts import MORE_ROUNDS
+from ..contacts import BETWEEN, MORE_ROUNDS
 from ..settings import DynamicsSettings
 from ..springs import STEEPEST, give, stiffness
 from ..state import DynamicsState
@@ -71,6 +71,9 @@ class _Guide:
         self.held = [False] * len(self.x)
         if drive.held is not None:
             self.held[PINNED:] = drive.held.is_held[guide, PINNED:].tolist()
+        self.clearance = np.full((len(self.x), 1 + len(BETWEEN)), np.inf)
+        if drive.clearance is not None:
+            self.clearance = drive.clearance.distances[guide].astype(np.float64)
         self.before = drive.target_before[guide].astype(np.float64)
         self.displacement = drive.target_now[guide].astype(np.float64) - self.before
         curvature = drive.target_curvature
@@ -97,7 +100,9 @@ class _Guide:
         self._pin(style)
         self._keep_lengths({}, settings)
         found = [
-            planes_of(posed, self.x, self.previous, self.held, settings, moment, self.size)
+            planes_of(
+                posed, self.x, self.previous, self.held, settings, moment, self.size, self.clearance
+            )
             for posed in drive.colliders
         ]
         planes = [of_cvs for of_cvs, _ in found] + [of_segments for _, of_segments in found]

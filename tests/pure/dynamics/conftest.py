@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from hairloom.addon.dynamics.clearance import GuideClearance, farthest_kept, guide_clearance
 from hairloom.addon.dynamics.colliders import Collider, PosedCollider
 from hairloom.addon.dynamics.held import Held
 from hairloom.addon.dynamics.settings import DynamicsSettings
@@ -153,6 +154,7 @@ class Scene:
 
     held: (guide_count, cv_count) the CVs that go with the head too, or None.
     room: (guide_count, cv_count - 1) how much curls have to give, or None.
+    is_combed: whether guides stay no farther from colliders than they are at first.
     bowed: whether the ways within a frame are smooth, as the pipeline makes them.
     """
 
@@ -167,6 +169,7 @@ class Scene:
     bowed: bool = False
     wind: Any = (0.0, 0.0, 0.0)
     room: Any = None
+    is_combed: bool = False
 
     def start(self) -> DynamicsState:
         return start(moved(self.motion(0.0), self.grid), self.room)
@@ -185,7 +188,17 @@ class Scene:
         colliders = self.colliders(before, now)
         held = None if self.held is None else Held(np.asarray(self.held, bool))
         wind = np.asarray(self.wind)
-        return Drive(*targets[1:], colliders, self.gravity, earlier, wind, held=held)
+        clearance = self.clearance if self.is_combed else None
+        return Drive(
+            *targets[1:], colliders, self.gravity, earlier, wind, held=held, clearance=clearance
+        )
+
+    @property
+    def clearance(self) -> GuideClearance:
+        begun = moved(self.motion(0.0), self.grid)
+        length = np.linalg.norm(np.diff(begun, axis=1), axis=2).sum(axis=1)
+        reach = farthest_kept(self.settings, float(np.median(length)))
+        return guide_clearance(begun, self.colliders(0.0, 0.0), reach)
 
     def play(self, seconds: float, fps: float = 60.0) -> list[DynamicsState]:
         """The states at all frames, the start first."""

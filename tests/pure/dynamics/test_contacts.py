@@ -59,6 +59,29 @@ def test_pearls_grow_towards_the_tip(kit):
     assert (away[:, 2:] > radius - 1e-3).all()
 
 
+@pytest.mark.parametrize("thin", [False, True])
+def test_hair_at_rest_stays_where_it_was_combed(kit, thin):
+    """Short hair that lies nearer to a ball, and to the edge of a box, than its radius is."""
+    settings = DynamicsSettings(radius_root=0.05, radius_tip=0.2, collider_resolution=24)
+    if thin:  # its segments pass the edge, whose CVs are farther away
+        edge = DistanceField.from_surface(kit.box((0.4, 0.03, 0.03)), settings)
+        grid = kit.straight(12, 6, 0.05, (0.0, 0.7, -0.7)) + np.float32([-0.05, 0.003, 0.035])
+        near = edge
+    else:
+        angle = np.linspace(-0.2, 0.4, 6)
+        out = np.stack([np.zeros(6), np.sin(angle), np.cos(angle)], axis=1)
+        grid = np.tile(out * np.linspace(0.1005, 0.103, 6)[:, None], (12, 1, 1)).astype(np.float32)
+        near = SphereCollider((0.0, 0.0, 0.0), 0.1)
+    scene = kit.Scene(grid, settings, on_head=(near,), is_combed=True)
+    assert (scene.clearance.distances[:, 2:] < 0.006).any()
+    off = [
+        np.abs(kit.Scene(**scene.__dict__ | values).play(0.5)[-1].grid - grid).max()
+        for values in ({}, {"is_combed": False}, {"on_head": ()})
+    ]
+    assert off[0] < off[2] + 1e-5
+    assert off[1] > 1e-3
+
+
 @pytest.mark.slow
 def test_a_mesh_holds_hair_out(kit):
     """The same through a distance field of a ball mesh, to 1 mm, with the default radius."""

@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 from tiers import few_in_commits
 
+from hairloom.addon.dynamics.clearance import farthest_kept, guide_clearance
 from hairloom.addon.dynamics.colliders import (
     CapsuleCollider,
     DistanceField,
+    PosedCollider,
     SphereCollider,
     SphereSetCollider,
 )
@@ -139,15 +141,21 @@ def test_a_changed_substep(kit, shake):
 
 
 @pytest.mark.parametrize("friction", few_in_commits([0.5, 0.0]))
-def test_with_a_ball_and_a_mesh(kit, shake, friction):
+@pytest.mark.parametrize("is_combed", [False, True])
+def test_with_a_ball_and_a_mesh(kit, shake, friction, is_combed):
+    radii = {"radius_root": 0.02, "radius_tip": 0.1} if is_combed else {}
     settings = DynamicsSettings(
-        **kit.LIMP | TIGHT | {"damping": 1.0, "friction": friction, "collider_resolution": 24}
+        **kit.LIMP | TIGHT | {"damping": 1.0, "friction": friction, "collider_resolution": 24},
+        **radii,
     )
     mesh = DistanceField.from_surface(kit.icosphere(0.095, 2), settings)
     grid = kit.curly(6, 12)
     ball = SphereCollider(grid[3, 7] + [0.0, 0.0, 0.03], 0.05)
-    scene = kit.Scene(grid, settings, shake, on_head=(mesh,), standing=(ball,))
+    scene = kit.Scene(grid, settings, shake, on_head=(mesh,), standing=(ball,), is_combed=is_combed)
     fast, slow = both(kit, scene)
+    if is_combed:  # it matters
+        uncombed = kit.Scene(**scene.__dict__ | {"is_combed": False}).play(0.4, 50.0)
+        assert np.abs(fast[-1].position - uncombed[-1].position).max() > 5e-3
     assert deepest_penetration(fast[0], scene.colliders(0, 0)) > 0.0  # some start inside
     for one, other in zip(fast, slow, strict=True):
         np.testing.assert_allclose(one.position, other.position, atol=TOUCHING)
@@ -181,9 +189,12 @@ def test_with_a_sphere_set_and_a_capsule(kit, shake, collider, bowed):
 
 
 @pytest.mark.parametrize("is_mesh", few_in_commits([True, False]))
-def test_segments_at_what_is_thin_and_fast(kit, is_mesh):
+@pytest.mark.parametrize("is_combed", [False, True])
+def test_segments_at_what_is_thin_and_fast(kit, is_mesh, is_combed):
     """It goes twice its own thickness in a substep; all find the same places on the segments."""
     settings = DynamicsSettings(**kit.LIMP | TIGHT | {"damping": 1.0, "collider_resolution": 24})
+    if is_combed:
+        settings = replace(settings, radius_root=0.02, radius_tip=0.08)
     thin = CapsuleCollider((-0.1, 0.0, 0.0), (0.1, 0.0, 0.0), 0.006)
     if is_mesh:
         thin = DistanceField.from_surface(kit.box((0.2, 0.012, 0.06)), settings)
@@ -197,10 +208,16 @@ def test_segments_at_what_is_thin_and_fast(kit, is_mesh):
         for how in (advance, advance_slowly)
     ]
     states = [start(grid) for _ in moving]
-    still = kit.Scene(grid, settings)
+    still, clearance = kit.Scene(grid, settings), None
+    if is_combed:  # so near that it matters
+        aside = kit.translation(0.0, 0.04, 0.0)
+        near = [PosedCollider(thin, aside @ motion(0.0), aside @ motion(0.0))]
+        clearance = guide_clearance(grid, near, farthest_kept(settings, 0.25))
+        assert (clearance.distances[:, 2:] < 0.01).any()
     for frame in range(4):
         times = frame / 60.0, (frame + 1) / 60.0
-        drive = replace(still.drive(*times), colliders=moving[0].colliders(*times))
+        colliders = moving[0].colliders(*times)
+        drive = replace(still.drive(*times), colliders=colliders, clearance=clearance)
         states = [
             scene.advance(state, drive, settings, 1.0 / 60.0)
             for scene, state in zip(moving, states, strict=True)

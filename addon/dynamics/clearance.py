@@ -1,0 +1,58 @@
+"""How far guides stay from colliders at most: as far as they were where the artist combed them.
+
+The collision radius of a CV goes by the length of all hair. Brows, and hair that lies on the head,
+are nearer than that; without this, a motion would begin by lifting them off.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from ..arrays import Floats
+from .colliders import PosedCollider, signed_distance
+from .contacts import BETWEEN
+from .settings import DynamicsSettings
+
+
+@dataclass(frozen=True, eq=False)
+class GuideClearance:
+    """Distances from colliders when a motion began.
+
+    reach: [m], none is longer.
+    distances: (guide_count, cv_count, 1 + len(BETWEEN)) float32 [m], of each CV, and of the points
+        of the segment that ends there; 0 for what was inside, which is led out to the surface.
+    """
+
+    reach: float
+    distances: Floats
+
+    @cached_property
+    def rows(self) -> Floats:
+        """The same as (1 + len(BETWEEN), cv_count, guide_count)."""
+        return np.ascontiguousarray(self.distances.transpose(2, 1, 0))
+
+
+def farthest_kept(settings: DynamicsSettings, size: float) -> float:
+    """[m] that any CV keeps from colliders, by hair of this size."""
+    return size * max(settings.radius_root, settings.radius_tip)
+
+
+def guide_clearance(
+    grid: Floats, colliders: Sequence[PosedCollider], reach: float
+) -> GuideClearance:
+    """That of a motion which begins now.
+
+    Args:
+        grid: (guide_count, cv_count, 3) world [m], at rest.
+        colliders: taken where they stand at their frame's end.
+        reach: [m], see `farthest_kept`.
+    """
+    before = grid[:, np.maximum(np.arange(grid.shape[1]) - 1, 0)]
+    points = [grid, *(before + (grid - before) * np.float32(along) for along in BETWEEN)]
+    distance, _ = signed_distance(np.stack(points, axis=2).reshape(-1, 3), colliders, reach)
+    shape = (*grid.shape[:2], len(points))
+    return GuideClearance(reach, np.maximum(distance, np.float32(0.0)).reshape(shape))
