@@ -63,6 +63,8 @@ ACTIONS = int(os.environ.get("HAIRLOOM_ACTIONS", "80"))
 COMMIT_ACTIONS = 40
 CLOSING_LINE = "SESSION PASSED"
 PROBLEM_LINES = 30
+#: how Python begins to say where it was when Blender crashed
+CRASH_LINE = "Fatal Python error"
 #: mean FLIP of the same picture on both backends
 MOST_DIFFERENT = 0.02
 
@@ -121,9 +123,17 @@ def announce(name: str, backend: str, passed: bool, detail: str, log: Path) -> N
     verdict = "passed" if passed else "FAILED"
     print(f"{verdict}  {name} on {backend}: {detail}", flush=True)
     if not passed:
-        print(f"        the end of {log.relative_to(REPOSITORY)}:")
-        for line in log.read_text(errors="replace").splitlines()[-PROBLEM_LINES:]:
+        print(f"        from {log.relative_to(REPOSITORY)}:")
+        for line in problem_lines(log.read_text(errors="replace").splitlines()):
             print(f"        | {line}")
+
+
+def problem_lines(lines: list[str]) -> list[str]:
+    """The end of a log; of a crash where it begins, for that names the test."""
+    crash = next((i for i, line in enumerate(lines) if line.startswith(CRASH_LINE)), None)
+    if crash is None:
+        return lines[-PROBLEM_LINES:]
+    return lines[crash : crash + PROBLEM_LINES]
 
 
 def install_extension(tally: Tally) -> bool:
