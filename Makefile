@@ -1,6 +1,6 @@
 # All that one does here, in one place. `make` alone lists it.
 .DEFAULT_GOAL := help
-.PHONY: help setup demo lint test tests-of-a-commit test-ui test-engines test-all bench docs gallery pictures zip lock clean
+.PHONY: help setup demo lint test tests-of-a-commit test-ui test-engines test-all bench docs gallery pictures styles zip lock clean
 
 PYTHON = .venv/bin/python
 OUT = out
@@ -55,6 +55,9 @@ gallery: setup ## draw docs/gallery.md: looks, stages, skins, kinds of hair, car
 
 pictures: setup ## draw the documentation's pictures again
 	$(PYTHON) tools/make_docs.py --pictures
+
+styles: setup ## make presets/styles/ from the recipes, with pictures in out/styles; NAME=x for one
+	$(PYTHON) tools/make_styles.py --pictures $(OUT)/styles $(NAME)
 
 zip: setup ## the extension's zip, into dist/
 	@$(PYTHON) tools/fetch_wheels.py

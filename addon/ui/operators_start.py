@@ -46,7 +46,7 @@ class HAIRLOOM_OT_add_groom(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return _in_object_mode(cls, context) and _has_ground(cls, context)
+        return in_object_mode(cls, context) and _has_ground(cls, context)
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
         _take_preferences(self, context)
@@ -66,7 +66,7 @@ class HAIRLOOM_OT_add_groom(bpy.types.Operator):
                 density_group=self.density_group,
                 length_group=self.length_group,
             )
-            _begin(self, context, [hair], plays=self.plays)
+            begin(self, context, [hair], plays=self.plays)
         return {"FINISHED"}
 
     def draw(self, _context: bpy.types.Context) -> None:
@@ -94,7 +94,7 @@ class HAIRLOOM_OT_sample_scene(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return _in_object_mode(cls, context)
+        return in_object_mode(cls, context)
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
         _take_preferences(self, context)
@@ -107,7 +107,7 @@ class HAIRLOOM_OT_sample_scene(bpy.types.Operator):
             if context.window is not None:
                 context.window.scene = scene
             with context.temp_override(scene=scene, view_layer=scene.view_layers[0]):
-                _begin(self, context, [hair], plays=False)
+                begin(self, context, [hair], plays=False)
                 hair.select_set(False)  # active, but without an outline
         if not bpy.app.background:
             _look_through_the_camera(context)
@@ -126,7 +126,7 @@ class HAIRLOOM_OT_use_groom(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if not _in_object_mode(cls, context):
+        if not in_object_mode(cls, context):
             return False
         if any(previews.session_of(hair) is None for hair in chosen_hair(context)):
             return True
@@ -148,7 +148,7 @@ class HAIRLOOM_OT_use_groom(bpy.types.Operator):
                     report(self, "INFO", f"{name}: {one}")
                 taken.append(ready)
             if taken:
-                _begin(self, context, taken, plays=chosen.plays)
+                begin(self, context, taken, plays=chosen.plays)
         return {"FINISHED"} if taken else {"CANCELLED"}
 
 
@@ -162,7 +162,7 @@ class HAIRLOOM_OT_convert_particles(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if not _in_object_mode(cls, context):
+        if not in_object_mode(cls, context):
             return False
         mesh = active_mesh(context)
         if mesh is not None and hair_systems(mesh):
@@ -181,7 +181,7 @@ class HAIRLOOM_OT_convert_particles(bpy.types.Operator):
                 _, done = take_over(hair, depsgraph, chosen_presets(chosen))
                 for one in done:
                     report(self, "INFO", f"{hair.name}: {one}")
-            _begin(self, context, made, plays=chosen.plays)
+            begin(self, context, made, plays=chosen.plays)
         report(self, "INFO", f"{mesh.name}: its particle hair is hidden, curves took its place")
         return {"FINISHED"}
 
@@ -215,7 +215,7 @@ def _show_data(editor: bpy.types.SpaceProperties) -> None:
             return
 
 
-def _begin(
+def begin(
     operator: bpy.types.Operator,
     context: bpy.types.Context,
     grooms: list[bpy.types.Object],
@@ -261,7 +261,7 @@ def _take_preferences(operator: Any, context: bpy.types.Context) -> None:
             setattr(operator, name, getattr(chosen, name))
 
 
-def _in_object_mode(operator: type[Any], context: bpy.types.Context) -> bool:
+def in_object_mode(operator: type[Any], context: bpy.types.Context) -> bool:
     if context.mode == "OBJECT":
         return True
     operator.poll_message_set("Go back to Object Mode first")

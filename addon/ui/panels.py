@@ -63,6 +63,7 @@ def draw_start(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     column = layout.column(align=True)
     column.scale_y = 1.3
     column.operator("hairloom.add_groom", text="Add Hair", icon="OUTLINER_OB_CURVES")
+    column.operator("hairloom.choose_hairstyle", icon="USER")
     mesh = active_mesh(context)
     if mesh is not None and hair_systems(mesh):
         column.operator("hairloom.convert_particles", icon="PARTICLES")
@@ -190,6 +191,7 @@ def draw_exports(self: Any, _context: bpy.types.Context) -> None:
 
 def draw_add(self: Any, _context: bpy.types.Context) -> None:
     self.layout.operator("hairloom.add_groom", icon="OUTLINER_OB_CURVES")
+    self.layout.menu("HAIRLOOM_MT_hairstyles", icon="USER")
     self.layout.operator("hairloom.sample_scene", icon="SCENE_DATA")
 
 

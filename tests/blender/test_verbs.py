@@ -28,6 +28,7 @@ WINDOW_ONLY = {
     "measure",
     "fin_preview",
     "fin_reset",
+    "choose_hairstyle",
     "choose_preset",
     "show_settings",
 }

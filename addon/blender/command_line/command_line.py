@@ -19,6 +19,7 @@ from ..base.gpu_context import gpu_refusals
 from ..base.interruption import Interrupted, interruptible
 from ..base.objects import objects_in
 from ..base.report import Report
+from ..setup.hairstyles import add_hairstyle, add_head, named_hairstyle
 from .bake_job import BAKE
 from .cards_job import CARDS
 from .demo_job import DEMO
@@ -28,7 +29,7 @@ from .import_job import IMPORT
 from .inputs import Sources
 from .job_options import check_numbers, chosen_settings
 from .job_steps import Job
-from .object_settings import is_groom
+from .object_settings import is_groom, named_objects
 from .places import check_outputs, check_report
 from .render_job import RENDER
 from .run_job import RUN
@@ -159,7 +160,10 @@ def _job(verb: Verb, options: argparse.Namespace, report: Report) -> Job:
         with report.stage("open scene"):
             open_scene(Path(options.scene))
         if verb.takes_hair and not hasattr(options, "object"):
-            options.groom = options.groom or _only_groom(options)
+            options.groom = options.groom or (None if options.style else _only_groom(options))
+    if verb.takes_hair and options.style:
+        with report.stage("add hairstyle"):
+            options.groom = _styled(options)
     output = getattr(options, "output", None)
     if verb.saves_scene:
         check_saving(output, over=options.save)
@@ -186,7 +190,31 @@ def _sources(verb: Verb, options: argparse.Namespace) -> Sources:
         length_group=options.length_group,
         children_density=options.children_density or _own_density(options.groom),
         skin=options.skin,
+        with_face=bool(options.style),
     )
+
+
+def _styled(options: argparse.Namespace) -> str:
+    """The hair of --style, added to the open scene as the artist's button does; its name.
+
+    Raises:
+        HairloomError: other hair is named too, or the head is none that it grows on.
+    """
+    if options.groom:
+        raise HairloomError(
+            "hair comes from a hairstyle or from a groom, not from both",
+            place="--style",
+            remedy="Leave out --groom",
+        )
+    collection = bpy.context.collection
+    if options.head:
+        (head,) = named_objects([options.head], lambda obj: bool(obj.type == "MESH"), "a mesh")
+    else:
+        head = add_head(collection, options.skin)
+    style, depsgraph = named_hairstyle(options.style), bpy.context.evaluated_depsgraph_get()
+    hair = add_hairstyle(style, head, depsgraph, collection)
+    bpy.context.view_layer.update()
+    return str(hair.name)
 
 
 def _only_groom(options: argparse.Namespace) -> str | None:

@@ -17,6 +17,7 @@ from ...groom.grow import grow, scalp_density
 from ...groom.settings import GrowSettings
 from ...strands import StrandSet, Surface
 from ...strands.colors import color_notes
+from ...strands.join import joined
 from ..base.objects import head_of
 from ..base.vertex_weights import read_weights
 from ..scene.built_in_head import HeadLook, built_in_head
@@ -24,6 +25,7 @@ from ..scene.curves import read_curves
 from ..scene.head_look import head_look
 from ..scene.mesh_files import read_mesh_file
 from ..scene.surfaces import read_surface
+from ..setup.hairstyles import face_hair, is_bust
 from ..strands.child_python import python_for
 
 BUILT_IN = "built-in"
@@ -42,6 +44,7 @@ class Sources:
         for hair that is grown here.
     children_density: the same for the children between guides.
     skin: of the built-in head where it comes without materials, one of bust_skin.TONES.
+    with_face: whether brows and lashes come with a groom of the scene, where its head is built in.
     """
 
     groom: str | None = None
@@ -55,6 +58,7 @@ class Sources:
     length_group: str = ""
     children_density: str = ""
     skin: str = "light"
+    with_face: bool = False
 
 
 @dataclass(frozen=True)
@@ -87,6 +91,10 @@ def read_inputs(sources: Sources, grow_settings: GrowSettings) -> Inputs:
     if sources.groom is not None:
         strands, dropped, groom, notes = _read_groom(sources.groom, sources)
         head = _read_head(head_name, sources)
+        mesh = bpy.data.objects.get(head_name or "")
+        if sources.with_face and head is not None and mesh is not None and is_bust(mesh):
+            face = face_hair(mesh, head, bpy.context.evaluated_depsgraph_get())
+            strands = joined(strands, face)
     else:
         head, dropped, groom, notes = _read_head(head_name, sources), {}, None, ()
         assert head is not None, "the built-in one is always there"

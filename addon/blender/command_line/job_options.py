@@ -18,6 +18,7 @@ from ..base.report import STYLES
 from ..properties.presets import named_preset, shipped
 from ..scene.bust_skin import TONES
 from ..scene.principled import look_from_named
+from ..setup.hairstyles import shipped as hairstyles
 from .object_settings import own_settings
 from .overrides import overrides
 
@@ -27,6 +28,13 @@ def add_hair_options(parser: argparse.ArgumentParser) -> None:
     sources = parser.add_argument_group("what to work on (files, or objects of the scene)")
     files = ", ".join(SUFFIXES)
     sources.add_argument("--groom", help=f"hair curves or a file, {files} (default: grown here)")
+    sources.add_argument(
+        "--style",
+        choices=[entry.name for entry in hairstyles()],
+        metavar="NAME",
+        help="a hairstyle on the built-in head, with its own settings: "
+        + ", ".join(entry.name for entry in hairstyles()),
+    )
     sources.add_argument("--head", help="mesh that the hair grows from (default: built in)")
     sources.add_argument("--collider", help="closed mesh that hair stays out of (default: head)")
     sources.add_argument(

@@ -38,6 +38,7 @@ _OF_SCENES = (
     "remove_spheres",
     "make_cards",
     "sort_cards",
+    "add_hairstyle",
     "sample_scene",
 )
 #: operators that change the artist's own presets instead

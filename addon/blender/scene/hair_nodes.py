@@ -1,0 +1,96 @@
+"""Blender's own node groups for hair, as modifiers: they come with every Blender."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import bpy
+
+from ...errors import HairloomError
+
+_LIBRARY = "assets/nodes/procedural_hair_node_assets.blend"
+#: types of input sockets that values are given to -> what Python calls the value
+_KINDS: dict[str, tuple[type, ...]] = {
+    "NodeSocketBool": (bool,),
+    "NodeSocketInt": (int,),
+    "NodeSocketFloat": (int, float),
+    "NodeSocketMenu": (str,),
+}
+
+
+def add_hair_nodes(
+    hair: bpy.types.Object, nodes: str, values: Mapping[str, Any]
+) -> bpy.types.Modifier:
+    """Add one of Blender's node groups for hair as a modifier, with these values.
+
+    A group of this name that is in the file is used if it has these inputs; else Blender's own is
+    added once more.
+
+    Args:
+        values: by the names of inputs, as the artist sees them.
+
+    Raises:
+        HairloomError: this Blender has no such group, or it has no such inputs.
+    """
+    group = bpy.data.node_groups.get(nodes)
+    if group is None or _unknown(group, values):
+        group = _from_library(nodes)
+    unknown = _unknown(group, values)
+    if unknown:
+        raise HairloomError(
+            f"Blender's node group '{nodes}' has no input '{unknown[0]}' for this value",
+            place=hair.name,
+            remedy=f"Use Blender 5.2; this is {bpy.app.version_string}",
+        )
+    modifier = hair.modifiers.new(nodes, "NODES")
+    modifier.node_group = group
+    inputs = _inputs(group)
+    for name, value in values.items():
+        getattr(modifier.properties.inputs, inputs[name].identifier).value = value
+    return modifier
+
+
+def library_path() -> Path:
+    """Where this Blender keeps its node groups for hair."""
+    folder = bpy.utils.system_resource("DATAFILES")
+    return Path(folder) / _LIBRARY
+
+
+def _from_library(nodes: str) -> bpy.types.NodeTree:
+    path = library_path()
+    if not path.is_file():
+        raise HairloomError(
+            f"this Blender came without its hair nodes, so there is no '{nodes}'",
+            place=str(path),
+            remedy="Install Blender from blender.org, which brings them",
+        )
+    with bpy.data.libraries.load(str(path), link=False) as (there, wanted):
+        wanted.node_groups = [nodes] if nodes in there.node_groups else []
+    if not wanted.node_groups or wanted.node_groups[0] is None:
+        raise HairloomError(
+            f"this Blender has no hair nodes '{nodes}'",
+            place=str(path),
+            remedy=f"Use Blender 5.2; this is {bpy.app.version_string}",
+        )
+    return wanted.node_groups[0]
+
+
+def _inputs(group: bpy.types.NodeTree) -> dict[str, Any]:
+    """The input sockets of a node group by name; the first where several share one."""
+    found: dict[str, Any] = {}
+    for item in group.interface.items_tree:
+        if item.item_type == "SOCKET" and item.in_out == "INPUT":
+            found.setdefault(item.name, item)
+    return found
+
+
+def _unknown(group: bpy.types.NodeTree, values: Mapping[str, Any]) -> list[str]:
+    """The inputs that the group lacks, or that take no such value."""
+    inputs = _inputs(group) if group.bl_idname == "GeometryNodeTree" else {}
+    return [
+        name
+        for name, value in values.items()
+        if name not in inputs or type(value) not in _KINDS.get(inputs[name].socket_type, ())
+    ]

@@ -1,0 +1,181 @@
+"""Hairstyles: those that come with Hairloom, and how one is added to a head."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from ...errors import HairloomError
+from ...exchange.hairstyles import Hairstyle, read_hairstyle, read_title
+from ...groom.face_hair import grow_face_hair
+from ...parameters import ALL_SETTINGS
+from ...strands import StrandSet, Surface
+from ...strands.affine import mean_scale
+from ..base.vertex_weights import read_weights
+from ..properties import previews
+from ..properties.presets import PRESET_FOLDER, STYLE_FOLDER, apply, named_preset
+from ..properties.properties import settings_of
+from ..scene.bust import bust_object
+from ..scene.bust_data import load_bust
+from ..scene.curves import write_curves
+from ..scene.hair_nodes import add_hair_nodes
+from ..scene.surfaces import read_surface
+
+_HEAD = "Head"
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One style in a menu. name: as `named_hairstyle` knows it."""
+
+    name: str
+    title: str
+    path: Path
+
+    @property
+    def icon(self) -> int:
+        """See `previews.icon_of`."""
+        return previews.icon_of(self.path)
+
+
+@cache
+def shipped() -> tuple[Entry, ...]:
+    """The styles that come with Hairloom, in their order."""
+    found = []
+    for path in (PRESET_FOLDER / STYLE_FOLDER).glob("*.json"):
+        order, title = read_title(path)
+        found.append((order, Entry(path.stem, title, path)))
+    return tuple(entry for _, entry in sorted(found, key=lambda one: (one[0], one[1].name)))
+
+
+def named_hairstyle(name: str) -> Hairstyle:
+    """A style by its name, such as bob, or by the path of its file.
+
+    Raises:
+        HairloomError: there is no such style, or it is damaged.
+    """
+    by_name = {entry.name: entry.path for entry in shipped()}
+    path = by_name.get(name) or Path(name)
+    if not path.is_file():
+        known = ", ".join(by_name)
+        raise HairloomError(
+            "there is no such hairstyle", place=name, remedy=f"Use a file or one of {known}"
+        )
+    return read_hairstyle(path, ALL_SETTINGS)
+
+
+def is_bust(mesh: bpy.types.Object) -> bool:
+    """Whether a mesh object is the built-in head, which may have been posed or shaped since."""
+    bust = load_bust()
+    return bool(
+        mesh.type == "MESH"
+        and len(mesh.data.vertices) == len(bust.positions)
+        and len(mesh.data.polygons) == len(bust.sizes)
+        and mesh.data.uv_layers.active is not None
+    )
+
+
+def add_head(collection: bpy.types.Collection, skin: str) -> bpy.types.Object:
+    """The built-in head.
+
+    Args:
+        skin: one of bust_skin.TONES.
+    """
+    head = bust_object(_HEAD, skin)
+    collection.objects.link(head)
+    return head
+
+
+def add_hairstyle(
+    style: Hairstyle,
+    head: bpy.types.Object,
+    depsgraph: bpy.types.Depsgraph,
+    collection: bpy.types.Collection,
+) -> bpy.types.Object:
+    """Hair curves in this style on the built-in head, with its modifiers and settings.
+
+    Raises:
+        HairloomError: another head, a mask that it has not or that is empty, a preset or node group
+            that is not there. Nothing is added then.
+    """
+    if not is_bust(head):
+        raise HairloomError(
+            "this is not the built-in head",
+            place=head.name,
+            remedy="Select a built-in head, or nothing to add one; on other meshes, Add Hair",
+        )
+    for name in style.masks.values():
+        if not (read_weights(head, depsgraph, name) > 0.0).any():
+            raise HairloomError(
+                f"the weights '{name}' are zero everywhere, so no hair would grow",
+                place=head.name,
+                remedy="Paint where hair is to grow, or add a new built-in head",
+            )
+    surface = read_surface(head, depsgraph, need_uv=True, place=head.name)
+    strands = style.guides.on(surface, _size_of(head))
+    hair = write_curves(f"{head.name} {style.title}", strands, head, collection)
+    try:
+        for one in style.modifiers:
+            add_hair_nodes(hair, one.nodes, one.inputs)
+        for name in style.presets:
+            for settings in named_preset(name).all:
+                apply(settings, hair)
+        _put_settings(style, hair)
+    except HairloomError:
+        curves = hair.data
+        bpy.data.objects.remove(hair)
+        bpy.data.hair_curves.remove(curves)
+        raise
+    hair.hairloom.children_density = style.masks.get("children", "")
+    return hair
+
+
+def add_face_hair(
+    head: bpy.types.Object,
+    depsgraph: bpy.types.Depsgraph,
+    collection: bpy.types.Collection,
+    like: bpy.types.Object,
+) -> bpy.types.Object:
+    """Brows and lashes on the built-in head, in the look of its hair.
+
+    Raises:
+        HairloomError: its groups for them are empty or gone.
+    """
+    surface = read_surface(head, depsgraph, need_uv=True, place=head.name)
+    strands = face_hair(head, surface, depsgraph)
+    hair = write_curves(f"{head.name} Brows and Lashes", strands, head, collection)
+    group = like.data.hairloom.shading
+    apply(settings_of(group, group.settings), hair)
+    hair.data.hairloom.children.method = "none"
+    return hair
+
+
+def face_hair(
+    head: bpy.types.Object, surface: Surface, depsgraph: bpy.types.Depsgraph
+) -> StrandSet:
+    """Brows and lashes of the built-in head, where its own vertex groups say.
+
+    Raises:
+        HairloomError: these are empty or gone.
+    """
+    brows, lashes = (read_weights(head, depsgraph, name) for name in ("brows", "lashes"))
+    return grow_face_hair(surface, brows, lashes)
+
+
+def _size_of(head: bpy.types.Object) -> float:
+    """How much larger than by its own measures the head stands in the scene."""
+    return mean_scale(np.array(head.matrix_world))
+
+
+def _put_settings(style: Hairstyle, hair: bpy.types.Object) -> None:
+    """The style's own values, over those of its presets and the defaults."""
+    for section, values in style.settings.items():
+        kind = ALL_SETTINGS[section]
+        owners = hair.data.hairloom, hair.hairloom
+        owner = next((one for one in owners if hasattr(one, section)), None)
+        own = {} if owner is None else settings_of(getattr(owner, section), kind).as_dict()
+        apply(kind.from_dict({**own, **values}, style.title), hair)

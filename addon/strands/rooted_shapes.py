@@ -1,0 +1,113 @@
+"""Strands as roots on a UV map, each with its shape in the frame of its root.
+
+So they grow on any mesh that has the same map, wherever it stands, however it is turned or posed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import Floats, Ints
+from ..errors import HairloomError
+from .closest_point import ClosestPointSearch
+from .strand_set import DEFAULT_RADIUS, StrandSet
+from .surface import Surface
+from .vectors import unit, unit_or
+
+#: A root further from every triangle of the map than this, in UV, is on none of them.
+_OFF_THE_MAP = 0.01
+
+
+@dataclass(frozen=True, eq=False)
+class RootedShapes:
+    """root_uv: (strand_count, 2) float32.
+    offsets: (strand_count + 1,) int32, as in `StrandSet`.
+    shape: (point_count, 3) float32 [m], from the root, which is 0: along the direction in which U
+        grows on the surface, along the one across, and along the normal.
+    group: (strand_count,) int32.
+    """
+
+    root_uv: Floats
+    offsets: Ints
+    shape: Floats
+    group: Ints
+
+    @classmethod
+    def of(cls, strands: StrandSet, surface: Surface) -> RootedShapes:
+        """The shapes of strands that are bound to this surface, in its space."""
+        triangle, barycentric = strands.root_triangle, strands.root_barycentric
+        assert triangle is not None and barycentric is not None and surface.corner_uv is not None
+        origin, frame = _frames(surface, triangle, barycentric.astype(np.float64))
+        counts = strands.point_counts
+        local = strands.points - np.repeat(origin, counts, axis=0)
+        shape = np.einsum("pi,pij->pj", local, np.repeat(frame, counts, axis=0))
+        shape[strands.offsets[:-1]] = 0.0
+        uv = np.einsum("sk,skj->sj", barycentric, surface.corner_uv[triangle])
+        return cls(uv.astype(np.float32), strands.offsets, shape.astype(np.float32), strands.group)
+
+    def on(self, surface: Surface, scale: float = 1.0) -> StrandSet:
+        """Strands on this surface, bound to it and in its space; their widths are yet to be found.
+
+        Args:
+            scale: how much larger they are.
+
+        Raises:
+            HairloomError: the surface has no UVs, or its map has nothing at a root.
+        """
+        triangle, barycentric = _at(self.root_uv, surface)
+        origin, frame = _frames(surface, triangle, barycentric)
+        counts = np.diff(self.offsets)
+        turned = np.einsum("pj,pij->pi", scale * self.shape, np.repeat(frame, counts, axis=0))
+        return StrandSet(
+            points=np.repeat(origin, counts, axis=0) + turned,
+            offsets=self.offsets,
+            radius=np.full(len(self.shape), DEFAULT_RADIUS),
+            group=self.group,
+            root_uv=self.root_uv,
+            root_triangle=triangle,
+            root_barycentric=barycentric,
+            has_widths=False,
+        )
+
+
+def _at(uv: Floats, surface: Surface) -> tuple[Ints, Floats]:
+    """The triangle (n,) and barycentric coordinates (n, 3) at each place of the UV map."""
+    if surface.corner_uv is None:
+        raise HairloomError(
+            "this mesh has no UVs", place="head", remedy="Use the built-in head with its UV map"
+        )
+    flat = np.zeros((3 * len(surface.triangles), 3), np.float32)
+    flat[:, :2] = surface.corner_uv.reshape(-1, 2)
+    places = np.zeros((len(uv), 3), np.float32)
+    places[:, :2] = uv
+    search = ClosestPointSearch(Surface(flat, np.arange(len(flat)).reshape(-1, 3)))
+    found = search.closest(places)
+    if len(uv) and found.distance.max() > _OFF_THE_MAP:
+        raise HairloomError(
+            "its UV map has no face where hair is to grow",
+            place="head",
+            remedy="Use the built-in head with its own UV map",
+        )
+    return found.triangle, found.barycentric
+
+
+def _frames(surface: Surface, triangle: Ints, barycentric: Floats) -> tuple[Floats, Floats]:
+    """Where roots are (n, 3), and their frames (n, 3, 3): along U, across and normal in columns."""
+    assert surface.corner_uv is not None
+    corners = surface.corners[triangle].astype(np.float64)
+    origin = np.einsum("nk,nkj->nj", barycentric, corners)
+    normals = surface.vertex_normals()[surface.triangles[triangle]].astype(np.float64)
+    edges = corners[:, 1:] - corners[:, :1]
+    flat_normal = np.cross(edges[:, 0], edges[:, 1])
+    normal = unit_or(np.einsum("nk,nkj->nj", barycentric, normals), unit(flat_normal))
+    uv = surface.corner_uv[triangle].astype(np.float64)
+    span = uv[:, 1:] - uv[:, :1]
+    # dP/du up to its length: the edges mixed so that V does not change, to the map's own side
+    area = span[:, 0, 0] * span[:, 1, 1] - span[:, 1, 0] * span[:, 0, 1]
+    growing = edges[:, 0] * span[:, 1, 1:] - edges[:, 1] * span[:, 0, 1:]
+    growing *= np.where(area < 0.0, -1.0, 1.0)[:, None]
+    growing -= normal * np.einsum("nj,nj->n", growing, normal)[:, None]
+    along = unit_or(unit(growing), unit(np.cross(normal, (0.3, 0.5, 0.8))))
+    return origin, np.stack([along, np.cross(normal, along), normal], axis=2)

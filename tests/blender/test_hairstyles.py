@@ -1,0 +1,231 @@
+"""Hairstyles: each is added as ordinary hair curves with ordinary modifiers, or not at all."""
+
+import importlib
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import bpy
+import numpy as np
+import pytest
+
+from hairloom.addon.blender.command_line.command_line import run
+from hairloom.addon.blender.preview import previews
+from hairloom.addon.blender.properties import presets
+from hairloom.addon.blender.properties.presets import named_preset
+from hairloom.addon.blender.scene import hair_nodes
+from hairloom.addon.blender.scene.curves import read_curves
+from hairloom.addon.blender.setup.hairstyles import (
+    add_hairstyle,
+    add_head,
+    is_bust,
+    named_hairstyle,
+    shipped,
+)
+from hairloom.addon.errors import HairloomError
+from hairloom.addon.exchange.hairstyles import Hairstyle, NodeModifier
+from hairloom.addon.parameters import ALL_SETTINGS
+from hairloom.addon.ui import operators_hairstyles
+
+pytestmark = [pytest.mark.usefixtures("extension")]
+NAMES = [entry.name for entry in shipped()]
+TOOLS = Path(__file__).parents[2] / "tools"
+
+
+@pytest.fixture
+def few(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Styles are added without their children, which take most of the time."""
+
+    def with_few(name: str) -> Hairstyle:
+        style = named_hairstyle(name)
+        return replace(style, settings={"children": {"method": "none"}})
+
+    monkeypatch.setattr(operators_hairstyles, "named_hairstyle", with_few)
+
+
+@pytest.fixture
+def head() -> bpy.types.Object:
+    made = add_head(bpy.context.collection, "light")
+    bpy.context.view_layer.update()
+    return made
+
+
+def depsgraph() -> bpy.types.Depsgraph:
+    return bpy.context.evaluated_depsgraph_get()
+
+
+def added(style: Hairstyle, head: bpy.types.Object) -> bpy.types.Object:
+    hair = add_hairstyle(style, head, depsgraph(), bpy.context.collection)
+    bpy.context.view_layer.update()
+    return hair
+
+
+def everything() -> set[str]:
+    kinds = bpy.data.objects, bpy.data.hair_curves, bpy.data.meshes
+    return {each.name for kind in kinds for each in kind}
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_each_style_that_ships_is_curves_on_the_scalp_with_its_settings(
+    name: str, head: bpy.types.Object
+) -> None:
+    style = named_hairstyle(name)
+    hair = added(style, head)
+    assert hair.type == "CURVES" and hair.data.surface == head and hair.parent == head
+    assert len(hair.data.curves) == len(style.guides.group)
+    assert [each.node_group.name for each in hair.modifiers] == [m.nodes for m in style.modifiers]
+    for section, values in style.settings.items():
+        owner = hair.data.hairloom if hasattr(hair.data.hairloom, section) else hair.hairloom
+        for key, value in values.items():
+            assert getattr(getattr(owner, section), key) == pytest.approx(value), key
+    look = named_preset(style.presets[0]).settings
+    assert hair.data.hairloom.shading.base_color[:] == pytest.approx(look.base_color)
+    assert hair.hairloom.children_density in head.vertex_groups
+    # roots on the skin, as Blender's own nearest point finds it
+    roots = read_curves(hair, depsgraph()).strands.roots
+    evaluated = head.evaluated_get(depsgraph())
+    for root in roots[:: len(roots) // 30]:
+        found, place, *_ = evaluated.closest_point_on_mesh(root.tolist())
+        assert found and (np.array(place) - root) @ (np.array(place) - root) < 1e-8
+
+
+@pytest.mark.usefixtures("few")
+def test_what_modifiers_make_is_what_is_simulated_and_muting_takes_it_away(
+    head: bpy.types.Object,
+) -> None:
+    bpy.context.view_layer.objects.active = head
+    assert bpy.ops.hairloom.add_hairstyle(style="curls", plays=False) == {"FINISHED"}
+    hair = bpy.context.object
+    (session,) = previews.sessions()
+    curled = session.rig.strands.lengths().sum()
+    evaluated = read_curves(hair, depsgraph()).strands
+    assert curled == pytest.approx(evaluated.lengths().sum(), rel=0.01)
+    bpy.ops.hairloom.preview()
+    hair.modifiers[0].show_viewport = False
+    bpy.ops.hairloom.preview()
+    (session,) = previews.sessions()
+    straight = session.rig.strands.lengths().sum()
+    assert straight < 0.9 * curled
+    assert straight == pytest.approx(read_curves(hair, depsgraph()).strands.lengths().sum(), 0.01)
+
+
+def test_a_moved_turned_and_larger_head_has_the_same_hair(head: bpy.types.Object) -> None:
+    style = named_hairstyle("buzz_cut")
+    before = read_curves(added(style, head), depsgraph()).strands.points
+    head.location, head.rotation_euler, head.scale = (1.0, 2.0, 3.0), (0.3, -0.2, 0.9), (2, 2, 2)
+    bpy.context.view_layer.update()
+    after = read_curves(added(style, head), depsgraph()).strands.points
+    matrix = np.array(head.matrix_world)
+    expected = before @ matrix[:3, :3].T + matrix[:3, 3]
+    assert np.abs(after - expected).max() < 1e-4
+
+
+@pytest.mark.usefixtures("few")
+def test_from_nothing_there_is_a_head_with_brows_and_lashes() -> None:
+    assert bpy.ops.hairloom.add_hairstyle(style="buzz_cut", plays=False) == {"FINISHED"}
+    names = {obj.name for obj in bpy.data.objects}
+    assert names == {"Head", "Head Brows and Lashes", "Head Buzz Cut"}
+    assert bpy.context.object.name == "Head Buzz Cut" and len(previews.sessions()) == 2
+    # the next one grows on the same head, whatever is active
+    bpy.ops.hairloom.add_hairstyle(style="stubble", plays=False)
+    assert sum(is_bust(obj) for obj in bpy.data.objects) == 1
+
+
+@pytest.mark.usefixtures("few")
+def test_one_undo_takes_it_all_away(head: bpy.types.Object) -> None:
+    bpy.ops.ed.undo_push(message="before")
+    before = everything()
+    bpy.ops.hairloom.add_hairstyle("EXEC_DEFAULT", True, style="curls", plays=False)
+    assert everything() != before
+    bpy.ops.ed.undo()
+    assert everything() == before
+
+
+def refused(style: Hairstyle, head: bpy.types.Object, problem: str) -> None:
+    """With a sentence and a remedy, and with the scene as it was."""
+    before = everything()
+    with pytest.raises(HairloomError, match=problem) as error:
+        added(style, head)
+    assert error.value.remedy and everything() == before
+
+
+def test_other_meshes_and_empty_masks_are_refused(head: bpy.types.Object) -> None:
+    style = named_hairstyle("buzz_cut")
+    bpy.ops.mesh.primitive_cube_add()
+    refused(style, bpy.context.object, "not the built-in head")
+    group = head.vertex_groups["scalp"]
+    group.remove(range(len(head.data.vertices)))
+    bpy.context.view_layer.update()
+    refused(style, head, "zero everywhere")
+    head.vertex_groups.remove(group)
+    refused(style, head, "neither a vertex group nor an attribute")
+
+
+def test_nodes_that_are_replaced_renamed_or_not_there(
+    head: bpy.types.Object, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    style = named_hairstyle("curls")
+    other = bpy.data.node_groups.new("Curl Hair Curves", "GeometryNodeTree")
+    hair = added(style, head)
+    assert hair.modifiers[0].node_group != other, "Blender's own is taken, not one without inputs"
+    again = added(style, head)
+    strange = Hairstyle("Odd", style.guides, modifiers=(NodeModifier("Braid Hairs", {}),))
+    refused(strange, head, "no hair nodes 'Braid Hairs'")
+    unknown = NodeModifier("Clump Hair Curves", {"Fluff": 1.0})
+    refused(Hairstyle("Odd", style.guides, modifiers=(unknown,)), head, "no input 'Fluff'")
+    for obj in (hair, again):
+        bpy.data.objects.remove(obj)
+    for group in list(bpy.data.node_groups):
+        bpy.data.node_groups.remove(group)
+    monkeypatch.setattr(hair_nodes, "library_path", lambda: tmp_path / "none.blend")
+    refused(style, head, "came without its hair nodes")
+
+
+@pytest.mark.portable
+def test_this_blender_brings_all_node_groups_that_styles_use(head: bpy.types.Object) -> None:
+    wanted = {one.nodes: one.inputs for n in NAMES for one in named_hairstyle(n).modifiers}
+    hair = added(named_hairstyle("buzz_cut"), head)
+    for nodes, inputs in wanted.items():
+        assert hair_nodes.add_hair_nodes(hair, nodes, inputs).node_group.name == nodes
+
+
+@pytest.mark.draws
+@pytest.mark.usefixtures("few")
+def test_the_command_line_draws_and_saves_a_style(tmp_path: Path, capsys) -> None:
+    scene = tmp_path / "styled.blend"
+    arguments = ["run", "add_hairstyle", "--set", "style=buzz_cut", "--output", str(scene)]
+    assert run(arguments) == 0 and scene.is_file()
+    picture = tmp_path / "buzz.png"
+    size = ["--width", "48", "--height", "48", "--samples", "1"]
+    few = ["--set", "children.strand_count=500"]
+    assert run(["render", "--style", "buzz_cut", *few, *size, "--output", str(picture)]) == 0
+    assert picture.is_file()
+    again = ["render", "--style", "buzz_cut", "--groom", "Hair", "--output", str(picture)]
+    assert run(again) == 1
+    assert "not from both" in capsys.readouterr().err
+
+
+@pytest.mark.slow
+def test_the_files_are_what_the_recipes_make() -> None:
+    sys.path.insert(0, str(TOOLS))
+    try:
+        growth, recipes = map(importlib.import_module, ("style_growth", "style_recipes"))
+    finally:
+        sys.path.remove(str(TOOLS))
+    assert set(recipes.RECIPES) == set(NAMES)
+    made, kept = recipes.RECIPES["buzz_cut"](growth.Head()), named_hairstyle("buzz_cut")
+    for name in ("title", "order", "masks", "modifiers", "presets", "settings"):
+        assert getattr(made, name) == getattr(kept, name)
+    assert np.abs(made.guides.shape - kept.guides.shape).max() < 3e-5
+    assert np.abs(made.guides.root_uv - kept.guides.root_uv).max() < 1e-6
+
+
+def test_every_style_has_a_picture_and_is_a_small_file() -> None:
+    for entry in shipped():
+        picture = entry.path.with_suffix(".png")
+        assert picture.is_file() and picture.stat().st_size < 60_000, "run make styles"
+        assert entry.path.with_suffix(".npz").stat().st_size < 700_000
+
+
+def test_presets_of_settings_do_not_take_styles_for_their_own() -> None:
+    assert not any("styles" in entry.name for s in ALL_SETTINGS for entry in presets.shipped(s))

@@ -1,0 +1,165 @@
+"""Makes the hairstyles that ship, from their recipes.
+
+python tools/make_styles.py [NAME ...]                write presets/styles/NAME.json and NAME.npz
+python tools/make_styles.py --pictures FOLDER [NAME ...]   then draw each from four sides, and its
+                                                           thumbnail, presets/styles/NAME.png
+python tools/make_styles.py --draw-only --pictures FOLDER [NAME ...]   draw what there is
+
+The recipes are in tools/style_recipes.py, what they grow with in tools/style_growth.py.
+"""
+
+import argparse
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import bpy
+import gpu
+import numpy as np
+from extension_loader import REPOSITORY, load_package
+from preset_pictures import THUMBNAIL, coarse
+from style_growth import Head, of_addon
+from style_recipes import RECIPES
+
+STYLES = REPOSITORY / "presets" / "styles"
+#: where pictures look from: directions from the head to the eye
+VIEWS = ((0.0, -1.0, 0.08), (-0.75, -0.75, 0.12), (-1.0, 0.0, 0.08), (0.0, 1.0, 0.12))
+WIDTH, HEIGHT, SAMPLES = 220, 264, 2
+#: enough children for a thumbnail
+THUMBNAIL_STRANDS = 9000
+#: where thumbnails look from if the style shows better from there
+THUMBNAIL_VIEWS = dict.fromkeys(("ponytail", "bun", "braid"), (-0.85, 0.6, 0.2))
+
+
+def make(names: list[str]) -> None:
+    """Write the styles of these names."""
+    head = Head()
+    hairstyles = of_addon("exchange.hairstyles")
+    STYLES.mkdir(parents=True, exist_ok=True)
+    for name in names:
+        begun = time.perf_counter()
+        style = RECIPES[name](head)
+        path = STYLES / f"{name}.json"
+        hairstyles.write_hairstyle(path, style)
+        size = path.with_suffix(".npz").stat().st_size // 1024
+        took = time.perf_counter() - begun
+        print(f"{name}: {len(style.guides.group):,} guides, {size} KB, {took:.1f} s", flush=True)
+
+
+def rig_of(name: str, most: int = 1_000_000) -> tuple[Any, bpy.types.Object]:
+    """A style added to a new scene by the artist's own way, made ready to be drawn.
+
+    Args:
+        most: children.
+    """
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    setup = of_addon("blender.setup.hairstyles")
+    collection = bpy.context.collection
+    head = setup.add_head(collection, "light")
+    bpy.context.view_layer.update()
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    hair = setup.add_hairstyle(setup.named_hairstyle(name), head, depsgraph, collection)
+    children = hair.data.hairloom.children
+    children.strand_count = min(children.strand_count, most)
+    inputs = of_addon("blender.command_line.inputs")
+    sources = inputs.Sources(
+        groom=hair.name, children_density=hair.hairloom.children_density, with_face=True
+    )
+    own = of_addon("blender.command_line.object_settings").own_settings(hair)
+    read = inputs.read_inputs(sources, of_addon("groom.settings").GrowSettings())
+    rig = of_addon("pipeline").prepare(
+        read.strands,
+        read.head,
+        own["guides"],
+        place=name,
+        children=own["children"],
+        density=read.density,
+        widths=own["widths"].method,
+    )
+    return rig, hair
+
+
+def studio_of(rig: Any, hair: bpy.types.Object) -> Any:
+    """Draws this hair in its own look."""
+    parameters, of = of_addon("parameters").ALL_SETTINGS, of_addon
+    own = of("blender.command_line.object_settings").own_settings(hair)
+    settings = {section: kind() for section, kind in parameters.items()} | own
+    return of("blender.pictures.studio").Studio(
+        of("blender.sessions.prepared_groom").prepared(rig, settings["ambient"]),
+        of("blender.properties.groom_settings").GroomSettings(
+            of("params").SettingsMap(*settings.values())
+        ),
+        look=of("blender.scene.built_in_head").built_in_head().look("light"),
+    )
+
+
+def camera_at(rig: Any, direction: tuple[float, float, float], aspect: float) -> Any:
+    """It holds the hair, and the head down to the shoulders."""
+    low, high = rig.strands.bounds()
+    low, high = np.minimum(low, (-0.11, -0.11, -0.2)), np.maximum(high, (0.11, 0.12, 0.12))
+    return of_addon("render.camera").frame_camera(
+        (low, high), direction, np.radians(24.0), aspect, margin=0.95
+    )
+
+
+def draw_thumbnail(name: str) -> None:
+    """presets/styles/NAME.png, with fewer strands: it is small."""
+    rig, hair = rig_of(name, THUMBNAIL_STRANDS)
+    camera = camera_at(rig, THUMBNAIL_VIEWS.get(name, VIEWS[1]), 1.0)
+    size = THUMBNAIL, THUMBNAIL, SAMPLES
+    picture = studio_of(rig, hair).picture(
+        rig.rest_pose, rig.strands.points, *size, camera=camera, is_transparent=True
+    )
+    of_addon("blender.base.images").write_png(STYLES / f"{name}.png", coarse(picture))
+    print(f"{name}: thumbnail", flush=True)
+
+
+def draw(name: str, folder: Path) -> None:
+    """NAME.png: the style from the front, three quarters, the side and the back."""
+    rig, hair = rig_of(name)
+    studio = studio_of(rig, hair)
+    pictures = [
+        studio.picture(
+            rig.rest_pose,
+            rig.strands.points,
+            WIDTH,
+            HEIGHT,
+            SAMPLES,
+            camera=camera_at(rig, direction, WIDTH / HEIGHT),
+        )
+        for direction in VIEWS
+    ]
+    folder.mkdir(parents=True, exist_ok=True)
+    sheet = of_addon("blender.base.images").contact_sheet(pictures, len(VIEWS))
+    studio.write(folder / f"{name}.png", sheet)
+    count, notes = rig.strands.strand_count, [*rig.notes, *studio.notes]
+    print(f"{name}: {count:,} strands; {rig.widths.line}. {notes}", flush=True)
+
+
+def main() -> int:
+    options = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    options.add_argument("names", nargs="*", metavar="NAME", default=[])
+    options.add_argument("--pictures", type=Path, metavar="FOLDER")
+    options.add_argument("--draw-only", action="store_true", help="what there is")
+    options.add_argument("--thumbnails", action="store_true", help="draw these alone")
+    chosen = options.parse_args()
+    names = chosen.names or list(RECIPES)
+    unknown = sorted(set(names) - set(RECIPES))
+    if unknown:
+        sys.exit(f"There is no recipe {', '.join(unknown)}; there are {', '.join(RECIPES)}")
+    gpu.init()
+    load_package().register()
+    if not chosen.draw_only:
+        make(names)
+    for name in names if chosen.pictures else ():
+        draw_thumbnail(name)
+    for name in names if chosen.pictures and not chosen.thumbnails else ():
+        draw(name, chosen.pictures.resolve())
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,631 @@
+"""The recipes of the hairstyles that ship: partings, flows, lengths and cuts over the scalp.
+
+`make styles` makes the files of presets/styles from them. A recipe takes the head and returns the
+style; all lengths are in metres, see tools/style_growth.py.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from style_growth import (
+    CROWN,
+    Head,
+    Roots,
+    along_skin,
+    cut,
+    evenly,
+    of_addon,
+    ramp,
+    shortened,
+    unit,
+)
+
+SOURCE = "tools/style_recipes.py"
+
+#: name -> what makes the style
+RECIPES: dict[str, Callable[[Head], Any]] = {}
+
+
+def recipe(make: Callable[[Head], Any]) -> Callable[[Head], Any]:
+    RECIPES[make.__name__] = make
+    return make
+
+
+def style(title: str, order: int, shapes: Any, look: str, **parts: Any) -> Any:
+    """A Hairstyle; `parts`: modifiers, and settings by section."""
+    hairstyles = of_addon("exchange.hairstyles")
+    modifiers = tuple(
+        hairstyles.NodeModifier(nodes, inputs) for nodes, inputs in parts.pop("modifiers", ())
+    )
+    mask = parts.pop("mask", "scalp")
+    presets = (f"looks/{look}", *parts.pop("presets", ()))
+    return hairstyles.Hairstyle(
+        title=title,
+        guides=shapes,
+        source=SOURCE,
+        order=order,
+        masks={"children": mask},
+        modifiers=modifiers,
+        presets=presets,
+        settings=parts,
+    )
+
+
+def children(count: int, **values: Any) -> dict[str, Any]:
+    return {"method": "multi", "strand_count": count, **values}
+
+
+def toward(x: Any, y: Any, z: Any) -> np.ndarray:
+    """Directions (n, 3) of parts that are numbers or (n,)."""
+    return np.stack(np.broadcast_arrays(x, y, z), axis=1).astype(float)
+
+
+def whorl(points: np.ndarray, roots: Roots, _reached: np.ndarray) -> np.ndarray:
+    """As hair grows: away from the crown, and a little around it."""
+    away = along_skin(roots.place - CROWN, roots)
+    return unit(away + 0.3 * np.cross(roots.normal, away))
+
+
+@recipe
+def buzz_cut(head: Head) -> Any:
+    roots = head.roots(1200, "scalp")
+    length = 0.0045 + 0.0015 * ramp(0.0, 0.06, roots.height)
+    locks = head.combed(roots, whorl, length, 6, lift=0.65, clearance=lambda s: 0.3 * s)
+    return style(
+        "Buzz Cut",
+        10,
+        head.shapes(roots, locks),
+        "brown",
+        children=children(45000, length_variation=0.25, clump=0.0, frizz=0.01, scatter=0.5),
+        presets=("dynamics/stiff",),
+    )
+
+
+@recipe
+def crop_fade(head: Head) -> Any:
+    roots = head.roots(2000, "scalp")
+    z = roots.height
+    top = ramp(0.045, 0.082, z)
+    length = 0.0016 + 0.003 * ramp(-0.04, 0.02, z) + 0.009 * ramp(0.0, 0.06, z) + 0.022 * top
+    length = length * (0.85 + 0.3 * roots.random[:, 0])
+    front = top * ramp(0.06, 0.02, roots.place[:, 1])
+
+    def flow(points: np.ndarray, roots: Roots, _reached: np.ndarray) -> np.ndarray:
+        ahead = toward(0.5 * (roots.random[:, 1] - 0.5), -1.0, 0.3)
+        return (1.0 - front)[:, None] * whorl(points, roots, _reached) + front[:, None] * ahead
+
+    locks = head.combed(
+        roots, flow, length, 8, lift=0.5 + 0.2 * front, follow=0.5, clearance=lambda s: 0.3 * s
+    )
+    return style(
+        "Crop with Fade",
+        20,
+        head.shapes(roots, locks),
+        "black",
+        children=children(
+            50000, length_variation=0.3, clump=0.25, clump_size=10, frizz=0.03, scatter=0.3
+        ),
+        presets=("dynamics/stiff",),
+    )
+
+
+def on_skull(points: np.ndarray) -> np.ndarray:
+    """How much hair lies on the head, which it does not further down, where it hangs."""
+    return 1.2 * ramp(-0.02, 0.04, points[:, 2])
+
+
+def swept(at: float, back: float) -> Any:
+    """Hair that is combed from a parting at x = `at` to both sides, and back."""
+
+    def flow(points: np.ndarray, roots: Roots, _reached: np.ndarray) -> np.ndarray:
+        z = points[:, 2]
+        side = np.clip((roots.place[:, 0] - at) / spread(roots), -1.0, 1.0)
+        on_top = ramp(0.03, 0.085, z)
+        return toward(
+            side * on_top,
+            back * on_top + 0.55 * (1 - on_top),
+            0.05 - 0.9 * (1 - on_top) * ramp(0.09, 0.0, z),
+        )
+
+    return flow
+
+
+def short_at_ears(roots: Roots) -> np.ndarray:
+    """A factor of the length: sideburns and what is right above the ears do not cover them."""
+    _, y, z = roots.place.T
+    above_ear = ramp(-0.045, -0.03, y) * ramp(0.05, 0.035, y) * ramp(0.045, 0.022, z)
+    return 1.0 - 0.8 * above_ear
+
+
+def spread(roots: Roots) -> np.ndarray:
+    """How wide a parting is: a line at the front that opens towards the crown [m]."""
+    return 0.0004 + 0.045 * ramp(0.0, 0.07, roots.place[:, 1])
+
+
+@recipe
+def side_part(head: Head) -> Any:
+    roots = head.roots(1700, "scalp")
+    z = roots.height
+    length = 0.012 + 0.02 * ramp(-0.05, 0.03, z) + 0.065 * ramp(0.04, 0.09, z)
+    length = length * short_at_ears(roots)
+    locks = head.combed(
+        roots,
+        swept(-0.034, 0.35),
+        length,
+        14,
+        lift=0.25 + 0.2 * ramp(0.04, 0.09, z),
+        follow=0.75,
+        hug=on_skull,
+        clearance=lambda s: 0.001 + 0.14 * np.minimum(s, 0.09),
+    )
+    return style(
+        "Side Part",
+        30,
+        head.shapes(roots, locks, sides(roots, -0.034)),
+        "brown",
+        children=children(
+            36000, length_variation=0.2, clump=0.35, clump_size=20, frizz=0.008, parting=0.9
+        ),
+        presets=("dynamics/stiff",),
+    )
+
+
+@recipe
+def slicked_back(head: Head) -> Any:
+    roots = head.roots(1500, "scalp")
+
+    def flow(points: np.ndarray, _roots: Roots, _reached: np.ndarray) -> np.ndarray:
+        x, y, z = points.T
+        # over the ears it goes straight back
+        down = -0.05 - 1.3 * ramp(0.04, 0.1, y) - 0.5 * ramp(0.06, 0.0, z) * ramp(0.03, 0.05, y)
+        in_behind = -0.25 * np.sign(x) * ramp(0.0, 0.09, y)
+        return toward(in_behind, 1.0 - 0.75 * ramp(0.04, 0.1, y), down)
+
+    length = (0.05 + 0.07 * ramp(0.0, 0.08, roots.height)) * short_at_ears(roots)
+    locks = head.combed(
+        roots,
+        flow,
+        length,
+        16,
+        lift=0.25,
+        follow=0.8,
+        hug=on_skull,
+        clearance=lambda s: 0.0015 + 0.09 * np.minimum(s, 0.07),
+    )
+    return style(
+        "Slicked Back",
+        40,
+        head.shapes(roots, locks),
+        "black",
+        children=children(30000, length_variation=0.25, clump=0.5, clump_size=25, frizz=0.004),
+        presets=("dynamics/stiff",),
+    )
+
+
+def parted(at: float, back: float) -> Any:
+    """Hair that falls to both sides of a parting at x = `at`, away from the face."""
+
+    def flow(points: np.ndarray, roots: Roots, _reached: np.ndarray) -> np.ndarray:
+        x, y, z = points.T
+        side = np.clip((roots.place[:, 0] - at) / spread(roots), -1.0, 1.0)
+        on_top = ramp(0.05, 0.1, z) * ramp(0.078, 0.06, np.abs(x)) * ramp(0.115, 0.09, y)
+        behind = ramp(-0.01, -0.07, y) * ramp(-0.16, -0.02, z)
+        before_face = ramp(0.088, 0.066, np.abs(x)) * ramp(-0.03, -0.06, y)
+        rear = on_top * ramp(0.02, 0.07, roots.place[:, 1])
+        return toward(
+            side * (1.1 * on_top + 1.3 * before_face),
+            back * on_top + 0.8 * rear + 0.9 * behind,
+            -0.25 - 1.4 * (1 - on_top),
+        )
+
+    return flow
+
+
+def sides(roots: Roots, at: float) -> np.ndarray:
+    """Groups on both sides of a parting: no child lies between them."""
+    return (roots.place[:, 0] > at).astype(np.int32)
+
+
+def layers(most: float, per_length: float = 0.14) -> Callable[[np.ndarray], np.ndarray]:
+    """How far hair keeps from the skin: what comes from further up lies over the rest."""
+    return lambda reached: 0.002 + np.minimum(per_length * reached, most)
+
+
+@recipe
+def bob(head: Head) -> Any:
+    roots = head.roots(1600, "scalp")
+    locks = head.combed(
+        roots,
+        parted(-0.022, 0.25),
+        0.30,
+        24,
+        lift=0.3,
+        follow=0.6,
+        hug=on_skull,
+        clearance=layers(0.016),
+    )
+    locks = cut(locks, lambda p: p[:, 2] + 0.098 + 0.15 * np.minimum(-p[:, 1], 0.06))
+    return style(
+        "Bob",
+        50,
+        head.shapes(roots, locks, sides(roots, -0.012)),
+        "brown",
+        children=children(
+            28000, length_variation=0.05, clump=0.35, clump_size=30, frizz=0.002, parting=1.0
+        ),
+        presets=("dynamics/natural",),
+    )
+
+
+def long_locks(
+    head: Head, roots: Roots, length: Any, at: float = 0.0, volume: float = 0.013
+) -> Any:
+    locks = head.combed(
+        roots,
+        parted(at, 0.3),
+        length,
+        28,
+        lift=0.25,
+        follow=0.6,
+        hug=on_skull,
+        clearance=layers(volume),
+    )
+    return head.settled(roots, locks, 1.5)
+
+
+@recipe
+def long_straight(head: Head) -> Any:
+    roots = head.roots(1500, "scalp")
+    length = 0.28 * (0.92 + 0.08 * roots.random[:, 0])
+    return style(
+        "Long and Straight",
+        60,
+        head.shapes(roots, long_locks(head, roots, length), sides(roots, 0.0)),
+        "brown",
+        children=children(
+            30000, length_variation=0.12, clump=0.4, clump_size=30, frizz=0.0015, parting=1.0
+        ),
+        presets=("dynamics/soft",),
+    )
+
+
+@recipe
+def layered_fringe(head: Head) -> Any:
+    roots = head.roots(1700, "scalp")
+    x, y, z = roots.place.T
+    is_fringe = (y < -0.035) & (np.abs(x) < 0.046) & (z > 0.05)
+    length = np.where(is_fringe, 0.14, 0.17 + 0.06 * ramp(0.06, -0.03, z))
+    locks = long_locks(head, roots, length * (0.9 + 0.1 * roots.random[:, 0]), 0.0, 0.016)
+    fringe = np.flatnonzero(is_fringe)
+    some = roots.take(fringe)
+
+    def ahead(points: np.ndarray, _roots: Roots, _reached: np.ndarray) -> np.ndarray:
+        return toward(3.0 * points[:, 0], -1.0 * ramp(-0.1, -0.08, points[:, 1]), -0.45)
+
+    front = head.combed(
+        some, ahead, 0.14, 28, lift=0.4, follow=0.6, hug=on_skull, clearance=layers(0.010, 0.2)
+    )
+    front = cut(front, lambda p: p[:, 2] - 0.022 + 3.5 * p[:, 0] ** 2)
+    locks[fringe] = front
+    return style(
+        "Layered with Fringe",
+        80,
+        head.shapes(roots, locks, np.where(is_fringe, 2, sides(roots, 0.0))),
+        "red",
+        children=children(
+            30000, length_variation=0.25, clump=0.5, clump_size=30, frizz=0.003, parting=0.9
+        ),
+        presets=("dynamics/natural",),
+    )
+
+
+@recipe
+def curls(head: Head) -> Any:
+    roots = head.roots(1500, "scalp")
+    length = 0.17 + 0.03 * roots.random[:, 0]
+    locks = head.combed(
+        roots, parted(-0.03, 0.35), length, 20, lift=0.5, follow=0.45, clearance=layers(0.03, 0.6)
+    )
+    return style(
+        "Curls",
+        90,
+        head.shapes(roots, locks, sides(roots, -0.03)),
+        "brown",
+        modifiers=(
+            (
+                "Curl Hair Curves",
+                {
+                    "Radius": 0.0075,
+                    "Frequency": 7.0,
+                    "Subdivision": 2,
+                    "Curl Start": 0.12,
+                    "Random Offset": 0.5,
+                    "Guide Distance": 0.0,
+                },
+            ),
+        ),
+        children=children(
+            16000, method="single", length_variation=0.15, clump=0.75, clump_size=10, frizz=0.004
+        ),
+        presets=("dynamics/natural",),
+    )
+
+
+@recipe
+def coils(head: Head) -> Any:
+    roots = head.roots(1800, "scalp")
+    length = 0.085 + 0.03 * roots.random[:, 0]
+
+    def flow(points: np.ndarray, roots: Roots, reached: np.ndarray) -> np.ndarray:
+        droop = ramp(0.0, 0.09, reached)[:, None] * np.array([0.0, 0.0, -1.2])
+        return roots.normal + 0.3 * whorl(points, roots, reached) + droop
+
+    locks = head.combed(roots, flow, length, 16, lift=0.8, follow=0.5, clearance=layers(0.02, 0.4))
+    return style(
+        "Coils",
+        100,
+        head.shapes(roots, locks),
+        "black",
+        modifiers=(
+            (
+                "Curl Hair Curves",
+                {
+                    "Radius": 0.0052,
+                    "Frequency": 8.0,
+                    "Subdivision": 3,
+                    "Curl Start": 0.02,
+                    "Random Offset": 1.0,
+                    "Guide Distance": 0.0,
+                },
+            ),
+        ),
+        children=children(
+            20000, method="single", length_variation=0.15, clump=0.93, clump_size=10, frizz=0.003
+        ),
+        presets=("dynamics/stiff",),
+    )
+
+
+@recipe
+def afro(head: Head) -> Any:
+    roots = head.roots(2600, "scalp")
+
+    def flow(points: np.ndarray, roots: Roots, _reached: np.ndarray) -> np.ndarray:
+        return unit(points - np.array([0.0, 0.015, 0.005])) + 0.5 * (roots.random[:, 1:] - 0.5)
+
+    locks = head.combed(roots, flow, 0.11, 16, lift=0.6, follow=0.6, clearance=lambda s: 0.6 * s)
+    middle, axes = np.array([0.0, 0.02, 0.035]), np.array([0.135, 0.14, 0.135])
+    locks = cut(locks, lambda p: 1.0 - np.linalg.norm((p - middle) / axes, axis=1))
+    return style(
+        "Afro",
+        110,
+        head.shapes(roots, locks),
+        "black",
+        modifiers=(
+            (
+                "Curl Hair Curves",
+                {
+                    "Radius": 0.0032,
+                    "Frequency": 9.0,
+                    "Subdivision": 3,
+                    "Curl Start": 0.05,
+                    "Random Offset": 1.0,
+                    "Guide Distance": 0.0,
+                },
+            ),
+        ),
+        children=children(
+            18000, method="single", length_variation=0.12, clump=0.4, clump_size=6, frizz=0.02
+        ),
+        presets=("dynamics/stiff",),
+    )
+
+
+KNOT = np.array([0.0, 0.128, 0.045])
+
+
+def section(roots: Roots, knot: np.ndarray) -> np.ndarray:
+    """Where each lock is in the round section of a tail, (n, 2) up to 1: as around the knot."""
+    seen = roots.place - knot
+    angle = np.arctan2(seen[:, 2], seen[:, 0])
+    far = np.sqrt(np.argsort(np.argsort(np.linalg.norm(seen, axis=1))) / len(seen))
+    return np.stack([far * np.cos(angle), far * np.sin(angle)], axis=1)
+
+
+def tube(line: np.ndarray, radius: np.ndarray, place: np.ndarray, across: np.ndarray) -> np.ndarray:
+    """Paths (n, m, 3) along a line (m, 3), at places (n, 2) of its section.
+
+    Args:
+        across: unit vector that is across the line everywhere, the first axis of the section.
+    """
+    ahead = unit(np.gradient(line, axis=0))
+    other = unit(np.cross(ahead, across))
+    return (
+        line
+        + place[:, :1, None] * radius[None, :, None] * across
+        + place[:, 1:, None] * (radius[:, None] * other)[None]
+    )
+
+
+@recipe
+def ponytail(head: Head) -> Any:
+    roots = head.roots(1500, "scalp")
+    place = section(roots, KNOT)
+    s = np.linspace(0.0, 1.0, 24)
+    # out of the tie, then down in an arc
+    turn = np.radians(22.0) - np.radians(108.0) * ramp(0.0, 0.42, s)
+    step = 0.27 / (len(s) - 1)
+    walked = np.stack([0 * s, np.cos(turn), np.sin(turn)], axis=1) * step
+    line = KNOT + np.concatenate([np.zeros((1, 3)), np.cumsum(walked[:-1], axis=0)])
+    radius = 0.009 + 0.023 * ramp(0.0, 0.4, s) - 0.008 * ramp(0.6, 1.0, s)
+    tail = tube(line, radius, place, np.array([1.0, 0.0, 0.0]))
+    # tips taper, and no lock runs quite beside the next
+    loose = 0.010 * ramp(0.05, 0.7, s)[None, :, None]
+    tail = tail + loose * (roots.random[:, None, 1:] - 0.5)
+    tail = shortened(tail, (len(s) - 1) * (1.0 - 0.3 * roots.random[:, 0] ** 1.5))
+    drawn = head.gathered(roots, tail[:, 0], 20)
+    locks = evenly(np.concatenate([drawn[:, :-1], tail], axis=1), 36)
+    locks = head.kept_out(locks)
+    return style(
+        "Ponytail",
+        120,
+        head.shapes(roots, locks),
+        "blond",
+        children=children(
+            28000, length_variation=0.12, clump=0.3, clump_size=40, frizz=0.0012, parting=3.0
+        ),
+        presets=("dynamics/natural",),
+    )
+
+
+@recipe
+def bun(head: Head) -> Any:
+    roots = head.roots(1500, "scalp")
+    knot = np.array([0.0, 0.118, 0.062])
+    out = unit(np.array([0.0, 0.9, 0.45]))
+    one, other = np.array([1.0, 0.0, 0.0]), unit(np.cross(out, [1.0, 0.0, 0.0]))
+    place = section(roots, knot)
+    angle = np.arctan2(place[:, 1], place[:, 0])[:, None]
+    far = np.linalg.norm(place, axis=1)[:, None]
+    s = np.linspace(0.0, 1.0, 44)[None]
+    wound = angle + 2.0 * np.pi * 1.6 * s
+    # around a ring, and around the ring's own core as a rope is twisted
+    core = 2.0 * np.pi * (0.9 * s) + 6.0 * far + angle
+    ring = 0.006 + 0.02 * ramp(0.0, 0.2, s)
+    thick = (0.004 + 0.014 * ramp(0.0, 0.2, s)) * np.sqrt(0.15 + 0.85 * far)
+    away = ring + thick * np.cos(core)
+    height = 0.012 + thick * np.sin(core)
+    knots = (
+        knot
+        + away[..., None] * (np.cos(wound)[..., None] * one + np.sin(wound)[..., None] * other)
+        + height[..., None] * out
+    )
+    drawn = head.gathered(roots, knots[:, 0], 20)
+    locks = evenly(np.concatenate([drawn[:, :-1], knots], axis=1), 48)
+    return style(
+        "Bun",
+        130,
+        head.shapes(roots, head.kept_out(locks)),
+        "brown",
+        children=children(
+            26000, length_variation=0.03, clump=0.3, clump_size=40, frizz=0.0012, parting=3.0
+        ),
+        presets=("dynamics/stiff",),
+    )
+
+
+@recipe
+def braid(head: Head) -> Any:
+    roots = head.roots(1800, "scalp")
+    knot = np.array([0.0, 0.112, -0.03])
+    group = np.digitize(roots.place[:, 0], (-0.028, 0.028))
+    cv_count, length = 48, 0.2
+    s = np.linspace(0.0, 1.0, cv_count)
+    line = knot + np.stack([0 * s, 0.02 * ramp(0, 0.2, s) + 0.0 * s, -length * s], axis=1)
+    for _ in range(3):  # down the neck and over the back
+        distance, outward = head.away(line)
+        line = line + np.maximum(0.024 - distance, 0.0)[:, None] * outward
+    phase = 2.0 * np.pi * length / 0.062 * s
+    narrow = 1.0 - 0.35 * s
+    tied = 1.0 - 0.75 * np.exp(-(((s - 0.88) / 0.025) ** 2))
+    paths = np.empty((len(roots.place), cv_count, 3))
+    for part in range(3):
+        of_part = np.flatnonzero(group == part)
+        shift = phase + 2.0 * np.pi * part / 3.0
+        is_woven = ramp(0.0, 0.08, s) * ramp(0.9, 0.86, s)
+        center = line + (0.0155 * narrow * is_woven * np.sin(shift))[:, None] * [1.0, 0.0, 0.0]
+        center = center + (0.0085 * narrow * is_woven * np.sin(2.0 * shift))[:, None] * [0, 1.0, 0]
+        place = section(roots.take(of_part), knot)
+        radius = 0.0135 * narrow * tied
+        paths[of_part] = tube(center, radius, place, np.array([1.0, 0.0, 0.0]))
+    drawn = head.gathered(roots, paths[:, 0], 20, 0.005)
+    locks = evenly(np.concatenate([drawn[:, :-1], paths], axis=1), 72)
+    return style(
+        "Braid",
+        140,
+        head.shapes(roots, head.kept_out(locks), group.astype(np.int32)),
+        "brown",
+        children=children(
+            24000, length_variation=0.06, clump=0.2, clump_size=40, frizz=0.0012, parting=3.0
+        ),
+        guides={"cv_count": 32},
+        presets=("dynamics/natural",),
+    )
+
+
+@recipe
+def undercut(head: Head) -> Any:
+    roots = head.roots(1900, "scalp")
+    _, y, z = roots.place.T
+    is_top = z - 0.25 * np.maximum(y - 0.06, 0.0) > 0.062
+    length = np.where(is_top, 0.10 + 0.015 * roots.random[:, 0], 0.0032)
+    sides = head.combed(roots, whorl, length, 16, lift=0.6, clearance=lambda s: 0.3 * s)
+    top = head.combed(
+        roots,
+        swept(-0.045, 0.75),
+        length,
+        16,
+        lift=0.45,
+        follow=0.6,
+        hug=on_skull,
+        clearance=lambda s: 0.002 + 0.2 * np.minimum(s, 0.1),
+    )
+    locks = np.where(is_top[:, None, None], top, sides)
+    return style(
+        "Undercut",
+        150,
+        head.shapes(roots, locks, is_top.astype(np.int32)),
+        "dyed",
+        children=children(
+            42000, length_variation=0.2, clump=0.15, clump_size=20, frizz=0.006, parting=0.9
+        ),
+        presets=("dynamics/stiff",),
+    )
+
+
+def beard_flow(points: np.ndarray, roots: Roots, _reached: np.ndarray) -> np.ndarray:
+    """Down and a little ahead, over the lip to both sides."""
+    x, y, z = roots.place.T
+    over_lip = (np.abs(x) < 0.028) & (z > -0.066) & (y < -0.08)
+    aside = np.where(over_lip, 1.2 * np.sign(x + 1e-9), 3.0 * x)
+    ahead = np.where(over_lip, -0.1, -0.35 * ramp(-0.03, -0.09, y))
+    return toward(aside, ahead, -0.9)
+
+
+@recipe
+def stubble(head: Head) -> Any:
+    roots = head.roots(900, "beard")
+    locks = head.combed(roots, beard_flow, 0.0024, 5, lift=0.5, clearance=lambda s: 0.25 * s)
+    return style(
+        "Stubble",
+        210,
+        head.shapes(roots, locks),
+        "brown",
+        mask="beard",
+        children=children(12000, length_variation=0.4, clump=0.0, frizz=0.02, scatter=0.6),
+        presets=("dynamics/stiff",),
+    )
+
+
+@recipe
+def full_beard(head: Head) -> Any:
+    roots = head.roots(1300, "beard")
+    x, y, z = roots.place.T
+    over_lip = (np.abs(x) < 0.03) & (z > -0.066) & (y < -0.08)
+    length = 0.012 + 0.03 * ramp(-0.04, -0.11, z) * ramp(-0.01, -0.07, y)
+    length = np.where(over_lip, 0.017, length) * (0.8 + 0.3 * roots.random[:, 0])
+    locks = head.combed(
+        roots, beard_flow, length, 10, lift=0.4, follow=0.6, clearance=lambda s: 0.0005 + 0.25 * s
+    )
+    return style(
+        "Full Beard",
+        220,
+        head.shapes(roots, locks),
+        "brown",
+        mask="beard",
+        children=children(
+            18000, length_variation=0.35, clump=0.4, clump_size=12, frizz=0.03, scatter=0.4
+        ),
+        presets=("dynamics/stiff",),
+    )
