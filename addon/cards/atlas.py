@@ -12,19 +12,26 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import Floats, Ints
+from ..arrays import Bools, Floats, Ints
 from ..errors import HairloomError
+from ..strands.face import is_face_hair
 from .atlas_grid import AtlasGrid
 from .atlas_settings import SIZES, AtlasSettings
 from .clusters import shared_out
 from .strip import CardFrames, Strips
 
+#: Tiles that brows, and that lashes have at least, where cards share them: of one or two an eye
+#: sees the pattern.
+_FACE_TILES = 6
 #: How many strands a tile holds at most, as a factor of its width in pixels.
 _MAX_STRANDS = 2
 #: How far a card may be widened or narrowed so that it covers as much as its own strands.
 _WIDTH_RANGE = (0.5, 2.0)
 #: A way aside that counts like another card being twice as wide: the sine of its angle.
 _WAVE = 0.2
+#: How much more roots on one side of a card lie ahead than on the other, as a slope, that counts as
+#: much: on the other side of a parting it is the other side.
+_SKEW = 0.5
 #: A difference of colour that counts as much, to the eye: of square roots of linear colours.
 _HUE = 0.15
 #: Beyond all colours, where a strand has none of its own.
@@ -95,11 +102,12 @@ def plan_atlas(
         )
     shapes = _card_shapes(strips, grid, radius, cluster)
     kind = _kinds(cluster, group, shapes.strand_count, atlas.tile_count)
+    is_face = _is_face(cluster, group)
     random = np.random.default_rng(settings.seed)
     features = shapes.features
     if color is not None:
         features = np.concatenate([features, _card_colors(color, cluster, len(strips))], axis=1)
-    tile, medoid = _shared_tiles(features, kind, atlas.tile_count, random)
+    tile, medoid = _shared_tiles(features, kind, is_face, atlas.tile_count, random)
     chosen = _of_cards(strips, medoid)
     strands, offsets, crowding = _baked_strands(cluster, medoid, settings, random)
     notes = (
@@ -114,7 +122,8 @@ def plan_atlas(
         strips=chosen,
         strands=strands,
         offsets=offsets,
-        thickness=crowding * settings.strand_width,
+        # brows and lashes are seen face to face
+        thickness=crowding * np.where(is_face[medoid], 1.0, settings.strand_width),
         notes=notes,
     )
 
@@ -126,7 +135,7 @@ class _CardShapes:
     strand_count: (n,).
     covered: (n, row_count) fraction of each row that its strands cover.
     spacing: (n, row_count) distance from row to row [m].
-    features: (n, 5), each weighted by how visible it is.
+    features: (n, 6), each weighted by how visible it is.
     """
 
     strand_count: Ints
@@ -148,7 +157,9 @@ def _card_shapes(strips: Strips, grid: Floats, radius: Floats, cluster: Ints) ->
     scales = (width.mean(axis=1), spacing.sum(axis=1), fill.mean(axis=1), count)
     octaves = [np.log2(np.maximum(scale / np.median(scale), _TINY)) for scale in scales]
     wave = np.bincount(cluster, _asides(strips.frames, grid, cluster), card_count) / count
-    return _CardShapes(count, covered, spacing, np.stack([*octaves, wave / _WAVE], axis=1))
+    skew = _skews(strips.frames, grid, cluster)
+    features = np.stack([*octaves, wave / _WAVE, skew / _SKEW], axis=1)
+    return _CardShapes(count, covered, spacing, features)
 
 
 def _card_colors(color: Floats, cluster: Ints, card_count: int) -> Floats:
@@ -171,6 +182,20 @@ def _asides(frames: CardFrames, grid: Floats, cluster: Ints) -> Floats:
     return mean
 
 
+def _skews(frames: CardFrames, grid: Floats, cluster: Ints) -> Floats:
+    """How much further along the card roots lie the further aside they do, (card_count,): the slope
+    of the line through them, within [-1, 1].
+    """
+    away = grid[:, 0] - frames.center[cluster, 0]
+    aside = np.einsum("si,si->s", away, frames.side[cluster, 0])
+    ahead = np.einsum("si,si->s", away, frames.tangent[cluster, 0])
+    count = np.bincount(cluster)
+    ahead -= (np.bincount(cluster, ahead) / count)[cluster]
+    aside -= (np.bincount(cluster, aside) / count)[cluster]
+    slope = np.bincount(cluster, aside * ahead) / np.maximum(np.bincount(cluster, aside**2), _TINY)
+    return np.clip(slope, -1.0, 1.0)
+
+
 def _kinds(cluster: Ints, group: Ints, strand_count: Ints, tile_count: int) -> Ints:
     """Cards of different kinds share no tile, (card_count,): groups, and single strands in each."""
     _, first = np.unique(cluster, return_index=True)
@@ -179,11 +204,23 @@ def _kinds(cluster: Ints, group: Ints, strand_count: Ints, tile_count: int) -> I
     return kind if len(pairs) <= tile_count else np.zeros_like(kind)
 
 
+def _is_face(cluster: Ints, group: Ints) -> Bools:
+    """Which cards are of brows or lashes, (card_count,)."""
+    return is_face_hair(group[np.unique(cluster, return_index=True)[1]])
+
+
 def _shared_tiles(
-    features: Floats, kind: Ints, tile_count: int, random: np.random.Generator
+    features: Floats,
+    kind: Ints,
+    is_face: Bools,
+    tile_count: int,
+    random: np.random.Generator,
 ) -> tuple[Ints, Ints]:
     """The tile of each card, (card_count,), and the card that each tile shows, (used tiles,)."""
-    parts = shared_out(min(tile_count, len(kind)), np.bincount(kind))
+    sizes = np.bincount(kind)
+    parts = shared_out(min(tile_count, len(kind)), sizes)
+    faces = np.bincount(kind, is_face) > 0.0
+    parts = np.maximum(parts, np.where(faces, np.minimum(_FACE_TILES, sizes), 1))
     while parts.sum() > tile_count:  # each kind has one at least
         parts[parts.argmax()] -= 1
     tile = np.zeros(len(kind), np.int32)

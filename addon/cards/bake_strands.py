@@ -18,6 +18,9 @@ from .atlas import AtlasPlan
 _NEAR = 0.25
 #: Part of a card's width, from its middle, in which strands stay where they are in any case.
 _KEPT = 0.35
+#: Strands that begin later than their card, by up to this fraction of its length, begin sooner by
+#: this part of it: where no other card lies over the first ones, along a parting, skin would show.
+_LATE, _SOONER = 0.06, 0.7
 #: Stations in place of each segment, so that bends are round.
 PIECES = 4
 _TINY = 1e-12
@@ -74,7 +77,7 @@ def flat_strands(
     shade, gain = _shades(plan, base, points.shape)
     at_cvs = (
         aside / width,
-        _within(np.linspace(0.0, 1.0, row_count) + ahead / spacing),
+        _sooner(_within(np.linspace(0.0, 1.0, row_count) + ahead / spacing)),
         np.clip(0.5 + outside / np.maximum(strips.width.mean(axis=1), _TINY)[tile, None], 0.0, 1.0),
         radii,
         width / spacing,
@@ -132,6 +135,14 @@ def _within(along: Floats) -> Floats:
     low = np.minimum(along.min(axis=1, keepdims=True), 0.0)
     high = np.maximum(along.max(axis=1, keepdims=True), 1.0)
     return (along - low) / (high - low)
+
+
+def _sooner(along: Floats) -> Floats:
+    """Strands that begin a little behind their card's begin, stretched towards it."""
+    root = along[:, :1]
+    start = root - _SOONER * np.minimum(root, _LATE)
+    stretched: Floats = start + (along - root) * (1.0 - start) / np.maximum(1.0 - root, _TINY)
+    return np.minimum(stretched, 1.0)
 
 
 def _squeezed(across: Floats, half: Floats, plan: AtlasPlan) -> Floats:

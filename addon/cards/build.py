@@ -21,6 +21,7 @@ from .layers import card_layers
 from .levels import card_levels
 from .occlusion import CardOccluder, occlusion_steps
 from .occlusion_settings import CardOcclusionSettings
+from .on_skin import on_skin
 from .order_check import wrong_fraction
 from .settings import CardSettings
 from .sort import VIEW_COUNT, CardOrders, SortBy, card_of_vertex, in_order, order_steps
@@ -115,6 +116,8 @@ def card_steps(
         error = settings.error * float(np.median(groom.strands.lengths()))
     levels = card_levels(cards, settings, error)
     meshes, errors = zip(*((level.mesh, level.error) for level in levels), strict=True)
+    usual = float(np.median(cards.strips.width[:, 0])) if len(cards) else 0.0
+    meshes = tuple(on_skin(mesh, groom.head, usual) for mesh in meshes)
     unsorted = tuple(mesh.triangles for mesh in meshes)
     build = CardBuild(meshes, unsorted, errors, plan)
     yield "Atlas"
@@ -173,7 +176,7 @@ def card_of_strand(groom: CardGroom, settings: CardSettings) -> Ints:
     grid, group = groom.strands.grid, groom.strands.group
     if settings.source == "guides":
         return cluster_of_guides(grid, group, groom.guides)
-    return cluster_of_strands(grid, group, settings)
+    return cluster_of_strands(grid, group, settings, groom.root_normal)
 
 
 def _orders(

@@ -3,22 +3,38 @@
 k-means (Lloyd 1982) with seeds far from each other (k-means++; Arthur and Vassilvitskii 2007). Two
 strands are as far apart as their points at a few stations are, so that root and shape count in one
 unit, metres.
+
+Along a parting and a hairline no other card lies over the roots of the first ones. There cards hold
+fewer strands, as artists lay narrow cards along a parting.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from ..arrays import Floats, Ints
+from ..arrays import Bools, Floats, Ints
 from ..strands.face import is_face_hair
+from ..strands.nearest import nearest_points
+from ..strands.vectors import unit
+from .strip import mean_spacing
 
 #: Places along a strand that are compared.
 _STATIONS = 6
 #: How much more than another place the root counts: cards shall not reach over a parting.
 _ROOT_WEIGHT = 2.0
-#: Cards of brows and of lashes, however few there are in all: six a side make a brow, three a rim
-#: the lashes of a lid.
-_MIN_FACE_CARDS = 12
+#: A card of brows or lashes holds no more strands than this, however few cards there are in all:
+#: their roots lie all over the brow, and are seen. But each has no more cards than this.
+_FACE_STRANDS, _MOST_FACE_CARDS = 8, 100
+#: A card at a rim has so many times fewer strands than others, but no more than this fraction of
+#: all cards lies there, nor of all strands.
+_RIM_FINER, _MOST_AT_RIM = 4.0, 0.4
+#: How far behind a root hair is looked for, in sides of the square that an average card's roots
+#: fill; and how much nearer it must be found, as a fraction of that.
+_RIM_DEPTH, _RIM_FREE = 0.5, 0.7
+#: The part of a strand by which it is judged which way it lies.
+_BEGIN = 0.2
+#: Hair that leans out of the upright by less than this sine lies over no roots.
+_LEANING = 1.0 / 3.0
 #: Strands that the means are found from; the others only join the nearest.
 _MAX_LEARNT = 20_000
 _ROUNDS = 12
@@ -26,31 +42,79 @@ _ROUNDS = 12
 _CHUNK = 2048
 
 
-def cluster_strands(grid: Floats, group: Ints, count: int, seed: int = 0) -> Ints:
+def cluster_strands(
+    grid: Floats, group: Ints, count: int, seed: int = 0, root_normal: Floats | None = None
+) -> Ints:
     """The cluster of each strand, (strand_count,) int32, numbered from 0 without gaps.
 
     No cluster holds strands of two groups. Each group gets clusters in proportion to its strands,
-    but at least one, and brows and lashes at least a dozen: there may be a few more than `count`,
-    but never more than strands.
+    but at least one, and brows and lashes one for every eight: there may be more than `count`, but
+    never more than strands.
 
     Args:
         grid: (strand_count, cv_count, 3) [m], root first.
         group: (strand_count,).
         count: clusters wanted.
         seed: another one gives other clusters.
+        root_normal: (strand_count, 3) unit normals of the head under the roots; None: clusters are
+            as large at partings and hairlines as elsewhere.
     """
     random = np.random.default_rng(seed)
     features = _features(grid)
     label = np.zeros(len(grid), np.int32)
     groups, sizes = np.unique(group, return_counts=True)
     first = 0
-    least = np.where(is_face_hair(groups), np.minimum(_MIN_FACE_CARDS, sizes), 1)
+    face = np.minimum(-(-sizes // _FACE_STRANDS), _MOST_FACE_CARDS)
+    least = np.where(is_face_hair(groups), face, 1)
     for name, wanted in zip(groups, np.maximum(shared_out(count, sizes), least), strict=True):
         own = np.flatnonzero(group == name)
-        found = _k_means(features[own], int(wanted), random)
-        label[own] = first + found
-        first += int(found.max()) + 1
+        normal = None if root_normal is None or is_face_hair(name) else root_normal[own]
+        for part, parts_wanted in _parts(grid[own], normal, int(wanted)):
+            found = _k_means(features[own[part]], parts_wanted, random)
+            label[own[part]] = first + found
+            first += int(found.max()) + 1
     return label
+
+
+def _parts(grid: Floats, root_normal: Floats | None, wanted: int) -> list[tuple[Ints, int]]:
+    """Strands of one group, at its rim and elsewhere, each with the clusters that it gets."""
+    everywhere: list[tuple[Ints, int]] = [(np.arange(len(grid)), wanted)]
+    if root_normal is None or wanted < 2:
+        return everywhere
+    is_rim = at_rim(grid, root_normal, len(grid) / wanted)
+    rim, rest = np.flatnonzero(is_rim), np.flatnonzero(~is_rim)
+    if len(rim) > _MOST_AT_RIM * len(grid):  # a fringe is all rim
+        return everywhere
+    finer = min(_RIM_FINER * len(rim) / len(grid), _MOST_AT_RIM)
+    at_rim_wanted = min(round(wanted * finer), len(rim))
+    if not at_rim_wanted:
+        return everywhere
+    return [(rest, min(wanted - at_rim_wanted, len(rest))), (rim, at_rim_wanted)]
+
+
+def at_rim(grid: Floats, root_normal: Floats, strands_per_card: float) -> Bools:
+    """Which strands no other hair lies over at the root, (strand_count,): along partings and
+    hairlines.
+
+    A little behind their roots, against the way that they lie, there is either no root, or one
+    whose hair lies the other way.
+
+    Args:
+        grid: (strand_count, cv_count, 3) [m], root first.
+        root_normal: (strand_count, 3) unit normals of the head under the roots.
+        strands_per_card: on average.
+    """
+    root = grid[:, 0].astype(np.float64)
+    way = grid[:, max(round(_BEGIN * (grid.shape[1] - 1)), 1)] - root
+    flat = way - root_normal * np.einsum("si,si->s", way, root_normal)[:, None]
+    lies = np.linalg.norm(flat, axis=1) > _LEANING * np.linalg.norm(way, axis=1)
+    flat = unit(flat)
+    # the nearest of points at random is half as far as they are apart in a square grid
+    behind = _RIM_DEPTH * strands_per_card**0.5 * 2.0 * mean_spacing(root)
+    nearest, away = (found[:, 0] for found in nearest_points(root - behind * flat, root, 1))
+    is_over = (away < _RIM_FREE * behind) & (np.einsum("si,si->s", flat, flat[nearest]) > 0.0)
+    rim: Bools = lies & ~is_over
+    return rim
 
 
 def cluster_of_guides(grid: Floats, group: Ints, guides: Ints) -> Ints:

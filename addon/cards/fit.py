@@ -32,15 +32,19 @@ _ROOT_REACH = 1.7
 _LEANING = 1.0 / 3.0
 
 
-def cluster_of_strands(grid: Floats, group: Ints, settings: CardSettings) -> Ints:
+def cluster_of_strands(
+    grid: Floats, group: Ints, settings: CardSettings, root_normal: Floats | None = None
+) -> Ints:
     """The card of each strand, (strand_count,) int32: clusters first, then the fly-aways.
 
     Args:
         grid: (strand_count, cv_count, 3) [m], root first.
         group: (strand_count,); no card holds strands of two.
+        root_normal: (strand_count, 3), see `cluster_strands`.
     """
     single = round(settings.card_count * settings.fly_aways)
-    cluster = cluster_strands(grid, group, max(settings.card_count - single, 1), settings.seed)
+    wanted = max(settings.card_count - single, 1)
+    cluster = cluster_strands(grid, group, wanted, settings.seed, root_normal)
     return with_fly_aways(grid, cluster, single)
 
 

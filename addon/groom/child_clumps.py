@@ -13,8 +13,8 @@ import numpy as np
 
 from ..arrays import Floats, Ints
 from ..params.curve import along
+from ..strands.nearest import nearest_points
 from .children_settings import ChildrenSettings
-from .nearest import nearest_points
 from .weights import by_group, directions, likeness
 
 #: Children of the first level.

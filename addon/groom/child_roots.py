@@ -9,10 +9,10 @@ import numpy as np
 
 from ..arrays import Bools, Floats, Ints
 from ..strands import StrandSet, Surface
+from ..strands.nearest import nearest_points
 from .blue_noise import require_area, spread_roots
 from .dart_throwing import Samples
 from .grown import checked_weights
-from .nearest import nearest_points
 from .triangle_subdivision import Pieces
 
 #: How far from its nearest guide a root may be that guides surround, in their spacings there.

@@ -17,12 +17,12 @@ import numpy as np
 from ..arrays import Floats
 from ..errors import HairloomError
 from ..strands import StrandSet, Surface
+from ..strands.nearest import nearest_points
 from .child_clumps import clump
 from .child_roots import ChildRoots, child_roots
 from .child_shape import frizz, mixed, shorten
 from .children_settings import ChildrenSettings
 from .counter_random import named, normal
-from .nearest import nearest_points
 from .weights import GUIDES_PER_STRAND, GuideWeights, child_weights
 
 #: Guides are as far apart as this neighbour is, in the middle.

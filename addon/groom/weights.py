@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays import Floats, Ints
-from .nearest import nearest_points
+from ..strands.nearest import nearest_points
 
 GUIDES_PER_STRAND = 3
 #: Guide spacings that a difference of 60 degrees in direction counts for.

@@ -19,7 +19,7 @@ import numpy as np
 from ..arrays import Floats, Ints
 from ..strands import StrandSet
 from ..strands.face import is_face_hair
-from .nearest import nearest_points
+from ..strands.nearest import nearest_points
 
 #: of a head: how many hairs, and the width of one in terms of the root of the area they grow on.
 _HAIRS, _HAIR = 120_000, 0.08 / 245.0
@@ -80,6 +80,12 @@ class Widths:
     extinction: float = 1.0
     reason: str = ""
     spacing: float = 0.0
+
+    @property
+    def hair_width(self) -> float:
+        """Of a hair that a strand stands for, as a fraction of the strand's: all of them together
+        block as much light as it does."""
+        return self.extinction / max(self.hairs, self.extinction)
 
     @property
     def numbers(self) -> tuple[float, float, float, float, float]:

@@ -15,8 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays import Bools, Floats, Ints
-from ..groom.nearest import nearest_points
 from ..strands import StrandSet, Surface
+from ..strands.nearest import nearest_points
 from ..strands.resample import resample
 
 #: directions around the hair that are tried

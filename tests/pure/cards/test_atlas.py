@@ -9,6 +9,7 @@ from hairloom.addon.cards.atlas import AtlasPlan, plan_atlas
 from hairloom.addon.cards.atlas_settings import AtlasSettings
 from hairloom.addon.cards.strip import CardFrames, Strips
 from hairloom.addon.errors import HairloomError
+from hairloom.addon.strands.face import BROWS
 
 ROWS = 8
 
@@ -84,6 +85,31 @@ def test_cards_of_different_colours_share_no_tile() -> None:
 
 def test_the_same_seed_gives_the_same_plan() -> None:
     np.testing.assert_array_equal(many().strands, many().strands)
+
+
+def test_brows_have_tiles_enough_and_strands_as_wide_as_they_are() -> None:
+    """Six of 16, where their share would be one; others are wider, since cards are seen aslant."""
+    parts = tufts(np.full(200, 0.02), np.full(200, 0.2), np.full(200, 6), 1e-4)
+    is_brow = np.arange(200) < 12
+    settings = AtlasSettings(size="512", columns=16, rows=1)
+    plan = plan_atlas(*parts, np.where(is_brow, BROWS, 0)[parts[3]], settings)
+    of_brows = np.unique(plan.tile[is_brow])
+    assert len(of_brows) == 6 and len(plan.strips) == 16
+    np.testing.assert_allclose(plan.thickness[of_brows], 1.0)
+    np.testing.assert_allclose(np.delete(plan.thickness, of_brows), settings.strand_width)
+
+
+def test_cards_of_both_sides_of_a_parting_share_no_tile() -> None:
+    """Alike but for on which side of the card roots lie ahead."""
+    parts = tufts(np.full(40, 0.02), np.full(40, 0.2), np.full(40, 6), 1e-4)
+    side, cluster = np.where(np.arange(40) % 2 == 0, 1.0, -1.0), parts[3]
+    frames = parts[0].frames
+    away = parts[1][:, 0] - frames.center[cluster, 0]
+    aside = np.einsum("si,si->s", away, frames.side[cluster, 0])
+    parts[1][:, 0] += (side[cluster] * aside)[:, None] * frames.tangent[cluster, 0]
+    settings = AtlasSettings(size="512", columns=2, rows=1)
+    plan = plan_atlas(*parts, np.zeros(240, int), settings)
+    assert {len(np.unique(side[plan.tile == tile])) for tile in range(2)} == {1}
 
 
 def test_groups_and_single_strands_share_no_tile() -> None:

@@ -4,7 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from hairloom.addon.cards.clusters import cluster_of_guides, cluster_strands, shared_out
+from hairloom.addon.cards.clusters import (
+    at_rim,
+    cluster_of_guides,
+    cluster_strands,
+    shared_out,
+)
 from hairloom.addon.strands.face import BROWS, LASHES
 
 
@@ -118,12 +123,45 @@ def test_cards_are_shared_out_by_size() -> None:
     np.testing.assert_array_equal(shared_out(100, np.array([3, 5])), [3, 5])
 
 
-def test_brows_and_lashes_keep_enough_cards() -> None:
+def test_cards_of_brows_and_lashes_hold_few_strands() -> None:
     """Of few cards in all they would get one or two, which are blocks."""
     grid, _ = bundles(12, 60)
     group = np.repeat([0, BROWS, LASHES], [600, 80, 40]).astype(np.int32)
     label = cluster_strands(grid, group, 20)
     cards = {name: len(np.unique(label[group == name])) for name in (0, BROWS, LASHES)}
-    assert cards[BROWS] == cards[LASHES] == 12 and cards[0] <= 20
+    assert cards[BROWS] == 10 and cards[LASHES] == 5 and cards[0] <= 20
     few = cluster_strands(grid[:603], np.repeat([0, BROWS], [600, 3]), 20)
-    assert len(np.unique(few[600:])) == 3
+    assert len(np.unique(few[600:])) == 1
+
+
+def parted(count: int = 4000, lift: float = 0.2) -> tuple[np.ndarray, np.ndarray]:
+    """Hair on a square of 10 cm, combed away from its middle line: (n, 8, 3), and normals."""
+    roots = np.random.default_rng(6).uniform(-0.05, 0.05, (count, 3)) * [1.0, 1.0, 0.0]
+    way = np.stack([np.sign(roots[:, 0]), 0.0 * roots[:, 0], np.full(count, lift)], axis=1)
+    grid = roots[:, None] + np.linspace(0.0, 0.1, 8)[:, None] * way[:, None]
+    return grid.astype(np.float32), np.tile(np.float32([0.0, 0.0, 1.0]), (count, 1))
+
+
+def test_the_rim_lies_along_the_parting_and_nowhere_else() -> None:
+    grid, normal = parted()
+    is_rim, away = at_rim(grid, normal, 40.0), np.abs(grid[:, 0, 0])
+    # an average card is a square of 1 cm
+    assert is_rim[away < 0.001].all()
+    assert 0.001 < np.median(away[is_rim]) < 0.004 and away[is_rim].max() < 0.01
+    # hair that stands upright lies over no roots, nor does it lie under any
+    assert not at_rim(parted(lift=9.0)[0], normal, 40.0).any()
+    # a hairline: roots behind which there are none
+    half = grid[:, 0, 0] > 0.0
+    is_rim = at_rim(grid[half], normal[half], 40.0)
+    assert is_rim[away[half] < 0.0005].all() and away[half][is_rim].max() < 0.01
+
+
+def test_cards_along_a_parting_hold_fewer_strands() -> None:
+    grid, normal = parted()
+    same = np.zeros(len(grid), np.int32)
+    found = cluster_strands(grid, same, 100, 0, normal)
+    assert found.max() == 99
+    is_rim = at_rim(grid, normal, 40.0)
+    assert 3.0 < 40.0 / (is_rim.sum() / len(np.unique(found[is_rim]))) < 5.0
+    # and none that begins elsewhere
+    assert not set(found[is_rim].tolist()) & set(found[~is_rim].tolist())

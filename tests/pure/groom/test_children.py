@@ -15,10 +15,10 @@ from hairloom.addon.errors import HairloomError
 from hairloom.addon.groom.children import Children, make_children
 from hairloom.addon.groom.children_settings import ChildrenSettings
 from hairloom.addon.groom.grow import grow, scalp_density
-from hairloom.addon.groom.nearest import nearest_points
 from hairloom.addon.groom.roots import bind_roots, root_frames
 from hairloom.addon.groom.settings import GrowSettings
 from hairloom.addon.strands import StrandSet, Surface
+from hairloom.addon.strands.nearest import nearest_points
 
 #: mixed, and nothing else
 PLAIN: dict[str, Any] = {"method": "multi", "length_variation": 0.0, "clump": 0.0, "frizz": 0.0}

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from hairloom.addon.arrays import Floats
-from hairloom.addon.groom.nearest import nearest_points
 from hairloom.addon.groom.weights import child_weights, guide_weights
+from hairloom.addon.strands.nearest import nearest_points
 
 
 def square(count: int, seed: int) -> Floats:
