@@ -24,7 +24,7 @@ MOST = {
     "missing_percent": 0.0,
     "lost_curves": 0,
     "scale_flip": 0.02,
-    "count_flip": 0.05,
+    "count_flip_excess": 0.05,
     "count_light_percent": 5.0,
     "cycles_flip_hair": 0.15,
 }

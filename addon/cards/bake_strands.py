@@ -20,7 +20,7 @@ _NEAR = 0.25
 _KEPT = 0.35
 #: Strands that begin later than their card, by up to this fraction of its length, begin sooner by
 #: this part of it: where no other card lies over the first ones, along a parting, skin would show.
-_LATE, _SOONER = 0.06, 0.7
+_BEHIND, _SOONER = 0.06, 0.7
 #: Stations in place of each segment, so that bends are round.
 PIECES = 4
 _TINY = 1e-12
@@ -140,7 +140,7 @@ def _within(along: Floats) -> Floats:
 def _sooner(along: Floats) -> Floats:
     """Strands that begin a little behind their card's begin, stretched towards it."""
     root = along[:, :1]
-    start = root - _SOONER * np.minimum(root, _LATE)
+    start = root - _SOONER * np.minimum(root, _BEHIND)
     stretched: Floats = start + (along - root) * (1.0 - start) / np.maximum(1.0 - root, _TINY)
     return np.minimum(stretched, 1.0)
 

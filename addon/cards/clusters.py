@@ -24,10 +24,10 @@ _STATIONS = 6
 _ROOT_WEIGHT = 2.0
 #: A card of brows or lashes holds no more strands than this, however few cards there are in all:
 #: their roots lie all over the brow, and are seen. But each has no more cards than this.
-_FACE_STRANDS, _MOST_FACE_CARDS = 8, 100
-#: A card at a rim has so many times fewer strands than others, but no more than this fraction of
+_FACE_STRANDS, _MAX_FACE_CARDS = 8, 100
+#: A card at a rim has this many times fewer strands than others, but no more than this fraction of
 #: all cards lies there, nor of all strands.
-_RIM_FINER, _MOST_AT_RIM = 4.0, 0.4
+_RIM_FINER, _MAX_AT_RIM = 4.0, 0.4
 #: How far behind a root hair is looked for, in sides of the square that an average card's roots
 #: fill; and how much nearer it must be found, as a fraction of that.
 _RIM_DEPTH, _RIM_FREE = 0.5, 0.7
@@ -64,7 +64,7 @@ def cluster_strands(
     label = np.zeros(len(grid), np.int32)
     groups, sizes = np.unique(group, return_counts=True)
     first = 0
-    face = np.minimum(-(-sizes // _FACE_STRANDS), _MOST_FACE_CARDS)
+    face = np.minimum(-(-sizes // _FACE_STRANDS), _MAX_FACE_CARDS)
     least = np.where(is_face_hair(groups), face, 1)
     for name, wanted in zip(groups, np.maximum(shared_out(count, sizes), least), strict=True):
         own = np.flatnonzero(group == name)
@@ -83,9 +83,9 @@ def _parts(grid: Floats, root_normal: Floats | None, wanted: int) -> list[tuple[
         return everywhere
     is_rim = at_rim(grid, root_normal, len(grid) / wanted)
     rim, rest = np.flatnonzero(is_rim), np.flatnonzero(~is_rim)
-    if len(rim) > _MOST_AT_RIM * len(grid):  # a fringe is all rim
+    if len(rim) > _MAX_AT_RIM * len(grid):  # a fringe is all rim
         return everywhere
-    finer = min(_RIM_FINER * len(rim) / len(grid), _MOST_AT_RIM)
+    finer = min(_RIM_FINER * len(rim) / len(grid), _MAX_AT_RIM)
     at_rim_wanted = min(round(wanted * finer), len(rim))
     if not at_rim_wanted:
         return everywhere
@@ -105,9 +105,9 @@ def at_rim(grid: Floats, root_normal: Floats, strands_per_card: float) -> Bools:
         strands_per_card: on average.
     """
     root = grid[:, 0].astype(np.float64)
-    way = grid[:, max(round(_BEGIN * (grid.shape[1] - 1)), 1)] - root
-    flat = way - root_normal * np.einsum("si,si->s", way, root_normal)[:, None]
-    lies = np.linalg.norm(flat, axis=1) > _LEANING * np.linalg.norm(way, axis=1)
+    direction = grid[:, max(round(_BEGIN * (grid.shape[1] - 1)), 1)] - root
+    flat = direction - root_normal * np.einsum("si,si->s", direction, root_normal)[:, None]
+    lies = np.linalg.norm(flat, axis=1) > _LEANING * np.linalg.norm(direction, axis=1)
     flat = unit(flat)
     # the nearest of points at random is half as far as they are apart in a square grid
     behind = _RIM_DEPTH * strands_per_card**0.5 * 2.0 * mean_spacing(root)

@@ -82,12 +82,6 @@ class Widths:
     spacing: float = 0.0
 
     @property
-    def hair_width(self) -> float:
-        """Of a hair that a strand stands for, as a fraction of the strand's: all of them together
-        block as much light as it does."""
-        return self.extinction / max(self.hairs, self.extinction)
-
-    @property
     def numbers(self) -> tuple[float, float, float, float, float]:
         return float(self.is_found), self.median, self.hairs, self.extinction, self.spacing
 
