@@ -48,7 +48,7 @@ def forget() -> None:
     _OWNED.clear()
 
 
-def _making(kind: str) -> Callable[..., Any]:
+def _owned(kind: str) -> Callable[..., Any]:
     def make(*values: Any, **options: Any) -> Any:
         free_unused()
         made = getattr(gpu.types, kind)(*values, **options)
@@ -58,9 +58,9 @@ def _making(kind: str) -> Callable[..., Any]:
     return make
 
 
-texture = _making("GPUTexture")
-framebuffer = _making("GPUFrameBuffer")
-vertex_buffer = _making("GPUVertBuf")
-index_buffer = _making("GPUIndexBuf")
-uniform_buffer = _making("GPUUniformBuf")
-batch = _making("GPUBatch")
+texture = _owned("GPUTexture")
+framebuffer = _owned("GPUFrameBuffer")
+vertex_buffer = _owned("GPUVertBuf")
+index_buffer = _owned("GPUIndexBuf")
+uniform_buffer = _owned("GPUUniformBuf")
+batch = _owned("GPUBatch")
