@@ -439,11 +439,10 @@ def advance(
         scene_wind: (3,) [m/s], world space.
     """
     target = style_of_guides(rig, pose)
-    motion = replace(motion, guide_clearance=guide_clearance_of(motion, colliders, settings))
+    motion = with_clearance(rig, motion, colliders, settings)
     drive = motion.drive(target, colliders, gravity, duration, scene_wind, held_cvs(rig, pose))
     state = advance_dynamics(motion.dynamics, drive, settings, duration)
     guides, before = grid_at_frame_end(state, drive, duration), motion.carried_guides
-    clearance = clearance_of(rig, motion, colliders, settings)
     return Motion(
         state,
         guides,
@@ -452,34 +451,29 @@ def advance(
         before,
         duration,
         colliders,
-        clearance,
+        motion.clearance,
         motion.guide_clearance,
     )
 
 
-def clearance_of(
+def with_clearance(
     rig: Rig, motion: Motion, colliders: tuple[PosedCollider, ...], settings: DynamicsSettings
-) -> Clearance | None:
-    """How far strands stay from colliders, from the first frame on that has any: as far as guides
-    do at their roots, but no farther than their roots carried them at its begin."""
-    kept = settings.radius_root * motion.dynamics.rest.size
-    known = motion.clearance
-    if not colliders or (known is not None and known.kept == kept):
-        return known
-    before = tuple(posed.at_begin() for posed in colliders)
-    return clearance_at(carried(rig, motion.pose), rig.strands.offsets, before, kept)
+) -> Motion:
+    """The motion that knows how far hair stays from colliders, from the first frame with any on.
 
-
-def guide_clearance_of(
-    motion: Motion, colliders: tuple[PosedCollider, ...], settings: DynamicsSettings
-) -> GuideClearance | None:
-    """The same of guides, by their style."""
-    reach = farthest_kept(settings, motion.dynamics.rest.size)
-    known = motion.guide_clearance
-    if not colliders or (known is not None and known.reach == reach):
-        return known
+    Guides stay as far as their radius says, strands as far as guides do at their roots, but
+    neither farther than they were at that frame's begin, in their style and as their roots
+    carried them.
+    """
+    size = motion.dynamics.rest.size
+    kept, reach = settings.radius_root * size, farthest_kept(settings, size)
     before = tuple(posed.at_begin() for posed in colliders)
-    return guide_clearance(motion.carried_guides, before, reach)
+    strands, guides = motion.clearance, motion.guide_clearance
+    if colliders and (strands is None or strands.kept != kept):
+        strands = clearance_at(carried(rig, motion.pose), rig.strands.offsets, before, kept)
+    if colliders and (guides is None or guides.reach != reach):
+        guides = guide_clearance(motion.carried_guides, before, reach)
+    return replace(motion, clearance=strands, guide_clearance=guides)
 
 
 def strands_and_led(rig: Rig, motion: Motion) -> tuple[Floats, LedOut]:

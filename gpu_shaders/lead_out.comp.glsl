@@ -2,15 +2,16 @@
 // Twin of lead_out in addon/refine/lead_out.py, in steps over points first_point to point_end - 1 of
 // each strand: software drivers end a shader after 65,535 rounds of all its loops.
 //
-//   IS_BEGIN  clearance_at: writes `clearances`
+//   IS_LEASH  _pull_back: writes `states`, and cv_points of strands that go too far
 //   IS_NEAR   which strands are too near: writes `states`, and `wanted` for each point
-//   IS_LED    leads them: writes `led_points`, which `put` copies into cv_points
-//   IS_PUT    does so
+//   IS_LED    leads them: writes `led_points`
+//   IS_PUT    copies these into cv_points
 //
-// states: x 1 where the strand is too near, y its length [m], z by how much [m] any point is nearer
-// than it must be, w 1 when it is out.
+// states: x 1 where the strand is led, y its length [m], z by how much [m] any point is nearer than it
+// must be, w 1 when it is out. The fourth number of strand_spans is the last point that has a leash.
+// clearances: x how far [m] a point stays from colliders, y its leash [m].
 #include "lib_strand_texel.glsl"
-#ifndef IS_PUT
+#if defined(IS_NEAR) || defined(IS_LED)
 #include "lib_signed_distance.glsl"
 #endif
 
@@ -24,33 +25,73 @@ vec3 riding_at(StrandSpan span, int point)
   return imageLoad(cv_points, span_texel(span, point)).xyz;
 }
 
-#ifdef IS_BEGIN
+#include "lib_root_frame.glsl"
+
+// Where the root of a strand carries it.
+RootMotion motion_of(int strand)
+{
+  return root_motion_at(root_motions, min(strand, mover_count - 1));
+}
+
+vec3 carried_at(StrandSpan span, int point, RootMotion motion)
+{
+  return follow(texelFetch(rest_points, span_texel(span, point), 0).xyz, motion);
+}
+
+vec3 at_length(vec3 start, vec3 arm, float size)
+{
+  return start + arm * (size / max(length(arm), TINY));
+}
+
+#ifdef IS_LEASH
+void put(StrandSpan span, int point, vec3 place)
+{
+  ivec2 texel = span_texel(span, point);
+  imageStore(cv_points, texel, vec4(place, imageLoad(cv_points, texel).w));
+}
+
 void take(int strand, StrandSpan span, int end)
 {
-  for (int point = first_point; point < end; point++) {
-    float near = point == 0 ? -1.0e30 : signed_distance(riding_at(span, point), kept).w;
-    imageStore(clearances, span_texel(span, point), vec4(near));
+  int last = span.factors;
+  RootMotion motion = motion_of(strand);
+  float part = 1.0;
+  for (int point = 1; point <= last; point++) {
+    float leash = texelFetch(clearances, span_texel(span, point), 0).y;
+    float away = distance(riding_at(span, point), carried_at(span, point, motion));
+    part = min(part, {{leashed}} * leash / max(away, TINY));
   }
+  if (part < 1.0) {
+    vec3 riding_before = riding_at(span, 0);
+    vec3 carried_before = carried_at(span, 0, motion);
+    vec3 place = riding_before;
+    for (int point = 1; point <= last; point++) {
+      vec3 riding = riding_at(span, point);
+      vec3 carried = carried_at(span, point, motion);
+      vec3 segment = riding - riding_before;
+      place = at_length(place, mix(carried - carried_before, segment, part), length(segment));
+      put(span, point, place);
+      riding_before = riding;
+      carried_before = carried;
+    }
+    vec3 shift = place - riding_before;
+    for (int point = last + 1; point < end; point++) {
+      put(span, point, riding_at(span, point) + shift);
+    }
+  }
+  imageStore(states, strand_texel(strand, 0, 1), vec4(part < 1.0 ? 1.0 : 0.0, 0.0, 0.0, 0.0));
 }
 #endif
 
 #ifdef IS_NEAR
-#include "lib_root_frame.glsl"
-
 void take(int strand, StrandSpan span, int end)
 {
   vec4 state = imageLoad(states, strand_texel(strand, 0, 1));
-  state = first_point == 0 ? vec4(0.0) : state;
-  int mover = min(strand, mover_count - 1);
-  RootMotion motion = unpacked_motion(texelFetch(root_motions, strand_texel(mover, 0, 4), 0),
-                                      texelFetch(root_motions, strand_texel(mover, 1, 4), 0),
-                                      texelFetch(root_motions, strand_texel(mover, 2, 4), 0),
-                                      texelFetch(root_motions, strand_texel(mover, 3, 4), 0));
+  RootMotion motion = motion_of(strand);
   for (int point = max(first_point, 1); point < end; point++) {
     vec3 here = riding_at(span, point);
     state.y += distance(riding_at(span, point - 1), here);
     ivec2 texel = span_texel(span, point);
-    float away = distance(here, follow(texelFetch(rest_points, texel, 0).xyz, motion));
+    float away = distance(here, carried_at(span, point, motion));
     float goal = min(texelFetch(clearances, texel, 0).x + away, kept);
     imageStore(wanted, texel, vec4(goal));
     float lack = goal - signed_distance(here, kept).w;
@@ -61,11 +102,6 @@ void take(int strand, StrandSpan span, int end)
 #endif
 
 #ifdef IS_LED
-vec3 at_length(vec3 start, vec3 arm, float size)
-{
-  return start + arm * (size / max(length(arm), TINY));
-}
-
 // Evenly over the sphere, on a spiral by the golden angle.
 vec3 direction(int number)
 {
@@ -125,12 +161,27 @@ vec4 led_out(vec3 start, vec3 segment, float needed, float farther)
   return vec4(end, max(needed - signed_distance(end, kept).w, 0.0));
 }
 
+// A point within its leash; w: twice `kept` where it does not get there.
+vec4 within_leash(vec3 here, vec3 start, float size, vec3 carried, float leash)
+{
+  for (int sweep = 0; sweep < SWEEPS; sweep++) {
+    vec3 away = here - carried;
+    float far = length(away);
+    if (far <= leash) {
+      return vec4(here, 0.0);
+    }
+    here = at_length(start, carried + away * ({{leashed}} * leash / far) - start, size);
+  }
+  return vec4(here, distance(here, carried) > leash ? 2.0 * kept : 0.0);
+}
+
 void take(int strand, StrandSpan span, int end)
 {
   vec4 state = imageLoad(states, strand_texel(strand, 0, 1));
   if (state.x < 0.5 || state.w > 0.5) {
     return;
   }
+  RootMotion motion = motion_of(strand);
   float farther = {{lead_margin}} * float(attempt) * state.y / float(span.count - 1);
   int first = max(first_point, 1);
   vec3 start = riding_at(span, 0);
@@ -146,8 +197,14 @@ void take(int strand, StrandSpan span, int end)
     vec3 riding = riding_at(span, point);
     float goal = texelFetch(wanted, span_texel(span, point), 0).x;
     vec4 led = led_out(start, riding - riding_start, goal, farther);
-    imageStore(led_points, span_texel(span, point), vec4(led.xyz, 0.0));
     state.z = max(state.z, led.w);
+    float leash = texelFetch(clearances, span_texel(span, point), 0).y;
+    if (point <= span.factors) {
+      float size = distance(riding, riding_start);
+      led = within_leash(led.xyz, start, size, carried_at(span, point, motion), leash);
+      state.z = max(state.z, led.w);
+    }
+    imageStore(led_points, span_texel(span, point), vec4(led.xyz, 0.0));
     start = led.xyz;
     riding_start = riding;
   }
@@ -159,13 +216,17 @@ void take(int strand, StrandSpan span, int end)
 #ifdef IS_PUT
 void take(int strand, StrandSpan span, int end)
 {
-  if (texelFetch(states, strand_texel(strand, 0, 1), 0).x < 0.5) {
+  vec4 state = texelFetch(states, strand_texel(strand, 0, 1), 0);
+  if (state.x < 0.5) {
     return;
   }
-  for (int point = max(first_point, 1); point < end; point++) {
+  RootMotion motion = motion_of(strand);
+  bool is_stuck = state.z > kept;  // then it is as its root carries it
+  for (int point = first_point; point < end; point++) {
     ivec2 texel = span_texel(span, point);
-    float radius = imageLoad(cv_points, texel).w;
-    imageStore(cv_points, texel, vec4(texelFetch(led_points, texel, 0).xyz, radius));
+    vec3 place = texelFetch(led_points, texel, 0).xyz;
+    place = is_stuck ? carried_at(span, point, motion) : place;
+    imageStore(cv_points, texel, vec4(place, imageLoad(cv_points, texel).w));
   }
 }
 #endif

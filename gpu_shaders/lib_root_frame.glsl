@@ -1,6 +1,7 @@
 // A frame where each strand is held by the surface, and how it carries the strand.
 //
 // Twin of addon/groom/roots.py (root_frames, follow). Holds no resources.
+#include "lib_strand_texel.glsl"
 //
 // Limits: with float32 a triangle whose first angle has a sine below 1e-6 counts as flat, where the
 // twin, with float64, still finds its normal.
@@ -58,12 +59,15 @@ RootMotion root_motion(RootFrame rest, RootFrame now)
   return motion;
 }
 
-// The motion from four texels as ride_roots.comp.glsl writes them: xyz a column of the turn and w a
-// coordinate of the shift, three times, then xyz the rest origin.
-RootMotion unpacked_motion(vec4 x, vec4 y, vec4 z, vec4 origin)
+// The motion that lies in four texels of a texture as ride_roots.comp.glsl writes them: xyz a column of
+// the turn and w a coordinate of the shift, three times, then xyz the rest origin.
+RootMotion root_motion_at(sampler2D motions, int mover)
 {
+  vec4 x = texelFetch(motions, strand_texel(mover, 0, 4), 0);
+  vec4 y = texelFetch(motions, strand_texel(mover, 1, 4), 0);
+  vec4 z = texelFetch(motions, strand_texel(mover, 2, 4), 0);
   RootMotion motion;
-  motion.rest_origin = origin.xyz;
+  motion.rest_origin = texelFetch(motions, strand_texel(mover, 3, 4), 0).xyz;
   motion.turn = mat3(x.xyz, y.xyz, z.xyz);
   motion.shift = vec3(x.w, y.w, z.w);
   return motion;

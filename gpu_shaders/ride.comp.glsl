@@ -8,31 +8,18 @@
 #include "lib_curls.glsl"
 #endif
 
-// How a guide has turned at a place along it [segments].
-vec4 turn_at(int guide, float place)
+// What guides have at their segments, at a place along one of them [segments]: how it has turned, or
+// where it points at rest and by how much it is longer.
+vec4 value_at(sampler2D values, int guide, float place)
 {
   float last = float(segment_count - 1);
   float held = clamp(place - 0.5, 0.0, last);
   int before = int(held);
-  vec4 near = texelFetch(guide_turns, strand_texel(guide, before, segment_count + 1), 0);
+  vec4 near = texelFetch(values, strand_texel(guide, before, segment_count + 1), 0);
   int after = min(before + 1, segment_count - 1);
-  vec4 far = texelFetch(guide_turns, strand_texel(guide, after, segment_count + 1), 0);
+  vec4 far = texelFetch(values, strand_texel(guide, after, segment_count + 1), 0);
   return near + (held - float(before)) * (far - near);
 }
-
-#ifdef HAS_CURLS
-// Where a guide points there at rest, and by how much it is longer.
-vec4 axis_at(int guide, float place)
-{
-  float last = float(segment_count - 1);
-  float held = clamp(place - 0.5, 0.0, last);
-  int before = int(held);
-  vec4 near = texelFetch(guide_axes, strand_texel(guide, before, segment_count + 1), 0);
-  int after = min(before + 1, segment_count - 1);
-  vec4 far = texelFetch(guide_axes, strand_texel(guide, after, segment_count + 1), 0);
-  return near + (held - float(before)) * (far - near);
-}
-#endif
 
 void main()
 {
@@ -40,11 +27,7 @@ void main()
   if (strand >= strand_count) {
     return;
   }
-  int mover = min(strand, mover_count - 1);
-  RootMotion motion = unpacked_motion(texelFetch(root_motions, strand_texel(mover, 0, 4), 0),
-                                      texelFetch(root_motions, strand_texel(mover, 1, 4), 0),
-                                      texelFetch(root_motions, strand_texel(mover, 2, 4), 0),
-                                      texelFetch(root_motions, strand_texel(mover, 3, 4), 0));
+  RootMotion motion = root_motion_at(root_motions, min(strand, mover_count - 1));
   // xyz of three texels: the guides, their weights, their segments a metre
   ivec3 guide = ivec3(texelFetch(guide_weights, strand_texel(strand, 0, 3), 0).xyz);
   vec3 weight = texelFetch(guide_weights, strand_texel(strand, 1, 3), 0).xyz;
@@ -68,9 +51,9 @@ void main()
     vec3 edge = next.xyz - rest.xyz;
     float size = length(edge);
     vec3 place = (reached + 0.5 * size) * per_meter;
-    vec4 blend = weight.x * turn_at(guide.x, place.x);
+    vec4 blend = weight.x * value_at(guide_turns, guide.x, place.x);
     for (int k = 1; k < 3; k++) {
-      vec4 turn = turn_at(guide[k], place[k]);
+      vec4 turn = value_at(guide_turns, guide[k], place[k]);
       // of two quaternions of one rotation the nearer
       blend += (dot(turn, blend) < 0.0 ? -weight[k] : weight[k]) * turn;
     }
@@ -79,7 +62,7 @@ void main()
 #ifdef HAS_CURLS
     vec4 axis = vec4(0.0);
     for (int k = 0; k < 3; k++) {
-      axis += weight[k] * axis_at(guide[k], place[k]);
+      axis += weight[k] * value_at(guide_axes, guide[k], place[k]);
     }
     vec3 drawn = drawn_out(carried, axis);
     displacement += drawn;

@@ -17,11 +17,7 @@ void main()
     return;
   }
   int strand = int(texelFetch(guide_strands, strand_texel(guide, 0, 1), 0).x);
-  int mover = min(strand, mover_count - 1);
-  RootMotion motion = unpacked_motion(texelFetch(root_motions, strand_texel(mover, 0, 4), 0),
-                                      texelFetch(root_motions, strand_texel(mover, 1, 4), 0),
-                                      texelFetch(root_motions, strand_texel(mover, 2, 4), 0),
-                                      texelFetch(root_motions, strand_texel(mover, 3, 4), 0));
+  RootMotion motion = root_motion_at(root_motions, min(strand, mover_count - 1));
   vec4 rest = texelFetch(guide_points, strand_texel(guide, 0, segment_count + 1), 0);
   vec3 was = follow(rest.xyz, motion);
   vec3 is = texelFetch(guides_now, strand_texel(guide, 0, segment_count + 1), 0).xyz;

@@ -30,7 +30,7 @@ void main()
 
   RootMotion motion = root_motion(rest, now);
   for (int axis = 0; axis < 3; axis++) {
-    vec4 packed_axis = vec4(motion.turn[axis], motion.shift[axis]);  // see unpacked_motion
+    vec4 packed_axis = vec4(motion.turn[axis], motion.shift[axis]);  // see root_motion_at
     imageStore(root_motions, strand_texel(strand, axis, 4), packed_axis);
   }
   imageStore(root_motions, strand_texel(strand, 3, 4), vec4(motion.rest_origin, 0.0));

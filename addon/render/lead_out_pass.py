@@ -4,7 +4,8 @@ textures in the layouts of `strand_layout`.
     strand_spans  RGBA32F: where the points of each strand lie, see strand_layout.StrandLayout
     solids, rounds, fields: the colliders, see collider_textures.py
     rest_points, root_motions: where roots carry points, see ride_pass.py
-    clearances    R32F: how far from colliders each point stays where its root carries it [m]
+    clearances    RG32F: how far from colliders each point stays where its root carries it, and how
+                  far it goes from there at most [m]
     wanted        R32F: how far it stays where it is [m]
     states        RGBA32F: of each strand x whether it is led out, see lead_out.comp.glsl
     led_points    RGBA32F: xyz where points are led to [m, world]
@@ -14,6 +15,7 @@ textures in the layouts of `strand_layout`.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import gpu
@@ -29,28 +31,31 @@ from .strand_layout import StrandLayout, from_strand_rows, strand_rows, strand_r
 from .textures import texture_from, texture_to_array
 
 _GROUP = (64, 1)
-#: what a clearance of -inf is on the GPU [m]
-_NONE = -1.0e30
+#: what infinity is on the GPU [m]
+_ENDLESS = np.float32(1.0e30)
 #: Software drivers end a shader after about this many rounds of all its loops.
 _ROUNDS = 60_000
 #: step -> its images
 _STEPS = {
-    "BEGIN": (("cv_points", "READ"), ("clearances", "WRITE")),
+    "LEASH": (("cv_points", "READ_WRITE"), ("states", "WRITE")),
     "NEAR": (("cv_points", "READ"), ("states", "READ_WRITE"), ("wanted", "WRITE")),
     "LED": (("cv_points", "READ"), ("states", "READ_WRITE"), ("led_points", "READ_WRITE")),
     "PUT": (("cv_points", "READ_WRITE"),),
 }
+_TEXTURES = {
+    "LEASH": ("clearances",),
+    "NEAR": ("clearances", "solids"),
+    "LED": ("clearances", "solids", "wanted"),
+    "PUT": ("states", "led_points"),
+}
 _INTEGERS = {
-    "BEGIN": ("solid_count",),
-    "NEAR": ("solid_count", "mover_count"),
+    "LEASH": (),
+    "NEAR": ("solid_count",),
     "LED": ("solid_count", "attempt"),
     "PUT": (),
 }
-_TEXTURES = {
-    "BEGIN": (),
-    "NEAR": ("clearances", "rest_points", "root_motions"),
-    "LED": ("wanted",),
-}
+#: steps that ask colliders
+_ASKING = ("NEAR", "LED")
 PUT_RECIPE = ShaderRecipe(
     name="put_points",
     compute="put_points.comp.glsl",
@@ -65,23 +70,19 @@ def lead_out_recipe(step: str, *, rounds: bool = False, fields: bool = False) ->
     """The program of one step, for these kinds of colliders.
 
     Args:
-        step: "BEGIN", "NEAR", "LED" or "PUT", see lead_out.comp.glsl.
+        step: "LEASH", "NEAR", "LED" or "PUT", see lead_out.comp.glsl.
     """
     flags = {f"IS_{step}": True, "HAS_ROUNDS": rounds, "HAS_FIELDS": fields}
-    names = ["strand_spans"]
-    if step == "PUT":
-        names += ["states", "led_points"]
-    else:
-        names += ["solids", *_TEXTURES[step]]
-        names += [name for name, is_there in (("rounds", rounds), ("fields", fields)) if is_there]
-    formats = {"clearances": "R32F", "wanted": "R32F"}
+    names = ["strand_spans", "rest_points", "root_motions", *_TEXTURES[step]]
+    names += [name for name, is_there in (("rounds", rounds), ("fields", fields)) if is_there]
+    formats = {"wanted": "R32F"}
     return ShaderRecipe(
         name=f"lead_out_{step.lower()}",
         compute="lead_out.comp.glsl",
         textures=tuple(("FLOAT_2D", name) for name in names),
         images=tuple((formats.get(name, "RGBA32F"), name, access) for name, access in _STEPS[step]),
-        integers=("strand_count", "first_point", "point_end", *_INTEGERS[step]),
-        numbers=() if step == "PUT" else (("FLOAT", "kept"),),
+        integers=("strand_count", "mover_count", "first_point", "point_end", *_INTEGERS[step]),
+        numbers=() if step == "LEASH" else (("FLOAT", "kept"),),
         group_size=_GROUP,
         defines=tuple((name, 1) for name, is_set in flags.items() if is_set),
     )
@@ -97,32 +98,14 @@ class LeadOutPass:
 
     def __init__(self, layout: StrandLayout, colliders: UploadedColliders) -> None:
         self._layout, self._colliders = layout, colliders
-        self._given: Clearance | None = None
-        self._kept: float | None = None
+        self._clearance: Clearance | None = None
         self.release()
-
-    @property
-    def kept(self) -> float | None:
-        """`Clearance.kept` [m]; None before a motion has any colliders."""
-        return self._kept
 
     def take(self, clearance: Clearance | None) -> None:
         """Go on with the clearance of a motion; None: it has none yet."""
-        self.release()
-        self._given, self._kept = clearance, None if clearance is None else clearance.kept
-
-    def begin(self, cv_points: Any, posed: tuple[PosedCollider, ...], kept: float) -> None:
-        """Find the clearance of strands that their roots carry, see `refine.lead_out.clearance_at`.
-
-        Raises:
-            HairloomError: a collider that the GPU cannot have.
-            ShaderError: the shader does not compile here.
-        """
-        self.release()
-        self._kept = kept
-        if self._layout.strand_count:
-            self._textures["clearances"] = _empty(self._layout.size, "R32F")
-            self._run("BEGIN", cv_points, posed)
+        if clearance is not self._clearance:
+            self.release()
+            self._clearance = clearance
 
     def lead(
         self,
@@ -138,24 +121,21 @@ class LeadOutPass:
             mover_count: how many root motions there are.
 
         Raises:
-            HairloomError, ShaderError: as `begin`.
+            HairloomError: a collider that the GPU cannot have.
+            ShaderError: the shader does not compile here.
         """
-        if self._kept is None or not posed or not self._layout.strand_count:
+        if self._clearance is None or not posed or not self._layout.strand_count:
             self._textures.pop("states", None)
             return
-        if self._given is not None:
-            held = np.maximum(self._given.points, np.float32(_NONE))[:, None]
-            self._textures["clearances"] = texture_from(self._layout.pixels(held), "R32F")
-            self._given = None
-        if "states" not in self._textures:
-            size = strand_rows_size(self._layout.strand_count, 1)
-            self._textures["states"] = _empty(size, "RGBA32F")
-            self._textures["led_points"] = _empty(self._layout.size, "RGBA32F")
-            self._textures["wanted"] = _empty(self._layout.size, "R32F")
-        self._run("NEAR", cv_points, posed, carrying, mover_count=mover_count)
+        self._upload(self._clearance)
+        colliders = self._colliders.of(posed)
+        frame = _Frame(cv_points, colliders, colliders.solids(posed), carrying)
+        integers = {"mover_count": mover_count, "solid_count": len(posed)}
+        self._run("LEASH", frame, integers)
+        self._run("NEAR", frame, integers)
         for attempt in range(ATTEMPTS):
-            self._run("LED", cv_points, posed, attempt=attempt)
-        self._run("PUT", cv_points, posed)
+            self._run("LED", frame, {**integers, "attempt": attempt})
+        self._run("PUT", frame, integers)
 
     def put(self, cv_points: Any, led: LedOut) -> None:
         """Put strands where they were led to earlier, see `LedOut.put`.
@@ -190,54 +170,63 @@ class LeadOutPass:
         flags = from_strand_rows(texture_to_array(states), self._layout.strand_count, 1)
         return np.flatnonzero(flags[:, 0, 0]).astype(np.int32)
 
-    def read(self) -> Clearance | None:
-        """The clearance, read back."""
-        if self._given is not None or self._kept is None:
-            return self._given
-        if "clearances" not in self._textures:
-            return Clearance(self._kept, np.zeros(0, np.float32))
-        points = self._layout.values(texture_to_array(self._textures["clearances"]))[:, 0]
-        return Clearance(self._kept, np.where(points > _NONE, points, -np.inf))
-
     def release(self) -> None:
-        """Let go of all that lies on the GPU."""
+        """Let go of all that lies on the GPU; the next frame uploads it again."""
         self._textures: dict[str, Any] = {}
-        self._kept = self._given = None
 
-    def _run(
-        self,
-        step: str,
-        cv_points: Any,
-        posed: tuple[PosedCollider, ...],
-        carrying: dict[str, Any] | None = None,
-        **integers: int,
-    ) -> None:
+    def _upload(self, clearance: Clearance) -> None:
+        """What is constant, and the textures that the shaders write."""
+        layout, textures = self._layout, self._textures
+        if "clearances" not in textures:
+            values = np.stack([clearance.points, clearance.leashes], axis=1)
+            values = np.clip(values, -_ENDLESS, _ENDLESS)
+            textures["clearances"] = texture_from(layout.pixels(values), "RG32F")
+            spans = layout.spans[:, None].copy()
+            spans[:, 0, 3] = 0  # the last point that has a leash
+            owner = np.searchsorted(layout.offsets, clearance.leashed, side="right") - 1
+            spans[owner, 0, 3] = clearance.leashed - layout.offsets[owner]
+            textures["strand_spans"] = texture_from(strand_rows(spans), "RGBA32F")
+            textures["led_points"] = _empty(layout.size, "RGBA32F")
+            textures["wanted"] = _empty(layout.size, "R32F")
+        if "states" not in textures:
+            size = strand_rows_size(layout.strand_count, 1)
+            textures["states"] = _empty(size, "RGBA32F")
+
+    def _run(self, step: str, frame: _Frame, integers: dict[str, int]) -> None:
         """One step over all points of all strands, as many at once as drivers bear."""
-        solids = self._colliders.of(posed)
-        if "strand_spans" not in self._textures:
-            spans = strand_rows(self._layout.spans[:, None])
-            self._textures["strand_spans"] = texture_from(spans, "RGBA32F")
-        kinds = {"rounds": solids.rounds is not None, "fields": solids.fields is not None}
-        recipe = lead_out_recipe(step, **({} if step == "PUT" else kinds))
-        taken = {"solids": solids.solids(posed), "rounds": solids.rounds, "fields": solids.fields}
-        taken |= self._textures | (carrying or {}) | {"cv_points": cv_points}
-        integers["solid_count"] = len(posed)
+        solids, kinds, at_once = frame.colliders, {}, _ROUNDS
+        if step in _ASKING:
+            kinds = {"rounds": solids.rounds is not None, "fields": solids.fields is not None}
+            at_once = _points_at_once(solids)
+        recipe = lead_out_recipe(step, **kinds)
+        taken = {"solids": frame.solids, "rounds": solids.rounds, "fields": solids.fields}
+        taken |= self._textures | frame.carrying | {"cv_points": frame.cv_points}
         shader, count = program(recipe), self._layout.strand_count
-        most, at_once = int(self._layout.counts.max()), _points_at_once(solids)
-        for first in range(0, most, at_once):
+        assert self._clearance is not None
+        for first in range(0, int(self._layout.counts.max()), at_once):
+            known = integers | {
+                "strand_count": count,
+                "first_point": first,
+                "point_end": first + at_once,
+            }
             shader.bind(
                 textures={name: taken[name] for _, name in recipe.textures},
                 images={name: taken[name] for _, name, *_ in recipe.images},
-                integers={
-                    "strand_count": count,
-                    "first_point": first,
-                    "point_end": first + at_once,
-                    **{name: integers[name] for name in _INTEGERS[step]},
-                },
-                numbers={name: self._kept for _, name in recipe.numbers},
+                integers={name: known[name] for name in recipe.integers},
+                numbers={name: self._clearance.kept for _, name in recipe.numbers},
             )
             gpu.compute.dispatch(shader.shader, -(-count // _GROUP[0]), 1, 1)
             gpu.shader.unbind()
+
+
+@dataclass(frozen=True)
+class _Frame:
+    """Textures and colliders of one frame, see the module."""
+
+    cv_points: Any
+    colliders: ColliderTextures
+    solids: Any
+    carrying: dict[str, Any]
 
 
 def _points_at_once(solids: ColliderTextures) -> int:

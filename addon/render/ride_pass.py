@@ -169,7 +169,7 @@ class RidePass:
             head_positions, matrix, anchors: as in `carry`.
             guides_now: (guide_count, cv_count, 3) [m], world space, or a texture RGBA32F that
                 holds them in the layout of strand_layout.strand_rows.
-            colliders: what strands are led out of, once a clearance has begun.
+            colliders: what strands are led out of, once `leading` knows their clearance.
             led: strands that were led out of colliders earlier.
 
         Raises:
@@ -185,26 +185,6 @@ class RidePass:
             guides_now = texture_from(strand_rows(_padded(guides_now)), "RGBA32F")
         self._run_guides(guides_now)
         self._run_ride("guide_turns", anchors, colliders, led)
-
-    def begin_clearance(
-        self,
-        head_positions: Floats | None,
-        matrix: Floats,
-        colliders: tuple[PosedCollider, ...],
-        kept: float,
-    ) -> None:
-        """From now on strands stay out of colliders; shows them where their roots carry them.
-
-        Args:
-            head_positions, matrix: as in `carry`.
-            colliders: as they stand now, at their frame's end. kept: see `Clearance`.
-
-        Raises:
-            HairloomError: a collider that the GPU cannot have.
-            ShaderError: a shader does not compile here.
-        """
-        self.carry(head_positions, matrix)
-        self.leading.begin(self.points.texture, colliders, kept)
 
     def read(self) -> Floats:
         """The strands as they are shown, (point_count, 3) float32 [m], world space."""

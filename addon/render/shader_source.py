@@ -110,7 +110,7 @@ CONSTANTS: Mapping[str, str] = MappingProxyType(
         "lead_tries": str(lead_out.TRIES),
         "lead_halvings": str(lead_out.HALVINGS),
         "lead_margin": repr(lead_out.MARGIN),
-        "lead_attempts": str(lead_out.ATTEMPTS),
+        "leashed": repr(lead_out.LEASHED),
         "skin_of_reach": repr(SKIN / REACH),
         "shortest_segment": repr(ride.SHORTEST),
         "curl_slack": repr(curls.SLACK),

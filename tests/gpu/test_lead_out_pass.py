@@ -13,12 +13,12 @@ from hairloom.addon.dynamics.colliders import (
     SphereSetCollider,
     signed_distance,
 )
-from hairloom.addon.refine.lead_out import LedOut, clearance_at, lead_out
+from hairloom.addon.refine.lead_out import Clearance, LedOut, clearance_at, lead_out
 from hairloom.addon.strands.arc_length import steps
 
 pytestmark = pytest.mark.usefixtures("gpu_context")
 
-KEPT = 0.001
+KEPT, MOVED = 0.001, 2.0e-4  # [m]
 
 
 def posed(*, moved: float) -> tuple[PosedCollider, ...]:
@@ -56,6 +56,18 @@ def strands(count: int, fewest: int, most: int) -> tuple[np.ndarray, np.ndarray]
     return np.concatenate(points).astype(np.float32), offsets
 
 
+def with_leashes(clearance: Clearance, offsets: np.ndarray) -> Clearance:
+    """Two points of every fourth strand may go less far than their roots have carried them."""
+    random = np.random.default_rng(7)
+    leashes = np.full(len(clearance.points), np.inf, np.float32)
+    for strand in range(0, len(offsets) - 1, 4):
+        first, after = offsets[strand] + 1, offsets[strand + 1]
+        chosen = random.integers(first, max(first + 1, first + (after - first) // 2), 2)
+        leashes[chosen] = random.uniform(0.2 * MOVED, 1.5 * MOVED, 2)
+    points = np.where(np.isfinite(leashes), np.float32(-np.inf), clearance.points)
+    return Clearance(clearance.kept, points, leashes)
+
+
 @pytest.mark.parametrize(("fewest", "most"), [(16, 16), (2, 60)])
 def test_equals_numpy(fewest: int, most: int) -> None:
     from hairloom.addon.render.collider_textures import UploadedColliders
@@ -69,8 +81,8 @@ def test_equals_numpy(fewest: int, most: int) -> None:
     texels = layout.pixels(np.column_stack([points, np.full(len(points), 1e-4)]))
     now = texture_from(texels, "RGBA32F")
     matrix = np.eye(4)
-    matrix[:3, 3] = 0.0, 2.0e-4, 0.0
-    carried = points + np.float32([0.0, 2.0e-4, 0.0])
+    matrix[:3, 3] = 0.0, MOVED, 0.0
+    carried = points + np.float32([0.0, MOVED, 0.0])
     carrying = {
         "rest_points": texture_from(texels, "RGBA32F"),
         "root_motions": texture_from(matrix_motion(matrix), "RGBA32F"),
@@ -80,16 +92,11 @@ def test_equals_numpy(fewest: int, most: int) -> None:
         return layout.values(texture_to_array(now))
 
     leading = LeadOutPass(layout, UploadedColliders())
-    assert leading.read() is None
     leading.lead(now, posed(moved=0.0), carrying, 1)
     np.testing.assert_array_equal(found()[:, :3], points, "no motion has begun")
 
-    leading.begin(now, posed(moved=-0.05), KEPT)
-    clearance = clearance_at(points, offsets, posed(moved=-0.05), KEPT)
-    read = leading.read()
-    assert read is not None and read.kept == KEPT
-    np.testing.assert_allclose(read.points, clearance.points, atol=2e-6)
-
+    clearance = with_leashes(clearance_at(points, offsets, posed(moved=-0.05), KEPT), offsets)
+    leading.take(clearance)
     expected = points.copy()
     led = lead_out(expected, carried, offsets, posed(moved=0.0), clearance)
     leading.lead(now, posed(moved=0.0), carrying, 1)
@@ -97,7 +104,7 @@ def test_equals_numpy(fewest: int, most: int) -> None:
     assert len(np.setxor1d(led, leading.led())) <= 2, "rounding decides few"
     off = np.maximum.reduceat(np.abs(found()[:, :3] - expected).max(axis=1), offsets[:-1])
     assert np.median(off[led]) < 2e-6
-    assert (off > 1e-4).mean() < 0.05, "where two solids are as near, rounding decides"
+    assert (off > 1e-4).mean() < 0.08, "where two solids are as near, rounding decides"
     np.testing.assert_array_equal(found()[:, 3], np.float32(1e-4), "radii stay")
 
     away = np.linalg.norm(points - carried, axis=1)
@@ -111,15 +118,14 @@ def test_equals_numpy(fewest: int, most: int) -> None:
     assert stuck(points) > 0.2
     np.testing.assert_allclose(steps(found()[:, :3], offsets), steps(points, offsets), atol=2e-6)
 
-    # another pass goes on with what was read
-    other, again = LeadOutPass(layout, UploadedColliders()), texture_from(texels, "RGBA32F")
-    other.take(read)
-    assert other.kept == KEPT and other.read() is read
-    other.lead(again, posed(moved=0.0), carrying, 1)
-    np.testing.assert_array_equal(layout.values(texture_to_array(again)), found())
-    np.testing.assert_array_equal(other.led(), leading.led())
-    other.lead(again, (), carrying, 1)
-    assert not len(other.led())
+    # after a release it goes on
+    before, led_before, again = found(), leading.led(), texture_from(texels, "RGBA32F")
+    leading.release()
+    leading.lead(again, posed(moved=0.0), carrying, 1)
+    np.testing.assert_array_equal(layout.values(texture_to_array(again)), before)
+    np.testing.assert_array_equal(leading.led(), led_before)
+    leading.lead(again, (), carrying, 1)
+    assert not len(leading.led())
 
 
 def test_puts_what_was_led_earlier() -> None:

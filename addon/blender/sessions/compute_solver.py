@@ -64,7 +64,6 @@ class ComputeSolver:
             self._motion,
             dynamics=self._dynamics.read(),
             guides=self.guides(),
-            clearance=self._ride.leading.read(),
         )
 
     def rest(self, pose: Pose) -> None:
@@ -82,11 +81,12 @@ class ComputeSolver:
     ) -> None:
         if self._is_baked:
             self._take(self.motion)
-        clearance = pipeline.guide_clearance_of(self._motion, colliders, settings)
-        motion = self._motion = replace(self._motion, guide_clearance=clearance)
+        motion = self._motion = pipeline.with_clearance(
+            self._rig, self._motion, colliders, settings
+        )
+        self._ride.leading.take(motion.clearance)
         if self._dynamics is None:
             self._dynamics = DynamicsPass(motion.dynamics, self._colliders)
-        self._begin_clearance(colliders, settings)
         rig = self._rig
         target, held = pipeline.style_of_guides(rig, pose), pipeline.held_cvs(rig, pose)
         drive = motion.drive(target, colliders, gravity, duration, scene_wind, held)
@@ -146,17 +146,6 @@ class ComputeSolver:
         self._motion, self._led = motion, NOT_LED
         self._ride.leading.take(motion.clearance)
         self._is_baked = self._is_resting = self._is_drawn = False
-
-    def _begin_clearance(
-        self, colliders: tuple[PosedCollider, ...], settings: DynamicsSettings
-    ) -> None:
-        """As pipeline.clearance_of."""
-        kept = settings.radius_root * self._motion.dynamics.rest.size
-        if colliders and self._ride.leading.kept != kept:
-            before = tuple(posed.at_begin() for posed in colliders)
-            pose = self.pose
-            self._ride.begin_clearance(pose.head_positions, pose.matrix, before, kept)
-            self._is_drawn = False
 
     def _draw(self) -> None:
         """Bring the strands on the GPU to this moment, once."""

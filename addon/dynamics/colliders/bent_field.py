@@ -75,7 +75,8 @@ class BentField:
         values = np.where(affected, distance, values)
         values, _ = _filled(values, cell)
         samples = points_on(Surface(now, self._triangles[beside]), cell / 2.0)
-        return DistanceField(covering(values, low, cell, samples), low, cell)
+        surface = Surface(now, self._triangles)
+        return DistanceField(covering(values, low, cell, samples), low, cell, surface)
 
     @cached_property
     def _nearest(self) -> Ints:

@@ -37,6 +37,8 @@ STRIDE = 3
 UNSURE = 0.35
 #: How far a part of the surface may lie outside of what is looked up, in cells.
 UNCOVERED = 0.05
+#: How many nodes around it know of the closure of an opening.
+CLOSURE_REACH = 16
 #: Cells between the nodes that tell how sharp the surface is.
 STEP = 2
 
@@ -47,9 +49,13 @@ class DistanceField:
     values: (nx, ny, nz) float32 [m], negative inside.
     low: (3,) float32 [m], place of node (0, 0, 0).
     cell: edge of a cell [m].
+    surface: what it is of, where that is known.
     """
 
-    def __init__(self, values: Floats, low: Floats, cell: float) -> None:
+    def __init__(
+        self, values: Floats, low: Floats, cell: float, surface: Surface | None = None
+    ) -> None:
+        self.surface = surface
         self.values = np.ascontiguousarray(values, np.float32)
         self.low = np.asarray(low, np.float32)
         self.cell = float(cell)
@@ -91,8 +97,9 @@ class DistanceField:
                 "it encloses no volume at this resolution",
                 "Close its holes, or raise the collider resolution",
             )
-        values = np.where(inside, -distance, distance)
-        return cls(covering(values, low, cell, points_on(surface, cell / 2.0)), low, cell)
+        values = with_closures(np.where(inside, -distance, distance), cell)
+        values = covering(values, low, cell, points_on(surface, cell / 2.0))
+        return cls(values, low, cell, surface)
 
     @cached_property
     def bounds(self) -> tuple[Floats, float]:
@@ -159,6 +166,14 @@ class DistanceField:
         gradient *= np.float32(1.0 / self.cell)
         return y[0] + fx * gradient[0] * np.float32(self.cell) + outside, gradient
 
+    def outside(self, points: Floats) -> Floats:
+        """How far points (3, n) are outside of the surface itself, (n,) [m]; 0 inside. Slow."""
+        if self.surface is None:
+            return np.maximum(self.distance(points)[0], 0.0)
+        is_inside = np.abs(winding_number(points.T, self.surface)) > 0.5
+        away = ClosestPointSearch(self.surface).closest(points.T).distance
+        return np.where(is_inside, 0.0, away)
+
     def _placed(self, points: Floats) -> tuple[Floats, Floats]:
         """Points in cells, held inside the grid, and how far outside of it they were [m]."""
         place = points - self.low[:, None]
@@ -194,6 +209,32 @@ def _distances(nodes: Floats, surface: Surface, cell: float) -> Floats:
     # for each axis; without that no distance is too long, which `near` relies on.
     distance -= 3.0 * (STRIDE * cell) ** 2 / (8.0 * np.maximum(distance, least))
     return np.where(exact <= least, exact, np.maximum(distance, least))
+
+
+def with_closures(values: Floats, cell: float) -> Floats:
+    """Values (nx, ny, nz), no longer than the way to where openings are closed.
+
+    There the sign changes between two nodes that are far from the surface. From them on, a value
+    is at most half a cell, and so much longer with each node that the way on the grid is never
+    longer than the straight one.
+    """
+    size, most = np.abs(values), np.full(values.shape, np.inf)
+    for axis in range(3):
+        here, there, limit, other = (
+            np.moveaxis(rows, axis, 0)[part]
+            for rows in (values, most)
+            for part in (slice(None, -1), slice(1, None))
+        )
+        is_closure = (here * there < 0.0) & (np.abs(here) + np.abs(there) > 1.01 * cell)
+        limit[is_closure] = other[is_closure] = cell / 2.0
+    if not np.isfinite(most).any():
+        return values
+    for _ in range(CLOSURE_REACH):
+        for axis in range(3):
+            rows = np.moveaxis(most, axis, 0)
+            rows[1:] = np.minimum(rows[1:], rows[:-1] + cell / 3.0**0.5)
+            rows[:-1] = np.minimum(rows[:-1], rows[1:] + cell / 3.0**0.5)
+    return np.copysign(np.minimum(size, most), values)
 
 
 def covering(values: Floats, low: Floats, cell: float, points: Floats) -> Floats:
@@ -263,10 +304,14 @@ def _inside(nodes: Floats, distance: Floats, surface: Surface, cell: float) -> B
     of_middle = is_middle[middles] & ~is_near
     is_asked = is_near | (of_middle & (np.abs(winding - 0.5) < UNSURE))
     winding[is_asked] = np.abs(winding_number(nodes[is_asked], surface))
-    # each row starts outside, thanks to the margin; what is left is as the last one before it
+    # each row starts outside, thanks to the margin; what is left is as the last one before it, but
+    # where that one is beside an opening
     along = np.broadcast_to(np.arange(distance.shape[2]), distance.shape)
     last = np.maximum.accumulate(np.where(is_asked | of_middle, along, 0), axis=2)
-    return np.take_along_axis(winding > 0.5, last, axis=2)
+    winding = np.take_along_axis(winding, last, axis=2)
+    is_left = (last < along) & (np.abs(winding - 0.5) < UNSURE)
+    winding[is_left] = np.abs(winding_number(nodes[is_left], surface))
+    return winding > 0.5
 
 
 def _broken(place: str, problem: str, remedy: str) -> HairloomError:

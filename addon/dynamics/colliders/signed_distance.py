@@ -10,7 +10,15 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...arrays import Floats
-from .posed import Pose, PosedCollider, near_points, poses_through, world_distance
+from .distance_field import DistanceField
+from .posed import (
+    Pose,
+    PosedCollider,
+    near_points,
+    poses_through,
+    transform_points,
+    world_distance,
+)
 
 #: How long the gradient of a sampled distance counts at least, see `world_distance`.
 FLATTEST = 0.5
@@ -53,3 +61,21 @@ def distance_to(points: Floats, poses: Sequence[Pose], reach: float) -> tuple[Fl
         distance[index] = found.take(nearer)
         outward[:, index] = normal.take(nearer, axis=1)
     return distance, np.ascontiguousarray(outward.T)
+
+
+def outside_by(points: Floats, colliders: Sequence[PosedCollider]) -> Floats:
+    """How far points (n, 3) world are outside of all colliders, (n,) [m]; 0 inside of any. Slow.
+
+    Of meshes themselves, where `signed_distance` knows only their grids, whose cells make thicker
+    what is thin. Where a collider is scaled unevenly, no more than it is.
+    """
+    rows = np.ascontiguousarray(np.asarray(points, np.float32).T)
+    least = np.full(rows.shape[1], np.inf, np.float32)
+    for pose in poses_now(colliders) if rows.size else ():
+        local = transform_points(pose.inverse, rows)
+        if isinstance(pose.collider, DistanceField):
+            found = pose.collider.outside(local) * pose.scale
+        else:
+            found = world_distance(pose, local)[0]
+        np.minimum(least, np.maximum(found, 0.0), out=least)
+    return least

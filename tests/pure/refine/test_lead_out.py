@@ -8,6 +8,7 @@ import pytest
 from hairloom.addon import pipeline
 from hairloom.addon.dynamics.colliders import (
     Collider,
+    DistanceField,
     PosedCollider,
     SphereCollider,
     SphereSetCollider,
@@ -17,7 +18,7 @@ from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.groom.weights import GuideWeights
 from hairloom.addon.pipeline import Pose, Rig
 from hairloom.addon.refine.lead_out import SLACK, LedOut, clearance_at, lead_out
-from hairloom.addon.strands import StrandSet
+from hairloom.addon.strands import StrandSet, Surface
 from hairloom.addon.strands.arc_length import steps
 
 KEPT = 0.001
@@ -196,3 +197,47 @@ def test_a_strand_between_guides_that_part_goes_around() -> None:
     assert (0.1 - np.linalg.norm(unled - now[:3, 3], axis=1)).max() > 0.005
     baked = pipeline.strands_at(rig, motion.pose, motion.guides, led)
     np.testing.assert_array_equal(baked, points)
+
+
+def test_hair_beside_a_sheet_that_its_grid_makes_thicker_stays_on_its_side() -> None:
+    """A sheet of 3 mm, turned, in cells of 9 mm: what lies 2 mm beside it lies in the grid."""
+    corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
+    quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    triangles = [t for a, b, c, d in quads for t in ((a, b, c), (a, c, d))]
+    half = np.array([0.06, 0.0015, 0.06])
+    sine, cosine = np.sin(0.3), np.cos(0.3)
+    turn = np.array([[1.0, 0.0, 0.0], [0.0, cosine, -sine], [0.0, sine, cosine]])
+    settings = DynamicsSettings(collider_resolution=13)
+    sheet = Surface((corners * half @ turn.T).astype(np.float32), np.array(triangles))
+    colliders = still(DistanceField.from_surface(sheet, settings))
+    begin, end = np.array([[-0.03, 0.013, -0.03]]), np.array([[0.04, 0.0025, 0.04]])
+    carried, offsets = lines(np.tile(begin, (8, 1)), np.tile(end, (8, 1)), np.full(8, 16))
+    # further to the other side from strand to strand, by up to 6 mm at their tips
+    aside = np.linspace(0.0, 0.006, 8)[:, None] * np.linspace(0.0, 1.0, 16)
+    ridden = carried - aside.reshape(-1, 1) * np.array([0.0, 1.0, 0.0])
+    heights = carried[:, 1] - half[1]
+    carried, ridden = ((points @ turn.T).astype(np.float32) for points in (carried, ridden))
+    clearance = clearance_at(carried, offsets, colliders, KEPT)
+    assert len(clearance.leashed) >= 8
+    leashes = clearance.leashes[clearance.leashed]
+    np.testing.assert_allclose(leashes, heights[clearance.leashed], atol=1e-6)
+    now = ridden.copy()
+    led = lead_out(now, carried, offsets, colliders, clearance)
+    assert (ridden @ turn)[:, 1].min() < -0.003
+    assert (now @ turn)[:, 1].min() > half[1]
+    assert 0 not in led
+    np.testing.assert_allclose(steps(now, offsets), steps(ridden, offsets), atol=1e-7)
+
+
+def test_a_strand_that_nothing_leads_out_is_as_its_root_carries_it() -> None:
+    """It rides into a ball of balls that close around its root."""
+    random = np.random.default_rng(3)
+    centers = random.normal(size=(400, 3))
+    centers *= 0.05 / np.linalg.norm(centers, axis=1, keepdims=True)
+    shell = still(SphereSetCollider(centers, np.full(400, 0.02)))
+    carried, offsets = lines(np.zeros((1, 3)), np.array([[0.02, 0.0, 0.0]]), np.array([6]))
+    clearance = clearance_at(carried, offsets, shell, KEPT)
+    longer = carried * np.float32(12.5)  # each point of it is in the shell
+    now = longer.copy()
+    assert lead_out(now, carried, offsets, shell, clearance).tolist() == [0]
+    np.testing.assert_array_equal(now, carried)
