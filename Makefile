@@ -56,7 +56,7 @@ gallery: setup ## draw docs/gallery.md: looks, stages, skins, kinds of hair, car
 pictures: setup ## draw the documentation's pictures again
 	$(PYTHON) tools/make_docs.py --pictures
 
-styles: setup ## make presets/styles/ from the recipes, with pictures in out/styles; NAME=x for one
+styles: setup ## make hairstyles/ from the recipes, with pictures in out/styles; NAME=x for one
 	$(PYTHON) tools/make_styles.py --pictures $(OUT)/styles $(NAME)
 
 zip: setup ## the extension's zip, into dist/

@@ -1,8 +1,8 @@
 """Makes the hairstyles that ship, from their recipes.
 
-python tools/make_styles.py [NAME ...]                write presets/styles/NAME.json and NAME.npz
+python tools/make_styles.py [NAME ...]                write hairstyles/NAME.json and NAME.npz
 python tools/make_styles.py --pictures FOLDER [NAME ...]   then draw each from four sides, and its
-                                                           thumbnail, presets/styles/NAME.png
+                                                           thumbnail, hairstyles/NAME.png
 python tools/make_styles.py --draw-only --pictures FOLDER [NAME ...]   draw what there is
 
 The recipes are in tools/style_recipes.py, what they grow with in tools/style_growth.py.
@@ -22,7 +22,7 @@ from preset_pictures import THUMBNAIL, coarse
 from style_growth import Head, of_addon
 from style_recipes import RECIPES
 
-STYLES = REPOSITORY / "presets" / "styles"
+STYLES = REPOSITORY / "hairstyles"
 #: where pictures look from: directions from the head to the eye
 VIEWS = ((0.0, -1.0, 0.08), (-0.75, -0.75, 0.12), (-1.0, 0.0, 0.08), (0.0, 1.0, 0.12))
 WIDTH, HEIGHT, SAMPLES = 220, 264, 2
@@ -104,7 +104,7 @@ def camera_at(rig: Any, direction: tuple[float, float, float], aspect: float) ->
 
 
 def draw_thumbnail(name: str) -> None:
-    """presets/styles/NAME.png, with fewer strands: it is small."""
+    """hairstyles/NAME.png, with fewer strands: it is small."""
     rig, hair = rig_of(name, THUMBNAIL_STRANDS)
     camera = camera_at(rig, THUMBNAIL_VIEWS.get(name, VIEWS[1]), 1.0)
     size = THUMBNAIL, THUMBNAIL, SAMPLES

@@ -1,6 +1,6 @@
 """The recipes of the hairstyles that ship: partings, flows, lengths and cuts over the scalp.
 
-`make styles` makes the files of presets/styles from them. A recipe takes the head and returns the
+`make styles` makes the files of hairstyles from them. A recipe takes the head and returns the
 style; all lengths are in metres, see tools/style_growth.py.
 """
 

@@ -124,7 +124,10 @@ def texts_of(repository: Path) -> Iterator[Text]:
         _page: [*pages, *(repository / "gpu_shaders").glob("*.md")],
         _python: (repository / "addon").rglob("*.py"),
         _shader: (repository / "gpu_shaders").rglob("*.glsl"),
-        _preset: (repository / "presets").rglob("*.json"),
+        _preset: [
+            *(repository / "presets").rglob("*.json"),
+            *(repository / "hairstyles").glob("*.json"),
+        ],
     }
     for read, paths in files.items():
         for path in sorted(paths):

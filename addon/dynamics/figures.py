@@ -29,7 +29,8 @@ STRETCHED, INSIDE = 0.01, 0.001
 class Figures:
     """Of some frames, each guide and each strand by its worst one. Reports have the same names.
 
-    stretch_max_percent: of a guide's segment. penetration_max_mm: of a guide's point.
+    stretch_max_percent: of a guide's segment, but of no curl's, for these may stretch.
+    penetration_max_mm: of a guide's point, also where it was inside at rest.
     strands_stretch_*: change of length of all strands as drawn; the worst, and the 99th percentile.
     strands_stretched_percent: how many change by more than 1 %.
     strands_penetration_*: how deep all strands as drawn are where they were outside at rest.

@@ -11,7 +11,6 @@ import pytest
 
 from hairloom.addon.blender.command_line.command_line import run
 from hairloom.addon.blender.preview import previews
-from hairloom.addon.blender.properties import presets
 from hairloom.addon.blender.properties.presets import named_preset
 from hairloom.addon.blender.scene import hair_nodes
 from hairloom.addon.blender.scene.curves import read_curves
@@ -24,7 +23,6 @@ from hairloom.addon.blender.setup.hairstyles import (
 )
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.exchange.hairstyles import Hairstyle, NodeModifier
-from hairloom.addon.parameters import ALL_SETTINGS
 from hairloom.addon.ui import operators_hairstyles
 
 pytestmark = [pytest.mark.usefixtures("extension")]
@@ -225,7 +223,3 @@ def test_every_style_has_a_picture_and_is_a_small_file() -> None:
         picture = entry.path.with_suffix(".png")
         assert picture.is_file() and picture.stat().st_size < 60_000, "run make styles"
         assert entry.path.with_suffix(".npz").stat().st_size < 700_000
-
-
-def test_presets_of_settings_do_not_take_styles_for_their_own() -> None:
-    assert not any("styles" in entry.name for s in ALL_SETTINGS for entry in presets.shipped(s))

@@ -24,8 +24,6 @@ from . import previews
 from .properties import settings_of
 
 PRESET_FOLDER = Path(__file__).resolve().parents[3] / "presets"
-#: folder there of hairstyles, which are more than settings, see `exchange.hairstyles`
-STYLE_FOLDER = "styles"
 #: what the names of the artist's own presets begin with
 OWN = "own/"
 #: no preset is nearly as long [bytes]
@@ -63,8 +61,6 @@ def shipped(section: str) -> tuple[Entry, ...]:
     """The presets of one section that come with Hairloom; a name is a path below their folder."""
     found = []
     for path in sorted(PRESET_FOLDER.rglob("*.json")):
-        if path.parent.name == STYLE_FOLDER:
-            continue
         preset = read_any_preset(path, ALL_SETTINGS)
         if preset.settings.section == section:
             name = path.relative_to(PRESET_FOLDER).with_suffix("").as_posix()

@@ -17,7 +17,7 @@ from ...strands import StrandSet, Surface
 from ...strands.affine import mean_scale
 from ..base.vertex_weights import read_weights
 from ..properties import previews
-from ..properties.presets import PRESET_FOLDER, STYLE_FOLDER, apply, named_preset
+from ..properties.presets import apply, named_preset
 from ..properties.properties import settings_of
 from ..scene.bust import bust_object
 from ..scene.bust_data import load_bust
@@ -25,6 +25,7 @@ from ..scene.curves import write_curves
 from ..scene.hair_nodes import add_hair_nodes
 from ..scene.surfaces import read_surface
 
+HAIRSTYLE_FOLDER = Path(__file__).resolve().parents[3] / "hairstyles"
 _HEAD = "Head"
 
 
@@ -46,7 +47,7 @@ class Entry:
 def shipped() -> tuple[Entry, ...]:
     """The styles that come with Hairloom, in their order."""
     found = []
-    for path in (PRESET_FOLDER / STYLE_FOLDER).glob("*.json"):
+    for path in HAIRSTYLE_FOLDER.glob("*.json"):
         order, title = read_title(path)
         found.append((order, Entry(path.stem, title, path)))
     return tuple(entry for _, entry in sorted(found, key=lambda one: (one[0], one[1].name)))
