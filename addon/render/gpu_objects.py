@@ -28,18 +28,21 @@ _UNUSED = _counts([object()])[0]
 
 def free_unused() -> None:
     """Free what this thread has made and nothing uses any more; in a thread that draws."""
-    owned = _OWNED.get(threading.get_ident(), [])
-    owned[:] = [each for each, count in zip(owned, _counts(owned), strict=True) if count > _UNUSED]
+    owned, before = _OWNED.get(threading.get_ident(), []), -1
+    while len(owned) != before:  # a batch goes before its vertices
+        before, counts = len(owned), _counts(owned)
+        owned[:] = [each for each, count in zip(owned, counts, strict=True) if count > _UNUSED]
 
 
 def hand_over() -> None:
-    """At the end of a render thread: what it has made belongs to the main thread."""
+    """At the end of a render thread: what is still in use belongs to the main thread."""
     main = threading.main_thread().ident
     assert main is not None
     if threading.get_ident() == main:
         return
     # reading waits for all that this thread's context has still to do
     texture((1, 1), format="R32F").read()
+    free_unused()
     _OWNED.setdefault(main, []).extend(_OWNED.pop(threading.get_ident(), []))
 
 

@@ -42,6 +42,12 @@ class HAIRLOOM_RE_engine(bpy.types.RenderEngine):
 
     def render(self, depsgraph: Any) -> None:
         """F12 and animations, once for each view layer; in a separate thread in the window."""
+        try:
+            self._render(depsgraph)
+        finally:
+            gpu_objects.hand_over()
+
+    def _render(self, depsgraph: Any) -> None:
         layer = depsgraph.view_layer
         for (name, channels, ids, _), is_wanted in _data_passes(layer):
             if is_wanted:
@@ -56,8 +62,6 @@ class HAIRLOOM_RE_engine(bpy.types.RenderEngine):
             # error_set() alone tells nobody in the background
             self.report({"ERROR"}, f"Hairloom: {error}")
             return
-        finally:
-            gpu_objects.hand_over()
         for warning in still.warnings:
             self.report({"WARNING"}, warning)
 

@@ -12,6 +12,7 @@ from functools import partial
 import bpy
 
 from ...errors import HairloomError
+from ...render import gpu_objects
 from ...shading.volume.settings import VolumeSettings
 from ..bakes import playback
 from ..bakes.bake_settings import folder_of
@@ -138,6 +139,16 @@ def _forget(uid: int) -> None:
     if preview is not None and preview.groom is not None:
         preview.groom.forget()
     overlay.drop(uid)
+    if not bpy.app.background and not bpy.app.timers.is_registered(_free_unused):
+        bpy.app.timers.register(_free_unused, first_interval=0.0, persistent=True)
+
+
+def _free_unused() -> float | None:
+    """A timer: what is gone from the views goes from the GPU too, once nothing refers to it."""
+    if is_interrupted():
+        return ARRIVAL_TIME
+    gpu_objects.free_unused()
+    return None
 
 
 def sessions() -> tuple[Session, ...]:
