@@ -6,6 +6,7 @@ artist's buttons and from the command line alike.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -13,7 +14,7 @@ import numpy as np
 
 from .arrays import Floats, Ints
 from .dynamics.clearance import GuideClearance, farthest_kept, guide_clearance
-from .dynamics.colliders import PosedCollider
+from .dynamics.colliders import DistanceField, PosedCollider
 from .dynamics.held import Held
 from .dynamics.settings import DynamicsSettings
 from .dynamics.state import DynamicsState, start
@@ -21,7 +22,7 @@ from .dynamics.step import Drive, grid_at_frame_end
 from .dynamics.step import advance as advance_dynamics
 from .errors import HairloomError
 from .groom.automatic_children import are_few, automatic
-from .groom.children import make_children
+from .groom.children import Children, make_children
 from .groom.children_settings import ChildrenSettings
 from .groom.counter_random import named, uniform
 from .groom.guides import choose_guides, grouped
@@ -33,6 +34,7 @@ from .groom.weights import GuideWeights, guide_weights
 from .groom.widths import Widths, with_widths
 from .refine.hold import hold
 from .refine.lead_out import NOT_LED, Clearance, LedOut, clearance_at, lead_out
+from .refine.lead_out_at_rest import led_out_at_rest
 from .refine.ride import Riders, ride
 from .refine.thinning import even_ranks
 from .shading.ambient import ambient_occlusion, skin_occlusion
@@ -48,6 +50,8 @@ from .strands.resample import resample
 NO_WIND = np.zeros(3)
 #: Points that children are mixed from, of all of them together, and of each one at least.
 CHILD_POINTS, FEWEST_CHILD_POINTS = 12_000_000, 16
+#: Of children that cannot be led out of the head, the part from which on a note says so.
+MANY_INSIDE = 0.01
 
 
 @dataclass(frozen=True)
@@ -184,6 +188,7 @@ def prepare(
     density: Floats | None = None,
     widths: str = "own",
     holders: Holders = NO_HOLDERS,
+    head_field: Callable[[], DistanceField | None] = lambda: None,
 ) -> Rig:
     """Bind strands to the head, choose the guides, weigh them for every strand, find all widths,
     and what is held.
@@ -196,6 +201,7 @@ def prepare(
         density: (vertex_count,) how densely children grow; None: wherever guides are near.
         widths: one of `groom.widths.METHODS`.
         holders: ties and a surface of tips, at rest.
+        head_field: is called if there are children: what they are led out of; None: of nothing.
 
     Raises:
         HairloomError: no strands, or a groom of another scale than the head.
@@ -216,10 +222,10 @@ def prepare(
     notes = _lost_length(bound, own)
     rig = Rig(own, head, guides, guide_lines.grid, weights, _frames(own, head), notes)
     if children is not None and children.method == "auto":
-        rig = _automatic(rig, children, density, widths, place)
+        rig = _automatic(rig, children, density, widths, head_field, place)
     else:
         if children is not None and children.method != "none":
-            rig = _with_children(rig, children, density, place)
+            rig = _with_children(rig, children, density, head_field, place)
         strands, found = with_widths(rig.strands, widths)
         rig = replace(rig, strands=strands, widths=found)
     if holds is None:
@@ -252,6 +258,7 @@ def _automatic(
     settings: ChildrenSettings,
     density: Floats | None,
     widths: str,
+    head_field: Callable[[], DistanceField | None],
     place: str,
 ) -> Rig:
     """With as many children as cover the body, each as wide as the strands around it: those stand
@@ -270,7 +277,8 @@ def _automatic(
     own, found = with_widths(rig.strands, widths, parts)
     rig = replace(rig, strands=own, widths=found)
     if parts > 1.0:
-        rig = replace(_with_children(rig, settings, density, place), widths=found)
+        with_children = _with_children(rig, settings, density, head_field, place)
+        rig = replace(with_children, widths=found)
         line = (
             f"Children: {rig.child_count:,} added, since {count:,} curves are too few for a body of"
             " hair. Set Method to None to see the curves alone"
@@ -299,7 +307,13 @@ def _weights(
     )
 
 
-def _with_children(rig: Rig, settings: ChildrenSettings, density: Floats | None, place: str) -> Rig:
+def _with_children(
+    rig: Rig,
+    settings: ChildrenSettings,
+    density: Floats | None,
+    head_field: Callable[[], DistanceField | None],
+    place: str,
+) -> Rig:
     """The artist's own strands, and children grown between them."""
     own, head = rig.strands, rig.head
     if head is None:
@@ -311,6 +325,7 @@ def _with_children(rig: Rig, settings: ChildrenSettings, density: Floats | None,
     parents, cv_count = _parents(own), rig.guide_grid.shape[1]
     shapes, notes = _parent_shapes(own.take(parents), settings.strand_count)
     made = make_children(shapes, head, settings, density, place=place)
+    made = _outside(made, head_field(), _hair_length(shapes))
     strands = joined(own, with_needed_points(made.strands, cv_count))
     if len(rig.guides) < own.strand_count:
         # shaped by their neighbours among all strands, they move as guides do
@@ -331,6 +346,26 @@ def _with_children(rig: Rig, settings: ChildrenSettings, density: Floats | None,
         (*rig.notes, *made.notes, *notes),
         own_count=own.strand_count,
     )
+
+
+def _outside(made: Children, head: DistanceField | None, length: float) -> Children:
+    """Children that are led out of the head, without those that nothing leads out.
+
+    Args:
+        length: the hair's [m].
+    """
+    if head is None:
+        return made
+    led, is_out = led_out_at_rest(made.strands, head, DynamicsSettings().radius_root * length)
+    chosen, lost = np.flatnonzero(is_out), int((~is_out).sum())
+    notes = made.notes
+    if lost > MANY_INSIDE * len(is_out):
+        notes += (
+            f"{lost:,} of {len(is_out):,} children would lie in the head, so they are left out."
+            " Comb the curves around them farther out.",
+        )
+    weights = GuideWeights(made.weights.guide[chosen], made.weights.weight[chosen])
+    return Children(led.take(chosen), weights, notes)
 
 
 def _parent_shapes(parents: StrandSet, child_count: int) -> tuple[StrandSet, tuple[str, ...]]:

@@ -76,6 +76,7 @@ def rig_of(name: str, most: int = 1_000_000) -> tuple[Any, bpy.types.Object]:
         children=own["children"],
         density=read.density,
         widths=own["widths"].method,
+        head_field=lambda: of_addon("blender.colliders.fields").solid_of(read.head),
     )
     return rig, hair
 

@@ -50,8 +50,8 @@ from ...shading.volume.card_opacity import StrandArea, card_shadow_area
 from ..base.gpu_context import ensure_gpu
 from ..base.outcome import notes_of
 from ..base.thread_work import ThreadWork
+from ..colliders.rigs import rig_from
 from ..properties.groom_settings import GroomSettings
-from ..scene.rigs import rig_from
 from ..scene.source import read_source
 from .occluders import Occluders, read_occluders
 from .textures import chosen_pictures

@@ -25,8 +25,8 @@ from ...params import SettingsMap
 from ...shading.settings import StrandSettings
 from ...strands import Surface
 from ..base.objects import objects_in
+from ..colliders.rigs import rig_from
 from ..properties.groom_settings import GroomSettings
-from ..scene.rigs import rig_from
 from ..scene.source import Source, read_source
 from ..scene.surfaces import read_surface
 from .material import alpha_of

@@ -59,6 +59,16 @@ def field_of(
         raise
 
 
+def solid_of(head: Surface | None) -> DistanceField | None:
+    """The field of what hair grows on, by default settings; None where that encloses nothing."""
+    if head is None:
+        return None
+    try:
+        return field_of(head, DynamicsSettings(), place="head")
+    except HairloomError:
+        return None
+
+
 def are_made() -> bool:
     """Whether no field is being made."""
     return all(work.is_done for work in _works.values())

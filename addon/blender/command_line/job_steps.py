@@ -21,6 +21,7 @@ from ...pipeline import Pose, Rig
 from ...shading.ambient_settings import AmbientSettings
 from ..bakes.guide_motion import BakedGuides
 from ..base.report import Report
+from ..colliders.fields import solid_of
 from ..pictures.studio import Studio
 from ..properties.groom_settings import GroomSettings
 from ..sessions.prepared_groom import prepared
@@ -63,6 +64,7 @@ def read_rig(job: Job) -> tuple[Rig, Inputs]:
             children=job.settings[ChildrenSettings],
             density=inputs.density,
             widths=job.settings[WidthSettings].method,
+            head_field=lambda: solid_of(inputs.head),
         )
     tell_notes([f"{inputs.groom_name}: {note}" for note in rig.notes], report)
     for line in filter(None, (rig.children_line, rig.widths.line)):

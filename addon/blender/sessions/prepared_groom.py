@@ -21,9 +21,9 @@ from ...groom.settings import GuideSettings
 from ...pipeline import Rig
 from ...shading.ambient_settings import AmbientSettings
 from ...strands import StrandSet, Surface
+from ..colliders.rigs import rig_from
 from ..colliders.ties import Holding
 from ..properties.groom_settings import GroomSettings
-from ..scene.rigs import rig_from
 from ..scene.source import Source
 from .occluder_spheres import OccluderSpheres
 

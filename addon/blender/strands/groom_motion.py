@@ -21,7 +21,7 @@ from ..bakes.playback import check_frames
 from ..bakes.stale_bakes import stale_notes
 from ..base.objects import Body, Handle, head_of
 from ..base.suspension import suspended
-from ..scene.rigs import rig_of
+from ..colliders.rigs import rig_of
 from ..scene.source import read_source, usable_curves
 from ..scene.surfaces import read_positions
 from .read_hair import ExportRequest, ExportStrands, baked_hair, still_hair

@@ -23,9 +23,9 @@ from ...strands.resample import resample
 from ..bakes import playback
 from ..bakes.cache import Cache
 from ..base.outcome import notes_of
+from ..colliders.rigs import rig_of
 from ..properties.groom_settings import GroomSettings
 from ..scene.groom_attributes import group_names, stored_groom
-from ..scene.rigs import rig_of
 from ..scene.source import Source, read_source, usable_curves
 
 _OF_GUIDES = ("is_guide", "closest_guides", "guide_weights")

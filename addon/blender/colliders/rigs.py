@@ -11,7 +11,8 @@ from ...groom.width_settings import WidthSettings
 from ...params import SettingsMap
 from ...pipeline import Rig
 from ..properties.groom_settings import GroomSettings
-from .source import Source
+from ..scene.source import Source
+from .fields import solid_of
 
 
 def rig_from(source: Source, settings: SettingsMap, *, place: str) -> Rig:
@@ -32,6 +33,7 @@ def rig_from(source: Source, settings: SettingsMap, *, place: str) -> Rig:
         density=source.density,
         widths=settings[WidthSettings].method,
         holders=source.holders,
+        head_field=lambda: solid_of(source.head),
     )
 
 

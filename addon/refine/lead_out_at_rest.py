@@ -1,0 +1,57 @@
+"""Children that were mixed from strands on both sides of an ear or a shoulder go through it: such
+are led out of the head once, at rest, as moving strands are."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..arrays import Bools, Floats, Ints
+from ..dynamics.colliders import DistanceField, PosedCollider, signed_distance
+from ..dynamics.colliders.winding import winding_number
+from ..strands import StrandSet
+from ..strands.arc_length import steps
+from ..strands.closest_point import ClosestPointSearch
+from .lead_out import clearance_at, lead_out
+
+#: How far a point keeps from the head at most, as a part of its distance along the strand.
+LIFT = 0.3
+#: What is deeper in the head afterwards, as a part of the distance that is kept, is inside.
+DEEP = 0.5
+
+
+def led_out_at_rest(
+    strands: StrandSet, head: DistanceField, kept: float
+) -> tuple[StrandSet, Bools]:
+    """Strands outside of the head that they grow on, and which (strand_count,) are: a few of them,
+    as in a fold, nothing leads out.
+
+    Args:
+        strands: in the space of the head.
+        kept: how far they keep from it [m].
+    """
+    posed = (PosedCollider(head, np.eye(4), np.eye(4)),)
+    offsets, points = strands.offsets, strands.points.copy()
+    clearance = clearance_at(strands.points, offsets, posed, kept)
+    reached = np.cumsum(steps(strands.points, offsets), dtype=np.float64)
+    reached -= np.repeat(reached[offsets[:-1]], strands.point_counts)
+    wanted = np.minimum(kept, LIFT * reached).astype(np.float32)
+    wanted[np.isneginf(clearance.points)] = -np.inf
+    lead_out(points, strands.points, offsets, posed, replace(clearance, points=wanted))
+    inside = _inside(points, head, signed_distance(points, posed, kept)[0], DEEP * kept)
+    is_out = np.ones(strands.strand_count, bool)
+    is_out[np.searchsorted(offsets, inside, side="right") - 1] = False
+    return replace(strands, points=points), is_out
+
+
+def _inside(points: Floats, head: DistanceField, distance: Floats, deep: float) -> Ints:
+    """The points (n,) that are deeper in the head itself than `deep`, not only in its grid."""
+    near = np.flatnonzero(distance < 0.0)
+    if head.surface is None or not len(near):
+        return near
+    near = near[np.abs(winding_number(points[near], head.surface)) > 0.5]
+    if not len(near):
+        return near
+    away = ClosestPointSearch(head.surface).closest(points[near], deep).distance
+    return near[away > deep]
