@@ -14,7 +14,7 @@ import numpy as np
 
 from ..arrays import Floats
 from ..strands import Surface
-from ..strands.closest_point import ClosestPointSearch
+from ..strands.closest_point import search_of
 from .card_mesh import CardMesh
 
 #: How far along a card its vertices are put onto the skin.
@@ -36,7 +36,7 @@ def on_skin(mesh: CardMesh, head: Surface | None, width: float) -> CardMesh:
     if head is None or not len(near) or not len(head.triangles):
         return mesh
     places = mesh.positions[near].astype(np.float64)
-    found = ClosestPointSearch(head).closest(places, reach=_DEEPEST * width)
+    found = search_of(head).closest(places, reach=_DEEPEST * width)
     normal = head.vertex_normals()[head.triangles[found.triangle]]
     outwards: Floats = np.einsum("nk,nki->ni", found.barycentric, normal)
     height = np.einsum("ni,ni->n", places - found.point, outwards)

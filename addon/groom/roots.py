@@ -9,7 +9,7 @@ import numpy as np
 from ..arrays import Bools, Floats, Ints
 from ..errors import HairloomError
 from ..strands import StrandSet, Surface
-from ..strands.closest_point import ClosestPointSearch
+from ..strands.closest_point import ClosestPointSearch, search_of
 from .root_fit import IMPLAUSIBLE_DISTANCE, fitting_factor
 
 #: Sine of a triangle's first angle below which rounding in float64 decides about its normal.
@@ -51,7 +51,7 @@ def bind_roots(strands: StrandSet, surface: Surface, *, place: str) -> BoundRoot
     Raises:
         HairloomError: the surface has no triangles, or the groom is of another scale than it.
     """
-    search = ClosestPointSearch(surface)
+    search = search_of(surface)
     roots = strands.roots
     closest = search.closest(roots)
     _check_scale(roots, closest.distance, surface, search, place)

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..arrays import Floats, Ints
 from ..strands import Surface
-from ..strands.closest_point import ClosestPointSearch
+from ..strands.closest_point import search_of
 from ..strands.vectors import unit
 
 
@@ -21,7 +21,7 @@ class GrowthSurface:
     """
 
     def __init__(self, surface: Surface, reach: float) -> None:
-        self._search = ClosestPointSearch(surface)
+        self._search = search_of(surface)
         self._triangles = surface.triangles
         self._normals = surface.vertex_normals().astype(np.float64)
         self._reach = reach

@@ -25,7 +25,7 @@ import numpy as np
 
 from ..arrays import Bools, Floats, Ints
 from ..strands import Surface
-from ..strands.closest_point import ClosestPointSearch
+from ..strands.closest_point import search_of
 from .detail import PictureView
 from .smooth import bezier
 
@@ -192,7 +192,7 @@ def _samples(surface: Surface) -> tuple[Floats, Floats]:
 
 def _grown(centers: Floats, surface: Surface, step: float) -> tuple[Floats, Floats]:
     """Balls after steps away from the surface, each where it was largest: centres and radii."""
-    search = ClosestPointSearch(surface)
+    search = search_of(surface)
     best, largest = centers, np.zeros(len(centers))
     for _ in range(_STEPS):
         closest = search.closest(centers)

@@ -9,10 +9,11 @@ import numpy as np
 
 from ..arrays import Bools, Floats, Ints
 from ..dynamics.colliders import DistanceField, PosedCollider, signed_distance
+from ..dynamics.colliders.distance_field import UNCOVERED
 from ..dynamics.colliders.winding import winding_number
 from ..strands import StrandSet
 from ..strands.arc_length import steps
-from ..strands.closest_point import ClosestPointSearch
+from ..strands.closest_point import search_of
 from .lead_out import clearance_at, lead_out
 
 #: How far a point keeps from the head at most, as a part of its distance along the strand.
@@ -47,11 +48,11 @@ def led_out_at_rest(
 
 def _inside(points: Floats, head: DistanceField, distance: Floats, deep: float) -> Ints:
     """The points (n,) that are deeper in the head itself than `deep`, not only in its grid."""
-    near = np.flatnonzero(distance < 0.0)
+    near = np.flatnonzero(distance < min(UNCOVERED * head.cell - deep, 0.0))
     if head.surface is None or not len(near):
         return near
     near = near[np.abs(winding_number(points[near], head.surface)) > 0.5]
     if not len(near):
         return near
-    away = ClosestPointSearch(head.surface).closest(points[near], deep).distance
+    away = search_of(head.surface).closest(points[near], deep).distance
     return near[away > deep]

@@ -16,7 +16,7 @@ import numpy as np
 
 from ..arrays import Bools, Floats, Ints
 from ..strands import StrandSet, Surface
-from ..strands.closest_point import ClosestPointSearch
+from ..strands.closest_point import search_of
 
 #: How far below the surface the middle of the body's shell lies [cells].
 _SHELL_DEPTH = 2.5
@@ -115,7 +115,7 @@ def _inset(body: Surface, grid: Grid) -> tuple[Floats, Bools]:
 
 def _is_below(points: Floats, body: Surface, depth: float) -> Bools:
     """Which points lie inside the body, and at least this far from its surface [m], (n,)."""
-    closest = ClosestPointSearch(body).closest(points, depth)
+    closest = search_of(body).closest(points, depth)
     corner_normals = body.vertex_normals()[body.triangles[closest.triangle]]
     normal = np.einsum("nk,nkj->nj", closest.barycentric, corner_normals)
     height = np.einsum("ij,ij->i", points - closest.point, normal)

@@ -235,13 +235,22 @@ class ClosestPointSearch:
         return np.asarray(gap <= best.distance[point])
 
 
+def search_of(surface: Surface) -> ClosestPointSearch:
+    """The search through this very surface, made once.
+
+    Raises:
+        HairloomError: the surface has no triangles.
+    """
+    return surface.once(ClosestPointSearch)
+
+
 def closest_point(points: Floats, surface: Surface) -> ClosestPoints:
     """The closest point of a surface to each point (point_count, 3), both in one space.
 
     Raises:
         HairloomError: the surface has no triangles.
     """
-    return ClosestPointSearch(surface).closest(points)
+    return search_of(surface).closest(points)
 
 
 def _first_least(point: Ints, value: Floats) -> Ints:

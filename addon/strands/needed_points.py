@@ -20,8 +20,8 @@ LOST = 0.005
 STRAY = 8.0e-4
 #: Each count that is tried is larger than the one before by about this factor.
 _STEP = 1.25
-#: Points tried at once.
-_CHUNK = 1_000_000
+#: Points tried at once: they stay in the cache.
+_CHUNK = 100_000
 
 
 def with_needed_points(strands: StrandSet, least: int, most: int = MAX_POINTS) -> StrandSet:
@@ -54,8 +54,8 @@ def with_needed_points(strands: StrandSet, least: int, most: int = MAX_POINTS) -
 def _needed(strands: StrandSet, least: int, most: int) -> tuple[Ints, Bools]:
     """How many points each strand gets, and whether evenly, (strand_count,) each.
 
-    The least of all strands is tried first, as it suffices for most, then what lies halfway between
-    what was too few and what was enough.
+    The least of all strands is tried first, as it suffices for most, then the next below its own,
+    then what lies halfway between what was too few and what was enough.
     """
     own = strands.point_counts
     counts = np.array(_counts(least, most))
@@ -71,7 +71,9 @@ def _needed(strands: StrandSet, least: int, most: int) -> tuple[Ints, Bools]:
             suffices = _suffice(strands, some, int(counts[number]), stray)
             high[some[suffices]] = number
             low[some[~suffices]] = number + 1
-        tried = (low + high) // 2
+        # curls need about as many as they have: that one fewer is too few spares all between
+        is_first = (low == 1) & (high == last) & (tried == 0)
+        tried = np.where(is_first, high - 1, (low + high) // 2)
     is_even = low < last
     needed = np.where(is_even, counts[np.minimum(low, len(counts) - 1)], np.clip(own, least, most))
     return needed, is_even | (own > most)

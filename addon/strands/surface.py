@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -68,6 +70,15 @@ class Surface:
     def bounds(self) -> tuple[Floats, Floats]:
         """Lowest and highest corner, each (3,) [m]."""
         return self.positions.min(axis=0), self.positions.max(axis=0)
+
+    def once[T](self, make: Callable[[Surface], T]) -> T:
+        """What `make` makes of this very surface, made once and kept as long as the surface: many
+        search one head."""
+        kept: dict[Callable[[Surface], Any], Any] = vars(self).setdefault("_made_once", {})
+        if make not in kept:
+            kept[make] = make(self)
+        found: T = kept[make]
+        return found
 
     def transformed(self, matrix: Floats) -> Surface:
         """Moved by an affine (4, 4) matrix; a mirroring one turns the triangles over."""

@@ -23,7 +23,7 @@ import numpy as np
 from ...arrays import Bools, Floats, Ints
 from ...errors import HairloomError
 from ...strands import Surface
-from ...strands.closest_point import ClosestPointSearch
+from ...strands.closest_point import search_of
 from ..settings import DynamicsSettings
 from .winding import winding_number
 
@@ -171,7 +171,7 @@ class DistanceField:
         if self.surface is None:
             return np.maximum(self.distance(points)[0], 0.0)
         is_inside = np.abs(winding_number(points.T, self.surface)) > 0.5
-        away = ClosestPointSearch(self.surface).closest(points.T).distance
+        away = search_of(self.surface).closest(points.T).distance
         return np.where(is_inside, 0.0, away)
 
     def _placed(self, points: Floats) -> tuple[Floats, Floats]:
@@ -197,7 +197,7 @@ class DistanceField:
 
 def _distances(nodes: Floats, surface: Surface, cell: float) -> Floats:
     """Distance of each node (nx, ny, nz) to the surface [m]."""
-    search, shape = ClosestPointSearch(surface), nodes.shape[:3]
+    search, shape = search_of(surface), nodes.shape[:3]
     exact = search.closest(nodes.reshape(-1, 3), EXACT * cell).distance.reshape(shape)
     chosen = [np.union1d(np.arange(0, count, STRIDE), count - 1) for count in shape]
     sparse = nodes[np.ix_(*chosen)]

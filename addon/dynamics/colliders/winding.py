@@ -45,13 +45,18 @@ def winding_number(points: Floats, surface: Surface) -> Floats:
     Args:
         points: (n, 3) [m], space of the surface, which has at least one triangle.
     """
-    corners = surface.corners.astype(np.float64)
-    tree = build_tree(corners)
-    leaves = _without_repeats(tree.leaf_triangles)
-    dipoles = _dipoles(tree, leaves, corners)
+    dipoles, leaves, corners = surface.once(_prepared)
     chunks = np.array_split(np.asarray(points, np.float64), max(1, -(-len(points) // _CHUNK)))
     angles = [_solid_angle(chunk, dipoles, leaves, corners) for chunk in chunks]
     return np.concatenate(angles) / (4.0 * np.pi)
+
+
+def _prepared(surface: Surface) -> tuple[list[_Dipoles], Ints, Floats]:
+    """What all points need of it: dipoles, leaves and corners."""
+    corners = surface.corners.astype(np.float64)
+    tree = build_tree(corners)
+    leaves = _without_repeats(tree.leaf_triangles)
+    return _dipoles(tree, leaves, corners), leaves, corners
 
 
 def _solid_angle(points: Floats, dipoles: list[_Dipoles], leaves: Ints, corners: Floats) -> Floats:
