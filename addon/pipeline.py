@@ -361,7 +361,7 @@ def _outside(made: Children, head: DistanceField | None, length: float) -> Child
     notes = made.notes
     if lost > MANY_INSIDE * len(is_out):
         notes += (
-            f"{lost:,} of {len(is_out):,} children would lie in the head, so they are left out."
+            f"{lost:,} of {len(is_out):,} children would lie in the surface, so they are left out."
             " Comb the curves around them farther out.",
         )
     weights = GuideWeights(made.weights.guide[chosen], made.weights.weight[chosen])

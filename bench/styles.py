@@ -1,4 +1,5 @@
-"""What is promised of each hairstyle that ships, added by the artist's own button to a new head.
+"""What is promised of each hairstyle that ships, added by the artist's own button to a new head; of
+fur, to Blender's monkey.
 
 - seconds: from the click until the preview is built; the head and its distance field are there.
 - bald: how much of the scalp inside of the hairline shows through from six sides, where hair covers
@@ -28,31 +29,44 @@ from hairloom.addon.blender.colliders.fields import field_of
 from hairloom.addon.blender.preview import previews, scene_events
 from hairloom.addon.blender.scene.built_in_head import built_in_head
 from hairloom.addon.blender.scene.curves import read_curves
-from hairloom.addon.blender.setup.hairstyles import shipped
+from hairloom.addon.blender.setup.hairstyles import grows_anywhere, named_hairstyle, shipped
 from hairloom.addon.dynamics.colliders import PosedCollider
 from hairloom.addon.dynamics.colliders.signed_distance import signed_distance
 from hairloom.addon.dynamics.colliders.winding import winding_number
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.pipeline import Rig
-from hairloom.addon.strands import StrandSet
+from hairloom.addon.strands import StrandSet, Surface
 from hairloom.addon.strands.closest_point import ClosestPointSearch
 
 REFERENCE = "the curves that Blender evaluates, and the triangles of the built-in head"
-#: of heads of hair, and of all: how many styles there are at least
-LEAST_STYLES = 8
+#: how many there are at least: heads of hair, and brows, lashes, beards and fur
+LEAST_HEADS, LEAST_EXTRAS = 16, 7
 LIMITS = {"bald_percent": 1.0, "inside_percent": 0.0, "length_error_percent": 0.5, "seconds": 3.0}
 #: styles whose name asks for skin that shows -> the most [%]
-BARE = {"buzz_cut": 3.0, "crop_fade": 12.0, "undercut": 12.0, "stubble": 100.0}
+BARE = {
+    "buzz_cut": 3.0,
+    "crop_fade": 12.0,
+    "undercut": 12.0,
+    "box_braids": 10.0,
+    "stubble": 100.0,
+    "brows": 100.0,
+    "lashes": 100.0,
+    "moustache": 100.0,
+}
 SIDES = np.concatenate([np.eye(3), -np.eye(3)[:2], [[0.0, 0.7, 0.7]]])
 SQUARE, COVERED, STEP = 0.002, 0.25, 0.0006  # [m], of one, [m]
 DEEP = 0.001  # [m]
 _CHUNK = 2_000_000
 
 
-def bald(strands: StrandSet, group: str) -> float:
-    """Of the squares in which skin of this group is nearest to the eye, how many show it."""
-    head = built_in_head()
-    place, is_scalp = skin_samples(head.weights[group] > 0.5)
+def bald(strands: StrandSet, head: Surface, group: str) -> float:
+    """Of the squares in which skin of this group is nearest to the eye, how many show it [%].
+
+    Args:
+        group: of the built-in head; "": all of the surface.
+    """
+    weights = built_in_head().weights[group] if group else np.ones(len(head.positions))
+    place, is_scalp = skin_samples(head, weights > 0.5)
     hair, area = hair_samples(strands)
     shown, seen = 0, 0
     for side in SIDES:
@@ -86,9 +100,8 @@ def cells(
     return place[:, 0] * size[1] + place[:, 1], points @ (side / np.linalg.norm(side))
 
 
-def skin_samples(is_scalp: Bools) -> tuple[Floats, Bools]:
+def skin_samples(surface: Surface, is_scalp: Bools) -> tuple[Floats, Bools]:
     """Points of the whole head, closer to each other than squares are wide, and which are scalp."""
-    surface = built_in_head().surface
     corners = surface.corners.astype(np.float64)
     grid = [(a, b, 8 - a - b) for a in range(9) for b in range(9 - a)]
     weight = np.array(grid) / 8.0
@@ -112,9 +125,8 @@ def hair_samples(strands: StrandSet) -> tuple[Floats, Floats]:
     return points.astype(np.float32), (width * length / count)[segment]
 
 
-def inside_percent(strands: StrandSet) -> float:
+def inside_percent(strands: StrandSet, head: Surface) -> float:
     """Strands with a point in the mesh itself, deeper than DEEP."""
-    head = built_in_head().surface
     field = field_of(head, DynamicsSettings(), place="head")
     posed = (PosedCollider(field, np.eye(4), np.eye(4)),)
     index = np.flatnonzero(signed_distance(strands.points, posed, 0.01)[0] < 0.0)
@@ -130,10 +142,14 @@ def added(name: str) -> tuple[Rig, float, float]:
     """The rig, the seconds that it took, and the worst error of lengths [%]."""
     scene_events.clear()
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    bpy.ops.hairloom.add_hairstyle(style="buzz_cut", plays=False)
-    bpy.ops.hairloom.preview()
-    head = next(obj for obj in bpy.data.objects if obj.type == "MESH")
-    bpy.context.view_layer.objects.active = head
+    if grows_anywhere(named_hairstyle(name)):
+        bpy.ops.mesh.primitive_monkey_add(size=0.2)
+        bpy.context.object.modifiers.new("Smooth", "SUBSURF").levels = 2
+    else:
+        bpy.ops.hairloom.add_hairstyle(style="buzz_cut", plays=False)
+        bpy.ops.hairloom.preview()
+        head = next(obj for obj in bpy.data.objects if obj.type == "MESH")
+        bpy.context.view_layer.objects.active = head
     begun = time.process_time(), time.perf_counter()
     bpy.ops.hairloom.add_hairstyle(style=name, plays=False)
     # other work on this machine must not count; more than one core must not count twice
@@ -153,14 +169,19 @@ def main(names: list[str]) -> int:
     field_of(built_in_head().surface, DynamicsSettings(), place="head")
     styles = [entry.name for entry in shipped()]
     found: dict[str, Any] = {"styles": len(styles)}
-    missed = [] if len(styles) >= LEAST_STYLES else ["styles"]
+    masks = [named_hairstyle(name).masks.get("children", "") for name in styles]
+    heads = masks.count("scalp")
+    found |= {"heads": heads, "extras": len(styles) - heads}
+    missed = [] if heads >= LEAST_HEADS else ["heads"]
+    missed += [] if found["extras"] >= LEAST_EXTRAS else ["extras"]
     for name in names or styles:
         rig, seconds, length_error = added(name)
-        group = "beard" if "beard" in name or name == "stubble" else "scalp"
+        head, group = rig.head, named_hairstyle(name).masks.get("children", "")
+        assert head is not None
         figures = {
             "strands": rig.strands.strand_count,
-            "bald_percent": bald(rig.strands, group),
-            "inside_percent": inside_percent(rig.strands),
+            "bald_percent": bald(rig.strands, head, group),
+            "inside_percent": inside_percent(rig.strands, head),
             "length_error_percent": length_error,
             "seconds": seconds,
         }

@@ -29,12 +29,15 @@ WIDTH, HEIGHT, SAMPLES = 220, 264, 2
 #: enough children for a thumbnail
 THUMBNAIL_STRANDS = 9000
 #: where thumbnails look from if the style shows better from there
-THUMBNAIL_VIEWS = dict.fromkeys(("ponytail", "bun", "braid"), (-0.85, 0.6, 0.2))
+THUMBNAIL_VIEWS = dict.fromkeys(("ponytail", "bun", "braid"), (-0.85, 0.6, 0.2)) | dict.fromkeys(
+    ("brows", "lashes"), (-0.35, -0.94, 0.05)
+)
 
 
 def make(names: list[str]) -> None:
     """Write the styles of these names."""
     head = Head()
+    of_addon("blender.setup.hairstyles").shipped.cache_clear()
     hairstyles = of_addon("exchange.hairstyles")
     STYLES.mkdir(parents=True, exist_ok=True)
     for name in names:
@@ -42,9 +45,8 @@ def make(names: list[str]) -> None:
         style = RECIPES[name](head)
         path = STYLES / f"{name}.json"
         hairstyles.write_hairstyle(path, style)
-        size = path.with_suffix(".npz").stat().st_size // 1024
-        took = time.perf_counter() - begun
-        print(f"{name}: {len(style.guides.group):,} guides, {size} KB, {took:.1f} s", flush=True)
+        count = 0 if style.guides is None else len(style.guides.group)
+        print(f"{name}: {count:,} guides, {time.perf_counter() - begun:.1f} s", flush=True)
 
 
 def rig_of(name: str, most: int = 1_000_000) -> tuple[Any, bpy.types.Object]:
@@ -56,15 +58,18 @@ def rig_of(name: str, most: int = 1_000_000) -> tuple[Any, bpy.types.Object]:
     bpy.ops.wm.read_factory_settings(use_empty=True)
     setup = of_addon("blender.setup.hairstyles")
     collection = bpy.context.collection
-    head = setup.add_head(collection, "light")
+    style = setup.named_hairstyle(name)
+    head = animal() if setup.grows_anywhere(style) else setup.add_head(collection, "light")
     bpy.context.view_layer.update()
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    hair = setup.add_hairstyle(setup.named_hairstyle(name), head, depsgraph, collection)
+    hair = setup.add_hairstyle(style, head, depsgraph, collection)
     children = hair.data.hairloom.children
     children.strand_count = min(children.strand_count, most)
     inputs = of_addon("blender.command_line.inputs")
     sources = inputs.Sources(
-        groom=hair.name, children_density=hair.hairloom.children_density, with_face=True
+        groom=hair.name,
+        children_density=hair.hairloom.children_density,
+        with_face=not setup.is_of_face(style),
     )
     own = of_addon("blender.command_line.object_settings").own_settings(hair)
     read = inputs.read_inputs(sources, of_addon("groom.settings").GrowSettings())
@@ -81,9 +86,18 @@ def rig_of(name: str, most: int = 1_000_000) -> tuple[Any, bpy.types.Object]:
     return rig, hair
 
 
+def animal() -> bpy.types.Object:
+    """What fur is shown on: Blender's own monkey, as large as a head."""
+    bpy.ops.mesh.primitive_monkey_add(size=0.2)
+    monkey = bpy.context.object
+    monkey.modifiers.new("Smooth", "SUBSURF").levels = 2
+    return monkey
+
+
 def studio_of(rig: Any, hair: bpy.types.Object) -> Any:
     """Draws this hair in its own look."""
     parameters, of = of_addon("parameters").ALL_SETTINGS, of_addon
+    is_bust = of("blender.setup.hairstyles").is_bust(hair.parent)
     own = of("blender.command_line.object_settings").own_settings(hair)
     settings = {section: kind() for section, kind in parameters.items()} | own
     return of("blender.pictures.studio").Studio(
@@ -91,14 +105,17 @@ def studio_of(rig: Any, hair: bpy.types.Object) -> Any:
         of("blender.properties.groom_settings").GroomSettings(
             of("params").SettingsMap(*settings.values())
         ),
-        look=of("blender.scene.built_in_head").built_in_head().look("light"),
+        look=of("blender.scene.built_in_head").built_in_head().look("light") if is_bust else None,
     )
 
 
 def camera_at(rig: Any, direction: tuple[float, float, float], aspect: float) -> Any:
-    """It holds the hair, and the head down to the shoulders."""
+    """It holds the hair, and the head down to the shoulders; of brows and lashes the face."""
     low, high = rig.strands.bounds()
-    low, high = np.minimum(low, (-0.11, -0.11, -0.2)), np.maximum(high, (0.11, 0.12, 0.12))
+    if of_addon("strands.face").is_face_hair(rig.strands.group).all():
+        low, high = low - 0.02, high + 0.02
+    else:
+        low, high = np.minimum(low, (-0.11, -0.11, -0.2)), np.maximum(high, (0.11, 0.12, 0.12))
     return of_addon("render.camera").frame_camera(
         (low, high), direction, np.radians(24.0), aspect, margin=0.95
     )

@@ -16,6 +16,8 @@ from extension_loader import PACKAGE
 UP = np.array([0.0, 0.0, 1.0])
 #: where hair grows away from in a whorl: the crown
 CROWN = np.array([0.012, 0.062, 0.092])
+#: balls over the ears, on which hair that covers them lies: where the right one is, and its radius
+EAR_COVER, EAR_RADIUS = np.array([0.0435, 0.008, -0.008]), 0.047
 GRAVITY, FRAME = np.array([0.0, 0.0, -9.81]), 1.0 / 24.0
 
 #: a direction for each point (n, 3) of locks with these roots (n, 3), `reached` (n,) [m] along
@@ -82,10 +84,21 @@ class Head:
         field = of_addon("blender.colliders.fields").field_of(self.surface, settings, place="head")
         return of_addon("dynamics.colliders").PosedCollider(field, np.eye(4), np.eye(4))
 
-    def away(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    @cached_property
+    def with_ears_covered(self) -> tuple[Any, ...]:
+        """The head, and balls that make it round where its ears are."""
+        colliders = of_addon("dynamics.colliders")
+        balls = [
+            colliders.SphereCollider(tuple(EAR_COVER * (side, 1.0, 1.0)), EAR_RADIUS)
+            for side in (-1.0, 1.0)
+        ]
+        return self.collider, *(colliders.PosedCollider(b, np.eye(4), np.eye(4)) for b in balls)
+
+    def away(self, points: np.ndarray, over_ears: bool = False) -> tuple[np.ndarray, np.ndarray]:
         """How far points (n, 3) are from the skin, negative inside, and which way leads away."""
         found = of_addon("dynamics.colliders.signed_distance").signed_distance
-        distance, outward = found(points, (self.collider,), 0.08)
+        solid = self.with_ears_covered if over_ears else (self.collider,)
+        distance, outward = found(points, solid, 0.08)
         return distance.astype(float), outward.astype(float)
 
     def roots(
@@ -116,6 +129,7 @@ class Head:
         follow: np.ndarray | float = 0.5,
         hug: Callable[[np.ndarray], np.ndarray] | None = None,
         clearance: Callable[[np.ndarray], np.ndarray] = lambda reached: 0.002 + 0.1 * reached,
+        over_ears: bool = False,
     ) -> np.ndarray:
         """Locks that leave the skin and turn into the flow, outside of the head.
 
@@ -126,6 +140,7 @@ class Head:
             hug: how much they turn back to the skin, at points (n, 3), for each centimetre that
                 they are further from it than `clearance`.
             clearance: how far from the skin they stay, by how far they have come [m].
+            over_ears: whether they lie over the ears rather than around them.
         """
         count = len(roots.place)
         step = np.broadcast_to(np.asarray(length, float), (count,)) / (cv_count - 1)
@@ -134,28 +149,36 @@ class Head:
         turn = np.broadcast_to(turn, (count,))[:, None]
         locks = np.empty((count, cv_count, 3))
         locks[:, 0], reached = roots.place, np.zeros(count)
+        at_root = np.minimum(self.away(roots.place, over_ears)[0], 0.0)
         ahead = unit(lift * roots.normal + (1.0 - lift) * unit(flow(roots.place, roots, reached)))
         for cv in range(1, cv_count):
             reached = reached + step
             if cv > 1:
                 wanted = unit(flow(locks[:, cv - 1], roots, reached))
                 if hug is not None:
-                    distance, outward = self.away(locks[:, cv - 1])
+                    distance, outward = self.away(locks[:, cv - 1], over_ears)
                     too_far = np.clip((distance - clearance(reached)) / 0.01, 0.0, 2.0)
                     back = hug(locks[:, cv - 1]) * too_far
                     wanted = unit(wanted - back[:, None] * outward)
                 ahead = unit((1.0 - turn) * ahead + turn * wanted)
             point = locks[:, cv - 1] + step[:, None] * ahead
             for _ in range(2):
-                distance, outward = self.away(point)
-                lacking = np.maximum(np.minimum(clearance(reached), reached) - distance, 0.0)
+                distance, outward = self.away(point, over_ears)
+                kept = np.minimum(clearance(reached), at_root + reached)
+                lacking = np.maximum(kept - distance, 0.0)
                 point = point + lacking[:, None] * outward
             ahead = unit(point - locks[:, cv - 1])
             locks[:, cv] = locks[:, cv - 1] + step[:, None] * ahead
         return locks
 
     def settled(
-        self, roots: Roots, locks: np.ndarray, seconds: float = 1.5, **settings: float
+        self,
+        roots: Roots,
+        locks: np.ndarray,
+        seconds: float = 1.5,
+        *,
+        over_ears: bool = False,
+        **settings: float,
     ) -> np.ndarray:
         """Locks after they have fallen onto head and shoulders, by the product's own solver.
 
@@ -179,10 +202,9 @@ class Head:
         guides = all_settings["guides"](guide_count=len(locks), cv_count=locks.shape[1])
         rig = pipeline.prepare(strands, self.surface, guides, place="style")
         motion = pipeline.begin(rig, rig.rest_pose)
+        solid = self.with_ears_covered if over_ears else (self.collider,)
         for _ in range(round(seconds / FRAME)):
-            motion = pipeline.advance(
-                rig, motion, rig.rest_pose, (self.collider,), dynamics, GRAVITY, FRAME
-            )
+            motion = pipeline.advance(rig, motion, rig.rest_pose, solid, dynamics, GRAVITY, FRAME)
         fallen = locks.copy()
         fallen[rig.guides] = motion.guides
         return self.kept_out(fallen)
@@ -238,6 +260,28 @@ class Head:
         """As a style keeps them."""
         rooted = of_addon("strands.rooted_shapes").RootedShapes
         return rooted.of(self.strands(roots, locks, group), self.surface)
+
+
+def waved(
+    locks: np.ndarray, roots: Roots, height: np.ndarray, length: float, phase: np.ndarray
+) -> np.ndarray:
+    """Locks with waves that turn around them, as long hair has.
+
+    Args:
+        height: of the waves at each point from root to tip (cv_count,) [m].
+        length: of one wave [m].
+        phase: of each lock (n,) [rad].
+    """
+    steps = np.linalg.norm(np.diff(locks, axis=1), axis=2)
+    reached = np.concatenate([np.zeros((len(locks), 1)), np.cumsum(steps, axis=1)], axis=1)
+    ahead = unit(np.gradient(locks, axis=1))
+    out = unit(locks * (1.0, 1.0, 0.0))
+    across = unit(np.cross(ahead, out))
+    turn = 2.0 * np.pi * reached / length + phase[:, None]
+    offset = np.cos(turn)[..., None] * across + 0.6 * np.sin(turn)[..., None] * np.cross(
+        across, ahead
+    )
+    return locks + height[None, :, None] * offset
 
 
 def cut(locks: np.ndarray, inside: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:

@@ -19,6 +19,7 @@ from style_growth import (
     ramp,
     shortened,
     unit,
+    waved,
 )
 
 SOURCE = "tools/style_recipes.py"
@@ -33,19 +34,20 @@ def recipe(make: Callable[[Head], Any]) -> Callable[[Head], Any]:
 
 
 def style(title: str, order: int, shapes: Any, look: str, **parts: Any) -> Any:
-    """A Hairstyle; `parts`: modifiers, and settings by section."""
+    """A Hairstyle; `parts`: mask, modifiers, presets, and settings by section. Without shapes it is
+    fur, which grows by the section `grow`."""
     hairstyles = of_addon("exchange.hairstyles")
     modifiers = tuple(
         hairstyles.NodeModifier(nodes, inputs) for nodes, inputs in parts.pop("modifiers", ())
     )
-    mask = parts.pop("mask", "scalp")
+    mask = parts.pop("mask", "" if shapes is None else "scalp")
     presets = (f"looks/{look}", *parts.pop("presets", ()))
     return hairstyles.Hairstyle(
         title=title,
         guides=shapes,
         source=SOURCE,
         order=order,
-        masks={"children": mask},
+        masks={"children": mask} if mask else {},
         modifiers=modifiers,
         presets=presets,
         settings=parts,
@@ -54,6 +56,25 @@ def style(title: str, order: int, shapes: Any, look: str, **parts: Any) -> Any:
 
 def children(count: int, **values: Any) -> dict[str, Any]:
     return {"method": "multi", "strand_count": count, **values}
+
+
+def curled(radius: float, turns: float, start: float, stray: float, finer: int) -> Any:
+    """Blender's Curl node.
+
+    Args:
+        start: how far along a lock curls begin, 0 to 1.
+        stray: how much locks differ in where their turns are, 0 to 1.
+        finer: how often each segment is halved first.
+    """
+    inputs = {
+        "Radius": radius,
+        "Frequency": turns,
+        "Subdivision": finer,
+        "Curl Start": start,
+        "Random Offset": stray,
+        "Guide Distance": 0.0,
+    }
+    return "Curl Hair Curves", inputs
 
 
 def toward(x: Any, y: Any, z: Any) -> np.ndarray:
@@ -147,7 +168,7 @@ def spread(roots: Roots) -> np.ndarray:
 def side_part(head: Head) -> Any:
     roots = head.roots(1700, "scalp")
     z = roots.height
-    length = 0.012 + 0.02 * ramp(-0.05, 0.03, z) + 0.065 * ramp(0.04, 0.09, z)
+    length = 0.010 + 0.016 * ramp(-0.07, 0.02, z) + 0.07 * ramp(-0.01, 0.095, z) ** 1.5
     length = length * short_at_ears(roots)
     locks = head.combed(
         roots,
@@ -235,24 +256,32 @@ def layers(most: float, per_length: float = 0.14) -> Callable[[np.ndarray], np.n
 @recipe
 def bob(head: Head) -> Any:
     roots = head.roots(1600, "scalp")
+    falls, thick = parted(-0.022, 0.25), 0.6 + 0.8 * roots.random[:, 1]
+
+    def flow(points: np.ndarray, roots: Roots, reached: np.ndarray) -> np.ndarray:
+        inward = ramp(-0.05, -0.1, points[:, 2])[:, None] * unit(points * (1.0, 1.0, 0.0))
+        return unit(falls(points, roots, reached)) - 0.5 * inward
+
     locks = head.combed(
         roots,
-        parted(-0.022, 0.25),
+        flow,
         0.30,
-        24,
+        26,
         lift=0.3,
-        follow=0.6,
+        follow=0.55,
         hug=on_skull,
-        clearance=layers(0.016),
+        clearance=lambda s: 0.002 + thick * np.minimum(0.14 * s, 0.012),
+        over_ears=True,
     )
-    locks = cut(locks, lambda p: p[:, 2] + 0.098 + 0.15 * np.minimum(-p[:, 1], 0.06))
+    ragged = np.repeat(0.014 * roots.random[:, 0], locks.shape[1])
+    locks = cut(locks, lambda p: p[:, 2] + 0.1 - ragged + 0.22 * np.minimum(-p[:, 1], 0.06))
     return style(
         "Bob",
         50,
         head.shapes(roots, locks, sides(roots, -0.012)),
         "brown",
         children=children(
-            28000, length_variation=0.05, clump=0.35, clump_size=30, frizz=0.002, parting=1.0
+            28000, length_variation=0.1, clump=0.5, clump_size=30, frizz=0.004, parting=1.0
         ),
         presets=("dynamics/natural",),
     )
@@ -270,8 +299,9 @@ def long_locks(
         follow=0.6,
         hug=on_skull,
         clearance=layers(volume),
+        over_ears=True,
     )
-    return head.settled(roots, locks, 1.5)
+    return head.settled(roots, locks, 1.5, over_ears=True)
 
 
 @recipe
@@ -287,6 +317,29 @@ def long_straight(head: Head) -> Any:
             30000, length_variation=0.12, clump=0.4, clump_size=30, frizz=0.0015, parting=1.0
         ),
         presets=("dynamics/soft",),
+    )
+
+
+@recipe
+def long_wavy(head: Head) -> Any:
+    roots = head.roots(1500, "scalp")
+    length = 0.27 * (0.85 + 0.15 * roots.random[:, 0])
+    locks = long_locks(head, roots, length, -0.02, 0.02)
+    locks = evenly(locks, 40)
+    # locks beside each other wave alike
+    x, y, z = 60.0 * roots.place.T
+    phase = np.sin(x + 0.7 * z) + np.sin(1.1 * y - 0.6 * x) + 0.7 * roots.random[:, 2]
+    s = np.linspace(0.0, 1.0, 40)
+    locks = waved(locks, roots, 0.0115 * ramp(0.15, 0.6, s), 0.068, phase)
+    return style(
+        "Long and Wavy",
+        70,
+        head.shapes(roots, head.kept_out(locks, 0.003), sides(roots, -0.02)),
+        "brown",
+        children=children(
+            30000, length_variation=0.2, clump=0.65, clump_size=40, frizz=0.004, parting=1.0
+        ),
+        presets=("dynamics/natural",),
     )
 
 
@@ -332,19 +385,7 @@ def curls(head: Head) -> Any:
         90,
         head.shapes(roots, locks, sides(roots, -0.03)),
         "brown",
-        modifiers=(
-            (
-                "Curl Hair Curves",
-                {
-                    "Radius": 0.0075,
-                    "Frequency": 7.0,
-                    "Subdivision": 2,
-                    "Curl Start": 0.12,
-                    "Random Offset": 0.5,
-                    "Guide Distance": 0.0,
-                },
-            ),
-        ),
+        modifiers=(curled(0.0075, 7.0, 0.12, 0.5, 2),),
         children=children(
             16000, method="single", length_variation=0.15, clump=0.75, clump_size=10, frizz=0.004
         ),
@@ -354,34 +395,22 @@ def curls(head: Head) -> Any:
 
 @recipe
 def coils(head: Head) -> Any:
-    roots = head.roots(1800, "scalp")
-    length = 0.085 + 0.03 * roots.random[:, 0]
+    roots = head.roots(1500, "scalp")
+    length = 0.075 + 0.03 * roots.random[:, 0]
 
     def flow(points: np.ndarray, roots: Roots, reached: np.ndarray) -> np.ndarray:
         droop = ramp(0.0, 0.09, reached)[:, None] * np.array([0.0, 0.0, -1.2])
         return roots.normal + 0.3 * whorl(points, roots, reached) + droop
 
-    locks = head.combed(roots, flow, length, 16, lift=0.8, follow=0.5, clearance=layers(0.02, 0.4))
+    locks = head.combed(roots, flow, length, 13, lift=0.8, follow=0.5, clearance=layers(0.02, 0.4))
     return style(
         "Coils",
         100,
         head.shapes(roots, locks),
         "black",
-        modifiers=(
-            (
-                "Curl Hair Curves",
-                {
-                    "Radius": 0.0052,
-                    "Frequency": 8.0,
-                    "Subdivision": 3,
-                    "Curl Start": 0.02,
-                    "Random Offset": 1.0,
-                    "Guide Distance": 0.0,
-                },
-            ),
-        ),
+        modifiers=(curled(0.0042, 12.0, 0.01, 0.4, 3),),
         children=children(
-            20000, method="single", length_variation=0.15, clump=0.93, clump_size=10, frizz=0.003
+            20000, method="single", length_variation=0.1, clump=0.95, clump_size=13, frizz=0.002
         ),
         presets=("dynamics/stiff",),
     )
@@ -402,19 +431,7 @@ def afro(head: Head) -> Any:
         110,
         head.shapes(roots, locks),
         "black",
-        modifiers=(
-            (
-                "Curl Hair Curves",
-                {
-                    "Radius": 0.0032,
-                    "Frequency": 9.0,
-                    "Subdivision": 3,
-                    "Curl Start": 0.05,
-                    "Random Offset": 1.0,
-                    "Guide Distance": 0.0,
-                },
-            ),
-        ),
+        modifiers=(curled(0.0032, 9.0, 0.05, 1.0, 3),),
         children=children(
             18000, method="single", length_variation=0.12, clump=0.4, clump_size=6, frizz=0.02
         ),
@@ -554,6 +571,64 @@ def braid(head: Head) -> Any:
     )
 
 
+BRAIDS = 110
+
+
+@recipe
+def box_braids(head: Head) -> Any:
+    roots = head.roots(1430, "scalp")
+    middles = head.roots(BRAIDS, "scalp", 3)
+    of_braid = np.linalg.norm(roots.place[:, None] - middles.place, axis=2).argmin(axis=1)
+    length = 0.24 - 0.05 * ramp(0.02, 0.08, middles.height)
+    lines = head.combed(
+        middles,
+        parted(0.0, 0.45),
+        length,
+        32,
+        lift=0.5,
+        follow=0.5,
+        hug=on_skull,
+        clearance=lambda s: 0.004 + np.minimum(0.25 * s, 0.016),
+        over_ears=True,
+    )
+    lines = head.settled(middles, lines, 1.2, over_ears=True, radius_root=0.006)
+    cv_count, thick = 84, 0.0026
+    lines = evenly(lines, cv_count)
+    s = np.linspace(0.0, 1.0, cv_count)
+    woven, narrow = ramp(0.02, 0.06, s), 1.0 - 0.3 * s
+    part = np.floor(3.0 * roots.random[:, 0]).astype(np.int32) % 3
+    angle, far = 2.0 * np.pi * roots.random[:, 1], np.sqrt(roots.random[:, 2])
+    locks = np.empty((len(roots.place), cv_count, 3))
+    for lock, braid in enumerate(of_braid):
+        line = lines[braid]
+        ahead = unit(np.gradient(line, axis=0))
+        out = unit(line - np.array([0.0, 0.015, 0.0]))
+        across = unit(np.cross(ahead, out))
+        out = np.cross(across, ahead)
+        turn = 2.0 * np.pi * (length[braid] / 0.019 * s + part[lock] / 3.0)
+        aside = (
+            thick * narrow * woven * (1.25 * np.sin(turn) + 0.75 * far[lock] * np.cos(angle[lock]))
+        )
+        height = (
+            thick
+            * narrow
+            * woven
+            * (0.7 * np.sin(2.0 * turn) + 0.7 * far[lock] * np.sin(angle[lock]))
+        )
+        gathers = (1.0 - ramp(0.0, 0.045, s))[:, None] * (roots.place[lock] - line[0])
+        locks[lock] = line + aside[:, None] * across + height[:, None] * out + gathers
+    return style(
+        "Box Braids",
+        145,
+        head.shapes(roots, head.kept_out(locks), 3 * of_braid.astype(np.int32) + part),
+        "black",
+        children=children(
+            22000, method="single", length_variation=0.02, clump=0.2, clump_size=15, frizz=0.001
+        ),
+        presets=("dynamics/natural",),
+    )
+
+
 @recipe
 def undercut(head: Head) -> Any:
     roots = head.roots(1900, "scalp")
@@ -576,7 +651,7 @@ def undercut(head: Head) -> Any:
         "Undercut",
         150,
         head.shapes(roots, locks, is_top.astype(np.int32)),
-        "dyed",
+        "black",
         children=children(
             42000, length_variation=0.2, clump=0.15, clump_size=20, frizz=0.006, parting=0.9
         ),
@@ -584,13 +659,54 @@ def undercut(head: Head) -> Any:
     )
 
 
+def over_lip(place: np.ndarray) -> np.ndarray:
+    """Which of these places (n, 3) are on the upper lip."""
+    x, y, z = place.T
+    return (np.abs(x) < 0.03) & (z > -0.066) & (y < -0.08)
+
+
 def beard_flow(points: np.ndarray, roots: Roots, _reached: np.ndarray) -> np.ndarray:
     """Down and a little ahead, over the lip to both sides."""
-    x, y, z = roots.place.T
-    over_lip = (np.abs(x) < 0.028) & (z > -0.066) & (y < -0.08)
-    aside = np.where(over_lip, 1.2 * np.sign(x + 1e-9), 3.0 * x)
-    ahead = np.where(over_lip, -0.1, -0.35 * ramp(-0.03, -0.09, y))
+    x, y, _ = roots.place.T
+    on_lip = over_lip(roots.place)
+    aside = np.where(on_lip, 1.2 * np.sign(x + 1e-9), 3.0 * x)
+    ahead = np.where(on_lip, -0.1, -0.35 * ramp(-0.03, -0.09, y))
     return toward(aside, ahead, -0.9)
+
+
+def face_hair(head: Head, kind: str, **values: Any) -> Any:
+    """Brows or lashes, as the built-in head has them, with other values of `FaceHair`."""
+    growth = of_addon("groom.face_hair")
+    strands = getattr(growth, f"grow_{kind}")(
+        head.surface, head.weights[kind], growth.FaceHair(**values)
+    )
+    return of_addon("strands.rooted_shapes").RootedShapes.of(strands, head.surface)
+
+
+@recipe
+def brows(head: Head) -> Any:
+    return style(
+        "Brows",
+        200,
+        face_hair(head, "brows", brow_count=1500, brow_length=0.009, cv_count=8),
+        "brown",
+        mask="brows",
+        children={"method": "none"},
+        presets=("dynamics/stiff",),
+    )
+
+
+@recipe
+def lashes(head: Head) -> Any:
+    return style(
+        "Lashes",
+        205,
+        face_hair(head, "lashes", lash_count=600, upper_lash=0.012, lower_lash=0.006, cv_count=8),
+        "black",
+        mask="lashes",
+        children={"method": "none"},
+        presets=("dynamics/stiff",),
+    )
 
 
 @recipe
@@ -611,10 +727,9 @@ def stubble(head: Head) -> Any:
 @recipe
 def full_beard(head: Head) -> Any:
     roots = head.roots(1300, "beard")
-    x, y, z = roots.place.T
-    over_lip = (np.abs(x) < 0.03) & (z > -0.066) & (y < -0.08)
+    _, y, z = roots.place.T
     length = 0.012 + 0.03 * ramp(-0.04, -0.11, z) * ramp(-0.01, -0.07, y)
-    length = np.where(over_lip, 0.017, length) * (0.8 + 0.3 * roots.random[:, 0])
+    length = np.where(over_lip(roots.place), 0.017, length) * (0.8 + 0.3 * roots.random[:, 0])
     locks = head.combed(
         roots, beard_flow, length, 10, lift=0.4, follow=0.6, clearance=lambda s: 0.0005 + 0.25 * s
     )
@@ -628,4 +743,69 @@ def full_beard(head: Head) -> Any:
             18000, length_variation=0.35, clump=0.4, clump_size=12, frizz=0.03, scatter=0.4
         ),
         presets=("dynamics/stiff",),
+    )
+
+
+@recipe
+def moustache(head: Head) -> Any:
+    def density(place: np.ndarray) -> np.ndarray:
+        return head.weights["beard"] * over_lip(place)
+
+    roots = head.roots(3000, density)
+    x = roots.place[:, 0]
+
+    def flow(points: np.ndarray, roots: Roots, reached: np.ndarray) -> np.ndarray:
+        side = np.sign(roots.place[:, 0] + 1e-9)
+        # down over the lip, then aside, and up again at the ends
+        turned = ramp(0.002, 0.016, reached)
+        return toward(side * (0.5 + 0.9 * turned), -0.25 + 0.35 * turned, -0.8 + 1.0 * turned)
+
+    length = (0.013 + 0.016 * ramp(0.008, 0.028, np.abs(x))) * (0.8 + 0.2 * roots.random[:, 0])
+    locks = head.combed(
+        roots, flow, length, 12, lift=0.35, follow=0.7, clearance=lambda s: 0.0005 + 0.18 * s
+    )
+    return style(
+        "Moustache",
+        230,
+        head.shapes(roots, locks, (x > 0.0).astype(np.int32)),
+        "brown",
+        mask="beard",
+        children={"method": "none"},
+        presets=("dynamics/stiff",),
+    )
+
+
+def fur(length: float, lift: float, **values: Any) -> dict[str, Any]:
+    """Growth on any mesh, as long as on one of a head's size."""
+    return {"method": "normals", "cv_count": 8, "length": length, "lift": lift} | values
+
+
+@recipe
+def short_coat(_head: Head) -> Any:
+    return style(
+        "Short Coat",
+        310,
+        None,
+        "brown",
+        grow=fur(0.011, 0.28, strand_count=4000, length_variation=0.3),
+        children=children(
+            50000, length_variation=0.35, clump=0.15, clump_size=8, frizz=0.02, scatter=0.8
+        ),
+        presets=("dynamics/stiff",),
+    )
+
+
+@recipe
+def shaggy_coat(_head: Head) -> Any:
+    return style(
+        "Shaggy Coat",
+        320,
+        None,
+        "grey",
+        modifiers=(curled(0.0045, 1.6, 0.15, 1.0, 1),),
+        grow=fur(0.05, 0.07, cv_count=12, strand_count=3000, length_variation=0.4),
+        children=children(
+            40000, length_variation=0.3, clump=0.85, clump_size=40, frizz=0.02, scatter=0.2
+        ),
+        presets=("dynamics/natural",),
     )

@@ -7,7 +7,9 @@ NAME.json says what the style is, NAME.npz beside it holds the guides:
  "modifiers": [{"nodes": "Clump Hair Curves", "inputs": {"Factor": 0.5}}],
  "presets": ["looks/brown"], "settings": {"children": {"method": "multi"}}}
 
-Both are data, checked and never executed.
+Fur has no NAME.npz: its settings have a section `grow`, by which it grows on any mesh.
+
+All are data, checked and never executed.
 """
 
 from __future__ import annotations
@@ -34,6 +36,8 @@ STYLE_VERSION = 1
 _LONGEST_TEXT, _MAX_BYTES = 1 << 16, 1 << 26
 #: shapes are kept in steps of this [m]: finer than any hair is wide, and 65 cm fit into 16 bits
 _STEP = 2.0e-5
+#: the section of settings that says how fur grows, which has no guides
+GROWN = "grow"
 #: what a mask may say: where children grow
 MASKS = ("children",)
 #: what numpy and zipfile raise at damaged files, some of it of encryption that is none
@@ -70,14 +74,15 @@ class NodeModifier:
 
 @dataclass(frozen=True, eq=False)
 class Hairstyle:
-    """order: its place among others, the lowest first.
+    """guides: None: it grows on any mesh, by the section `grow` of its settings.
+    order: its place among others, the lowest first.
     masks: vertex groups of the head, by what they say, see MASKS.
     presets: names of presets, the later over the earlier.
     settings: section -> values, over those.
     """
 
     title: str
-    guides: RootedShapes
+    guides: RootedShapes | None
     source: str = ""
     order: int = 0
     masks: Mapping[str, str] = field(default_factory=dict)
@@ -118,7 +123,7 @@ def read_hairstyle(path: Path, kinds: Mapping[str, type[Settings]]) -> Hairstyle
         raise _damaged("its order is no whole number", place)
     return Hairstyle(
         title=str(data.get("title") or path.stem),
-        guides=_guides(path.with_suffix(".npz")),
+        guides=None if GROWN in settings else _guides(path.with_suffix(".npz")),
         source=str(data.get("source", "")),
         order=order,
         masks=masks,
@@ -141,20 +146,6 @@ def write_hairstyle(path: Path, style: Hairstyle) -> None:
     Raises:
         HairloomError: a shape is longer than the file can hold, or a file cannot be written.
     """
-    steps = np.round(style.guides.shape / _STEP)
-    if len(steps) and np.abs(steps).max() > np.iinfo(np.int16).max:
-        raise HairloomError(
-            "a guide is longer than 65 cm", place=str(path), remedy="Make the style shorter"
-        )
-    guides = style.guides
-    content = io.BytesIO()
-    np.savez_compressed(
-        content,
-        root_uv=guides.root_uv.astype(np.float32),
-        steps=_changes(steps.astype(np.int16)),
-        counts=np.diff(guides.offsets).astype(np.int32),
-        group=guides.group.astype(np.int32),
-    )
     data = {
         "hairloom_style": STYLE_VERSION,
         "title": style.title,
@@ -165,8 +156,26 @@ def write_hairstyle(path: Path, style: Hairstyle) -> None:
         "presets": list(style.presets),
         "settings": {section: dict(values) for section, values in style.settings.items()},
     }
-    write_bytes_atomic(path.with_suffix(".npz"), content.getvalue())
+    if style.guides is not None:
+        write_bytes_atomic(path.with_suffix(".npz"), _packed(style.guides, str(path)))
     write_text_atomic(path, json.dumps(data, indent=2) + "\n")
+
+
+def _packed(guides: RootedShapes, place: str) -> bytes:
+    steps = np.round(guides.shape / _STEP)
+    if len(steps) and np.abs(steps).max() > np.iinfo(np.int16).max:
+        raise HairloomError(
+            "a guide is longer than 65 cm", place=place, remedy="Make the style shorter"
+        )
+    content = io.BytesIO()
+    np.savez_compressed(
+        content,
+        root_uv=guides.root_uv.astype(np.float32),
+        steps=_changes(steps.astype(np.int16)),
+        counts=np.diff(guides.offsets).astype(np.int32),
+        group=guides.group.astype(np.int32),
+    )
+    return content.getvalue()
 
 
 def _changes(steps: Any) -> Any:

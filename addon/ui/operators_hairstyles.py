@@ -14,7 +14,9 @@ from ..blender.setup.hairstyles import (
     add_face_hair,
     add_hairstyle,
     add_head,
+    grows_anywhere,
     is_bust,
+    is_of_face,
     named_hairstyle,
     shipped,
 )
@@ -29,7 +31,7 @@ _ACROSS, _PICTURE_SCALE, _WIDTH = 4, 5.0, 440
 
 class HAIRLOOM_OT_add_hairstyle(bpy.types.Operator):
     """Add this hairstyle as hair curves to the built-in head: the selected one, or the one in the
-    scene. Without one, a head with brows and lashes is added too"""
+    scene. Fur grows on the selected mesh. Without one, a head with brows and lashes is added too"""
 
     bl_idname = "hairloom.add_hairstyle"
     bl_label = "Hairloom Hairstyle"
@@ -63,22 +65,23 @@ class HAIRLOOM_OT_add_hairstyle(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         style, collection = named_hairstyle(self.style), context.collection
         with waiting(context):
-            head = built_in_head_of(context)
+            head = ground_mesh(context) if grows_anywhere(style) else built_in_head_of(context)
             is_new = head is None
             if head is None:
                 head = add_head(collection, self.skin)
             depsgraph = context.evaluated_depsgraph_get()
             hair = add_hairstyle(style, head, depsgraph, collection)
             grooms = [hair]
-            if is_new:
+            if is_new and not is_of_face(style):
                 grooms.insert(0, add_face_hair(head, depsgraph, collection, hair))
+            if is_new:
                 report(self, "INFO", f"Added a head, {head.name}, for the hair to grow on")
             begin(self, context, grooms, plays=self.plays)
         return {"FINISHED"}
 
 
 class HAIRLOOM_OT_choose_hairstyle(bpy.types.Operator):
-    """Choose a hairstyle and add it to the built-in head"""
+    """Choose a hairstyle and add it to the built-in head, or fur and add it to the selected mesh"""
 
     bl_idname = "hairloom.choose_hairstyle"
     bl_label = "Add Hairstyle"

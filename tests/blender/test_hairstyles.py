@@ -1,6 +1,8 @@
 """Hairstyles: each is added as ordinary hair curves with ordinary modifiers, or not at all."""
 
 import importlib
+import json
+import shutil
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -8,12 +10,14 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
+from mathutils import Vector
 
 from hairloom.addon.blender.command_line.command_line import run
 from hairloom.addon.blender.preview import previews
 from hairloom.addon.blender.properties.presets import named_preset
 from hairloom.addon.blender.scene import hair_nodes
 from hairloom.addon.blender.scene.curves import read_curves
+from hairloom.addon.blender.setup import hairstyles
 from hairloom.addon.blender.setup.hairstyles import (
     add_hairstyle,
     add_head,
@@ -27,6 +31,9 @@ from hairloom.addon.ui import operators_hairstyles
 
 pytestmark = [pytest.mark.usefixtures("extension")]
 NAMES = [entry.name for entry in shipped()]
+#: what grows on any mesh
+FUR = ["short_coat", "shaggy_coat"]
+ON_HEADS = [name for name in NAMES if name not in FUR]
 TOOLS = Path(__file__).parents[2] / "tools"
 
 
@@ -36,7 +43,8 @@ def few(monkeypatch: pytest.MonkeyPatch) -> None:
 
     def with_few(name: str) -> Hairstyle:
         style = named_hairstyle(name)
-        return replace(style, settings={"children": {"method": "none"}})
+        growth = {key: values for key, values in style.settings.items() if key == "grow"}
+        return replace(style, settings={"children": {"method": "none"}} | growth)
 
     monkeypatch.setattr(operators_hairstyles, "named_hairstyle", with_few)
 
@@ -63,11 +71,12 @@ def everything() -> set[str]:
     return {each.name for kind in kinds for each in kind}
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", ON_HEADS)
 def test_each_style_that_ships_is_curves_on_the_scalp_with_its_settings(
     name: str, head: bpy.types.Object
 ) -> None:
     style = named_hairstyle(name)
+    assert style.guides is not None
     hair = added(style, head)
     assert hair.type == "CURVES" and hair.data.surface == head and hair.parent == head
     assert len(hair.data.curves) == len(style.guides.group)
@@ -85,6 +94,51 @@ def test_each_style_that_ships_is_curves_on_the_scalp_with_its_settings(
     for root in roots[:: len(roots) // 30]:
         found, place, *_ = evaluated.closest_point_on_mesh(root.tolist())
         assert found and (np.array(place) - root) @ (np.array(place) - root) < 1e-8
+
+
+def monkey(size: float) -> bpy.types.Object:
+    bpy.ops.mesh.primitive_monkey_add(size=size, location=(1.0, 2.0, 3.0))
+    bpy.context.view_layer.update()
+    return bpy.context.object
+
+
+@pytest.mark.parametrize("name", FUR)
+def test_fur_grows_on_any_mesh_and_by_its_size(name: str) -> None:
+    style, lengths = named_hairstyle(name), []
+    assert style.guides is None and not style.masks
+    for size in (0.2, 20.0):
+        hair = added(style, monkey(size))
+        strands = read_curves(hair, depsgraph()).strands
+        assert strands.strand_count == style.settings["grow"]["strand_count"]
+        evaluated = hair.parent.evaluated_get(depsgraph())
+        for root in strands.roots[::300]:
+            local = hair.parent.matrix_world.inverted() @ Vector(root.tolist())
+            found, place, *_ = evaluated.closest_point_on_mesh(local)
+            assert found and (place - local).length < 1e-4 * size
+        lengths.append(float(np.median(strands.lengths())))
+        children = hair.data.hairloom.children
+        assert children.strand_count == style.settings["children"]["strand_count"]
+        assert hair.hairloom.children_density == ""
+    assert 0.5 < lengths[0] / style.settings["grow"]["length"] < 1.0
+    assert lengths[1] > 20.0 * lengths[0]
+
+
+@pytest.mark.usefixtures("few")
+def test_fur_grows_on_the_selected_mesh_in_one_step() -> None:
+    mesh = monkey(0.2)
+    bpy.ops.ed.undo_push(message="before")
+    before = everything()
+    bpy.ops.hairloom.add_hairstyle("EXEC_DEFAULT", True, style="short_coat", plays=False)
+    assert bpy.context.object.parent == mesh
+    assert everything() - before == {f"{mesh.name} Short Coat"}
+    bpy.ops.ed.undo()
+    assert everything() == before
+
+
+@pytest.mark.usefixtures("few")
+def test_brows_from_nothing_come_once() -> None:
+    bpy.ops.hairloom.add_hairstyle(style="brows", plays=False)
+    assert {obj.name for obj in bpy.data.objects} == {"Head", "Head Brows"}
 
 
 @pytest.mark.usefixtures("few")
@@ -211,9 +265,12 @@ def test_the_files_are_what_the_recipes_make() -> None:
     finally:
         sys.path.remove(str(TOOLS))
     assert set(recipes.RECIPES) == set(NAMES)
-    made, kept = recipes.RECIPES["buzz_cut"](growth.Head()), named_hairstyle("buzz_cut")
-    for name in ("title", "order", "masks", "modifiers", "presets", "settings"):
-        assert getattr(made, name) == getattr(kept, name)
+    head = growth.Head()
+    for style in ("shaggy_coat", "buzz_cut"):
+        made, kept = recipes.RECIPES[style](head), named_hairstyle(style)
+        for name in ("title", "order", "masks", "modifiers", "presets", "settings"):
+            assert getattr(made, name) == getattr(kept, name)
+    assert kept.guides is not None
     assert np.abs(made.guides.shape - kept.guides.shape).max() < 3e-5
     assert np.abs(made.guides.root_uv - kept.guides.root_uv).max() < 1e-6
 
@@ -222,4 +279,28 @@ def test_every_style_has_a_picture_and_is_a_small_file() -> None:
     for entry in shipped():
         picture = entry.path.with_suffix(".png")
         assert picture.is_file() and picture.stat().st_size < 60_000, "run make styles"
-        assert entry.path.with_suffix(".npz").stat().st_size < 700_000
+        guides = entry.path.with_suffix(".npz")
+        if entry.name in FUR:
+            assert not guides.exists()
+        else:
+            assert guides.stat().st_size < 700_000
+
+
+@pytest.mark.draws
+def test_another_file_of_a_style_makes_its_job_run_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder, report = tmp_path / "styles", tmp_path / "report.json"
+    shutil.copytree(hairstyles.HAIRSTYLE_FOLDER, folder)
+    monkeypatch.setattr(hairstyles, "HAIRSTYLE_FOLDER", folder)
+
+    def status() -> str:
+        options = ["--width", "32", "--height", "32", "--samples", "1", "--skip-existing"]
+        options += ["--set", "children.strand_count=100", "--report", str(report)]
+        options += ["--output", str(tmp_path / "buzz.png")]
+        assert run(["render", "--style", "buzz_cut", *options]) == 0
+        return str(json.loads(report.read_text())["status"])
+
+    assert status() == "done" and status() == "skipped"
+    shutil.copy(folder / "bob.npz", folder / "buzz_cut.npz")
+    assert status() == "done"

@@ -26,6 +26,7 @@ from ...exchange.files.atomic import write_text_atomic
 from ...params.preset import preset_as_dict
 from ..base.report import Report, hairloom_version
 from ..properties.presets import named_preset
+from ..setup.hairstyles import files_of_hairstyle
 from .places import named_inputs
 
 SUFFIX = ".done.json"
@@ -131,7 +132,7 @@ def _seen_from(folder: Path, path: str) -> str:
 
 def _asked(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
     """All options as JSON has them, absolute paths in them as seen from a folder; what their
-    presets say; and which Hairloom and Blender."""
+    presets and hairstyle say; and which Hairloom and Blender."""
     asked = {
         name: _moved_with(folder, value)
         for name, value in vars(options).items()
@@ -139,6 +140,8 @@ def _asked(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
     }
     presets = [preset_as_dict(named_preset(name)) for name in getattr(options, "preset", ())]
     asked |= {"presets": presets, "made_by": [hairloom_version(), bpy.app.version_string]}
+    if getattr(options, "style", None):
+        asked["style_files"] = [digest(path) for path in files_of_hairstyle(options.style)]
     plain: dict[str, Any] = json.loads(json.dumps(asked, default=str))
     return plain
 

@@ -10,11 +10,14 @@ import bpy
 import numpy as np
 
 from ...errors import HairloomError
-from ...exchange.hairstyles import Hairstyle, read_hairstyle, read_title
+from ...exchange.hairstyles import GROWN, Hairstyle, read_hairstyle, read_title
 from ...groom.face_hair import grow_face_hair
+from ...groom.grow import grow
+from ...groom.settings import GrowSettings
 from ...parameters import ALL_SETTINGS
 from ...strands import StrandSet, Surface
 from ...strands.affine import mean_scale
+from ...strands.face import is_face_hair
 from ..base.vertex_weights import read_weights
 from ..properties import previews
 from ..properties.presets import apply, named_preset
@@ -24,6 +27,7 @@ from ..scene.bust_data import load_bust
 from ..scene.curves import write_curves
 from ..scene.hair_nodes import add_hair_nodes
 from ..scene.surfaces import read_surface
+from .starting import fit_motion, fitted, fitting_factor
 
 HAIRSTYLE_FOLDER = Path(__file__).resolve().parents[3] / "hairstyles"
 _HEAD = "Head"
@@ -51,6 +55,12 @@ def shipped() -> tuple[Entry, ...]:
         order, title = read_title(path)
         found.append((order, Entry(path.stem, title, path)))
     return tuple(entry for _, entry in sorted(found, key=lambda one: (one[0], one[1].name)))
+
+
+def files_of_hairstyle(name: str) -> tuple[Path, Path]:
+    """Where a style that ships says what it is, and where its guides are; fur has none."""
+    path = HAIRSTYLE_FOLDER / f"{name}.json"
+    return path, path.with_suffix(".npz")
 
 
 def named_hairstyle(name: str) -> Hairstyle:
@@ -97,17 +107,18 @@ def add_hairstyle(
     depsgraph: bpy.types.Depsgraph,
     collection: bpy.types.Collection,
 ) -> bpy.types.Object:
-    """Hair curves in this style on the built-in head, with its modifiers and settings.
+    """Hair curves in this style on the built-in head, or fur on any mesh, with its modifiers and
+    settings.
 
     Raises:
-        HairloomError: another head, a mask that it has not or that is empty, a preset or node group
-            that is not there. Nothing is added then.
+        HairloomError: a mesh that it does not grow on, a mask that it has not or that is empty, a
+            preset or node group that is not there. Nothing is added then.
     """
-    if not is_bust(head):
+    if not (grows_anywhere(style) or is_bust(head)):
         raise HairloomError(
             "this is not the built-in head",
             place=head.name,
-            remedy="Select a built-in head, or nothing to add one; on other meshes, Add Hair",
+            remedy="Select a built-in head, or nothing to add one; fur and Add Hair take others",
         )
     for name in style.masks.values():
         if not (read_weights(head, depsgraph, name) > 0.0).any():
@@ -116,8 +127,7 @@ def add_hairstyle(
                 place=head.name,
                 remedy="Paint where hair is to grow, or add a new built-in head",
             )
-    surface = read_surface(head, depsgraph, need_uv=True, place=head.name)
-    strands = style.guides.on(surface, _size_of(head))
+    strands, factor = _strands(style, head, depsgraph)
     hair = write_curves(f"{head.name} {style.title}", strands, head, collection)
     try:
         for one in style.modifiers:
@@ -126,6 +136,7 @@ def add_hairstyle(
             for settings in named_preset(name).all:
                 apply(settings, hair)
         _put_settings(style, hair)
+        fit_motion(hair, factor)
     except HairloomError:
         curves = hair.data
         bpy.data.objects.remove(hair)
@@ -133,6 +144,29 @@ def add_hairstyle(
         raise
     hair.hairloom.children_density = style.masks.get("children", "")
     return hair
+
+
+def _strands(
+    style: Hairstyle, head: bpy.types.Object, depsgraph: bpy.types.Depsgraph
+) -> tuple[StrandSet, float]:
+    """The style's curves on this mesh, and how much larger than a head's fur is there."""
+    if style.guides is None:
+        factor = fitting_factor(head, depsgraph)
+        settings = fitted(GrowSettings.from_dict(style.settings[GROWN], style.title), factor)
+        surface = read_surface(head, depsgraph, need_uv=False, place=head.name)
+        return grow(surface, settings), factor
+    surface = read_surface(head, depsgraph, need_uv=True, place=head.name)
+    return style.guides.on(surface, _size_of(head)), 1.0
+
+
+def grows_anywhere(style: Hairstyle) -> bool:
+    """Whether it is fur."""
+    return style.guides is None
+
+
+def is_of_face(style: Hairstyle) -> bool:
+    """Whether it is brows or lashes."""
+    return style.guides is not None and bool(is_face_hair(style.guides.group).all())
 
 
 def add_face_hair(
@@ -174,8 +208,8 @@ def _size_of(head: bpy.types.Object) -> float:
 
 def _put_settings(style: Hairstyle, hair: bpy.types.Object) -> None:
     """The style's own values, over those of its presets and the defaults."""
-    for section, values in style.settings.items():
-        kind = ALL_SETTINGS[section]
+    for section in set(style.settings) - {GROWN}:
+        kind, values = ALL_SETTINGS[section], style.settings[section]
         owners = hair.data.hairloom, hair.hairloom
         owner = next((one for one in owners if hasattr(one, section)), None)
         own = {} if owner is None else settings_of(getattr(owner, section), kind).as_dict()

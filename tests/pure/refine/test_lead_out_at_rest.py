@@ -125,4 +125,4 @@ def test_what_nothing_leads_out_is_left_out_and_said(
     inside = depth(before.strands)[before.own_count :] > 0.001
     assert after.child_count <= before.child_count - inside.sum()
     (note,) = set(after.notes) - set(before.notes)
-    assert "would lie in the head" in note and "Comb" in note
+    assert "would lie in the surface" in note and "Comb" in note
