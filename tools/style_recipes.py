@@ -651,7 +651,7 @@ def undercut(head: Head) -> Any:
         "Undercut",
         150,
         head.shapes(roots, locks, is_top.astype(np.int32)),
-        "black",
+        "brown",
         children=children(
             42000, length_variation=0.2, clump=0.15, clump_size=20, frizz=0.006, parting=0.9
         ),
