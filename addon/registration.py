@@ -11,7 +11,7 @@ from typing import Any
 import bpy
 
 from .blender.command_line.command_line import run
-from .blender.engine import engine
+from .blender.engine import engine, hair_scene
 from .blender.preview import handlers, scene_events
 from .blender.properties import groups, previews
 from .ui import (
@@ -122,6 +122,7 @@ def _steps() -> tuple[Step, ...]:
         (translations.register, translations.unregister),
         (operators_adopted.register, operators_adopted.unregister),
         (handlers.register, handlers.unregister),
+        (hair_scene.register, hair_scene.unregister),
         (_register_command, _unregister_command),
     )
 

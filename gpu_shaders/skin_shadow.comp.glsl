@@ -1,5 +1,6 @@
 // Soft shadows on skin, first step: how much of each light reaches the skin that a texel of the
-// head's UV map shows. A channel a light, by the number of its opacity map.
+// head's UV map shows. A channel a light, by the number of its opacity map. HAIR_ALONE: meshes keep
+// no light out.
 #include "lib_shadows.glsl"
 #include "lib_skin.glsl"
 
@@ -27,7 +28,11 @@ void main()
     for (int index = 0; index < light_count; index++) {
       int map = int(opacity.light[index].x);
       if (map >= 0 && map < {{skin_lights}}) {
+#ifdef HAIR_ALONE
+        vec3 path = vec3(shadow_path(index, point).xy, 1.0);
+#else
         vec3 path = shadow_path_to_mesh(index, point, facet);
+#endif
         lit[map] = light_left(path, vec3(skin_forward(hair_forward))).x;
       }
     }

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager
+from dataclasses import replace
 from typing import Any
 
 from ..shading.lights import kept_lights
 from ..shading.skin.layout import SkinLayout
 from .camera import Camera
+from .caster_batch import alpha_picture
 from .feature_programs import UniformBlocks, bound
 from .hashed_alpha import shifts
 from .marschner_textures import hair_forward, under_hair_feature
@@ -42,6 +45,11 @@ _RECIPE = ShaderRecipe(
     defines=(("SHADOWS", 0),),
 )
 
+#: what hair leaves of the light on meshes, in place of them
+_SHADOW_RECIPE = replace(
+    _RECIPE, name="mesh_hair_shadow", fragment="mesh_hair_shadow.frag.glsl", integers=()
+)
+
 type _Batch = tuple[MeshSnapshot, SkinLayout | None, Any]
 
 
@@ -74,32 +82,44 @@ class MeshPass:
                 InterGroomShadow;
                 counts where there are maps. Others as in StrandPass.draw.
         """
-        skins = self.skin.shadows(
-            snapshot.meshes,
-            opacity,
-            snapshot.skin,
-            len(kept_lights(snapshot.lights)),
-            (0.0, 0.0, 0.0) if opacity is None else hair_forward(snapshot),
-            shadows,
-        )
+        # nothing is seen of a hole in the picture, nor a shadow on it
+        seen = [mesh for mesh in snapshot.meshes if not mesh.is_holdout]
+        skins = self._skins(seen, snapshot, opacity, shadows)
         self._upload(snapshot.meshes, skins)
-        shared = [view_feature(camera, width, height), lights_feature(snapshot)]
-        if opacity is not None:
-            shared.append(under_hair_feature(snapshot, opacity))
-        if shadows is not None:
-            shared.append(shadows.feature(camera.sample))
+        shared = _shared(snapshot, camera, (width, height), opacity, shadows)
         integers = {"output_encoding": output_index(output)}
         for number, (mesh, _, batch) in enumerate(_far_to_near(self._batches, camera)):
             features = [*shared, *self._mesh_features(mesh, skins.get(id(mesh)))]
-            is_blended = mesh.transparency == "blended"
-            # a pixel stands for what lies behind all that is blended
-            if between is not None and opacity is not None and not is_blended:
-                features.append(_inter_groom_feature(between))
-            if mesh.transparency == "hashed":
-                features.append(_hashed_feature(number, camera.sample))
-            blend = "ALPHA_PREMULT" if is_blended else "NONE"
-            with drawing_state(depth_write=not is_blended, blend=blend):
+            features += _moment_features(mesh, number, camera.sample, opacity and between)
+            with _state_for(mesh):
                 batch.draw(bound(_RECIPE, features, self._blocks, integers=integers).shader)
+        self._pictures.forget_but(snapshot.meshes)
+
+    def draw_hair_shadow(
+        self,
+        snapshot: Snapshot,
+        camera: Camera,
+        width: int,
+        height: int,
+        *,
+        opacity: OpacityMaps | None = None,
+        shadows: MeshShadows | None = None,
+        between: Any = None,
+    ) -> None:
+        """Draw the fraction of their light that hair leaves to all meshes of the snapshot, by
+        colour, into the bound framebuffer, depth-tested.
+
+        Args:
+            all as of `draw`.
+        """
+        skins = self._skins(snapshot.meshes, snapshot, opacity, shadows, of_hair_alone=True)
+        self._upload(snapshot.meshes, skins)
+        shared = _shared(snapshot, camera, (width, height), opacity, shadows)
+        for number, (mesh, _, batch) in enumerate(_far_to_near(self._batches, camera)):
+            features = [*shared, *self._cover_features(mesh, skins.get(id(mesh)))]
+            features += _moment_features(mesh, number, camera.sample, opacity and between)
+            with _state_for(mesh):
+                batch.draw(bound(_SHADOW_RECIPE, features, self._blocks).shader)
         self._pictures.forget_but(snapshot.meshes)
 
     def release(self) -> None:
@@ -109,6 +129,26 @@ class MeshPass:
         self.skin = SkinPass()
         self.mesh_shadows.release()
         self._pictures = PictureTextures()
+
+    def _skins(
+        self,
+        meshes: Sequence[MeshSnapshot],
+        snapshot: Snapshot,
+        opacity: OpacityMaps | None,
+        shadows: MeshShadows | None,
+        *,
+        of_hair_alone: bool = False,
+    ) -> dict[int, SkinShadow]:
+        """The soft shadows on those that are skin, see SkinPass.shadows."""
+        return self.skin.shadows(
+            meshes,
+            opacity,
+            snapshot.skin,
+            len(kept_lights(snapshot.lights)),
+            (0.0, 0.0, 0.0) if opacity is None else hair_forward(snapshot),
+            shadows,
+            of_hair_alone=of_hair_alone,
+        )
 
     def _mesh_features(
         self, mesh: MeshSnapshot, skin: SkinShadow | None
@@ -129,11 +169,19 @@ class MeshPass:
         else:
             yield self._pictures.feature(mesh, pictures)
         if mesh.transparency != "opaque":
-            yield ShaderFeature(
-                name=mesh.transparency,
-                numbers={"mesh_alpha": ("FLOAT", mesh.alpha)},
-                defines={mesh.transparency.upper(): 1},
-            )
+            yield _alpha_feature(mesh)
+
+    def _cover_features(
+        self, mesh: MeshSnapshot, skin: SkinShadow | None
+    ) -> Iterator[ShaderFeature]:
+        """What the program of one mesh has that shows not its surface: how much of it is there."""
+        if skin is not None:
+            yield skin.feature
+        if mesh.transparency != "opaque":
+            yield _alpha_feature(mesh)
+            picture = alpha_picture(mesh)
+            if picture is not None:
+                yield self._pictures.alpha_feature(picture)
 
     def _upload(self, meshes: tuple[MeshSnapshot, ...], skins: Mapping[int, SkinShadow]) -> None:
         kept = {(id(mesh), id(layout)): batch for mesh, layout, batch in self._batches}
@@ -146,6 +194,47 @@ class MeshPass:
             (mesh, layout, kept.get((id(mesh), id(layout))) or mesh_batch(mesh, layout))
             for mesh, layout in wanted
         ]
+
+
+def _shared(
+    snapshot: Snapshot,
+    camera: Camera,
+    size: tuple[int, int],
+    opacity: OpacityMaps | None,
+    shadows: MeshShadows | None,
+) -> list[ShaderFeature]:
+    """What the programs of all meshes have: view, light, and what is in its way."""
+    found = [view_feature(camera, *size), lights_feature(snapshot)]
+    if opacity is not None:
+        found.append(under_hair_feature(snapshot, opacity))
+    if shadows is not None:
+        found.append(shadows.feature(camera.sample))
+    return found
+
+
+def _moment_features(
+    mesh: MeshSnapshot, number: int, sample: int, between: Any
+) -> Iterable[ShaderFeature]:
+    """What the program of one mesh has in this sample alone."""
+    # a pixel stands for what lies behind all that is blended
+    if between is not None and mesh.transparency != "blended":
+        yield _inter_groom_feature(between)
+    if mesh.transparency == "hashed":
+        yield _hashed_feature(number, sample)
+
+
+def _state_for(mesh: MeshSnapshot) -> AbstractContextManager[None]:
+    is_blended = mesh.transparency == "blended"
+    blend = "ALPHA_PREMULT" if is_blended else "NONE"
+    return drawing_state(depth_write=not is_blended, blend=blend)
+
+
+def _alpha_feature(mesh: MeshSnapshot) -> ShaderFeature:
+    return ShaderFeature(
+        name=mesh.transparency,
+        numbers={"mesh_alpha": ("FLOAT", mesh.alpha)},
+        defines={mesh.transparency.upper(): 1},
+    )
 
 
 def _inter_groom_feature(between: Any) -> ShaderFeature:

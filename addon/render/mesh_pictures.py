@@ -47,6 +47,16 @@ class PictureTextures:
             defines={"PICTURES": 1},
         )
 
+    def alpha_feature(self, picture: Floats) -> ShaderFeature:
+        """What a program has that lays the alpha of this picture alone over a mesh's UVs."""
+        return ShaderFeature(
+            name="alpha",
+            textures={"mesh_color_map": ("FLOAT_2D", self._texture(picture))},
+            inputs=(("VEC2", "picture_place"),),
+            varyings=(("smooth", "VEC2", "mesh_uv"),),
+            defines={"PICTURES": 1},
+        )
+
     def color(self, picture: Floats) -> Any:
         """A picture of colours by itself, (height, width, 4)."""
         return self._texture(picture)

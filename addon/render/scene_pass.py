@@ -32,6 +32,7 @@ type Rgba = tuple[float, float, float, float]
 #: A render in the window draws in a separate thread, and passes share textures.
 ONE_AT_A_TIME = threading.Lock()
 _NOTHING: Rgba = (0.0, 0.0, 0.0, 0.0)
+_ALL: Rgba = (1.0, 1.0, 1.0, 1.0)
 #: distance [m] where nothing is, as Blender's engines have it
 FAR_AWAY = 1.0e10
 
@@ -65,12 +66,8 @@ class ScenePass:
     def _draw(
         self, scene: SceneSnapshot, camera: Camera, target: Target, size: tuple[int, int], sky: Rgba
     ) -> None:
-        self._forget_but(scene)
         lit = {groom.key: scene.lit(groom) for groom in scene.grooms}
-        maps = {
-            key: self._strands(key).opacity(groom) or self._cards(key).opacity(groom)
-            for key, groom in lit.items()
-        }
+        maps = self._maps(scene)
         shafts = next((each.shafts for each in lit.values() if each.shafts.use_shafts), None)
         holes = {groom.key for groom in scene.grooms if groom.is_holdout}
         seen = lit.keys() - holes
@@ -85,6 +82,28 @@ class ScenePass:
             color, depth = target.color, target.depth
             add_shafts(color, color, depth, camera, scene.lights, shafts)
             put_under(color, sky)
+
+    def draw_hair_shadow(
+        self, scene: SceneSnapshot, camera: Camera, target: Target, size: tuple[int, int]
+    ) -> None:
+        """Draw the fraction of their light that hair leaves to meshes, by colour; 1 elsewhere.
+
+        Others, and errors, as of `draw`.
+        """
+        with ONE_AT_A_TIME:
+            maps = self._maps(scene)
+            target.sized(*size).clear(_ALL)
+            with target.drawing():
+                self._draw_meshes(scene, camera, size, maps, is_hair_shadow=True)
+
+    def _maps(self, scene: SceneSnapshot) -> dict[Hashable, OpacityMaps | None]:
+        """What is in the way of light in each groom; grooms that are no longer there are let go."""
+        self._forget_but(scene)
+        lit = {groom.key: scene.lit(groom) for groom in scene.grooms}
+        return {
+            key: self._strands(key).opacity(groom) or self._cards(key).opacity(groom)
+            for key, groom in lit.items()
+        }
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -152,6 +171,8 @@ class ScenePass:
         camera: Camera,
         size: tuple[int, int],
         maps: dict[Hashable, OpacityMaps | None],
+        *,
+        is_hair_shadow: bool = False,
     ) -> None:
         """Each mesh with the maps of the groom that is nearest, and what the others have in the way
         of light.
@@ -173,7 +194,8 @@ class ScenePass:
             key = None if groom is None else groom.key
             mesh_pass = self._mesh_passes.setdefault(key, MeshPass())
             opacity = None if key is None else maps[key]
-            mesh_pass.draw(
+            draw = mesh_pass.draw_hair_shadow if is_hair_shadow else mesh_pass.draw
+            draw(
                 replace(light, meshes=tuple(meshes)),
                 camera,
                 *size,

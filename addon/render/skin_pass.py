@@ -39,7 +39,7 @@ SKIN_TEXTURES = tuple(
     ("FLOAT_2D", f"skin_{name}") for name in ("shadow", "texels", "stretches", "seams", "shifts")
 )
 
-
+_OF_HAIR_ALONE = ShaderFeature(name="hair_alone", defines={"HAIR_ALONE": 1})
 _SHADOW_RECIPE = ShaderRecipe(
     name="skin_shadow",
     compute="skin_shadow.comp.glsl",
@@ -105,6 +105,7 @@ class _Drawn:
     light_count: int
     forward: Color
     shadows: MeshShadows | None
+    is_of_hair_alone: bool
 
     def is_like(self, other: _Drawn) -> bool:
         return (
@@ -113,6 +114,7 @@ class _Drawn:
             and self.shadows is other.shadows
             and (self.softness, self.light_count) == (other.softness, other.light_count)
             and self.forward == other.forward
+            and self.is_of_hair_alone == other.is_of_hair_alone
         )
 
 
@@ -160,6 +162,8 @@ class SkinPass:
         light_count: int,
         forward: Color = (0.0, 0.0, 0.0),
         shadows: MeshShadows | None = None,
+        *,
+        of_hair_alone: bool = False,
     ) -> dict[int, SkinShadow]:
         """The soft shadow on each mesh that is skin, by the mesh's id(); none on those whose UVs
         are of no use, and none at all without opacity maps or softness.
@@ -169,6 +173,7 @@ class SkinPass:
             forward: the fraction of light that hair sends on, by colour; the shadow is that of
                 their mean.
             shadows: of all meshes, beyond the maps.
+            of_hair_alone: without the shadows of meshes.
         """
         if opacity is None or not settings.soft_shadow or not settings.softness:
             return {}
@@ -179,7 +184,7 @@ class SkinPass:
             head = self._head(mesh.skin.surface, settings.skin_resolution)
             used.append(head)
             if not head.layout.is_empty:
-                light = settings.softness * head.size, light_count, forward, shadows
+                light = settings.softness * head.size, light_count, forward, shadows, of_hair_alone
                 wanted = _Drawn(mesh.skin.surface.positions, opacity, *light)
                 found[id(mesh)] = self._drawn(head, mesh.skin.surface, wanted)
         self._heads = [head for head in self._heads if head in used]
@@ -228,9 +233,10 @@ class SkinPass:
         texels, shadows = head.textures["skin_texels"], wanted.shadows
         found = _like(texels)
         depths = [] if shadows is None else [shadows.feature(sample=0)]
+        kind = [_OF_HAIR_ALONE] if wanted.is_of_hair_alone else []
         shader = bound(
             _SHADOW_RECIPE,
-            [wanted.opacity.feature, *depths],
+            [wanted.opacity.feature, *depths, *kind],
             self._blocks,
             textures={"skin_texels": texels, "skin_corners": corners},
             images={"reaching": found},

@@ -6,7 +6,9 @@ from typing import Any
 
 import bpy
 
+from ..blender.engine import hair_scene
 from ..blender.viewport.overlay import ENGINE
+from .messages import draw_message
 
 #: panels for every engine that does not bring its own
 _UNFIT = frozenset({"VIEWLAYER_PT_filter", "RENDER_PT_freestyle"})
@@ -96,6 +98,37 @@ class HAIRLOOM_PT_engine_film(_RenderPanel):
         layout.prop(render, "film_transparent", text="Transparent")
 
 
+class HAIRLOOM_PT_hair_scene(bpy.types.Panel):
+    """Hair drawn by Hairloom over the pictures of this engine"""
+
+    bl_label = "Hairloom Hair"
+    bl_space_type = "PROPERTIES"
+    bl_region_type = "WINDOW"
+    bl_context = "render"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return context.engine != ENGINE
+
+    def draw_header(self, context: bpy.types.Context) -> None:
+        self.layout.prop(context.scene.hairloom, "use_hair_scene", text="")
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout, settings = self.layout, context.scene.hairloom
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        column = layout.column()
+        column.active = settings.use_hair_scene
+        column.prop(settings.picture, "samples", text="Samples")
+        row = column.row()
+        row.active = context.scene.render.use_motion_blur
+        row.prop(settings.picture, "motion_steps", text="Motion Steps")
+        problem = hair_scene.problem_of(context.scene) if settings.use_hair_scene else ""
+        if problem:
+            draw_message(layout, context, f"Blender draws the hair. {problem}", "ERROR")
+
+
 class HAIRLOOM_PT_engine_passes(bpy.types.Panel):
     """Passes rendered besides the image"""
 
@@ -123,6 +156,7 @@ CLASSES = (
     HAIRLOOM_PT_engine_mesh_shadows,
     HAIRLOOM_PT_engine_motion_blur,
     HAIRLOOM_PT_engine_film,
+    HAIRLOOM_PT_hair_scene,
     HAIRLOOM_PT_engine_passes,
 )
 

@@ -12,10 +12,12 @@ SIZE = 64
 
 
 def set_world(color: tuple[float, float, float]) -> None:
-    world = bpy.context.scene.world
-    world.node_tree.nodes.clear()
-    background = world.node_tree.nodes.new("ShaderNodeBackground")
+    tree = bpy.context.scene.world.node_tree
+    tree.nodes.clear()
+    background = tree.nodes.new("ShaderNodeBackground")
     background.inputs["Color"].default_value = (*color, 1.0)
+    output = tree.nodes.new("ShaderNodeOutputWorld")
+    tree.links.new(background.outputs[0], output.inputs["Surface"])
 
 
 def add_ball(radius: float = 0.15, color: tuple[float, float, float] = (1.0, 1.0, 1.0)) -> Any:

@@ -67,7 +67,7 @@ def ensure_gpu() -> None:
     """
     if not bpy.app.background:
         return
-    if not gpu_in_use()["backend"] and not _can_draw():
+    if not gpu_in_use()["backend"] and not can_draw():
         raise HairloomError(
             "there is no GPU here, and no software driver in place of one",
             place="render",
@@ -77,8 +77,8 @@ def ensure_gpu() -> None:
 
 
 @cache
-def _can_draw() -> bool:
-    """Elsewhere than on Linux there always is a driver."""
+def can_draw() -> bool:
+    """Whether there is a driver that draws; elsewhere than on Linux there always is."""
     if not sys.platform.startswith("linux"):
         return True
     try:

@@ -11,9 +11,10 @@ import bpy
 from ...errors import HairloomError
 from ...render import gpu_objects, skin_layouts
 from ...render.shader_source import ShaderError
+from ..base.gpu_context import can_draw
 from ..viewport.overlay import ENGINE
-from . import engine_hair
-from .engine_still import COMBINED, DEPTH_PASS, NUMBERS_PASS, Still
+from . import engine_hair, hair_scene
+from .engine_still import COMBINED, DEPTH_PASS, NUMBERS_PASS, SHADOW_PASS, Still
 from .engine_view import EngineView
 
 
@@ -25,8 +26,8 @@ class HAIRLOOM_RE_engine(bpy.types.RenderEngine):
     bl_use_preview = False
     bl_use_eevee_viewport = True
     # With it Blender makes a context before it asks us, and crashes where none can be had: in the
-    # background, where renders run in the main thread, we look first.
-    bl_use_gpu_context = not bpy.app.background
+    # background we look first. It is needed there too, where another engine has rendered before.
+    bl_use_gpu_context = not bpy.app.background or can_draw()
 
     def __init__(self, *args: Any, **keywords: Any) -> None:
         super().__init__(*args, **keywords)
@@ -36,7 +37,7 @@ class HAIRLOOM_RE_engine(bpy.types.RenderEngine):
     def update_render_passes(self, scene: Any, renderlayer: Any) -> None:
         """Tell Blender's compositor and file outputs what passes there will be."""
         self.register_pass(scene, renderlayer, COMBINED, 4, "RGBA", "COLOR")
-        for (name, channels, ids, kind), is_wanted in _data_passes(renderlayer):
+        for (name, channels, ids, kind), is_wanted in _passes(scene, renderlayer):
             if is_wanted:
                 self.register_pass(scene, renderlayer, name, channels, ids, kind)
 
@@ -49,7 +50,7 @@ class HAIRLOOM_RE_engine(bpy.types.RenderEngine):
 
     def _render(self, depsgraph: Any) -> None:
         layer = depsgraph.view_layer
-        for (name, channels, ids, _), is_wanted in _data_passes(layer):
+        for (name, channels, ids, _), is_wanted in _passes(depsgraph.scene, layer):
             if is_wanted:
                 self.add_pass(name, channels, ids, layer=layer.name)
         try:
@@ -97,8 +98,13 @@ class HAIRLOOM_RE_engine(bpy.types.RenderEngine):
             return None
 
 
-def _data_passes(layer: Any) -> tuple[tuple[tuple[str, int, str, str], bool], ...]:
-    return (DEPTH_PASS, layer.use_pass_z), (NUMBERS_PASS, layer.use_pass_object_index)
+def _passes(scene: Any, layer: Any) -> tuple[tuple[tuple[str, int, str, str], bool], ...]:
+    """What there is beside the picture, and whether it is wanted."""
+    return (
+        (DEPTH_PASS, layer.use_pass_z),
+        (NUMBERS_PASS, layer.use_pass_object_index),
+        (SHADOW_PASS, hair_scene.drawn_by(scene) is not None),
+    )
 
 
 def _views(render: Any) -> list[str]:

@@ -22,7 +22,7 @@ from ..base.objects import head_of
 from ..properties.properties import settings_of
 from ..scene.lights import light_warnings, read_ambient, read_lights
 from ..scene.mesh_materials import material_notes
-from . import engine_hair
+from . import engine_hair, hair_scene
 from .engine_hair import HairNotMadeYetError
 from .engine_meshes import SOLID_TYPES, as_before, read_meshes
 
@@ -102,12 +102,16 @@ class SceneReader:
         uids: set[int] = set()
         self.previewed, self.pending = {}, set()
         self._heads = _heads(depsgraph)
+        behind = hair_scene.drawn_by(depsgraph.scene)
+        layer = depsgraph.view_layer if behind is None else hair_scene.drawn_layer(behind)
         for instance in depsgraph.object_instances:
             obj = instance.object
             if not instance.show_self or not is_shown(_holder(instance)):
                 continue
             key, matrix = _key(instance), np.array(instance.matrix_world)
-            visibility = _visibility(instance, depsgraph.view_layer)
+            visibility = _visibility(instance, layer)
+            if behind is not None and obj.type in SOLID_TYPES:
+                visibility = replace(visibility, is_holdout=True)
             if obj.type in SOLID_TYPES:
                 read[key] = self._read_mesh(key, obj, matrix, visibility, changed)
                 if visibility.is_seen:
@@ -273,7 +277,8 @@ def _visibility(
     owner = engine_hair.owner_of(obj) if obj.type == "CURVES" else obj
     marked = (each.is_holdout for each in (obj, owner, holder))
     is_holdout = any(marked) or holder.holdout_get(view_layer=layer)
-    return Visibility(obj.visible_camera and not is_indirect, is_holdout, obj.visible_shadow)
+    is_seen = hair_scene.was_seen(owner) if obj.type == "CURVES" else obj.visible_camera
+    return Visibility(is_seen and not is_indirect, is_holdout, obj.visible_shadow)
 
 
 def _center(grooms: tuple[DrawnGroom, ...], meshes: list[MeshSnapshot]) -> Floats:

@@ -15,18 +15,21 @@ from ...render.accumulation import Accumulation, Target
 from ...render.camera import Camera
 from ...render.camera_window import Window, jittered
 from ...render.pixel_filter import jitters
-from ...render.scene_pass import Rgba, ScenePass
+from ...render.scene_pass import FAR_AWAY, Rgba, ScenePass
 from ...render.scene_snapshot import SceneSnapshot
 from ...shading.picture_settings import PictureSettings
 from ..base.gpu_context import ensure_gpu
 from ..properties.properties import settings_of
+from . import hair_scene
 from .engine_camera import border_window, camera_warnings, read_camera
 from .engine_scene import SceneReader
 
-COMBINED, DEPTH, NUMBERS = "Combined", "Depth", "Object Index"
+COMBINED, DEPTH, NUMBERS, SHADOW = "Combined", "Depth", "Object Index", "Hair Shadow"
 #: name, channels, their names, kind; what Blender's compositor knows each by
 DEPTH_PASS = (DEPTH, 1, "Z", "VALUE")
 NUMBERS_PASS = (NUMBERS, 1, "X", "VALUE")
+#: of hair scenes: the fraction of their light that hair leaves to meshes
+SHADOW_PASS = (SHADOW, 3, "RGB", "COLOR")
 #: while it renders, the picture so far is shown this often [s]
 _SHOWN_EVERY = 1.0
 
@@ -76,6 +79,9 @@ class Still:
         self._window, self._size = border_window(self._render, *self._whole)
         self._reader, self._pass = SceneReader(), ScenePass()
         self._target, self._picture = Target(), Accumulation()
+        behind = hair_scene.drawn_by(depsgraph.scene)
+        self._shadow = None if behind is None else (Target(), Accumulation())
+        self._is_needed = behind is None or hair_scene.is_needed(behind)
         self.warnings: tuple[str, ...] = ()
 
     def view(self, name: str) -> None:
@@ -89,7 +95,10 @@ class Still:
         engine.active_view_set(name)
         result = engine.begin_result(0, 0, *self._size, layer=depsgraph.view_layer.name, view=name)
         try:
-            self._fill(result)
+            if self._is_needed:
+                self._fill(result)
+            else:
+                _leave_empty(result)
         finally:
             engine.end_result(result)
 
@@ -97,6 +106,8 @@ class Still:
         frame = self._depsgraph.scene.frame_current_final
         moments = moments_of(self._settings, self._render)
         self._picture.begin(*self._size)
+        if self._shadow is not None:
+            self._shadow[1].begin(*self._size)
         shown = time.monotonic()
         scene, camera = self._moment()
         self._add_data(result, scene, camera)
@@ -132,6 +143,10 @@ class Still:
         self._pass.draw(scene, moved, self._target, self._size, sky_of(scene, self._render))
         self.warnings = tuple(dict.fromkeys((*self.warnings, *self._pass.notes)))
         self._picture.add(self._target.color)
+        if self._shadow is not None:
+            target, shadow = self._shadow
+            self._pass.draw_hair_shadow(scene, moved, target, self._size)
+            shadow.add(target.color)
         self._engine.update_progress(self._picture.count / self._settings.samples)
         self._engine.update_stats("", f"Sample {self._picture.count} of {self._settings.samples}")
 
@@ -151,6 +166,16 @@ class Still:
         for each in _passes(result):
             if each.name == COMBINED:
                 each.rect.foreach_set(self._picture.mean().ravel())
+            if each.name == SHADOW and self._shadow is not None:
+                shadow = self._shadow[1].mean()[..., :3]
+                each.rect.foreach_set(np.ascontiguousarray(shadow).ravel())
+
+
+def _leave_empty(result: Any) -> None:
+    """No hair, and no shadow of any: whoever lays it over a picture changes nothing."""
+    for each in _passes(result):
+        value = 1.0 if each.name == SHADOW else FAR_AWAY if each.name == DEPTH else 0.0
+        each.rect.foreach_set(np.full(len(each.rect) * each.channels, value, np.float32))
 
 
 def sky_of(scene: SceneSnapshot, render: bpy.types.RenderSettings) -> Rgba:

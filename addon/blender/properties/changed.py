@@ -9,7 +9,12 @@ import bpy
 type Listener = Callable[[bpy.types.ID], None]
 
 #: kind of change -> its subscribers
-_listeners: dict[str, list[Listener]] = {"settings": [], "display": [], "bake": []}
+_listeners: dict[str, list[Listener]] = {
+    "settings": [],
+    "display": [],
+    "bake": [],
+    "hair_scene": [],
+}
 
 
 def subscribe(kind: str, listener: Listener) -> None:
@@ -34,6 +39,11 @@ def display(owner: bpy.types.ID) -> None:
 def bake(owner: bpy.types.ID) -> None:
     """Where the bake is, or whether it is shown, was changed."""
     _call("bake", owner)
+
+
+def hair_scene(owner: bpy.types.ID) -> None:
+    """Whether Hairloom draws the hair of a scene over its engine's pictures was changed."""
+    _call("hair_scene", owner)
 
 
 def _call(kind: str, owner: bpy.types.ID) -> None:

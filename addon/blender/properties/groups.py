@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import bpy
-from bpy.props import BoolProperty, EnumProperty, PointerProperty, StringProperty
+from bpy.props import BoolProperty, EnumProperty, IntProperty, PointerProperty, StringProperty
 
 from ...parameters import ALL_SETTINGS, sections_of
 from ...params import Owner
@@ -252,6 +252,12 @@ class HAIRLOOM_PG_character(bpy.types.PropertyGroup):
             description="As what this object collides with hair and cloth",
             override=OVERRIDABLE,
         ),
+        "hidden_rays": IntProperty(
+            name="Hidden Rays",
+            description="What these curves are hidden from while a render runs",
+            options={"HIDDEN"},
+            override=OVERRIDABLE,
+        ),
         "hide_original": BoolProperty(
             name="Hide Blender's Strands",
             description="While previewing, show Blender's own drawing of these curves as a box",
@@ -265,7 +271,26 @@ class HAIRLOOM_PG_character(bpy.types.PropertyGroup):
 class HAIRLOOM_PG_scene(bpy.types.PropertyGroup):
     """Everything about the pictures of one scene."""
 
-    __annotations__ = _pointers("scene")
+    __annotations__ = {
+        **_pointers("scene"),
+        "use_hair_scene": BoolProperty(
+            name="Hairloom Hair",
+            description="Draw hair curves by Hairloom over the pictures of this render engine, "
+            "with their shadow on meshes, by a scene and nodes of the compositor",
+            update=lambda self, _context: changed.hair_scene(self.id_data),
+        ),
+        "hair_scene": PointerProperty(
+            type=bpy.types.Scene,
+            name="Hair Scene",
+            description="The scene that draws the hair of this one",
+            options={"HIDDEN"},
+        ),
+        "is_hair_scene": BoolProperty(
+            name="Is Hair Scene",
+            description="This scene draws the hair of its background set, and nothing else",
+            options={"HIDDEN"},
+        ),
+    }
 
 
 CLASSES = (

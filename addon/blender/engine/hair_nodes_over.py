@@ -1,0 +1,138 @@
+"""The nodes that lay hair over Blender's own picture, in the compositor of the artist's scene."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import bpy
+
+NAME = "Hairloom Hair"
+IMAGE, HAIR, SHADOW, STRENGTH = "Image", "Hair", "Hair Shadow", "Shadow Strength"
+#: custom property of node trees that are ours: the group, and a compositor made for it
+_KIND = "hairloom"
+_LAYERS = "CompositorNodeRLayers"
+#: of nodes [pixels], below and beside that of the picture
+_BELOW, _BESIDE = 320.0, 340.0
+
+
+def link(scene: bpy.types.Scene, hair: bpy.types.Scene, layer: str) -> None:
+    """Lay the hair over each Render Layers node of this view layer, in a compositor made for it if
+    there is none."""
+    tree = scene.compositing_node_group or _new_compositor(scene)
+    for node in [each for each in _pictures(tree, scene) if each.layer == layer]:
+        beside = tree.nodes.new(_LAYERS)
+        beside.scene = hair
+        beside.location = node.location.x, node.location.y - _BELOW
+        group = tree.nodes.new("CompositorNodeGroup")
+        group.node_tree = _group()
+        group.location = node.location.x + _BESIDE, node.location.y
+        picture = node.outputs[IMAGE]
+        for old in list(picture.links):
+            tree.links.new(group.outputs[IMAGE], old.to_socket)
+        tree.links.new(picture, group.inputs[IMAGE])
+        tree.links.new(beside.outputs[IMAGE], group.inputs[HAIR])
+        tree.links.new(beside.outputs[SHADOW], group.inputs[SHADOW])
+
+
+def unlink(scene: bpy.types.Scene, hair: bpy.types.Scene | None) -> None:
+    """Give the picture back to what asked for it, and remove our nodes."""
+    tree = scene.compositing_node_group
+    if tree is None:
+        return
+    for group in list(_groups(tree)):
+        sources = [each.from_socket for each in group.inputs[IMAGE].links]
+        for old in list(group.outputs[IMAGE].links):
+            if sources:
+                tree.links.new(sources[0], old.to_socket)
+        tree.nodes.remove(group)
+    for node in list(_hair_layers(tree, hair)):
+        tree.nodes.remove(node)
+    if tree.get(_KIND) == "compositor" and tree.users <= 1 and len(tree.nodes) == 2:
+        scene.compositing_node_group = None
+        bpy.data.node_groups.remove(tree)
+    group_tree = _known_group()
+    if group_tree is not None and not group_tree.users:
+        bpy.data.node_groups.remove(group_tree)
+
+
+def is_linked(scene: bpy.types.Scene, hair: bpy.types.Scene) -> bool:
+    """Whether the compositor asks for the hair and uses it."""
+    tree = scene.compositing_node_group
+    if tree is None or not any(_hair_layers(tree, hair)):
+        return False
+    return any(group.inputs[HAIR].is_linked and not group.mute for group in _groups(tree))
+
+
+def _pictures(tree: Any, scene: bpy.types.Scene) -> Iterator[Any]:
+    return (each for each in tree.nodes if each.bl_idname == _LAYERS and each.scene == scene)
+
+
+def _hair_layers(tree: Any, hair: bpy.types.Scene | None) -> Iterator[Any]:
+    """Of a hair scene that is gone, those of no scene."""
+    return _pictures(tree, hair)
+
+
+def _groups(tree: Any) -> Iterator[Any]:
+    group = _known_group()
+    return (
+        each
+        for each in tree.nodes
+        if each.bl_idname == "CompositorNodeGroup" and group and each.node_tree == group
+    )
+
+
+def _new_compositor(scene: bpy.types.Scene) -> Any:
+    """What Blender does without one: the picture as it is rendered."""
+    tree = bpy.data.node_groups.new(f"{scene.name} Compositing", "CompositorNodeTree")
+    tree[_KIND] = "compositor"
+    tree.interface.new_socket(IMAGE, in_out="OUTPUT", socket_type="NodeSocketColor")
+    picture, output = tree.nodes.new(_LAYERS), tree.nodes.new("NodeGroupOutput")
+    picture.scene = scene
+    output.location.x = 2.0 * _BESIDE
+    tree.links.new(picture.outputs[IMAGE], output.inputs[0])
+    scene.compositing_node_group = tree
+    return tree
+
+
+def _known_group() -> Any:
+    return next((each for each in bpy.data.node_groups if each.get(_KIND) == "hair"), None)
+
+
+def _group() -> Any:
+    """Picture times shadow, and hair over it."""
+    tree = _known_group()
+    if tree is not None:
+        return tree
+    tree = bpy.data.node_groups.new(NAME, "CompositorNodeTree")
+    tree[_KIND] = "hair"
+    sockets = tree.interface
+    sockets.new_socket(IMAGE, in_out="OUTPUT", socket_type="NodeSocketColor")
+    for name, color in ((IMAGE, (0, 0, 0, 1)), (HAIR, (0, 0, 0, 0)), (SHADOW, (1, 1, 1, 1))):
+        socket = sockets.new_socket(name, in_out="INPUT", socket_type="NodeSocketColor")
+        socket.default_value = color
+    strength = sockets.new_socket(STRENGTH, in_out="INPUT", socket_type="NodeSocketFloat")
+    strength.subtype, strength.default_value = "FACTOR", 1.0
+    strength.min_value, strength.max_value = 0.0, 1.0
+    given, output = tree.nodes.new("NodeGroupInput"), tree.nodes.new("NodeGroupOutput")
+    shaded, over = tree.nodes.new("ShaderNodeMix"), tree.nodes.new("CompositorNodeAlphaOver")
+    shaded.data_type, shaded.blend_type = "RGBA", "MULTIPLY"
+    shaded.clamp_factor = False
+    for number, node in enumerate((given, shaded, over, output)):
+        node.location.x = 220.0 * number
+    pairs = (
+        (given.outputs[STRENGTH], shaded.inputs[0]),
+        (given.outputs[IMAGE], _of_type(shaded.inputs, "RGBA", 0)),
+        (given.outputs[SHADOW], _of_type(shaded.inputs, "RGBA", 1)),
+        (_of_type(shaded.outputs, "RGBA", 0), over.inputs["Background"]),
+        (given.outputs[HAIR], over.inputs["Foreground"]),
+        (over.outputs[0], output.inputs[0]),
+    )
+    for one, other in pairs:
+        tree.links.new(one, other)
+    return tree
+
+
+def _of_type(sockets: Any, kind: str, number: int) -> Any:
+    """Sockets of a node that mixes whatever it is set to have the same names for all kinds."""
+    return [each for each in sockets if each.type == kind][number]

@@ -1,0 +1,220 @@
+"""Hair over the pictures of EEVEE and Cycles, by a scene that draws the hair of another.
+
+The hair scene holds nothing. Its engine is Hairloom, and the artist's scene is its background set,
+so it shows whatever is there. The compositor of the artist's scene asks for both: Blender renders
+each by its own engine, with progress, cancel and the frames of an animation, and the node group
+*Hairloom Hair* darkens Blender's picture by the shadow of the hair and lays the hair over it.
+
+While it renders, Blender's own engine sees no hair curves; they keep what they were in a property,
+from which a file that was saved meanwhile is healed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import bpy
+from bpy.app.handlers import persistent
+
+from ..properties import changed
+from ..viewport.overlay import ENGINE
+from . import hair_nodes_over
+
+#: what an object may be hidden from, in the order of its bits in `hidden_rays`
+RAYS = ("camera", "diffuse", "glossy", "transmission", "volume_scatter", "shadow")
+#: bit that says that rays are hidden at all
+HIDDEN = 1 << len(RAYS)
+_CAMERA = 1 << RAYS.index("camera")
+#: what the hair scene has as the artist's scene has it
+_RENDER = (
+    *("resolution_x", "resolution_y", "resolution_percentage", "pixel_aspect_x", "pixel_aspect_y"),
+    *("use_border", "use_crop_to_border", "border_min_x", "border_min_y"),
+    *("border_max_x", "border_max_y", "filter_size", "fps", "fps_base"),
+    *("use_motion_blur", "motion_blur_position", "motion_blur_shutter"),
+    *("use_multiview", "views_format"),
+)
+
+
+def hair_scene_of(scene: bpy.types.Scene) -> bpy.types.Scene | None:
+    """The scene that draws the hair of this one; None where there is none."""
+    found = scene.hairloom.hair_scene
+    # a copy of a scene names the hair scene of its original
+    return found if found is not None and found.background_set == scene else None
+
+
+def drawn_by(scene: bpy.types.Scene) -> bpy.types.Scene | None:
+    """The scene whose hair this one draws; None for a scene that is no hair scene."""
+    shown = scene.background_set
+    is_hair_scene = shown is not None and shown.hairloom.hair_scene == scene.original
+    return shown if is_hair_scene else None
+
+
+def drawn_layer(scene: bpy.types.Scene) -> bpy.types.ViewLayer:
+    """The view layer of a scene of which a background set is made: the first that is rendered."""
+    return next((layer for layer in scene.view_layers if layer.use), scene.view_layers[0])
+
+
+def is_needed(scene: bpy.types.Scene) -> bool:
+    """Whether the engine of a scene leaves its hair to the hair scene."""
+    return scene.render.engine != ENGINE
+
+
+def was_seen(hair: bpy.types.Object) -> bool:
+    """Whether the artist lets the camera see these curves, hidden for a render or not."""
+    hidden = hair.hairloom.hidden_rays
+    return bool(hidden & _CAMERA) if hidden else hair.visible_camera
+
+
+def problem_of(scene: bpy.types.Scene) -> str:
+    """Why Blender's engine draws the hair itself though Hairloom is to; empty: it does not."""
+    hair = hair_scene_of(scene)
+    if hair is None:
+        return "The scene that draws the hair is gone. Turn Hairloom Hair off and on."
+    if not scene.render.use_compositing:
+        return "Compositing is off. Turn it on in Post Processing."
+    if scene.render.use_sequencer and scene.sequence_editor and scene.sequence_editor.strips:
+        return "The sequencer is rendered. Turn it off in Post Processing."
+    if not hair_nodes_over.is_linked(scene, hair):
+        return (
+            "The compositor does not use the hair. Turn Hairloom Hair off and on, with Render "
+            "Layers of this scene in the compositor."
+        )
+    return ""
+
+
+def switched(scene: bpy.types.Scene) -> None:
+    """The artist has turned *Hairloom Hair* on or off."""
+    hair = hair_scene_of(scene)
+    if scene.hairloom.use_hair_scene and hair is None:
+        _add(scene)
+    elif not scene.hairloom.use_hair_scene:
+        scene.hairloom.hair_scene = None
+        hair_nodes_over.unlink(scene, hair)
+        if hair is not None:
+            bpy.data.scenes.remove(hair)
+
+
+def _add(scene: bpy.types.Scene) -> None:
+    hair = bpy.data.scenes.new(f"{scene.name} Hair")
+    hair.render.engine = ENGINE
+    hair.render.film_transparent = True
+    hair.background_set, hair.hairloom.is_hair_scene = scene, True
+    scene.hairloom.hair_scene = hair
+    follow(scene, hair)
+    hair_nodes_over.link(scene, hair, drawn_layer(scene).name)
+
+
+def follow(scene: bpy.types.Scene, hair: bpy.types.Scene) -> None:
+    """Give the hair scene the camera, the world and the picture of the artist's scene."""
+    pairs = [(scene.render, hair.render, name) for name in _RENDER]
+    pairs += [(scene, hair, name) for name in ("camera", "world", "frame_start", "frame_end")]
+    for section in ("picture", "mesh_shadows"):
+        ours = getattr(scene.hairloom, section)
+        pairs += [(ours, getattr(hair.hairloom, section), name) for name in ours.__annotations__]
+    for ours, theirs, name in pairs:
+        value = getattr(ours, name)
+        if getattr(theirs, name) != value:
+            setattr(theirs, name, value)
+    used = {view.name: view.use for view in scene.render.views}
+    for view in hair.render.views:
+        view.use = used.get(view.name, False)
+
+
+def _hair_in(collection: bpy.types.Collection, seen: set[str]) -> Iterator[bpy.types.Object]:
+    """All hair curves of a collection, also of the collections that it has instances of."""
+    for obj in collection.all_objects:
+        if obj.type == "CURVES":
+            yield obj
+        inner = obj.instance_collection if obj.instance_type == "COLLECTION" else None
+        if inner is not None and inner.name_full not in seen:
+            seen.add(inner.name_full)
+            yield from _hair_in(inner, seen)
+
+
+def hide_hair(scene: bpy.types.Scene) -> None:
+    """Let Blender's own engine see no hair curves of this scene."""
+    for hair in _hair_in(scene.collection, set()):
+        if hair.hairloom.hidden_rays:
+            continue
+        bits = (getattr(hair, f"visible_{ray}") << number for number, ray in enumerate(RAYS))
+        hair.hairloom.hidden_rays = HIDDEN | sum(bits)
+        for ray in RAYS:
+            setattr(hair, f"visible_{ray}", False)
+
+
+def show_hair() -> None:
+    """Every engine sees all hair curves again as the artist has them."""
+    for hair in bpy.data.objects:
+        hidden = hair.hairloom.hidden_rays if hair.type == "CURVES" else 0
+        if hidden:
+            for number, ray in enumerate(RAYS):
+                setattr(hair, f"visible_{ray}", bool(hidden & 1 << number))
+            hair.hairloom.hidden_rays = 0
+
+
+@persistent
+def on_render_begin(scene: bpy.types.Scene, *_: object) -> None:
+    """Runs in the thread of the render: only what it alone reads is written."""
+    hair = hair_scene_of(scene)
+    if hair is None:
+        return
+    follow(scene, hair)
+    if not is_needed(scene):
+        return
+    problem = problem_of(scene)
+    if problem:
+        print(f"Hairloom: {scene.name}: Blender draws the hair. {problem}")
+    else:
+        hide_hair(scene)
+
+
+@persistent
+def on_frame_begin(scene: bpy.types.Scene, *_: object) -> None:
+    """Cameras may be others from frame to frame."""
+    hair = hair_scene_of(scene)
+    if hair is not None and hair.camera != scene.camera:
+        hair.camera = scene.camera
+
+
+@persistent
+def on_render_end(*_: object) -> None:
+    show_hair()
+
+
+@persistent
+def on_update(scene: bpy.types.Scene, *_: object) -> None:
+    """Blender asks all scenes of a compositor for a camera before a render begins."""
+    on_frame_begin(scene)
+
+
+@persistent
+def heal(*_: object) -> None:
+    """Files that were saved amid a render, and hair scenes whose scene is gone."""
+    show_hair()
+    named = {scene.hairloom.hair_scene for scene in bpy.data.scenes}
+    for scene in list(bpy.data.scenes):
+        if scene.hairloom.is_hair_scene and scene not in named and len(bpy.data.scenes) > 1:
+            bpy.data.scenes.remove(scene)
+
+
+HANDLERS = (
+    (bpy.app.handlers.render_init, on_render_begin),
+    (bpy.app.handlers.render_pre, on_frame_begin),
+    (bpy.app.handlers.render_complete, on_render_end),
+    (bpy.app.handlers.render_cancel, on_render_end),
+    (bpy.app.handlers.depsgraph_update_post, on_update),
+    (bpy.app.handlers.load_post, heal),
+    (bpy.app.handlers.save_pre, heal),
+)
+
+
+def register() -> None:
+    for handlers, handler in HANDLERS:
+        handlers.append(handler)
+    changed.subscribe("hair_scene", switched)
+
+
+def unregister() -> None:
+    changed.unsubscribe("hair_scene", switched)
+    for handlers, handler in reversed(HANDLERS):
+        handlers.remove(handler)

@@ -1,0 +1,84 @@
+// What hair leaves of the light on meshes, fragment stage: the fraction of it, by colour, that a matt
+// surface still gets, 1 where hair takes nothing. What other meshes keep out counts neither way.
+// OTHER_TAU, SKIN, HASHED and BLENDED as in mesh.frag.glsl; of PICTURES only alpha counts.
+#include "lib_lights.glsl"
+#include "lib_shadows.glsl"
+#ifdef SKIN
+#  include "lib_skin.glsl"
+#endif
+#ifdef HASHED
+#  include "lib_hashed.glsl"
+#endif
+
+// Less light than this is none [W/(m^2 sr)]; and a fainter shadow than this, which only rounding makes.
+const float NO_LIGHT = 1.0e-9, NO_SHADOW = 1.0e-4;
+
+void main()
+{
+#if defined(HASHED) || defined(BLENDED)
+  float alpha = mesh_alpha;
+#  ifdef PICTURES
+  alpha *= texture(mesh_color_map, mesh_uv).w;
+#  endif
+#endif
+#ifdef HASHED
+  float chance = gl_FrontFacing ? mesh_chance.x : mesh_chance.y;
+  if (alpha <= fract(place_noise(floor(gl_FragCoord.xy)) + chance)) {
+    discard;
+  }
+#endif
+  vec3 to_eye = view.eye.xyz - view.eye.w * mesh_point;
+  vec3 normal = normalize(mesh_normal);
+  normal = dot(normal, to_eye) < 0.0 ? reflect(normal, normalize(to_eye)) : normal;
+  vec3 facet = cross(dFdx(mesh_point), dFdy(mesh_point));
+#ifdef SKIN
+  float known;
+  vec4 soft = skin_soft_shadow(skin_shadow,
+                               skin_texels,
+                               skin_stretches,
+                               skin_seams,
+                               skin_shifts,
+                               mesh_skin.xy,
+                               round(mesh_skin.z),
+                               known);
+#endif
+#ifdef OTHER_TAU
+  vec4 between = texelFetch(inter_groom_shadow, ivec2(gl_FragCoord.xy), 0);
+#endif
+  vec3 all_light = lights.ambient_and_count.xyz * mesh_occlusion;
+  vec3 left = all_light;
+  for (int index = 0; index < int(lights.ambient_and_count.w); index++) {
+    vec3 to_light, irradiance;
+    light_at(lights, index, mesh_point, to_light, irradiance);
+    float facing = dot(normal, to_light);
+    if (facing <= 0.0) {
+      continue;
+    }
+    vec3 path = shadow_path(index, mesh_point);
+    float past_meshes = light_past_meshes(index, mesh_point, facet, path);
+    vec3 by_hair = vec3(1.0);
+#if SHADOWS
+    by_hair = light_left(vec3(path.xy, 1.0), hair_forward);
+#endif
+#ifdef SKIN
+    int map = int(opacity.light[index].x);
+    if (map >= 0 && map < {{skin_lights}}) {
+      by_hair = mix(by_hair, skin_colored(soft[map], path.x, hair_forward), min(4.0 * known, 1.0));
+    }
+#endif
+#ifdef OTHER_TAU
+    by_hair *= exp((index < {{other_tau_lights}} ? -between[index] : 0.0) * (1.0 - hair_forward));
+#endif
+    vec3 arriving = past_meshes * facing / LIGHT_PI * irradiance;
+    all_light += arriving;
+    left += arriving * by_hair;
+  }
+  vec3 fraction = left / max(all_light, vec3(NO_LIGHT));
+  // exactly 1 without a shadow, so that pictures stay as they are there
+  bvec3 is_full = greaterThan(fraction, vec3(1.0 - NO_SHADOW));
+  bvec3 is_dark = lessThan(all_light, vec3(NO_LIGHT));
+  color = vec4(mix(fraction, vec3(1.0), max(vec3(is_full), vec3(is_dark))), 1.0);
+#ifdef BLENDED
+  color *= alpha;
+#endif
+}

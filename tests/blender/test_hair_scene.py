@@ -1,0 +1,298 @@
+"""Hair over the pictures of Blender's own engines: what is drawn, and what becomes of the scene.
+
+Cycles stands for both engines: it is the one that draws without a GPU, always in the same way.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+bpy = pytest.importorskip("bpy", reason="these tests need Blender or the bpy module")
+
+from engine_stage import set_world  # noqa: E402
+
+from hairloom.addon.blender.engine import hair_scene  # noqa: E402
+from hairloom.addon.strands import StrandSet  # noqa: E402
+
+pytestmark = [pytest.mark.draws, pytest.mark.usefixtures("gpu_context", "extension")]
+
+SAMPLES, SIZE = 16, 200
+#: of the hair: strands, points of each, radius [m]
+COUNT, POINTS, RADIUS = 8000, 4, 0.00015
+
+
+@pytest.fixture
+def cycles(stage: Any) -> Any:
+    """The stage as Cycles renders it, with the same noise in each picture."""
+    stage.render.engine = "CYCLES"
+    stage.cycles.samples, stage.cycles.use_denoising = SAMPLES, False
+    stage.cycles.use_adaptive_sampling, stage.cycles.max_bounces = False, 0
+    stage.hairloom.picture.samples = SAMPLES
+    # small hair is thinned out
+    stage.render.resolution_x = stage.render.resolution_y = SIZE
+    return stage
+
+
+@pytest.fixture
+def hairy(cycles: Any, sphere: Any, new_hair: Callable[..., Any]) -> Any:
+    """A ball with some hair on the stage, in the light of the world alone."""
+    cycles.camera.location.y = -0.6
+    return dense(new_hair, sphere)
+
+
+def dense(new_hair: Callable[..., Any], head: Any = None) -> Any:
+    """What our renderer is for: many thin strands; as thick at their tips as Cycles has them."""
+    outward = np.random.default_rng(1).normal(size=(COUNT, 1, 3))
+    outward /= np.linalg.norm(outward, axis=2, keepdims=True)
+    points = outward * np.linspace(0.1, 0.18, POINTS)[None, :, None]
+    offsets, radius = np.arange(COUNT + 1) * POINTS, np.full(COUNT * POINTS, RADIUS)
+    strands = StrandSet(points.reshape(-1, 3), offsets, radius, np.zeros(COUNT))
+    hair = new_hair(head, strands)
+    hair.data.hairloom.strands.tip_width = 1.0
+    return hair
+
+
+def rendered(folder: Path) -> np.ndarray:
+    """The picture after compositing, (height, width, 4) scene-linear, premultiplied."""
+    scene = bpy.context.scene
+    settings = scene.render.image_settings
+    settings.file_format, settings.color_depth, settings.color_mode = "OPEN_EXR", "32", "RGBA"
+    scene.render.filepath = str(folder / "picture.exr")
+    bpy.ops.render.render(write_still=True)
+    return pixels_of(folder / "picture.exr")
+
+
+def pixels_of(path: Path) -> np.ndarray:
+    image = bpy.data.images.load(str(path))
+    found = np.empty(len(image.pixels), np.float32)
+    image.pixels.foreach_get(found)
+    size = image.size[1], image.size[0], 4
+    bpy.data.images.remove(image)
+    return found.reshape(size)
+
+
+def differs(one: np.ndarray, other: np.ndarray, by: float = 0.01) -> np.ndarray:
+    return np.abs(one - other)[..., :3].max(axis=2) > by
+
+
+def grown(mask: np.ndarray) -> np.ndarray:
+    """A mask and the pixels beside it."""
+    padded = np.pad(mask, 1)
+    return np.any([padded[y : y + SIZE, x : x + SIZE] for y in range(3) for x in range(3)], axis=0)
+
+
+def blocks(image: np.ndarray) -> np.ndarray:
+    """Means of 10 x 10 pixels: which strand lies where in a pixel does not count."""
+    return image.reshape(SIZE // 10, 10, SIZE // 10, 10).mean(axis=(1, 3))
+
+
+def bald(hair: Any, folder: Path) -> np.ndarray:
+    hair.hide_render = True
+    found = rendered(folder)
+    hair.hide_render = False
+    return found
+
+
+def links_of(tree: Any) -> set[tuple[str, str, str, str]]:
+    return {
+        (each.from_node.name, each.from_socket.name, each.to_node.name, each.to_socket.name)
+        for each in tree.links
+    }
+
+
+def test_hair_covers_what_it_covers_in_cycles_and_nothing_else_changes(
+    cycles: Any, hairy: Any, tmp_path: Path
+) -> None:
+    """Without shadows all other pixels are Cycles', bit for bit."""
+    hairy.data.hairloom.volume.shadows = "none"
+    cycles.render.film_transparent = True
+    without, native = bald(hairy, tmp_path), rendered(tmp_path)
+    cycles.hairloom.use_hair_scene = True
+    ours = rendered(tmp_path)
+    theirs, own = native[..., 3], ours[..., 3]
+    assert 0.1 < (theirs > 0.5).mean() < 0.6
+    assert np.abs(blocks(theirs) - blocks(own)).max() < 0.05
+    assert abs(theirs.mean() - own.mean()) < 0.005
+    free = ~grown(grown((own > 0.0) | (theirs > 0.0)))
+    assert free.mean() > 0.3
+    np.testing.assert_array_equal(ours[free], without[free])
+
+
+def test_hair_behind_a_mesh_is_hidden_at_its_very_edge(
+    cycles: Any, hairy: Any, tmp_path: Path
+) -> None:
+    """The edge of a black plate that glows: a pixel shows as much hair as Cycles shows sky."""
+    set_world((0.0, 0.0, 0.0))
+    bpy.ops.mesh.primitive_plane_add(
+        size=1.0, location=(0.503, -0.3, 0.0), rotation=(np.pi / 2.0, 0.0, 0.0)
+    )
+    hairy.data.hairloom.volume.shadows = "none"
+    bpy.ops.object.light_add(type="SUN", rotation=(np.pi / 2.0, 0.0, 0.0))
+    cycles.render.film_transparent = True
+    cycles.hairloom.use_hair_scene = True
+    alpha = rendered(tmp_path)[..., 3]
+    # the plate is where alpha is 1 without hair, its edge in between
+    cycles.hairloom.use_hair_scene = False
+    plate = bald(hairy, tmp_path)[..., 3]
+    hair_alone = alpha - plate
+    middle = slice(SIZE // 2 - 4, SIZE // 2 + 4)
+    assert (plate[middle] == 1.0).mean() > 0.4
+    assert np.abs(hair_alone[middle][plate[middle] == 1.0]).max() == 0.0
+    assert alpha.max() <= 1.0 + 1e-6
+
+
+def test_shadow_on_a_mesh_is_as_dark_as_in_cycles(
+    cycles: Any, new_hair: Callable[..., Any], tmp_path: Path
+) -> None:
+    """A ball of hair between a sun and the floor, seen past the hair."""
+    hair = dense(new_hair)
+    # without light that hair sends on, as of a matt black one
+    hair.data.hairloom.volume.scattering = False
+    hair.location.z = 0.2
+    set_world((0.0, 0.0, 0.0))
+    bpy.ops.mesh.primitive_plane_add(size=1.2, location=(0.0, 0.0, -0.1))
+    bpy.ops.object.light_add(type="SUN")
+    bpy.context.object.data.angle = 0.0
+    cycles.camera.location, cycles.camera.rotation_euler = (0.0, -0.45, 0.35), (0.9, 0.0, 0.0)
+    without, native = bald(hair, tmp_path), rendered(tmp_path)
+    cycles.hairloom.use_hair_scene = True
+    ours = rendered(tmp_path)
+    # hair in front of the floor is not to count
+    floor = (without[..., 0] > 0.1) & (np.arange(SIZE) < SIZE // 2)[:, None]
+    taken = [1.0 - (found / np.maximum(without, 1e-6))[..., 0][floor] for found in (native, ours)]
+    assert taken[0].mean() > 0.01
+    assert taken[1].mean() == pytest.approx(taken[0].mean(), rel=0.15)
+    assert np.corrcoef(*taken)[0, 1] > 0.9
+
+
+def test_the_scene_is_as_it_was_after_the_render_and_after_turning_off(
+    cycles: Any, hairy: Any, tmp_path: Path
+) -> None:
+    hairy.visible_glossy = False
+    kept = [getattr(hairy, f"visible_{ray}") for ray in hair_scene.RAYS]
+    names = [set(each.keys()) for each in (bpy.data.scenes, bpy.data.node_groups)]
+    cycles.hairloom.use_hair_scene = True
+    seen = []
+
+    def look(*_: Any) -> None:
+        seen.append((hairy.visible_camera, hairy.visible_shadow))
+
+    bpy.app.handlers.render_pre.append(look)
+    try:
+        rendered(tmp_path)
+    finally:
+        bpy.app.handlers.render_pre.remove(look)
+    assert seen == [(False, False)]
+    assert [getattr(hairy, f"visible_{ray}") for ray in hair_scene.RAYS] == kept
+    cycles.hairloom.use_hair_scene = False
+    assert [set(each.keys()) for each in (bpy.data.scenes, bpy.data.node_groups)] == names
+    assert cycles.compositing_node_group is None
+
+
+def test_an_artists_compositor_is_extended_and_given_back(
+    cycles: Any, hairy: Any, tmp_path: Path
+) -> None:
+    tree = bpy.data.node_groups.new("Mine", "CompositorNodeTree")
+    tree.interface.new_socket("Image", in_out="OUTPUT", socket_type="NodeSocketColor")
+    layers, invert = (
+        tree.nodes.new(kind) for kind in ("CompositorNodeRLayers", "CompositorNodeInvert")
+    )
+    output = tree.nodes.new("NodeGroupOutput")
+    layers.scene = cycles
+    tree.links.new(layers.outputs["Image"], invert.inputs["Color"])
+    tree.links.new(invert.outputs["Color"], output.inputs[0])
+    cycles.compositing_node_group = tree
+    before = links_of(tree)
+    plain = bald(hairy, tmp_path)
+    cycles.hairloom.use_hair_scene = True
+    assert hair_scene.problem_of(cycles) == ""
+    inverted = rendered(tmp_path)
+    cycles.hairloom.use_hair_scene = False
+    assert links_of(tree) == before and cycles.compositing_node_group == tree
+    # the world's 0.5 inverted, far from all hair; and hair before it is inverted
+    np.testing.assert_array_equal(inverted[0, 0], plain[0, 0])
+    assert differs(inverted, plain).mean() > 0.02
+
+
+def test_hairlooms_own_engine_draws_hair_once(
+    stage: Any, sphere: Any, new_hair: Any, tmp_path: Path
+) -> None:
+    new_hair(sphere)
+    alone = rendered(tmp_path)
+    stage.hairloom.use_hair_scene = True
+    np.testing.assert_array_equal(rendered(tmp_path), alone)
+
+
+@pytest.mark.parametrize("wrong", ["compositing", "muted", "unlinked", "gone"])
+def test_where_the_hair_cannot_be_laid_over_blender_draws_it(
+    cycles: Any, hairy: Any, tmp_path: Path, wrong: str, capsys: Any
+) -> None:
+    native = rendered(tmp_path)
+    cycles.hairloom.use_hair_scene = True
+    tree, hair = cycles.compositing_node_group, hair_scene.hair_scene_of(cycles)
+    if wrong == "compositing":
+        cycles.render.use_compositing = False
+    if wrong == "muted":
+        next(node for node in tree.nodes if node.bl_idname == "CompositorNodeGroup").mute = True
+    if wrong == "unlinked":
+        for node in [node for node in tree.nodes if getattr(node, "scene", None) == hair]:
+            tree.nodes.remove(node)
+    if wrong == "gone":
+        bpy.data.scenes.remove(hair)
+    problem = hair_scene.problem_of(cycles)
+    assert problem and problem.endswith(".")
+    np.testing.assert_array_equal(rendered(tmp_path), native)
+    assert wrong == "gone" or problem in capsys.readouterr().out
+
+
+def test_cameras_that_change_in_an_animation_are_followed(
+    cycles: Any, hairy: Any, tmp_path: Path
+) -> None:
+    other = bpy.data.objects.new("Other", cycles.camera.data)
+    other.location = (1000.0, 0.0, 0.0)
+    cycles.collection.objects.link(other)
+    for frame, camera in ((1, cycles.camera), (2, other)):
+        cycles.timeline_markers.new(camera.name, frame=frame).camera = camera
+    cycles.hairloom.use_hair_scene = True
+    cycles.frame_start, cycles.frame_end = 1, 2
+    settings = cycles.render.image_settings
+    settings.file_format, settings.color_depth = "OPEN_EXR", "32"
+    cycles.render.filepath = str(tmp_path / "frame")
+    bpy.ops.render.render(animation=True)
+    shown = []
+    for path in sorted(tmp_path.glob("frame*.exr")):
+        pixels = pixels_of(path)
+        shown.append(differs(pixels, np.full_like(pixels, 0.5), 0.001).any())
+    assert shown == [True, False]
+
+
+def test_files_that_were_saved_amid_a_render_are_healed(
+    cycles: Any, hairy: Any, tmp_path: Path
+) -> None:
+    cycles.hairloom.use_hair_scene = True
+    hair_scene.hide_hair(cycles)
+    path = str(tmp_path / "amid.blend")
+    handler = hair_scene.heal
+    bpy.app.handlers.save_pre.remove(handler)  # an autosave has none
+    try:
+        bpy.ops.wm.save_as_mainfile(filepath=path, copy=True)
+    finally:
+        bpy.app.handlers.save_pre.append(handler)
+    bpy.ops.wm.open_mainfile(filepath=path)
+    hair = bpy.data.objects["Hair"]
+    assert hair.visible_camera and hair.visible_shadow and not hair.hairloom.hidden_rays
+    assert hair_scene.problem_of(bpy.context.scene) == ""
+
+
+def test_a_hair_scene_goes_with_the_scene_whose_hair_it_draws(cycles: Any, tmp_path: Path) -> None:
+    cycles.hairloom.use_hair_scene = True
+    hair = cycles.hairloom.hair_scene.name
+    bpy.data.scenes.new("Another")
+    bpy.data.scenes.remove(cycles)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "saved.blend"))
+    assert hair not in bpy.data.scenes
