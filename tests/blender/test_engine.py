@@ -231,3 +231,32 @@ def test_both_eyes_of_a_stereo_camera(stage: Any, tmp_path: Path) -> None:
     places = [np.average(np.arange(SIZE), weights=alpha.sum(axis=0)) for alpha in alphas]
     # parallax of a point at 1 m, whose eyes meet at 2 m, through a lens that sees 0.72 m there
     assert abs(abs(places[0] - places[1]) - 0.05 / 0.72 * SIZE) < 0.3
+
+
+@pytest.mark.parametrize("aperture", ["circle", "three blades", "narrow", "orthographic"])
+def test_what_is_out_of_focus_is_as_soft_as_in_cycles(
+    stage: Any, tmp_path: Path, aperture: str
+) -> None:
+    """A ball that covers as much of each pixel, focused on an object behind it."""
+    add_ball(0.08)
+    target = bpy.data.objects.new("Target", None)
+    target.location = (0.7, 1.5, 0.0)
+    stage.collection.objects.link(target)
+    dof = stage.camera.data.dof
+    dof.use_dof, dof.aperture_fstop, dof.focus_object = True, 0.5, target
+    if aperture == "three blades":
+        dof.aperture_blades, dof.aperture_rotation = 3, 0.5
+    if aperture == "narrow":
+        dof.aperture_ratio = 2.0
+    if aperture == "orthographic":
+        stage.camera.data.type, stage.camera.data.ortho_scale = "ORTHO", 0.6
+        dof.aperture_fstop = 8.0
+    stage.render.film_transparent = True
+    stage.hairloom.picture.samples = 128
+    ours = picture(tmp_path)[..., 3]
+    stage.render.engine, stage.cycles.samples = "CYCLES", 512
+    stage.cycles.use_denoising = stage.cycles.use_adaptive_sampling = False
+    theirs = picture(tmp_path)[..., 3]
+    assert ((theirs > 0.05) & (theirs < 0.95)).mean() > 0.02
+    difference = np.abs(ours - theirs)
+    assert difference.mean() < 0.004 and np.quantile(difference, 0.99) < 0.06

@@ -37,6 +37,7 @@ MODULES = {
     "fin_modifier": "blender.scene.fin_modifier",
     "groom_file": "exchange.groom",
     "hair_file": "exchange.hair_file",
+    "hair_scene": "blender.engine.hair_scene",
     "import_groom": "blender.strands.import_groom",
     "latest_job": "blender.base.latest_job",
     "long_work": "ui.long_work",

@@ -11,9 +11,12 @@ from ...arrays import Floats
 from ...errors import HairloomError
 from ...render.camera import Camera
 from ...render.camera_window import Window, cropped
+from ...render.lens import Lens
 
 #: Blender's own limit of a picture's side
 _SMALLEST = 1
+#: the aperture that a wider one is taken for [f-stops], as in Cycles
+_SMALLEST_STOP = 1.0e-5
 
 
 def read_camera(
@@ -51,6 +54,36 @@ def read_camera(
     )
     matrix = np.array(engine.camera_model_matrix(evaluated)).reshape(4, 4)
     return cropped(Camera(_view_matrix(matrix), projection), window)
+
+
+def read_lens(engine: Any, depsgraph: bpy.types.Depsgraph) -> Lens | None:
+    """The lens of the camera that renders now; None where all is sharp."""
+    camera = engine.camera_override or depsgraph.scene.camera
+    if camera is None or camera.type != "CAMERA" or not camera.data.dof.use_dof:
+        return None
+    evaluated = camera.evaluated_get(depsgraph)
+    data = evaluated.data
+    # as Cycles has it; a lens is given in millimetres
+    wide = 1.0 if data.type == "ORTHO" else 1.0e-3 * data.lens
+    radius = wide / (2.0 * max(data.dof.aperture_fstop, _SMALLEST_STOP))
+    focus = _focus_distance(evaluated, depsgraph)
+    if not (radius > 0.0 and focus > 0.0 and np.isfinite(focus)):
+        return None
+    dof = data.dof
+    return Lens(radius, focus, dof.aperture_blades, dof.aperture_rotation, dof.aperture_ratio)
+
+
+def _focus_distance(camera: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> float:
+    """Along the view [m]: to what the camera is focused on, or as far as it says."""
+    dof = camera.data.dof
+    if dof.focus_object is None:
+        return float(dof.focus_distance)
+    target = dof.focus_object.evaluated_get(depsgraph)
+    place = target.matrix_world
+    if target.type == "ARMATURE" and dof.focus_subtarget in target.pose.bones:
+        place = place @ target.pose.bones[dof.focus_subtarget].matrix
+    seen = camera.matrix_world.normalized().inverted() @ place.translation
+    return float(abs(seen.z))
 
 
 def camera_warnings(depsgraph: bpy.types.Depsgraph) -> tuple[str, ...]:

@@ -14,6 +14,7 @@ from ...arrays import Floats
 from ...render.accumulation import Accumulation, Target
 from ...render.camera import Camera
 from ...render.camera_window import Window, jittered
+from ...render.lens import through
 from ...render.pixel_filter import jitters
 from ...render.scene_pass import FAR_AWAY, Rgba, ScenePass
 from ...render.scene_snapshot import SceneSnapshot
@@ -21,7 +22,7 @@ from ...shading.picture_settings import PictureSettings
 from ..base.gpu_context import ensure_gpu
 from ..properties.properties import settings_of
 from . import hair_scene
-from .engine_camera import border_window, camera_warnings, read_camera
+from .engine_camera import border_window, camera_warnings, read_camera, read_lens
 from .engine_scene import SceneReader
 
 COMBINED, DEPTH, NUMBERS, SHADOW = "Combined", "Depth", "Object Index", "Hair Shadow"
@@ -105,6 +106,8 @@ class Still:
     def _fill(self, result: Any) -> None:
         frame = self._depsgraph.scene.frame_current_final
         moments = moments_of(self._settings, self._render)
+        lens = read_lens(self._engine, self._depsgraph)
+        through_lens = None if lens is None else lens.places(self._settings.samples)
         self._picture.begin(*self._size)
         if self._shadow is not None:
             self._shadow[1].begin(*self._size)
@@ -118,7 +121,10 @@ class Still:
             for place in moment.places:
                 if self._engine.test_break():
                     break
-                self._add_sample(scene, camera, place)
+                seen = camera
+                if lens is not None and through_lens is not None:
+                    seen = through(camera, lens, through_lens[self._picture.count])
+                self._add_sample(scene, seen, place)
                 if time.monotonic() - shown > _SHOWN_EVERY:
                     self._show(result)
                     self._engine.update_result(result)
