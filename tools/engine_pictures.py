@@ -1,9 +1,11 @@
-"""Draws what the render engine gives: picture, distance and object mask, for docs/engine.md.
+"""Draws what the render engine gives, and hair over Blender's own engines, for docs/engine.md.
 
 python tools/engine_pictures.py FOLDER
 
-FOLDER gets engine.png. The head is the built-in one with a groom, her face a material of its own,
-before a wall; rendered as an artist would, by the engine, into a file of many layers.
+FOLDER gets engine.png: picture, distance and object mask. The head is the built-in one with a
+groom, her face a material of its own, before a wall; rendered as an artist would, by the engine,
+into a file of many layers. And over_engines.jpg: the sample scene by EEVEE and Cycles, with
+*Hairloom Hair*, and by Hairloom.
 """
 
 import importlib
@@ -16,8 +18,11 @@ import bpy
 import numpy as np
 from extension_loader import PACKAGE, load_package
 from mathutils import Vector
+from small_pictures import write_small
 
 SIZE, SAMPLES, STRANDS, THICKER = 340, 16, 12000, 1.5
+#: of hair over Blender's own engines
+OVER_SIZE, OVER_SAMPLES = 480, 64
 WORLD = (0.12, 0.15, 0.2, 1.0)
 CAMERA, TARGET = Vector((-0.42, -0.85, 0.12)), Vector((0.0, 0.0, 0.02))
 #: number in the mask -> colour [scene-linear]
@@ -99,6 +104,36 @@ def passes_of(scene: Any, path: Path) -> dict[str, Any]:
     return found
 
 
+def by_each_engine(work: Path) -> list[Path]:
+    """The sample scene as EEVEE and Cycles show it with our hair, and as our engine does."""
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    scene, _ = of_addon("blender.setup.sample_scene").add_sample_scene(("looks/brown",))
+    scene.render.resolution_x = scene.render.resolution_y = OVER_SIZE
+    scene.hairloom.picture.samples = SAMPLES
+    scene.eevee.taa_render_samples = scene.cycles.samples = OVER_SAMPLES
+    scene.hairloom.use_hair_scene = True
+    pictures = []
+    for engine in ("BLENDER_EEVEE", "CYCLES", "HAIRLOOM"):
+        scene.render.engine = engine
+        pictures.append(work / f"{engine}.png")
+        scene.render.filepath = str(pictures[-1])
+        bpy.ops.render.render(write_still=True, scene=scene.name)
+    return pictures
+
+
+def side_by_side(pictures: list[Path], kept: Path) -> None:
+    import OpenImageIO as oiio
+
+    sheet = oiio.ImageBuf(oiio.ImageSpec(OVER_SIZE * len(pictures), OVER_SIZE, 3, "uint8"))
+    for number, path in enumerate(pictures):
+        picture = oiio.ImageBufAlgo.channels(oiio.ImageBuf(str(path)), (0, 1, 2))
+        oiio.ImageBufAlgo.paste(sheet, number * OVER_SIZE, 0, 0, 0, picture)
+    drawn = kept.with_suffix(".png")
+    sheet.write(str(drawn))
+    write_small(drawn, kept)
+    drawn.unlink()
+
+
 def opaque(colors: Any) -> Any:
     return np.concatenate([colors, np.ones_like(colors[..., :1])], axis=-1).astype(np.float32)
 
@@ -118,6 +153,7 @@ def main() -> int:
     try:
         with tempfile.TemporaryDirectory() as work:
             found = passes_of(scene_of_head(), Path(work) / "picture.exr")
+            side_by_side(by_each_engine(Path(work)), folder / "over_engines.jpg")
     finally:
         extension.unregister()
     mask = np.zeros((SIZE, SIZE, 3), np.float32)

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..arrays import Floats
+from ..arrays import Floats, Ints
 from .camera import Camera
 
 _FEWEST_BLADES = 3
@@ -65,7 +65,7 @@ def through(camera: Camera, lens: Lens, place: Floats) -> Camera:
     return replace(camera, view=view, projection=np.asarray(camera.projection) @ sheared)
 
 
-def _radical_inverse(number: Floats, base: int) -> Floats:
+def _radical_inverse(number: Ints, base: int) -> Floats:
     """The digits of whole numbers behind the point, in reverse (Halton 1960)."""
     found, left, place = np.zeros(len(number)), number.astype(np.int64), 1.0 / base
     while left.any():

@@ -252,11 +252,12 @@ def test_what_is_out_of_focus_is_as_soft_as_in_cycles(
         stage.camera.data.type, stage.camera.data.ortho_scale = "ORTHO", 0.6
         dof.aperture_fstop = 8.0
     stage.render.film_transparent = True
-    stage.hairloom.picture.samples = 128
+    stage.hairloom.picture.samples = 256
     ours = picture(tmp_path)[..., 3]
-    stage.render.engine, stage.cycles.samples = "CYCLES", 512
+    stage.render.engine, stage.cycles.samples = "CYCLES", 1024
     stage.cycles.use_denoising = stage.cycles.use_adaptive_sampling = False
     theirs = picture(tmp_path)[..., 3]
     assert ((theirs > 0.05) & (theirs < 0.95)).mean() > 0.02
     difference = np.abs(ours - theirs)
-    assert difference.mean() < 0.004 and np.quantile(difference, 0.99) < 0.06
+    # blades that turn the other way are off by 0.0017 and 0.057
+    assert difference.mean() < 0.001 and np.quantile(difference, 0.99) < 0.03

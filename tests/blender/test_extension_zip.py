@@ -16,6 +16,7 @@ from pathlib import Path
 import bpy
 import pytest
 
+from hairloom.addon.blender.engine import hair_scene
 from hairloom.addon.blender.preview.handlers import HANDLERS
 
 REPOSITORY = Path(__file__).resolve().parents[2]
@@ -311,7 +312,7 @@ def test_it_installs_from_the_zip_and_goes_on_and_off_ten_times(built, tmp_path)
     answer, output = in_fresh_blender(script, tmp_path / "resources")
     assert answer["after"] == ["[0, 0, false, 0]"]
     handlers, classes, _, operators = answer["enabled"]
-    assert handlers == len(HANDLERS) and classes > 15 and operators >= 7
+    assert handlers == len(HANDLERS) + len(hair_scene.HANDLERS) and classes > 15 and operators >= 7
     assert answer["strands"] == 50
     assert answer["root"] == "bl_ext.user_default.hairloom"
     assert answer["installed"] == ["etcpak"], "the wheel of this platform, and only that"

@@ -10,6 +10,7 @@ import pytest
 
 import hairloom
 from hairloom import register, unregister
+from hairloom.addon.blender.engine import hair_scene
 from hairloom.addon.blender.preview import handlers
 from hairloom.addon.blender.properties import changed, groups
 from hairloom.addon.blender.properties.properties import property_group, settings_of
@@ -117,7 +118,8 @@ def test_an_edit_names_the_data_block_at_once(new_hair):
 
 def test_the_preview_listens_while_hairloom_is_enabled_and_no_longer(extension):
     heard = {kind: list(listeners) for kind, listeners in changed._listeners.items()}
-    assert heard == {kind: [listener] for kind, listener in handlers.LISTENERS}
+    own = (*handlers.LISTENERS, hair_scene.LISTENER)
+    assert heard == {kind: [listener] for kind, listener in own}
     hairloom.unregister()
     try:
         assert not any(changed._listeners.values())

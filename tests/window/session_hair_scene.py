@@ -1,4 +1,4 @@
-"""F12 by EEVEE with Hairloom's hair over it: in the render's thread, cancelled, and again."""
+"""F12 by EEVEE with Hairloom's hair over it, in the thread of the render; undo and redo."""
 
 import sys
 from pathlib import Path
@@ -21,7 +21,6 @@ def steps():
     yield from set_the_scene()
     yield from a_bald_head_alone()
     yield from hair_over_it()
-    yield from a_render_that_is_cancelled()
     yield from hair_over_it("again")
     yield from undo_and_redo()
 
@@ -82,22 +81,6 @@ def hair_over_it(name="over"):
     assert 0.05 < is_changed.mean() < 0.7
     corner = SIZE // 10
     assert not is_changed[:corner, :corner].any()
-
-
-def a_render_that_is_cancelled():
-    """By Esc, while the hair is drawn or before."""
-    scene, hair = bpy.context.scene, bpy.data.objects["Hair"]
-    scene.eevee.taa_render_samples = scene.hairloom.picture.samples = 4096
-    cancelled = []
-    bpy.app.handlers.render_cancel.append(lambda *_: cancelled.append(1))
-    bpy.ops.render.render("INVOKE_DEFAULT")
-    yield from until(lambda: not hair.visible_camera, "the render does not begin")
-    yield from press("ESC")
-    yield from until(lambda: not bpy.app.is_job_running("RENDER"), "Esc does not end the render")
-    bpy.app.handlers.render_cancel.pop()
-    yield
-    assert cancelled and hair.visible_camera and hair.visible_shadow
-    scene.eevee.taa_render_samples = scene.hairloom.picture.samples = 4
 
 
 def undo_and_redo():

@@ -70,7 +70,8 @@ def read_lens(engine: Any, depsgraph: bpy.types.Depsgraph) -> Lens | None:
     if not (radius > 0.0 and focus > 0.0 and np.isfinite(focus)):
         return None
     dof = data.dof
-    return Lens(radius, focus, dof.aperture_blades, dof.aperture_rotation, dof.aperture_ratio)
+    # Cycles' blades turn clockwise in the picture
+    return Lens(radius, focus, dof.aperture_blades, -dof.aperture_rotation, dof.aperture_ratio)
 
 
 def _focus_distance(camera: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> float:

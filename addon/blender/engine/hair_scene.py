@@ -208,13 +208,17 @@ HANDLERS = (
 )
 
 
+#: the property that the artist changes, and what follows
+LISTENER = ("hair_scene", switched)
+
+
 def register() -> None:
     for handlers, handler in HANDLERS:
         handlers.append(handler)
-    changed.subscribe("hair_scene", switched)
+    changed.subscribe(*LISTENER)
 
 
 def unregister() -> None:
-    changed.unsubscribe("hair_scene", switched)
+    changed.unsubscribe(*LISTENER)
     for handlers, handler in reversed(HANDLERS):
         handlers.remove(handler)

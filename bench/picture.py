@@ -1,0 +1,182 @@
+"""Hair over the pictures of EEVEE and Cycles, and how a camera blurs it, beside Cycles.
+
+The sample scene as it comes, its hair laid over by *Hairloom Hair*. Where neither hair nor its
+shadow is, the picture has to be the engine's own; where our raster of a mesh and the engine's depth
+disagree, hair is cut off wrongly. Depth of field and motion blur are compared by what the same
+strands, with the same widths, cover of each pixel.
+
+Exit code 1: a limit is missed.
+
+make bench NAME=picture
+tools/bench.py picture over blur      some parts
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import bpy
+import flip_evaluator
+import numpy as np
+import OpenImageIO as oiio
+from _report import start, tell
+
+import hairloom
+from hairloom.addon.blender.setup.sample_scene import add_sample_scene
+
+REFERENCE = "the engine without hair; Cycles with the same curves"
+WIDTH, HEIGHT = 960, 720
+#: few, since all is done on the CPU here
+ENGINE_SAMPLES, HAIR_SAMPLES, BLUR_SAMPLES = 8, 32, 64
+ENGINES = {"eevee": "BLENDER_EEVEE", "cycles": "CYCLES"}
+#: how far apart depths may be, as a fraction, and of what size the pictures of blur are [pixels]
+DEPTH_TOLERANCE, BLUR_SIZE = 0.01, 320
+#: figure -> the most that it may be
+MOST = {
+    **{f"over_{engine}_depth_mismatch_percent": 0.1 for engine in ENGINES},
+    **{f"over_{engine}_outside_difference": 0.0 for engine in ENGINES},
+    "over_eevee_seconds_ratio": 1.0,
+    "dof_flip": 0.05,
+    "motion_flip": 0.05,
+}
+
+type Passes = dict[str, np.ndarray]
+
+
+def scene_with_hair() -> tuple[Any, Any]:
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    if not hasattr(bpy.types.Scene, "hairloom"):
+        hairloom.register()
+    scene, hair = add_sample_scene(())
+    bpy.context.window.scene = scene
+    scene.render.resolution_x, scene.render.resolution_y = WIDTH, HEIGHT
+    scene.hairloom.picture.samples = HAIR_SAMPLES
+    scene.cycles.samples = scene.eevee.taa_render_samples = ENGINE_SAMPLES
+    scene.cycles.use_denoising = scene.cycles.use_adaptive_sampling = False
+    for layer in scene.view_layers:
+        layer.use_pass_z = True
+    return scene, hair
+
+
+def rendered(scene: Any) -> tuple[Passes, float]:
+    """Passes by name, (height, width, channels), and the seconds that it took."""
+    settings = scene.render.image_settings
+    settings.media_type = "MULTI_LAYER_IMAGE"
+    settings.file_format, settings.color_depth = "OPEN_EXR_MULTILAYER", "32"
+    with tempfile.TemporaryDirectory(prefix="hairloom") as folder:
+        path = Path(folder) / "picture.exr"
+        scene.render.filepath = str(path)
+        began = time.monotonic()
+        bpy.ops.render.render(write_still=True, scene=scene.name)
+        seconds = time.monotonic() - began
+        return _passes_in(path), seconds
+
+
+def _passes_in(path: Path) -> Passes:
+    found: Passes = {}
+    file = oiio.ImageInput.open(str(path))
+    while file.seek_subimage(len(found), 0):
+        spec = file.spec()
+        name = spec.channelnames[0].rpartition(".")[0]
+        # what was composited has no layer
+        found[name.rpartition(".")[2]] = file.read_image(len(found), 0, 0, spec.nchannels, "float")
+    file.close()
+    return found
+
+
+@contextmanager
+def without(hair: Any) -> Iterator[None]:
+    hair.hide_render = True
+    try:
+        yield
+    finally:
+        hair.hide_render = False
+
+
+def over(name: str) -> dict[str, Any]:
+    """outside_difference: the most that a pixel without hair and shadow differs by.
+    depth_mismatch_percent: of the pixels, where the mesh that hides hair is elsewhere.
+    seconds_ratio: of one frame to 1.5 times the engine's own and that of the hair alone.
+    """
+    scene, hair = scene_with_hair()
+    scene.render.engine = ENGINES[name]
+    rendered(scene)  # shaders are compiled once
+    with without(hair):
+        bald, engine_seconds = rendered(scene)
+    scene.hairloom.use_hair_scene = True
+    hair_scene = scene.hairloom.hair_scene
+    hair_scene.view_layers[0].use_pass_z = True
+    shown, seconds = rendered(scene)
+    alone, hair_seconds = rendered(hair_scene)
+    with without(hair):
+        meshes, _ = rendered(hair_scene)
+    is_free = (alone["Combined"][..., 3] == 0.0) & (alone["Hair Shadow"] == 1.0).all(axis=2)
+    difference = np.abs(shown["Combined"] - bald["Combined"])[is_free]
+    ours, theirs = (each["Depth"][..., 0] for each in (meshes, bald))
+    near = np.minimum(ours, theirs)
+    is_off = np.abs(ours - theirs) > DEPTH_TOLERANCE * near
+    return {
+        f"over_{name}_free_percent": 100.0 * float(is_free.mean()),
+        f"over_{name}_outside_difference": float(difference.max()),
+        f"over_{name}_depth_mismatch_percent": 100.0 * float(is_off.mean()),
+        f"over_{name}_seconds": seconds,
+        f"over_{name}_engine_seconds": engine_seconds,
+        f"over_{name}_hair_seconds": hair_seconds,
+        f"over_{name}_seconds_ratio": seconds / (1.5 * engine_seconds + hair_seconds),
+    }
+
+
+def blur() -> dict[str, Any]:
+    """Mean FLIP of what strands cover, over the pixels where either engine has hair."""
+    scene, hair = scene_with_hair()
+    scene.render.resolution_x = scene.render.resolution_y = BLUR_SIZE
+    scene.render.film_transparent = True
+    scene.hairloom.picture.samples = scene.cycles.samples = BLUR_SAMPLES
+    scene.hairloom.picture.motion_steps = BLUR_SAMPLES // 2
+    groom = hair.data.hairloom
+    groom.widths.method, groom.children.method, groom.strands.tip_width = "own", "none", 1.0
+    next(each for each in scene.objects if each.type == "MESH").hide_render = True
+    found = {"sharp_flip": _cover_flip(scene)}
+    dof = scene.camera.data.dof
+    dof.use_dof, dof.aperture_fstop, dof.focus_distance = True, 0.5, 0.6
+    found["dof_flip"] = _cover_flip(scene)
+    dof.use_dof = False
+    scene.render.use_motion_blur = True
+    scene.frame_set(10)
+    found["motion_flip"] = _cover_flip(scene)
+    return found
+
+
+def _cover_flip(scene: Any) -> float:
+    covers = []
+    for engine in ("CYCLES", "HAIRLOOM"):
+        scene.render.engine = engine
+        passes, _ = rendered(scene)
+        covers.append(np.repeat(passes["Combined"][..., 3:], 3, axis=2).clip(0.0, 1.0))
+    found, _, _ = flip_evaluator.evaluate(*covers, "LDR", applyMagma=False)
+    has_hair = np.maximum(*covers)[..., 0] > 0.0
+    return float(np.asarray(found).reshape(has_hair.shape)[has_hair].mean())
+
+
+def main() -> int:
+    start()
+    parts = sys.argv[1:] or ["over", "blur"]
+    found: dict[str, Any] = {}
+    if "over" in parts:
+        for name in ENGINES:
+            found |= over(name)
+    if "blur" in parts:
+        found |= blur()
+    missed = {name: most for name, most in MOST.items() if found.get(name, 0.0) > most}
+    tell({**found, "limits_missed": sorted(missed)}, REFERENCE)
+    return 1 if missed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
