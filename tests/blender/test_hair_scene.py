@@ -21,7 +21,7 @@ from hairloom.addon.strands import StrandSet  # noqa: E402
 
 pytestmark = [pytest.mark.draws, pytest.mark.usefixtures("gpu_context", "extension")]
 
-SAMPLES, SIZE = 16, 200
+SAMPLES, SIZE = 8, 120
 #: of the hair: strands, points of each, radius [m]
 COUNT, POINTS, RADIUS = 8000, 4, 0.00015
 
@@ -296,3 +296,43 @@ def test_a_hair_scene_goes_with_the_scene_whose_hair_it_draws(cycles: Any, tmp_p
     bpy.data.scenes.remove(cycles)
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "saved.blend"))
     assert hair not in bpy.data.scenes
+
+
+@pytest.mark.parametrize("is_baked", [False, True])
+def test_moving_hair_is_blurred_and_baked_as_by_our_own_engine(
+    cycles: Any, hairy: Any, sphere: Any, tmp_path: Path, is_baked: bool
+) -> None:
+    """Without its head hair covers the same of each pixel, sample by sample."""
+    cycles.frame_start, cycles.frame_end = 1, 3
+    for frame, x in ((1, -0.1), (3, 0.1)):
+        sphere.location.x = x
+        sphere.keyframe_insert("location", frame=frame)
+    cycles.frame_set(1)
+    if is_baked:
+        hairy.hairloom.dynamics.collider_resolution = 8
+        hairy.hairloom.bake.folder = str(tmp_path / "bake")
+        assert bpy.ops.hairloom.bake() == {"FINISHED"}
+    sphere.hide_render = True
+    cycles.render.film_transparent = cycles.render.use_motion_blur = True
+    cycles.hairloom.picture.motion_steps = 4
+    cycles.hairloom.use_hair_scene = True
+    cycles.frame_set(2)
+    over = rendered(tmp_path)
+    cycles.render.engine = "HAIRLOOM"
+    own = rendered(tmp_path)
+    assert (own[..., 3] > 0.5).mean() > 0.05
+    np.testing.assert_allclose(over[..., 3], own[..., 3], atol=1e-5)
+
+
+def test_a_border_that_is_rendered_alone_has_its_hair(
+    cycles: Any, hairy: Any, tmp_path: Path
+) -> None:
+    cycles.hairloom.use_hair_scene = True
+    whole = rendered(tmp_path)
+    render = cycles.render
+    render.use_border = render.use_crop_to_border = True
+    render.border_min_x, render.border_max_x = 0.25, 0.75
+    render.border_min_y, render.border_max_y = 0.5, 1.0
+    part = rendered(tmp_path)
+    quarter = SIZE // 4
+    np.testing.assert_allclose(part, whole[2 * quarter :, quarter : 3 * quarter], atol=0.02)
