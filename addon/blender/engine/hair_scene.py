@@ -100,6 +100,8 @@ def _add(scene: bpy.types.Scene) -> None:
     hair.render.film_transparent = True
     hair.background_set, hair.hairloom.is_hair_scene = scene, True
     scene.hairloom.hair_scene = hair
+    # what a render's thread hides may not be drawn meanwhile
+    scene.render.use_lock_interface = True
     follow(scene, hair)
     hair_nodes_over.link(scene, hair, drawn_layer(scene).name)
 
