@@ -356,7 +356,7 @@ def _outside(made: Children, head: DistanceField | None, length: float) -> Child
     """
     if head is None:
         return made
-    led, is_out = led_out_at_rest(made.strands, head, DynamicsSettings().radius_root * length)
+    led, is_out = led_out_at_rest(made.strands, head, length)
     chosen, lost = np.flatnonzero(is_out), int((~is_out).sum())
     notes = made.notes
     if lost > MANY_INSIDE * len(is_out):

@@ -802,10 +802,9 @@ def shaggy_coat(_head: Head) -> Any:
         320,
         None,
         "grey",
-        modifiers=(curled(0.0045, 1.6, 0.15, 1.0, 1),),
         grow=fur(0.05, 0.07, cv_count=12, strand_count=3000, length_variation=0.4),
         children=children(
-            40000, length_variation=0.3, clump=0.85, clump_size=40, frizz=0.02, scatter=0.2
+            40000, length_variation=0.3, clump=0.8, clump_size=40, frizz=0.06, frizz_length=0.45
         ),
         presets=("dynamics/natural",),
     )

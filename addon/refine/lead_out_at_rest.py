@@ -1,5 +1,5 @@
-"""Children that were mixed from strands on both sides of an ear or a shoulder go through it: such
-are led out of the head once, at rest, as moving strands are."""
+"""Children that were mixed from strands on both sides of an ear go through it, and fur through the
+folds of its mesh: such are led out once, at rest, as moving strands are."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from ..arrays import Bools, Floats, Ints
 from ..dynamics.colliders import DistanceField, PosedCollider, signed_distance
 from ..dynamics.colliders.distance_field import UNCOVERED
 from ..dynamics.colliders.winding import winding_number
+from ..dynamics.settings import DynamicsSettings
 from ..strands import StrandSet
 from ..strands.arc_length import steps
 from ..strands.closest_point import search_of
@@ -23,15 +24,16 @@ DEEP = 0.5
 
 
 def led_out_at_rest(
-    strands: StrandSet, head: DistanceField, kept: float
+    strands: StrandSet, head: DistanceField, length: float
 ) -> tuple[StrandSet, Bools]:
     """Strands outside of the head that they grow on, and which (strand_count,) are: a few of them,
     as in a fold, nothing leads out.
 
     Args:
         strands: in the space of the head.
-        kept: how far they keep from it [m].
+        length: the hair's [m]; they keep as far from the head as moving hair does by default.
     """
+    kept = DynamicsSettings().radius_root * length
     posed = (PosedCollider(head, np.eye(4), np.eye(4)),)
     offsets, points = strands.offsets, strands.points.copy()
     clearance = clearance_at(strands.points, offsets, posed, kept)

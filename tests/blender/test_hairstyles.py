@@ -17,6 +17,7 @@ from hairloom.addon.blender.preview import previews
 from hairloom.addon.blender.properties.presets import named_preset
 from hairloom.addon.blender.scene import hair_nodes
 from hairloom.addon.blender.scene.curves import read_curves
+from hairloom.addon.blender.scene.surfaces import read_surface
 from hairloom.addon.blender.setup import hairstyles
 from hairloom.addon.blender.setup.hairstyles import (
     add_hairstyle,
@@ -25,8 +26,10 @@ from hairloom.addon.blender.setup.hairstyles import (
     named_hairstyle,
     shipped,
 )
+from hairloom.addon.dynamics.colliders.winding import winding_number
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.exchange.hairstyles import Hairstyle, NodeModifier
+from hairloom.addon.strands.closest_point import search_of
 from hairloom.addon.ui import operators_hairstyles
 
 pytestmark = [pytest.mark.usefixtures("extension")]
@@ -108,8 +111,15 @@ def test_fur_grows_on_any_mesh_and_by_its_size(name: str) -> None:
     assert style.guides is None and not style.masks
     for size in (0.2, 20.0):
         hair = added(style, monkey(size))
+        assert [one.node_group.name for one in hair.modifiers] == [m.nodes for m in style.modifiers]
+        hair.modifiers.clear()  # what it grew as
         strands = read_curves(hair, depsgraph()).strands
-        assert strands.strand_count == style.settings["grow"]["strand_count"]
+        count = style.settings["grow"]["strand_count"]
+        assert 0.85 * count < strands.strand_count < count, "none on the eyes' back, in the head"
+        surface = read_surface(hair.parent, depsgraph(), need_uv=False, place="monkey")
+        inside = strands.points[np.abs(winding_number(strands.points, surface)) > 0.5]
+        deep = search_of(surface).closest(inside).distance.max(initial=0.0)
+        assert deep < 0.007 * size, "a fifth of a cell of its distance field"
         evaluated = hair.parent.evaluated_get(depsgraph())
         for root in strands.roots[::300]:
             local = hair.parent.matrix_world.inverted() @ Vector(root.tolist())

@@ -15,10 +15,12 @@ from ...groom.face_hair import grow_face_hair
 from ...groom.grow import grow
 from ...groom.settings import GrowSettings
 from ...parameters import ALL_SETTINGS
+from ...refine.lead_out_at_rest import led_out_at_rest
 from ...strands import StrandSet, Surface
 from ...strands.affine import mean_scale
 from ...strands.face import is_face_hair
 from ..base.vertex_weights import read_weights
+from ..colliders.fields import solid_of
 from ..properties import previews
 from ..properties.presets import apply, named_preset
 from ..properties.properties import settings_of
@@ -154,9 +156,18 @@ def _strands(
         factor = fitting_factor(head, depsgraph)
         settings = fitted(GrowSettings.from_dict(style.settings[GROWN], style.title), factor)
         surface = read_surface(head, depsgraph, need_uv=False, place=head.name)
-        return grow(surface, settings), factor
+        return _outside(grow(surface, settings), surface), factor
     surface = read_surface(head, depsgraph, need_uv=True, place=head.name)
     return style.guides.on(surface, _size_of(head)), 1.0
+
+
+def _outside(fur: StrandSet, surface: Surface) -> StrandSet:
+    """Fur led out of the mesh that it grows on, without what grows on parts within it."""
+    solid = solid_of(surface)
+    if solid is None:
+        return fur
+    led, is_out = led_out_at_rest(fur, solid, float(np.median(fur.lengths())))
+    return led.take(np.flatnonzero(is_out)) if is_out.any() else fur
 
 
 def grows_anywhere(style: Hairstyle) -> bool:

@@ -107,7 +107,7 @@ def test_lengths_and_roots_stay_and_strands_outside_are_not_touched(field: Dista
     inward = root[:15, None] * (1.0 - np.linspace(0.0, 0.5, count)[None, :, None]) + through
     outward = root[15:, None] * (1.0 + np.linspace(0.0, 1.0, count)[None, :, None])
     strands = strand_set(np.concatenate([inward, outward]))
-    led, is_out = led_out_at_rest(strands, field, 0.001)
+    led, is_out = led_out_at_rest(strands, field, 0.25)
     assert is_out.all()
     np.testing.assert_array_equal(led.roots, strands.roots)
     np.testing.assert_allclose(
