@@ -1,6 +1,7 @@
 // Opacity maps, vertex stage: strands as ribbons across the light's rays, straight between CVs and
 // at least a texel wide; what they cover less than that is their weight. Stations beyond the tip fall
-// onto it. UNEVEN: points say how far along their strand they are; else they are evenly spaced.
+// onto it. What a mesh hides from the light has no width: light does not come there anyway. UNEVEN:
+// points say how far along their strand they are; else they are evenly spaced.
 #include "lib_strand_texel.glsl"
 #include "lib_opacity.glsl"
 
@@ -11,6 +12,22 @@ vec4 map_position(vec3 point)
   float depth = clamp(dot(opacity.map_depth[light_index], at), 0.0, 1.0);
   return vec4(dot(opacity.map_x[light_index], at), dot(opacity.map_y[light_index], at),
               (2.0 * depth - 1.0) * w, w);
+}
+
+// Whether the first mesh hides a place of the map, and what is this far around it, from the light.
+bool is_hidden(vec4 clip, float around)
+{
+  int side = textureSize(opacity_meshes, 0).x, map = int(opacity.light[light_index].x);
+  float w = max(clip.w, 1.0e-6), depth = 0.5 * clip.z / w + 0.5 - opacity.bias;
+  vec2 place = 0.5 * clip.xy / w + 0.5;
+  for (int corner = 0; corner < 4; corner++) {
+    vec2 aside = around * (2.0 * vec2(corner & 1, corner >> 1) - 1.0);
+    ivec2 texel = clamp(ivec2((place + aside) * float(side)), ivec2(0), ivec2(side - 1));
+    if (depth <= texelFetch(opacity_meshes, ivec3(texel, map), 0).x) {
+      return false;
+    }
+  }
+  return true;
 }
 
 void main()
@@ -38,9 +55,13 @@ void main()
   float half_width = cv.w * strands.fullness * taper *
                      strand_breadth(opacity, light_index, clip.xyw, across);
   float drawn = max(half_width, 0.5);
+  // a look-up blends over a texel to each side of what a strand covers
+  float around = (drawn + 1.0) / texels;
+  bool hidden = is_hidden(clip, around) && is_hidden(from, around) && is_hidden(to, around);
 
   strand_weight = strand_step * strands.opacity * half_width / drawn;
   strand_depth = 0.5 * clip.z / clip.w + 0.5;
+  drawn = hidden ? 0.0 : drawn;
   clip.xy += across * side * drawn * 2.0 / texels * max(abs(clip.w), 1.0e-6);
   gl_Position = clip;
 }

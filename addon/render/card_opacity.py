@@ -87,7 +87,7 @@ class _Cards:
             defines={"VIEW_COMPENSATED": int(self.is_view_compensated)},
         )
 
-    def draw_layers(self, features: Sequence[ShaderFeature]) -> None:
+    def draw_layers(self, features: Sequence[ShaderFeature], meshes: ShaderFeature) -> None:
         shader = bound(
             _LAYERS_RECIPE,
             [*features, self.feature],

@@ -112,8 +112,12 @@ class HairInMaps(Protocol):
             number: of the map. place: the block of the maps, and which light it is.
         """
 
-    def draw_layers(self, features: Sequence[ShaderFeature]) -> None:
-        """Draw all hair into the bound framebuffer, by a program with these features."""
+    def draw_layers(self, features: Sequence[ShaderFeature], meshes: ShaderFeature) -> None:
+        """Draw all hair into the bound framebuffer, by a program with these features.
+
+        Args:
+            meshes: the depths of the first mesh, for hair that leaves out what is behind it.
+        """
 
 
 class OpacityDrawing:
@@ -189,6 +193,7 @@ def _draw_map(maps: OpacityMaps, number: int, light: int, hair: HairInMaps) -> N
     place = ShaderFeature(
         blocks={"opacity": ("Opacity", maps.values)}, integers={"light_index": light}
     )
+    meshes = ShaderFeature(textures={"opacity_meshes": ("DEPTH_2D_ARRAY", maps.meshes)})
     features = [place]
     if maps.starts is not None:
         hair.draw_starts(maps, number, place)
@@ -217,7 +222,7 @@ def _draw_map(maps: OpacityMaps, number: int, light: int, hair: HairInMaps) -> N
             drawing_state(depth_test="NONE", depth_write=False, blend="ADDITIVE_PREMULT"),
         ):
             target.clear(color=_NOTHING)
-            hair.draw_layers([*features, texels])
+            hair.draw_layers([*features, texels], meshes)
 
 
 def pack_opacity(

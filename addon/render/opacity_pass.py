@@ -110,11 +110,11 @@ class _Strands:
             gpu.compute.dispatch(shader.shader, -(-cvs // 8), -(-drawn.count // 8), 1)
         gpu.shader.unbind()
 
-    def draw_layers(self, features: Sequence[ShaderFeature]) -> None:
+    def draw_layers(self, features: Sequence[ShaderFeature], meshes: ShaderFeature) -> None:
         casting = self.casting
         shader = bound(
             _LAYERS_RECIPE,
-            [*features, self.curves, self.settings],
+            [*features, meshes, self.curves, self.settings],
             self.blocks,
             integers={"first_instance": 0},
             numbers={"strand_step": casting.layout.strand_count / casting.count},

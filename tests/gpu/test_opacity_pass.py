@@ -189,6 +189,58 @@ def test_strands_that_stand_for_many_are_blurred_and_meshes_are_not(
         assert np.abs(found[:, 1] - expected[1]).max() < 1e-3
 
 
+@pytest.mark.parametrize("light", ["sun", "point"])
+@pytest.mark.parametrize("shadows", ["slices", "deep"])
+def test_hair_that_a_mesh_hides_from_the_light_is_left_out(
+    gpu_context: Any, compute: Callable[..., np.ndarray], light: str, shadows: str
+) -> None:
+    """A wall with an edge amidst the hair: lit places meet as many strands as counted one by one,
+    at least as nearly as where the hair behind the wall is in the maps too.
+    """
+    from hairloom.addon.render.opacity_pass import OpacityPass
+
+    strands, radius = dome()
+    ball = ball_around(strands)
+    settings = VolumeSettings(
+        shadows=shadows, slices=16, layers=8, resolution=64, strand_fraction=1.0, bias=0.01
+    )
+    frame = light_frame(LIGHTS[light], ball)
+    assert frame is not None
+    along = frame.to_depth[:3] / np.linalg.norm(frame.to_depth[:3])
+    across = np.cross(along, [0.0, 0.0, 1.0])
+    across /= np.linalg.norm(across)
+    upward = np.cross(across, along)
+    corners = [0.05 * across + side * upward for side in (-1.0, 1.0)]
+    corners += [2.0 * across + side * upward for side in (1.0, -1.0)]
+    wall = Surface(
+        (ball.center + np.array(corners)).astype(np.float32), np.array([[0, 1, 2], [0, 2, 3]])
+    )
+    points = np.random.default_rng(3).permutation(strands.reshape(-1, 3))[:6000]
+    place, depth = frame.places(points.astype(np.float64))
+    column, row = np.floor(place * 64).astype(int).T
+    exact = coverage(strands, radius, frame, 64)
+    counted = exact.optical_depth(row * 64 + column, depth - settings.bias)
+    sums, error, lit = [], [], np.ones(len(points))
+    for meshes in ((), (wall,)):
+        maps = OpacityPass().maps(
+            points_of(strands, radius),
+            1,
+            layout_of(strands),
+            ball,
+            (LIGHTS[light],),
+            settings,
+            PLAIN,
+            meshes,
+        )
+        found = path_at(compute, maps, points)
+        lit = found[:, 2]
+        sums.append(layers_of(maps)[..., len(layer_ends(settings)) - 1].sum())
+        error.append(np.abs(np.exp(-found[:, 0]) - np.exp(-counted)))
+    assert 500 < (lit < 1.0).sum() < 5000
+    assert sums[1] < 0.95 * sums[0]
+    assert error[1][lit > 0.0].mean() < 1.002 * error[0][lit > 0.0].mean()
+
+
 def spans_of(maps: Any) -> tuple[np.ndarray, np.ndarray]:
     """Where the first map's layers start in each texel, and how thick they are together."""
     side = maps.slots[0].width
