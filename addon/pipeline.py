@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -27,7 +27,7 @@ from .groom.children_settings import ChildrenSettings
 from .groom.counter_random import named, uniform
 from .groom.guides import choose_guides, grouped
 from .groom.holds import Holds
-from .groom.roots import RootFrames, bind_roots, follow, root_frames
+from .groom.roots import RootFrames, bind_roots, follow, root_frames, root_motions
 from .groom.settings import GuideSettings
 from .groom.ties import NO_HOLDERS, Holders, find_holds, idle
 from .groom.weights import GuideWeights, guide_weights
@@ -46,6 +46,7 @@ from .strands.face import is_face_hair
 from .strands.join import joined
 from .strands.needed_points import LOST, MAX_POINTS, with_needed_points
 from .strands.resample import resample
+from .strands.root_motions import RootMotions
 
 NO_WIND = np.zeros(3)
 #: Points that children are mixed from, of all of them together, and of each one at least.
@@ -403,26 +404,27 @@ def _frames(strands: StrandSet, head: Surface | None) -> RootFrames | None:
 def carried(rig: Rig, pose: Pose) -> Floats:
     """Rest shapes of all strands, each carried rigidly by its own root, (point_count, 3)."""
     strands = rig.strands
-    return _carried(rig, strands.points, strands.point_counts, slice(None), pose)
+    return follow(strands.points, strands.offsets, motions_of(rig, pose))
 
 
-def carried_guides(rig: Rig, pose: Pose) -> Floats:
+def carried_guides(rig: Rig, pose: Pose, precision: type = np.float32) -> Floats:
     """The same of the guides, (guide_count, cv_count, 3)."""
-    grid = rig.guide_grid
-    counts = np.full(len(grid), grid.shape[1])
-    return _carried(rig, grid.reshape(-1, 3), counts, rig.guides, pose).reshape(grid.shape)
+    grid: Floats = rig.guide_grid.astype(precision)
+    offsets, motions = np.arange(len(grid) + 1) * grid.shape[1], motions_of(rig, pose, rig.guides)
+    return follow(grid.reshape(-1, 3), offsets, motions).reshape(grid.shape)
 
 
-def _carried(rig: Rig, points: Floats, counts: Ints, chosen: Ints | slice, pose: Pose) -> Floats:
+def motions_of(rig: Rig, pose: Pose, chosen: Ints | slice = slice(None)) -> RootMotions:
+    """How the roots of some strands have moved since rest."""
     if rig.head is None or pose.head_positions is None or rig.rest_frames is None:
-        return (points @ pose.matrix[:3, :3].T + pose.matrix[:3, 3]).astype(np.float32)
+        return RootMotions.of_matrix(pose.matrix)
     triangle, barycentric = rig.strands.root_triangle, rig.strands.root_barycentric
     assert triangle is not None and barycentric is not None
     now = root_frames(
         pose.head_positions, rig.head.triangles, triangle[chosen], barycentric[chosen]
     )
     rest = RootFrames(rig.rest_frames.origin[chosen], rig.rest_frames.rotation[chosen])
-    return follow(points, counts, rest, now)
+    return root_motions(rest, now)
 
 
 def style_of_guides(rig: Rig, pose: Pose) -> Floats:
@@ -515,11 +517,11 @@ def strands_and_led(rig: Rig, motion: Motion) -> tuple[Floats, LedOut]:
     """All strands at this moment of a running motion, (point_count, 3) [m], and those of them that
     were led out of colliders."""
     pose, offsets = motion.pose, rig.strands.offsets
-    by_roots = carried(rig, pose)
-    points = ride(by_roots, rig.riders, carried_guides(rig, pose), motion.guides)
+    points, motions = _ridden(rig, pose, motion.guides)
     if motion.clearance is None:
         return held_strands(rig, pose, points), NOT_LED
-    led = lead_out(points, by_roots, offsets, motion.colliders, motion.clearance)
+    carry = partial(motions.carried, rig.strands.points)
+    led = lead_out(points, carry, offsets, motion.colliders, motion.clearance)
     points = held_strands(rig, pose, points)
     return points, LedOut.of(led, points, offsets)
 
@@ -531,10 +533,18 @@ def strands_at(rig: Rig, pose: Pose, guides_now: Floats, led: LedOut = NOT_LED) 
         guides_now: (guide_count, cv_count, 3) [m], simulated or baked, world space.
         led: strands that were led out of colliders.
     """
-    points = ride(carried(rig, pose), rig.riders, carried_guides(rig, pose), guides_now)
+    points = _ridden(rig, pose, guides_now)[0]
     points = held_strands(rig, pose, points)
     led.put(points, rig.strands.offsets)
     return points
+
+
+def _ridden(rig: Rig, pose: Pose, guides_now: Floats) -> tuple[Floats, RootMotions]:
+    """All strands riding on guides, and how their roots have moved."""
+    motions = motions_of(rig, pose)
+    # as precise as the guides are, so that those which their roots carry turn by exactly nothing
+    by_roots = carried_guides(rig, pose, guides_now.dtype.type)
+    return ride(rig.strands.points, rig.riders, by_roots, guides_now, motions), motions
 
 
 def strands_at_rest(rig: Rig, pose: Pose) -> Floats:

@@ -1,15 +1,22 @@
-// Strands that ride on guides, led out of colliders; one invocation a strand.
+// Strands that ride on guides, led out of colliders.
 // Twin of lead_out in addon/refine/lead_out.py, in steps over points first_point to point_end - 1 of
 // each strand: software drivers end a shader after 65,535 rounds of all its loops.
 //
-//   IS_LEASH  _pull_back: writes `states`, and cv_points of strands that go too far
-//   IS_NEAR   which strands are too near: writes `states`, and `wanted` for each point
-//   IS_LED    leads them: writes `led_points`
-//   IS_PUT    copies these into cv_points
+//   IS_HELD     _hold: writes `states`, and cv_points of strands that go with their roots at first
+//   IS_NEAR     which strands are too near: writes `states`
+//   IS_COUNTED  how many of these each block of strands has: writes `near_counts`
+//   IS_LISTED   which: writes `near_strands`, one after the other, and behind all how many there are,
+//               so that the next steps lose no lanes to the others
+//   IS_LED      leads them: writes `led_points`
+//   IS_PUT      copies these into cv_points
 //
-// states: x 1 where the strand is led, y its length [m], z by how much [m] any point is nearer than it
-// must be, w 1 when it is out. The fourth number of strand_spans is the last point that has a leash.
-// clearances: x how far [m] a point stays from colliders, y its leash [m].
+// Where drivers bear it, the first two are done as strands ride, see ride.comp.glsl.
+// One invocation a strand, a block of strands in IS_COUNTED and IS_LISTED; in IS_LED and IS_PUT every
+// lane_count-th of the strands that are too near.
+//
+// states: x 1 where the strand is moved, y its first point that is too near, 0 for none, z by how much
+// [m] any point is nearer than it must be, w 1 when it is out. The fourth number of strand_spans is the
+// last point that goes with the root. clearances: how far [m] a point stays from colliders.
 #include "lib_strand_texel.glsl"
 #if defined(IS_NEAR) || defined(IS_LED)
 #include "lib_signed_distance.glsl"
@@ -20,9 +27,21 @@
 #define HALVINGS {{lead_halvings}}
 #define TINY 1.0e-30
 
+#define BLOCK {{lead_block}}
+
+#if defined(IS_COUNTED) || defined(IS_LISTED)
+bool is_near(int strand)
+{
+  return texelFetch(states, strand_texel(strand, 0, 1), 0).y > 0.5;
+}
+#else
 vec3 riding_at(StrandSpan span, int point)
 {
+#if defined(IS_NEAR) || defined(IS_LED)
+  return texelFetch(cv_points, span_texel(span, point), 0).xyz;
+#else
   return imageLoad(cv_points, span_texel(span, point)).xyz;
+#endif
 }
 
 #include "lib_root_frame.glsl"
@@ -38,47 +57,33 @@ vec3 carried_at(StrandSpan span, int point, RootMotion motion)
   return follow(texelFetch(rest_points, span_texel(span, point), 0).xyz, motion);
 }
 
+#if defined(IS_NEAR) || defined(IS_LED)
+// How far [m] a point stays from colliders that rides so far from where its root carries it.
+float wanted_at(StrandSpan span, int point, float away)
+{
+  return min(texelFetch(clearances, span_texel(span, point), 0).x + away, kept);
+}
+#endif
+
 vec3 at_length(vec3 start, vec3 arm, float size)
 {
   return start + arm * (size / max(length(arm), TINY));
 }
+#endif
 
-#ifdef IS_LEASH
-void put(StrandSpan span, int point, vec3 place)
-{
-  ivec2 texel = span_texel(span, point);
-  imageStore(cv_points, texel, vec4(place, imageLoad(cv_points, texel).w));
-}
-
+#ifdef IS_HELD
 void take(int strand, StrandSpan span, int end)
 {
   int last = span.factors;
   RootMotion motion = motion_of(strand);
-  float part = 1.0;
-  for (int point = 1; point <= last; point++) {
-    float leash = texelFetch(clearances, span_texel(span, point), 0).y;
-    float away = distance(riding_at(span, point), carried_at(span, point, motion));
-    part = min(part, {{leashed}} * leash / max(away, TINY));
+  vec3 shift = carried_at(span, last, motion) - riding_at(span, last);
+  for (int point = 0; last > 0 && point < end; point++) {
+    ivec2 texel = span_texel(span, point);
+    vec4 riding = imageLoad(cv_points, texel);
+    vec3 place = point > last ? riding.xyz + shift : carried_at(span, point, motion);
+    imageStore(cv_points, texel, vec4(place, riding.w));
   }
-  if (part < 1.0) {
-    vec3 riding_before = riding_at(span, 0);
-    vec3 carried_before = carried_at(span, 0, motion);
-    vec3 place = riding_before;
-    for (int point = 1; point <= last; point++) {
-      vec3 riding = riding_at(span, point);
-      vec3 carried = carried_at(span, point, motion);
-      vec3 segment = riding - riding_before;
-      place = at_length(place, mix(carried - carried_before, segment, part), length(segment));
-      put(span, point, place);
-      riding_before = riding;
-      carried_before = carried;
-    }
-    vec3 shift = place - riding_before;
-    for (int point = last + 1; point < end; point++) {
-      put(span, point, riding_at(span, point) + shift);
-    }
-  }
-  imageStore(states, strand_texel(strand, 0, 1), vec4(part < 1.0 ? 1.0 : 0.0, 0.0, 0.0, 0.0));
+  imageStore(states, strand_texel(strand, 0, 1), vec4(last > 0 ? 1.0 : 0.0, 0.0, 0.0, 0.0));
 }
 #endif
 
@@ -87,16 +92,14 @@ void take(int strand, StrandSpan span, int end)
 {
   vec4 state = imageLoad(states, strand_texel(strand, 0, 1));
   RootMotion motion = motion_of(strand);
-  for (int point = max(first_point, 1); point < end; point++) {
+  Solid solid = solid_at(0);
+  for (int point = max(first_point, 1); point < end && state.y < 0.5; point++) {
     vec3 here = riding_at(span, point);
-    state.y += distance(riding_at(span, point - 1), here);
-    ivec2 texel = span_texel(span, point);
     float away = distance(here, carried_at(span, point, motion));
-    float goal = min(texelFetch(clearances, texel, 0).x + away, kept);
-    imageStore(wanted, texel, vec4(goal));
-    float lack = goal - signed_distance(here, kept).w;
-    state.x = lack > {{lead_slack}} * kept ? 1.0 : state.x;
+    float lack = wanted_at(span, point, away) - signed_distance(solid, here, kept).w;
+    state.y = lack > {{lead_slack}} * kept ? float(point) : state.y;
   }
+  state.x = state.y > 0.5 ? 1.0 : state.x;
   imageStore(states, strand_texel(strand, 0, 1), state);
 }
 #endif
@@ -111,17 +114,18 @@ vec3 direction(int number)
   return vec3(radius * cos(angle), radius * sin(angle), height);
 }
 
-// The end of a segment that is turned until it is out.
-vec3 turned_out(vec3 start, vec3 arm, float size, float goal)
+// The end of a segment that is turned until it is out. `toward`: where its root carries it, of length
+// 1: tried as well, since that does not jump from frame to frame.
+vec3 turned_out(Solid solid, vec3 start, vec3 arm, float size, vec3 toward, float goal)
 {
   arm /= max(size, TINY);
   vec3 out_of = vec3(0.0);
   float best = -1.0e30;
-  for (int number = 0; number < TRIES; number++) {
-    vec3 tried = direction(number);
-    float lack = goal - signed_distance(start + size * tried, goal).w;
+  for (int number = -1; number < TRIES; number++) {
+    vec3 tried = number < 0 ? toward : direction(number);
+    float lack = goal - signed_distance(solid, start + size * tried, goal).w;
     // the nearest that leads out; if none does, the one that lacks least
-    float worth = lack > 0.0 ? -1.0 - lack : dot(tried, arm);
+    float worth = lack > 0.0 ? -2.0 - lack : dot(tried, arm);
     out_of = worth > best ? tried : out_of;
     best = max(worth, best);
   }
@@ -130,7 +134,7 @@ vec3 turned_out(vec3 start, vec3 arm, float size, float goal)
   for (int halving = 0; halving < HALVINGS; halving++) {
     float middle = (low + high) / 2.0;
     vec3 end = at_length(start, arm + middle * (out_of - arm), size);
-    if (signed_distance(end, goal).w < goal) {
+    if (signed_distance(solid, end, goal).w < goal) {
       low = middle;
     }
     else {
@@ -140,75 +144,89 @@ vec3 turned_out(vec3 start, vec3 arm, float size, float goal)
   return at_length(start, arm + high * (out_of - arm), size);
 }
 
+// How far [m] the end of a segment goes straight out, so that it is out by `lack` [m] when it is back
+// at its length.
+float going_out(vec3 arm, vec3 outward, float size, float lack)
+{
+  float along = dot(arm, outward) / max(size, TINY);
+  return lack / max(1.0 - along * along, {{lead_steepest}});
+}
+
 // xyz: the end of a segment that is led out farther than it must be; w: by how much [m] it is nearer
 // than it must be all the same.
-vec4 led_out(vec3 start, vec3 segment, float needed, float farther)
+vec4 led_out(Solid solid, vec3 start, vec3 segment, vec3 toward, float needed, float farther)
 {
   float size = length(segment);
   float goal = needed + farther;
   vec3 end = start + segment;
   for (int sweep = 0; sweep <= SWEEPS; sweep++) {
-    vec4 found = signed_distance(end, kept + farther);
+    vec4 found = signed_distance(solid, end, kept + farther);
     float lack = goal - found.w;
-    if (lack <= 0.0 || (sweep == SWEEPS && lack <= {{lead_slack}} * kept)) {
+    if (lack <= {{lead_slack}} * kept) {
       return vec4(end, 0.0);
     }
+    // from deep inside of a collider the way out changes its side
+    if (lack > {{lead_deepest}} * size) {
+      break;
+    }
     if (sweep < SWEEPS) {
-      end = at_length(start, end + found.xyz * lack - start, size);
+      vec3 arm = end - start;
+      end = at_length(start, arm + found.xyz * going_out(arm, found.xyz, size, lack), size);
     }
   }
-  end = turned_out(start, end - start, size, goal);
-  return vec4(end, max(needed - signed_distance(end, kept).w, 0.0));
+  end = turned_out(solid, start, end - start, size, toward, goal);
+  return vec4(end, max(needed - signed_distance(solid, end, kept).w, 0.0));
 }
 
-// A point within its leash; w: twice `kept` where it does not get there.
-vec4 within_leash(vec3 here, vec3 start, float size, vec3 carried, float leash)
+// One attempt on some points of a strand from the first that is too near on.
+void lead(StrandSpan span, int begin, int end, RootMotion motion, float farther, inout vec4 state)
 {
-  for (int sweep = 0; sweep < SWEEPS; sweep++) {
-    vec3 away = here - carried;
-    float far = length(away);
-    if (far <= leash) {
-      return vec4(here, 0.0);
-    }
-    here = at_length(start, carried + away * ({{leashed}} * leash / far) - start, size);
+  if (begin >= end) {
+    return;
   }
-  return vec4(here, distance(here, carried) > leash ? 2.0 * kept : 0.0);
+  vec3 riding_start = riding_at(span, begin - 1);
+  vec3 start = riding_start;
+  if (begin == int(state.y)) {
+    state.z = 0.0;
+  }
+  else {
+    start = imageLoad(led_points, span_texel(span, begin - 1)).xyz;
+  }
+  Solid solid = solid_at(0);
+  vec3 carried_start = carried_at(span, begin - 1, motion);
+  for (int point = begin; point < end; point++) {
+    vec3 riding = riding_at(span, point);
+    vec3 carried = carried_at(span, point, motion);
+    vec3 toward = at_length(vec3(0.0), carried - carried_start, 1.0);
+    float goal = wanted_at(span, point, distance(riding, carried));
+    vec4 led = led_out(solid, start, riding - riding_start, toward, goal, farther);
+    state.z = max(state.z, led.w);
+    imageStore(led_points, span_texel(span, point), vec4(led.xyz, 0.0));
+    start = led.xyz;
+    riding_start = riding;
+    carried_start = carried;
+  }
 }
 
 void take(int strand, StrandSpan span, int end)
 {
   vec4 state = imageLoad(states, strand_texel(strand, 0, 1));
-  if (state.x < 0.5 || state.w > 0.5) {
+  if (state.y < 0.5 || state.w > 0.5) {
     return;
   }
   RootMotion motion = motion_of(strand);
-  float farther = {{lead_margin}} * float(attempt) * state.y / float(span.count - 1);
-  int first = max(first_point, 1);
-  vec3 start = riding_at(span, 0);
-  if (first_point == 0) {
-    state.z = 0.0;
-    imageStore(led_points, span_texel(span, 0), vec4(start, 0.0));
-  }
-  else {
-    start = imageLoad(led_points, span_texel(span, first - 1)).xyz;
-  }
-  vec3 riding_start = riding_at(span, first - 1);
-  for (int point = first; point < end; point++) {
-    vec3 riding = riding_at(span, point);
-    float goal = texelFetch(wanted, span_texel(span, point), 0).x;
-    vec4 led = led_out(start, riding - riding_start, goal, farther);
-    state.z = max(state.z, led.w);
-    float leash = texelFetch(clearances, span_texel(span, point), 0).y;
-    if (point <= span.factors) {
-      float size = distance(riding, riding_start);
-      led = within_leash(led.xyz, start, size, carried_at(span, point, motion), leash);
-      state.z = max(state.z, led.w);
+  for (int attempt = first_attempt; attempt < attempt_end && state.w < 0.5; attempt++) {
+    float farther = 0.0;
+    if (attempt > 0) {
+      for (int point = 1; point < span.count; point++) {
+        farther += distance(riding_at(span, point - 1), riding_at(span, point));
+      }
+      farther *= {{lead_margin}} * float(attempt) / float(span.count - 1);
+      state.y = 1.0;
     }
-    imageStore(led_points, span_texel(span, point), vec4(led.xyz, 0.0));
-    start = led.xyz;
-    riding_start = riding;
+    lead(span, max(first_point, int(state.y)), end, motion, farther, state);
+    state.w = end == span.count && state.z <= {{lead_slack}} * kept ? 1.0 : 0.0;
   }
-  state.w = end == span.count && state.z <= {{lead_slack}} * kept ? 1.0 : 0.0;
   imageStore(states, strand_texel(strand, 0, 1), state);
 }
 #endif
@@ -217,12 +235,12 @@ void take(int strand, StrandSpan span, int end)
 void take(int strand, StrandSpan span, int end)
 {
   vec4 state = texelFetch(states, strand_texel(strand, 0, 1), 0);
-  if (state.x < 0.5) {
+  if (state.y < 0.5) {
     return;
   }
   RootMotion motion = motion_of(strand);
   bool is_stuck = state.z > kept;  // then it is as its root carries it
-  for (int point = first_point; point < end; point++) {
+  for (int point = is_stuck ? first_point : max(first_point, int(state.y)); point < end; point++) {
     ivec2 texel = span_texel(span, point);
     vec3 place = texelFetch(led_points, texel, 0).xyz;
     place = is_stuck ? carried_at(span, point, motion) : place;
@@ -231,6 +249,56 @@ void take(int strand, StrandSpan span, int end)
 }
 #endif
 
+#if defined(IS_LED) || defined(IS_PUT)
+void main()
+{
+  int near_count = int(texelFetch(near_strands, strand_texel(strand_count, 0, 1), 0).x);
+  for (int number = int(gl_GlobalInvocationID.x); number < near_count; number += lane_count) {
+    int strand = int(texelFetch(near_strands, strand_texel(number, 0, 1), 0).x);
+    StrandSpan span = strand_span(strand_spans, strand);
+    if (first_point < span.count) {
+      take(strand, span, min(point_end, span.count));
+    }
+  }
+}
+#elif defined(IS_COUNTED)
+void main()
+{
+  int block = int(gl_GlobalInvocationID.x);
+  int begin = block * BLOCK;
+  if (begin >= strand_count) {
+    return;
+  }
+  int count = 0;
+  for (int strand = begin; strand < min(begin + BLOCK, strand_count); strand++) {
+    count += is_near(strand) ? 1 : 0;
+  }
+  imageStore(near_counts, strand_texel(block, 0, 1), vec4(float(count)));
+}
+#elif defined(IS_LISTED)
+void main()
+{
+  int block = int(gl_GlobalInvocationID.x);
+  int begin = block * BLOCK;
+  if (begin >= strand_count) {
+    return;
+  }
+  int number = 0;
+  for (int before = 0; before < block; before++) {
+    number += int(texelFetch(near_counts, strand_texel(before, 0, 1), 0).x);
+  }
+  int end = min(begin + BLOCK, strand_count);
+  for (int strand = begin; strand < end; strand++) {
+    if (is_near(strand)) {
+      imageStore(near_strands, strand_texel(number, 0, 1), vec4(float(strand)));
+      number++;
+    }
+  }
+  if (end == strand_count) {
+    imageStore(near_strands, strand_texel(strand_count, 0, 1), vec4(float(number)));
+  }
+}
+#else
 void main()
 {
   int strand = int(gl_GlobalInvocationID.x);
@@ -242,3 +310,4 @@ void main()
     take(strand, span, min(point_end, span.count));
   }
 }
+#endif

@@ -10,32 +10,54 @@ vec4 solid_texel(int solid, int texel)
   return texelFetch(solids, ivec2(solid * {{collider_texels}} + texel, 0), 0);
 }
 
+// A collider as it stands.
+struct Solid {
+  vec4 to_own[3];  // rows of the matrix to its own space
+  vec4 sphere;     // around it
+  vec4 own;        // see distance_to
+  vec4 low_cell;
+};
+
+Solid solid_at(int number)
+{
+  Solid solid;
+  for (int row = 0; row < 3; row++) {
+    solid.to_own[row] = solid_texel(number, row);
+  }
+  solid.own = solid_texel(number, 6);
+  solid.low_cell = solid_texel(number, 7);
+  solid.sphere = solid_texel(number, 8);
+  return solid;
+}
+
+// What signed_distance gives, once this collider is looked at too.
+vec4 nearer_of(vec4 result, Solid solid, vec3 point)
+{
+  if (distance(solid.sphere.xyz, point) - solid.sphere.w >= result.w) {
+    return result;
+  }
+  vec4 here = vec4(point, 1.0);
+  vec4 rows[3] = solid.to_own;
+  vec3 local = vec3(dot(rows[0], here), dot(rows[1], here), dot(rows[2], here));
+  Found found = distance_to(solid.own, solid.low_cell, local);
+  vec3 normal = rows[0].xyz * found.gradient.x + rows[1].xyz * found.gradient.y +
+                rows[2].xyz * found.gradient.z;
+  float size = max(length(normal), 1.0e-12);
+  // two sides of the collider may be as near; then a sampled gradient is short
+  float stretch = max({{flattest}} / max(length(found.gradient), 1.0e-12), 1.0);
+  float away = found.distance / (size * stretch);
+  return away < result.w ? vec4(normal / size, away) : result;
+}
+
 // w: the signed distance [m] of a point of the world to the nearest collider, negative inside,
 // `reach` where nothing is nearer. xyz: unit direction outwards, zero where nothing is nearer.
-vec4 signed_distance(vec3 point, float reach)
+//
+// `first`: solid_at(0), which is fetched once for many points; there is at least one collider.
+vec4 signed_distance(Solid first, vec3 point, float reach)
 {
-  vec4 result = vec4(0.0, 0.0, 0.0, reach);
-  for (int solid = 0; solid < solid_count; solid++) {
-    vec4 sphere = solid_texel(solid, 8);  // around the collider
-    if (distance(sphere.xyz, point) - sphere.w >= result.w) {
-      continue;
-    }
-    vec4 rows[3];
-    for (int row = 0; row < 3; row++) {
-      rows[row] = solid_texel(solid, row);
-    }
-    vec4 here = vec4(point, 1.0);
-    vec3 local = vec3(dot(rows[0], here), dot(rows[1], here), dot(rows[2], here));
-    Found found = distance_to(solid_texel(solid, 6), solid_texel(solid, 7), local);
-    vec3 normal = rows[0].xyz * found.gradient.x + rows[1].xyz * found.gradient.y +
-                  rows[2].xyz * found.gradient.z;
-    float size = max(length(normal), 1.0e-12);
-    // two sides of the collider may be as near; then a sampled gradient is short
-    float stretch = max({{flattest}} / max(length(found.gradient), 1.0e-12), 1.0);
-    float away = found.distance / (size * stretch);
-    if (away < result.w) {
-      result = vec4(normal / size, away);
-    }
+  vec4 result = nearer_of(vec4(0.0, 0.0, 0.0, reach), first, point);
+  for (int solid = 1; solid < solid_count; solid++) {
+    result = nearer_of(result, solid_at(solid), point);
   }
   return result;
 }

@@ -1,11 +1,18 @@
 // Strands that ride on guides: carried by their own roots, they turn with their guides.
 // Twin of ride in addon/refine/ride.py, behind follow in addon/groom/roots.py. One
-// invocation a strand. Define: HAS_CURLS, where curls may be drawn out.
+// invocation a strand.
+//
+// Defines: HAS_CURLS, where curls may be drawn out; HAS_CLEARANCE, where strands are to be led out of
+// colliders: then the steps IS_HELD and IS_NEAR of lead_out.comp.glsl are done here, where all that they
+// need is at hand.
 #include "lib_root_frame.glsl"
 #include "lib_strand_texel.glsl"
 #include "lib_turn.glsl"
 #ifdef HAS_CURLS
 #include "lib_curls.glsl"
+#endif
+#ifdef HAS_CLEARANCE
+#include "lib_signed_distance.glsl"
 #endif
 
 // What guides have at their segments, at a place along one of them [segments]: how it has turned, or
@@ -40,10 +47,22 @@ void main()
     ivec2 shift = strand_texel(guide[k], segment_count, segment_count + 1);
     displacement += weight[k] * texelFetch(guide_turns, shift, 0).xyz;
   }
+#ifdef HAS_CLEARANCE
+  int held = span.factors;  // the last point that goes with the root
+  displacement = held > 0 ? vec3(0.0) : displacement;
+  int first_near = 0;
+  Solid solid = solid_at(0);
+#endif
   float reached = 0.0;
   for (int point = 0; point < span.count; point++) {
-    imageStore(cv_points, span_texel(span, point),
-               vec4(follow(rest.xyz, motion) + displacement, rest.w));
+    vec3 here = follow(rest.xyz, motion) + displacement;
+    imageStore(cv_points, span_texel(span, point), vec4(here, rest.w));
+#ifdef HAS_CLEARANCE
+    float clearance = texelFetch(clearances, span_texel(span, point), 0).x;
+    float wanted = min(clearance + length(displacement), kept);
+    float lack = wanted - signed_distance(solid, here, kept).w;
+    first_near = first_near == 0 && lack > {{lead_slack}} * kept ? point : first_near;
+#endif
     if (point + 1 == span.count) {
       break;
     }
@@ -65,11 +84,22 @@ void main()
       axis += weight[k] * value_at(guide_axes, guide[k], place[k]);
     }
     vec3 drawn = drawn_out(carried, axis);
+#ifdef HAS_CLEARANCE
+    drawn = point < held ? vec3(0.0) : drawn;
+#endif
     displacement += drawn;
     carried += drawn;
 #endif
+#ifdef HAS_CLEARANCE
+    displacement += point < held ? vec3(0.0) : turn_change(blend, carried);
+#else
     displacement += turn_change(blend, carried);
+#endif
     reached += size;
     rest = next;
   }
+#ifdef HAS_CLEARANCE
+  float is_moved = held > 0 || first_near > 0 ? 1.0 : 0.0;
+  imageStore(states, strand_texel(strand, 0, 1), vec4(is_moved, float(first_near), 0.0, 0.0));
+#endif
 }

@@ -9,13 +9,14 @@ import numpy as np
 from ..arrays import Bools, Floats, Ints
 from ..errors import HairloomError
 from ..strands import StrandSet, Surface
+from ..strands.blocks import blocks_of
 from ..strands.closest_point import ClosestPointSearch, search_of
+from ..strands.root_motions import RootMotions
+from ..strands.vectors import cross_rows, dot_rows
 from .root_fit import IMPLAUSIBLE_DISTANCE, fitting_factor
 
 #: Sine of a triangle's first angle below which rounding in float64 decides about its normal.
 _FLAT = 1.0e-9
-#: Strands carried at once, so that they stay in the processor's cache.
-_CHUNK = 512
 
 
 @dataclass(frozen=True)
@@ -82,47 +83,51 @@ def root_frames(
         root_triangle: (strand_count,).
         root_barycentric: (strand_count, 3).
     """
-    a, b, c = (positions[triangles[root_triangle, k]].astype(np.float64) for k in range(3))
-    weight = np.asarray(root_barycentric, np.float64)
+    corners = triangles[root_triangle]
+    a, b, c = (_rows(positions[corners[:, k]]) for k in range(3))
+    weight = _rows(root_barycentric)
+    along, across = b - a, c - a
     # offsets from a: barycentric coordinates in float32 need not sum to 1 exactly
-    origin = a + weight[:, 1:2] * (b - a) + weight[:, 2:3] * (c - a)
-    tangent, _ = _unit(b - a, 0.0, fallback=(1.0, 0.0, 0.0))
-    flat = _FLAT * np.linalg.norm(c - a, axis=1)
-    normal, is_flat = _unit(np.cross(tangent, c - a), flat, fallback=(0.0, 0.0, 1.0))
-    normal[is_flat] = _across(tangent[is_flat])
-    rotation = np.stack([tangent, np.cross(normal, tangent), normal], axis=2)
-    return RootFrames(origin, rotation)
+    origin = a + weight[1] * along + weight[2] * across
+    tangent, _ = _unit(along, 0.0, fallback=(1.0, 0.0, 0.0))
+    flat = _FLAT * np.sqrt(dot_rows(across, across))
+    normal, is_flat = _unit(cross_rows(tangent, across), flat, fallback=(0.0, 0.0, 1.0))
+    if is_flat.any():
+        normal[:, is_flat] = _across(tangent[:, is_flat])
+    axes = np.stack([tangent, cross_rows(normal, tangent), normal])
+    return RootFrames(origin.T, axes.transpose(2, 1, 0))
 
 
-def follow(points: Floats, counts: Ints, rest: RootFrames, now: RootFrames) -> Floats:
-    """Each strand carried rigidly with its root, (point_count, 3) float32 [m].
+def root_motions(rest: RootFrames, now: RootFrames) -> RootMotions:
+    """How the same roots have moved; by exactly nothing where they have not."""
+    was = rest.rotation.transpose(1, 2, 0)
+    change, origin = now.rotation.transpose(1, 2, 0) - was, rest.origin.T
+    turn = np.empty_like(change)
+    for row in range(3):
+        for column in range(3):
+            turn[row, column] = dot_rows(change[row], was[column])
+    # the rounding of the origin to float32 must not show: it is turned here instead
+    rounding = origin - origin.astype(np.float32)
+    shift = now.origin.T - origin
+    for column in range(3):
+        shift -= turn[:, column] * rounding[column]
+    return RootMotions(*(np.ascontiguousarray(rows, np.float32) for rows in (turn, shift, origin)))
+
+
+def follow(points: Floats, offsets: Ints, motions: RootMotions) -> Floats:
+    """Each strand carried with its root, (point_count, 3) [m], as precise as `points`.
 
     Adds only the change, so that a root that did not move returns its strand bit for bit.
 
     Args:
         points: (point_count, 3) [m], the strands at rest, one after the other.
-        counts: (strand_count,) how many points each has.
-        rest, now: frames of the same roots at rest and now.
+        offsets: (strand_count + 1,), strand s is points[offsets[s]:offsets[s + 1]].
+        motions: of their roots.
     """
-    turn = (now.rotation - rest.rotation) @ rest.rotation.transpose(0, 2, 1)
-    # the rounding of the origin to float32 must not show: it is turned here instead
-    rounding = rest.origin - rest.origin.astype(np.float32)
-    shift = now.origin - rest.origin - np.einsum("sij,sj->si", turn, rounding)
-    # of a strand the turn, in three columns of three, the shift, and the origin
-    motions = np.column_stack([turn.transpose(0, 2, 1).reshape(-1, 9), shift, rest.origin]).astype(
-        np.float32
-    )
-    moved = np.array(points, np.float32)
-    ends = np.cumsum(counts)
-    for first in range(0, len(counts), _CHUNK):
-        last = min(first + _CHUNK, len(counts))
-        part = moved[ends[first] - counts[first] : ends[last - 1]]
-        motion = np.ascontiguousarray(np.repeat(motions[first:last], counts[first:last], axis=0).T)
-        local = part.T - motion[12:]
-        change = motion[9:12]
-        for column in range(3):
-            change += motion[3 * column : 3 * column + 3] * local[column]
-        part += change.T
+    moved = np.array(points)
+    for block in blocks_of(offsets):
+        rest = block.planes(moved)
+        block.put(moved, rest + motions.change(rest, block.strands))
     return moved
 
 
@@ -154,20 +159,27 @@ def _check_scale(
     )
 
 
+def _rows(values: Floats) -> Floats:
+    """Values (n, 3) as rows (3, n) float64."""
+    return np.ascontiguousarray(values.T, np.float64)
+
+
 def _unit(
-    vectors: Floats, shortest: Floats | float, fallback: tuple[float, float, float]
+    rows: Floats, shortest: Floats | float, fallback: tuple[float, float, float]
 ) -> tuple[Floats, Bools]:
-    """Unit vectors, and which are the fallback because they were no longer than the shortest."""
-    length = np.linalg.norm(vectors, axis=1)
+    """Unit vectors (3, n), and which are the fallback because they were no longer than the
+    shortest."""
+    length = np.sqrt(dot_rows(rows, rows))
     is_short = length <= shortest
-    unit = vectors / np.where(is_short, 1.0, length)[:, None]
-    unit[is_short] = fallback
+    unit = rows / np.where(is_short, 1.0, length)
+    if is_short.any():
+        unit[:, is_short] = np.array(fallback)[:, None]
     return unit, is_short
 
 
 def _across(tangent: Floats) -> Floats:
-    """Unit vectors across these unit tangents, as near to the world's axes as can be."""
+    """Unit vectors across these unit tangents (3, n), as near to the world's axes as can be."""
     axis = np.zeros_like(tangent)
-    axis[np.arange(len(tangent)), np.abs(tangent).argmin(axis=1)] = 1.0
-    across = axis - tangent * np.einsum("ij,ij->i", axis, tangent)[:, None]
-    return across / np.linalg.norm(across, axis=1, keepdims=True)
+    axis[np.abs(tangent).argmin(axis=0), np.arange(tangent.shape[1])] = 1.0
+    across = axis - tangent * dot_rows(axis, tangent)
+    return across / np.sqrt(dot_rows(across, across))

@@ -8,41 +8,56 @@ What comes after it goes along, in its shape. What was in a collider when the mo
 as deep as it was where its root carries it, and comes out by as much as it moves away from there.
 
 Hair behind an ear may lie in the grid of a mesh, whose cells are thicker than the ear, though
-outside of the mesh itself. There the grid does not tell which way is out, so such a point goes no
-farther from where its root carries it than it was from the mesh: it stays outside, wherever it
-turns. So does a strand that nothing leads out: it is as its root carries it.
+outside of the mesh itself. There the grid does not tell which way is out, so a strand goes with its
+root up to its last such point, and only what comes after that rides. A strand that nothing leads
+out is as its root carries it.
 
 The twin on the GPU is gpu_shaders/lead_out.comp.glsl.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache
 
 import numpy as np
 
 from ..arrays import Floats, Ints
 from ..dynamics.colliders import Pose, PosedCollider, signed_distance
-from ..dynamics.colliders.signed_distance import distance_to, outside_by, poses_now
-from ..strands.vectors import GOLDEN_ANGLE
+from ..dynamics.colliders.signed_distance import (
+    are_outside_meshes,
+    distance_of_few,
+    nearer_than,
+    poses_now,
+)
+from ..strands.vectors import GOLDEN_ANGLE, unit
 
 #: How often a point goes straight out and back to its length, at most.
-SWEEPS = 4
+SWEEPS = 2
+#: The square of the sine between a segment and the way out counts as this at least there.
+STEEPEST = 0.5
 #: How much nearer than it should be a point may come before its strand is led out, as a fraction
 #: of the distance that is kept.
 SLACK = 0.05
+#: A point that lacks more than this of its segment is not moved straight out: from deep inside of a
+#: collider the way out changes its side.
+DEEPEST = 0.5
 #: How many directions are tried for a segment that this does not lead out, and how often the turn
 #: to the one that does is halved.
 TRIES, HALVINGS = 64, 5
 #: A point that is deeper than this in a grid, as a fraction of the distance that is kept, is looked
-#: for in the mesh itself; and how much of the way that it may go is used, since it also bends.
-DEEP, LEASHED = 0.5, 0.9
+#: for in the mesh itself.
+DEEP = 0.5
 #: A strand that is stuck all the same, as in a fold, is led from its root again, farther out by
 #: this much of its mean segment; how often it is led at most.
 MARGIN, ATTEMPTS = 0.5, 3
+#: How many points of a strand are looked at together, for the next one that is too near.
+_AHEAD = np.arange(4)
 _TINY = 1.0e-30
+
+#: Where roots carry points (n,) of all, which belong to the strands (n,): (n, 3) world [m].
+type Carry = Callable[[Ints, Ints], Floats]
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,19 +66,14 @@ class Clearance:
 
     kept: [m], the distance of a point that was at least so far away when the motion began.
     points: (point_count,) float32 [m], that of each: `kept`, or less if it was nearer when the
-        motion began; -inf for roots, and for those that have a leash.
-    leashes: (point_count,) float32 [m], how far each goes at most from where its root carries it,
-        since it lies in a grid but not in its mesh; inf: as far as it likes.
+        motion began; -inf where it goes with its root.
+    held: (strand_count,) int32, up to which of its points each strand goes with its root, since
+        that lies in a grid but not in its mesh; 0: only the root.
     """
 
     kept: float
     points: Floats
-    leashes: Floats
-
-    @cached_property
-    def leashed(self) -> Ints:
-        """The points that have a leash, ascending."""
-        return np.isfinite(self.leashes).nonzero()[0]
+    held: Ints
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,18 +120,26 @@ def clearance_at(
     """
     distance, _ = signed_distance(points, colliders, kept)
     distance[offsets[:-1]] = np.inf
-    leashes = np.full(len(points), np.inf, np.float32)
+    deep = beside_meshes(points, distance, colliders, kept)
+    owner, held = _owners(deep, offsets), np.zeros(len(offsets) - 1, np.int32)
+    np.maximum.at(held, owner, deep - offsets[owner])
+    number = np.arange(len(points)) - np.repeat(offsets[:-1], np.diff(offsets))
+    distance[number <= np.repeat(held, np.diff(offsets))] = -np.inf
+    return Clearance(kept, distance, held)
+
+
+def beside_meshes(
+    points: Floats, distance: Floats, colliders: Sequence[PosedCollider], kept: float
+) -> Ints:
+    """Which points (n, 3) of these distances (n,) lie deep in a grid, but not in its mesh, (m,)."""
     deep = (distance < -DEEP * kept).nonzero()[0]
-    outside = outside_by(points[deep], colliders)
-    deep, outside = deep[outside > 0.0], outside[outside > 0.0]
-    leashes[deep] = outside
-    distance[deep] = distance[offsets[:-1]] = -np.inf
-    return Clearance(kept, distance, leashes)
+    chosen: Ints = deep[are_outside_meshes(points[deep], colliders)]
+    return chosen
 
 
 def lead_out(
     points: Floats,
-    carried: Floats,
+    carry: Carry,
     offsets: Ints,
     colliders: Sequence[PosedCollider],
     clearance: Clearance,
@@ -129,59 +147,49 @@ def lead_out(
     """Lead strands out of colliders, in place.
 
     Args:
-        carried: (point_count, 3) world [m], where their roots carry them.
+        carry: where their roots carry points.
         points, offsets, colliders: as of `clearance_at`.
 
     Returns:
         (n,) the strands that were too near, ascending.
     """
-    poses, kept, counts = poses_now(colliders), clearance.kept, np.diff(offsets)
-    pulled = _pull_back(points, carried, offsets, clearance)
-    distance, _ = distance_to(points, poses, kept)
-    near = (distance < np.float32((1.0 - SLACK) * kept)).nonzero()[0]
-    goal = _wanted(points, carried, clearance, near)
-    near = near[distance[near] < goal - np.float32(SLACK * kept)]
-    strands = np.unique(np.searchsorted(offsets, near, side="right") - 1)
-    for count in np.unique(counts[strands]).tolist():
-        index = offsets[strands[counts[strands] == count], None] + np.arange(count)
-        wanted = _wanted(points, carried, clearance, index)
-        near_ones = _Near(points[index], carried[index], wanted, clearance.leashes[index])
-        points[index] = _led(near_ones, kept, poses)
-    return np.union1d(pulled, strands)
+    poses, kept = poses_now(colliders), clearance.kept
+    held = _hold(points, carry, offsets, clearance)
+    index, distance = nearer_than(points, poses, (1.0 - SLACK) * kept)
+    owner = _owners(index, offsets)
+    away = _size(points[index] - carry(index, owner))
+    wanted = np.minimum(clearance.points[index] + away, np.float32(kept))
+    is_near = distance < wanted - np.float32(SLACK * kept)
+    strands, first = np.unique(owner[is_near], return_index=True)
+    if len(strands):
+        near = _Near.of(strands, index[is_near][first], points, carry, offsets, clearance)
+        points[near.index] = _led(near, kept, poses)
+    return np.union1d(held, strands)
 
 
-def _wanted(points: Floats, carried: Floats, clearance: Clearance, index: Ints) -> Floats:
-    """How far from colliders some points shall be [m], in the shape of `index`."""
-    away = np.linalg.norm(points[index] - carried[index], axis=-1)
-    return np.minimum(clearance.points[index] + away, np.float32(clearance.kept))
+def _owners(index: Ints, offsets: Ints) -> Ints:
+    """Which strands points belong to."""
+    return np.searchsorted(offsets, index, side="right") - 1
 
 
-def _pull_back(points: Floats, carried: Floats, offsets: Ints, clearance: Clearance) -> Ints:
-    """Bring points that have a leash within it, in place; and the strands (n,) that had to move.
-
-    All segments up to the last such point turn towards where their root carries them, all by the
-    same part of the way. What comes after goes along, in its shape.
-    """
-    index = clearance.leashed
-    away = np.linalg.norm(points[index] - carried[index], axis=1)
-    part = np.float32(LEASHED) * clearance.leashes[index] / np.maximum(away, np.float32(_TINY))
-    owner = np.searchsorted(offsets, index, side="right") - 1
-    strands, begins = np.unique(owner, return_index=True)
-    if not len(strands):
-        return strands
-    part = np.minimum.reduceat(part, begins)
-    last = index[np.append(begins[1:], len(index)) - 1]
-    is_far = part < 1.0
-    strands, part, last = strands[is_far], part[is_far], last[is_far]
-    for strand, fraction, end in zip(strands.tolist(), part.tolist(), last.tolist(), strict=True):
-        first, after = int(offsets[strand]), int(offsets[strand + 1])
-        segments = np.diff(points[first : end + 1].astype(np.float64), axis=0)
-        there = np.diff(carried[first : end + 1].astype(np.float64), axis=0)
-        arms = _at_length(0.0, there + fraction * (segments - there), _size(segments))
-        before = points[end].copy()
-        points[first + 1 : end + 1] = points[first] + np.cumsum(arms, axis=0)
-        points[end + 1 : after] += points[end] - before
+def _hold(points: Floats, carry: Carry, offsets: Ints, clearance: Clearance) -> Ints:
+    """Bring what goes with its root there, in place, and along what comes after it, in its shape;
+    and which strands (n,) have such a part."""
+    strands = clearance.held.nonzero()[0]
+    counts, last = np.diff(offsets)[strands], clearance.held[strands]
+    index, ends = points_of(strands, offsets), np.cumsum(counts)
+    shift = carry(index, np.repeat(strands, counts)) - points[index]
+    number = np.arange(len(index)) - np.repeat(ends - counts, counts)
+    shift = shift[np.minimum(number, np.repeat(last, counts)) + np.repeat(ends - counts, counts)]
+    points[index] += shift
     return strands
+
+
+def _steps(points: Floats, begins: Ints) -> Floats:
+    """From the point before to each, (n, 3); 0 where strands begin."""
+    steps = np.diff(points, axis=0, prepend=points[:1])
+    steps[begins] = 0.0
+    return steps
 
 
 def points_of(strands: Ints, offsets: Ints) -> Ints:
@@ -192,6 +200,7 @@ def points_of(strands: Ints, offsets: Ints) -> Ints:
     return index
 
 
+@cache
 def directions() -> Floats:
     """What is tried, (TRIES, 3): evenly over the sphere, on a spiral by the golden angle."""
     number = np.arange(TRIES)
@@ -202,110 +211,198 @@ def directions() -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class _Near:
-    """Strands of one point count that are too near.
+    """Strands that are too near, one after the other.
 
-    points, carried: (n, count, 3) where they ride, and where their roots carry them. wanted,
-    leashes: (n, count) [m].
+    begins, ends: (n,) their points among these. firsts: (n,) the first of each that is too near.
+    index: (m,) which points these are of all. points, carried: (m, 3) where they ride, and where
+    their roots carry them. wanted: (m,) [m].
     """
 
+    begins: Ints
+    ends: Ints
+    firsts: Ints
+    index: Ints
     points: Floats
     carried: Floats
     wanted: Floats
-    leashes: Floats
+
+    @classmethod
+    def of(
+        cls,
+        strands: Ints,
+        firsts: Ints,
+        points: Floats,
+        carry: Carry,
+        offsets: Ints,
+        clearance: Clearance,
+    ) -> _Near:
+        """Those of all strands (point_count, 3) whose first points that are too near these are."""
+        counts = np.diff(offsets)[strands]
+        ends, index = np.cumsum(counts), points_of(strands, offsets)
+        some, carried = points[index], carry(index, np.repeat(strands, counts))
+        wanted = clearance.points[index] + _size(some - carried)
+        return cls(
+            ends - counts,
+            ends,
+            firsts - offsets[strands] + ends - counts,
+            index,
+            some.astype(np.float64),
+            carried.astype(np.float64),
+            np.minimum(wanted, np.float32(clearance.kept)),
+        )
 
     def part(self, chosen: Ints) -> _Near:
-        return _Near(*(values[chosen] for values in vars(self).values()))
+        """Some of the strands, from their roots on."""
+        offsets = np.append(self.begins, self.ends[-1:])
+        index, counts = points_of(chosen, offsets), np.diff(offsets)[chosen]
+        ends = np.cumsum(counts)
+        begins = ends - counts
+        return _Near(
+            begins,
+            ends,
+            begins + 1,
+            self.index[index],
+            self.points[index],
+            self.carried[index],
+            self.wanted[index],
+        )
+
+    @property
+    def mean_segments(self) -> Floats:
+        """(n,) [m]."""
+        length = _size(_steps(self.points, self.begins))
+        return np.add.reduceat(length, self.begins) / (self.ends - self.begins - 1)
 
 
 def _led(near: _Near, kept: float, poses: Sequence[Pose]) -> Floats:
-    """Where they are led to, (n, count, 3)."""
-    led, stuck = near.points.astype(np.float64), np.arange(len(near.points))
-    mean = np.linalg.norm(np.diff(led, axis=1), axis=2).mean(axis=1)
-    lack = np.zeros(len(led))
-    for attempt in range(ATTEMPTS):
-        farther = MARGIN * attempt * mean[stuck]
-        led[stuck], lack[stuck] = _led_by(near.part(stuck), farther, kept, poses)
-        stuck = stuck[lack[stuck] > SLACK * kept]
-        if not len(stuck):
-            break
-    return np.where((lack > kept)[:, None, None], near.carried, led)
+    """Where they are led to, (m, 3)."""
+    count = len(near.begins)
+    led, lack = _led_by(near, np.zeros(count), np.full(count, SLACK * kept), kept, poses)
+    stuck = np.flatnonzero(lack > SLACK * kept)
+    if len(stuck):
+        # all further attempts at once; the first that succeeds counts, or the last
+        tries = np.tile(stuck, ATTEMPTS - 1)
+        number = np.repeat(np.arange(1, ATTEMPTS), len(stuck))
+        again = near.part(tries)
+        farther = MARGIN * number * again.mean_segments
+        given_up = np.where(number == ATTEMPTS - 1, kept, SLACK * kept)
+        found, left_over = _led_by(again, farther, given_up, kept, poses)
+        is_out = (left_over <= SLACK * kept).reshape(ATTEMPTS - 1, -1)
+        is_out[-1] = True
+        chosen = is_out.argmax(axis=0) * len(stuck) + np.arange(len(stuck))
+        lack[stuck] = left_over[chosen]
+        from_ = points_of(chosen, np.append(again.begins, again.ends[-1:]))
+        led[points_of(stuck, np.append(near.begins, near.ends[-1:]))] = found[from_]
+    is_lost = np.repeat(lack > kept, near.ends - near.begins)
+    return np.where(is_lost[:, None], near.carried, led)
 
 
 def _led_by(
-    near: _Near, farther: Floats, kept: float, poses: Sequence[Pose]
+    near: _Near, farther: Floats, given_up: Floats, kept: float, poses: Sequence[Pose]
 ) -> tuple[Floats, Floats]:
     """Strands led out farther than they must be, by (n,) [m]; and by how much any point of each is
-    nearer than it must be, (n,) [m], which is twice `kept` where one is beyond its leash."""
-    some = near.points.astype(np.float64)
-    segments, led, worst = np.diff(some, axis=1), some.copy(), np.zeros(len(some))
-    lengths = np.linalg.norm(segments, axis=2)
-    for point in range(1, led.shape[1]):
-        start, length = led[:, point - 1], lengths[:, point - 1]
-        here = start + segments[:, point - 1]
-        goal = near.wanted[:, point] + farther
-        left = np.arange(len(led))
-        for sweep in range(SWEEPS + 1):
-            distance, outward = distance_to(here[left], poses, kept + float(farther.max()))
-            lack = goal[left] - distance
-            chosen = np.flatnonzero(lack > 0.0)
-            left, lack = left[chosen], lack[chosen]
-            if sweep == SWEEPS or not len(left):
-                break
-            arm = here[left] + outward[chosen] * lack[:, None] - start[left]
-            here[left] = _at_length(start[left], arm, length[left])
-        left = left[lack > SLACK * kept]
-        if len(left):
-            arms = here[left] - start[left], length[left]
-            here[left] = _turned_out(start[left], *arms, goal[left], poses)
-            distance, _ = distance_to(here[left], poses, kept)
-            worst[left] = np.maximum(worst[left], near.wanted[left, point] - distance)
-        is_far = _pull_within(here, start, length, near.carried[:, point], near.leashes[:, point])
-        worst[is_far] = 2.0 * kept
-        led[:, point] = here
-    return led, worst
+    nearer than it must be, (n,) [m].
+
+    A strand of which any is nearer by more than `given_up` (n,) [m] is led no further.
+
+    Each round asks the colliders once, for all strands: where a strand searches, of its next
+    points, and where one of them is too near, of the place to which this has been moved.
+    """
+    worst = np.zeros(len(farther))
+    lengths = _size(_steps(near.points, near.begins))
+    goal = near.wanted + np.repeat(farther, near.ends - near.begins)
+    slack, toward = SLACK * kept, unit(_steps(near.carried, near.begins))
+    # each point that is led moves all that come after it along, up to the next one that is
+    shifts, is_led = np.zeros_like(near.points), np.zeros(len(near.points), bool)
+    is_led[near.begins] = True
+    at, shift = near.firsts.copy(), np.zeros((len(farther), 3))
+    sweep, here = np.zeros(len(farther), np.int64), np.zeros((len(farther), 3))
+    left = np.flatnonzero(at < near.ends)
+    while len(left):
+        is_searching = sweep[left] == 0
+        searching, moved = left[is_searching], left[~is_searching]
+        index = np.minimum(at[searching, None] + _AHEAD, near.ends[searching, None] - 1)
+        ahead = near.points[index] + shift[searching, None]
+        asked = np.concatenate([ahead.reshape(-1, 3), here[moved]])
+        distance, outward = distance_of_few(asked, poses)
+        lack = goal[np.append(index.ravel(), at[moved])] - distance
+        is_bad = (lack[: index.size] > slack).reshape(index.shape)
+        number = np.flatnonzero(is_bad.any(axis=1))
+        place = is_bad[number].argmax(axis=1)
+        at[searching] = index[:, -1] + 1
+        at[searching[number]] = index[number, place]
+        here[searching[number]] = ahead[number, place]
+        # from here on only those that have a point which is too near
+        some = np.append(searching[number], moved)
+        asked = np.append(number * len(_AHEAD) + place, np.arange(index.size, len(lack)))
+        lack, outward, point = lack[asked], outward[asked], at[some]
+        start, length = near.points[point - 1] + shift[some], lengths[point]
+        is_out = lack <= slack
+        is_tried = (sweep[some] == SWEEPS) | (lack > DEEPEST * length)
+        go = np.flatnonzero(~is_out & ~is_tried)
+        arm = here[some[go]] - start[go]
+        arm += outward[go] * _going_out(arm, outward[go], length[go], lack[go])[:, None]
+        here[some[go]] = _at_length(start[go], arm, length[go])
+        sweep[some[go]] += 1
+        go = np.flatnonzero(~is_out & is_tried)
+        if len(go):
+            one = some[go]
+            arm = here[one] - start[go]
+            here[one], left_over = _turned_out(
+                start[go], arm, length[go], toward[point[go]], goal[point[go]], poses
+            )
+            worst[one] = np.maximum(worst[one], left_over - farther[one])
+        go = np.flatnonzero(is_out | is_tried)
+        one, point = some[go], point[go]
+        shift[one] = shifts[point] = here[one] - near.points[point]
+        is_led[point] = True
+        at[one], sweep[one] = point + 1, 0
+        left = left[(at[left] < near.ends[left]) & (worst[left] <= given_up[left])]
+    last = np.maximum.accumulate(np.where(is_led, np.arange(len(is_led)), 0))
+    return near.points + shifts[last], worst
 
 
-def _pull_within(
-    here: Floats, start: Floats, length: Floats, carried: Floats, leashes: Floats
-) -> Ints:
-    """Bring points (n, 3) within their leash of where their roots carry them, in place, at their
-    length [m] from `start`; and those that do not get there, (m,)."""
-    held = np.flatnonzero(np.isfinite(leashes))
-    for _ in range(SWEEPS):
-        away = here[held] - carried[held]
-        size = _size(away)
-        is_far = size > leashes[held]
-        if not is_far.any():
-            return held[:0]
-        held, away, size = held[is_far], away[is_far], size[is_far]
-        arm = carried[held] + away * (LEASHED * leashes[held] / size)[:, None] - start[held]
-        here[held] = _at_length(start[held], arm, length[held])
-    return held[_size(here[held] - carried[held]) > leashes[held]]
+def _going_out(arm: Floats, outward: Floats, length: Floats, lack: Floats) -> Floats:
+    """How far [m] the ends of segments (n, 3) go straight out, so that they are out by `lack` [m]
+    when they are back at their length: that takes on what is along the segment."""
+    along = np.einsum("ij,ij->i", arm, outward) / np.maximum(length, _TINY)
+    return lack / np.maximum(1.0 - along * along, STEEPEST)
 
 
 def _turned_out(
     start: Floats,
     arm: Floats,
     length: Floats,
+    toward: Floats,
     wanted: Floats,
     poses: Sequence[Pose],
-) -> Floats:
-    """The ends (n, 3) of segments that are turned until they are out."""
-    tried = directions()
-    ends = start + length[:, None] * tried[:, None]
-    reach = float(wanted.max())
-    distance, _ = distance_to(ends.reshape(-1, 3), poses, reach)
-    lack = np.maximum(wanted - distance.reshape(TRIES, -1), 0.0)
+) -> tuple[Floats, Floats]:
+    """The ends (n, 3) of segments that are turned until they are out, and by how much [m] each is
+    nearer than `wanted` all the same.
+
+    Args:
+        toward: (n, 3) unit vectors, where roots carry segments: tried as well, since that does not
+            jump from frame to frame.
+    """
+    rows = np.arange(len(arm))
+    tried = np.concatenate([toward[None], np.repeat(directions()[:, None], len(arm), axis=1)])
+    distance, _ = distance_of_few((start + length[:, None] * tried).reshape(-1, 3), poses)
+    lack = np.maximum(wanted - distance.reshape(len(tried), -1), 0.0)
     arm = arm / np.maximum(length, _TINY)[:, None]
     # the nearest that leads out; if none does, the one that lacks least
-    out = tried[np.where(lack > 0.0, -1.0 - lack, tried @ arm.T).argmax(axis=0)]
-    low, high = np.zeros(len(arm)), np.ones(len(arm))
+    found = np.where(lack > 0.0, -2.0 - lack, np.einsum("tni,ni->tn", tried, arm)).argmax(axis=0)
+    # all turns that halving might come to, at once: the least one that leads out
+    parts = np.arange(1, (1 << HALVINGS) + 1)[:, None, None] / (1 << HALVINGS)
+    arms = arm + parts * (tried[found, rows] - arm)
+    ends = start + arms * (length / np.maximum(_size(arms), _TINY))[..., None]
+    is_near = distance_of_few(ends[:-1].reshape(-1, 3), poses)[0].reshape(-1, len(arm)) < wanted
+    low, high = np.zeros(len(arm), np.int64), np.full(len(arm), 1 << HALVINGS)
     for _ in range(HALVINGS):
-        middle = (low + high) / 2.0
-        end = _at_length(start, arm + middle[:, None] * (out - arm), length)
-        is_near = distance_to(end, poses, reach)[0] < wanted
-        low, high = np.where(is_near, middle, low), np.where(is_near, high, middle)
-    return _at_length(start, arm + high[:, None] * (out - arm), length)
+        middle = (low + high) // 2
+        is_in = is_near[middle - 1, rows]
+        low, high = np.where(is_in, middle, low), np.where(is_in, high, middle)
+    lack = np.where(high < 1 << HALVINGS, 0.0, lack[found, rows])
+    return ends[high - 1, rows], lack
 
 
 def _at_length(start: Floats | float, arm: Floats, length: Floats) -> Floats:
@@ -313,6 +410,7 @@ def _at_length(start: Floats | float, arm: Floats, length: Floats) -> Floats:
     return start + arm * (length / np.maximum(_size(arm), _TINY))[:, None]
 
 
-def _size(rows: Floats) -> Floats:
-    result: Floats = np.sqrt(np.einsum("ij,ij->i", rows, rows))
+def _size(vectors: Floats) -> Floats:
+    """Of vectors (..., 3)."""
+    result: Floats = np.sqrt(np.einsum("...j,...j->...", vectors, vectors))
     return result

@@ -4,6 +4,7 @@ folds of its mesh: such are led out once, at rest, as moving strands are."""
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -15,7 +16,7 @@ from ..dynamics.settings import DynamicsSettings
 from ..strands import StrandSet
 from ..strands.arc_length import steps
 from ..strands.closest_point import search_of
-from .lead_out import clearance_at, lead_out
+from .lead_out import Clearance, beside_meshes, lead_out
 
 #: How far a point keeps from the head at most, as a part of its distance along the strand.
 LIFT = 0.3
@@ -36,16 +37,24 @@ def led_out_at_rest(
     kept = DynamicsSettings().radius_root * length
     posed = (PosedCollider(head, np.eye(4), np.eye(4)),)
     offsets, points = strands.offsets, strands.points.copy()
-    clearance = clearance_at(strands.points, offsets, posed, kept)
+    distance, _ = signed_distance(points, posed, kept)
     reached = np.cumsum(steps(strands.points, offsets), dtype=np.float64)
     reached -= np.repeat(reached[offsets[:-1]], strands.point_counts)
     wanted = np.minimum(kept, LIFT * reached).astype(np.float32)
-    wanted[np.isneginf(clearance.points)] = -np.inf
-    lead_out(points, strands.points, offsets, posed, replace(clearance, points=wanted))
+    wanted[offsets[:-1]] = -np.inf
+    wanted[beside_meshes(points, distance, posed, kept)] = -np.inf
+    clearance = Clearance(kept, wanted, np.zeros(strands.strand_count, np.int32))
+    carry = partial(_as_they_are, strands.points)
+    lead_out(points, carry, offsets, posed, clearance)
     inside = _inside(points, head, signed_distance(points, posed, kept)[0], DEEP * kept)
     is_out = np.ones(strands.strand_count, bool)
     is_out[np.searchsorted(offsets, inside, side="right") - 1] = False
     return replace(strands, points=points), is_out
+
+
+def _as_they_are(points: Floats, index: Ints, _: Ints) -> Floats:
+    """At rest, roots carry points to where they are."""
+    return points[index]
 
 
 def _inside(points: Floats, head: DistanceField, distance: Floats, deep: float) -> Ints:

@@ -9,11 +9,13 @@ lengths are kept whatever the guides do, strands of guides that turn rigidly tur
 coil stays this coil on a guide that bends. Where a curled guide is drawn out, see `curls`.
 
 Vectors lie as planes here, (3, n), and quaternions as (4, n), xyz and w last: that is several times
-as fast.
+as fast. Strands of about one point count are moved together, with the points of one number side by
+side, (3, point_count, strand_count): then nothing has to be repeated for each point.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -22,12 +24,12 @@ import numpy as np
 from ..arrays import Bools, Floats, Ints
 from ..strands import StrandSet
 from ..strands.arc_length import steps
+from ..strands.blocks import Block, blocks_of
 from ..strands.center_lines import center_lines
+from ..strands.root_motions import RootMotions
 from ..strands.vectors import cross_rows, dot_rows
 from .curls import drawn_out, guide_axes
 
-#: Points moved at once, so that they stay in the processor's cache.
-_CHUNK = 8192
 #: Segments shorter than this [m] have no direction, so they turn as the one before them.
 SHORTEST = 1.0e-12
 #: Below this a quaternion that turns one direction into another is that of a full reversal.
@@ -50,8 +52,9 @@ class Riders:
 
     offsets: (strand_count + 1,), strand s is points offsets[s]:offsets[s + 1].
     weights: of all strands.
-    stations: (point_count,) float32 [m], how far along its guides the middle of the segment that
-        begins at a point takes its rotation from.
+    blocks: all strands, those of about as many points beside each other.
+    stations: of each block (count - 1, n) float32 [m], how far along its guides the middle of each
+        segment takes its rotation from.
     reach: (strand_count,) float32, the length of each centre line as a fraction of its strand's.
     segments_per_meter: (guide_count,) float32 [1/m], of each guide.
     gives: (guide_count, cv_count - 1), which segments of guides are curls, which may be drawn out;
@@ -62,7 +65,8 @@ class Riders:
 
     offsets: Ints
     weights: Weights
-    stations: Floats
+    blocks: tuple[Block, ...]
+    stations: tuple[Floats, ...]
     reach: Floats
     segments_per_meter: Floats
     gives: Bools | None = None
@@ -88,7 +92,15 @@ class Riders:
         stations *= np.repeat(reach, strands.point_counts)
         gives = None if room is None else room > 0.0
         per_meter = per_meter.astype(np.float32)
-        return cls(strands.offsets, weights, stations, reach, per_meter, gives)
+        blocks = tuple(blocks_of(strands.offsets))
+        placed = tuple(block.planes(stations)[:-1] for block in blocks)
+        return cls(strands.offsets, weights, blocks, placed, reach, per_meter, gives)
+
+    def of_block(self, block: Block) -> Iterator[tuple[Ints, Floats]]:
+        """Guides (n,) and their weights (n,) of some strands, one guide after the other."""
+        guide, weight = self.weights.guide[block.strands], self.weights.weight[block.strands]
+        for column in range(guide.shape[1]):
+            yield guide[:, column].astype(np.int64), weight[:, column].astype(np.float32)
 
 
 def _middles(points: Floats, offsets: Ints) -> Floats:
@@ -102,15 +114,22 @@ def _middles(points: Floats, offsets: Ints) -> Floats:
     return (reached + 0.5 * begins).astype(np.float32)
 
 
-def ride(points: Floats, riders: Riders, guide_rest: Floats, guide_now: Floats) -> Floats:
+def ride(
+    points: Floats,
+    riders: Riders,
+    guide_rest: Floats,
+    guide_now: Floats,
+    motions: RootMotions | None = None,
+) -> Floats:
     """Strands turned with their guides, (point_count, 3) float32, all in one space [m].
 
-    Guides at rest leave every strand bit for bit.
+    Guides at rest leave every strand bit for bit where its root carries it.
 
     Args:
-        points: (point_count, 3), strands carried by their own roots to now.
+        points: (point_count, 3), strands at rest.
         guide_rest: (guide_count, cv_count, 3), guides carried by their own roots to now.
         guide_now: (guide_count, cv_count, 3), guides as simulated.
+        motions: of the strands' roots to now; None: they have not moved, or `points` have already.
     """
     moved = np.array(points, np.float32)
     if not len(moved):
@@ -119,17 +138,17 @@ def ride(points: Floats, riders: Riders, guide_rest: Floats, guide_now: Floats) 
     axes = None if riders.gives is None else guide_axes(guide_rest, guide_now, riders.gives)
     axes = None if axes is None else _with_steps(axes)
     shifts = np.asarray(guide_now[:, 0] - guide_rest[:, 0], np.float32)
-    counts = np.diff(riders.offsets)
-    # whole strands a chunk, about as many points each
-    ends = np.searchsorted(riders.offsets, np.arange(_CHUNK, len(points) + _CHUNK, _CHUNK))
-    first = 0
-    for last in np.unique(np.minimum(ends, len(counts))).tolist():
-        chunk = slice(int(riders.offsets[first]), int(riders.offsets[last]))
-        strands = slice(first, last)
-        turned = _turned(moved[chunk], strands, counts[strands], riders, table, axes)
-        turned += np.repeat(_mean_shift(shifts, riders.weights, strands), counts[strands], axis=0)
-        moved[chunk] += turned
-        first = last
+    for block, station in zip(riders.blocks, riders.stations, strict=True):
+        rest = block.planes(moved)
+        if motions is not None:  # to the bit as `groom.roots.follow` does
+            rest += motions.change(rest, block.strands)
+        change, edge = np.zeros_like(rest), rest[:, 1:] - rest[:, :-1]
+        for guide, weight in riders.of_block(block) if shifts.any() else ():
+            change[:, 0] += weight * shifts[guide].T
+        _turn(edge, change[:, 1:], riders, block, station, table, axes)
+        _sum(change)
+        change += rest
+        block.put(moved, change)
     return moved
 
 
@@ -196,8 +215,11 @@ def _directions(grid: Floats) -> Floats:
 
 
 def _dot(one: Floats, other: Floats) -> Floats:
-    """Of quaternions (4, n)."""
-    return np.asarray(np.einsum("in,in->n", one, other))
+    """Of quaternions (4, ...)."""
+    total: Floats = one[0] * other[0]
+    for axis in (1, 2, 3):
+        total += one[axis] * other[axis]
+    return total
 
 
 def _product(left: Floats, right: Floats) -> Floats:
@@ -218,69 +240,60 @@ def _with_steps(values: Floats) -> Floats:
     return table
 
 
-def _mean_shift(shifts: Floats, weights: Weights, strands: slice) -> Floats:
-    """How far the guides of some strands have left their roots, (n, 3)."""
-    if not shifts.any():
-        return np.zeros((strands.stop - strands.start, 3), np.float32)
-    guide, weight = weights.guide[strands], weights.weight[strands]
-    return np.einsum("nk,nkc->nc", weight, shifts[guide]).astype(np.float32)
-
-
-def _turned(
-    points: Floats,
-    strands: slice,
-    counts: Ints,
+def _turn(
+    edge: Floats,
+    change: Floats,
     riders: Riders,
+    block: Block,
+    station: Floats,
     table: Floats,
     axes: Floats | None,
-) -> Floats:
-    """What turning and drawing out add to the points of some strands, (n, 3)."""
-    segment = np.zeros((3, len(points)), np.float32)
-    segment[:, :-1] = (points[1:] - points[:-1]).T
-    tips = np.cumsum(counts) - 1
-    segment[:, tips] = 0.0
-    first = riders.offsets[strands.start]
-    station = riders.stations[first : first + len(points)]
-    last = table.shape[1] - 1
-    flat = table.reshape(-1, 8)
+) -> None:
+    """Add to `change` what turning and drawing out add to segments (3, count - 1, n)."""
+    shape, last = edge.shape[1:], table.shape[1] - 1
     blend: Floats | None = None
-    axis = None if axes is None else np.zeros((4, len(points)), np.float32)
-    for guide, weight in zip(
-        riders.weights.guide[strands].T, riders.weights.weight[strands].T, strict=True
-    ):
-        place = np.repeat(riders.segments_per_meter[guide], counts) * station
+    axis = None if axes is None else np.zeros((4, *shape), np.float32)
+    for guide, weight in riders.of_block(block):
+        place = station * riders.segments_per_meter[guide]
         place -= np.float32(0.5)
-        np.clip(place, 0.0, last, out=place)
-        before = place.astype(np.int64)
-        place -= before
-        before += np.repeat(guide.astype(np.int64) * (last + 1), counts)
-        near = np.ascontiguousarray(flat.take(before, axis=0, mode="clip").T)
-        turn = near[4:] * place
-        turn += near[:4]
-        fraction = np.repeat(weight, counts)
+        np.clip(place, np.float32(0.0), np.float32(last), out=place)
+        whole = np.trunc(place)
+        place -= whole
+        before = whole.astype(np.int32) + guide * (last + 1)
+        turn = _between(table, before, place)
         if axes is not None and axis is not None:
-            near = np.ascontiguousarray(axes.reshape(-1, 8).take(before, axis=0, mode="clip").T)
-            here = near[4:] * place
-            here += near[:4]
-            here *= fraction
+            here = _between(axes, before, place)
+            here *= weight
             axis += here
         if blend is None:
-            blend = turn * fraction
+            blend = turn
+            blend *= weight
         else:  # of two quaternions of one rotation the nearer
-            turn *= np.copysign(fraction, _dot(turn, blend))
+            turn *= np.copysign(weight, _dot(turn, blend))
             blend += turn
     assert blend is not None
-    size = _dot(blend, blend)
-    blend[3] += size < REVERSED  # opposite turns that leave nothing
-    drawn: Floats | None = None
+    blend[3] += _dot(blend, blend) < REVERSED  # opposite turns that leave nothing
     if axis is not None and axis[3].any():
-        drawn = segment * axis[3] if riders.are_lines else drawn_out(segment, axis)
-        segment += drawn
-    change = turn_change(blend, segment)
-    if drawn is not None:
+        drawn = edge * axis[3] if riders.are_lines else drawn_out(edge, axis)
+        edge += drawn
         change += drawn
-    total = np.cumsum(change, axis=1, dtype=np.float64)
-    total -= change  # of the segments before each point
-    starts = tips + 1 - counts
-    total -= np.repeat(total[:, starts], counts, axis=1)
-    return total.T.astype(np.float32)
+    change += turn_change(blend, edge)
+
+
+def _between(table: Floats, before: Ints, fraction: Floats) -> Floats:
+    """Values (4, ...) on the way from some rows of a table to the next ones, see `_with_steps`."""
+    rows = table.reshape(-1, 8).take(before.ravel(), axis=0, mode="clip")
+    near: Floats = np.ascontiguousarray(rows.T).reshape(8, *before.shape)
+    value = near[4:]
+    value *= fraction
+    value += near[:4]
+    return value
+
+
+def _sum(change: Floats) -> None:
+    """Sums along the second axis of (3, count, n), in place."""
+    if change.shape[1] > change.shape[2]:
+        np.cumsum(change, axis=1, out=change)
+        return
+    for point in range(1, change.shape[1]):
+        change[:, point] += change[:, point - 1]

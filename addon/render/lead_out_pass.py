@@ -4,10 +4,9 @@ textures in the layouts of `strand_layout`.
     strand_spans  RGBA32F: where the points of each strand lie, see strand_layout.StrandLayout
     solids, rounds, fields: the colliders, see collider_textures.py
     rest_points, root_motions: where roots carry points, see ride_pass.py
-    clearances    RG32F: how far from colliders each point stays where its root carries it, and how
-                  far it goes from there at most [m]
-    wanted        R32F: how far it stays where it is [m]
+    clearances    R32F: how far from colliders each point stays where its root carries it [m]
     states        RGBA32F: of each strand x whether it is led out, see lead_out.comp.glsl
+    near_strands, near_counts RGBA32F: which strands are too near, see lead_out.comp.glsl
     led_points    RGBA32F: xyz where points are led to [m, world]
     led_texels    RG32F: the texels of points that were led earlier
     cv_points     RGBA32F: xyz position now [m, world], changed in place
@@ -27,6 +26,7 @@ from ..refine.lead_out import ATTEMPTS, HALVINGS, SWEEPS, TRIES, Clearance, LedO
 from . import gpu_objects
 from .collider_textures import ColliderTextures, UploadedColliders
 from .shader_program import ShaderRecipe, program
+from .shader_source import LEAD_BLOCK
 from .strand_layout import StrandLayout, from_strand_rows, strand_rows, strand_rows_size
 from .textures import texture_from, texture_to_array
 
@@ -37,23 +37,33 @@ _ENDLESS = np.float32(1.0e30)
 _ROUNDS = 60_000
 #: step -> its images
 _STEPS = {
-    "LEASH": (("cv_points", "READ_WRITE"), ("states", "WRITE")),
-    "NEAR": (("cv_points", "READ"), ("states", "READ_WRITE"), ("wanted", "WRITE")),
-    "LED": (("cv_points", "READ"), ("states", "READ_WRITE"), ("led_points", "READ_WRITE")),
+    "HELD": (("cv_points", "READ_WRITE"), ("states", "WRITE")),
+    "NEAR": (("states", "READ_WRITE"),),
+    "COUNTED": (("near_counts", "WRITE"),),
+    "LISTED": (("near_strands", "WRITE"),),
+    "LED": (("states", "READ_WRITE"), ("led_points", "READ_WRITE")),
     "PUT": (("cv_points", "READ_WRITE"),),
 }
+_CARRYING = ("strand_spans", "rest_points", "root_motions")
 _TEXTURES = {
-    "LEASH": ("clearances",),
-    "NEAR": ("clearances", "solids"),
-    "LED": ("clearances", "solids", "wanted"),
-    "PUT": ("states", "led_points"),
+    "HELD": _CARRYING,
+    "NEAR": (*_CARRYING, "cv_points", "clearances", "solids"),
+    "COUNTED": ("states",),
+    "LISTED": ("states", "near_counts"),
+    "LED": (*_CARRYING, "near_strands", "cv_points", "clearances", "solids"),
+    "PUT": (*_CARRYING, "near_strands", "states", "led_points"),
 }
+_OF_POINTS = ("mover_count", "first_point", "point_end")
 _INTEGERS = {
-    "LEASH": (),
-    "NEAR": ("solid_count",),
-    "LED": ("solid_count", "attempt"),
-    "PUT": (),
+    "HELD": _OF_POINTS,
+    "NEAR": (*_OF_POINTS, "solid_count"),
+    "COUNTED": (),
+    "LISTED": (),
+    "LED": (*_OF_POINTS, "solid_count", "lane_count", "first_attempt", "attempt_end"),
+    "PUT": (*_OF_POINTS, "lane_count"),
 }
+#: strands of an invocation, at most
+_INVOCATION = {"COUNTED": LEAD_BLOCK, "LISTED": LEAD_BLOCK, "LED": 4, "PUT": 4}
 #: steps that ask colliders
 _ASKING = ("NEAR", "LED")
 PUT_RECIPE = ShaderRecipe(
@@ -70,19 +80,18 @@ def lead_out_recipe(step: str, *, rounds: bool = False, fields: bool = False) ->
     """The program of one step, for these kinds of colliders.
 
     Args:
-        step: "LEASH", "NEAR", "LED" or "PUT", see lead_out.comp.glsl.
+        step: a key of _STEPS, see lead_out.comp.glsl.
     """
     flags = {f"IS_{step}": True, "HAS_ROUNDS": rounds, "HAS_FIELDS": fields}
-    names = ["strand_spans", "rest_points", "root_motions", *_TEXTURES[step]]
+    names = list(_TEXTURES[step])
     names += [name for name, is_there in (("rounds", rounds), ("fields", fields)) if is_there]
-    formats = {"wanted": "R32F"}
     return ShaderRecipe(
         name=f"lead_out_{step.lower()}",
         compute="lead_out.comp.glsl",
         textures=tuple(("FLOAT_2D", name) for name in names),
-        images=tuple((formats.get(name, "RGBA32F"), name, access) for name, access in _STEPS[step]),
-        integers=("strand_count", "mover_count", "first_point", "point_end", *_INTEGERS[step]),
-        numbers=() if step == "LEASH" else (("FLOAT", "kept"),),
+        images=tuple(("RGBA32F", name, access) for name, access in _STEPS[step]),
+        integers=("strand_count", *_INTEGERS[step]),
+        numbers=(("FLOAT", "kept"),) if step in ("NEAR", "LED", "PUT") else (),
         group_size=_GROUP,
         defines=tuple((name, 1) for name, is_set in flags.items() if is_set),
     )
@@ -99,6 +108,7 @@ class LeadOutPass:
     def __init__(self, layout: StrandLayout, colliders: UploadedColliders) -> None:
         self._layout, self._colliders = layout, colliders
         self._clearance: Clearance | None = None
+        self._solids: ColliderTextures | None = None
         self.release()
 
     def take(self, clearance: Clearance | None) -> None:
@@ -107,35 +117,53 @@ class LeadOutPass:
             self.release()
             self._clearance = clearance
 
-    def lead(
-        self,
-        cv_points: Any,
-        posed: tuple[PosedCollider, ...],
-        carrying: dict[str, Any],
-        mover_count: int,
-    ) -> None:
+    def begin(self, posed: tuple[PosedCollider, ...], point_rounds: int) -> Seen | None:
+        """What a frame needs where strands are to be led out of these; None where they are not.
+
+        Args:
+            point_rounds: how many rounds of its loops the pass that moves strands takes for a point
+                of one, see `Seen.at_once`.
+
+        Raises:
+            HairloomError: a collider that the GPU cannot have.
+        """
+        if self._clearance is None or not posed or not self._layout.strand_count:
+            self._textures.pop("states", None)
+            return None
+        self._upload(self._clearance)
+        solids = self._solids = self._colliders.of(posed)
+        names = ("strand_spans", "clearances")
+        textures = {name: self._textures[name] for name in names}
+        textures["solids"] = solids.solids(posed)
+        for name, texture in (("rounds", solids.rounds), ("fields", solids.fields)):
+            if texture is not None:
+                textures[name] = texture
+        rounds = int(self._layout.counts.max()) * (point_rounds + _rounds_of_distance(solids))
+        return Seen(
+            textures, self._textures["states"], len(posed), self._clearance.kept, rounds <= _ROUNDS
+        )
+
+    def lead(self, cv_points: Any, seen: Seen, carrying: dict[str, Any], mover_count: int) -> None:
         """Lead strands out, see `refine.lead_out.lead_out`.
 
         Args:
+            seen: of this frame; if `at_once`, the pass before has found who is too near.
             carrying: the textures rest_points and root_motions.
             mover_count: how many root motions there are.
 
         Raises:
-            HairloomError: a collider that the GPU cannot have.
             ShaderError: the shader does not compile here.
         """
-        if self._clearance is None or not posed or not self._layout.strand_count:
-            self._textures.pop("states", None)
-            return
-        self._upload(self._clearance)
-        colliders = self._colliders.of(posed)
-        frame = _Frame(cv_points, colliders, colliders.solids(posed), carrying)
-        integers = {"mover_count": mover_count, "solid_count": len(posed)}
-        self._run("LEASH", frame, integers)
-        self._run("NEAR", frame, integers)
-        for attempt in range(ATTEMPTS):
-            self._run("LED", frame, {**integers, "attempt": attempt})
-        self._run("PUT", frame, integers)
+        textures = self._textures | carrying | seen.textures | {"cv_points": cv_points}
+        integers = {"mover_count": mover_count, "solid_count": seen.solid_count}
+        for step in (() if seen.at_once else ("HELD", "NEAR")) + ("COUNTED", "LISTED"):
+            self._run(step, textures, integers)
+        # all attempts in one go where drivers bear it
+        is_short = self._points_at_once() >= ATTEMPTS * int(self._layout.counts.max())
+        for attempt in (0,) if is_short else range(ATTEMPTS):
+            end = ATTEMPTS if is_short else attempt + 1
+            self._run("LED", textures, {**integers, "first_attempt": attempt, "attempt_end": end})
+        self._run("PUT", textures, integers)
 
     def put(self, cv_points: Any, led: LedOut) -> None:
         """Put strands where they were led to earlier, see `LedOut.put`.
@@ -178,66 +206,71 @@ class LeadOutPass:
         """What is constant, and the textures that the shaders write."""
         layout, textures = self._layout, self._textures
         if "clearances" not in textures:
-            values = np.stack([clearance.points, clearance.leashes], axis=1)
-            values = np.clip(values, -_ENDLESS, _ENDLESS)
-            textures["clearances"] = texture_from(layout.pixels(values), "RG32F")
+            values = np.maximum(clearance.points, -_ENDLESS)[:, None]
+            textures["clearances"] = texture_from(layout.pixels(values), "R32F")
             spans = layout.spans[:, None].copy()
-            spans[:, 0, 3] = 0  # the last point that has a leash
-            owner = np.searchsorted(layout.offsets, clearance.leashed, side="right") - 1
-            spans[owner, 0, 3] = clearance.leashed - layout.offsets[owner]
+            spans[:, 0, 3] = clearance.held
             textures["strand_spans"] = texture_from(strand_rows(spans), "RGBA32F")
-            textures["led_points"] = _empty(layout.size, "RGBA32F")
-            textures["wanted"] = _empty(layout.size, "R32F")
+            textures["led_points"] = _empty(layout.size)
+            blocks = -(-layout.strand_count // LEAD_BLOCK)
+            textures["near_counts"] = _empty(strand_rows_size(blocks, 1))
+            textures["near_strands"] = _empty(strand_rows_size(layout.strand_count + 1, 1))
         if "states" not in textures:
             size = strand_rows_size(layout.strand_count, 1)
-            textures["states"] = _empty(size, "RGBA32F")
+            textures["states"] = _empty(size)
 
-    def _run(self, step: str, frame: _Frame, integers: dict[str, int]) -> None:
+    def _run(self, step: str, taken: dict[str, Any], integers: dict[str, int]) -> None:
         """One step over all points of all strands, as many at once as drivers bear."""
-        solids, kinds, at_once = frame.colliders, {}, _ROUNDS
+        kinds: dict[str, bool] = {}
         if step in _ASKING:
-            kinds = {"rounds": solids.rounds is not None, "fields": solids.fields is not None}
-            at_once = _points_at_once(solids)
+            kinds = {name: name in taken for name in ("rounds", "fields")}
         recipe = lead_out_recipe(step, **kinds)
-        taken = {"solids": frame.solids, "rounds": solids.rounds, "fields": solids.fields}
-        taken |= self._textures | frame.carrying | {"cv_points": frame.cv_points}
         shader, count = program(recipe), self._layout.strand_count
+        invocations = -(-count // _INVOCATION.get(step, 1))
+        known = integers | {"strand_count": count, "lane_count": invocations}
+        at_once = self._points_at_once() if step in _ASKING else _ROUNDS
+        end = int(self._layout.counts.max()) if "first_point" in recipe.integers else 1
         assert self._clearance is not None
-        for first in range(0, int(self._layout.counts.max()), at_once):
-            known = integers | {
-                "strand_count": count,
-                "first_point": first,
-                "point_end": first + at_once,
-            }
+        for first in range(0, end, at_once):
+            known |= {"first_point": first, "point_end": first + at_once}
             shader.bind(
                 textures={name: taken[name] for _, name in recipe.textures},
                 images={name: taken[name] for _, name, *_ in recipe.images},
                 integers={name: known[name] for name in recipe.integers},
                 numbers={name: self._clearance.kept for _, name in recipe.numbers},
             )
-            gpu.compute.dispatch(shader.shader, -(-count // _GROUP[0]), 1, 1)
+            gpu.compute.dispatch(shader.shader, -(-invocations // _GROUP[0]), 1, 1)
             gpu.shader.unbind()
+
+    def _points_at_once(self) -> int:
+        """How many points of a strand one dispatch may lead."""
+        assert self._solids is not None
+        a_point = 1 + (SWEEPS + TRIES + HALVINGS + 4) * (1 + _rounds_of_distance(self._solids))
+        return max(_ROUNDS // (a_point * _INVOCATION["LED"]), 1)
 
 
 @dataclass(frozen=True)
-class _Frame:
-    """Textures and colliders of one frame, see the module."""
+class Seen:
+    """What strands are led out of in one frame.
 
-    cv_points: Any
-    colliders: ColliderTextures
-    solids: Any
-    carrying: dict[str, Any]
+    textures: strand_spans, clearances and the colliders. states: an image. solid_count: colliders.
+    kept: [m]. at_once: whether the pass that moves strands can do the steps HELD and NEAR.
+    """
+
+    textures: dict[str, Any]
+    states: Any
+    solid_count: int
+    kept: float
+    at_once: bool
 
 
-def _points_at_once(solids: ColliderTextures) -> int:
-    """How many points of a strand one dispatch may lead."""
+def _rounds_of_distance(solids: ColliderTextures) -> int:
+    """Rounds of loops that one look at all colliders takes."""
     is_round = solids.own[:, 0, 3] < 0.0
-    a_distance = len(solids.own) + int(solids.own[is_round, 0, 1].sum())
-    a_point = 1 + (SWEEPS + TRIES + HALVINGS + 3) * (1 + a_distance)
-    return max(_ROUNDS // a_point, 1)
+    return len(solids.own) + int(solids.own[is_round, 0, 1].sum())
 
 
-def _empty(size: tuple[int, int], format_name: str) -> Any:
-    texture = gpu_objects.texture(size, format=format_name)
-    texture.clear(format="FLOAT", value=(0.0,) * (1 if format_name == "R32F" else 4))
+def _empty(size: tuple[int, int]) -> Any:
+    texture = gpu_objects.texture(size, format="RGBA32F")
+    texture.clear(format="FLOAT", value=(0.0, 0.0, 0.0, 0.0))
     return texture

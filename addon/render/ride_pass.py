@@ -77,27 +77,30 @@ def _guides_recipe(*, curls: bool) -> ShaderRecipe:
     )
 
 
-def _ride_recipe(*, curls: bool) -> ShaderRecipe:
+def _ride_recipe(
+    *, curls: bool, clearance: bool = False, rounds: bool = False, fields: bool = False
+) -> ShaderRecipe:
+    """The pass that moves strands, which may find who is too near to these kinds of colliders."""
+    flags = {"HAS_CURLS": curls, "HAS_CLEARANCE": clearance}
+    flags |= {"HAS_ROUNDS": rounds, "HAS_FIELDS": fields}
+    names = ["root_motions", "guide_weights", "rest_points", "strand_spans", "guide_turns"]
+    names += ["guide_axes"] * curls + ["clearances", "solids"] * clearance
+    names += ["rounds"] * rounds + ["fields"] * fields
     return ShaderRecipe(
         name="ride",
         compute="ride.comp.glsl",
-        textures=(
-            ("FLOAT_2D", "root_motions"),
-            ("FLOAT_2D", "guide_weights"),
-            ("FLOAT_2D", "rest_points"),
-            ("FLOAT_2D", "strand_spans"),
-            ("FLOAT_2D", "guide_turns"),
-            *[("FLOAT_2D", "guide_axes")] * curls,
-        ),
-        images=(("RGBA32F", "cv_points"),),
-        integers=("segment_count", "strand_count", "mover_count"),
+        textures=tuple(("FLOAT_2D", name) for name in names),
+        images=(("RGBA32F", "cv_points"), *[("RGBA32F", "states")] * clearance),
+        integers=("segment_count", "strand_count", "mover_count", *["solid_count"] * clearance),
+        numbers=(("FLOAT", "kept"),) if clearance else (),
         group_size=(64, 1),
-        defines=(("HAS_CURLS", 1),) if curls else (),
+        defines=tuple((name, 1) for name, is_set in flags.items() if is_set),
     )
 
 
 GUIDES_RECIPE, CURLED_GUIDES_RECIPE = _guides_recipe(curls=False), _guides_recipe(curls=True)
-RIDE_RECIPE, CURLED_RIDE_RECIPE = _ride_recipe(curls=False), _ride_recipe(curls=True)
+#: Rounds of loops that ride.comp.glsl takes for a point, but for colliders.
+_POINT_ROUNDS = 8
 
 
 class RidePass:
@@ -303,21 +306,28 @@ class RidePass:
     ) -> None:
         textures, count = self._textures, self._strands.strand_count
         is_curled = self._riders.gives is not None and turns == "guide_turns"
-        shader = program(CURLED_RIDE_RECIPE if is_curled else RIDE_RECIPE)
-        taken = ["root_motions", "guide_weights", "rest_points", "strand_spans"]
-        taken += ["guide_axes"] * is_curled
-        shader.bind(
-            textures=_named(textures, *taken) | {"guide_turns": textures[turns]},
-            images={"cv_points": self.points.texture},
-            integers={
-                "segment_count": self._segment_count,
-                "strand_count": count,
-                "mover_count": self._mover_count,
-            },
-        )
+        seen = self.leading.begin(colliders, _POINT_ROUNDS)
+        taken = _named(textures, "root_motions", "guide_weights", "rest_points", "strand_spans")
+        taken |= {"guide_turns": textures[turns]}
+        taken |= _named(textures, "guide_axes") if is_curled else {}
+        images, kinds = {"cv_points": self.points.texture}, {}
+        integers = {
+            "segment_count": self._segment_count,
+            "strand_count": count,
+            "mover_count": self._mover_count,
+        }
+        numbers = {}
+        if seen is not None and seen.at_once:
+            kinds = {name: name in seen.textures for name in ("rounds", "fields")}
+            kinds["clearance"] = True
+            taken, images = taken | seen.textures, images | {"states": seen.states}
+            integers, numbers["kept"] = integers | {"solid_count": seen.solid_count}, seen.kept
+        shader = program(_ride_recipe(curls=is_curled, **kinds))
+        shader.bind(textures=taken, images=images, integers=integers, numbers=numbers)
         _dispatch(shader, count, 1)
-        carrying = _named(textures, "rest_points", "root_motions")
-        self.leading.lead(self.points.texture, colliders, carrying, self._mover_count)
+        if seen is not None:
+            carrying = _named(textures, "rest_points", "root_motions")
+            self.leading.lead(self.points.texture, seen, carrying, self._mover_count)
         if self._held is not None:
             self._held.hold(self.points.texture, textures["rest_points"], anchors)
         self.leading.put(self.points.texture, led)

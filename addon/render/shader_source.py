@@ -61,6 +61,8 @@ SHADER_FOLDER = Path(__file__).resolve().parents[2] / "gpu_shaders"
 STRAND_ROWS = 16384
 #: Texels of the dynamics' table of moments: of the substep itself, and of each collider.
 MOMENT_TEXELS, COLLIDER_TEXELS = 1 + -(-MODES // 4), 13
+#: Strands that are counted at once, of which some are led out of colliders.
+LEAD_BLOCK = 128
 #: Round solids, and nodes of distance fields, in one row of their textures.
 ROUNDS_ACROSS, FIELD_ROW = 512, 4096
 #: Regions behind the head that culling looks into, at most; a strand's are bits of one number.
@@ -110,7 +112,9 @@ CONSTANTS: Mapping[str, str] = MappingProxyType(
         "lead_tries": str(lead_out.TRIES),
         "lead_halvings": str(lead_out.HALVINGS),
         "lead_margin": repr(lead_out.MARGIN),
-        "leashed": repr(lead_out.LEASHED),
+        "lead_block": str(LEAD_BLOCK),
+        "lead_deepest": repr(lead_out.DEEPEST),
+        "lead_steepest": repr(lead_out.STEEPEST),
         "skin_of_reach": repr(SKIN / REACH),
         "shortest_segment": repr(ride.SHORTEST),
         "curl_slack": repr(curls.SLACK),

@@ -9,10 +9,12 @@ import numpy as np
 import pytest
 
 from hairloom.addon import pipeline
+from hairloom.addon.dynamics.colliders import PosedCollider, SphereCollider
 from hairloom.addon.groom.roots import root_frames
 from hairloom.addon.groom.settings import GuideSettings
 from hairloom.addon.groom.weights import GuideWeights
 from hairloom.addon.pipeline import Pose, Rig
+from hairloom.addon.refine.lead_out import Clearance, clearance_at
 from hairloom.addon.strands import StrandSet, Surface
 
 pytestmark = pytest.mark.usefixtures("gpu_context")
@@ -270,3 +272,33 @@ def test_curls_are_drawn_out_as_in_numpy() -> None:
     assert np.abs(shown(other, pose, now.astype(np.float32)) - found).max() > 0.02
     ride.carry(None, matrix)
     assert np.abs(ride.read() - pipeline.carried(rig, pose)).max() < TOLERANCE
+
+
+@pytest.mark.parametrize("rounds", [8, 1 << 20])
+def test_strands_that_ride_are_led_out(monkeypatch: pytest.MonkeyPatch, rounds: int) -> None:
+    """In the pass that moves them, or, where its loops would have too many rounds, behind it."""
+    from hairloom.addon.render import ride_pass
+
+    monkeypatch.setattr(ride_pass, "_POINT_ROUNDS", rounds)
+    rig = rig_on(ball(), 700)
+    ride, pose, offsets = pass_of(rig), deformed(rig.head), rig.strands.offsets
+    head = SphereCollider(ABOVE_GROUND, 0.11)
+    posed = (PosedCollider(head, pose.matrix, pose.matrix),)
+    begun = clearance_at(pipeline.carried(rig, pose), offsets, posed, 0.001)
+    held = np.where(np.arange(700) % 5, 0, 4).astype(np.int32)
+    number = np.arange(len(begun.points)) - np.repeat(offsets[:-1], np.diff(offsets))
+    is_held = number <= np.repeat(held, np.diff(offsets))
+    clearance = Clearance(0.001, np.where(is_held, -np.inf, begun.points), held)
+    guides = simulated(rig, pose)
+    motion = replace(pipeline.begin(rig, pose), guides=guides, colliders=posed, clearance=clearance)
+    expected, led = pipeline.strands_and_led(rig, motion)
+    ride.leading.take(clearance)
+    ride.ride(pose.head_positions, pose.matrix, guides, None, posed)
+    found = ride.read_led()
+    assert 200 < len(led.strands) < 650
+    assert len(np.setxor1d(found.strands, led.strands)) <= 2, "rounding decides few"
+    off = np.abs(ride.read() - expected).max(axis=1)
+    assert (np.maximum.reduceat(off, offsets[:-1]) > TOLERANCE).mean() < 0.03
+    assert off[is_held].max() < TOLERANCE
+    shift = pipeline.carried(rig, pose) - pipeline.strands_at(rig, pose, guides)
+    assert np.abs(shift[is_held]).max() > 0.01

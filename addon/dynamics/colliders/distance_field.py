@@ -24,6 +24,7 @@ from ...arrays import Bools, Floats, Ints
 from ...errors import HairloomError
 from ...strands import Surface
 from ...strands.closest_point import search_of
+from ...strands.vectors import dot_rows
 from ..settings import DynamicsSettings
 from .winding import winding_number
 
@@ -61,6 +62,7 @@ class DistanceField:
         self.cell = float(cell)
         self._flat = self.values.ravel()
         self._strides = tuple(stride // 4 for stride in self.values.strides)
+        self._along_x = np.array([[0], [self._strides[0]]], np.int64)
         self._top = np.array(self.values.shape, np.float32)[:, None] - np.float32(1.0)
         self._below_top = self._top - np.float32(1.0e-3)  # so that there is a cell beyond
         # of each node the values of itself and its neighbours along z, y and both: what lies near
@@ -145,44 +147,68 @@ class DistanceField:
 
         Outside of the grid the distance grows by the way to the grid's box.
         """
-        place, outside = self._placed(points)
-        np.minimum(place, self._below_top, out=place)
-        index = self._index(place)
-        place -= np.floor(place)
-        fx, fy, fz = place
-        corner = np.empty((2, 2, 2, len(index)), np.float32)  # along x, y and z
-        for side, step in zip(corner, (0, self._strides[0]), strict=True):
-            side.reshape(4, -1)[:] = self._squares.take(index + step, axis=0).T
-        # along z, then y, then x; what is left over at each turn is a derivative
-        dz = corner[:, :, 1] - corner[:, :, 0]
-        z = corner[:, :, 0] + fz * dz
-        dy = z[:, 1] - z[:, 0]
-        y = z[:, 0] + fy * dy
-        slope_z = dz[:, 0] + fy * (dz[:, 1] - dz[:, 0])
-        gradient = np.empty_like(points)
-        gradient[0] = y[1] - y[0]
-        gradient[1] = dy[0] + fx * (dy[1] - dy[0])
-        gradient[2] = slope_z[0] + fx * (slope_z[1] - slope_z[0])
-        gradient *= np.float32(1.0 / self.cell)
-        return y[0] + fx * gradient[0] * np.float32(self.cell) + outside, gradient
+        held, beyond = self._placed(points)
+        return self._looked_up(held, self._index(held), beyond)
 
-    def outside(self, points: Floats) -> Floats:
-        """How far points (3, n) are outside of the surface itself, (n,) [m]; 0 inside. Slow."""
-        if self.surface is None:
-            return np.maximum(self.distance(points)[0], 0.0)
-        is_inside = np.abs(winding_number(points.T, self.surface)) > 0.5
-        away = search_of(self.surface).closest(points.T).distance
-        return np.where(is_inside, 0.0, away)
+    def nearer(self, points: Floats, reach: float) -> tuple[Ints, Floats, Floats]:
+        """Points (3, n) that may be closer than `reach` [m], with `distance` of these alone."""
+        held, beyond = self._placed(points)
+        index = self._index(held)
+        # what is looked up is within its cell's corners, and grows by sqrt(3) at most
+        kept = (self._least.take(index) < reach * 1.7321).nonzero()[0]
+        held, beyond = (rows.take(kept, axis=1, mode="clip") for rows in (held, beyond))
+        return kept, *self._looked_up(held, index.take(kept), beyond)
+
+    def _looked_up(self, held: Floats, index: Ints, beyond: Floats) -> tuple[Floats, Floats]:
+        """Distance [m] (n,) and gradient (3, n).
+
+        Args:
+            held, beyond: see `_placed`.
+            index: (n,) of the node below each.
+        """
+        fx, fy, fz = held - np.trunc(held)
+        # the corners of cells, by y and z, and then by x
+        corner = self._squares.take(index + self._along_x, axis=0)
+        corner = np.ascontiguousarray(corner.transpose(2, 0, 1)).reshape(2, 2, 2, -1)
+        # along z, then y, then x; what is left over at each turn is a derivative
+        values = np.empty((2, *corner.shape[1:]), np.float32)
+        np.subtract(corner[:, 1], corner[:, 0], out=values[1])
+        np.multiply(values[1], fz, out=values[0])
+        values[0] += corner[:, 0]
+        change = values[:, 1] - values[:, 0]
+        rows = np.empty((3, *change.shape[1:]), np.float32)
+        np.multiply(change, fy, out=rows[::2])
+        rows[::2] += values[:, 0]
+        rows[1] = change[0]
+        change = rows[:, 1] - rows[:, 0]
+        gradient = change * fx
+        gradient += rows[:, 0]  # the distance, and the derivatives along y and z
+        distance = gradient[0].copy()
+        if beyond.any():
+            distance += np.sqrt(dot_rows(beyond, beyond)) * np.float32(self.cell)
+        gradient[0] = change[0]
+        gradient *= np.float32(1.0 / self.cell)
+        return distance, gradient
+
+    def are_outside(self, points: Floats) -> Bools:
+        """Whether points (3, n) are outside of the surface itself, (n,). Slow."""
+        if self.surface is None or not points.size:
+            return self.distance(points)[0] > 0.0
+        return np.abs(winding_number(points.T, self.surface)) <= 0.5
 
     def _placed(self, points: Floats) -> tuple[Floats, Floats]:
-        """Points in cells, held inside the grid, and how far outside of it they were [m]."""
+        """Points (3, n) in cells, held inside the grid, and how far outside of it they were."""
         place = points - self.low[:, None]
         place *= np.float32(1.0 / self.cell)
         held = self._held(place)
         place -= held
-        place *= place
-        outside = np.sqrt(place[0] + place[1] + place[2]) * np.float32(self.cell)
-        return held, outside
+        return np.minimum(held, self._below_top, out=held), place
+
+    @cached_property
+    def _least(self) -> Floats:
+        """The least value at a corner of the cell above each node, flat."""
+        of_squares = self._squares.min(axis=1)
+        return np.minimum(of_squares, np.roll(of_squares, -self._strides[0]))
 
     def _held(self, place: Floats) -> Floats:
         """Places (3, n) in cells, brought inside of the grid; sooner than by np.clip."""

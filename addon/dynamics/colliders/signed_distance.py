@@ -5,25 +5,26 @@ The twin on the GPU is gpu_shaders/lib_signed_distance.glsl.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from ...arrays import Floats
+from ...arrays import Bools, Floats, Ints
 from .distance_field import DistanceField
 from .posed import (
+    Collider,
     Pose,
     PosedCollider,
-    near_points,
     poses_through,
+    to_world,
     transform_points,
     world_distance,
 )
 
 #: How long the gradient of a sampled distance counts at least, see `world_distance`.
 FLATTEST = 0.5
-#: [m] colliders are asked for points that are at least this near, also inside of another.
-_LEAST = np.float32(1.0e-9)
+#: Points that are looked for at once.
+_CHUNK = 16384
 
 
 def signed_distance(
@@ -50,32 +51,80 @@ def poses_now(colliders: Sequence[PosedCollider]) -> list[Pose]:
 
 def distance_to(points: Floats, poses: Sequence[Pose], reach: float) -> tuple[Floats, Floats]:
     """`signed_distance` for whoever asks often."""
-    rows = np.ascontiguousarray(np.asarray(points, np.float32).T)
-    distance = np.full(rows.shape[1], reach, np.float32)
+    distance = np.full(len(points), reach, np.float32)
+    outward = np.zeros((len(points), 3), np.float32)
+    for index, found, normal in _nearer(points, poses, reach):
+        distance[index] = found
+        outward[index] = normal.T
+    return distance, outward
+
+
+def nearer_than(points: Floats, poses: Sequence[Pose], reach: float) -> tuple[Ints, Floats]:
+    """Which points (n, 3) are nearer than `reach` [m], ascending, and their distance [m]."""
+    indices: list[Ints] = [np.zeros(0, np.int64)]
+    distances: list[Floats] = [np.zeros(0, np.float32)]
+    for index, distance, _ in _nearer(points, poses, reach):
+        indices.append(index)
+        distances.append(distance)
+    return np.concatenate(indices), np.concatenate(distances)
+
+
+def distance_of_few(points: Floats, poses: Sequence[Pose]) -> tuple[Floats, Floats]:
+    """`distance_to` at any distance; sooner than that where points are few, or near anyway."""
+    rows = np.ascontiguousarray(points.T, np.float32)
+    distance = np.full(rows.shape[1], np.inf, np.float32)
     outward = np.zeros_like(rows)
-    for pose in poses if rows.size else ():
-        index, local, _ = near_points(pose, rows, np.maximum(distance, _LEAST))
-        found, normal = world_distance(pose, local, FLATTEST)
-        nearer = (found < distance.take(index)).nonzero()[0]
-        index = index.take(nearer)
-        distance[index] = found.take(nearer)
-        outward[:, index] = normal.take(nearer, axis=1)
-    return distance, np.ascontiguousarray(outward.T)
+    for pose in poses:
+        found, normal = world_distance(pose, transform_points(pose.inverse, rows), FLATTEST)
+        if len(poses) == 1:
+            return found, normal.T
+        is_nearer = found < distance
+        np.copyto(distance, found, where=is_nearer)
+        np.copyto(outward, normal, where=is_nearer)
+    return distance, outward.T
 
 
-def outside_by(points: Floats, colliders: Sequence[PosedCollider]) -> Floats:
-    """How far points (n, 3) world are outside of all colliders, (n,) [m]; 0 inside of any. Slow.
+def _nearer(
+    points: Floats, poses: Sequence[Pose], reach: float
+) -> Iterator[tuple[Ints, Floats, Floats]]:
+    """Which points (n, 3) are nearer than `reach` [m], ascending: their indices, distances and
+    normals (3, m). As many at once as stay in the processor's cache."""
+    for first in range(0, len(points) if poses else 0, _CHUNK):
+        rows = np.ascontiguousarray(points[first : first + _CHUNK].T, np.float32)
+        distance, outward = np.full(rows.shape[1], reach, np.float32), np.zeros_like(rows)
+        for pose in poses:
+            local = transform_points(pose.inverse, rows)
+            index, found, normal = _near(pose.collider, local, reach / pose.scale)
+            found, normal = to_world(pose, found, normal, FLATTEST)
+            nearer = (found < distance.take(index)).nonzero()[0]
+            index = index.take(nearer)
+            distance[index] = found.take(nearer)
+            outward[:, index] = normal.take(nearer, axis=1)
+        index = (distance < np.float32(reach)).nonzero()[0]
+        yield index + first, distance.take(index), outward.take(index, axis=1)
+
+
+def _near(collider: Collider, local: Floats, reach: float) -> tuple[Ints, Floats, Floats]:
+    """Points (3, n) of object space that may be nearer than `reach`, their distances and gradients
+    (3, m)."""
+    if isinstance(collider, DistanceField):
+        return collider.nearer(local, reach)
+    index = collider.near(local, reach)
+    return index, *collider.distance(local.take(index, axis=1))
+
+
+def are_outside_meshes(points: Floats, colliders: Sequence[PosedCollider]) -> Bools:
+    """Whether points (n, 3) world are outside of all colliders, (n,). Slow.
 
     Of meshes themselves, where `signed_distance` knows only their grids, whose cells make thicker
-    what is thin. Where a collider is scaled unevenly, no more than it is.
+    what is thin.
     """
     rows = np.ascontiguousarray(np.asarray(points, np.float32).T)
-    least = np.full(rows.shape[1], np.inf, np.float32)
+    result = np.ones(rows.shape[1], bool)
     for pose in poses_now(colliders) if rows.size else ():
         local = transform_points(pose.inverse, rows)
         if isinstance(pose.collider, DistanceField):
-            found = pose.collider.outside(local) * pose.scale
+            result &= pose.collider.are_outside(local)
         else:
-            found = world_distance(pose, local)[0]
-        np.minimum(least, np.maximum(found, 0.0), out=least)
-    return least
+            result &= world_distance(pose, local)[0] > 0.0
+    return result

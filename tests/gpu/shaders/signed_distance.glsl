@@ -8,5 +8,5 @@ void main()
     return;
   }
   vec4 point = texelFetch(points, at, 0);
-  imageStore(result, at, signed_distance(point.xyz, point.w));
+  imageStore(result, at, signed_distance(solid_at(0), point.xyz, point.w));
 }

@@ -10,7 +10,7 @@ import pytest
 
 from hairloom.addon.arrays import Floats
 from hairloom.addon.errors import HairloomError
-from hairloom.addon.groom.roots import RootFrames, bind_roots, follow, root_frames
+from hairloom.addon.groom.roots import RootFrames, bind_roots, follow, root_frames, root_motions
 from hairloom.addon.strands import StrandSet, Surface
 
 
@@ -71,7 +71,8 @@ def test_missing_root_uvs_come_from_the_surface_and_own_ones_stay(egg: Surface) 
 
 
 def followed(strands: StrandSet, rest: RootFrames, now: RootFrames) -> Floats:
-    return follow(strands.points, strands.point_counts, rest, now).reshape(strands.grid.shape)
+    points = follow(strands.points, strands.offsets, root_motions(rest, now))
+    return points.reshape(strands.grid.shape)
 
 
 def test_strands_of_any_point_counts_go_each_with_its_own_root(egg: Surface) -> None:
@@ -80,7 +81,8 @@ def test_strands_of_any_point_counts_go_each_with_its_own_root(egg: Surface) -> 
     whole, counts = followed(even, rest, now), np.random.default_rng(1).integers(2, 9, 1300)
     parts = [points[:count] for points, count in zip(even.grid, counts, strict=True)]
     expected = [points[:count] for points, count in zip(whole, counts, strict=True)]
-    found = follow(np.concatenate(parts), counts, rest, now)
+    offsets = np.concatenate([[0], np.cumsum(counts)])
+    found = follow(np.concatenate(parts), offsets, root_motions(rest, now))
     assert np.array_equal(found, np.concatenate(expected))
 
 

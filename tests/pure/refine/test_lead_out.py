@@ -17,7 +17,7 @@ from hairloom.addon.dynamics.colliders import (
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.groom.weights import GuideWeights
 from hairloom.addon.pipeline import Pose, Rig
-from hairloom.addon.refine.lead_out import SLACK, LedOut, clearance_at, lead_out
+from hairloom.addon.refine.lead_out import SLACK, Carry, LedOut, clearance_at, lead_out
 from hairloom.addon.strands import StrandSet, Surface
 from hairloom.addon.strands.arc_length import steps
 
@@ -29,6 +29,11 @@ def still(collider: Collider, *shift: float) -> tuple[PosedCollider, ...]:
     matrix = np.eye(4)
     matrix[:3, 3] = shift or (0.0, 0.0, 0.0)
     return (PosedCollider(collider, matrix, matrix),)
+
+
+def at(places: np.ndarray) -> Carry:
+    """Roots carry points there."""
+    return lambda index, strands: places[index]
 
 
 def lines(begin: np.ndarray, end: np.ndarray, counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -57,7 +62,7 @@ def test_strands_go_around_a_ball_and_keep_their_segments(across) -> None:
     clearance = clearance_at(points + 10.0, offsets, colliders, KEPT)
     assert (clearance.points[offsets[:-1]] == -np.inf).all()
     now = points.copy()
-    led = lead_out(now, points, offsets, colliders, clearance)
+    led = lead_out(now, at(points), offsets, colliders, clearance)
     depth = np.linalg.norm(points, axis=1) - 0.1
     were_near = np.minimum.reduceat(depth, offsets[:-1]) < KEPT * (1.0 - SLACK)
     np.testing.assert_array_equal(led, np.flatnonzero(were_near))
@@ -76,7 +81,7 @@ def test_what_comes_after_goes_along_in_its_shape() -> None:
     points = points.astype(np.float32)
     now, offsets = points.copy(), np.array([0, 4])
     clearance = clearance_at(points + 1, offsets, still(BALL), KEPT)
-    led = lead_out(now, points, offsets, still(BALL), clearance)
+    led = lead_out(now, at(points), offsets, still(BALL), clearance)
     assert led.tolist() == [0]
     np.testing.assert_allclose(np.diff(now[1:], axis=0), np.diff(points[1:], axis=0), atol=1e-7)
     assert np.linalg.norm(now[1]) >= 0.1 + KEPT * (1.0 - SLACK)
@@ -87,10 +92,10 @@ def test_what_was_inside_may_stay_as_deep_and_no_deeper(across) -> None:
     colliders = still(BALL)
     clearance = clearance_at(points, offsets, colliders, KEPT)
     now = points.copy()
-    assert not len(lead_out(now, points, offsets, colliders, clearance))
+    assert not len(lead_out(now, at(points), offsets, colliders, clearance))
     np.testing.assert_array_equal(now, points)
     moved = still(BALL, 0.02, 0.0, 0.0)
-    led = lead_out(now, points, offsets, moved, clearance)
+    led = lead_out(now, at(points), offsets, moved, clearance)
     assert len(led)
     lack = clearance.points - signed_distance(now, moved, KEPT)[0]
     assert lack.max() <= SLACK * KEPT + 1e-7
@@ -105,7 +110,7 @@ def test_what_was_inside_comes_out_as_it_moves_away() -> None:
     for aside in (0.0015, 0.02):
         now = points + np.array([[0.0, 0.0, 0.0], [aside, 0.0, 0.0], [aside, 0.0, 0.0]])
         now = now.astype(np.float32)
-        lead_out(now, points, offsets, colliders, clearance)
+        lead_out(now, at(points), offsets, colliders, clearance)
         away = np.linalg.norm(now - points, axis=1)[1:]
         distance = np.linalg.norm(now, axis=1)[1:] - 0.1
         wanted = np.minimum(clearance.points[1:] + aside, KEPT)
@@ -128,7 +133,7 @@ def test_a_fold_from_which_no_segment_leads_out() -> None:
     colliders = still(bowl)
     clearance = clearance_at(points + 1.0, offsets, colliders, KEPT)
     now = points.copy()
-    led = lead_out(now, points, offsets, colliders, clearance)
+    led = lead_out(now, at(points), offsets, colliders, clearance)
     assert len(led) > 40
     distance = signed_distance(now, colliders, KEPT)[0]
     assert distance.min() > KEPT * (1.0 - 2.0 * SLACK)
@@ -141,12 +146,12 @@ def test_strands_without_length_and_of_two_points_stay_finite() -> None:
     offsets = np.array([0, 2, 5, 9])
     now = points.copy()
     clearance = clearance_at(points + 1.0, offsets, still(BALL), KEPT)
-    lead_out(now, points, offsets, still(BALL), clearance)
+    lead_out(now, at(points), offsets, still(BALL), clearance)
     assert np.isfinite(now).all()
     np.testing.assert_allclose(steps(now, offsets), steps(points, offsets), atol=1e-7)
     none = np.zeros((0, 3), np.float32)
     clearance = clearance_at(none, np.array([0]), still(BALL), KEPT)
-    assert not len(lead_out(none, none, np.array([0]), still(BALL), clearance))
+    assert not len(lead_out(none, at(none), np.array([0]), still(BALL), clearance))
 
 
 def test_led_strands_are_put_where_they_were(across) -> None:
@@ -215,18 +220,20 @@ def test_hair_beside_a_sheet_that_its_grid_makes_thicker_stays_on_its_side() -> 
     # further to the other side from strand to strand, by up to 6 mm at their tips
     aside = np.linspace(0.0, 0.006, 8)[:, None] * np.linspace(0.0, 1.0, 16)
     ridden = carried - aside.reshape(-1, 1) * np.array([0.0, 1.0, 0.0])
-    heights = carried[:, 1] - half[1]
     carried, ridden = ((points @ turn.T).astype(np.float32) for points in (carried, ridden))
     clearance = clearance_at(carried, offsets, colliders, KEPT)
-    assert len(clearance.leashed) >= 8
-    leashes = clearance.leashes[clearance.leashed]
-    np.testing.assert_allclose(leashes, heights[clearance.leashed], atol=1e-6)
+    assert (clearance.held > 8).all()
     now = ridden.copy()
-    led = lead_out(now, carried, offsets, colliders, clearance)
+    led = lead_out(now, at(carried), offsets, colliders, clearance)
     assert (ridden @ turn)[:, 1].min() < -0.003
     assert (now @ turn)[:, 1].min() > half[1]
-    assert 0 not in led
-    np.testing.assert_allclose(steps(now, offsets), steps(ridden, offsets), atol=1e-7)
+    assert len(led) == 8
+    expected = steps(ridden, offsets)
+    for strand, last in enumerate(clearance.held):
+        held = slice(offsets[strand], offsets[strand] + last + 1)
+        np.testing.assert_allclose(now[held], carried[held], atol=KEPT * SLACK)
+        expected[held] = steps(carried, offsets)[held]
+    np.testing.assert_allclose(steps(now, offsets), expected, atol=1e-7)
 
 
 def test_a_strand_that_nothing_leads_out_is_as_its_root_carries_it() -> None:
@@ -239,5 +246,5 @@ def test_a_strand_that_nothing_leads_out_is_as_its_root_carries_it() -> None:
     clearance = clearance_at(carried, offsets, shell, KEPT)
     longer = carried * np.float32(12.5)  # each point of it is in the shell
     now = longer.copy()
-    assert lead_out(now, carried, offsets, shell, clearance).tolist() == [0]
+    assert lead_out(now, at(carried), offsets, shell, clearance).tolist() == [0]
     np.testing.assert_array_equal(now, carried)

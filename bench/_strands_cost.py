@@ -1,0 +1,182 @@
+"""What it costs that strands turn with their guides, keep their lengths and stay out of the head.
+
+A frame of all strands, in numpy and in compute, as a factor of what strands took that only added
+up the displacements of their guides: the code of the first round, kept here, with the frames of
+roots that both have in common. Frames of the demo's shake, both forms in turns. Times are the
+processor's, of all threads, so that what else runs on the machine counts little; of each frame the
+least of some rounds, and then the mean of all frames. In compute, the texture of the strands is
+read back once, behind all frames.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import gpu
+import numpy as np
+
+from hairloom.addon import pipeline
+from hairloom.addon.arrays import Floats, Ints
+from hairloom.addon.groom.roots import RootFrames, root_frames
+from hairloom.addon.pipeline import Motion, Pose, Rig
+from hairloom.addon.render import gpu_objects
+from hairloom.addon.render.ride_pass import RidePass
+from hairloom.addon.render.shader_program import ShaderRecipe, program
+from hairloom.addon.render.shader_source import SHADER_FOLDER
+from hairloom.addon.render.strand_layout import strand_rows_size
+
+SHADERS = Path(__file__).parent / "shaders"
+ROUNDS, EVERY, CHUNK = 9, 4, 512
+
+
+def cost_figures(rig: Rig, motions: Sequence[Motion]) -> dict[str, float]:
+    """Milliseconds a frame and ratios; all strands have as many points as guides have CVs."""
+    chosen = motions[EVERY - 1 :: EVERY]
+    shape = (rig.strands.strand_count, *rig.guide_grid.shape[1:])
+    assert rig.strands.points.size == np.prod(shape)
+    rest = RootFrames(*map(np.ascontiguousarray, vars(rig.rest_frames).values()))
+    ours, peer = _least(
+        lambda motion: pipeline.strands_and_led(rig, motion),
+        lambda motion: _summed(rig, rest, motion),
+        [[motion] for motion in chosen],
+    )
+    ours_gpu, peer_gpu = _on_gpu(rig, rest, chosen)
+    return {
+        "numpy_ms": ours,
+        "numpy_summed_ms": peer,
+        "numpy_cost_ratio": ours / peer,
+        "compute_ms": ours_gpu,
+        "compute_summed_ms": peer_gpu,
+        "compute_cost_ratio": ours_gpu / peer_gpu,
+    }
+
+
+def _least(
+    one: Callable[[Any], object], other: Callable[[Any], object], parts: Sequence[Sequence[Any]]
+) -> tuple[float, float]:
+    """The processor's milliseconds for a frame of two forms, which do parts of it in turns."""
+    times = np.empty((ROUNDS, len(parts), 2))
+    for of_round in times:
+        for of_part, part in zip(of_round, parts, strict=True):
+            for form, work in enumerate((one, other)):
+                begin = time.process_time()
+                for frame in part:
+                    work(frame)
+                of_part[form] = (time.process_time() - begin) * 1000.0 / len(part)
+    mean = times.min(axis=0).mean(axis=0)
+    return float(mean[0]), float(mean[1])
+
+
+def _summed(rig: Rig, rest: RootFrames, motion: Motion) -> Floats:
+    """All strands (strand_count, cv_count, 3) with the displacements of their guides."""
+    grid = rig.strands.points.reshape(rig.strands.strand_count, -1, 3)
+    moved = _carried(rig, rest, motion.pose, slice(None), grid)
+    by_roots = _carried(rig, rest, motion.pose, rig.guides, rig.guide_grid)
+    width = grid.shape[1] * 3
+    flat = moved.reshape(len(grid), width)
+    change = (motion.guides - by_roots).astype(np.float32).reshape(len(by_roots), width)
+    part = np.empty((min(CHUNK, len(flat)), width), np.float32)
+    for start in range(0, len(flat), CHUNK):
+        chunk = flat[start : start + CHUNK]
+        taken, stop = part[: len(chunk)], start + len(chunk)
+        for guide, weight in zip(
+            rig.weights.guide[start:stop].T, rig.weights.weight[start:stop].T, strict=True
+        ):
+            np.take(change, guide, axis=0, out=taken, mode="clip")
+            taken *= weight[:, None]
+            chunk += taken
+    return moved
+
+
+def _carried(rig: Rig, rest: RootFrames, pose: Pose, chosen: Ints | slice, grid: Floats) -> Floats:
+    """Each strand of a grid carried by its root."""
+    strands, head = rig.strands, rig.head
+    assert head is not None and pose.head_positions is not None
+    assert strands.root_triangle is not None and strands.root_barycentric is not None
+    triangle, barycentric = strands.root_triangle[chosen], strands.root_barycentric[chosen]
+    now = root_frames(pose.head_positions, head.triangles, triangle, barycentric)
+    origin, rotation = rest.origin[chosen], rest.rotation[chosen]
+    turn = (now.rotation - rotation) @ rotation.transpose(0, 2, 1)
+    rounding = origin - origin.astype(np.float32)
+    shift = now.origin - origin - np.einsum("sij,sj->si", turn, rounding)
+    moved = (grid - origin[:, None].astype(np.float32)) @ turn.astype(np.float32).transpose(0, 2, 1)
+    moved += shift.astype(np.float32)[:, None]
+    moved += grid
+    return np.asarray(moved, np.float32)
+
+
+class _SummedPass(RidePass):
+    """RidePass, but that strands only add up displacements."""
+
+    def _run_guides(self, guides_now: Any) -> None:
+        count, cv_count = self._guide_grid.shape[:2]
+        if "guide_motions" not in self._textures:
+            size = strand_rows_size(count, cv_count)
+            self._textures["guide_motions"] = gpu_objects.texture(size, format="RGBA32F")
+        names = ("guide_strands", "root_motions", "guide_points")
+        shader = program(
+            ShaderRecipe(
+                name="bench_summed_guides",
+                compute="summed_guides.comp.glsl",
+                textures=tuple(("FLOAT_2D", name) for name in ("guides_now", *names)),
+                images=(("RGBA32F", "guide_motions"),),
+                integers=("cv_count", "guide_count"),
+                group_size=(8, 8),
+                folders=(SHADERS, SHADER_FOLDER),
+            )
+        )
+        shader.bind(
+            textures={"guides_now": guides_now, **{name: self._textures[name] for name in names}},
+            images={"guide_motions": self._textures["guide_motions"]},
+            integers={"cv_count": cv_count, "guide_count": count},
+        )
+        gpu.compute.dispatch(shader.shader, -(-cv_count // 8), -(-count // 8), 1)
+        gpu.shader.unbind()
+
+    def _run_ride(self, turns: str, *_: Any) -> None:
+        count, cv_count = self._strands.strand_count, self._guide_grid.shape[1]
+        names = ("root_motions", "guide_weights", "rest_points", "guide_motions")
+        shader = program(
+            ShaderRecipe(
+                name="bench_summed_ride",
+                compute="summed_ride.comp.glsl",
+                textures=tuple(("FLOAT_2D", name) for name in names),
+                images=(("RGBA32F", "cv_points"),),
+                integers=("cv_count", "strand_count"),
+                group_size=(64, 1),
+                folders=(SHADERS, SHADER_FOLDER),
+            )
+        )
+        shader.bind(
+            textures={name: self._textures[name] for name in names},
+            images={"cv_points": self.points.texture},
+            integers={"cv_count": cv_count, "strand_count": count},
+        )
+        gpu.compute.dispatch(shader.shader, -(-count // 64), 1, 1)
+        gpu.shader.unbind()
+
+
+def _on_gpu(rig: Rig, rest: RootFrames, motions: Sequence[Motion]) -> tuple[float, float]:
+    """Milliseconds of a frame in compute, of today's form and of the first round's."""
+    ours, peer = (
+        form(rig.strands, rig.head, rig.guides, rig.guide_grid, rig.riders, rig.holds)
+        for form in (RidePass, _SummedPass)
+    )
+    ours.leading.take(motions[0].clearance)
+
+    def shown(form: RidePass, frames: Sequence[Motion]) -> Floats:
+        for motion in frames:
+            pose, colliders = motion.pose, motion.colliders
+            form.ride(pose.head_positions, pose.matrix, motion.guides, None, colliders)
+        return form.read()
+
+    off = shown(peer, motions[-1:]) - _summed(rig, rest, motions[-1]).reshape(-1, 3)
+    assert np.abs(off).max() < 1.0e-5, "both forms of the peer are one"
+    shown(ours, motions[-1:])
+    milliseconds = _least(
+        lambda frames: shown(ours, frames), lambda frames: shown(peer, frames), [[motions]]
+    )
+    return milliseconds[0] / len(motions), milliseconds[1] / len(motions)
