@@ -29,6 +29,7 @@ PICTURES: dict[str, tuple[tuple[str, ...], ...]] = {
         ("engine_sampling", "engine_mesh_shadows", "engine_motion_blur", "engine_film"),
         ("engine_passes",),
     ),
+    "hair_scene": (("hair_scene",),),
     "preview": (("sidebar",),),
     "warnings": (("sidebar",),),
     "meshes": (("sidebar_mesh_cards", "sidebar_fin"), ("sidebar_fin_bake",)),

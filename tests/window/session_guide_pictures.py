@@ -272,6 +272,9 @@ def of_the_engine():
             bpy.utils.unregister_class(each)
     yield from picture("engine", at_the_tab)
     bpy.context.scene.render.engine = "BLENDER_EEVEE"
+    bpy.context.scene.hairloom.use_hair_scene = True
+    yield from picture("hair_scene", at_the_tab)
+    bpy.context.scene.hairloom.use_hair_scene = False
 
 
 def at_the_tab():

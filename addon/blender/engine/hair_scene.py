@@ -166,13 +166,17 @@ def on_render_begin(scene: bpy.types.Scene, *_: object) -> None:
     problem = problem_of(scene)
     if problem:
         print(f"Hairloom: {scene.name}: Blender draws the hair. {problem}")
-    else:
-        hide_hair(scene)
 
 
 @persistent
 def on_frame_begin(scene: bpy.types.Scene, *_: object) -> None:
-    """Cameras may be others from frame to frame."""
+    """Cameras may be others from frame to frame; a file that is saved amid a render shows hair."""
+    _follow_camera(scene)
+    if hair_scene_of(scene) is not None and is_needed(scene) and not problem_of(scene):
+        hide_hair(scene)
+
+
+def _follow_camera(scene: bpy.types.Scene) -> None:
     hair = hair_scene_of(scene)
     if hair is not None and hair.camera != scene.camera:
         hair.camera = scene.camera
@@ -186,7 +190,7 @@ def on_render_end(*_: object) -> None:
 @persistent
 def on_update(scene: bpy.types.Scene, *_: object) -> None:
     """Blender asks all scenes of a compositor for a camera before a render begins."""
-    on_frame_begin(scene)
+    _follow_camera(scene)
 
 
 @persistent
