@@ -125,7 +125,8 @@ def every_panel_draws():
 
 
 def panels_of_the_engine(properties):
-    """They are there while the engine is chosen; Passes stands below a panel of Blender's own."""
+    """They are there while the engine is chosen; Passes stands below a panel of Blender's own.
+    Hairloom Hair is there with Blender's engines."""
     render = bpy.context.scene.render
     before, render.engine = render.engine, "HAIRLOOM"
     for tab in ("RENDER", "VIEW_LAYER"):
@@ -133,6 +134,9 @@ def panels_of_the_engine(properties):
         yield
         driver.screenshot(f"panels-of-the-engine-{tab.lower()}")
     render.engine = before
+    properties.spaces.active.context = "RENDER"
+    yield
+    driver.screenshot("panels-of-blenders-engine")
     properties.spaces.active.context = "DATA"
     yield
 
