@@ -168,6 +168,8 @@ def test_shadow_on_a_mesh_is_as_dark_as_in_cycles(
     assert taken[0].mean() > 0.01
     assert taken[1].mean() == pytest.approx(taken[0].mean(), rel=0.15)
     assert np.corrcoef(*taken)[0, 1] > 0.9
+    # where no shadow falls the floor is Cycles', not ours
+    assert (ours == without).all(axis=2)[floor].mean() > 0.2
 
 
 def test_the_scene_is_as_it_was_after_the_render_and_after_turning_off(

@@ -18,7 +18,7 @@ from bpy.app.handlers import persistent
 
 from ..properties import changed
 from ..viewport.overlay import ENGINE
-from . import hair_nodes_over
+from . import hair_compositor
 
 #: what an object may be hidden from, in the order of its bits in `hidden_rays`
 RAYS = ("camera", "diffuse", "glossy", "transmission", "volume_scatter", "shadow")
@@ -74,7 +74,7 @@ def problem_of(scene: bpy.types.Scene) -> str:
         return "Compositing is off. Turn it on in Post Processing."
     if scene.render.use_sequencer and scene.sequence_editor and scene.sequence_editor.strips:
         return "The sequencer is rendered. Turn it off in Post Processing."
-    if not hair_nodes_over.is_linked(scene, hair):
+    if not hair_compositor.is_linked(scene, hair):
         return (
             "The compositor does not use the hair. Turn Hairloom Hair off and on, with Render "
             "Layers of this scene in the compositor."
@@ -89,7 +89,7 @@ def switched(scene: bpy.types.Scene) -> None:
         _add(scene)
     elif not scene.hairloom.use_hair_scene:
         scene.hairloom.hair_scene = None
-        hair_nodes_over.unlink(scene, hair)
+        hair_compositor.unlink(scene, hair)
         if hair is not None:
             bpy.data.scenes.remove(hair)
 
@@ -103,7 +103,7 @@ def _add(scene: bpy.types.Scene) -> None:
     # what a render's thread hides may not be drawn meanwhile
     scene.render.use_lock_interface = True
     follow(scene, hair)
-    hair_nodes_over.link(scene, hair, drawn_layer(scene).name)
+    hair_compositor.link(scene, hair, drawn_layer(scene).name)
 
 
 def follow(scene: bpy.types.Scene, hair: bpy.types.Scene) -> None:
