@@ -24,13 +24,16 @@ _DARKEST = 1e-4
 _FEW = 16_000
 
 
-def drawn_radius(radius: Floats, settings: StrandSettings) -> Floats:
-    """Half the width that strands are drawn with, (n, cv_count) [m], narrower towards the tip.
+def drawn_radius(radius: Floats, settings: StrandSettings, along: Floats | None = None) -> Floats:
+    """Half the width that strands are drawn with, as the radius [m], narrower towards the tip.
 
     Args:
-        radius: (n, cv_count) [m].
+        radius: (n, cv_count) [m]; any shape if along is given.
+        along: of the same shape, 0 at the root to 1 at the tip; None: CVs are evenly spaced.
     """
-    taper = np.linspace(1.0, settings.tip_width, radius.shape[1], dtype=np.float32)
+    if along is None:
+        along = np.linspace(0.0, 1.0, radius.shape[1])
+    taper = (1.0 + (settings.tip_width - 1.0) * along).astype(np.float32)
     drawn: Floats = radius * (np.float32(settings.fullness) * taper)
     return drawn
 
@@ -118,25 +121,45 @@ def strand_variation(
         color: (n, cv_count, 3) as in Snapshot.
         group: (n,) as in Snapshot.
     """
-    every_cv = None if group is None else np.repeat(group[:, None], cv_count, axis=1)
-    root = own_colors(color, every_cv, shading)
-    root = None if root is None else _whole(root, shading)
-    card = brightest_look(color, shading)
     along = np.linspace(0.0, 1.0, cv_count)[None, :]
-    is_natural = natural_strands(group, shading)
-    tinted = np.where(is_natural[:, None], 0.0, along) if is_natural.any() else along
-    color_noise = strand_noise(seed, _COLOR, np.zeros(1))[:, None]
-    grey_noise = strand_noise(seed, _GREY, np.zeros(1))[:, None]
+    every_cv = None if group is None else group[:, None].repeat(cv_count, axis=1)
+    own = strand_colors(seed[:, None], along, shading, color, every_cv)
+    card = brightest_look(color, shading)
     if shading.model == "marschner":
-        absorbing = None if root is None else color_absorption(root)
-        own = strand_color(strand_absorption(shading, tinted, color_noise, grey_noise, absorbing))
         even = np.full_like(along, 0.5)
         colored, grey = (strand_absorption(card, along, even, even + s) for s in (1.0, -1.0))
         mean = strand_color(colored + (grey - colored) * shading.grey_fraction)
     else:
-        own = strand_base(tinted, color_noise, grey_noise, shading, root)
         mean = card_base(along, card)
     return np.clip(own / np.maximum(mean, _DARKEST), 0.0, _MAX)
+
+
+def strand_colors(
+    seed: Ints,
+    along: Floats,
+    shading: ShadingSettings,
+    color: Floats | None = None,
+    group: Ints | None = None,
+) -> Floats:
+    """The colour of hair at places of strands, (..., 3): of the look or their own, with the tint of
+    the tips, the strand's variation, and grey.
+
+    Args:
+        seed: (...) what the noise of the strand depends on, as in Snapshot.
+        along: (...) 0 at the root to 1 at the tip.
+        color: (..., 3) the strands' own; NaN or None where they have none.
+        group: (...) of the strand.
+    """
+    root = own_colors(color, group, shading)
+    root = None if root is None else _whole(root, shading)
+    is_natural = natural_strands(group, shading)
+    tinted = np.where(is_natural, 0.0, along) if is_natural.any() else along
+    color_noise = strand_noise(seed, _COLOR, np.zeros(1))
+    grey_noise = strand_noise(seed, _GREY, np.zeros(1))
+    if shading.model == "marschner":
+        absorbing = None if root is None else color_absorption(root)
+        return strand_color(strand_absorption(shading, tinted, color_noise, grey_noise, absorbing))
+    return strand_base(tinted, color_noise, grey_noise, shading, root)
 
 
 def _whole(color: Floats, shading: ShadingSettings) -> Floats:

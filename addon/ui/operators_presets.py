@@ -16,6 +16,7 @@ from ..blender.properties.presets import (
     save_own,
 )
 from ..blender.properties.properties import settings_of
+from ..blender.scene.hair_material import has_look_material, put_look_material
 from ..blender.scene.principled import has_principled_hair, look_from_material
 from .preset_chooser import KIND
 from .reports import reporting
@@ -43,6 +44,8 @@ class HAIRLOOM_OT_apply_preset(bpy.types.Operator):
         for hair in chosen_hair(context):
             for settings in preset.all:
                 apply(settings, hair)
+            if has_look_material(hair.data):
+                _put_material(hair)
         return {"FINISHED"}
 
 
@@ -125,9 +128,37 @@ class HAIRLOOM_OT_look_from_material(bpy.types.Operator):
         return {"FINISHED"}
 
 
+class HAIRLOOM_OT_look_to_material(bpy.types.Operator):
+    """Give the hair a Principled Hair material that looks like it, for EEVEE, Cycles and other
+    tools"""
+
+    bl_idname = "hairloom.look_to_material"
+    bl_label = "Look to Material"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return needs_hair(cls, context)
+
+    @reporting
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        for hair in chosen_hair(context):
+            material, notes = _put_material(hair)
+            report(self, "INFO", f"{hair.name} has the material '{material.name}'")
+            for note in notes:
+                report(self, "WARNING", f"{hair.name}: {note}")
+        return {"FINISHED"}
+
+
+def _put_material(hair: bpy.types.Object) -> tuple[bpy.types.Material, tuple[str, ...]]:
+    group = hair.data.hairloom.shading
+    return put_look_material(hair.data, settings_of(group, group.settings))
+
+
 CLASSES = (
     HAIRLOOM_OT_apply_preset,
     HAIRLOOM_OT_save_preset,
     HAIRLOOM_OT_delete_preset,
     HAIRLOOM_OT_look_from_material,
+    HAIRLOOM_OT_look_to_material,
 )

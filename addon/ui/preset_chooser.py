@@ -35,13 +35,17 @@ _ACROSS, _PICTURE_SCALE, _WIDTH, _LETTERS = 3, 5.0, 330, 42
 def draw_preset_row(
     layout: bpy.types.UILayout, hair: bpy.types.Object, section: str = "shading", text: str = ""
 ) -> None:
-    """Draw the two buttons; for looks also Look from Material, if there is a material."""
+    """Draw the two buttons; for looks also those from and to a material."""
     row = layout.row(align=True)
     chooser = row.operator("hairloom.choose_preset", text=text or "Presets", icon="PRESET")
     chooser.section = section
     row.operator("hairloom.save_preset", text="", icon="ADD").section = section
-    if section == "shading" and has_principled_hair(hair):
-        layout.operator("hairloom.look_from_material", icon="MATERIAL")
+    if section != "shading":
+        return
+    materials = layout.row(align=True)
+    if has_principled_hair(hair):
+        materials.operator("hairloom.look_from_material", text="From Material", icon="MATERIAL")
+    materials.operator("hairloom.look_to_material", text="To Material", icon="MATERIAL")
 
 
 class HAIRLOOM_OT_choose_preset(bpy.types.Operator):

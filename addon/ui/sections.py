@@ -125,6 +125,7 @@ def draw_export(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
     layout.operator("hairloom.export_cards", icon="EXPORT")
     layout.menu("HAIRLOOM_MT_export_strands", icon="EXPORT")
     layout.operator("hairloom.check_export", icon="CHECKMARK")
+    layout.operator("hairloom.make_real", icon="OUTLINER_OB_CURVES")
 
 
 #: those below Look that have nothing to show in another model

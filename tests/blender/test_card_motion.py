@@ -15,6 +15,7 @@ import pytest
 from glb_files import Glb, validated
 from glb_player import Player
 from shaken import MadeMotion, shaken_poses
+from tiers import few_in_commits
 
 bpy = pytest.importorskip("bpy", reason="writing cards needs Blender or the bpy module")
 
@@ -228,7 +229,7 @@ def test_a_motion_texture_holds_the_simulated_cards(
     assert worst - 1e-6 <= error["worst"] <= 2.0 * worst if depth == "half" else not error["worst"]
 
 
-@pytest.mark.parametrize("file_format", [FBX, USD])
+@pytest.mark.parametrize("file_format", few_in_commits([USD, FBX]))
 def test_texels_are_in_other_formats_too(
     motion: GuideMotion, tmp_path: Path, file_format: Any
 ) -> None:

@@ -11,6 +11,7 @@ import bpy
 import numpy as np
 import pytest
 from mathutils import Vector
+from tiers import few_in_commits
 
 from hairloom.addon.blender.command_line.command_line import run
 from hairloom.addon.blender.preview import previews
@@ -105,7 +106,7 @@ def monkey(size: float) -> bpy.types.Object:
     return bpy.context.object
 
 
-@pytest.mark.parametrize("name", FUR)
+@pytest.mark.parametrize("name", few_in_commits(FUR))
 def test_fur_grows_on_any_mesh_and_by_its_size(name: str) -> None:
     style, lengths = named_hairstyle(name), []
     assert style.guides is None and not style.masks
@@ -296,6 +297,7 @@ def test_every_style_has_a_picture_and_is_a_small_file() -> None:
             assert guides.stat().st_size < 700_000
 
 
+@pytest.mark.slow
 @pytest.mark.draws
 def test_another_file_of_a_style_makes_its_job_run_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -58,6 +58,7 @@ def plays(hair):
     return swings(session)
 
 
+@pytest.mark.slow
 def test_an_appended_groom_keeps_its_settings_and_moves(library):
     bpy.context.scene.collection.children.link(brought(library, link=False))
     hair = bpy.data.objects["Hair"]
@@ -291,6 +292,7 @@ def held_strands(hair, head):
     return count
 
 
+@pytest.mark.slow
 def test_hair_of_an_override_is_tied_by_the_button_and_stays_tied(override, tmp_path):
     ring, head = a_ring(), override.parent
     bpy.context.scene.collection.objects.link(ring)

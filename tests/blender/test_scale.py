@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from grids import grid_of
 from mathutils import Matrix
+from tiers import few_in_commits
 
 from hairloom.addon.blender.preview import previews
 from hairloom.addon.blender.preview.diagnostics import issues_of
@@ -76,7 +77,7 @@ def told(
 
 
 # powers of two: on a sphere, whose triangles are alike, rounding decides where children come first
-@pytest.mark.parametrize("scale", [2.0**-10, 2.0**10])
+@pytest.mark.parametrize("scale", few_in_commits([2.0**-10, 2.0**10]))
 def test_a_scene_of_another_size_moves_and_warns_the_same(
     sphere: Any, new_hair: Callable[..., Any], evaluated: Callable[[], Any], scale: float
 ) -> None:
@@ -88,7 +89,7 @@ def test_a_scene_of_another_size_moves_and_warns_the_same(
     assert np.abs(other - one).max() < 1e-4  # a thousandth of the hair's length
 
 
-@pytest.mark.parametrize("unit", [0.01, 1000.0])
+@pytest.mark.parametrize("unit", few_in_commits([0.01, 1000.0]))
 def test_the_unit_scale_only_changes_how_numbers_are_shown(
     sphere: Any, new_hair: Callable[..., Any], evaluated: Callable[[], Any], unit: float
 ) -> None:

@@ -145,6 +145,7 @@ def test_sculpting_shows_blenders_own_strands(preview, evaluated):
     assert hair.evaluated_get(evaluated()).display_type == "BOUNDS"
 
 
+@pytest.mark.slow
 def test_a_final_render_does_not_disturb_the_preview(preview):
     _, _, session = preview
     scene = bpy.context.scene

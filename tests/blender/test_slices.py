@@ -85,6 +85,7 @@ def test_an_image_shows_them_and_is_the_same_each_time(new_hair: Any, sphere: An
     assert sum(each.name.startswith(IMAGE) for each in bpy.data.images) == 1
 
 
+@pytest.mark.slow
 def test_render_writes_the_skin_shadow(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     """White where no hair is in the way, dark below it, a map for each light."""
     shadow, picture = tmp_path / "skin.png", tmp_path / "a.png"

@@ -80,6 +80,7 @@ def head(extension: None, sphere: bpy.types.Object) -> Surface:
     return read_surface(sphere, depsgraph, need_uv=True, place="the test's head")
 
 
+@pytest.mark.slow
 @pytest.mark.draws
 @pytest.mark.usefixtures("gpu_context")
 def test_a_picture_is_the_same_at_any_size(head: Surface) -> None:

@@ -150,6 +150,7 @@ def test_the_camera_of_the_sample_sees_all_of_its_hair():
     assert np.ptp(seen[:, 1]) > 0.4, "hair is small in the picture"
 
 
+@pytest.mark.slow
 def test_empty_hair_of_blenders_gets_hair_a_look_and_a_preview(sphere):
     bpy.ops.object.curves_empty_hair_add()
     empty = bpy.context.object

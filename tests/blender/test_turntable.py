@@ -125,6 +125,7 @@ def test_the_groom_stays_whole_in_view_and_does_not_drift(
     assert np.ptp(places, axis=0).max() < 1e-6
 
 
+@pytest.mark.slow
 def test_lights_turn_with_the_camera_or_stay_on_the_groom(table: Turntable) -> None:
     follows = [table.picture(frame) for frame in (0, 1)]
     table.settings = replace(SMALL, lights="groom")
@@ -241,6 +242,7 @@ def test_a_folder_that_is_a_file_is_named(table: Turntable, tmp_path: Path) -> N
     assert table.folder.read_text() == "mine"
 
 
+@pytest.mark.slow
 def test_a_picture_that_another_program_holds_keeps_all_and_the_new_ones(
     table: Turntable, monkeypatch: pytest.MonkeyPatch
 ) -> None:

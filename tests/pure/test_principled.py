@@ -16,6 +16,7 @@ from hairloom.addon.shading.marschner.pigment import (
 from hairloom.addon.shading.marschner.principled import (
     PrincipledHair,
     azimuthal_width,
+    hair_from,
     settings_from,
 )
 from hairloom.addon.shading.settings import ShadingSettings
@@ -136,3 +137,58 @@ def test_colours_outside_the_range_of_hair_are_finite() -> None:
     for color in ((0.0, 0.0, 0.0), (7.0, 1.0, -1.0)):
         settings, _ = settings_from(PrincipledHair(color=color))
         assert np.isfinite(root_absorption(settings)).all()
+
+
+@pytest.mark.parametrize(
+    "hair",
+    [
+        PrincipledHair(color=(0.2, 0.1, 0.05), radial_roughness=0.5),
+        PrincipledHair(parametrization="MELANIN", melanin=0.4, random_color=0.2, roughness=0.15),
+        PrincipledHair(parametrization="ABSORPTION", absorption_coefficient=(0.1, 0.5, 2.0)),
+        PrincipledHair(color=(0.4, 0.2, 0.1), coat=0.4, offset=0.05, ior=1.4, roughness=0.6),
+        PrincipledHair(
+            color=(0.4, 0.2, 0.1), model="HUANG", aspect_ratio=0.8, transmission=0.5, roughness=0.4
+        ),
+    ],
+)
+def test_a_node_that_became_a_look_becomes_the_same_node(hair: PrincipledHair) -> None:
+    found, _ = hair_from(settings_from(hair)[0])
+    names = {"model", "parametrization", "roughness", "ior", "offset", "aspect_ratio"}
+    names |= {"reflection", "transmission", "secondary_reflection"}
+    names |= {"radial_roughness", "coat"} if hair.model == "CHIANG" else set()
+    names |= {
+        "COLOR": {"color"},
+        "MELANIN": {"melanin", "melanin_redness", "random_color"},
+        "ABSORPTION": {"absorption_coefficient"},
+    }[hair.parametrization]
+    for name in names:
+        wanted = getattr(hair, name)
+        if name == "aspect_ratio" and hair.model == "CHIANG":
+            continue
+        value = getattr(found, name)
+        assert value == (wanted if isinstance(wanted, str) else pytest.approx(wanted, rel=2e-3)), (
+            name
+        )
+
+
+def test_the_highlights_of_kajiya_kay_are_as_wide_as_those_of_the_node() -> None:
+    look = ShadingSettings(model="kajiya_kay", primary_exponent=200.0, secondary_exponent=30.0)
+    hair, (note,) = hair_from(look)
+    again, _ = settings_from(hair)
+    angle = np.linspace(0.0, 0.15, 9)
+    for exponent, width in ((200.0, again.width_r), (30.0, again.width_trt)):
+        np.testing.assert_allclose(
+            np.cos(angle) ** exponent, np.exp(-0.5 * (angle / width) ** 2), atol=0.01
+        )
+    assert again.base_color == pytest.approx(look.base_color, rel=1e-3)
+    assert "Kajiya-Kay" in note
+
+
+def test_what_the_node_cannot_do_is_said() -> None:
+    uneven = ShadingSettings(width_tt=math.radians(1.0), width_trt=math.radians(20.0))
+    assert any("one Roughness" in note for note in hair_from(uneven)[1])
+    assert any("offsets" in note for note in hair_from(ShadingSettings(offset_trt=0.1))[1])
+    strong, notes = hair_from(ShadingSettings(strength_r=1.5))
+    assert strong.model == "HUANG" and strong.reflection == 1.0
+    assert any("taken down to 1" in note for note in notes)
+    assert hair_from(ShadingSettings())[1] == ()

@@ -7,8 +7,11 @@ from __future__ import annotations
 
 import bpy
 
+from ...shading.settings import ShadingSettings
 from ..base.attributes import read_attribute, set_attribute
+from ..properties.properties import settings_of
 from ..scene.curves import set_colors
+from ..scene.hair_material import put_look_material
 from . import playback
 from .baked_rig import BakedRig
 from .cache import Cache
@@ -123,6 +126,8 @@ def _fill(
     curves.materials.clear()
     for material in hair.data.materials:
         curves.materials.append(material)
+    if not len(curves.materials):
+        put_look_material(curves, settings_of(hair.data.hairloom.shading, ShadingSettings))
 
 
 def _are_poly(curves: bpy.types.Curves) -> bool:

@@ -30,6 +30,8 @@ _OF_SCENES = (
     "mute_hair_dynamics",
     "apply_preset",
     "look_from_material",
+    "look_to_material",
+    "make_real",
     "fin_add",
     "fin_remove",
     "add_hair_tie",

@@ -14,7 +14,7 @@ from ...shading.settings import ShadingSettings
 
 _NODE = "BSDF_HAIR_PRINCIPLED"
 #: input of the node -> our name for it; inputs that the node's options hide are not read
-_INPUTS = {
+INPUTS = {
     "Color": "color",
     "Melanin": "melanin",
     "Melanin Redness": "melanin_redness",
@@ -119,14 +119,14 @@ def _values(node: bpy.types.Node) -> tuple[dict[str, Any], tuple[str, ...]]:
     values: dict[str, Any] = {"model": node.model, "parametrization": node.parametrization}
     notes = []
     for socket in node.inputs:
-        if socket.name not in _INPUTS or not socket.enabled:
+        if socket.name not in INPUTS or not socket.enabled:
             continue
         value = _constant(socket)
         if value is None:
             value = socket.default_value
             notes.append(f"{socket.name} comes from other nodes: its own value was taken")
         is_color = socket.type in ("RGBA", "VECTOR")
-        values[_INPUTS[socket.name]] = tuple(value)[:3] if is_color else float(value)
+        values[INPUTS[socket.name]] = tuple(value)[:3] if is_color else float(value)
     return values, tuple(notes)
 
 

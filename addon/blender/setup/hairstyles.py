@@ -16,6 +16,7 @@ from ...groom.grow import grow
 from ...groom.settings import GrowSettings
 from ...parameters import ALL_SETTINGS
 from ...refine.lead_out_at_rest import led_out_at_rest
+from ...shading.settings import ShadingSettings
 from ...strands import StrandSet, Surface
 from ...strands.affine import mean_scale
 from ...strands.face import is_face_hair
@@ -27,6 +28,7 @@ from ..properties.properties import settings_of
 from ..scene.bust import bust_object
 from ..scene.bust_data import load_bust
 from ..scene.curves import write_curves
+from ..scene.hair_material import put_look_material
 from ..scene.hair_nodes import add_hair_nodes
 from ..scene.surfaces import read_surface
 from .starting import fit_motion, fitted, fitting_factor
@@ -145,6 +147,7 @@ def add_hairstyle(
         bpy.data.hair_curves.remove(curves)
         raise
     hair.hairloom.children_density = style.masks.get("children", "")
+    put_look_material(hair.data, settings_of(hair.data.hairloom.shading, ShadingSettings))
     return hair
 
 

@@ -10,10 +10,12 @@ import numpy as np
 from ...dynamics.settings import DynamicsSettings
 from ...errors import HairloomError
 from ...groom.settings import GrowSettings
+from ...shading.settings import ShadingSettings
 from ..base.objects import head_of
 from ..properties.presets import apply, named_preset
 from ..properties.properties import settings_of
 from ..scene.curves import read_curves
+from ..scene.hair_material import put_look_material
 from ..scene.principled import has_principled_hair, look_from_material
 from ..scene.source import mute_own_dynamics
 from ..scene.surfaces import read_positions
@@ -101,6 +103,7 @@ def new_groom(
     )
     dress(hair, presets)
     fit_motion(hair, factor)
+    put_look_material(hair.data, settings_of(hair.data.hairloom.shading, ShadingSettings))
     return hair
 
 

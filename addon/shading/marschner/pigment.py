@@ -58,6 +58,12 @@ def absorption_color(absorption: Floats, azimuthal_roughness: float = 0.3) -> Fl
     return np.exp(-np.sqrt(np.maximum(absorption, 0.0)) * _color_fit(azimuthal_roughness))
 
 
+def color_exponent(azimuthal_roughness: float) -> float:
+    """The power of a colour at Blender's usual roughness, 0.3, that is the colour of the same
+    absorption at another one."""
+    return _color_fit(azimuthal_roughness) / COLOR_FACTOR
+
+
 def roughness_widths(roughness: float) -> tuple[float, float, float]:
     """Widths of R, TT, TRT for Blender's roughness in [0, 1], as Fibre has them, [rad].
 

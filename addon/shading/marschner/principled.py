@@ -1,4 +1,4 @@
-"""From Blender's Principled Hair to our settings: a starting point that answers light as it does.
+"""Blender's Principled Hair to our settings and back: each answers light as the other does.
 
 References:
     Blender's manual, "Principled Hair BSDF", and Cycles, which it describes.
@@ -8,12 +8,14 @@ References:
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from ..settings import ShadingSettings
+from .look import root_absorption
 from .pigment import absorption_color, color_absorption, melanin_absorption, roughness_widths
 
 type Color = tuple[float, float, float]
@@ -25,6 +27,8 @@ WHITE: Color = (1.0, 1.0, 1.0)
 _NEAREST_GAUSSIAN = 1.702
 #: Cycles blurs caustics by the width around alone; ours need a little [rad]
 _GLINT_WIDTH = float(np.radians(2.0))
+#: Widths of TT and TRT that differ by more than this factor from one roughness are worth a note.
+_UNEVEN = 1.5
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,6 +59,12 @@ class PrincipledHair:
     transmission: float = 1.0
     secondary_reflection: float = 1.0
 
+    @property
+    def around(self) -> float:
+        """Roughness around the fibre; Huang's model has but one roughness."""
+        roughness = self.radial_roughness if self.model == "CHIANG" else self.roughness
+        return _between(roughness, 0.001, 1.0)
+
 
 def settings_from(
     hair: PrincipledHair, before: ShadingSettings | None = None
@@ -72,6 +82,92 @@ def settings_from(
     return replace(before or ShadingSettings(), **_in_range(values, notes)), tuple(notes)
 
 
+def hair_from(settings: ShadingSettings) -> tuple[PrincipledHair, tuple[str, ...]]:
+    """The node that answers light as a strand of this look does at its root, `settings_from` turned
+    round, and notes on what it has no input for.
+
+    Noise, sparkle and what changes along a strand or between strands are no part of the node, but
+    for the variation of melanin.
+    """
+    notes: list[str] = []
+    is_fibre = settings.model == "marschner"
+    shape = _node_of_fibre(settings, notes) if is_fibre else _node_of_highlights(settings, notes)
+    hair = PrincipledHair(**shape)
+    absorption = root_absorption(settings if is_fibre else replace(settings, pigment="color"))
+    color = tuple(absorption_color(absorption, hair.around).tolist())
+    inputs: dict[str, Any] = {
+        "color": color,
+        "absorption_coefficient": tuple(absorption.tolist()),
+        "melanin": settings.melanin,
+        "melanin_redness": settings.redness,
+        "parametrization": settings.pigment.upper() if is_fibre else "COLOR",
+    }
+    if inputs["parametrization"] == "MELANIN":
+        inputs["random_color"] = settings.color_variation
+    return replace(hair, **inputs), tuple(notes)
+
+
+def _node_of_fibre(settings: ShadingSettings, notes: list[str]) -> dict[str, Any]:
+    """The inputs about the shape of the highlights; one roughness stands for three widths."""
+    inner = 0.5 * (2.0 * settings.width_tt + 0.5 * settings.width_trt)
+    if max(2.0 * settings.width_tt, 0.5 * settings.width_trt) > _UNEVEN * inner:
+        notes.append("Rim Width and Second Width became one Roughness")
+    if settings.offset_r or settings.offset_tt or settings.offset_trt:
+        notes.append("the offsets of single highlights are left out: the node has one Offset")
+    roughness = _roughness_of(inner)
+    outer = _roughness_of(settings.width_r)
+    # glints are blurred around the fibre at least as much as all else
+    around = max(settings.azimuthal_width, settings.glint_width)
+    values: dict[str, Any] = {
+        "roughness": roughness,
+        "radial_roughness": _inverse(azimuthal_width, around),
+        "coat": _between(1.0 - outer / roughness, 0.0, 1.0) if roughness > 0.0 else 0.0,
+        "ior": settings.index_of_refraction,
+        "offset": settings.cuticle_tilt,
+    }
+    strengths = {
+        "reflection": settings.strength_r,
+        "transmission": settings.strength_tt,
+        "secondary_reflection": settings.strength_trt,
+    }
+    if settings.eccentricity == 1.0 and all(value == 1.0 for value in strengths.values()):
+        return values
+    notes.append("the node's model is Huang's, which knows strengths: one Roughness is for all")
+    if max(strengths.values()) > 1.0 or settings.eccentricity > 1.0:
+        notes.append("strengths and Eccentricity above 1 were taken down to 1")
+    within = {name: _between(value, 0.0, 1.0) for name, value in strengths.items()}
+    return values | within | {"model": "HUANG", "aspect_ratio": min(settings.eccentricity, 1.0)}
+
+
+def _node_of_highlights(settings: ShadingSettings, notes: list[str]) -> dict[str, Any]:
+    """The same of Kajiya-Kay's two highlights: cos^n of an angle is a Gaussian of 1 / sqrt(n)."""
+    notes.append("Kajiya-Kay is no model of a fibre: only colour, width and shift were taken over")
+    first, second = (
+        float(1.0 / np.sqrt(exponent))
+        for exponent in (settings.primary_exponent, settings.secondary_exponent)
+    )
+    roughness, outer = _roughness_of(0.5 * second), _roughness_of(first)
+    return {
+        "roughness": roughness,
+        "coat": _between(1.0 - outer / roughness, 0.0, 1.0),
+        "offset": float(np.arctan(settings.primary_shift)),
+    }
+
+
+def _roughness_of(width: float) -> float:
+    """Blender's roughness whose R is so wide [rad]."""
+    return _inverse(lambda roughness: roughness_widths(roughness)[0], width)
+
+
+def _inverse(function: Callable[[float], float], value: float) -> float:
+    """Where in [0, 1] a rising function has this value; an end where it has it nowhere."""
+    low, high = 0.0, 1.0
+    for _ in range(40):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if function(middle) < value else (low, middle)
+    return 0.5 * (low + high)
+
+
 def azimuthal_width(roughness: float) -> float:
     """Standard deviation around the fibre for Blender's radial roughness in [0, 1], [rad].
 
@@ -87,7 +183,7 @@ def azimuthal_width(roughness: float) -> float:
 
 def _pigment(hair: PrincipledHair, notes: list[str]) -> dict[str, Any]:
     """What colours the hair; with pigment and dye at once, both as one absorption."""
-    radial = _around(hair)
+    radial = hair.around
     variation = 0.0
     if hair.parametrization == "MELANIN":
         melanin, redness = (
@@ -130,7 +226,7 @@ def _shape(hair: PrincipledHair, notes: list[str]) -> dict[str, Any]:
         "width_r": width_r if coat == 0.0 else roughness_widths(roughness * (1.0 - coat))[0],
         "width_tt": width_tt,
         "width_trt": width_trt,
-        "azimuthal_width": azimuthal_width(_around(hair)),
+        "azimuthal_width": azimuthal_width(hair.around),
         "glint_width": _GLINT_WIDTH,
         "eccentricity": 1.0,
         "strength_r": 1.0,
@@ -147,12 +243,6 @@ def _shape(hair: PrincipledHair, notes: list[str]) -> dict[str, Any]:
             "strength_trt": hair.secondary_reflection,
         }
     return values
-
-
-def _around(hair: PrincipledHair) -> float:
-    """Roughness around the fibre; Huang's model has but one roughness."""
-    roughness = hair.radial_roughness if hair.model == "CHIANG" else hair.roughness
-    return _between(roughness, 0.001, 1.0)
 
 
 def _in_range(values: dict[str, Any], notes: list[str]) -> dict[str, Any]:

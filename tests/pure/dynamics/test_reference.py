@@ -141,7 +141,7 @@ def test_a_changed_substep(kit, shake):
 
 
 @pytest.mark.parametrize("friction", few_in_commits([0.5, 0.0]))
-@pytest.mark.parametrize("is_combed", [False, True])
+@pytest.mark.parametrize("is_combed", few_in_commits([True, False]))
 def test_with_a_ball_and_a_mesh(kit, shake, friction, is_combed):
     radii = {"radius_root": 0.02, "radius_tip": 0.1} if is_combed else {}
     settings = DynamicsSettings(

@@ -234,7 +234,7 @@ def test_a_guide_does_not_feel_the_others(kit, shake, solver):
         np.testing.assert_array_equal(alone.previous[:, :, 0], together.previous[:, :, guide])
 
 
-@pytest.mark.parametrize("size", [1, 7, 30])
+@pytest.mark.parametrize("size", few_in_commits([7, 1, 30]))
 def test_blocks_change_nothing(kit, shake, size, monkeypatch):
     """With held weight too, as the mean rotation is that of the whole groom."""
     whole = swept(kit, shake, np.arange(30), DynamicsSettings())

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tiers import few_in_commits
 
 from hairloom.addon import pipeline
 from hairloom.addon.arrays import Floats
@@ -100,6 +101,7 @@ def test_long_hair_gets_strands_of_a_few_hairs(across: int) -> None:
     assert rig.strands.strand_count * each == pytest.approx(120_000, rel=0.1)
 
 
+@pytest.mark.slow
 def test_enough_strands_stay_as_combed() -> None:
     full = rig_of(fur(190, 0.2), sheet())
     assert full.child_count == 0 and full.children_line == ""
@@ -129,6 +131,7 @@ def test_brows_and_lashes_get_none_and_keep_their_widths() -> None:
     assert 2.0 * widths[0].max() <= 0.25 * 1.3 * 0.2 * SIDE / 12
 
 
+@pytest.mark.slow
 def test_own_strands_come_first_and_stay() -> None:
     rig, bare = rig_of(fur(32, 0.05), sheet()), rig_of(fur(32, 0.05), sheet(), "none")
     assert rig.child_count > 0
@@ -138,7 +141,7 @@ def test_own_strands_come_first_and_stay() -> None:
     np.testing.assert_array_equal(again.strands.points, rig.strands.points)
 
 
-@pytest.mark.parametrize("factor", [1e-3, 1e3])
+@pytest.mark.parametrize("factor", few_in_commits([1e-3, 1e3]))
 def test_no_unit_of_length_is_assumed(factor: float) -> None:
     one = rig_of(fur(32, 0.05), sheet())
     other = rig_of(fur(32, 0.05, factor), sheet(factor))

@@ -1,0 +1,252 @@
+"""A material for Blender's own engines that answers light as a look does.
+
+One Principled Hair node has the shape of the highlights. What it has no input for, the tint of the
+tips and the differences between strands, are nodes before its colour.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import bpy
+
+from ...shading.drawn_strands import look_color
+from ...shading.marschner.look import GREY_LEFT, root_absorption, tip_absorption
+from ...shading.marschner.pigment import color_exponent
+from ...shading.marschner.principled import PrincipledHair, hair_from
+from ...shading.settings import ShadingSettings
+from ..base.attributes import read_attribute, set_attribute
+from .curves import COLOR_ATTRIBUTE
+from .principled import INPUTS
+
+#: Under which name the material finds the curves' colours: Cycles takes "color" for that of a
+#: volume, and reads black (Blender 5.2).
+MATERIAL_COLOR = "hair_color"
+#: property that marks a material of ours
+_MARK = "hairloom_look"
+_ACROSS, _DOWN = 190.0, 180.0
+
+
+def has_look_material(curves: bpy.types.Curves) -> bool:
+    """Whether hair curves have a material that `put_look_material` would write again."""
+    return _own_material(curves) is not None
+
+
+def put_look_material(
+    curves: bpy.types.Curves, shading: ShadingSettings, *, are_final: bool = False
+) -> tuple[bpy.types.Material, tuple[str, ...]]:
+    """Give hair curves a material of a look; one that it has of an earlier look is written again.
+
+    A material of the artist's own is not changed: ours takes its place in the first slot.
+
+    Args:
+        are_final: whether the curves' own colours hold all that the look does to colours.
+
+    Returns:
+        the material, and notes on what of the look it does not have.
+    """
+    has_colors = shading.color_source == "own" and COLOR_ATTRIBUTE in curves.attributes
+    if has_colors:
+        _copy_colors(curves)
+    slots, material = curves.materials, _own_material(curves)
+    if material is None:
+        material = bpy.data.materials.new(f"{curves.name} Look")
+        material[_MARK] = True
+        if len(slots):
+            slots[0] = material
+        else:
+            slots.append(material)
+    return material, _write(material, shading, has_colors=has_colors, are_final=are_final)
+
+
+def _own_material(curves: bpy.types.Curves) -> bpy.types.Material | None:
+    marked = (each for each in curves.materials if each is not None and _MARK in each)
+    return next((each for each in marked if each.is_editable and each.users == 1), None)
+
+
+def _copy_colors(curves: bpy.types.Curves) -> None:
+    for domain in ("POINT", "CURVE"):
+        colors = read_attribute(curves, COLOR_ATTRIBUTE, domain, 4)
+        if colors is not None:
+            set_attribute(curves, MATERIAL_COLOR, domain, colors)
+
+
+def _write(
+    material: bpy.types.Material, shading: ShadingSettings, *, has_colors: bool, are_final: bool
+) -> tuple[str, ...]:
+    hair, notes = hair_from(shading)
+    nodes = _Nodes(material.node_tree)
+    node = nodes.hair(hair)
+    # what Blender's other engine and its Solid view show
+    material.diffuse_color = (*hair.color, 1.0)
+    material.roughness = hair.roughness
+    if has_colors:
+        node.parametrization = "COLOR"
+        nodes.link(nodes.own_color(hair, shading, are_final=are_final), node.inputs["Color"])
+        is_changed = shading.tip_tint > 0.0 or shading.grey_fraction > 0.0
+        if is_changed and not are_final:
+            notes += (
+                "Tip Tint and Grey Strands are left out where strands have colours of their own",
+            )
+    elif _differs(shading, hair):
+        node.parametrization = "ABSORPTION"
+        nodes.link(nodes.absorption(shading), node.inputs["Absorption Coefficient"])
+    return notes
+
+
+def _differs(shading: ShadingSettings, hair: PrincipledHair) -> bool:
+    """Whether hair differs between strands or along them in ways that the node has no input for."""
+    has_own_variation = shading.color_variation > 0.0 and hair.parametrization != "MELANIN"
+    return has_own_variation or shading.tip_tint > 0.0 or shading.grey_fraction > 0.0
+
+
+@dataclass
+class _Nodes:
+    """Fills an empty node tree, right to left."""
+
+    tree: bpy.types.NodeTree
+    column: int = 0
+
+    def __post_init__(self) -> None:
+        self.tree.nodes.clear()
+
+    def add(self, kind: str, **values: Any) -> bpy.types.Node:
+        node = self.tree.nodes.new(kind)
+        node.location = -_ACROSS * self.column, -_DOWN * (self.column % 2)
+        self.column += 1
+        for name, value in values.items():
+            setattr(node, name, value)
+        return node
+
+    def link(self, giver: bpy.types.NodeSocket, taker: bpy.types.NodeSocket) -> None:
+        self.tree.links.new(giver, taker)
+
+    def put(self, socket: bpy.types.NodeSocket, value: Any) -> None:
+        """A number, a colour, or what another node gives."""
+        if isinstance(value, bpy.types.NodeSocket):
+            self.link(value, socket)
+        else:
+            socket.default_value = value
+
+    def hair(self, hair: PrincipledHair) -> bpy.types.Node:
+        """The node at the output, with these inputs."""
+        output = self.add("ShaderNodeOutputMaterial")
+        node = self.add(
+            "ShaderNodeBsdfHairPrincipled", model=hair.model, parametrization=hair.parametrization
+        )
+        for socket in node.inputs:
+            if socket.name in INPUTS:
+                value = getattr(hair, INPUTS[socket.name])
+                is_color = socket.type == "RGBA"
+                socket.default_value = (*value, 1.0) if is_color else value
+        self.link(node.outputs[0], output.inputs["Surface"])
+        return node
+
+    def own_color(
+        self, hair: PrincipledHair, shading: ShadingSettings, *, are_final: bool
+    ) -> bpy.types.NodeSocket:
+        """The curves' colours for this node. A colour is a power of Euler's number by the root of
+        absorption, so that a factor on absorption is an exponent of colour."""
+        color = self.add("ShaderNodeAttribute", attribute_name=MATERIAL_COLOR).outputs["Color"]
+        exponent: Any = color_exponent(hair.around)
+        if not are_final:
+            color = self._whole(color, tuple(look_color(shading).tolist()))
+            if shading.color_variation > 0.0:
+                root = self._math("POWER", self._variation(shading), 0.5)
+                exponent = self._math("MULTIPLY", root, exponent)
+        if exponent == 1.0:
+            return color
+        gamma = self.add("ShaderNodeGamma")
+        self.put(gamma.inputs["Color"], color)
+        self.put(gamma.inputs["Gamma"], exponent)
+        return gamma.outputs["Color"]
+
+    def absorption(self, shading: ShadingSettings) -> bpy.types.NodeSocket:
+        """`marschner.look.strand_absorption` as nodes."""
+        value: Any = tuple(root_absorption(shading).tolist())
+        if shading.tip_tint > 0.0:
+            tip = tuple(tip_absorption(shading).tolist())
+            value = self._mix(self._tip_fraction(shading), value, tip)
+        if shading.grey_fraction > 0.0:
+            third = (1.0 / 3.0,) * 3
+            mean = self._vector("DOT_PRODUCT", value, third).outputs["Value"]
+            even = self._vector("SCALE", (GREY_LEFT,) * 3, mean).outputs["Vector"]
+            value = self._mix(self._is_grey(shading), value, even)
+        amount = self._variation(shading)
+        return self._vector("SCALE", value, amount).outputs["Vector"]
+
+    def _whole(self, color: bpy.types.NodeSocket, look: tuple[float, ...]) -> bpy.types.NodeSocket:
+        """Curves without a colour have one of -1: they get the look's."""
+        red = self.add("ShaderNodeSeparateColor")
+        self.put(red.inputs["Color"], color)
+        is_own = self._math("GREATER_THAN", red.outputs["Red"], -0.5)
+        mix = self.add("ShaderNodeMix", data_type="RGBA")
+        for name, value in (("Factor", is_own), ("A", (*look, 1.0)), ("B", color)):
+            self.put(_socket(mix, name), value)
+        return _output(mix)
+
+    def _variation(self, shading: ShadingSettings) -> bpy.types.NodeSocket:
+        """1 + v (1 - 2 n): each strand's factor on absorption."""
+        amount = shading.color_variation
+        return self._range(self._strand("Random"), 0.0, 1.0, 1.0 + amount, 1.0 - amount)
+
+    def _is_grey(self, shading: ShadingSettings) -> bpy.types.NodeSocket:
+        other = self.add("ShaderNodeTexWhiteNoise", noise_dimensions="1D")
+        self.put(other.inputs["W"], self._strand("Random"))
+        return self._math("LESS_THAN", other.outputs["Value"], shading.grey_fraction)
+
+    def _tip_fraction(self, shading: ShadingSettings) -> bpy.types.NodeSocket:
+        start, end = shading.tint_start, shading.tint_end
+        intercept = self._strand("Intercept")
+        return self._range(intercept, start, end, 0.0, shading.tip_tint, "SMOOTHSTEP")
+
+    def _strand(self, name: str) -> bpy.types.NodeSocket:
+        return self.add("ShaderNodeHairInfo").outputs[name]
+
+    def _range(
+        self,
+        value: Any,
+        low: float,
+        high: float,
+        to_low: float,
+        to_high: float,
+        how: str = "LINEAR",
+    ) -> bpy.types.NodeSocket:
+        node = self.add("ShaderNodeMapRange", interpolation_type=how)
+        for name, number in (
+            ("Value", value),
+            ("From Min", low),
+            ("From Max", max(high, low + 1e-4)),
+            ("To Min", to_low),
+            ("To Max", to_high),
+        ):
+            self.put(node.inputs[name], number)
+        return node.outputs["Result"]
+
+    def _math(self, operation: str, one: Any, other: Any) -> bpy.types.NodeSocket:
+        node = self.add("ShaderNodeMath", operation=operation)
+        self.put(node.inputs[0], one)
+        self.put(node.inputs[1], other)
+        return node.outputs["Value"]
+
+    def _vector(self, operation: str, one: Any, other: Any) -> bpy.types.Node:
+        node = self.add("ShaderNodeVectorMath", operation=operation)
+        self.put(node.inputs[0], one)
+        self.put(node.inputs["Scale"] if operation == "SCALE" else node.inputs[1], other)
+        return node
+
+    def _mix(self, factor: Any, one: Any, other: Any) -> bpy.types.NodeSocket:
+        node = self.add("ShaderNodeMix", data_type="VECTOR")
+        for name, value in (("Factor", factor), ("A", one), ("B", other)):
+            self.put(_socket(node, name), value)
+        return _output(node)
+
+
+def _socket(mix: bpy.types.Node, name: str) -> bpy.types.NodeSocket:
+    """Of a Mix node, which has one of each name for each type of data."""
+    return next(each for each in mix.inputs if each.name == name and each.enabled)
+
+
+def _output(mix: bpy.types.Node) -> bpy.types.NodeSocket:
+    return next(each for each in mix.outputs if each.enabled)

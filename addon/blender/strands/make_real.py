@@ -1,0 +1,106 @@
+"""All hair that Hairloom draws as Blender's ordinary hair curves, for every other tool."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import bpy
+import numpy as np
+
+from ...cards.drawing_settings import CardDrawingSettings
+from ...groom.children_settings import ChildrenSettings
+from ...groom.width_settings import WidthSettings
+from ...parameters import ALL_SETTINGS, sections_of
+from ...pipeline import strand_seeds
+from ...shading.drawn_strands import drawn_radius, strand_colors
+from ...shading.settings import ShadingSettings, StrandSettings
+from ...strands.arc_length import along
+from ..base.objects import head_of
+from ..base.outcome import Outcome, notes_of
+from ..colliders.rigs import rig_of
+from ..properties.groom_settings import GroomSettings
+from ..properties.presets import apply
+from ..scene.curves import write_curves
+from ..scene.groom_attributes import group_names, store_group_names
+from ..scene.hair_material import put_look_material
+from ..scene.source import read_source
+
+#: what of the scene moves hair, as properties of an object's group
+_POINTERS = ("collider", "collider_collection", "collider_shape", "tie_collection", "tip_surface")
+
+
+def make_real(
+    hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph
+) -> tuple[bpy.types.Object, Outcome]:
+    """New hair curves beside these: every strand that is drawn, as it is combed, with its children,
+    curls, widths and colours, and a material equal to the look.
+
+    Drawn by Hairloom they look the same: they keep its settings, but for what they hold themselves.
+    The hair that they are made from is hidden.
+
+    Raises:
+        HairloomError: no hair that can be used, or one of another scale than its head.
+    """
+    source = read_source(hair, depsgraph)
+    rig, settings = rig_of(hair, source), GroomSettings.of(hair)
+    shading, strands = settings[ShadingSettings], rig.strands
+    place = along(strands.points, strands.offsets)
+    counts = strands.point_counts
+    color = strand_colors(
+        np.repeat(strand_seeds(rig), counts),
+        place,
+        shading,
+        strands.color,
+        np.repeat(strands.group, counts),
+    )
+    drawn = replace(
+        strands,
+        radius=drawn_radius(strands.radius, settings[StrandSettings], place),
+        color=np.clip(color, 0.0, 1.0),
+        has_widths=True,
+    )
+    real = write_curves(f"{hair.name} Real", drawn, head_of(hair), hair.users_collection[0])
+    store_group_names(real.data, group_names(hair))
+    _keep_settings(real, hair, settings)
+    _, notes = put_look_material(real.data, real_look(shading), are_final=True)
+    _hide(hair)
+    result = f"Made {drawn.strand_count:,} strands real: {real.name}. {hair.name} is hidden"
+    warnings = (*source.warnings, *notes_of(hair, rig), *(f"{real.name}: {each}" for each in notes))
+    return real, Outcome(result, dict(source.dropped), warnings)
+
+
+def real_look(shading: ShadingSettings) -> ShadingSettings:
+    """The look of strands whose colours hold what it does to them."""
+    return replace(
+        shading,
+        color_source="own",
+        brow_source="look",
+        color_variation=0.0,
+        grey_fraction=0.0,
+        tip_tint=0.0,
+    )
+
+
+def _keep_settings(real: bpy.types.Object, hair: bpy.types.Object, settings: GroomSettings) -> None:
+    """All settings, but for those whose effect real hair has in itself."""
+    own = settings.with_settings(
+        real_look(settings[ShadingSettings]),
+        replace(settings[StrandSettings], fullness=1.0, tip_width=1.0),
+        replace(settings[ChildrenSettings], method="none"),
+        replace(settings[CardDrawingSettings], shown_as="strands"),
+        WidthSettings(method="own"),
+    )
+    for name in (*sections_of("groom"), *sections_of("character")):
+        apply(own[ALL_SETTINGS[name]], real)
+    for name in _POINTERS:
+        setattr(real.hairloom, name, getattr(hair.hairloom, name))
+
+
+def _hide(hair: bpy.types.Object) -> None:
+    """From the viewport and from renders, whichever of its copies they show."""
+    bake = hair.hairloom.bake
+    if bake.hides:
+        bake.was_hidden = True
+        if bake.copy is not None:
+            bake.copy.hide_render = True
+    hair.hide_render = hair.hide_viewport = True

@@ -1,0 +1,90 @@
+"""Make Real: what other tools get is what Hairloom draws."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+import pytest
+from engine_stage import add_ball, picture
+from strand_files import hedgehog
+
+from hairloom.addon.blender.colliders.rigs import rig_of
+from hairloom.addon.blender.scene.source import read_source
+from hairloom.addon.strands import StrandSet
+
+RED = (0.8, 0.02, 0.03)
+
+
+@pytest.fixture
+def hair(new_hair: Callable[..., Any], sphere: Any) -> Any:
+    """Curves of which some are red, with children, a tint, grey and thin tips."""
+    strands: StrandSet = hedgehog()
+    is_left = np.repeat(strands.roots[:, 0] < 0.0, strands.point_counts)[:, None]
+    made = new_hair(sphere, replace(strands, color=np.where(is_left, RED, np.nan)))
+    groom = made.data.hairloom
+    groom.children.method, groom.children.strand_count = "multi", 300
+    groom.shading.tip_tint, groom.shading.grey_fraction = 0.7, 0.2
+    groom.strands.tip_width, groom.strands.fullness = 0.3, 8.0
+    return made
+
+
+def made_real() -> Any:
+    assert bpy.ops.hairloom.make_real() == {"FINISHED"}
+    return bpy.context.active_object
+
+
+def test_every_strand_is_there_at_its_place(hair: Any) -> None:
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    rig = rig_of(hair, read_source(hair, depsgraph))
+    assert rig.child_count > 100
+    real = made_real()
+    assert real != hair and len(real.data.curves) == rig.strands.strand_count
+    points = np.empty((len(real.data.points), 3), np.float32)
+    real.data.position_data.foreach_get("vector", points.ravel())
+    np.testing.assert_allclose(points, rig.strands.points, atol=1e-6)
+    assert real.parent == hair.parent and real.data.surface == hair.data.surface
+
+
+def test_it_is_drawn_as_the_hair_was(hair: Any, stage: Any, tmp_path: Path) -> None:
+    """By our own engine: the very same picture, but for noise of each strand's own."""
+    hair.data.hairloom.shading.shift_noise = hair.data.hairloom.shading.sparkle = 0.0
+    add_ball(0.1)
+    light = bpy.data.objects.new("Sun", bpy.data.lights.new("Sun", "SUN"))
+    stage.collection.objects.link(light)
+    bpy.context.view_layer.objects.active = hair
+    hair.select_set(True)
+    stage.camera.location.y = -0.6
+    stage.render.resolution_x = stage.render.resolution_y = 256  # all strands are drawn
+    before = picture(tmp_path)
+    real = made_real()
+    assert hair.hide_render and not real.hide_render
+    after = picture(tmp_path)
+    real.hide_render = True
+    without = picture(tmp_path)
+    is_hair = np.abs(before - without).max(axis=-1) > 0.02
+    assert is_hair.mean() > 0.1
+    assert np.abs(after - before)[is_hair].mean() < 0.02  # other strands throw the shadows
+    real.hide_render = False
+    real.data.hairloom.shading.base_color = (1.0, 1.0, 1.0)
+    np.testing.assert_allclose(picture(tmp_path), after, atol=1e-3)  # colours are its own
+
+
+def test_the_hair_stays_and_undo_is_there(hair: Any) -> None:
+    count = len(hair.data.curves)
+    made_real()
+    assert len(hair.data.curves) == count and hair.hide_viewport
+    assert "UNDO" in bpy.types.HAIRLOOM_OT_make_real.bl_options
+
+
+def test_what_cannot_be_read_changes_nothing(new_hair: Callable[..., Any]) -> None:
+    hair = new_hair()
+    hair.data.remove_curves()
+    before = set(bpy.data.objects)
+    with pytest.raises(RuntimeError, match="no "):
+        bpy.ops.hairloom.make_real()
+    assert set(bpy.data.objects) == before and not hair.hide_render
