@@ -59,11 +59,10 @@ pictures: setup ## draw the documentation's pictures again
 styles: setup ## make hairstyles/ from the recipes, with pictures in out/styles; NAME=x for one
 	$(PYTHON) tools/make_styles.py --pictures $(OUT)/styles $(NAME)
 
-zip: setup ## the extension's zip, into dist/
+zip: setup ## the extension's zips, one for each build of Blender, into dist/
 	@$(PYTHON) tools/fetch_wheels.py
 	@rm -rf dist && mkdir dist
-	$(PYTHON) .venv/lib/python*/site-packages/bpy/*/scripts/addons_core/bl_pkg/cli/blender_ext.py \
-	    build --source-dir . --output-dir dist
+	$(PYTHON) tools/make_zips.py dist
 	$(PYTHON) tools/bill_of_materials.py dist/hairloom.cdx.json
 
 lock: ## write requirements.lock again from requirements.in (needs uv)

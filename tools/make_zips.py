@@ -1,0 +1,106 @@
+"""Builds the zips of the extension, one for each build of Blender with the wheels that fit it.
+
+python tools/make_zips.py dist
+
+Blender's own packager makes one zip of everything, and takes wheels apart by platform alone. Its
+official builds have one Python, those of Linux distributions may have a newer one: so there is one
+zip for each of both, and each is small.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import re
+import subprocess
+import sys
+import tempfile
+import zipfile
+from importlib.machinery import SourceFileLoader
+from pathlib import Path
+from typing import Any
+
+REPOSITORY = Path(__file__).resolve().parents[1]
+MANIFEST = "blender_manifest.toml"
+#: Blender's names for systems, and the Pythons that it is built with there; official builds first
+OFFICIAL = (3, 13)
+BUILDS = [
+    ("linux-x64", OFFICIAL),
+    ("windows-x64", OFFICIAL),
+    ("macos-arm64", OFFICIAL),
+    ("linux-x64", (3, 14)),
+]
+
+
+def extension_tool() -> Path:
+    """Blender's packager, as it comes with the module bpy."""
+    (spec,) = importlib.util.find_spec("bpy").submodule_search_locations  # type: ignore[union-attr]
+    return next(Path(spec).glob("*/scripts/addons_core/bl_pkg/cli/blender_ext.py"))
+
+
+def packager() -> Any:
+    """The same as a module, which decides which wheels fit."""
+    loader = SourceFileLoader("blender_ext", str(extension_tool()))
+    module = importlib.util.module_from_spec(importlib.util.spec_from_loader(loader.name, loader))  # type: ignore[arg-type]
+    sys.modules[loader.name] = module
+    loader.exec_module(module)
+    return module
+
+
+def wheels_for(wheels: list[str], system: str, python: tuple[int, int]) -> list[str]:
+    """Those of these file names that a build of Blender can use."""
+    tool = packager()
+
+    def suits(name: str) -> bool:
+        tags = name.removesuffix(".whl").split("-")[-3:]
+        versions = tool.python_versions_from_wheel_python_tag(tags[0])
+        stable = tool.python_versions_from_wheel_abi_tag(tags[1], stable_only=True)
+        return python in versions or (python[0],) in versions | stable
+
+    return [n for n in tool.paths_filter_wheels_by_platform(wheels, system) if suits(n)]
+
+
+def manifest_for(manifest: str, system: str, wheels: list[str]) -> str:
+    """The manifest of a zip for one system, with these wheels."""
+    lines = "".join(f'  "./wheels/{name}",\n' for name in wheels)
+    ours = f'platforms = ["{system}"]\nwheels = [\n{lines}]\n'
+    changed, count = re.subn(r"^wheels = \[\n.*?^\]\n", ours, manifest, flags=re.M | re.S)
+    assert count == 1, "the manifest has one list of wheels"
+    return changed
+
+
+def write_zip(whole: Path, folder: Path, system: str, python: tuple[int, int]) -> Path:
+    """The part of the whole zip that one build of Blender takes."""
+    other = "" if python == OFFICIAL else f"_python{python[0]}{python[1]}"
+    path = folder / f"{whole.stem}-{system.replace('-', '_')}{other}.zip"
+    partial = path.with_suffix(".part")
+    with zipfile.ZipFile(whole) as old, zipfile.ZipFile(partial, "w", zipfile.ZIP_DEFLATED) as new:
+        names = [n.removeprefix("wheels/") for n in old.namelist() if n.endswith(".whl")]
+        kept = wheels_for(names, system, python)
+        for entry in old.infolist():
+            if entry.filename.endswith(".whl") and entry.filename.rpartition("/")[2] not in kept:
+                continue
+            content = old.read(entry)
+            if entry.filename == MANIFEST:
+                content = manifest_for(content.decode(), system, kept).encode()
+            new.writestr(entry, content)
+    os.replace(partial, path)
+    return path
+
+
+def main(folder: Path) -> int:
+    folder.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory() as temporary:
+        command = [sys.executable, extension_tool(), "build", "--source-dir", REPOSITORY]
+        done = subprocess.run([*map(str, command), "--output-dir", temporary])
+        if done.returncode:
+            return done.returncode
+        (whole,) = Path(temporary).glob("*.zip")
+        for system, python in BUILDS:
+            path = write_zip(whole, folder, system, python)
+            print(f"{path.name}  {path.stat().st_size / 1e6:.1f} MB")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(Path(sys.argv[1])))
