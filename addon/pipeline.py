@@ -97,6 +97,19 @@ class Rig:
     children_line: str = ""
     holds: Holds | None = None
 
+    @property
+    def guides_line(self) -> str:
+        """Which curves are simulated and which follow, for an artist."""
+        own, guides = self.strands.strand_count - self.child_count, len(self.guides)
+        points = f"with {self.guide_grid.shape[1]} points each"
+        if guides == own:
+            line = f"All {own:,} curves are simulated, {points}"
+        else:
+            line = f"{guides:,} of {own:,} curves are simulated, {points}; the others follow"
+        if not self.child_count:
+            return line
+        return f"{line}. {self.child_count:,} children follow, too"
+
     @cached_property
     def guide_holds(self) -> Holds | None:
         """The same of the guides alone, numbered as these, along their centre lines."""

@@ -74,14 +74,18 @@ def draw_look(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
 
 
 def draw_strands(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
-    """The widths that the preview has, where they come from, and the rest."""
+    """What is said of the widths and guides of the preview, the settings, and Blender's hair nodes."""
     session = previews.session_of(hair)
     if session is not None and session.is_made:
-        draw_lines(layout.column(align=True), bpy.context, f"{session.rig.widths.line}.")
+        column = layout.column(align=True)
+        draw_lines(column, bpy.context, f"{session.rig.widths.line}.")
+        draw_lines(column, bpy.context, f"{session.rig.guides_line}.")
     draw_section(layout, hair.data.hairloom, "widths")
     draw_section(layout, hair.data.hairloom, "strands")
     layout.label(text=ALL_SETTINGS["ambient"].title)
     draw_section(layout, hair.data.hairloom, "ambient")
+    if bpy.context.object == hair:  # Blender's menu is about the active object
+        layout.menu("OBJECT_MT_modifier_add", text="Add Modifier", icon="MODIFIER")
 
 
 def draw_volume(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:

@@ -46,6 +46,17 @@ def test_none_is_as_without_the_setting() -> None:
         assert none.strands.strand_count == 60 and none.notes == ()
 
 
+def test_an_artist_reads_which_curves_are_simulated() -> None:
+    some = rig_of(None, sheet())
+    assert (
+        some.guides_line == "30 of 60 curves are simulated, with 6 points each; the others follow"
+    )
+    more = rig_of(ChildrenSettings(method="multi", strand_count=2000), sheet())
+    assert more.guides_line == f"{some.guides_line}. 2,000 children follow, too"
+    few = pipeline.prepare(curves(20), sheet(), GUIDES, place="a wig")
+    assert few.guides_line == "All 20 curves are simulated, with 6 points each"
+
+
 @pytest.mark.parametrize("method", ["multi", "single"])
 def test_no_strand_of_the_artist_is_lost(method: str) -> None:
     """All that were there are still there, where they were, and children come on top."""

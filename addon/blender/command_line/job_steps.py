@@ -67,7 +67,7 @@ def read_rig(job: Job) -> tuple[Rig, Inputs]:
             head_field=lambda: solid_of(inputs.head),
         )
     tell_notes([f"{inputs.groom_name}: {note}" for note in rig.notes], report)
-    for line in filter(None, (rig.children_line, rig.widths.line)):
+    for line in filter(None, (rig.children_line, rig.widths.line, rig.guides_line)):
         print(f"{line}.", flush=True)
     tell_rig(report, rig, inputs.groom_name)
     return rig, inputs
