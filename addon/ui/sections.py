@@ -74,7 +74,7 @@ def draw_look(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
 
 
 def draw_strands(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
-    """What is said of the widths and guides of the preview, the settings, and Blender's hair nodes."""
+    """What is said of widths and guides, their settings, and Blender's hair nodes."""
     session = previews.session_of(hair)
     if session is not None and session.is_made:
         column = layout.column(align=True)
