@@ -16,6 +16,7 @@ from .messages import draw_lines
 from .operators_bake import draw_bake
 from .operators_colliders import draw_colliders
 from .operators_measure import draw_measure
+from .operators_settle import draw_settle
 from .operators_show import draw_show
 from .operators_ties import draw_ties
 from .preset_chooser import draw_preset_row
@@ -117,6 +118,7 @@ def draw_children(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
 def draw_dynamics(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
     draw_preset_row(layout, hair, "dynamics")
     draw_section(layout, hair.hairloom, "dynamics")
+    draw_settle(layout)
     draw_measure(layout, hair)
 
 

@@ -36,6 +36,8 @@ _OF_SCENES = (
     "fin_remove",
     "add_hair_tie",
     "remove_hair_tie",
+    "settle",
+    "back_to_combed",
     "fit_spheres",
     "remove_spheres",
     "make_cards",

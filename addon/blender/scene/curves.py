@@ -32,21 +32,40 @@ def read_curves(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Cleane
     Raises:
         HairloomError: the object holds no hair curves.
     """
+    _check_curves(obj)
+    evaluated = obj.evaluated_get(depsgraph)
+    return _read(evaluated.data, np.array(evaluated.matrix_world))
+
+
+def read_own_curves(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Cleaned:
+    """The same before all modifiers, as brushes comb it.
+
+    Raises:
+        HairloomError: the object holds no hair curves.
+    """
+    _check_curves(obj)
+    return _read(obj.data, np.array(obj.evaluated_get(depsgraph).matrix_world))
+
+
+def _check_curves(obj: bpy.types.Object) -> None:
+    """Raises:
+    HairloomError: the object holds no hair curves.
+    """
     if obj.type != "CURVES":
         raise HairloomError(
             f"it is a {obj.type.lower()} object, not hair curves",
             place=obj.name,
             remedy=_REMEDIES.get(obj.type, "Select hair curves (Add > Curve > Empty Hair)"),
         )
-    evaluated = obj.evaluated_get(depsgraph)
-    curves = evaluated.data
-    matrix = np.array(evaluated.matrix_world)
+
+
+def _read(curves: bpy.types.Curves, matrix: Floats) -> Cleaned:
     radius = read_attribute(curves, "radius", "POINT")
     group = next(
         filter(_is_there, (read_attribute(curves, n, "CURVE") for n in GROUP_ATTRIBUTES)), None
     )
     return clean(
-        moved(_positions(curves), matrix),
+        moved(curve_points(curves), matrix),
         curve_offsets(curves),
         radius=None if radius is None else radius * np.float32(mean_scale(matrix)),
         group=group,
@@ -106,7 +125,7 @@ def _attach(obj: bpy.types.Object, surface: bpy.types.Object) -> None:
     obj.matrix_parent_inverse = surface.matrix_world.inverted_safe()
 
 
-def _positions(curves: bpy.types.Curves) -> Floats:
+def curve_points(curves: bpy.types.Curves) -> Floats:
     """(point_count, 3) float32, object space."""
     points = np.empty((len(curves.position_data), 3), np.float32)
     curves.position_data.foreach_get("vector", points.ravel())

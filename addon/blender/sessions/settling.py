@@ -1,0 +1,194 @@
+"""Settle: hair falls onto what it collides with, and that becomes the shape of the curves.
+
+What falls are the curves as brushes comb them, before their modifiers: a modifier that curls them
+does so after they have fallen. The combed shape stays with them, as an attribute of their points.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Generator
+
+import bpy
+import numpy as np
+
+from ... import pipeline, settle_flow
+from ...arrays import Bools, Floats
+from ...dynamics.colliders import PosedCollider
+from ...dynamics.settings import DynamicsSettings
+from ...dynamics.settle_settings import SettleSettings
+from ...errors import HairloomError
+from ...groom.settings import GuideSettings
+from ...pipeline import Rig
+from ...shading.ambient_settings import AmbientSettings
+from ...strands.affine import moved
+from ...strands.clean import Cleaned
+from ..base.attributes import read_attribute, set_attribute
+from ..base.objects import matrix_of
+from ..base.outcome import Outcome
+from ..colliders.fields import solid_of
+from ..colliders.obstacles import Obstacles
+from ..scene.curves import curve_offsets, curve_points, read_own_curves
+from ..scene.wind import gravity_of
+from .groom_source import GroomSource
+from .prepared_groom import PreparedGroom
+
+#: attribute of the points: where they were before the hair settled, object space [m]
+COMBED = "hairloom_combed"
+#: custom properties: of the curves, what settled last; of the object, its Sag Compensation before
+_SETTLED, _SAG = "hairloom_settled", "hairloom_combed_sag"
+
+
+def is_settled(hair: bpy.types.Object) -> bool:
+    """Whether there is a combed shape to go back to."""
+    return COMBED in hair.data.attributes
+
+
+def settle_hair(
+    hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph, settings: SettleSettings
+) -> Generator[float, None, Outcome]:
+    """Let hair fall in the present pose of its body; yields how much is done, 0 to 1.
+
+    Nothing changes before the end.
+
+    Raises:
+        HairloomError: no hair that can be used, it is linked from another file, its roots are away
+            from its surface, or the surface is gone.
+    """
+    if not hair.data.is_editable:
+        raise HairloomError(
+            "it is linked from another file", place=hair.name, remedy="Make it local in Blender"
+        )
+    source = GroomSource(hair, depsgraph)
+    own = read_own_curves(hair, depsgraph)
+    guides = settle_flow.guides_that_fall(own.strands, source.settings[GuideSettings])
+    rig = pipeline.prepare(
+        own.strands, source.source.head, guides, place=hair.name, holders=source.source.holders
+    )
+    _check_roots(hair, rig)
+    dynamics, pose = source.settings[DynamicsSettings], source.pose(rig, depsgraph)
+    posed, warnings = _colliders(hair, source, rig, dynamics, depsgraph)
+    gravity = gravity_of(depsgraph.scene)
+    fallen = yield from settle_flow.settle(rig, pose, posed, dynamics, settings, gravity)
+    head = solid_of(rig.head)
+    settled, is_out = settle_flow.as_curves(own.strands, rig, fallen, head)
+    _store(hair, own, settled.points, depsgraph)
+    warnings += _carry_whole_weight(hair)
+    lost = int((~is_out).sum())
+    if lost:
+        warnings += (
+            f"{hair.name}: {lost:,} curves are still in the surface. Comb them out of it.",
+        )
+    tips = own.strands.offsets[1:] - 1
+    moved_by = np.linalg.norm(settled.points[tips] - own.strands.points[tips], axis=1)
+    result = (
+        f"{hair.name}: {own.strands.strand_count:,} curves have settled, their tips moved by "
+        f"{100.0 * float(np.median(moved_by)):.1f} cm"
+    )
+    return Outcome(result, own.dropped, warnings)
+
+
+def back_to_combed(hair: bpy.types.Object) -> None:
+    """Give curves the shape that they had before they settled; those drawn since stay as they are.
+
+    Raises:
+        HairloomError: there is no such shape.
+    """
+    curves = hair.data
+    combed = read_attribute(curves, COMBED, "POINT", 3)
+    if combed is None:
+        raise HairloomError(
+            "it has not settled, so there is no combed shape to go back to",
+            place=hair.name,
+            remedy="Press Settle first",
+        )
+    points, offsets = curve_points(curves), curve_offsets(curves)
+    is_known = np.repeat(_have_extent(combed, offsets), np.diff(offsets))
+    points[is_known] = combed[is_known]
+    _put(hair, points)
+    curves.attributes.remove(curves.attributes[COMBED])
+    curves.pop(_SETTLED, None)
+    sag = hair.pop(_SAG, None)
+    if sag is not None:
+        hair.hairloom.dynamics.sag_compensation = sag
+
+
+def _have_extent(points: Floats, offsets: np.ndarray) -> Bools:
+    """Curves (curve_count,) whose points are not all the same: Blender gives new ones zeros."""
+    if len(offsets) < 2:
+        return np.zeros(0, bool)
+    low, high = (find.reduceat(points, offsets[:-1], axis=0) for find in (np.minimum, np.maximum))
+    is_extended: Bools = (high > low).any(axis=1)
+    return is_extended
+
+
+def _check_roots(hair: bpy.types.Object, rig: Rig) -> None:
+    """Raises:
+    HairloomError: most roots are away from the surface as it stands now.
+    """
+    loose = PreparedGroom(rig, AmbientSettings()).loose_roots
+    if 2 * loose > rig.strands.strand_count:
+        raise HairloomError(
+            f"{loose:,} of {rig.strands.strand_count:,} roots are away from the surface in its "
+            "present pose",
+            place=hair.name,
+            remedy="Go to the frame in which the hair was combed, or press Snap Roots",
+        )
+
+
+def _colliders(
+    hair: bpy.types.Object,
+    source: GroomSource,
+    rig: Rig,
+    dynamics: DynamicsSettings,
+    depsgraph: bpy.types.Depsgraph,
+) -> tuple[tuple[PosedCollider, ...], tuple[str, ...]]:
+    """What the hair falls onto, and warnings."""
+    roots = PreparedGroom(rig, AmbientSettings()).used
+    obstacles = Obstacles.of(hair, source.head, rig.head, dynamics, depsgraph, None, roots)
+    return obstacles.rest(depsgraph), (*source.warnings, *obstacles.warnings)
+
+
+def _store(
+    hair: bpy.types.Object, own: Cleaned, settled: Floats, depsgraph: bpy.types.Depsgraph
+) -> None:
+    """Write the settled shape (point_count, 3), world space, and keep the combed one; hair that
+    settles a second time without having been combed keeps the first."""
+    curves = hair.data
+    points = curve_points(curves)
+    if curves.get(_SETTLED) != _digest(points) or not is_settled(hair):
+        set_attribute(curves, COMBED, "POINT", points)
+    offsets = curve_offsets(curves)
+    counts = np.diff(offsets)[own.kept]
+    number = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
+    back = np.linalg.inv(matrix_of(hair, depsgraph))
+    points = points.copy()
+    points[np.repeat(offsets[own.kept], counts) + number] = moved(settled, back)
+    _put(hair, points)
+    curves[_SETTLED] = _digest(curve_points(curves))
+
+
+def _put(hair: bpy.types.Object, points: Floats) -> None:
+    curves = hair.data
+    curves.position_data.foreach_set("vector", np.ascontiguousarray(points, np.float32).ravel())
+    curves.update_tag()
+
+
+def _digest(points: Floats) -> str:
+    return hashlib.blake2b(points.tobytes(), digest_size=16).hexdigest()
+
+
+def _carry_whole_weight(hair: bpy.types.Object) -> tuple[str, ...]:
+    """The settled shape hangs under its weight already: it would sag once more where the style does
+    not carry all of it. What is said of that."""
+    dynamics = hair.hairloom.dynamics
+    if dynamics.sag_compensation == 1.0:
+        return ()
+    before = dynamics.sag_compensation
+    if _SAG not in hair:
+        hair[_SAG] = before
+    dynamics.sag_compensation = 1.0
+    return (
+        f"{hair.name}: Sag Compensation was {before:.2g} and is 1 now, as settled hair hangs under "
+        "its weight already",
+    )

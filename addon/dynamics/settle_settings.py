@@ -1,0 +1,48 @@
+"""What the artist sets about letting hair fall."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from ..params import Settings, number
+from .settings import DynamicsSettings
+
+#: Still air slows falling hair at least this much, so that it comes to rest and does not swing.
+_DAMPING = 3.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class SettleSettings(Settings):
+    """How combed hair falls onto head and shoulders."""
+
+    section = "settle"
+    title = "Settle"
+
+    seconds: float = number(
+        2.0,
+        label="Time",
+        description="Time that the hair falls; it ends earlier where nothing moves any more",
+        unit="time",
+        soft=(0.1, 5.0),
+        hard=(0.0, 60.0),
+    )
+    stiffness: float = number(
+        0.4,
+        label="Stiffness",
+        description="Fraction of the hair's own stiffness, as set under Dynamics, that holds the "
+        "combed shape while it falls: 0 lets it hang from its roots",
+        unit="factor",
+        soft=(0.0, 1.0),
+        hard=(0.0, 10.0),
+    )
+
+    def falling(self, own: DynamicsSettings) -> DynamicsSettings:
+        """How this hair falls: by its whole weight, in still air, held by a part of its
+        stiffness."""
+        held = dict.fromkeys(("style_root", "style_tip", "bend"), self.stiffness)
+        return replace(
+            own.multiplied(**held),
+            sag_compensation=0.0,
+            wind_speed=0.0,
+            damping=max(own.damping, _DAMPING),
+        )

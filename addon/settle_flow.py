@@ -1,0 +1,97 @@
+"""The flow of settling: combed hair falls onto what it collides with, and keeps that shape.
+
+Limitations: strands do not push each other, so that hair lies as deep as its guides were combed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from dataclasses import replace
+
+import numpy as np
+
+from . import pipeline
+from .arrays import Bools, Floats
+from .dynamics.colliders import DistanceField, PosedCollider
+from .dynamics.settings import DynamicsSettings
+from .dynamics.settle_settings import SettleSettings
+from .groom.settings import GuideSettings
+from .pipeline import Pose, Rig
+from .refine.lead_out_at_rest import led_out_at_rest
+from .strands import StrandSet
+from .strands.arc_length import along, steps
+from .strands.vectors import unit
+
+#: Curves that are simulated, at most; of more, the others ride on these.
+_MAX_GUIDES = 4096
+#: A frame [s], and how many there are at least before hair counts as at rest.
+_FRAME, _FEWEST = 1.0 / 24.0, 12
+#: Hair is at rest where no CV moves farther in a frame than this part of the hair's length.
+_STILL = 1.0e-4
+#: Points of guides: as many as most curves have, within what a guide may have.
+_MIN_CVS, _MAX_CVS = 8, 64
+
+
+def guides_that_fall(strands: StrandSet, own: GuideSettings) -> GuideSettings:
+    """All curves are simulated, with as many points as most of them have."""
+    typical = int(np.median(strands.point_counts)) if strands.strand_count else own.cv_count
+    cv_count = min(max(typical, own.cv_count, _MIN_CVS), _MAX_CVS)
+    guide_count = min(max(strands.strand_count, 1), _MAX_GUIDES)
+    return GuideSettings(guide_count=guide_count, cv_count=cv_count, tip_distance=own.tip_distance)
+
+
+def settle(
+    rig: Rig,
+    pose: Pose,
+    colliders: tuple[PosedCollider, ...],
+    own: DynamicsSettings,
+    settings: SettleSettings,
+    gravity: Floats,
+) -> Generator[float, None, Floats]:
+    """All strands after they have fallen, (point_count, 3) [m]; yields the fraction of the time.
+
+    Args:
+        pose, colliders: at rest, where they stay.
+        own: the hair's dynamics.
+        gravity: (3,) [m/s^2], world space.
+    """
+    falling = settings.falling(own)
+    still = _STILL * float(np.median(rig.rest_lengths))
+    motion = pipeline.begin(rig, pose)
+    frame_count = round(settings.seconds / _FRAME)
+    for frame in range(frame_count):
+        before = motion.guides
+        motion = pipeline.advance(rig, motion, pose, colliders, falling, gravity, _FRAME)
+        yield (frame + 1) / frame_count
+        if frame >= _FEWEST and np.abs(motion.guides - before).max(initial=0.0) < still:
+            break
+    return pipeline.strands_and_led(rig, motion)[0]
+
+
+def as_curves(
+    curves: StrandSet, rig: Rig, fallen: Floats, head: DistanceField | None
+) -> tuple[StrandSet, Bools]:
+    """The artist's curves in the shape that they have fallen into, each segment as long as it was;
+    and which (strand_count,) are outside of the head.
+
+    Args:
+        curves: as combed, bound to the head if there is one.
+        fallen: (point_count, 3) [m], the rig's strands.
+    """
+    length = steps(curves.points, curves.offsets)
+    place = along(curves.points, curves.offsets)
+    known = along(rig.strands.points, rig.strands.offsets)
+    # a number for each place of all strands, rising, so that one look-up serves them all
+    wanted = place + 2.0 * np.repeat(np.arange(curves.strand_count), curves.point_counts)
+    there = known + 2.0 * np.repeat(np.arange(curves.strand_count), rig.strands.point_counts)
+    points = np.stack([np.interp(wanted, there, fallen[:, axis]) for axis in range(3)], axis=1)
+    first = curves.offsets[:-1]
+    points[first] = curves.points[first]
+    direction = unit(np.diff(points, axis=0, prepend=points[:1]))
+    for number in range(1, int(curves.point_counts.max(initial=1))):
+        at = first[curves.point_counts > number] + number
+        points[at] = points[at - 1] + direction[at] * length[at, None]
+    settled = replace(curves, points=points.astype(np.float32))
+    if head is None:
+        return settled, np.ones(curves.strand_count, bool)
+    return led_out_at_rest(settled, head, float(np.median(curves.lengths())))

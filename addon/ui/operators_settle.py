@@ -1,0 +1,73 @@
+"""Settle and Back to Combed, and their buttons."""
+
+from __future__ import annotations
+
+import bpy
+
+from ..blender.base.outcome import report
+from ..blender.properties.groups import operator_properties
+from ..blender.properties.properties import settings_of
+from ..blender.sessions.settling import back_to_combed, is_settled, settle_hair
+from ..dynamics.settle_settings import SettleSettings
+from .long_work import LongWork, Progress, Steps, as_progress, draw_progress
+from .operators_start import in_object_mode
+from .reports import reporting, tell
+from .selection import chosen_hair, needs_hair
+
+
+class HAIRLOOM_OT_settle(LongWork, bpy.types.Operator):
+    """Let the selected hair fall under gravity onto head and shoulders, and keep that as its shape.
+    Ties and colliders hold it as they do in motion"""
+
+    bl_idname = "hairloom.settle"
+    bl_label = "Settle"
+    bl_options = {"REGISTER", "UNDO"}
+
+    __annotations__ = operator_properties("settle")
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return cls.is_free() and in_object_mode(cls, context) and needs_hair(cls, context)
+
+    def steps(self, context: bpy.types.Context) -> Steps[None]:
+        settings = settings_of(self, SettleSettings)
+        for hair in chosen_hair(context):
+            yield Progress("Reading the hair")
+            depsgraph = context.evaluated_depsgraph_get()
+            tell(self, (yield from as_progress(settle_hair(hair, depsgraph, settings))))
+
+
+class HAIRLOOM_OT_back_to_combed(bpy.types.Operator):
+    """Give the selected hair the shape that it had before it settled"""
+
+    bl_idname = "hairloom.back_to_combed"
+    bl_label = "Back to Combed"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if not (in_object_mode(cls, context) and needs_hair(cls, context)):
+            return False
+        if any(map(is_settled, chosen_hair(context))):
+            return True
+        cls.poll_message_set("The selected hair has not settled: press Settle first")
+        return False
+
+    @reporting
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        for hair in filter(is_settled, chosen_hair(context)):
+            back_to_combed(hair)
+            report(self, "INFO", f"{hair.name} is as it was combed")
+        return {"FINISHED"}
+
+
+def draw_settle(layout: bpy.types.UILayout) -> None:
+    """Draw the buttons, or how far the hair has fallen."""
+    if draw_progress(layout, HAIRLOOM_OT_settle):
+        return
+    row = layout.row(align=True)
+    row.operator("hairloom.settle", icon="SORT_ASC")
+    row.operator("hairloom.back_to_combed", icon="LOOP_BACK")
+
+
+CLASSES = (HAIRLOOM_OT_settle, HAIRLOOM_OT_back_to_combed)

@@ -1,0 +1,232 @@
+"""Settle: combed hair falls onto head and shoulders, keeps that shape, and can go back."""
+
+import bpy
+import numpy as np
+import pytest
+
+from hairloom.addon.blender.command_line import command_line
+from hairloom.addon.blender.preview import previews
+from hairloom.addon.blender.scene.curves import curve_offsets, curve_points
+from hairloom.addon.blender.sessions.settling import COMBED, settle_hair
+from hairloom.addon.dynamics.settle_settings import SettleSettings
+from hairloom.addon.strands import StrandSet
+
+RADIUS = 0.1
+#: how far settled hair moves at most in two seconds of simulation on a head that stands still [m]:
+#: as far as combed hair does, by what gravity does to it in a substep
+AT_REST = 5e-4
+
+
+def lying(count=5, points=12, length=0.3):
+    """Straight curves that stand out sideways, far from the sphere that they hang from."""
+    begin = np.zeros((count, 1, 3))
+    begin[:, 0] = [RADIUS, 0.0, 0.0] + np.arange(count)[:, None] * [0.0, 0.001, 0.0]
+    along = np.linspace(0.0, length, points)[:, None] * [1.0, 0.0, 0.0]
+    return strand_set(list(begin + along))
+
+
+def strand_set(curves):
+    counts = [len(each) for each in curves]
+    return StrandSet(
+        np.concatenate(curves),
+        np.concatenate([[0], np.cumsum(counts)]),
+        np.full(sum(counts), 4e-5),
+        np.zeros(len(curves), np.int32),
+    )
+
+
+def steps(hair):
+    """The length of each segment, and 0 at roots [m]."""
+    length = np.linalg.norm(np.diff(curve_points(hair.data), axis=0), axis=1)
+    length = np.concatenate([[0.0], length])
+    length[curve_offsets(hair.data)[:-1]] = 0.0
+    return length
+
+
+def settle(**values):
+    assert bpy.ops.hairloom.settle(**values) == {"FINISHED"}
+
+
+def test_hair_without_stiffness_hangs_straight_down_from_its_roots(new_hair, sphere):
+    """Its first segment is the root's; the rest is a chain at rest, which is vertical."""
+    hair = new_hair(sphere, lying())
+    settle(stiffness=0.0, seconds=6.0)
+    grid = curve_points(hair.data).reshape(5, 12, 3)
+    segment = 0.3 / 11
+    hanging = grid[:, -1] - grid[:, 1]
+    assert hanging[:, 2] == pytest.approx(-(0.3 - segment), rel=0.01)
+    assert np.abs(hanging[:, :2]).max() < 0.03
+
+
+def test_stiffness_holds_hair_up(new_hair, sphere):
+    tips = []
+    for stiffness in (0.0, 1.0, 6.0):
+        hair = new_hair(sphere, lying())
+        settle(stiffness=stiffness, seconds=4.0)
+        tips.append(curve_points(hair.data)[-1, 2])
+        bpy.data.objects.remove(hair)
+    assert tips[0] < tips[1] - 0.01 < tips[2] - 0.02 < -0.02
+
+
+def test_lengths_are_kept_and_nothing_is_in_the_head(new_hair, sphere):
+    """Of curves with different counts, that fall from all sides onto a sphere of flat faces."""
+    random = np.random.default_rng(2)
+    outward = random.normal(size=(80, 3))
+    outward /= np.linalg.norm(outward, axis=1, keepdims=True)
+    curves = [
+        out * np.linspace(RADIUS, RADIUS + 0.15, number)[:, None]
+        for out, number in zip(outward, random.integers(5, 30, 80), strict=True)
+    ]
+    hair = new_hair(sphere, strand_set(curves))
+    before = steps(hair)
+    settle()
+    assert np.abs(steps(hair) - before).max() < 1e-6
+    inscribed = RADIUS * np.cos(np.pi / 24) * np.cos(np.pi / 24)  # 24 segments, 12 rings
+    away = np.linalg.norm(curve_points(hair.data), axis=1)
+    roots = curve_offsets(hair.data)[:-1]
+    assert np.delete(away, roots).min() > inscribed
+    assert np.linalg.norm(curve_points(hair.data)[roots] - RADIUS * outward, axis=1).max() < 1e-6
+    is_low = outward[:, 2] < -0.5
+    tips = curve_points(hair.data)[curve_offsets(hair.data)[1:] - 1]
+    assert (tips[~is_low, 2] < RADIUS * outward[~is_low, 2]).mean() > 0.9
+
+
+@pytest.mark.parametrize("preset", ["dynamics/natural", "dynamics/soft"])
+def test_settled_hair_is_at_rest_in_motion(new_hair, sphere, evaluated, preset):
+    hair = new_hair(sphere)
+    bpy.ops.hairloom.apply_preset(name=preset)
+    hair.hairloom.dynamics.device = "numpy"
+
+    def moved():
+        session = previews.start(hair, evaluated())
+        session.play(evaluated())
+        before = session.strands.copy()
+        for _ in range(48):
+            session.advance(evaluated(), 1.0 / 24.0)
+        away = np.linalg.norm(session.strands - before, axis=1).max()
+        previews.stop(session)
+        return away
+
+    settle(seconds=3.0)
+    assert moved() < AT_REST
+    hair.hairloom.dynamics.sag_compensation = 0.0
+    assert moved() > 10 * AT_REST  # the test can fail
+
+
+def test_back_to_combed_is_exact_and_settling_again_keeps_the_first(new_hair, sphere):
+    hair = new_hair(sphere)
+    hair.hairloom.dynamics.sag_compensation = 0.5
+    combed = curve_points(hair.data)
+    settle(seconds=0.3)
+    once = curve_points(hair.data)
+    settle(seconds=0.3)
+    assert np.abs(once - combed).max() > 0.005
+    assert np.abs(curve_points(hair.data) - once).max() > 0.001
+    assert hair.hairloom.dynamics.sag_compensation == 1.0
+    assert bpy.ops.hairloom.back_to_combed() == {"FINISHED"}
+    assert (curve_points(hair.data) == combed).all()
+    assert hair.hairloom.dynamics.sag_compensation == 0.5
+    assert COMBED not in hair.data.attributes
+    assert not bpy.ops.hairloom.back_to_combed.poll()
+
+
+def test_hair_that_was_combed_since_goes_back_to_that(new_hair, sphere):
+    hair = new_hair(sphere)
+    settle(seconds=0.3)
+    points = curve_points(hair.data)
+    points[7] += 0.002
+    hair.data.position_data.foreach_set("vector", points.ravel())
+    settle(seconds=0.3)
+    bpy.ops.hairloom.back_to_combed()
+    assert (curve_points(hair.data) == points).all()
+
+
+def test_curves_drawn_since_and_curves_that_cannot_be_used_stay_as_they_are(new_hair, sphere):
+    hair = new_hair(sphere)
+    hair.data.add_curves([1, 5])
+    points = curve_points(hair.data)
+    combed = points.copy()
+    settle(seconds=0.2)
+    now = curve_points(hair.data)
+    assert (now[-6:] == points[-6:]).all()
+    hair.data.add_curves([3])
+    now = curve_points(hair.data)
+    now[-3:] = [[0.2, 0.0, 0.0], [0.3, 0.0, 0.0], [0.4, 0.0, 0.0]]
+    hair.data.position_data.foreach_set("vector", now.ravel())
+    bpy.ops.hairloom.back_to_combed()
+    back = curve_points(hair.data)
+    assert (back[-3:] == now[-3:]).all()
+    assert (back[:-3] == combed).all()
+
+
+def test_until_its_end_nothing_changes(new_hair, sphere, evaluated):
+    hair = new_hair(sphere)
+    combed = curve_points(hair.data)
+    work = settle_hair(hair, evaluated(), SettleSettings())
+    parts = [next(work) for _ in range(5)]
+    assert parts == sorted(parts)
+    work.close()
+    assert (curve_points(hair.data) == combed).all()
+    assert COMBED not in hair.data.attributes
+
+
+def test_modifiers_act_on_what_has_settled(extension):
+    """A modifier that curls does so once: the curves themselves keep their points and lengths."""
+    bpy.ops.hairloom.add_hairstyle(style="curls", plays=False)
+    hair = bpy.context.object
+    before, number = steps(hair), len(curve_points(hair.data))
+    settle(seconds=0.2)
+    assert len(curve_points(hair.data)) == number
+    assert np.abs(steps(hair) - before).max() < 1e-6
+    assert hair.modifiers
+
+
+def test_moved_and_scaled_hair_settles_where_it_is(new_hair, sphere):
+    """Down is the world's, and what is written is in the object's own space."""
+    sphere.location, sphere.rotation_euler = (1.0, 2.0, 3.0), (0.0, 1.2, 0.4)
+    sphere.scale = (2.0, 2.0, 2.0)
+    bpy.context.view_layer.update()
+    hair = new_hair(sphere)
+    hair.matrix_parent_inverse.identity()
+    bpy.context.view_layer.update()
+    before = curve_points(hair.data)
+    settle(seconds=4.0)
+    way = (curve_points(hair.data) - before)[7::8] @ np.array(hair.matrix_world)[:3, :3].T
+    assert way[:, 2].mean() < -0.02
+    assert np.abs(way.mean(axis=0)[:2]).max() < 0.3 * abs(way[:, 2].mean())
+
+
+def test_hair_away_from_its_surface_is_refused(new_hair, sphere):
+    hair = new_hair(sphere)
+    hair.location.x += 0.1
+    bpy.context.view_layer.update()
+    combed = curve_points(hair.data)
+    with pytest.raises(RuntimeError, match="roots are away from the surface"):
+        bpy.ops.hairloom.settle()
+    assert (curve_points(hair.data) == combed).all()
+
+
+def test_the_verb_settles_a_file(new_hair, sphere, tmp_path):
+    hair = new_hair(sphere)
+    combed, name = curve_points(hair.data), hair.name
+    scene, output = tmp_path / "combed.blend", tmp_path / "settled.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(scene))
+    arguments = ["run", "settle", "--scene", str(scene), "--object", name]
+    arguments += ["--set", "seconds=0.5", "--output", str(output)]
+    assert command_line.run(arguments) == 0
+    bpy.ops.wm.open_mainfile(filepath=str(output))
+    settled = curve_points(bpy.data.objects[name].data)
+    assert np.abs(settled - combed).max() > 0.005
+
+
+def test_one_undo_takes_it_back(new_hair, sphere):
+    hair = new_hair(sphere)
+    combed, name = curve_points(hair.data), hair.name
+    bpy.ops.ed.undo_push(message="combed")
+    settle(seconds=0.2)
+    bpy.ops.ed.undo_push(message="settled")  # as Blender does after a click
+    assert (curve_points(bpy.data.objects[name].data) != combed).any()
+    bpy.ops.ed.undo()
+    hair = bpy.data.objects[name]
+    assert (curve_points(hair.data) == combed).all()
+    assert COMBED not in hair.data.attributes
