@@ -27,6 +27,7 @@ from .groom.children_settings import ChildrenSettings
 from .groom.counter_random import named, uniform
 from .groom.guides import choose_guides, grouped
 from .groom.holds import Holds
+from .groom.partings import Partings
 from .groom.roots import RootFrames, bind_roots, follow, root_frames, root_motions
 from .groom.settings import GuideSettings
 from .groom.ties import NO_HOLDERS, Holders, find_holds, idle
@@ -202,6 +203,7 @@ def prepare(
     density: Floats | None = None,
     widths: str = "own",
     holders: Holders = NO_HOLDERS,
+    partings: Floats | None = None,
     head_field: Callable[[], DistanceField | None] = lambda: None,
 ) -> Rig:
     """Bind strands to the head, choose the guides, weigh them for every strand, find all widths,
@@ -215,6 +217,7 @@ def prepare(
         density: (vertex_count,) how densely children grow; None: wherever guides are near.
         widths: one of `groom.widths.METHODS`.
         holders: ties and a surface of tips, at rest.
+        partings: (n, 2, 3) [m] the straight pieces of lines on the head, at rest; None: no line.
         head_field: is called if there are children: what they are led out of; None: of nothing.
 
     Raises:
@@ -232,14 +235,19 @@ def prepare(
     kind = None if holds is None else holds.kinds(own.strand_count)
     guides = choose_guides(lines, settings, kind)
     guide_lines = lines.take(guides)
-    weights = _weights(lines, guide_lines, kind, None if kind is None else kind[guides])
+    parted = None
+    if partings is not None and len(partings) and head is not None:
+        parted = Partings.of(partings, head)
+    guide_kind = None if kind is None else kind[guides]
+    weights = _weights(lines, guide_lines, kind, guide_kind, parted)
     notes = _lost_length(bound, own)
     rig = Rig(own, head, guides, guide_lines.grid, weights, _frames(own, head), notes)
+    ground = _Ground(density, parted, head_field)
     if children is not None and children.method == "auto":
-        rig = _automatic(rig, children, density, widths, head_field, place)
+        rig = _automatic(rig, children, ground, widths, place)
     else:
         if children is not None and children.method != "none":
-            rig = _with_children(rig, children, density, head_field, place)
+            rig = _with_children(rig, children, ground, place)
         strands, found = with_widths(rig.strands, widths)
         rig = replace(rig, strands=strands, widths=found)
     if holds is None:
@@ -248,6 +256,15 @@ def prepare(
         holds = find_holds(rig.strands, holders, reach)
     assert holds is not None
     return replace(rig, holds=holds, notes=(*rig.notes, *idle(holds, holders)))
+
+
+@dataclass(frozen=True)
+class _Ground:
+    """What matters to children of the head that they grow on; the arguments of `prepare`."""
+
+    density: Floats | None
+    partings: Partings | None
+    field: Callable[[], DistanceField | None]
 
 
 def _lost_length(strands: StrandSet, own: StrandSet) -> tuple[str, ...]:
@@ -270,9 +287,8 @@ def _hair_length(strands: StrandSet) -> float:
 def _automatic(
     rig: Rig,
     settings: ChildrenSettings,
-    density: Floats | None,
+    ground: _Ground,
     widths: str,
-    head_field: Callable[[], DistanceField | None],
     place: str,
 ) -> Rig:
     """With as many children as cover the body, each as wide as the strands around it: those stand
@@ -291,7 +307,7 @@ def _automatic(
     own, found = with_widths(rig.strands, widths, parts)
     rig = replace(rig, strands=own, widths=found)
     if parts > 1.0:
-        with_children = _with_children(rig, settings, density, head_field, place)
+        with_children = _with_children(rig, settings, ground, place)
         rig = replace(with_children, widths=found)
         line = (
             f"Children: {rig.child_count:,} added, since {count:,} curves are too few for a body of"
@@ -305,6 +321,7 @@ def _weights(
     guides: StrandSet,
     kind: Ints | None = None,
     guide_kind: Ints | None = None,
+    partings: Partings | None = None,
 ) -> GuideWeights:
     """Strands that are held follow guides that are held by the same."""
     group, guide_group = strands.group, guides.group
@@ -318,14 +335,14 @@ def _weights(
         guide_group,
         strand_grid=strands.grid,
         guide_grid=guides.grid,
+        partings=partings,
     )
 
 
 def _with_children(
     rig: Rig,
     settings: ChildrenSettings,
-    density: Floats | None,
-    head_field: Callable[[], DistanceField | None],
+    ground: _Ground,
     place: str,
 ) -> Rig:
     """The artist's own strands, and children grown between them."""
@@ -338,13 +355,13 @@ def _with_children(
         return replace(rig, notes=(*rig.notes, note))
     parents, cv_count = _parents(own), rig.guide_grid.shape[1]
     shapes, notes = _parent_shapes(own.take(parents), settings.strand_count)
-    made = make_children(shapes, head, settings, density, place=place)
-    made = _outside(made, head_field(), _hair_length(shapes))
+    made = make_children(shapes, head, settings, ground.density, ground.partings, place=place)
+    made = _outside(made, ground.field(), _hair_length(shapes))
     strands = joined(own, with_needed_points(made.strands, cv_count))
     if len(rig.guides) < own.strand_count:
         # shaped by their neighbours among all strands, they move as guides do
         lines = center_lines(own.take(rig.guides), cv_count)
-        weights = _weights(center_lines(made.strands, cv_count), lines)
+        weights = _weights(center_lines(made.strands, cv_count), lines, partings=ground.partings)
     else:
         weights = replace(made.weights, guide=parents[made.weights.guide])
     return Rig(

@@ -67,10 +67,20 @@ def settle(folder: Path) -> None:
     sheet(folder, "settle.jpg", [*pictures, picture(hair)])
 
 
+def parting(folder: Path) -> None:
+    hair = grown(method="normals", length=0.24)
+    bpy.ops.hairloom.add_parting()
+    bpy.ops.hairloom.comb_parting()
+    pictures = [picture(hair)]
+    bpy.ops.hairloom.settle()
+    sheet(folder, "parting.jpg", [*pictures, picture(hair)])
+
+
 def main(folder: Path) -> None:
     gpu.init()
     load_package().register()
     settle(folder)
+    parting(folder)
 
 
 if __name__ == "__main__":

@@ -15,6 +15,7 @@ from ..arrays import Floats, Ints
 from ..params.curve import along
 from ..strands.nearest import nearest_points
 from .children_settings import ChildrenSettings
+from .partings import Partings
 from .weights import by_group, directions, likeness
 
 #: Children of the first level.
@@ -26,12 +27,15 @@ _REACH = 3.0
 _CHUNK = 2048
 
 
-def clump(grid: Floats, group: Ints, settings: ChildrenSettings) -> None:
+def clump(
+    grid: Floats, group: Ints, settings: ChildrenSettings, partings: Partings | None = None
+) -> None:
     """Draw the children of each clump towards its middle, in place; roots stay.
 
     Args:
         grid: (child_count, cv_count, 3) float32 [m], in the order in which they grew.
         group: (child_count,).
+        partings: no clump has strands on both sides of these.
     """
     if not settings.clump or settings.clump_size == 1:
         return
@@ -42,7 +46,9 @@ def clump(grid: Floats, group: Ints, settings: ChildrenSettings) -> None:
         middle_count = max(1, round(last / settings.clump_size))
         member = np.arange(max(first, middle_count), min(last, len(grid)))
         if len(member):
-            middle, strength = _middles(grid, group, member, middle_count, settings.parting)
+            middle, strength = _middles(
+                grid, group, member, middle_count, settings.parting, partings
+            )
             for start in range(0, len(member), _CHUNK):
                 chunk = slice(start, start + _CHUNK)
                 pull = (strength[chunk, None] * fraction).astype(np.float32)[..., None]
@@ -52,7 +58,12 @@ def clump(grid: Floats, group: Ints, settings: ChildrenSettings) -> None:
 
 
 def _middles(
-    grid: Floats, group: Ints, member: Ints, middle_count: int, parting: float
+    grid: Floats,
+    group: Ints,
+    member: Ints,
+    middle_count: int,
+    parting: float,
+    partings: Partings | None,
 ) -> tuple[Ints, Floats]:
     """The middle of each member's clump (n,), and how far it draws the member, 0 to 1."""
     root = grid[:, 0]
@@ -67,6 +78,8 @@ def _middles(
         near = middles[near]
         alike = likeness(member_direction[of_group, None], middle_direction[near], parting)
         alike[gap > reach] = 0.0
+        if partings is not None:
+            alike[partings.crossed(root[member[of_group]], root[near])] = 0.0
         best = (alike > 0.0).argmax(axis=1)[:, None]
         middle[of_group] = np.take_along_axis(near, best, axis=1)[:, 0]
         strength[of_group] = np.take_along_axis(alike, best, axis=1)[:, 0]

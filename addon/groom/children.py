@@ -23,7 +23,8 @@ from .child_roots import ChildRoots, child_roots
 from .child_shape import frizz, mixed, shorten
 from .children_settings import ChildrenSettings
 from .counter_random import named, normal
-from .weights import GUIDES_PER_STRAND, GuideWeights, child_weights
+from .partings import Partings
+from .weights import GUIDES_PER_STRAND, GuideWeights, child_weights, nearest_before
 
 #: Guides are as far apart as this neighbour is, in the middle.
 _NEIGHBOUR = 3
@@ -48,6 +49,7 @@ def make_children(
     surface: Surface,
     settings: ChildrenSettings,
     density: Floats | None = None,
+    partings: Partings | None = None,
     *,
     place: str,
 ) -> Children:
@@ -57,6 +59,7 @@ def make_children(
         guides: of one CV count, bound, at rest in the surface's space.
         density: (vertex_count,), how densely children grow, not negative; None: wherever guides
             are near.
+        partings: lines that the artist has drawn; None: there are none.
         place: names the groom in error messages.
 
     Raises:
@@ -68,10 +71,10 @@ def make_children(
             "it has no guides to grow children from", place=place, remedy="Draw some strands"
         )
     roots = child_roots(guides, surface, settings.strand_count, density, settings.seed)
-    weights = _weights(roots, guides, settings)
+    weights = _weights(roots, guides, settings, partings)
     group = guides.group[weights.guide[:, 0]]
     grid = mixed(roots.point, guides.grid, weights)
-    clump(grid, group, settings)
+    clump(grid, group, settings, partings)
     shorten(grid, roots.key, settings)
     frizz(grid, roots.key, settings, float(np.median(guides.lengths())))
     cv_count = grid.shape[1]
@@ -89,11 +92,21 @@ def make_children(
     return Children(strands, weights, roots.notes + _notes(guides, settings))
 
 
-def _weights(roots: ChildRoots, guides: StrandSet, settings: ChildrenSettings) -> GuideWeights:
+def _weights(
+    roots: ChildRoots, guides: StrandSet, settings: ChildrenSettings, partings: Partings | None
+) -> GuideWeights:
     if settings.method != "single":
         place = _scattered(roots, guides.roots, settings)
-        return child_weights(place, guides.roots, guides.group, guides.grid, settings.parting)
-    nearest, _ = nearest_points(roots.point, guides.roots, 1)
+        return child_weights(
+            place,
+            guides.roots,
+            guides.group,
+            guides.grid,
+            settings.parting,
+            partings,
+            roots.point,
+        )
+    nearest, _, _ = nearest_before(partings, roots.point, guides.roots, 1, roots.point)
     weight = np.zeros((len(nearest), GUIDES_PER_STRAND), np.float32)
     weight[:, 0] = 1.0
     return GuideWeights(np.repeat(nearest, GUIDES_PER_STRAND, axis=1).astype(np.int32), weight)

@@ -18,8 +18,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import Floats, Ints
+from ..arrays import Bools, Floats, Ints
 from ..strands.nearest import nearest_points
+from .partings import Partings
 
 GUIDES_PER_STRAND = 3
 #: Guide spacings that a difference of 60 degrees in direction counts for.
@@ -30,6 +31,8 @@ _DIVERGENT, _ALIKE = 0.0, 0.5
 _SURELY_TOGETHER = 2.0 / 3.0
 #: The nearest guides of a child that are looked at; beyond a parting most of them drop out.
 _CHILD_CANDIDATES = 8
+#: Those that are looked at where a parting is between a strand and all of these.
+_MANY_CANDIDATES = 32
 #: Strands weighed at once, so that their table of distances stays in the cache.
 _CHUNK = 2048
 
@@ -52,6 +55,7 @@ def guide_weights(
     *,
     strand_grid: Floats | None = None,
     guide_grid: Floats | None = None,
+    partings: Partings | None = None,
 ) -> GuideWeights:
     """The three guides of each strand, of its own group only; a guide rides on itself alone.
 
@@ -63,6 +67,7 @@ def guide_weights(
         strand_grid: (strand_count, cv_count, 3) [m], to keep partings; or None, to look at
             the roots only.
         guide_grid: (guide_count, cv_count, 3) [m], with strand_grid.
+        partings: no strand follows a guide across these, but where its group has no other.
 
     Limitations: groups are visited one by one, so tens of thousands of them take long.
     """
@@ -79,15 +84,50 @@ def guide_weights(
         for chunk in np.array_split(strands, -(-len(strands) // _CHUNK)):
             own = np.concatenate([root[chunk], spread * strand_direction[chunk]], axis=1)
             candidates = _nearest(own, features, GUIDES_PER_STRAND + 1)
+            if partings is not None:
+                candidates = _on_one_side(
+                    partings, root[chunk], guide_root[guides], own, features, candidates
+                )
             alike = likeness(strand_direction[chunk, None], guide_direction[guides][candidates])
+            if partings is not None:
+                crossed = partings.crossed(root[chunk], guide_root[guides][candidates])
+                alike[crossed] = 0.0
             gap = np.linalg.norm(own[:, None] - features[candidates], axis=2)
             chosen, weight[chunk] = _weigh(gap.astype(np.float64), alike)
             guide[chunk] = guides[np.take_along_axis(candidates, chosen, axis=1)]
     return GuideWeights(guide, weight)
 
 
+def _on_one_side(
+    partings: Partings,
+    root: Floats,
+    guide_root: Floats,
+    own: Floats,
+    features: Floats,
+    candidates: Ints,
+) -> Ints:
+    """The candidates (n, k), where a parting is before one of them those of the nearest that none
+    is before, nearest first."""
+    crossed = partings.crossed(root, guide_root[candidates]).any(axis=1)
+    found = candidates.copy()
+    behind = np.flatnonzero(crossed)
+    if not len(behind):
+        return found
+    more = _nearest(own[behind], features, _MANY_CANDIDATES)
+    is_behind = partings.crossed(root[behind], guide_root[more])
+    order = np.argsort(is_behind, axis=1, kind="stable")[:, : candidates.shape[1]]
+    found[behind] = np.take_along_axis(more, order, axis=1)
+    return found
+
+
 def child_weights(
-    root: Floats, guide_root: Floats, guide_group: Ints, guide_grid: Floats, parting: float
+    root: Floats,
+    guide_root: Floats,
+    guide_group: Ints,
+    guide_grid: Floats,
+    parting: float,
+    partings: Partings | None = None,
+    grown: Floats | None = None,
 ) -> GuideWeights:
     """The three guides that a child at each root mixes: all of one group, all on one side.
 
@@ -99,27 +139,64 @@ def child_weights(
         guide_group: (guide_count,).
         guide_grid: (guide_count, cv_count, 3) [m].
         parting: guides that go apart by more than this are not mixed [rad].
+        partings: no child takes a guide from behind these, but where its group has no other, and
+            none mixes guides with one between them.
+        grown: (child_count, 3) [m], where they grow, if `root` is where they take shapes from; this
+            decides about partings.
     """
+    grown = root if grown is None else grown
     guide = np.zeros((len(root), GUIDES_PER_STRAND), np.int32)
     weight = np.zeros((len(root), GUIDES_PER_STRAND), np.float32)
     guide_direction = directions(guide_grid, guide_root)
-    for children, guides in by_group(_nearest_group(root, guide_root, guide_group), guide_group):
-        near, gap = nearest_points(root[children], guide_root[guides], _CHILD_CANDIDATES)
+    of_child = _nearest_group(root, guide_root, guide_group, partings, grown)
+    for children, guides in by_group(of_child, guide_group):
+        near, gap, crossed = nearest_before(
+            partings, root[children], guide_root[guides], _CHILD_CANDIDATES, grown[children]
+        )
         near = guides[near]
         alike = likeness(guide_direction[near[:, :1]], guide_direction[near], parting)
+        if crossed is not None:
+            alike[crossed] = 0.0
         mixable, away, alike = _usable_first(near, gap, alike)
         alike = _agreeing(guide_direction[mixable], alike, parting)
+        if partings is not None:
+            alike = _unparted(partings, guide_root[mixable], alike)
         chosen, weight[children] = _weigh(away, alike)
         guide[children] = np.take_along_axis(mixable, chosen, axis=1)
     return GuideWeights(guide, weight)
 
 
-def _nearest_group(root: Floats, guide_root: Floats, guide_group: Ints) -> Ints:
-    """Group of the guide that is nearest to each root, (n,)."""
+def _nearest_group(
+    root: Floats,
+    guide_root: Floats,
+    guide_group: Ints,
+    partings: Partings | None,
+    grown: Floats,
+) -> Ints:
+    """Group of the guide that is nearest to each root on its side of partings, (n,)."""
     if (guide_group == guide_group[0]).all():
         return np.full(len(root), guide_group[0])
-    nearest, _ = nearest_points(root, guide_root, 1)
+    nearest, _, _ = nearest_before(partings, root, guide_root, 1, grown)
     return guide_group[nearest[:, 0]]
+
+
+def nearest_before(
+    partings: Partings | None, root: Floats, among: Floats, count: int, grown: Floats
+) -> tuple[Ints, Floats, Bools | None]:
+    """`nearest_points`, but where one is behind a parting, seen from `grown`, those nearest to that
+    place, with all behind partings as the last; and which these are."""
+    near, gap = nearest_points(root, among, count)
+    if partings is None:
+        return near, gap, None
+    crossed = partings.crossed(grown, among[near])
+    behind = np.flatnonzero(crossed.any(axis=1))
+    if len(behind):
+        more, away = nearest_points(grown[behind], among, max(_MANY_CANDIDATES, count))
+        is_behind = partings.crossed(grown[behind], among[more])
+        order = np.argsort(is_behind, axis=1, kind="stable")[:, : near.shape[1]]
+        for found, wider in ((near, more), (gap, away), (crossed, is_behind)):
+            found[behind] = np.take_along_axis(wider, order, axis=1)
+    return near, gap, crossed
 
 
 def by_group(group: Ints, guide_group: Ints) -> Iterator[tuple[Ints, Ints]]:
@@ -213,6 +290,21 @@ def _agreeing(direction: Floats, alike: Floats, parting: float) -> Floats:
                 is_mixed, np.minimum(agreed[:, later], both), agreed[:, later]
             )
     return agreed
+
+
+def _unparted(partings: Partings, root: Floats, alike: Floats) -> Floats:
+    """Likeness (n, k), none of a guide with a parting before a nearer one that is mixed.
+
+    Args:
+        root: (n, k, 3) of the guides.
+    """
+    unparted = alike.copy()
+    for later in range(1, alike.shape[1]):
+        for earlier in range(later):
+            crossed = partings.crossed(root[:, later], root[:, [earlier]])[:, 0]
+            is_mixed = (unparted[:, earlier] > 0.0) | (earlier == 0)
+            unparted[crossed & is_mixed, later] = 0.0
+    return unparted
 
 
 def _weigh(distance: Floats, alike: Floats) -> tuple[Ints, Floats]:

@@ -16,6 +16,7 @@ from .messages import draw_lines
 from .operators_bake import draw_bake
 from .operators_colliders import draw_colliders
 from .operators_measure import draw_measure
+from .operators_partings import draw_partings
 from .operators_settle import draw_settle
 from .operators_show import draw_show
 from .operators_ties import draw_ties
@@ -172,6 +173,7 @@ SUB_SECTIONS: dict[str, tuple[Section, ...]] = {
         for panel in ALL_SETTINGS["shading"].panels
     ),
     "shadows": (("skin", "Soft Shadow on Skin", draw_skin),),
+    "children": (("partings", "Partings", draw_partings),),
     "dynamics": (
         ("style", "Style", _panel("dynamics", "Style")),
         ("medium", "Medium & Wind", _panel("dynamics", "Medium & Wind")),

@@ -61,6 +61,8 @@ PROMISES = {
     "verbs that draw say so instead of crashing": GPU,
     "before Blender itself would crash": "blender/test_no_gpu.py::test_the_engine_says_so",
     "Esc cancels and leaves everything unchanged": CANCELLED_CARDS,
+    "Esc cancels it and leaves the hair as it was": "blender/test_settle.py"
+    "::test_until_its_end_nothing_changes",
     "Cancelling with Esc or Ctrl-C": "window/session_long_work.py::cards_in_motion",
     "Esc cancels a turntable": CANCELLED_TURN,
     "After an error or Ctrl-C no partial files": "blender/test_tasks.py"

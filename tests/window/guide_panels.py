@@ -12,7 +12,10 @@ PICTURES: dict[str, tuple[tuple[str, ...], ...]] = {
         + ("data_look_look_fibre", "data_look_look_variation"),
     ),
     "shadows": (("data_shadows",), ("data_shadows_skin", "data_shafts")),
-    "strands": (("data_strands", "data_detail", "data_guides"), ("data_children",)),
+    "strands": (
+        ("data_strands", "data_detail", "data_guides"),
+        ("data_children", "data_children_partings"),
+    ),
     "dynamics": (
         ("data_dynamics", "data_dynamics_style"),
         ("data_dynamics_medium", "data_dynamics_lengths"),

@@ -25,12 +25,13 @@ from ..colliders.obstacles import shape_of, sources_of
 from ..colliders.ties import holders_of
 from ..properties.groom_settings import GroomSettings
 from ..scene.curves import COLOR_ATTRIBUTE, GROUP_ATTRIBUTES
+from ..scene.partings import parting_state, partings_of
 from ..scene.surfaces import read_positions
 from ..scene.wind import gravity_of, scene_wind
 from .simulated import SOLVER_VERSION, Hashed, hashes
 
 #: The parts of a rig hash that determine the rig; the others only matter to a bake.
-RIG_PARTS = ("hair", "head", "guides", "widths", "children", "ties")
+RIG_PARTS = ("hair", "head", "guides", "widths", "children", "partings", "ties")
 
 
 def groom_rig_hash(
@@ -46,6 +47,9 @@ def groom_rig_hash(
             settings[ChildrenSettings],
             _density_before_modifiers(head, settings),
         )
+    lines = _parting_shapes(hair)
+    if lines:
+        grown["partings"] = lines
     held = _tie_shapes(hair)
     if held:
         grown["ties"] = held
@@ -141,6 +145,15 @@ def _tie_shapes(hair: bpy.types.Object) -> tuple[Floats | Ints | str, ...]:
         if obj.animation_data is None and not len(obj.constraints):
             parts += [np.array(obj.matrix_parent_inverse), np.array(obj.matrix_basis)]
     return tuple(parts)
+
+
+def _parting_shapes(hair: bpy.types.Object) -> tuple[Floats | str, ...]:
+    """As `parting_state`, but named, so that it is the same after the file was loaded again."""
+    names = {f"{obj.session_uid} {obj.type}": obj.name for obj in partings_of(hair)}
+    return tuple(
+        names[part] if isinstance(part, str) else part.astype(np.float64)
+        for part in parting_state(hair)
+    )
 
 
 def frame_rate(scene: bpy.types.Scene) -> float:

@@ -112,7 +112,7 @@ class _ReadStrands:
         source, strands = self.source, self.source.strands
         head = None if source.head is None else source.head.positions
         hair = strands.points, strands.offsets, strands.radius, strands.group
-        return *hair, head, source.density, self.name, self.settings
+        return *hair, head, source.density, source.partings, self.name, self.settings
 
 
 def read_occluders(

@@ -33,6 +33,7 @@ def rig_from(source: Source, settings: SettingsMap, *, place: str) -> Rig:
         density=source.density,
         widths=settings[WidthSettings].method,
         holders=source.holders,
+        partings=source.partings,
         head_field=lambda: solid_of(source.head),
     )
 

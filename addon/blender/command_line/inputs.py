@@ -24,6 +24,7 @@ from ..scene.built_in_head import HeadLook, built_in_head
 from ..scene.curves import read_curves
 from ..scene.head_look import head_look
 from ..scene.mesh_files import read_mesh_file
+from ..scene.partings import read_partings
 from ..scene.surfaces import read_surface
 from ..setup.hairstyles import face_hair, is_bust
 from ..strands.child_python import python_for
@@ -68,6 +69,7 @@ class Inputs:
     groom: all that a groom's file says of the strands, or None.
     notes: what of that file was left out or changed.
     density: (vertex_count,) how densely children grow on the head, or None.
+    partings: see `Source.partings`.
     """
 
     strands: StrandSet
@@ -79,6 +81,7 @@ class Inputs:
     head_object: str | None
     collider: Surface | None
     density: Floats | None
+    partings: Floats | None = None
 
 
 def read_inputs(sources: Sources, grow_settings: GrowSettings) -> Inputs:
@@ -112,7 +115,9 @@ def read_inputs(sources: Sources, grow_settings: GrowSettings) -> Inputs:
         )
     children = _weights(sources.children_density, head_name)
     found = head_object and head_object.name
-    return Inputs(strands, dropped, groom, notes, name, head, found, collider, children)
+    partings, unusable = _partings(sources.groom)
+    notes = (*notes, *unusable)
+    return Inputs(strands, dropped, groom, notes, name, head, found, collider, children, partings)
 
 
 def _grown(
@@ -163,6 +168,15 @@ def head_of_sources(sources: Sources) -> Surface | None:
     if name is None and sources.groom is None:
         return built_in_head().surface
     return None if name is None else _read_mesh(name, need_uv=sources.need_uv)
+
+
+def _partings(groom: str | None) -> tuple[Floats | None, tuple[str, ...]]:
+    """Those of hair curves of the scene, and what of them cannot be used."""
+    hair = bpy.data.objects.get(groom or "")
+    if hair is None or hair.type != "CURVES":
+        return None, ()
+    lines, unusable = read_partings(hair, bpy.context.evaluated_depsgraph_get())
+    return (lines if len(lines) else None), unusable
 
 
 def _weights(group: str, head_name: str | None) -> Floats | None:

@@ -63,6 +63,7 @@ def read_rig(job: Job) -> tuple[Rig, Inputs]:
             place=inputs.groom_name,
             children=job.settings[ChildrenSettings],
             density=inputs.density,
+            partings=inputs.partings,
             widths=job.settings[WidthSettings].method,
             head_field=lambda: solid_of(inputs.head),
         )

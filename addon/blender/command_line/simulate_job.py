@@ -20,6 +20,7 @@ from ..base.attributes import set_attribute
 from ..colliders.ties import copy_holders
 from ..preview.bake import Bake
 from ..scene.curves import write_curves
+from ..scene.partings import copy_partings
 from .bake_job import write_bake
 from .inputs import Inputs
 from .job_options import add_motion_options
@@ -101,6 +102,7 @@ def _scene_of(job: Job, inputs: Inputs) -> Iterator[bpy.types.Object]:
             hair.hairloom.children_density = _DENSITY
         if named is not None and is_groom(named):
             copy_holders(named, hair, head, scene, depsgraph)
+            copy_partings(named, hair, head, scene, depsgraph)
         low, high = inputs.head.bounds()
         rate = float(job.options.frame_rate)
         shake(head, (low + high) / 2.0, round(job.options.seconds * rate), rate)

@@ -42,7 +42,7 @@ def settings_changed(owner: bpy.types.ID) -> None:
         hair = session.hair.handle.find()
         if hair is not None and owner in (hair, hair.data):
             attempt(preview, depsgraph, partial(_take_settings, preview, session, depsgraph))
-            session.is_stale |= session.has_other_holders(set())
+            session.is_stale |= session.has_other_holders(set()) or session.has_other_partings()
             if session.is_stale:
                 _read_again_soon()
         elif occluders_changed(session, {owner.session_uid}, depsgraph.view_layer):
@@ -79,6 +79,7 @@ def updated(depsgraph: bpy.types.Depsgraph) -> None:
             is_edited(session, edited)
             or weights_changed(session, edited)
             or session.has_other_holders(edited)
+            or session.has_other_partings()
         ):
             session.is_stale = True
             _read_again_soon()

@@ -238,6 +238,14 @@ class HAIRLOOM_PG_character(bpy.types.PropertyGroup):
             update=lambda self, _context: changed.settings(self.id_data),
             override=OVERRIDABLE,
         ),
+        "parting_collection": PointerProperty(
+            type=bpy.types.Collection,
+            name="Partings",
+            description="Collection of curves drawn on the surface, across which no strand follows "
+            "another: hair falls to both sides of them",
+            update=lambda self, _context: changed.settings(self.id_data),
+            override=OVERRIDABLE,
+        ),
         "tip_surface": PointerProperty(
             type=bpy.types.Object,
             name="Held Tips",

@@ -74,6 +74,29 @@ def _read(curves: bpy.types.Curves, matrix: Floats) -> Cleaned:
     )
 
 
+def write_own_curves(
+    obj: bpy.types.Object, own: Cleaned, points: Floats, depsgraph: bpy.types.Depsgraph
+) -> None:
+    """Move the curves that `read_own_curves` has given; those that it dropped stay.
+
+    Args:
+        points: (point_count, 3) [m] world space, of the strands of `own`.
+    """
+    curves = obj.data
+    offsets, moved_points = curve_offsets(curves), curve_points(curves)
+    counts = np.diff(offsets)[own.kept]
+    number = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
+    back = np.linalg.inv(np.array(obj.evaluated_get(depsgraph).matrix_world, np.float64))
+    moved_points[np.repeat(offsets[own.kept], counts) + number] = moved(points, back)
+    put_points(curves, moved_points)
+
+
+def put_points(curves: bpy.types.Curves, points: Floats) -> None:
+    """Move all points, (point_count, 3) [m] object space."""
+    curves.position_data.foreach_set("vector", np.ascontiguousarray(points, np.float32).ravel())
+    curves.update_tag()
+
+
 def write_curves(
     name: str,
     strands: StrandSet,

@@ -16,6 +16,7 @@ from ...strands.colors import color_notes
 from ..base.objects import head_of
 from ..base.vertex_weights import read_weights
 from .curves import read_curves
+from .partings import read_partings
 from .surfaces import read_surface
 
 #: node group of the modifier that Blender 5.2 gives to new hair
@@ -32,6 +33,8 @@ class Source:
     head_warning, density_warning: a warning with its remedy, or empty.
     color_warnings: about strands without a colour.
     holders: what holds it beside its roots, at rest.
+    partings: the straight pieces of its partings, (n, 2, 3) [m] world space; None: there are none.
+    parting_warnings: about objects that cannot be partings.
     """
 
     strands: StrandSet
@@ -43,10 +46,17 @@ class Source:
     density_warning: str = ""
     color_warnings: tuple[str, ...] = ()
     holders: Holders = NO_HOLDERS
+    partings: Floats | None = None
+    parting_warnings: tuple[str, ...] = ()
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        found = self.head_warning, self.density_warning, *self.color_warnings
+        found = (
+            self.head_warning,
+            self.density_warning,
+            *self.color_warnings,
+            *self.parting_warnings,
+        )
         return tuple(filter(None, found))
 
 
@@ -59,6 +69,7 @@ def read_source(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Sourc
     read = usable_curves(hair, depsgraph)
     head, head_warning = _read_head(hair, depsgraph)
     density, density_warning = read_density(hair, head, depsgraph)
+    partings, parting_warnings = read_partings(hair, depsgraph)
     return Source(
         read.strands,
         read.dropped,
@@ -68,6 +79,8 @@ def read_source(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Sourc
         head_warning,
         density_warning,
         color_notes(hair.name, read.strands),
+        partings=partings if len(partings) else None,
+        parting_warnings=parting_warnings,
     )
 
 

@@ -14,12 +14,14 @@ from ...arrays import Floats
 from ...pipeline import Pose, Rig
 from ...shading.ambient_settings import AmbientSettings
 from ...strands import StrandSet
+from ...strands.affine import moved
 from ...strands.colors import color_notes
 from ..bakes.baked_rig import BakedRig, RestMatrices
 from ..bakes.groom_hashes import groom_frame_hash, groom_rig_hash
 from ..base.objects import Body, head_of, matrix_of
 from ..colliders.ties import Holding
 from ..properties.groom_settings import GroomSettings
+from ..scene.partings import is_same_state, parting_state, read_partings
 from ..scene.poses import check_finite, read_pose
 from ..scene.source import read_density, read_source, usable_curves
 from .prepared_groom import BuildRequest, rig_of
@@ -46,6 +48,7 @@ class GroomSource:
         uses_head = self.source.head is not None and head is not None
         self.head = Body.at_rest(head, depsgraph) if uses_head else None
         self._head_uid = head and head.session_uid
+        self._parting_state = parting_state(hair)
         self.settings = GroomSettings.of(hair, depsgraph)
         self.request = BuildRequest(self.name, self.source, self.settings, holding=self._holding)
         check_finite(hair.name, self.hair.rest)
@@ -74,6 +77,11 @@ class GroomSource:
         hair = self.hair.handle.find()
         return hair is not None and self.request.holding.is_outdated(hair, edited)
 
+    def has_other_partings(self) -> bool:
+        """Whether partings have come or gone, or have been moved or edited."""
+        hair = self.hair.handle.find()
+        return hair is not None and not is_same_state(parting_state(hair), self._parting_state)
+
     def rig(self) -> Rig:
         """The groom made ready to move.
 
@@ -93,7 +101,11 @@ class GroomSource:
         """The rig of a bake; rest is where hair and head were then."""
         back = baked.rests.hair @ np.linalg.pinv(self.hair.rest)
         strands = self.source.strands.transformed(back)
-        self.source = replace(self.source, strands=strands, head=baked.rig.head)
+        lines = self.source.partings
+        if lines is not None:
+            lines = moved(lines.reshape(-1, 3), back).reshape(-1, 2, 3)
+        head = baked.rig.head
+        self.source = replace(self.source, strands=strands, head=head, partings=lines)
         self.hair.rest = baked.rests.hair
         if self.head is not None and baked.rests.head is not None:
             self.head.rest = baked.rests.head
@@ -122,6 +134,12 @@ class GroomSource:
             strands = before.strands
         density, warning = read_density(hair, before.head, depsgraph)
         holding = Holding.of(hair, depsgraph, known.holding, back)
+        partings, parting_warnings = before.partings, before.parting_warnings
+        if self.has_other_partings():
+            self._parting_state = parting_state(hair)
+            lines, parting_warnings = read_partings(hair, depsgraph)
+            there = moved(lines.reshape(-1, 3), back).reshape(-1, 2, 3)
+            partings = there if len(lines) else None
         source = replace(
             before,
             holders=holding.holders,
@@ -130,13 +148,20 @@ class GroomSource:
             density=density,
             density_warning=warning,
             color_warnings=color_notes(hair.name, strands),
+            partings=partings,
+            parting_warnings=parting_warnings,
         )
         request = BuildRequest(self.name, source, GroomSettings.of(hair), holding=holding)
         if (
             request.gives_rig_of(known)
             and request.settings[AmbientSettings] == known.settings[AmbientSettings]
         ):
-            self.source = replace(self.source, dropped=read.dropped, density_warning=warning)
+            self.source = replace(
+                self.source,
+                dropped=read.dropped,
+                density_warning=warning,
+                parting_warnings=parting_warnings,
+            )
             return None
         self.request = request
         return request

@@ -61,6 +61,7 @@ class BuildRequest:
             and one.head is two.head
             and np.array_equal(one.density, two.density)  # type: ignore[arg-type]
             and one.holders == two.holders
+            and np.array_equal(one.partings, two.partings)  # type: ignore[arg-type]
         )
 
 

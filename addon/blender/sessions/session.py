@@ -146,6 +146,10 @@ class Session:
         """
         return self._source.has_other_holders(edited)
 
+    def has_other_partings(self) -> bool:
+        """Whether partings have come, gone, been moved or edited."""
+        return self._source.has_other_partings()
+
     def constants(self) -> Arrays:
         """See `baked_rig.rig_arrays`."""
         return rig_arrays(self.rig, self._source.rests)

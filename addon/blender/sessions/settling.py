@@ -21,14 +21,18 @@ from ...errors import HairloomError
 from ...groom.settings import GuideSettings
 from ...pipeline import Rig
 from ...shading.ambient_settings import AmbientSettings
-from ...strands.affine import moved
 from ...strands.clean import Cleaned
 from ..base.attributes import read_attribute, set_attribute
-from ..base.objects import matrix_of
 from ..base.outcome import Outcome
 from ..colliders.fields import solid_of
 from ..colliders.obstacles import Obstacles
-from ..scene.curves import curve_offsets, curve_points, read_own_curves
+from ..scene.curves import (
+    curve_offsets,
+    curve_points,
+    put_points,
+    read_own_curves,
+    write_own_curves,
+)
 from ..scene.wind import gravity_of
 from .groom_source import GroomSource
 from .prepared_groom import PreparedGroom
@@ -62,8 +66,14 @@ def settle_hair(
     source = GroomSource(hair, depsgraph)
     own = read_own_curves(hair, depsgraph)
     guides = settle_flow.guides_that_fall(own.strands, source.settings[GuideSettings])
+    read = source.source
     rig = pipeline.prepare(
-        own.strands, source.source.head, guides, place=hair.name, holders=source.source.holders
+        own.strands,
+        read.head,
+        guides,
+        place=hair.name,
+        holders=read.holders,
+        partings=read.partings,
     )
     _check_roots(hair, rig)
     dynamics, pose = source.settings[DynamicsSettings], source.pose(rig, depsgraph)
@@ -105,7 +115,7 @@ def back_to_combed(hair: bpy.types.Object) -> None:
     points, offsets = curve_points(curves), curve_offsets(curves)
     is_known = np.repeat(_have_extent(combed, offsets), np.diff(offsets))
     points[is_known] = combed[is_known]
-    _put(hair, points)
+    put_points(curves, points)
     curves.attributes.remove(curves.attributes[COMBED])
     curves.pop(_SETTLED, None)
     sag = hair.pop(_SAG, None)
@@ -158,20 +168,8 @@ def _store(
     points = curve_points(curves)
     if curves.get(_SETTLED) != _digest(points) or not is_settled(hair):
         set_attribute(curves, COMBED, "POINT", points)
-    offsets = curve_offsets(curves)
-    counts = np.diff(offsets)[own.kept]
-    number = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
-    back = np.linalg.inv(matrix_of(hair, depsgraph))
-    points = points.copy()
-    points[np.repeat(offsets[own.kept], counts) + number] = moved(settled, back)
-    _put(hair, points)
+    write_own_curves(hair, own, settled, depsgraph)
     curves[_SETTLED] = _digest(curve_points(curves))
-
-
-def _put(hair: bpy.types.Object, points: Floats) -> None:
-    curves = hair.data
-    curves.position_data.foreach_set("vector", np.ascontiguousarray(points, np.float32).ravel())
-    curves.update_tag()
 
 
 def _digest(points: Floats) -> str:

@@ -1,0 +1,48 @@
+"""What the artist sets about combing hair away from partings."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..params import Settings, number
+
+
+@dataclass(frozen=True, kw_only=True)
+class PartingSettings(Settings):
+    """How roots lean away from a parting."""
+
+    section = "parting"
+    title = "Comb from Partings"
+
+    amount: float = number(
+        0.8,
+        label="Amount",
+        description="How far roots beside a parting turn away from it",
+        unit="factor",
+        soft=(0.0, 1.0),
+        hard=(0.0, 1.0),
+    )
+    width: float = number(
+        0.2,
+        label="Width",
+        description="Distance from a parting up to which roots turn, as a fraction of the hair's "
+        "length",
+        soft=(0.01, 0.5),
+        hard=(0.0, 10.0),
+    )
+    along: float = number(
+        0.6,
+        label="Along",
+        description="Fraction of a curve, from its root on, that turns",
+        unit="factor",
+        soft=(0.05, 1.0),
+        hard=(0.01, 1.0),
+    )
+    lift: float = number(
+        0.4,
+        label="Lift",
+        description="How much hair rises from the surface where it turns away: 0 lies flat",
+        unit="factor",
+        soft=(0.0, 1.0),
+        hard=(0.0, 4.0),
+    )

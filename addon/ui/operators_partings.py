@@ -1,0 +1,108 @@
+"""Partings: Add Parting, Remove Parting and Comb from Partings, and their panel."""
+
+from __future__ import annotations
+
+import bpy
+from bpy.props import StringProperty
+
+from ..blender.base.outcome import report
+from ..blender.properties.groups import operator_properties
+from ..blender.properties.properties import settings_of
+from ..blender.scene import partings
+from ..blender.sessions.parting import comb_parting
+from ..groom.parting_settings import PartingSettings
+from .operators_start import in_object_mode
+from .reports import reporting, tell, waiting
+from .selection import chosen_hair, needs_hair
+
+
+class HAIRLOOM_OT_add_parting(bpy.types.Operator):
+    """Part the hair along the selected curves, which are drawn on its surface. If none is selected,
+    a line from the forehead to the crown is added, to be edited like any curve"""
+
+    bl_idname = "hairloom.add_parting"
+    bl_label = "Add Parting"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return in_object_mode(cls, context) and needs_hair(cls, context)
+
+    @reporting
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        hair = chosen_hair(context)[0]
+        depsgraph = context.evaluated_depsgraph_get()
+        lines = [obj for obj in context.selected_objects if obj.type == "CURVE"]
+        lines += [obj for obj in context.selected_objects if partings.is_wire(obj)]
+        for line in lines:
+            partings.check_on_surface(line, hair, depsgraph)
+        if not lines:
+            lines = [partings.new_parting(hair, context)]
+        partings.add_partings(hair, lines, context.scene)
+        names = ", ".join(line.name for line in lines)
+        report(self, "INFO", f"{hair.name} is parted along {names}")
+        return {"FINISHED"}
+
+
+class HAIRLOOM_OT_remove_parting(bpy.types.Operator):
+    """Part the hair along this line no longer. The object itself stays in the scene"""
+
+    bl_idname = "hairloom.remove_parting"
+    bl_label = "Remove Parting"
+    bl_options = {"REGISTER", "UNDO"}
+
+    __annotations__ = {
+        "line": StringProperty(name="Line", description="Name of the object", options={"SKIP_SAVE"})
+    }
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return needs_hair(cls, context)
+
+    @reporting
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        partings.remove_parting(chosen_hair(context)[0], self.line, context.scene)
+        return {"FINISHED"}
+
+
+class HAIRLOOM_OT_comb_parting(bpy.types.Operator):
+    """Comb the roots of the selected hair away from its partings, to both sides"""
+
+    bl_idname = "hairloom.comb_parting"
+    bl_label = "Comb from Partings"
+    bl_options = {"REGISTER", "UNDO"}
+
+    __annotations__ = operator_properties("parting")
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if not (in_object_mode(cls, context) and needs_hair(cls, context)):
+            return False
+        if any(map(partings.partings_of, chosen_hair(context))):
+            return True
+        cls.poll_message_set("The selected hair has no partings: press Add Parting first")
+        return False
+
+    @reporting
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        settings = settings_of(self, PartingSettings)
+        with waiting(context):
+            for hair in filter(partings.partings_of, chosen_hair(context)):
+                depsgraph = context.evaluated_depsgraph_get()
+                tell(self, comb_parting(hair, depsgraph, settings))
+        return {"FINISHED"}
+
+
+def draw_partings(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
+    """Draw what parts the hair."""
+    column = layout.column()
+    column.prop(hair.hairloom, "parting_collection")
+    for obj in partings.partings_of(hair):
+        row = column.row(align=True)
+        row.label(text=obj.name, icon="CURVE_DATA")
+        row.operator("hairloom.remove_parting", text="", icon="X").line = obj.name
+    column.operator("hairloom.add_parting", icon="CURVE_DATA")
+    column.operator("hairloom.comb_parting", icon="ARROW_LEFTRIGHT")
+
+
+CLASSES = (HAIRLOOM_OT_add_parting, HAIRLOOM_OT_remove_parting, HAIRLOOM_OT_comb_parting)
