@@ -86,9 +86,8 @@ def settle_hair(
     warnings += _carry_whole_weight(hair)
     lost = int((~is_out).sum())
     if lost:
-        warnings += (
-            f"{hair.name}: {lost:,} curves are still in the surface. Comb them out of it.",
-        )
+        are = "1 curve is" if lost == 1 else f"{lost:,} curves are"
+        warnings += (f"{hair.name}: {are} still in the surface. Comb out what is there.",)
     tips = own.strands.offsets[1:] - 1
     moved_by = np.linalg.norm(settled.points[tips] - own.strands.points[tips], axis=1)
     result = (

@@ -26,7 +26,14 @@ from ..scene.hair_material import put_look_material
 from ..scene.source import read_source
 
 #: what of the scene moves hair, as properties of an object's group
-_POINTERS = ("collider", "collider_collection", "collider_shape", "tie_collection", "tip_surface")
+_POINTERS = (
+    "collider",
+    "collider_collection",
+    "collider_shape",
+    "tie_collection",
+    "tip_surface",
+    "parting_collection",
+)
 
 
 def make_real(
