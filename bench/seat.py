@@ -1,0 +1,74 @@
+"""The artist's seat: what leaves Hairloom for Blender's own tools is what was drawn.
+
+`make_real_flip` compares the sample scene, rendered by Hairloom with the settings that ship, with
+the same scene after *Make Real*: Blender's own curves, drawn again. FLIP is Andersson et al.'s
+(2020), over the pixels that hair changes. `make_real_seconds` is processor time.
+
+make bench NAME=seat                some five minutes
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import bpy
+import flip_evaluator
+import numpy as np
+from _report import start, tell
+
+import hairloom
+from hairloom.addon.blender.setup.sample_scene import add_sample_scene
+from hairloom.addon.blender.strands.make_real import make_real
+
+REFERENCE = "the same scene before Make Real"
+MOST = {"make_real_flip": 0.05}
+SIZE = 480
+#: a look with all that a colour for each strand has to hold
+LOOK = {"tip_tint": 0.5, "grey_fraction": 0.1}
+_CHANGED = 0.01
+
+
+def main() -> int:
+    start()
+    hairloom.register()
+    scene, hair = add_sample_scene(("looks/brown",), "light")
+    for name, value in LOOK.items():
+        setattr(hair.data.hairloom.shading, name, value)
+    scene.render.resolution_x = scene.render.resolution_y = SIZE
+    before = _picture(scene)
+    began = time.process_time()
+    with bpy.context.temp_override(scene=scene, view_layer=scene.view_layers[0]):
+        real, _ = make_real(hair, scene.view_layers[0].depsgraph)
+    seconds = time.process_time() - began
+    after = _picture(scene)
+    real.hide_render = True
+    is_hair = np.abs(before - _picture(scene)).max(axis=-1) > _CHANGED
+    flip, _, _ = flip_evaluator.evaluate(before, after, "LDR", applyMagma=False)
+    found = {
+        "make_real_flip": float(np.asarray(flip).reshape(is_hair.shape)[is_hair].mean()),
+        "make_real_seconds": seconds,
+        "strands": len(real.data.curves),
+    }
+    missed = [name for name, most in MOST.items() if found[name] > most]
+    tell({**found, "missed": missed}, REFERENCE)
+    return int(bool(missed))
+
+
+def _picture(scene: bpy.types.Scene) -> np.ndarray:
+    """As an artist sees it, (SIZE, SIZE, 3)."""
+    scene.render.image_settings.file_format = "PNG"
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "picture.png"
+        scene.render.filepath = str(path)
+        bpy.ops.render.render(write_still=True, scene=scene.name)
+        image = bpy.data.images.load(str(path), check_existing=False)
+        pixels = np.empty(len(image.pixels), np.float32)
+        image.pixels.foreach_get(pixels)
+        bpy.data.images.remove(image)
+    return np.ascontiguousarray(pixels.reshape(SIZE, SIZE, -1)[..., :3])
+
+
+sys.exit(main())
