@@ -7,7 +7,7 @@ first frame it has its full speed of 1.9 m/s, which is as hard as it gets.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import bpy
 import numpy as np
@@ -39,7 +39,8 @@ def surface_of(head: bpy.types.Object) -> Surface:
 def guides_on(surface: Surface, count: int, cv_count: int = 16) -> StrandSet:
     """Combed hair of the scalp, every strand of it a guide."""
     settings = GrowSettings(strand_count=count, cv_count=cv_count, length=LENGTH)
-    return grow(surface, settings, scalp_density(surface))
+    # of known widths: others are found and marked so, for which the extension must be registered
+    return replace(grow(surface, settings, scalp_density(surface)), has_widths=True)
 
 
 def sway(time: float) -> float:

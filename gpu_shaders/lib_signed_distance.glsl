@@ -1,8 +1,9 @@
 // How far a point is from posed colliders, and which way leads out: for whoever is not the solver.
 //
-// Twin of addon/dynamics/colliders/signed_distance.py. Needs the integer `solid_count`, and the
-// textures `solids`, `rounds` and `fields`, see render/collider_textures.py; HAS_ROUNDS and
-// HAS_FIELDS say which of the latter there are.
+// Twin of addon/dynamics/colliders/signed_distance.py. Needs the textures `solids`,
+// `rounds` and `fields`, see render/collider_textures.py; HAS_ROUNDS and HAS_FIELDS say which of the
+// latter there are. With HAS_SEVERAL the integer `solid_count` says how many colliders there are, else
+// there is one: software drivers go once through a loop that is to be skipped.
 #include "lib_collider.glsl"
 
 vec4 solid_texel(int solid, int texel)
@@ -56,8 +57,10 @@ vec4 nearer_of(vec4 result, Solid solid, vec3 point)
 vec4 signed_distance(Solid first, vec3 point, float reach)
 {
   vec4 result = nearer_of(vec4(0.0, 0.0, 0.0, reach), first, point);
+#ifdef HAS_SEVERAL
   for (int solid = 1; solid < solid_count; solid++) {
     result = nearer_of(result, solid_at(solid), point);
   }
+#endif
   return result;
 }

@@ -33,6 +33,32 @@ NOT_FOLLOWED = 1.0e30
 
 
 @dataclass(frozen=True)
+class SolidKinds:
+    """Which colliders a program with lib_signed_distance.glsl is for.
+
+    rounds, fields: whether any is a round solid, and a field. several: whether there may be more
+    than one.
+    """
+
+    rounds: bool
+    fields: bool
+    several: bool
+
+    @property
+    def textures(self) -> tuple[str, ...]:
+        return ("solids", *("rounds",) * self.rounds, *("fields",) * self.fields)
+
+    @property
+    def integers(self) -> tuple[str, ...]:
+        return ("solid_count",) * self.several
+
+    @property
+    def defines(self) -> tuple[tuple[str, int], ...]:
+        flags = {"HAS_ROUNDS": self.rounds, "HAS_FIELDS": self.fields, "HAS_SEVERAL": self.several}
+        return tuple((name, 1) for name, is_set in flags.items() if is_set)
+
+
+@dataclass(frozen=True)
 class ColliderTextures:
     """The solids of some colliders.
 
@@ -78,6 +104,12 @@ class ColliderTextures:
         """Whether these are the colliders that lie in the textures."""
         return len(posed) == len(self.colliders) and all(
             one.collider is other for one, other in zip(posed, self.colliders, strict=True)
+        )
+
+    @property
+    def kinds(self) -> SolidKinds:
+        return SolidKinds(
+            self.rounds is not None, self.fields is not None, len(self.colliders) > 1
         )
 
     def solids(self, posed: tuple[PosedCollider, ...]) -> Any:

@@ -24,7 +24,7 @@ from ..arrays import Ints
 from ..dynamics.colliders import PosedCollider
 from ..refine.lead_out import ATTEMPTS, HALVINGS, SWEEPS, TRIES, Clearance, LedOut
 from . import gpu_objects
-from .collider_textures import ColliderTextures, UploadedColliders
+from .collider_textures import ColliderTextures, SolidKinds, UploadedColliders
 from .shader_program import ShaderRecipe, program
 from .shader_source import LEAD_BLOCK
 from .strand_layout import StrandLayout, from_strand_rows, strand_rows, strand_rows_size
@@ -47,19 +47,19 @@ _STEPS = {
 _CARRYING = ("strand_spans", "rest_points", "root_motions")
 _TEXTURES = {
     "HELD": _CARRYING,
-    "NEAR": (*_CARRYING, "cv_points", "clearances", "solids"),
+    "NEAR": (*_CARRYING, "cv_points", "clearances"),
     "COUNTED": ("states",),
     "LISTED": ("states", "near_counts"),
-    "LED": (*_CARRYING, "near_strands", "cv_points", "clearances", "solids"),
+    "LED": (*_CARRYING, "near_strands", "cv_points", "clearances"),
     "PUT": (*_CARRYING, "near_strands", "states", "led_points"),
 }
 _OF_POINTS = ("mover_count", "first_point", "point_end")
 _INTEGERS = {
     "HELD": _OF_POINTS,
-    "NEAR": (*_OF_POINTS, "solid_count"),
+    "NEAR": _OF_POINTS,
     "COUNTED": (),
     "LISTED": (),
-    "LED": (*_OF_POINTS, "solid_count", "lane_count", "first_attempt", "attempt_end"),
+    "LED": (*_OF_POINTS, "lane_count", "first_attempt", "attempt_end"),
     "PUT": (*_OF_POINTS, "lane_count"),
 }
 #: strands of an invocation, at most
@@ -76,24 +76,28 @@ PUT_RECIPE = ShaderRecipe(
 )
 
 
-def lead_out_recipe(step: str, *, rounds: bool = False, fields: bool = False) -> ShaderRecipe:
-    """The program of one step, for these kinds of colliders.
+def lead_out_recipe(step: str, solids: SolidKinds | None) -> ShaderRecipe:
+    """The program of one step.
 
     Args:
         step: a key of _STEPS, see lead_out.comp.glsl.
+        solids: the colliders that it asks; None: none.
     """
-    flags = {f"IS_{step}": True, "HAS_ROUNDS": rounds, "HAS_FIELDS": fields}
-    names = list(_TEXTURES[step])
-    names += [name for name, is_there in (("rounds", rounds), ("fields", fields)) if is_there]
+    names, integers = _TEXTURES[step], ("strand_count", *_INTEGERS[step])
+    defines: tuple[tuple[str, int], ...] = ((f"IS_{step}", 1),)
+    if solids is not None:
+        names += solids.textures
+        integers += solids.integers
+        defines += solids.defines
     return ShaderRecipe(
         name=f"lead_out_{step.lower()}",
         compute="lead_out.comp.glsl",
         textures=tuple(("FLOAT_2D", name) for name in names),
         images=tuple(("RGBA32F", name, access) for name, access in _STEPS[step]),
-        integers=("strand_count", *_INTEGERS[step]),
+        integers=integers,
         numbers=(("FLOAT", "kept"),) if step in ("NEAR", "LED", "PUT") else (),
         group_size=_GROUP,
-        defines=tuple((name, 1) for name, is_set in flags.items() if is_set),
+        defines=defines,
     )
 
 
@@ -139,8 +143,14 @@ class LeadOutPass:
             if texture is not None:
                 textures[name] = texture
         rounds = int(self._layout.counts.max()) * (point_rounds + _rounds_of_distance(solids))
+        kinds = solids.kinds
         return Seen(
-            textures, self._textures["states"], len(posed), self._clearance.kept, rounds <= _ROUNDS
+            textures,
+            self._textures["states"],
+            kinds,
+            {name: len(posed) for name in kinds.integers},
+            self._clearance.kept,
+            rounds <= _ROUNDS,
         )
 
     def lead(self, cv_points: Any, seen: Seen, carrying: dict[str, Any], mover_count: int) -> None:
@@ -155,7 +165,7 @@ class LeadOutPass:
             ShaderError: the shader does not compile here.
         """
         textures = self._textures | carrying | seen.textures | {"cv_points": cv_points}
-        integers = {"mover_count": mover_count, "solid_count": seen.solid_count}
+        integers = {"mover_count": mover_count, **seen.integers}
         for step in (() if seen.at_once else ("HELD", "NEAR")) + ("COUNTED", "LISTED"):
             self._run(step, textures, integers)
         # all attempts in one go where drivers bear it
@@ -221,10 +231,8 @@ class LeadOutPass:
 
     def _run(self, step: str, taken: dict[str, Any], integers: dict[str, int]) -> None:
         """One step over all points of all strands, as many at once as drivers bear."""
-        kinds: dict[str, bool] = {}
-        if step in _ASKING:
-            kinds = {name: name in taken for name in ("rounds", "fields")}
-        recipe = lead_out_recipe(step, **kinds)
+        assert self._solids is not None
+        recipe = lead_out_recipe(step, self._solids.kinds if step in _ASKING else None)
         shader, count = program(recipe), self._layout.strand_count
         invocations = -(-count // _INVOCATION.get(step, 1))
         known = integers | {"strand_count": count, "lane_count": invocations}
@@ -253,13 +261,15 @@ class LeadOutPass:
 class Seen:
     """What strands are led out of in one frame.
 
-    textures: strand_spans, clearances and the colliders. states: an image. solid_count: colliders.
-    kept: [m]. at_once: whether the pass that moves strands can do the steps HELD and NEAR.
+    textures: strand_spans, clearances and the colliders. states: an image. kinds, integers: of the
+    colliders. kept: [m]. at_once: whether the pass that moves strands can do the steps HELD and
+    NEAR.
     """
 
     textures: dict[str, Any]
     states: Any
-    solid_count: int
+    kinds: SolidKinds
+    integers: dict[str, int]
     kept: float
     at_once: bool
 

@@ -42,7 +42,7 @@ from ..refine.lead_out import NOT_LED, LedOut
 from ..refine.ride import Riders
 from ..strands import StrandSet, Surface
 from . import gpu_objects
-from .collider_textures import UploadedColliders
+from .collider_textures import SolidKinds, UploadedColliders
 from .hold_pass import HoldPass
 from .lead_out_pass import LeadOutPass
 from .shader_program import ShaderRecipe, program, released_with_shaders
@@ -77,24 +77,25 @@ def _guides_recipe(*, curls: bool) -> ShaderRecipe:
     )
 
 
-def _ride_recipe(
-    *, curls: bool, clearance: bool = False, rounds: bool = False, fields: bool = False
-) -> ShaderRecipe:
-    """The pass that moves strands, which may find who is too near to these kinds of colliders."""
-    flags = {"HAS_CURLS": curls, "HAS_CLEARANCE": clearance}
-    flags |= {"HAS_ROUNDS": rounds, "HAS_FIELDS": fields}
+def _ride_recipe(*, curls: bool, solids: SolidKinds | None = None) -> ShaderRecipe:
+    """The pass that moves strands, which may find who is too near to colliders."""
     names = ["root_motions", "guide_weights", "rest_points", "strand_spans", "guide_turns"]
-    names += ["guide_axes"] * curls + ["clearances", "solids"] * clearance
-    names += ["rounds"] * rounds + ["fields"] * fields
+    names += ["guide_axes"] * curls
+    defines = (("HAS_CURLS", 1),) if curls else ()
+    integers = ["segment_count", "strand_count", "mover_count"]
+    if solids is not None:
+        names += ["clearances", *solids.textures]
+        defines += ("HAS_CLEARANCE", 1), *solids.defines
+        integers += solids.integers
     return ShaderRecipe(
         name="ride",
         compute="ride.comp.glsl",
         textures=tuple(("FLOAT_2D", name) for name in names),
-        images=(("RGBA32F", "cv_points"), *[("RGBA32F", "states")] * clearance),
-        integers=("segment_count", "strand_count", "mover_count", *["solid_count"] * clearance),
-        numbers=(("FLOAT", "kept"),) if clearance else (),
+        images=(("RGBA32F", "cv_points"), *[("RGBA32F", "states")] * (solids is not None)),
+        integers=tuple(integers),
+        numbers=() if solids is None else (("FLOAT", "kept"),),
         group_size=(64, 1),
-        defines=tuple((name, 1) for name, is_set in flags.items() if is_set),
+        defines=defines,
     )
 
 
@@ -310,7 +311,7 @@ class RidePass:
         taken = _named(textures, "root_motions", "guide_weights", "rest_points", "strand_spans")
         taken |= {"guide_turns": textures[turns]}
         taken |= _named(textures, "guide_axes") if is_curled else {}
-        images, kinds = {"cv_points": self.points.texture}, {}
+        images, solids = {"cv_points": self.points.texture}, None
         integers = {
             "segment_count": self._segment_count,
             "strand_count": count,
@@ -318,11 +319,10 @@ class RidePass:
         }
         numbers = {}
         if seen is not None and seen.at_once:
-            kinds = {name: name in seen.textures for name in ("rounds", "fields")}
-            kinds["clearance"] = True
+            solids = seen.kinds
             taken, images = taken | seen.textures, images | {"states": seen.states}
-            integers, numbers["kept"] = integers | {"solid_count": seen.solid_count}, seen.kept
-        shader = program(_ride_recipe(curls=is_curled, **kinds))
+            integers, numbers["kept"] = integers | seen.integers, seen.kept
+        shader = program(_ride_recipe(curls=is_curled, solids=solids))
         shader.bind(textures=taken, images=images, integers=integers, numbers=numbers)
         _dispatch(shader, count, 1)
         if seen is not None:

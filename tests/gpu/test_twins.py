@@ -278,8 +278,11 @@ def test_collider_distance(
 
 
 @pytest.mark.parametrize("reach", [1.0e6, 0.05])
-def test_signed_distance(compute: Callable[..., np.ndarray], reach: float) -> None:
-    """Of several colliders of all kinds, moved, turned and scaled."""
+@pytest.mark.parametrize("chosen", [(0, 1, 2), (0,), (1,), (2,)])
+def test_signed_distance(
+    compute: Callable[..., np.ndarray], chosen: tuple[int, ...], reach: float
+) -> None:
+    """Of several colliders of all kinds, or of one, moved, turned and scaled."""
     from hairloom.addon.render.collider_textures import ColliderTextures
 
     random = np.random.default_rng(8)
@@ -298,17 +301,21 @@ def test_signed_distance(compute: Callable[..., np.ndarray], reach: float) -> No
         posed.append(PosedCollider(collider, np.eye(4), matrix))
     points = random.uniform(-0.6, 0.6, (40, 32, 4)).astype(np.float32)
     points[..., 3] = reach
+    solids = tuple(solids[place] for place in chosen)
+    posed = [posed[place] for place in chosen]
     textures = ColliderTextures.of(solids)
+    kinds = textures.kinds
+    there = {
+        "solids": textures.solids(tuple(posed)),
+        "rounds": textures.rounds,
+        "fields": textures.fields,
+    }
     found = compute(
         "signed_distance.glsl",
         (32, 40),
         textures={"points": points},
-        samplers={
-            "solids": ("FLOAT_2D", textures.solids(tuple(posed))),
-            "rounds": ("FLOAT_2D", textures.rounds),
-            "fields": ("FLOAT_2D", textures.fields),
-        },
-        defines=(("HAS_ROUNDS", 1), ("HAS_FIELDS", 1), ("solid_count", len(solids))),
+        samplers={name: ("FLOAT_2D", there[name]) for name in kinds.textures},
+        defines=(*kinds.defines, ("solid_count", len(solids))),
     )
     distance, outward = signed_distance(points[..., :3].reshape(-1, 3), posed, reach)
     assert (distance < 0.0).any() and (distance > 0.04).any()
