@@ -164,7 +164,7 @@ void keep_outside()
   bool is_off = false;
 #else
   int passes = 0;
-  bool is_off = is_off_length(frame.length_tolerance);
+  bool is_off = is_off_length(frame.length_tolerance, frame.springs.z);
 #endif
 #ifdef RELAXATION
   int steps = passes;
@@ -189,7 +189,7 @@ void keep_outside()
 #endif
       number++;
 #ifndef RELAXATION
-      is_off = is_off_length(frame.length_tolerance);
+      is_off = is_off_length(frame.length_tolerance, frame.springs.z);
 #endif
     } while (number < steps && (number < passes || is_off));
   }

@@ -67,17 +67,18 @@ void newton_step(bool has_normals)
   }
 }
 
-// Whether a segment is off by more than this fraction of its length; by squares, without a root.
-bool is_off_length(float tolerance)
+// Whether a segment is off by more than this fraction of its length and what cannot be told from none,
+// `rounding` [m]; by squares, without a root.
+bool is_off_length(float tolerance, float rounding)
 {
-  float low = max(1.0 - tolerance, 0.0) * max(1.0 - tolerance, 0.0);
-  float high = (1.0 + tolerance) * (1.0 + tolerance);
   bool is_off = false;
   for (int i = 0; i < FREE; i++) {
     vec3 segment = position[i + 2] - position[i + 1];
     float square = dot(segment, segment) + TINY * TINY;
-    float wanted = segment_length[i] * segment_length[i];
-    is_off = is_off || square < wanted * low || square > wanted * high;
+    float allowed = segment_length[i] * tolerance + rounding;
+    float low = max(segment_length[i] - allowed, 0.0);
+    float high = segment_length[i] + allowed;
+    is_off = is_off || square < low * low || square > high * high;
   }
   return is_off;
 }

@@ -21,7 +21,8 @@ struct Dynamics {
                       // that of this one
   vec4 combed;        // xyz the same of the gravity in which the style was combed, where it is held
   vec4 wind;          // xyz mean [m/s]
-  vec4 springs;       // x fraction of their room that curls give, y 1 / (kappa dt^2), see lib_springs.glsl
+  vec4 springs;       // x fraction of their room that curls give, y 1 / (kappa dt^2), see lib_springs.glsl;
+                      // z [m] that lengths cannot be kept better than
   vec4 swing[{{wind_modes}}];  // xyz [m/s]
   vec4 wave[{{wind_modes}}];   // xyz [1/m]
   vec4 band[CV_COUNT];  // of each CV: near and far factor, inverse pivot, pull

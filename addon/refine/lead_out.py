@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 
 import numpy as np
 
@@ -74,6 +74,12 @@ class Clearance:
     kept: float
     points: Floats
     held: Ints
+
+    @cached_property
+    def reach(self) -> Floats:
+        """How near each point must be to be too near, (point_count,) float32 [m]."""
+        most = np.float32((1.0 - SLACK) * self.kept)
+        return np.where(self.points == -np.inf, np.float32(-np.inf), most)
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,7 +161,7 @@ def lead_out(
     """
     poses, kept = poses_now(colliders), clearance.kept
     held = _hold(points, carry, offsets, clearance)
-    index, distance = nearer_than(points, poses, (1.0 - SLACK) * kept)
+    index, distance = nearer_than(points, poses, clearance.reach)
     owner = _owners(index, offsets)
     away = _size(points[index] - carry(index, owner))
     wanted = np.minimum(clearance.points[index] + away, np.float32(kept))

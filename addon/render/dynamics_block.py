@@ -16,7 +16,7 @@ from functools import lru_cache
 import numpy as np
 
 from ..arrays import Floats
-from ..dynamics.constraints import PINNED
+from ..dynamics.constraints import PINNED, ROUNDING
 from ..dynamics.contacts import REACH, cv_radius
 from ..dynamics.forces import air_fraction, carried_fraction, speed_kept
 from ..dynamics.frame import Frame
@@ -86,7 +86,8 @@ def block_of(
     )
     vectors = values[_NUMBERS:].reshape(-1, 4)
     _fill_forces(vectors, frame)
-    vectors[3, :2] = give(settings), 1.0 / (stiffness(settings, cv_count) * dt * dt)
+    bounce = 1.0 / (stiffness(settings, cv_count) * dt * dt)
+    vectors[3, :3] = give(settings), bounce, ROUNDING * frame.size
     values[_NUMBERS + 4 * _VECTORS :] = _cv_values(settings, cv_count, dt, frame.size)
     return values
 

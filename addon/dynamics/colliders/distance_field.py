@@ -130,8 +130,7 @@ class DistanceField:
     def near(self, points: Floats, reach: Floats | float) -> Ints:
         """Points whose nearest node is no farther away than `reach` plus the distance to that node:
         the distance changes by no more than the way, so no point within `reach` is missed."""
-        place = points - self.low[:, None]
-        place *= np.float32(1.0 / self.cell)
+        place = self._in_cells(points)
         held = self._held(place)
         place -= held
         np.abs(place, out=place)
@@ -147,23 +146,28 @@ class DistanceField:
 
         Outside of the grid the distance grows by the way to the grid's box.
         """
-        held, beyond = self._placed(points)
-        return self._looked_up(held, self._index(held), beyond)
+        held, beyond = self._split(self._in_cells(points))
+        return self._looked_up(held, beyond, self._index(held))
 
-    def nearer(self, points: Floats, reach: float) -> tuple[Ints, Floats, Floats]:
-        """Points (3, n) that may be closer than `reach` [m], with `distance` of these alone."""
-        held, beyond = self._placed(points)
-        index = self._index(held)
+    def nearer(self, points: Floats, reach: Floats | float) -> tuple[Ints, Floats, Floats]:
+        """Points (3, n) that may be closer than `reach` [m], one or (n,) float32, with `distance` of
+        these alone."""
+        place = self._in_cells(points)
+        held = np.maximum(place, np.float32(0.0))
+        index = self._index(np.minimum(held, self._below_top, out=held))
         # what is looked up is within its cell's corners, and grows by sqrt(3) at most
-        kept = (self._least.take(index) < reach * 1.7321).nonzero()[0]
-        held, beyond = (rows.take(kept, axis=1, mode="clip") for rows in (held, beyond))
-        return kept, *self._looked_up(held, index.take(kept), beyond)
+        limit = np.broadcast_to(np.float32(1.7321) * reach, index.shape)
+        kept = (self._least.take(index) < limit).nonzero()[0]
+        index, place = index.take(kept), place.take(kept, axis=1, mode="clip")
+        distance, gradient = self._looked_up(*self._split(place), index)
+        near = (distance < limit.take(kept)).nonzero()[0]
+        return kept.take(near), distance.take(near), gradient.take(near, axis=1)
 
-    def _looked_up(self, held: Floats, index: Ints, beyond: Floats) -> tuple[Floats, Floats]:
+    def _looked_up(self, held: Floats, beyond: Floats, index: Ints) -> tuple[Floats, Floats]:
         """Distance [m] (n,) and gradient (3, n).
 
         Args:
-            held, beyond: see `_placed`.
+            held, beyond: see `_split`.
             index: (n,) of the node below each.
         """
         fx, fy, fz = held - np.trunc(held)
@@ -196,10 +200,15 @@ class DistanceField:
             return self.distance(points)[0] > 0.0
         return np.abs(winding_number(points.T, self.surface)) <= 0.5
 
-    def _placed(self, points: Floats) -> tuple[Floats, Floats]:
-        """Points (3, n) in cells, held inside the grid, and how far outside of it they were."""
-        place = points - self.low[:, None]
+    def _in_cells(self, points: Floats) -> Floats:
+        """Points (3, n) in cells from the first node."""
+        place: Floats = points - self.low[:, None]
         place *= np.float32(1.0 / self.cell)
+        return place
+
+    def _split(self, place: Floats) -> tuple[Floats, Floats]:
+        """Places (3, n) in cells, held inside the grid, and how far outside of it they were;
+        takes `place` for the latter."""
         held = self._held(place)
         place -= held
         return np.minimum(held, self._below_top, out=held), place

@@ -12,7 +12,6 @@ import numpy as np
 from ...arrays import Bools, Floats, Ints
 from .distance_field import DistanceField
 from .posed import (
-    Collider,
     Pose,
     PosedCollider,
     poses_through,
@@ -59,8 +58,9 @@ def distance_to(points: Floats, poses: Sequence[Pose], reach: float) -> tuple[Fl
     return distance, outward
 
 
-def nearer_than(points: Floats, poses: Sequence[Pose], reach: float) -> tuple[Ints, Floats]:
-    """Which points (n, 3) are nearer than `reach` [m], ascending, and their distance [m]."""
+def nearer_than(points: Floats, poses: Sequence[Pose], reach: Floats) -> tuple[Ints, Floats]:
+    """Which points (n, 3) are nearer than their reach, (n,) float32 [m], ascending, and their
+    distance [m]."""
     indices: list[Ints] = [np.zeros(0, np.int64)]
     distances: list[Floats] = [np.zeros(0, np.float32)]
     for index, distance, _ in _nearer(points, poses, reach):
@@ -85,32 +85,39 @@ def distance_of_few(points: Floats, poses: Sequence[Pose]) -> tuple[Floats, Floa
 
 
 def _nearer(
-    points: Floats, poses: Sequence[Pose], reach: float
+    points: Floats, poses: Sequence[Pose], reach: Floats | float
 ) -> Iterator[tuple[Ints, Floats, Floats]]:
-    """Which points (n, 3) are nearer than `reach` [m], ascending: their indices, distances and
-    normals (3, m). As many at once as stay in the processor's cache."""
+    """Which points (n, 3) are nearer than `reach` [m], one or (n,), ascending: their indices,
+    distances and normals (3, m). As many at once as stay in the processor's cache."""
+    reaches = np.broadcast_to(np.float32(reach), len(points))
     for first in range(0, len(points) if poses else 0, _CHUNK):
         rows = np.ascontiguousarray(points[first : first + _CHUNK].T, np.float32)
-        distance, outward = np.full(rows.shape[1], reach, np.float32), np.zeros_like(rows)
-        for pose in poses:
-            local = transform_points(pose.inverse, rows)
-            index, found, normal = _near(pose.collider, local, reach / pose.scale)
-            found, normal = to_world(pose, found, normal, FLATTEST)
-            nearer = (found < distance.take(index)).nonzero()[0]
-            index = index.take(nearer)
-            distance[index] = found.take(nearer)
-            outward[:, index] = normal.take(nearer, axis=1)
-        index = (distance < np.float32(reach)).nonzero()[0]
-        yield index + first, distance.take(index), outward.take(index, axis=1)
+        found = [_near(pose, rows, reaches[first : first + _CHUNK]) for pose in poses]
+        index, distance, outward = found[0]
+        if len(found) > 1:
+            index = np.concatenate([each[0] for each in found])
+            distance = np.concatenate([each[1] for each in found])
+            order = np.lexsort((distance, index))  # of each point the nearest collider first
+            index, chosen = np.unique(index.take(order), return_index=True)
+            chosen = order.take(chosen)
+            distance = distance.take(chosen)
+            outward = np.concatenate([each[2] for each in found], axis=1).take(chosen, axis=1)
+        yield index + first, distance, outward
 
 
-def _near(collider: Collider, local: Floats, reach: float) -> tuple[Ints, Floats, Floats]:
-    """Points (3, n) of object space that may be nearer than `reach`, their distances and gradients
-    (3, m)."""
+def _near(pose: Pose, rows: Floats, reach: Floats) -> tuple[Ints, Floats, Floats]:
+    """Points (3, n) world that are nearer to a collider than their reach, (n,) [m], ascending: their
+    indices, distances and normals (3, m)."""
+    local, collider = transform_points(pose.inverse, rows), pose.collider
+    own_reach = reach / np.float32(pose.scale)
     if isinstance(collider, DistanceField):
-        return collider.nearer(local, reach)
-    index = collider.near(local, reach)
-    return index, *collider.distance(local.take(index, axis=1))
+        index, distance, normal = collider.nearer(local, own_reach)
+    else:
+        index = collider.near(local, own_reach)
+        distance, normal = collider.distance(local.take(index, axis=1))
+    distance, normal = to_world(pose, distance, normal, FLATTEST)
+    nearer = (distance < reach.take(index)).nonzero()[0]
+    return index.take(nearer), distance.take(nearer), normal.take(nearer, axis=1)
 
 
 def are_outside_meshes(points: Floats, colliders: Sequence[PosedCollider]) -> Bools:
