@@ -108,9 +108,7 @@ class ColliderTextures:
 
     @property
     def kinds(self) -> SolidKinds:
-        return SolidKinds(
-            self.rounds is not None, self.fields is not None, len(self.colliders) > 1
-        )
+        return SolidKinds(self.rounds is not None, self.fields is not None, len(self.colliders) > 1)
 
     def solids(self, posed: tuple[PosedCollider, ...]) -> Any:
         """The texture `solids` of lib_signed_distance.glsl: all colliders at the frame's end.

@@ -81,7 +81,7 @@ def _ride_recipe(*, curls: bool, solids: SolidKinds | None = None) -> ShaderReci
     """The pass that moves strands, which may find who is too near to colliders."""
     names = ["root_motions", "guide_weights", "rest_points", "strand_spans", "guide_turns"]
     names += ["guide_axes"] * curls
-    defines = (("HAS_CURLS", 1),) if curls else ()
+    defines: tuple[tuple[str, int], ...] = (("HAS_CURLS", 1),) if curls else ()
     integers = ["segment_count", "strand_count", "mover_count"]
     if solids is not None:
         names += ["clearances", *solids.textures]

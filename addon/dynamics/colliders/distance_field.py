@@ -150,8 +150,8 @@ class DistanceField:
         return self._looked_up(held, beyond, self._index(held))
 
     def nearer(self, points: Floats, reach: Floats | float) -> tuple[Ints, Floats, Floats]:
-        """Points (3, n) that may be closer than `reach` [m], one or (n,) float32, with `distance` of
-        these alone."""
+        """Points (3, n) that may be closer than `reach` [m], one or (n,) float32, with `distance`
+        of these alone."""
         place = self._in_cells(points)
         held = np.maximum(place, np.float32(0.0))
         index = self._index(np.minimum(held, self._below_top, out=held))

@@ -106,8 +106,8 @@ def _nearer(
 
 
 def _near(pose: Pose, rows: Floats, reach: Floats) -> tuple[Ints, Floats, Floats]:
-    """Points (3, n) world that are nearer to a collider than their reach, (n,) [m], ascending: their
-    indices, distances and normals (3, m)."""
+    """Points (3, n) world that are nearer to a collider than their reach, (n,) [m], ascending:
+    their indices, distances and normals (3, m)."""
     local, collider = transform_points(pose.inverse, rows), pose.collider
     own_reach = reach / np.float32(pose.scale)
     if isinstance(collider, DistanceField):
