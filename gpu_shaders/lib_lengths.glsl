@@ -67,7 +67,7 @@ void newton_step(bool has_normals)
   }
 }
 
-// Whether a segment is off by more than this fraction of its length and what cannot be told from none,
+// Whether a segment is off by more than this fraction of its length and what rounding hides,
 // `rounding` [m]; by squares, without a root.
 bool is_off_length(float tolerance, float rounding)
 {
