@@ -457,8 +457,16 @@ def vertex_normals(mesh: Mesh) -> np.ndarray:
     return normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
 
 
+def indices_in(whole: Mesh, part: np.ndarray) -> np.ndarray:
+    """The vertex of a mesh at each of these points, -1 where none is: those made at the cut."""
+    index = {tuple(point): number for number, point in enumerate(whole.positions)}
+    return np.array([index.get(tuple(point), -1) for point in part])
+
+
 def main(path: Path) -> None:
-    skin = shallow(cut(relaxed(read_skin(path))))
+    whole = relaxed(read_skin(path))
+    skin = shallow(cut(whole))
+    makehuman = indices_in(whole, skin.positions)
     island = island_of(skin.uv)[skin.corner_uv]
     lashes, red = lid_rims(skin, np.isin(island, (2, 3))), lips(skin, island == 1)
     skin, sole, balls = laid_out(skin), cap(skin), eyes()
@@ -473,6 +481,7 @@ def main(path: Path) -> None:
     }
     groups = {name: np.concatenate([value, np.zeros(count)]) for name, value in weights.items()}
     groups["cavity"] = cavities(both)
+    makehuman = np.concatenate([makehuman, np.full(count, -1)])
     is_eye = np.arange(len(both.sizes)) >= len(both.sizes) - len(balls.sizes)
     np.savez_compressed(
         OUTPUT,
@@ -482,6 +491,7 @@ def main(path: Path) -> None:
         corner_vertex=both.corner_vertex.astype(np.uint16),
         corner_uv=both.corner_uv.astype(np.uint16),
         material=is_eye.astype(np.uint8),
+        makehuman=makehuman.astype(np.int16),
         **{name: np.round(255 * value).astype(np.uint8) for name, value in groups.items()},
     )
     low, high = both.positions.min(axis=0), both.positions.max(axis=0)

@@ -62,7 +62,7 @@ def rig_of(name: str, most: int = 1_000_000) -> tuple[Any, bpy.types.Object]:
     head = animal() if setup.grows_anywhere(style) else setup.add_head(collection, "light")
     bpy.context.view_layer.update()
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    hair = setup.add_hairstyle(style, head, depsgraph, collection)
+    hair = setup.add_hairstyle(style, head, depsgraph, collection).hair
     children = hair.data.hairloom.children
     children.strand_count = min(children.strand_count, most)
     inputs = of_addon("blender.command_line.inputs")

@@ -79,6 +79,7 @@ class Hairstyle:
     masks: vertex groups of the head, by what they say, see MASKS.
     presets: names of presets, the later over the earlier.
     settings: section -> values, over those.
+    name: by which it is found again; a file's is its path. Not written.
     """
 
     title: str
@@ -89,6 +90,7 @@ class Hairstyle:
     modifiers: tuple[NodeModifier, ...] = ()
     presets: tuple[str, ...] = ()
     settings: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    name: str = ""
 
 
 def read_hairstyle(path: Path, kinds: Mapping[str, type[Settings]]) -> Hairstyle:

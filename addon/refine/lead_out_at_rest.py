@@ -46,10 +46,18 @@ def led_out_at_rest(
     clearance = Clearance(kept, wanted, np.zeros(strands.strand_count, np.int32))
     carry = partial(_as_they_are, strands.points)
     lead_out(points, carry, offsets, posed, clearance)
-    inside = _inside(points, head, signed_distance(points, posed, kept)[0], DEEP * kept)
-    is_out = np.ones(strands.strand_count, bool)
-    is_out[np.searchsorted(offsets, inside, side="right") - 1] = False
-    return replace(strands, points=points), is_out
+    led = replace(strands, points=points)
+    return led, ~are_inside(led, head, DEEP * kept)
+
+
+def are_inside(strands: StrandSet, head: DistanceField, deep: float) -> Bools:
+    """Which strands (strand_count,) have a point in the head itself that is deeper than this."""
+    posed = (PosedCollider(head, np.eye(4), np.eye(4)),)
+    distance, _ = signed_distance(strands.points, posed, deep)
+    inside = _inside(strands.points, head, distance, deep)
+    found = np.zeros(strands.strand_count, bool)
+    found[np.searchsorted(strands.offsets, inside, side="right") - 1] = True
+    return found
 
 
 def _as_they_are(points: Floats, index: Ints, _: Ints) -> Floats:

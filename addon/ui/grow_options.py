@@ -15,7 +15,7 @@ from ..parameters import ALL_SETTINGS
 from .selection import ground_mesh
 
 
-def _weight_names(_operator: Any, context: bpy.types.Context, typed: str) -> list[str]:
+def names_of_weights(_operator: Any, context: bpy.types.Context, typed: str) -> list[str]:
     mesh = ground_mesh(context)
     names = [] if mesh is None else weight_names(mesh)
     return [name for name in names if typed.lower() in name.lower()]
@@ -28,14 +28,14 @@ GROW_PROPERTIES: dict[str, Any] = {
         name="Density",
         description="Vertex group or float attribute on points that sets how densely hair "
         "grows. If empty, combed hair grows on the scalp, other hair everywhere",
-        search=_weight_names,
+        search=names_of_weights,
         search_options={"SUGGESTION"},
     ),
     "length_group": StringProperty(
         name="Length Factor",
         description="Vertex group or float attribute on points that the length is multiplied "
         "by. If empty, all hair has the same length",
-        search=_weight_names,
+        search=names_of_weights,
         search_options={"SUGGESTION"},
     ),
 }

@@ -5,33 +5,36 @@ from __future__ import annotations
 from typing import Any
 
 import bpy
-from bpy.props import BoolProperty, EnumProperty
+from bpy.props import BoolProperty, EnumProperty, StringProperty
 
 from ..blender.base.objects import objects_in
 from ..blender.base.outcome import report
 from ..blender.scene.bust_skin import TONES
+from ..blender.setup.foreign_heads import add_landmarks, may_be_head
 from ..blender.setup.hairstyles import (
     add_face_hair,
     add_hairstyle,
     add_head,
+    fit_again,
     grows_anywhere,
     is_bust,
     is_of_face,
     named_hairstyle,
     shipped,
 )
+from .grow_options import names_of_weights
 from .operators_start import begin, in_object_mode
 from .preferences import preferences
 from .reports import reporting, waiting
-from .selection import ground_mesh
+from .selection import chosen_hair, ground_mesh
 
 #: pictures: how many side by side, how large, and the width of the page at UI scale 1
 _ACROSS, _PICTURE_SCALE, _WIDTH = 4, 5.0, 440
 
 
 class HAIRLOOM_OT_add_hairstyle(bpy.types.Operator):
-    """Add this hairstyle as hair curves to the built-in head: the selected one, or the one in the
-    scene. Fur grows on the selected mesh. Without one, a head with brows and lashes is added too"""
+    """Add this hairstyle as hair curves to the selected head, or to the built-in one in the scene.
+    Fur grows on the selected mesh. Without one, a head with brows and lashes is added too"""
 
     bl_idname = "hairloom.add_hairstyle"
     bl_label = "Hairloom Hairstyle"
@@ -47,6 +50,13 @@ class HAIRLOOM_OT_add_hairstyle(bpy.types.Operator):
         description="Skin tone of the head, if one is added",
         items=[(name, name.title(), "") for name in TONES],
         default="light",
+    )
+    hairline: StringProperty(
+        name="Hairline",
+        description="Vertex group or float attribute on points of the head that says where this "
+        "hair grows; empty: the one named as the hairstyle says, such as scalp",
+        search=names_of_weights,
+        search_options={"SUGGESTION"},
     )
     plays: BoolProperty(
         name="Play", description="Simulate the hair as soon as it is there", default=True
@@ -65,12 +75,16 @@ class HAIRLOOM_OT_add_hairstyle(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         style, collection = named_hairstyle(self.style), context.collection
         with waiting(context):
-            head = ground_mesh(context) if grows_anywhere(style) else built_in_head_of(context)
+            head = ground_mesh(context) if grows_anywhere(style) else self._head(context)
             is_new = head is None
             if head is None:
                 head = add_head(collection, self.skin)
             depsgraph = context.evaluated_depsgraph_get()
-            hair = add_hairstyle(style, head, depsgraph, collection)
+            added = add_hairstyle(style, head, depsgraph, collection, hairline=self.hairline)
+            hair = added.hair
+            for kind, lines in (("WARNING", added.warnings), ("INFO", added.done)):
+                for line in lines:
+                    report(self, kind, line)
             grooms = [hair]
             if is_new and not is_of_face(style):
                 grooms.insert(0, add_face_hair(head, depsgraph, collection, hair))
@@ -79,9 +93,81 @@ class HAIRLOOM_OT_add_hairstyle(bpy.types.Operator):
             begin(self, context, grooms, plays=self.plays)
         return {"FINISHED"}
 
+    def _head(self, context: bpy.types.Context) -> bpy.types.Object | None:
+        """The head that is meant: the active one, or that of the active hair, else the first
+        built-in one of the view layer; None without any."""
+        active = ground_mesh(context)
+        if active is not None:
+            if is_bust(active) or may_be_head(active):
+                return active
+            report(self, "INFO", f"{active.name}: no head; a built-in one is used")
+        return next((obj for obj in objects_in(context.view_layer) if is_bust(obj)), None)
+
+
+class HAIRLOOM_OT_place_landmarks(bpy.types.Operator):
+    """Guess where crown, ears, nose and other landmarks of the selected head are, and mark them by
+    objects that can be moved. Hairstyles that are added, or fitted again, go by them"""
+
+    bl_idname = "hairloom.place_landmarks"
+    bl_label = "Place Landmarks"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if not in_object_mode(cls, context):
+            return False
+        if ground_mesh(context) is not None:
+            return True
+        cls.poll_message_set("Select a head")
+        return False
+
+    @reporting
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        head = ground_mesh(context)
+        assert head is not None, "poll has looked"
+        with waiting(context):
+            depsgraph = context.evaluated_depsgraph_get()
+            made, is_sure = add_landmarks(head, depsgraph, context.collection)
+        if is_sure:
+            report(self, "INFO", f"{head.name}: placed {len(made)} landmarks it lacked")
+        else:
+            report(
+                self, "WARNING", f"{head.name}: it is unlike a head: drag all landmarks yourself"
+            )
+        return {"FINISHED"}
+
+
+class HAIRLOOM_OT_fit_again(bpy.types.Operator):
+    """Give the selected hair the curves of its hairstyle again, by the landmarks and the shape that
+    its head has now. Modifiers and settings stay, combing is lost"""
+
+    bl_idname = "hairloom.fit_again"
+    bl_label = "Fit Again"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if not in_object_mode(cls, context):
+            return False
+        if any(hair.hairloom.hairstyle for hair in chosen_hair(context)):
+            return True
+        cls.poll_message_set("Select hair that was added as a hairstyle")
+        return False
+
+    @reporting
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        with waiting(context):
+            depsgraph = context.evaluated_depsgraph_get()
+            for hair in chosen_hair(context):
+                if hair.hairloom.hairstyle:
+                    for warning in fit_again(hair, depsgraph):
+                        report(self, "WARNING", warning)
+        return {"FINISHED"}
+
 
 class HAIRLOOM_OT_choose_hairstyle(bpy.types.Operator):
-    """Choose a hairstyle and add it to the built-in head, or fur and add it to the selected mesh"""
+    """Choose a hairstyle and add it to the selected head or the built-in one, or fur and add it to
+    the selected mesh"""
 
     bl_idname = "hairloom.choose_hairstyle"
     bl_label = "Add Hairstyle"
@@ -122,17 +208,10 @@ class HAIRLOOM_MT_hairstyles(bpy.types.Menu):
             operator.style = entry.name
 
 
-def built_in_head_of(context: bpy.types.Context) -> bpy.types.Object | None:
-    """The built-in head that is meant: the active one, or that of the active hair, else the first
-    of the view layer; None without any."""
-    active = ground_mesh(context)
-    if active is not None and is_bust(active):
-        return active
-    return next((obj for obj in objects_in(context.view_layer) if is_bust(obj)), None)
-
-
 CLASSES: tuple[type[Any], ...] = (
     HAIRLOOM_OT_add_hairstyle,
+    HAIRLOOM_OT_place_landmarks,
+    HAIRLOOM_OT_fit_again,
     HAIRLOOM_OT_choose_hairstyle,
     HAIRLOOM_MT_hairstyles,
 )

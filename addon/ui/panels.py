@@ -9,6 +9,7 @@ import bpy
 
 from ..blender.preview import previews
 from ..blender.scene.particle_hair import hair_systems
+from ..blender.setup.foreign_heads import may_be_head
 from ..blender.setup.starting import is_untouched
 from .drawing import Draw
 from .operators_adopted import draw_sort
@@ -51,6 +52,10 @@ def draw_preview(layout: bpy.types.UILayout, context: bpy.types.Context) -> None
     if session is None and is_untouched(hair):
         layout.operator("hairloom.use_groom", icon="OUTLINER_OB_CURVES")
     draw_issues(layout, context, hair, session)
+    if hair.hairloom.hairstyle:
+        row = layout.row(align=True)
+        row.operator("hairloom.place_landmarks", text="Landmarks", icon="EMPTY_AXIS")
+        row.operator("hairloom.fit_again", icon="FILE_REFRESH")
     row = layout.row(align=True)
     row.prop(hair.hairloom, "debug_view")
     row.prop(hair.hairloom, "show_counts", text="", icon="INFO")
@@ -65,6 +70,8 @@ def draw_start(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     column.operator("hairloom.add_groom", text="Add Hair", icon="OUTLINER_OB_CURVES")
     column.operator("hairloom.choose_hairstyle", icon="USER")
     mesh = active_mesh(context)
+    if mesh is not None and may_be_head(mesh):
+        column.operator("hairloom.place_landmarks", icon="EMPTY_AXIS")
     if mesh is not None and hair_systems(mesh):
         column.operator("hairloom.convert_particles", icon="PARTICLES")
     column.operator("hairloom.sample_scene", text="Sample Scene", icon="SCENE_DATA")

@@ -52,6 +52,14 @@ def weights_on(obj: bpy.types.Object, mesh: bpy.types.Mesh, name: str) -> Floats
     return weights
 
 
+def set_group(obj: bpy.types.Object, name: str, weights: Floats) -> None:
+    """A vertex group with these weights, (vertex_count,), those above 0."""
+    group = obj.vertex_groups.get(name) or obj.vertex_groups.new(name=name)
+    steps = np.round(255.0 * weights).astype(np.int64)  # few calls for many vertices
+    for step in np.unique(steps[steps > 0]):
+        group.add(np.flatnonzero(steps == step).tolist(), float(step) / 255.0, "REPLACE")
+
+
 def _group_weights(mesh: bpy.types.Mesh, index: int) -> Floats:
     weights = np.zeros(len(mesh.vertices), np.float32)
     for vertex in mesh.vertices:  # Blender gives the weights of groups in no faster way

@@ -28,7 +28,7 @@ from .grow_job import GROW
 from .import_job import IMPORT
 from .inputs import Sources
 from .job_options import check_numbers, chosen_settings
-from .job_steps import Job
+from .job_steps import Job, tell_notes
 from .object_settings import is_groom, named_objects
 from .places import check_outputs, check_report
 from .render_job import RENDER
@@ -163,7 +163,7 @@ def _job(verb: Verb, options: argparse.Namespace, report: Report) -> Job:
             options.groom = options.groom or (None if options.style else _only_groom(options))
     if verb.takes_hair and options.style:
         with report.stage("add hairstyle"):
-            options.groom = _styled(options)
+            options.groom = _styled(options, report)
     output = getattr(options, "output", None)
     if verb.saves_scene:
         check_saving(output, over=options.save)
@@ -194,7 +194,7 @@ def _sources(verb: Verb, options: argparse.Namespace) -> Sources:
     )
 
 
-def _styled(options: argparse.Namespace) -> str:
+def _styled(options: argparse.Namespace, report: Report) -> str:
     """The hair of --style, added to the open scene as the artist's button does; its name.
 
     Raises:
@@ -212,9 +212,12 @@ def _styled(options: argparse.Namespace) -> str:
     else:
         head = add_head(collection, options.skin)
     style, depsgraph = named_hairstyle(options.style), bpy.context.evaluated_depsgraph_get()
-    hair = add_hairstyle(style, head, depsgraph, collection)
+    added = add_hairstyle(
+        style, head, depsgraph, collection, hairline=options.children_density or ""
+    )
+    tell_notes([*added.warnings, *added.done], report)
     bpy.context.view_layer.update()
-    return str(hair.name)
+    return str(added.hair.name)
 
 
 def _only_groom(options: argparse.Namespace) -> str | None:

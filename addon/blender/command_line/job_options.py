@@ -32,7 +32,7 @@ def add_hair_options(parser: argparse.ArgumentParser) -> None:
         "--style",
         choices=[entry.name for entry in hairstyles()],
         metavar="NAME",
-        help="a hairstyle on the built-in head, with its own settings: "
+        help="a hairstyle on the built-in head or on --head, with its own settings: "
         + ", ".join(entry.name for entry in hairstyles()),
     )
     sources.add_argument("--head", help="mesh that the hair grows from (default: built in)")

@@ -46,6 +46,8 @@ _OF_SCENES = (
     "make_cards",
     "sort_cards",
     "add_hairstyle",
+    "place_landmarks",
+    "fit_again",
     "sample_scene",
 )
 #: operators that change the artist's own presets instead

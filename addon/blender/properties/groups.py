@@ -193,6 +193,16 @@ class HAIRLOOM_PG_character(bpy.types.PropertyGroup):
             update=lambda self, _context: changed.settings(self.id_data),
             override=OVERRIDABLE,
         ),
+        "hairstyle": StringProperty(
+            name="Hairstyle",
+            description="The hairstyle that these curves were added as, by name or file",
+            override=OVERRIDABLE,
+        ),
+        "landmark": StringProperty(
+            name="Landmark",
+            description="Which place of its parent, a head, this object marks",
+            override=OVERRIDABLE,
+        ),
         "debug_view": EnumProperty(
             items=_DEBUG_VIEWS,
             name="Show",

@@ -6,6 +6,7 @@ import bpy
 import numpy as np
 
 from ...exchange.textures.srgb import srgb_encoded
+from ..base.vertex_weights import set_group
 from .bust_data import HAIR_GROUPS, Bust, load_bust
 from .bust_skin import (
     EYE_IOR,
@@ -31,7 +32,7 @@ def bust_object(name: str, tone: str | None) -> bpy.types.Object:
     mesh = _mesh(name, bust)
     obj = bpy.data.objects.new(name, mesh)
     for group in HAIR_GROUPS:
-        _add_group(obj, group, bust)
+        set_group(obj, group, bust.weights[group])
     modifier = obj.modifiers.new("Smooth", "SUBSURF")
     modifier.levels = modifier.render_levels = 1
     # the picture is painted over the map as it is
@@ -54,12 +55,6 @@ def _mesh(name: str, bust: Bust) -> bpy.types.Mesh:
     mesh.polygons.foreach_set("material_index", bust.material)
     mesh.shade_smooth()
     return mesh
-
-
-def _add_group(obj: bpy.types.Object, name: str, bust: Bust) -> None:
-    group, weights = obj.vertex_groups.new(name=name), bust.weights[name]
-    for weight in np.unique(weights[weights > 0.0]):
-        group.add(np.flatnonzero(weights == weight).tolist(), float(weight), "REPLACE")
 
 
 def _picture(tone: str) -> bpy.types.Image:

@@ -30,6 +30,7 @@ class Bust:
     corner_vertex, corner_uv: (corner_count,) indices.
     weights: by name, (vertex_count,) from 0 to 1: HAIR_GROUPS; lips; cavity, the light from around
         that no fold keeps off.
+    makehuman: (vertex_count,) index in MakeHuman's base mesh; -1 for eyes and what closes the cut.
     """
 
     positions: Floats
@@ -39,6 +40,7 @@ class Bust:
     corner_vertex: Ints
     corner_uv: Ints
     weights: dict[str, Floats]
+    makehuman: Ints
 
     @property
     def fans(self) -> tuple[Ints, Ints]:
@@ -59,7 +61,7 @@ def load_bust() -> Bust:
         arrays = {name: file[name] for name in file.files}
     integers = {
         name: arrays[name].astype(np.int32)
-        for name in ("sizes", "material", "corner_vertex", "corner_uv")
+        for name in ("sizes", "material", "corner_vertex", "corner_uv", "makehuman")
     }
     weights = {
         name: arrays[name].astype(np.float32) / 255.0 for name in (*HAIR_GROUPS, "lips", "cavity")

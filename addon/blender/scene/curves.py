@@ -110,6 +110,16 @@ def write_curves(
             knows their widths, the curves have those that are found.
     """
     curves = bpy.data.hair_curves.new(name)
+    fill_curves(curves, strands)
+    obj = bpy.data.objects.new(name, curves)
+    collection.objects.link(obj)
+    if surface is not None:
+        _attach(obj, surface)
+    return obj
+
+
+def fill_curves(curves: bpy.types.Curves, strands: StrandSet) -> None:
+    """Write strands into empty hair curves; see `write_curves`."""
     if strands.strand_count:
         curves.add_curves(strands.point_counts.tolist())
         curves.position_data.foreach_set("vector", strands.points.ravel())
@@ -122,11 +132,6 @@ def write_curves(
     if strands.root_uv is not None:
         set_attribute(curves, "surface_uv_coordinate", "CURVE", strands.root_uv)
     set_colors(curves, strands)
-    obj = bpy.data.objects.new(name, curves)
-    collection.objects.link(obj)
-    if surface is not None:
-        _attach(obj, surface)
-    return obj
 
 
 def set_colors(curves: bpy.types.Curves, strands: StrandSet) -> None:

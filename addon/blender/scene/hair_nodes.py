@@ -18,10 +18,12 @@ _KINDS: dict[str, tuple[type, ...]] = {
     "NodeSocketFloat": (int, float),
     "NodeSocketMenu": (str,),
 }
+#: the input of curls and braids that counts turns along a length
+_PER_LENGTH = "Frequency"
 
 
 def add_hair_nodes(
-    hair: bpy.types.Object, nodes: str, values: Mapping[str, Any]
+    hair: bpy.types.Object, nodes: str, values: Mapping[str, Any], scale: float = 1.0
 ) -> bpy.types.Modifier:
     """Add one of Blender's node groups for hair as a modifier, with these values.
 
@@ -30,6 +32,8 @@ def add_hair_nodes(
 
     Args:
         values: by the names of inputs, as the artist sees them.
+        scale: how much larger than a human's the hair is; distances and frequencies are
+            fitted to it.
 
     Raises:
         HairloomError: this Blender has no such group, or it has no such inputs.
@@ -48,6 +52,10 @@ def add_hair_nodes(
     modifier.node_group = group
     inputs = _inputs(group)
     for name, value in values.items():
+        if getattr(inputs[name], "subtype", "") == "DISTANCE":
+            value *= scale
+        elif name == _PER_LENGTH:
+            value /= scale
         getattr(modifier.properties.inputs, inputs[name].identifier).value = value
     return modifier
 

@@ -2,39 +2,49 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
 
 import bpy
 import numpy as np
 
+from ...arrays import Floats
+from ...dynamics.colliders import DistanceField
 from ...errors import HairloomError
 from ...exchange.hairstyles import GROWN, Hairstyle, read_hairstyle, read_title
 from ...groom.face_hair import grow_face_hair
 from ...groom.grow import grow
 from ...groom.settings import GrowSettings
 from ...parameters import ALL_SETTINGS
-from ...refine.lead_out_at_rest import led_out_at_rest
+from ...refine.lead_out_at_rest import are_inside, led_out_at_rest
 from ...shading.settings import ShadingSettings
 from ...strands import StrandSet, Surface
-from ...strands.affine import mean_scale
+from ...strands.affine import mean_scale, moved
 from ...strands.face import is_face_hair
-from ..base.vertex_weights import read_weights
+from ...strands.rooted_shapes import RootedShapes
+from ..base.objects import head_of
+from ..base.vertex_weights import read_weights, set_group, weight_names
 from ..colliders.fields import solid_of
 from ..properties import previews
 from ..properties.presets import apply, named_preset
 from ..properties.properties import settings_of
 from ..scene.bust import bust_object
 from ..scene.bust_data import load_bust
-from ..scene.curves import write_curves
+from ..scene.curves import fill_curves, read_curves, write_curves
 from ..scene.hair_material import put_look_material
 from ..scene.hair_nodes import add_hair_nodes
 from ..scene.surfaces import read_surface
-from .starting import fit_motion, fitted, fitting_factor
+from .foreign_heads import own_positions, put_landmarks, read_foreign_head
+from .starting import REAL, fit_motion, fitted, fitting_factor
 
 HAIRSTYLE_FOLDER = Path(__file__).resolve().parents[3] / "hairstyles"
 _HEAD = "Head"
+#: a note says so where more guides than this part are left out
+_NOTED_LOSS = 0.02
+#: how far modifiers may bring hair into a head [m on the built-in head]
+_DEEP = 0.0008
 
 
 @dataclass(frozen=True)
@@ -80,7 +90,7 @@ def named_hairstyle(name: str) -> Hairstyle:
         raise HairloomError(
             "there is no such hairstyle", place=name, remedy=f"Use a file or one of {known}"
         )
-    return read_hairstyle(path, ALL_SETTINGS)
+    return replace(read_hairstyle(path, ALL_SETTINGS), name=name)
 
 
 def is_bust(mesh: bpy.types.Object) -> bool:
@@ -105,72 +115,233 @@ def add_head(collection: bpy.types.Collection, skin: str) -> bpy.types.Object:
     return head
 
 
+@dataclass(frozen=True)
+class _Growth:
+    """What a style is on a mesh, before anything of it is in the scene.
+
+    size: how much larger than it was made the hair is.
+    factor: the same for its motion, 1 for all that may be human.
+    solid: of a head that is not built in, what its modifiers may bring hair into.
+    groups: weights of vertices by the names of groups that the mesh lacks.
+    landmarks: where those that it lacks may be, by name.
+    """
+
+    strands: StrandSet
+    size: float
+    factor: float
+    warnings: tuple[str, ...] = ()
+    groups: Mapping[str, Floats] = field(default_factory=dict)
+    landmarks: Mapping[str, Floats] = field(default_factory=dict)
+    solid: DistanceField | None = None
+
+
+@dataclass(frozen=True)
+class AddedHair:
+    """done: what else was added to the scene, a sentence each."""
+
+    hair: bpy.types.Object
+    done: tuple[str, ...]
+    warnings: tuple[str, ...]
+
+
 def add_hairstyle(
     style: Hairstyle,
     head: bpy.types.Object,
     depsgraph: bpy.types.Depsgraph,
     collection: bpy.types.Collection,
-) -> bpy.types.Object:
-    """Hair curves in this style on the built-in head, or fur on any mesh, with its modifiers and
-    settings.
+    *,
+    hairline: str = "",
+) -> AddedHair:
+    """Hair curves in this style on a head, or fur on any mesh, with its modifiers and settings.
+
+    A head that is neither the built-in one nor MakeHuman's gets landmarks. One without the vertex
+    group by which the style's children grow gets it.
+
+    Args:
+        hairline: a vertex group or attribute of the head instead of the style's own.
 
     Raises:
         HairloomError: a mesh that it does not grow on, a mask that it has not or that is empty, a
             preset or node group that is not there. Nothing is added then.
     """
-    if not (grows_anywhere(style) or is_bust(head)):
-        raise HairloomError(
-            "this is not the built-in head",
-            place=head.name,
-            remedy="Select a built-in head, or nothing to add one; fur and Add Hair take others",
-        )
-    for name in style.masks.values():
-        if not (read_weights(head, depsgraph, name) > 0.0).any():
-            raise HairloomError(
-                f"the weights '{name}' are zero everywhere, so no hair would grow",
-                place=head.name,
-                remedy="Paint where hair is to grow, or add a new built-in head",
-            )
-    strands, factor = _strands(style, head, depsgraph)
-    hair = write_curves(f"{head.name} {style.title}", strands, head, collection)
+    masks = {**style.masks, **({"children": hairline} if hairline and style.masks else {})}
+    _check_masks(style, head, depsgraph, masks.values(), needed=hairline)
+    growth = _growth(style, head, depsgraph, masks)
+    hair = write_curves(f"{head.name} {style.title}", growth.strands, head, collection)
     try:
         for one in style.modifiers:
-            add_hair_nodes(hair, one.nodes, one.inputs)
+            add_hair_nodes(hair, one.nodes, one.inputs, growth.size)
         for name in style.presets:
             for settings in named_preset(name).all:
                 apply(settings, hair)
         _put_settings(style, hair)
-        fit_motion(hair, factor)
+        fit_motion(hair, growth.factor)
+        if growth.solid is not None and hair.modifiers:
+            _leave_out_inside(hair, growth.solid, _DEEP * growth.size)
     except HairloomError:
         curves = hair.data
         bpy.data.objects.remove(hair)
         bpy.data.hair_curves.remove(curves)
         raise
-    hair.hairloom.children_density = style.masks.get("children", "")
+    hair.hairloom.children_density = masks.get("children", "")
+    hair.hairloom.hairstyle = style.name
     put_look_material(hair.data, settings_of(hair.data.hairloom.shading, ShadingSettings))
-    return hair
+    done = _put(growth, head, collection)
+    return AddedHair(hair, done, growth.warnings)
 
 
-def _strands(
-    style: Hairstyle, head: bpy.types.Object, depsgraph: bpy.types.Depsgraph
-) -> tuple[StrandSet, float]:
-    """The style's curves on this mesh, and how much larger than a head's fur is there."""
+def _put(
+    growth: _Growth, head: bpy.types.Object, collection: bpy.types.Collection
+) -> tuple[str, ...]:
+    """Give a head the vertex groups and landmarks that it lacks; what was done."""
+    done = []
+    for name, weights in growth.groups.items():
+        set_group(head, name, weights)
+        done.append(f"{head.name} has a vertex group '{name}' now: paint it to move the hairline")
+    if growth.landmarks and put_landmarks(head, growth.landmarks, collection):
+        done.append(
+            f"{head.name} has landmarks now: drag those that are not at their places, and press "
+            "Fit Again"
+        )
+    return tuple(done)
+
+
+def fit_again(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> tuple[str, ...]:
+    """Give hair the curves of its hairstyle again, by the landmarks and the shape that its head has
+    now; modifiers and settings stay. Returns warnings.
+
+    Raises:
+        HairloomError: it was not added as a hairstyle, has no head, or does not fit on it. It is
+            as it was then.
+    """
+    head = head_of(hair)
+    if not hair.hairloom.hairstyle or head is None:
+        raise HairloomError(
+            "it was not added as a hairstyle",
+            place=hair.name,
+            remedy="Add a hairstyle to the head (Add Hairstyle)",
+        )
+    style = named_hairstyle(hair.hairloom.hairstyle)
+    mask = hair.hairloom.children_density
+    masks = {**style.masks, **({"children": mask} if mask else {})}
+    _check_masks(style, head, depsgraph, masks.values(), needed="")
+    growth = _growth(style, head, depsgraph, masks)
+    curves = hair.data
+    curves.remove_curves()
+    # as they are written where their object stands now
+    back = np.linalg.inv(np.array(hair.matrix_world, np.float64))
+    fill_curves(curves, replace(growth.strands, points=moved(growth.strands.points, back)))
+    hair.update_tag()
+    if growth.solid is not None and hair.modifiers:
+        _leave_out_inside(hair, growth.solid, _DEEP * growth.size)
+    return growth.warnings
+
+
+def _check_masks(
+    style: Hairstyle,
+    head: bpy.types.Object,
+    depsgraph: bpy.types.Depsgraph,
+    names: Iterable[str],
+    needed: str,
+) -> None:
+    """Raise where a mask is empty, or is not there and nothing can make it."""
+    made = () if is_bust(head) else set(style.masks.values()) - {needed}
+    for name in names:
+        if name in made and name not in weight_names(head):
+            continue
+        if not (read_weights(head, depsgraph, name) > 0.0).any():
+            raise HairloomError(
+                f"the weights '{name}' are zero everywhere, so no hair would grow",
+                place=head.name,
+                remedy="Paint where hair is to grow, delete the group to have it made, or add a "
+                "new built-in head",
+            )
+
+
+def _growth(
+    style: Hairstyle,
+    head: bpy.types.Object,
+    depsgraph: bpy.types.Depsgraph,
+    masks: Mapping[str, str],
+) -> _Growth:
     if style.guides is None:
         factor = fitting_factor(head, depsgraph)
         settings = fitted(GrowSettings.from_dict(style.settings[GROWN], style.title), factor)
         surface = read_surface(head, depsgraph, need_uv=False, place=head.name)
-        return _outside(grow(surface, settings), surface), factor
+        return _Growth(_outside(grow(surface, settings), solid_of(surface)), factor, factor)
+    if not is_bust(head):
+        return _on_foreign(style.guides, head, depsgraph, masks)
     surface = read_surface(head, depsgraph, need_uv=True, place=head.name)
-    return style.guides.on(surface, _size_of(head)), 1.0
+    size = _size_of(head)
+    return _Growth(style.guides.on(surface, size), size, 1.0)
 
 
-def _outside(fur: StrandSet, surface: Surface) -> StrandSet:
-    """Fur led out of the mesh that it grows on, without what grows on parts within it."""
-    solid = solid_of(surface)
+def _on_foreign(
+    guides: RootedShapes,
+    head: bpy.types.Object,
+    depsgraph: bpy.types.Depsgraph,
+    masks: Mapping[str, str],
+) -> _Growth:
+    """Guides on a head that is not built in."""
+    foreign = read_foreign_head(head, depsgraph)
+    strands, warnings = foreign.hair(guides)
+    mask, groups = masks.get("children", ""), {}
+    if mask in weight_names(head):
+        strands = _within(strands, read_weights(head, depsgraph, mask), foreign.surface, head, mask)
+    elif mask:
+        groups[mask] = foreign.weights(mask, own_positions(head, depsgraph))
+    solid = solid_of(foreign.surface)
+    strands = _outside(strands, solid)
+    lost = len(guides.group) - strands.strand_count
+    if lost > _NOTED_LOSS * len(guides.group):
+        warnings.append(
+            f"{head.name}: {lost:,} of {len(guides.group):,} guides were left out, since the mesh "
+            "or its vertex group has no place for them"
+        )
+    size = foreign.scale
+    factor = size if not 1.0 / REAL <= size <= REAL else 1.0
+    return _Growth(strands, size, factor, tuple(warnings), groups, foreign.landmarks, solid)
+
+
+def _within(
+    strands: StrandSet, weights: Floats, surface: Surface, head: bpy.types.Object, mask: str
+) -> StrandSet:
+    """The strands whose roots have a weight above 0.
+
+    Raises:
+        HairloomError: none has.
+    """
+    triangle, barycentric = strands.root_triangle, strands.root_barycentric
+    assert triangle is not None and barycentric is not None
+    at = np.einsum("sk,sk->s", barycentric, weights[surface.triangles[triangle]])
+    kept = np.flatnonzero(at > 0.0)
+    if not len(kept):
+        raise HairloomError(
+            f"the weights '{mask}' are zero wherever this hair grows",
+            place=head.name,
+            remedy="Paint them where hair is to grow, or choose another group as the hairline",
+        )
+    return strands.take(kept)
+
+
+def _leave_out_inside(hair: bpy.types.Object, solid: DistanceField, deep: float) -> None:
+    """Take away the curves that their modifiers, such as curls, bring into the head."""
+    bpy.context.view_layer.update()
+    made = read_curves(hair, bpy.context.evaluated_depsgraph_get())
+    if made.dropped:
+        return  # which curves are left cannot be said
+    inside = np.flatnonzero(are_inside(made.strands, solid, deep))
+    if 0 < len(inside) < made.strands.strand_count:
+        hair.data.remove_curves(indices=inside.tolist())
+
+
+def _outside(strands: StrandSet, solid: DistanceField | None) -> StrandSet:
+    """Strands led out of the mesh that they grow on, without those that nothing leads out, such as
+    fur on parts within it."""
     if solid is None:
-        return fur
-    led, is_out = led_out_at_rest(fur, solid, float(np.median(fur.lengths())))
-    return led.take(np.flatnonzero(is_out)) if is_out.any() else fur
+        return strands
+    led, is_out = led_out_at_rest(strands, solid, float(np.median(strands.lengths())))
+    return led.take(np.flatnonzero(is_out)) if is_out.any() else strands
 
 
 def grows_anywhere(style: Hairstyle) -> bool:

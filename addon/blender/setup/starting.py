@@ -24,7 +24,7 @@ from ..strands.groom_files import grow_on
 #: Smallest extent [m] of a head of human size; lengths are declared for it.
 _HEAD_SIZE = 0.19
 #: Meshes within these factors are heads or bodies of real size, and are not fitted.
-_REAL = 2.5
+REAL = 2.5
 #: lengths that belong to the whole head, not to single hairs
 _LENGTHS = ("length", "wave", "wave_length", "frizz", "clearance", "volume")
 #: settings of dynamics -> the power of the size that they scale with; frequencies are kept
@@ -46,7 +46,7 @@ def fitting_factor(head: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> fl
         return 1.0
     least = float(np.ptp(positions, axis=0).min())
     factor = least / _HEAD_SIZE
-    return factor if factor > _REAL or 0.0 < factor < 1.0 / _REAL else 1.0
+    return factor if factor > REAL or 0.0 < factor < 1.0 / REAL else 1.0
 
 
 def fitted(settings: GrowSettings, factor: float) -> GrowSettings:

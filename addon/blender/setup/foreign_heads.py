@@ -1,0 +1,274 @@
+"""Heads that are not the built-in one: MakeHuman's by their topology, others by fitting."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cache
+
+import bpy
+import numpy as np
+
+from ...arrays import Floats, Ints
+from ...errors import HairloomError
+from ...groom.fitted_hair import OuterSearch, fitted_hair, warped_weights
+from ...groom.head_fit import (
+    LANDMARKS,
+    FitModel,
+    Warp,
+    fit_by_vertices,
+    fit_head,
+    guess_landmarks,
+)
+from ...strands import StrandSet, Surface
+from ...strands.rooted_shapes import RootedShapes
+from ..scene.built_in_head import built_in_head
+from ..scene.bust_data import SKIN, load_bust
+from ..scene.surfaces import read_positions, read_surface
+
+#: modifiers that move vertices and leave their number as it is
+_DEFORMING = {
+    "ARMATURE", "CAST", "CURVE", "DISPLACE", "HOOK", "LAPLACIANDEFORM", "LATTICE", "MESH_DEFORM",
+    "SHRINKWRAP", "SIMPLE_DEFORM", "SMOOTH", "CORRECTIVE_SMOOTH", "LAPLACIANSMOOTH",
+    "SURFACE_DEFORM", "WARP", "WAVE",
+}  # fmt: skip
+#: of the built-in head's edges, how many a mesh of MakeHuman's has at least
+_SAME_EDGES = 0.9
+#: a mesh with fewer vertices is no head
+_MIN_VERTICES = 150
+#: height [m] in the built-in head above which vertices are the head's, not neck or shoulders
+_CHIN = -0.115
+#: how far [m on the built-in head] a root may be from the mesh, and the part that may be farther
+_MISSING, _MAX_MISSING = 0.012, 0.25
+#: how far skin may be from a fitted mesh on average before a warning asks to look [m]
+_LOOSE = 0.002
+#: the same of single roots, and how many of them may be farther
+_LOOSE_ROOT, _MAX_LOOSE = 0.004, 0.05
+#: of vertex groups: what is farther from the fitted skin has no weight [m]
+_GROUP_REACH = 0.02
+#: how large landmarks are shown, as a part of a head of 1 m
+_SHOWN = 0.006
+
+
+@dataclass(frozen=True, eq=False)
+class ForeignHead:
+    """A mesh with the built-in head fitted to it, in world space.
+
+    skin: the built-in head's skin as it lies on the mesh, with its own UVs.
+    away: how far from the mesh that is, on average [m on the built-in head].
+    landmarks: guessed or placed; none where the topology says where everything is.
+    """
+
+    name: str
+    surface: Surface
+    skin: Surface
+    warp: Warp
+    landmarks: dict[str, Floats]
+    away: float
+
+    @property
+    def scale(self) -> float:
+        """How much larger than the built-in head it is."""
+        return self.warp.scale
+
+    def hair(self, guides: RootedShapes) -> tuple[StrandSet, list[str]]:
+        """Guides of the built-in head on this one, but for those below which it has no skin; and
+        warnings.
+
+        Raises:
+            HairloomError: too many of them.
+        """
+        outside = OuterSearch(self.surface, self.skin, self.scale)
+        made, roots = guides.on(built_in_head().surface), guides.on(self.skin).roots
+        fitted = fitted_hair(made, roots, self.warp, outside, self.scale)
+        missing, loose = (fitted.away > limit * self.scale for limit in (_MISSING, _LOOSE_ROOT))
+        if missing.mean() > _MAX_MISSING:
+            raise HairloomError(
+                f"it has no faces where {100.0 * missing.mean():.0f} % of this hair grows",
+                place=self.name,
+                remedy="Close its holes, or press Place Landmarks, drag them to their places and "
+                "add the hairstyle again",
+            )
+        warnings = []
+        if self.away > _LOOSE:
+            warnings.append(
+                f"{self.name}: it is unlike the built-in head. Drag its landmarks to their places, "
+                "and press Fit Again"
+            )
+        elif loose.mean() > _MAX_LOOSE:
+            warnings.append(
+                f"{self.name}: {100.0 * loose.mean():.0f} % of the roots had to move by more than "
+                f"{1000.0 * _LOOSE_ROOT * self.scale:.0f} mm to be on it. Close its holes, or drag "
+                "its landmarks to their places and press Fit Again"
+            )
+        return fitted.strands.take(np.flatnonzero(~missing)), warnings
+
+    def weights(self, group: str, positions: Floats) -> Floats:
+        """What one of the built-in head's groups is at positions (n, 3) on this head."""
+        own = load_bust().weights[group]
+        return warped_weights(own, self.skin, positions, _GROUP_REACH * self.scale)
+
+
+def read_foreign_head(head: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> ForeignHead:
+    """A mesh that hair of the built-in head is to grow on; the scene is not changed.
+
+    Raises:
+        HairloomError: it has no faces, or is too unlike a head; landmarks that are mistaken.
+    """
+    surface = read_surface(head, depsgraph, need_uv=False, place=head.name)
+    if has_makehuman_topology(head.data):
+        warp, positions = _by_topology(own_positions(head, depsgraph))
+        return ForeignHead(head.name, surface, _skin(positions), warp, {}, 0.0)
+    if not may_be_head(head):
+        raise HairloomError(
+            f"a mesh of {len(head.data.vertices)} vertices is no head",
+            place=head.name,
+            remedy="Select a head, or nothing to add one; fur and Add Hair take any mesh",
+        )
+    placed = placed_landmarks(head, depsgraph)
+    points = None
+    if placed:
+        is_whole = len(placed) == len(LANDMARKS)
+        points = {**({} if is_whole else guess_landmarks(fit_model(), surface)[0]), **placed}
+    fit = fit_head(fit_model(), surface, points, head.name)
+    positions = fit.warp(load_bust().positions)
+    return ForeignHead(head.name, surface, _skin(positions), fit.warp, fit.landmarks, fit.away)
+
+
+def may_be_head(mesh: bpy.types.Object) -> bool:
+    """Whether it has as many vertices as a head needs."""
+    return mesh.type == "MESH" and len(mesh.data.vertices) >= _MIN_VERTICES
+
+
+@cache
+def fit_model() -> FitModel:
+    """The built-in head as others are fitted to it."""
+    bust = load_bust()
+    is_skin = bust.makehuman >= 0
+    is_open = is_skin & (bust.weights["cavity"] > 0.4)
+    surface = _skin(bust.positions)
+    triangles = surface.triangles[is_skin[surface.triangles].any(axis=1)]
+    return FitModel(Surface(bust.positions, triangles), is_open)
+
+
+def _skin(positions: Floats) -> Surface:
+    """The built-in head without its eyes, with its vertices elsewhere."""
+    bust = load_bust()
+    corners, material = bust.fans
+    corners = corners[material == SKIN]
+    return Surface(positions, bust.corner_vertex[corners], bust.uv[bust.corner_uv[corners]])
+
+
+def has_makehuman_topology(mesh: bpy.types.Mesh) -> bool:
+    """Whether a mesh, with or without the helpers for clothes, has MakeHuman's vertices."""
+    own = _makehuman_edges()
+    if len(mesh.vertices) <= own.max():
+        return False
+    edges = np.empty((len(mesh.edges), 2), np.int32)
+    mesh.edges.foreach_get("vertices", edges.ravel())
+    return bool(np.isin(_keys(own), _keys(edges)).mean() > _SAME_EDGES)
+
+
+@cache
+def _makehuman_edges() -> Ints:
+    """The edges of the built-in head between vertices of MakeHuman's, by its numbers, (n, 2)."""
+    bust = load_bust()
+    last = np.cumsum(bust.sizes) - 1
+    following = np.arange(len(bust.corner_vertex)) + 1
+    following[last] = last - bust.sizes + 1
+    edges = np.stack([bust.corner_vertex, bust.corner_vertex[following]], axis=1)
+    edges = bust.makehuman[edges]
+    return edges[(edges >= 0).all(axis=1)]
+
+
+def _keys(edges: Ints) -> Ints:
+    low, high = np.sort(edges.astype(np.int64), axis=1).T
+    return low << 32 | high
+
+
+def _by_topology(positions: Floats) -> tuple[Warp, Floats]:
+    """From the built-in head to a mesh of MakeHuman's, and where its own vertices are there."""
+    bust = load_bust()
+    known = np.flatnonzero(bust.makehuman >= 0)
+    source = bust.positions[known].astype(np.float64)
+    target = positions[bust.makehuman[known]].astype(np.float64)
+    warp = fit_by_vertices(source, target, source[:, 2] > _CHIN)
+    places = warp(bust.positions)
+    places[known] = target
+    return warp, places
+
+
+def own_positions(head: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Floats:
+    """Where the vertices of a mesh are before modifiers add some or take some away, but as posed
+    and shaped: (vertex_count, 3) world space."""
+    positions = read_positions(head, depsgraph, place=head.name)
+    if len(positions) == len(head.data.vertices):
+        return positions
+    with _only_deformed(head) as same:
+        return read_positions(same, bpy.context.evaluated_depsgraph_get(), place=head.name)
+
+
+@contextmanager
+def _only_deformed(head: bpy.types.Object) -> Iterator[bpy.types.Object]:
+    """The same object without modifiers that change how many vertices there are."""
+    same = head.copy()
+    try:
+        for modifier in same.modifiers:
+            modifier.show_viewport &= modifier.type in _DEFORMING
+        bpy.context.scene.collection.objects.link(same)
+        yield same
+    finally:
+        bpy.data.objects.remove(same)
+
+
+def placed_landmarks(head: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> dict[str, Floats]:
+    """Where the landmarks of a head are, by name, in world space; none if it has none."""
+    return {
+        name: np.array(obj.evaluated_get(depsgraph).matrix_world.translation, np.float64)
+        for name, obj in landmarks_of(head).items()
+    }
+
+
+def landmarks_of(head: bpy.types.Object) -> dict[str, bpy.types.Object]:
+    """The landmarks of a head, by name."""
+    return {
+        child.hairloom.landmark: child
+        for child in head.children
+        if child.hairloom.landmark in LANDMARKS and child.users_scene
+    }
+
+
+def add_landmarks(
+    head: bpy.types.Object, depsgraph: bpy.types.Depsgraph, collection: bpy.types.Collection
+) -> tuple[list[bpy.types.Object], bool]:
+    """Empties where landmarks may be, for those that a head lacks; and whether the mesh is like a
+    head, so that the guess may be good.
+
+    Raises:
+        HairloomError: it has no faces.
+    """
+    surface = read_surface(head, depsgraph, need_uv=False, place=head.name)
+    guess, is_sure = guess_landmarks(fit_model(), surface)
+    return put_landmarks(head, guess, collection), is_sure
+
+
+def put_landmarks(
+    head: bpy.types.Object, places: Mapping[str, Floats], collection: bpy.types.Collection
+) -> list[bpy.types.Object]:
+    """Empties at places in world space, for those that a head lacks."""
+    there, made = landmarks_of(head), []
+    extent = float(np.linalg.norm(np.ptp(np.array(list(places.values())), axis=0)))
+    for name, place in places.items():
+        if name in there:
+            continue
+        empty = bpy.data.objects.new(f"{head.name} {LANDMARKS[name][0]}", None)
+        empty.hairloom.landmark = name
+        empty.empty_display_type, empty.show_in_front = "SPHERE", True
+        empty.parent = head
+        empty.matrix_parent_inverse = head.matrix_world.inverted_safe()
+        empty.location = place.tolist()
+        empty.empty_display_size = _SHOWN * extent / 0.3
+        collection.objects.link(empty)
+        made.append(empty)
+    return made
