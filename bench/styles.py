@@ -6,22 +6,30 @@ fur, to Blender's monkey.
   less than a quarter of a square of 2 mm; what counts is the width of all strands before the skin.
 - inside: strands that are in the head's own triangles, by their winding number, by more than 1 mm.
 - length: how far the strands that are drawn are from the curves that Blender's nodes make.
+- fit_distance: how far roots are from other heads, as Blender's own search finds it, and how many
+  strands are in these: MakeHuman's base mesh shaped as another person, Sintel's, and one
+  like a scan of that person: few triangles with noise and holes, turned, in centimetres.
 
 Exit code 1: a limit is missed.
 
 make bench NAME=styles
 tools/bench.py styles bob curls          some styles
+tools/bench.py styles fit                other heads alone
 """
 
 from __future__ import annotations
 
+import os
 import sys
 import time
+from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import bpy
 import numpy as np
 from _report import start, tell
+from mathutils import Vector
 
 import hairloom
 from hairloom.addon.arrays import Bools, Floats
@@ -29,6 +37,7 @@ from hairloom.addon.blender.colliders.fields import field_of
 from hairloom.addon.blender.preview import previews, scene_events
 from hairloom.addon.blender.scene.built_in_head import built_in_head
 from hairloom.addon.blender.scene.curves import read_curves
+from hairloom.addon.blender.scene.surfaces import read_surface
 from hairloom.addon.blender.setup.hairstyles import grows_anywhere, named_hairstyle, shipped
 from hairloom.addon.dynamics.colliders import PosedCollider
 from hairloom.addon.dynamics.colliders.signed_distance import signed_distance
@@ -59,6 +68,12 @@ SIDES = np.concatenate([np.eye(3), -np.eye(3)[:2], [[0.0, 0.7, 0.7]]])
 SQUARE, COVERED, STEP = 0.002, 0.25, 0.0006  # [m], of one, [m]
 DEEP = 0.001  # [m]
 _CHUNK = 2_000_000
+#: styles that are put on other heads, and what is promised of them there
+FITTED = ("long_straight", "curls", "full_beard")
+FIT_LIMITS = {"fit_distance_mm": 0.5, "fit_inside_percent": 0.0}
+DATA = Path(os.environ.get("HAIRLOOM_DATA", Path(__file__).parents[2] / "shared" / "data"))
+#: of MakeHuman's base mesh: vertices of its skin, and the middle of its skull [m]
+SKIN, MAKEHUMANS_SKULL = 13380, np.array([0.0, -0.06, 0.735])
 
 
 def bald(strands: StrandSet, head: Surface, group: str) -> float:
@@ -127,15 +142,15 @@ def hair_samples(strands: StrandSet) -> tuple[Floats, Floats]:
     return points.astype(np.float32), (width * length / count)[segment]
 
 
-def inside_percent(strands: StrandSet, head: Surface) -> float:
-    """Strands with a point in the mesh itself, deeper than DEEP."""
+def inside_percent(strands: StrandSet, head: Surface, least: float = DEEP) -> float:
+    """Strands with a point in the mesh itself, deeper than this [m]."""
     field = field_of(head, DynamicsSettings(), place="head")
     posed = (PosedCollider(field, np.eye(4), np.eye(4)),)
-    index = np.flatnonzero(signed_distance(strands.points, posed, 0.01)[0] < 0.0)
+    index = np.flatnonzero(signed_distance(strands.points, posed, 10.0 * least)[0] < 0.0)
     index = index[np.abs(winding_number(strands.points[index], head)) > 0.5]
     if not len(index):
         return 0.0
-    deep = index[ClosestPointSearch(head).closest(strands.points[index]).distance > DEEP]
+    deep = index[ClosestPointSearch(head).closest(strands.points[index]).distance > least]
     of_strand = np.searchsorted(strands.offsets, deep, side="right") - 1
     return 100.0 * len(np.unique(of_strand)) / strands.strand_count
 
@@ -165,6 +180,97 @@ def added(name: str) -> tuple[Rig, float, float]:
     return session.rig, took, 100.0 * float(np.abs(ratio - 1.0).max())
 
 
+def other_heads() -> Iterator[tuple[str, Any]]:
+    """Each in a new scene, selected; and its name."""
+    for name, make in (("makehuman", _makehuman), ("sintel", _sintel), ("scan", _scan)):
+        scene_events.clear()
+        bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+        head = make()
+        bpy.context.view_layer.objects.active = head
+        head.select_set(True)
+        yield name, head
+
+
+def _makehuman() -> Any:
+    """MakeHuman's base mesh with its helpers, with a wide jaw, a high skull and a long nose."""
+    bpy.ops.wm.obj_import(filepath=str(DATA / "makehuman" / "mh_base.obj"), global_scale=0.1)
+    head = bpy.context.object
+    bpy.ops.object.transform_apply()
+    points = np.array([vertex.co[:] for vertex in head.data.vertices]) - MAKEHUMANS_SKULL
+    x, y, z = points.T
+    wide = 1.0 + 0.12 * np.exp(-(((z + 0.08) / 0.06) ** 2))
+    high = 0.08 * (z + 0.12) / (1.0 + np.exp(-(z + 0.12) / 0.02))
+    nose = 0.012 * np.exp(-(((z + 0.045) / 0.02) ** 2) - (x / 0.02) ** 2) * (y < -0.06)
+    shaped = np.stack([x * wide, y - nose, z + high], axis=1) + MAKEHUMANS_SKULL
+    head.data.vertices.foreach_set("co", shaped.astype(np.float32).ravel())
+    skin = {vertex for face in head.data.polygons for vertex in face.vertices if vertex < SKIN}
+    head.vertex_groups.new(name="body").add(sorted(skin), 1.0, "REPLACE")
+    head.modifiers.new("Hide Helpers", "MASK").vertex_group = "body"
+    return head
+
+
+def _sintel() -> Any:
+    bpy.ops.wm.obj_import(filepath=str(DATA / "sintel" / "sintel.obj"))
+    return bpy.context.object
+
+
+def _scan() -> Any:
+    head = _makehuman()
+    surface = read_surface(head, bpy.context.evaluated_depsgraph_get(), need_uv=False, place="head")
+    above = (surface.corners[..., 2] > MAKEHUMANS_SKULL[2] - 0.16).all(axis=1)
+    bpy.data.objects.remove(head)
+    mesh = bpy.data.meshes.new("Scan")
+    mesh.from_pydata(surface.positions.tolist(), [], surface.triangles[above].tolist())
+    whole = bpy.data.objects.new("Scan", mesh)
+    bpy.context.collection.objects.link(whole)
+    whole.modifiers.new("Fewer", "DECIMATE").ratio = 0.3
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    few = read_surface(whole, depsgraph, need_uv=False, place="scan")
+    bpy.data.objects.remove(whole)
+    random = np.random.default_rng(1)
+    noisy = 100.0 * (few.positions + random.normal(0.0, 0.0006, few.positions.shape))
+    kept = few.triangles[random.random(len(few.triangles)) > 0.01]
+    mesh = bpy.data.meshes.new("Scan")
+    mesh.from_pydata(noisy.tolist(), [], kept.tolist())
+    head = bpy.data.objects.new("Scan", mesh)
+    head.rotation_euler.z = np.radians(25.0)
+    bpy.context.collection.objects.link(head)
+    bpy.context.view_layer.update()
+    return head
+
+
+def fit_figures() -> dict[str, float]:
+    """Of three styles on each of the other heads: the farthest root [mm on a head of 1 times the
+    built-in one's size], strands inside [%]; and the most seconds."""
+    found: dict[str, float] = {}
+    for style in FITTED:
+        for name, head in other_heads():
+            begun = time.process_time()
+            bpy.ops.hairloom.add_hairstyle(style=style, plays=False)
+            took, hair = time.process_time() - begun, bpy.context.object
+            session = previews.session_of(hair)
+            assert session is not None and session.rig.head is not None
+            larger = 100.0 if name == "scan" else 1.0
+            depsgraph = bpy.context.evaluated_depsgraph_get()
+            mesh, far = head.evaluated_get(depsgraph), 0.0
+            back = head.matrix_world.inverted()
+            for root in read_curves(hair, depsgraph).strands.roots:
+                local = back @ Vector(root.tolist())
+                far = max(far, (mesh.closest_point_on_mesh(local)[1] - local).length)
+            inside = inside_percent(session.rig.strands, session.rig.head, DEEP * larger)
+            figures = {
+                "fit_distance_mm": 1000.0 * far / larger,
+                "fit_inside_percent": inside,
+                "fit_seconds": took,
+            }
+            print(style, name, {key: round(value, 5) for key, value in figures.items()}, flush=True)
+            for key, value in figures.items():
+                found[f"{name}_{key}"] = max(found.get(f"{name}_{key}", 0.0), value)
+    for key in ("fit_distance_mm", "fit_inside_percent", "fit_seconds"):
+        found[key] = max(value for name, value in found.items() if name.endswith(f"_{key}"))
+    return found
+
+
 def main(names: list[str]) -> int:
     start()
     hairloom.register()
@@ -176,7 +282,10 @@ def main(names: list[str]) -> int:
     found |= {"heads": heads, "extras": len(styles) - heads}
     missed = [] if heads >= LEAST_HEADS else ["heads"]
     missed += [] if found["extras"] >= LEAST_EXTRAS else ["extras"]
-    for name in names or styles:
+    if not names or "fit" in names:
+        found |= fit_figures()
+        missed += [key for key, most in FIT_LIMITS.items() if found[key] > most]
+    for name in [name for name in names if name != "fit"] or (styles if not names else []):
         rig, seconds, length_error = added(name)
         head, group = rig.head, named_hairstyle(name).masks.get("children", "")
         assert head is not None
