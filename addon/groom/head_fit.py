@@ -35,7 +35,7 @@ LANDMARKS: dict[str, tuple[str, tuple[float, float, float]]] = {
     "mouth": ("Mouth", (0.0, -0.0966, -0.0765)),
     "chin": ("Chin", (0.0, -0.0885, -0.108)),
 }
-_TO_DRAG = "Press Place Landmarks, drag them to their places and add the hairstyle again"
+_REMEDY = "Press Place Landmarks, drag them to their places and add the hairstyle again"
 
 # All lengths below are [m] on the built-in head.
 #: what is lower is neck and shoulders, which other heads may lack
@@ -160,7 +160,7 @@ def fit_head(
     if landmarks is None:
         landmarks, is_sure = guess_landmarks(model, target)
         if not is_sure:
-            raise HairloomError("nothing like a head was found on it", place=place, remedy=_TO_DRAG)
+            raise HairloomError("nothing like a head was found on it", place=place, remedy=_REMEDY)
     names = [name for name in LANDMARKS if name in landmarks]
     own = _own_landmarks(model)
     source = np.array([own[name] for name in names])
