@@ -181,7 +181,7 @@ def test_panda3d_plays_the_same(
     assert written.motion["frames"]["count"] == FRAMES
 
 
-@pytest.mark.parametrize("depth", ["half", "float"])
+@pytest.mark.parametrize("depth", few_in_commits(["half", "float"]))
 def test_a_motion_texture_holds_the_simulated_cards(
     motion: GuideMotion, tmp_path: Path, depth: str
 ) -> None:

@@ -46,6 +46,7 @@ def test_the_command_line_writes_a_bake(tmp_path: Path, capfd: Any) -> None:
     assert told["chains"] <= 4
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("extension")
 def test_a_button_writes_the_bake(sphere: Any, tmp_path: Path) -> None:
     """Its frames, or some of them; without a bake it says so, and nothing is written."""

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from mathutils import Vector
 from mathutils.bvhtree import BVHTree
+from tiers import few_in_commits
 
 from hairloom.addon.blender.command_line.command_line import run
 from hairloom.addon.blender.preview import previews
@@ -159,7 +160,7 @@ def by_barycentric(style: Hairstyle, positions: np.ndarray) -> np.ndarray:
     return np.array(found)
 
 
-@pytest.mark.parametrize("count", [BODY, WITH_HELPERS])
+@pytest.mark.parametrize("count", few_in_commits([WITH_HELPERS, BODY]))
 def test_a_posed_mesh_of_makehumans_has_roots_at_the_same_places_of_its_faces(count: int) -> None:
     human, style = makehuman(count), named_hairstyle("buzz_cut")
     assert has_makehuman_topology(human.data)
@@ -191,6 +192,7 @@ def test_a_posed_mesh_of_makehumans_has_roots_at_the_same_places_of_its_faces(co
     assert len(made.done) == 1 and not made.warnings
 
 
+@pytest.mark.slow
 def test_modifiers_that_add_and_take_vertices_do_not_hide_the_topology() -> None:
     human = makehuman(WITH_HELPERS)
     before = roots_of(added("buzz_cut", human).hair)
@@ -267,6 +269,7 @@ def test_hair_is_led_out_of_what_other_heads_have() -> None:
     assert (away_from_ball < 1.3 * radius).sum() > 100, "much hair passes it"
 
 
+@pytest.mark.slow
 def test_a_dragged_landmark_moves_the_hair_when_it_is_fitted_again() -> None:
     head = scan()
     hair = added("buzz_cut", head).hair
@@ -296,6 +299,7 @@ def test_the_own_vertex_group_limits_where_hair_grows() -> None:
     assert hair.hairloom.children_density == "mine" and "scalp" not in human.vertex_groups
 
 
+@pytest.mark.slow
 def test_a_head_without_the_group_gets_the_built_in_heads() -> None:
     human = makehuman()
     added("stubble", human)
@@ -328,6 +332,7 @@ def test_half_a_head_is_refused() -> None:
     refused(half, "no faces where|nothing like a head")
 
 
+@pytest.mark.slow
 def test_every_second_face_missing_is_reported() -> None:
     head = scan(0.2)
     keep = [list(p.vertices) for p in head.data.polygons if p.index % 2]
@@ -402,6 +407,7 @@ def test_the_button_adds_to_the_selected_head_and_one_undo_takes_it_away() -> No
     assert everything() == before
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("few")
 def test_a_cube_is_passed_over_for_the_built_in_head() -> None:
     bpy.ops.mesh.primitive_cube_add()
@@ -409,6 +415,7 @@ def test_a_cube_is_passed_over_for_the_built_in_head() -> None:
     assert bpy.context.object.parent.name == "Head"
 
 
+@pytest.mark.slow
 @pytest.mark.draws
 def test_the_command_line_takes_a_head_of_the_scene(tmp_path: Path) -> None:
     scan()

@@ -186,6 +186,7 @@ def test_axes_and_scale_are_undone_by_their_own_inverse(groom_file):
     assert after.points == pytest.approx(before.points, rel=1e-5, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_cards_are_written_with_their_sidecar(sphere, tmp_path, told):
     hair = grown(sphere, strand_count=300, length=0.05)
     hair.data.hairloom.guides.guide_count = 20

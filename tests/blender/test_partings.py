@@ -96,6 +96,7 @@ def test_no_child_blends_both_sides_and_the_preview_follows(hair, evaluated):
     assert mixes_both_sides(session) > 50
 
 
+@pytest.mark.slow
 def test_a_head_that_turns_with_its_parting_builds_nothing_again(hair, sphere, evaluated):
     line = arch()
     line.parent = sphere
@@ -118,6 +119,7 @@ def test_a_head_that_turns_with_its_parting_builds_nothing_again(hair, sphere, e
     assert np.abs(partings[-59:, :, 0] - 0.02).max() < 1e-5
 
 
+@pytest.mark.slow
 def test_without_a_selected_curve_a_line_is_drawn_on_the_head(extension, evaluated):
     bpy.ops.hairloom.add_hairstyle(style="bob", plays=False)
     hair = bpy.context.object

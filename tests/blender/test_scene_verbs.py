@@ -311,6 +311,7 @@ def test_the_self_test_tells_what_this_machine_can_do(
     assert "passed" in outcomes and "failed" not in outcomes
 
 
+@pytest.mark.slow
 def test_hair_of_a_scene_is_taken_with_its_own_settings(scene: Path, tmp_path: Path) -> None:
     """What the artist has set goes into files; --set goes over it."""
     bpy.ops.wm.open_mainfile(filepath=str(scene))

@@ -3,6 +3,7 @@
 import bpy
 import numpy as np
 import pytest
+from tiers import few_in_commits
 
 from hairloom.addon.blender.command_line import command_line
 from hairloom.addon.blender.preview import previews
@@ -58,6 +59,7 @@ def test_hair_without_stiffness_hangs_straight_down_from_its_roots(new_hair, sph
     assert np.abs(hanging[:, :2]).max() < 0.03
 
 
+@pytest.mark.slow
 def test_stiffness_holds_hair_up(new_hair, sphere):
     tips = []
     for stiffness in (0.0, 1.0, 6.0):
@@ -91,7 +93,7 @@ def test_lengths_are_kept_and_nothing_is_in_the_head(new_hair, sphere):
     assert (tips[~is_low, 2] < RADIUS * outward[~is_low, 2]).mean() > 0.9
 
 
-@pytest.mark.parametrize("preset", ["dynamics/natural", "dynamics/soft"])
+@pytest.mark.parametrize("preset", few_in_commits(["dynamics/soft", "dynamics/natural"]))
 def test_settled_hair_is_at_rest_in_motion(new_hair, sphere, evaluated, preset):
     hair = new_hair(sphere)
     bpy.ops.hairloom.apply_preset(name=preset)
@@ -130,6 +132,7 @@ def test_back_to_combed_is_exact_and_settling_again_keeps_the_first(new_hair, sp
     assert not bpy.ops.hairloom.back_to_combed.poll()
 
 
+@pytest.mark.slow
 def test_hair_that_was_combed_since_goes_back_to_that(new_hair, sphere):
     hair = new_hair(sphere)
     settle(seconds=0.3)
@@ -170,6 +173,7 @@ def test_until_its_end_nothing_changes(new_hair, sphere, evaluated):
     assert COMBED not in hair.data.attributes
 
 
+@pytest.mark.slow
 def test_modifiers_act_on_what_has_settled(extension):
     """A modifier that curls does so once: the curves themselves keep their points and lengths."""
     bpy.ops.hairloom.add_hairstyle(style="curls", plays=False)
@@ -181,6 +185,7 @@ def test_modifiers_act_on_what_has_settled(extension):
     assert hair.modifiers
 
 
+@pytest.mark.slow
 def test_moved_and_scaled_hair_settles_where_it_is(new_hair, sphere):
     """Down is the world's, and what is written is in the object's own space."""
     sphere.location, sphere.rotation_euler = (1.0, 2.0, 3.0), (0.0, 1.2, 0.4)

@@ -54,6 +54,7 @@ def test_render_writes_the_layers_side_by_side(
     bpy.data.images.remove(image)
 
 
+@pytest.mark.slow
 def test_extremes_are_told_on_the_command_line(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:

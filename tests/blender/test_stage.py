@@ -97,6 +97,7 @@ def test_a_picture_is_the_same_at_any_size(head: Surface) -> None:
         assert away.mean() < 0.005, f"at {scale:g}: {away.mean():.4f}"
 
 
+@pytest.mark.slow
 def test_children_do_not_turn_the_camera(head: Surface) -> None:
     strands = half_a_head(head)
     own = studio_of(strands, head).side
@@ -114,6 +115,7 @@ def test_the_stages_that_ship_are_four_and_the_studio_is_the_default() -> None:
     assert len(set(found.values())) == len(STAGES)
 
 
+@pytest.mark.slow
 @pytest.mark.draws
 @pytest.mark.usefixtures("gpu_context", "extension")
 def test_a_stage_is_chosen_by_its_name_and_changed_by_set(tmp_path: Path) -> None:

@@ -116,6 +116,7 @@ def test_undo_takes_the_groom_and_its_preview_away(sphere):
     assert previews.sessions() == () and previews.notice() == ""
 
 
+@pytest.mark.slow
 def test_the_sample_scene_is_a_scene_of_its_own_that_moves():
     bpy.ops.mesh.primitive_cube_add()
     before = bpy.context.scene

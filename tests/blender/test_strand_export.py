@@ -193,6 +193,7 @@ def test_hairs_whose_names_are_one_as_files_get_two(
     assert counts == sorted([20, len(hair.data.curves)])
 
 
+@pytest.mark.slow
 def test_children_are_strands_and_their_guides_are_marked(
     new_hair: Any, sphere: Any, tmp_path: Path
 ) -> None:

@@ -295,6 +295,7 @@ def test_without_hair_the_buttons_say_so(extension: None, tmp_path: Path) -> Non
         assert not operator.poll()
 
 
+@pytest.mark.slow
 def test_a_contact_sheet_shows_all_sides(hair: bpy.types.Object, tmp_path: Path) -> None:
     path = tmp_path / "sheet.png"
     result = bpy.ops.hairloom.contact_sheet(filepath=str(path), size=64, samples=1)

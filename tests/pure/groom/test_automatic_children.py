@@ -117,6 +117,7 @@ def test_a_few_curves_may_be_anything() -> None:
     assert rig_of(fur(1, 0.2), sheet()).children_line == ""
 
 
+@pytest.mark.slow
 def test_brows_and_lashes_get_none_and_keep_their_widths() -> None:
     """However few strands the head of hair beside them has."""
     brows, widths = fur(12, 0.004, 0.2), []
