@@ -69,7 +69,7 @@ def ended_in_both(mine, other):
     """Blender's own strands are back in each of them; then it is previewed again."""
     live().stop_all()
     yield
-    assert not are_wires(mine) and not are_wires(other), "a box is left"
+    assert not are_wires(mine) and not are_wires(other), "wires are left"
     bpy.ops.hairloom.preview()
     yield from hair_is_made()
     yield from ours_alone("both-layers-again", mine)
