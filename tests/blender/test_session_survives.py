@@ -142,7 +142,7 @@ def test_sculpting_shows_blenders_own_strands(preview, evaluated):
     assert drawn(session)[0, -1] == pytest.approx([0.0, 0.0, 0.5], abs=1e-5)
     bpy.ops.object.mode_set(mode="OBJECT")
     update()
-    assert hair.evaluated_get(evaluated()).display_type == "WIRE"
+    assert hair.evaluated_get(evaluated()).display_type == "BOUNDS"
 
 
 @pytest.mark.slow

@@ -69,7 +69,7 @@ def ended_in_both(mine, other):
     """Blender's own strands are back in each of them; then it is previewed again."""
     live().stop_all()
     yield
-    assert not are_wires(mine) and not are_wires(other), "wires are left"
+    assert not is_box(mine) and not is_box(other), "a box is left"
     bpy.ops.hairloom.preview()
     yield from hair_is_made()
     yield from ours_alone("both-layers-again", mine)
@@ -79,7 +79,7 @@ def ours_alone(label, mine):
     """What the second window shows of its view layer is what it shows of the first one's."""
     second = windows()[1]
     other = second.view_layer
-    yield from until(lambda: are_wires(mine) and are_wires(other), f"{label}: {are_wires(mine)}")
+    yield from until(lambda: is_box(mine) and is_box(other), f"{label}: {is_box(mine)}")
     _, shown = yield from pictures(label)
     second.view_layer = mine
     yield
@@ -91,10 +91,10 @@ def ours_alone(label, mine):
     assert share < SAME, f"{label}: Blender's own strands are seen"
 
 
-def are_wires(layer):
+def is_box(layer):
     """Whether Blender's own strands are out of the way in a view layer."""
     depsgraph = layer.depsgraph  # None before a window has shown it
-    return depsgraph and hair().evaluated_get(depsgraph).display_type == "WIRE"
+    return depsgraph and hair().evaluated_get(depsgraph).display_type == "BOUNDS"
 
 
 def played_in_both(head):

@@ -12,8 +12,7 @@ def show_originals(
     show: bool,
     has_own_shadow: bool = False,
 ) -> None:
-    """Solid view leaves out hair that is shown as wires, EEVEE what no camera can see. Its outline
-    stays where it is selected.
+    """Solid view leaves out what is shown as its bounds, EEVEE what no camera can see.
 
     Touches the evaluated copy only.
 
@@ -23,7 +22,7 @@ def show_originals(
     evaluated = hair.evaluated_get(depsgraph)
     if not evaluated.is_evaluated:
         return
-    display, is_seen = (hair.display_type, hair.visible_camera) if show else ("WIRE", False)
+    display, is_seen = (hair.display_type, hair.visible_camera) if show else ("BOUNDS", False)
     if evaluated.display_type != display:
         evaluated.display_type = display
     if evaluated.visible_camera != is_seen:
