@@ -20,6 +20,7 @@ from ...groom.holds import Holds, anchors_of
 from ...groom.ties import Holders, Tie, TipSurface, find_holds
 from ...strands.affine import moved
 from ..base.objects import Body, Handle, head_of, matrix_of
+from ..scene.own_collections import put_into, take_out
 from ..scene.source import usable_curves
 from ..scene.surfaces import read_positions, read_surface
 from .carriers import is_deforming, is_left_out
@@ -240,14 +241,7 @@ def new_ring(hair: bpy.types.Object, context: bpy.types.Context) -> bpy.types.Ob
 
 def add_ties(hair: bpy.types.Object, rings: list[bpy.types.Object], scene: bpy.types.Scene) -> None:
     """Put rings into the hair's collection of ties, which is made where there is none."""
-    collection = hair.hairloom.tie_collection
-    if collection is None:
-        collection = bpy.data.collections.new(f"{hair.name} Ties")
-        scene.collection.children.link(collection)
-    for ring in rings:
-        if ring not in collection.all_objects.values():
-            collection.objects.link(ring)
-    hair.hairloom.tie_collection = collection
+    put_into(hair, "tie_collection", "Ties", rings, scene)
 
 
 def remove_tie(hair: bpy.types.Object, name: str, scene: bpy.types.Scene) -> None:
@@ -256,18 +250,7 @@ def remove_tie(hair: bpy.types.Object, name: str, scene: bpy.types.Scene) -> Non
     Raises:
         HairloomError: it is not in that collection itself.
     """
-    collection = hair.hairloom.tie_collection
-    obj = None if collection is None else collection.objects.get(name)
-    if obj is None:
-        raise HairloomError(
-            "it is not in the collection of ties itself",
-            place=name or hair.name,
-            remedy="Name one of its objects, or take it out of the collection that it is in",
-        )
-    if len(obj.users_collection) == 1:
-        scene.collection.objects.link(obj)
-    collection.objects.unlink(obj)
-    hair.hairloom.tie_collection = collection
+    take_out(hair, "tie_collection", "Ties", name, scene)
 
 
 def copy_holders(

@@ -10,6 +10,7 @@ from ...errors import HairloomError
 from ...strands.affine import moved
 from ...strands.closest_point import search_of
 from ..base.objects import head_of, matrix_of
+from .own_collections import put_into, take_out
 from .surfaces import read_surface
 
 #: types of objects that can be a parting
@@ -159,14 +160,7 @@ def add_partings(
     hair: bpy.types.Object, lines: list[bpy.types.Object], scene: bpy.types.Scene
 ) -> None:
     """Put lines into the hair's collection of partings, which is made where there is none."""
-    collection = hair.hairloom.parting_collection
-    if collection is None:
-        collection = bpy.data.collections.new(f"{hair.name} Partings")
-        scene.collection.children.link(collection)
-    for line in lines:
-        if line not in collection.all_objects.values():
-            collection.objects.link(line)
-    hair.hairloom.parting_collection = collection
+    put_into(hair, "parting_collection", "Partings", lines, scene)
 
 
 def remove_parting(hair: bpy.types.Object, name: str, scene: bpy.types.Scene) -> None:
@@ -175,18 +169,7 @@ def remove_parting(hair: bpy.types.Object, name: str, scene: bpy.types.Scene) ->
     Raises:
         HairloomError: it is not in that collection itself.
     """
-    collection = hair.hairloom.parting_collection
-    obj = None if collection is None else collection.objects.get(name)
-    if obj is None:
-        raise HairloomError(
-            "it is not in the collection of partings itself",
-            place=name or hair.name,
-            remedy="Name one of its objects, or take it out of the collection that it is in",
-        )
-    if len(obj.users_collection) == 1:
-        scene.collection.objects.link(obj)
-    collection.objects.unlink(obj)
-    hair.hairloom.parting_collection = collection
+    take_out(hair, "parting_collection", "Partings", name, scene)
 
 
 def copy_partings(

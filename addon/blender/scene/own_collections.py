@@ -1,0 +1,52 @@
+"""Collections that hair names in its settings, such as its ties: what acts on it is in there."""
+
+from __future__ import annotations
+
+import bpy
+
+from ...errors import HairloomError
+
+
+def put_into(
+    hair: bpy.types.Object,
+    setting: str,
+    kind: str,
+    objects: list[bpy.types.Object],
+    scene: bpy.types.Scene,
+) -> None:
+    """Put objects into a collection of the hair, which is made where there is none.
+
+    Args:
+        setting: the property of the hair that names it.
+        kind: what is in it, such as "Ties".
+    """
+    collection = getattr(hair.hairloom, setting)
+    if collection is None:
+        collection = bpy.data.collections.new(f"{hair.name} {kind}")
+        scene.collection.children.link(collection)
+    for obj in objects:
+        if obj not in collection.all_objects.values():
+            collection.objects.link(obj)
+    setattr(hair.hairloom, setting, collection)
+
+
+def take_out(
+    hair: bpy.types.Object, setting: str, kind: str, name: str, scene: bpy.types.Scene
+) -> None:
+    """Take an object out of a collection of the hair, but not out of the scene.
+
+    Raises:
+        HairloomError: it is not in that collection itself.
+    """
+    collection = getattr(hair.hairloom, setting)
+    obj = None if collection is None else collection.objects.get(name)
+    if obj is None:
+        raise HairloomError(
+            f"it is not in the collection of {kind.lower()} itself",
+            place=name or hair.name,
+            remedy="Name one of its objects, or take it out of the collection that it is in",
+        )
+    if len(obj.users_collection) == 1:
+        scene.collection.objects.link(obj)
+    collection.objects.unlink(obj)
+    setattr(hair.hairloom, setting, collection)
