@@ -320,8 +320,8 @@ def test_signed_distance(
     distance, outward = signed_distance(points[..., :3].reshape(-1, 3), posed, reach)
     assert (distance < 0.0).any() and (distance > 0.04).any()
     off = np.abs(found[..., 3].ravel() - distance)
-    # at the border of a cell of the field rounding decides which one a point is in
-    assert off.max() < 2e-5 and (off > 2e-6).sum() <= 4 * (1 in chosen)
+    # a field's distance is divided by its gradient's length: a driver's root is good to 1e-5
+    assert off.max() < (2e-5 if 1 in chosen else 2e-6)
     # at borders of cells, and where two solids are as near, rounding decides
     off = np.abs(found[..., :3].reshape(-1, 3) - outward).max(axis=1)
     assert (off > 1e-3).sum() <= 6
