@@ -124,14 +124,20 @@ def strand_variation(
     along = np.linspace(0.0, 1.0, cv_count)[None, :]
     every_cv = None if group is None else group[:, None].repeat(cv_count, axis=1)
     own = strand_colors(seed[:, None], along, shading, color, every_cv)
-    card = brightest_look(color, shading)
-    if shading.model == "marschner":
-        even = np.full_like(along, 0.5)
-        colored, grey = (strand_absorption(card, along, even, even + s) for s in (1.0, -1.0))
-        mean = strand_color(colored + (grey - colored) * shading.grey_fraction)
-    else:
-        mean = card_base(along, card)
+    mean = card_color(along, brightest_look(color, shading))
     return np.clip(own / np.maximum(mean, _DARKEST), 0.0, _MAX)
+
+
+def card_color(along: Floats, shading: ShadingSettings) -> Floats:
+    """Mean colour of the strands at places of a card, (..., 3); `along` is 0 at the root.
+
+    Times the base texture it is what `strand_colors` is for a strand.
+    """
+    if shading.model != "marschner":
+        return card_base(along, shading)
+    even = np.full(np.shape(along), 0.5)
+    colored, grey = (strand_absorption(shading, along, even, even + s) for s in (1.0, -1.0))
+    return strand_color(colored + (grey - colored) * shading.grey_fraction)
 
 
 def strand_colors(

@@ -30,11 +30,10 @@ def write_glb(
     texture: np.ndarray | None,
     *,
     name: str = "Hair cards",
-    base_color: tuple[float, float, float] = (1.0, 1.0, 1.0),
     portable: bool = True,
 ) -> None:
     """One level, alone."""
-    look = CardLook(card=texture, color=base_color)
+    look = CardLook(card=texture)
     with written_together(path) as folder:
         write_card_mesh(folder / path.name, [mesh], GLB, look, name=name, portable=portable)
 

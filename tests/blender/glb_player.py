@@ -21,8 +21,9 @@ class Player:
         return [points[index] for points, index in self._placed(seconds)]
 
     def vertices(self, seconds: float) -> np.ndarray:
-        """All of all skinned nodes, also those of no triangle, in Blender's axes."""
-        return np.concatenate([points for points, _ in self._placed(seconds)])
+        """All of the finest level, which a scene shows, also those of no triangle, in Blender's
+        axes."""
+        return self._placed(seconds)[0][0]
 
     def _placed(self, seconds: float) -> list[tuple[np.ndarray, np.ndarray]]:
         world = self._worlds(seconds)

@@ -32,7 +32,7 @@ from hairloom.addon.blender.cards.exporters import (  # noqa: E402
 
 MESH_VIEW = Path(__file__).parent / "mesh_view.py"
 NAME, NODE = "Haar/Ä.001", "Haar_Ä_001"
-LOOK = CardLook(base="hair_base.png", alpha="hair_alpha.png", color=(0.3, 0.2, 0.1))
+LOOK = CardLook(base="hair_base.png", alpha="hair_alpha.png")
 
 needs_ufbx = pytest.mark.skipif(
     importlib.util.find_spec("ufbx") is None, reason="ufbx is missing: `make setup` installs it"

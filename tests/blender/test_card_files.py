@@ -14,13 +14,15 @@ from typing import Any
 
 import numpy as np
 import pytest
-from glb_files import Glb
+from glb_files import Glb, validated
 from tiers import few_in_commits
 
 from hairloom.addon.exchange.cards.card_formats import FORMATS
 from hairloom.addon.exchange.textures.card_textures import FORMATS as TEXTURE_FORMATS
 from hairloom.addon.exchange.textures.texture_packing import PRESETS
+from hairloom.addon.shading.card_look import plain_albedo
 from hairloom.addon.shading.marschner.look import fibre_of
+from hairloom.addon.shading.marschner.pigment import melanin_absorption
 from hairloom.addon.shading.marschner.tables import marschner_tables, shape_of
 from hairloom.addon.shading.settings import ShadingSettings
 
@@ -100,7 +102,7 @@ def test_every_format_comes_with_a_sidecar_that_follows_the_schema(
     content = sidecar_of(tmp_path / f"hair{suffix}")
     assert [level["node"] for level in content["levels"]] == ["hair_LOD0", "hair_LOD1"]
     assert content["levels"][1]["triangles"] < 0.6 * content["levels"][0]["triangles"]
-    assert set(content["textures"]) >= {"base", "alpha", "shift", "noise", "tangent"}
+    assert set(content["textures"]) >= {"color", "base", "alpha", "shift", "noise", "tangent"}
     assert "index_buffer" not in content
     for written in tmp_path.iterdir():
         assert not written.name.startswith(".")
@@ -131,11 +133,92 @@ def test_the_index_buffer_holds_the_indices_of_the_glb(tmp_path: Path) -> None:
 def test_a_baked_atlas_is_packed_as_the_engine_wants_it(tmp_path: Path) -> None:
     assert cards(tmp_path / "hair.fbx", *BAKED, "--packing", "gltf", "--levels", "1") == 0
     content = sidecar_of(tmp_path / "hair.fbx")
-    base, alpha = (content["textures"][role] for role in ("base", "alpha"))
-    assert base["file"] == alpha["file"] == "hair_baseColor.png"
-    assert (base["channels"], alpha["channels"]) == ("rgb", "a")
+    color, alpha = (content["textures"][role] for role in ("color", "alpha"))
+    assert color["file"] == alpha["file"] == "hair_baseColor.png"
+    assert (color["channels"], alpha["channels"]) == ("rgb", "a")
     assert b"hair_baseColor.png" in (tmp_path / "hair.fbx").read_bytes()
     assert (content["atlas"]["columns"], content["atlas"]["rows"]) == (4, 2)
+
+
+def test_a_viewer_that_knows_nothing_of_us_shows_one_level_in_the_hairs_colour(
+    tmp_path: Path,
+) -> None:
+    path = tmp_path / "hair.glb"
+    melanin = (
+        "--set",
+        "shading.pigment=melanin",
+        "--set",
+        "shading.melanin=0.5",
+        "--set",
+        "shading.redness=0.6",
+    )
+    assert cards(path, *melanin, "--levels", "3") == 0
+    assert not validated(path)["issues"]["numErrors"]
+    glb = Glb(path)
+    nodes, (scene,) = glb.json["nodes"], glb.json["scenes"]
+    waiting, met = list(scene["nodes"]), []
+    while waiting:
+        node = nodes[waiting.pop()]
+        met.append(node["name"])
+        waiting += node.get("children", [])
+    assert sorted(met) == ["hair", "hair_LOD0"]
+    (finest,) = (node for node in nodes if node["name"] == "hair_LOD0")
+    others = [nodes[number]["name"] for number in finest["extensions"]["MSFT_lod"]["ids"]]
+    assert others == ["hair_LOD1", "hair_LOD2"]
+    coverage = finest["extras"]["MSFT_screencoverage"]
+    assert len(coverage) == 3 and coverage == sorted(coverage, reverse=True) and coverage[2] == 0
+    # the colour of a mass of such hair, by Chiang et al. 2016
+    (material,) = glb.json["materials"]
+    assert "baseColorFactor" not in material["pbrMetallicRoughness"]
+    color = oiio_pixels(tmp_path / "hair_color.png")[..., :3].reshape(-1, 3)
+    linear = np.where(color > 0.04045, ((color + 0.055) / 1.055) ** 2.4, color / 12.92)
+    power = np.polyval([0.245, 5.574, -10.73, 2.532, -0.215, 5.969], 0.3)
+    expected = np.exp(-power * np.sqrt(melanin_absorption(0.5, 0.6)))
+    base = oiio_pixels(tmp_path / "hair_base.png")[..., :3].reshape(-1, 3)
+    factor = np.where(base > 0.04045, ((base + 0.055) / 1.055) ** 2.4, base / 12.92)
+    albedo = plain_albedo(expected * factor)  # `bench engines` judges it
+    np.testing.assert_allclose(linear.mean(0), albedo.mean(0), rtol=0.03)
+
+
+def test_the_occlusion_of_a_vertex_is_what_a_viewer_reads_from_the_ramp(tmp_path: Path) -> None:
+    path = tmp_path / "hair.glb"
+    assert cards(path, "--levels", "1") == 0
+    glb = Glb(path)
+    (material,) = glb.json["materials"]
+    assert material["occlusionTexture"]["texCoord"] == 1
+    texture = glb.json["textures"][material["occlusionTexture"]["index"]]
+    picture = tmp_path / "ramp.png"
+    picture.write_bytes(glb.view(glb.json["images"][texture["source"]]["bufferView"]))
+    ramp = oiio_pixels(picture)[0, :, 0]
+    (attributes,) = (
+        primitive["attributes"] for mesh in glb.json["meshes"] for primitive in mesh["primitives"]
+    )
+    occlusion = glb.accessor(attributes["TEXCOORD_1"])[:, 0]
+    assert occlusion.min() < 0.8 < occlusion.max()
+    centers = (np.arange(len(ramp)) + 0.5) / len(ramp)
+    read = np.interp(occlusion, centers, ramp)  # linear, clamped
+    np.testing.assert_allclose(read, occlusion, atol=0.005)
+
+
+@pytest.mark.parametrize("suffix", [".usda", ".usdc"])
+def test_one_level_is_active_in_usd_and_the_others_can_be_chosen(
+    tmp_path: Path, suffix: str
+) -> None:
+    if not bpy.app.build_options.usd:
+        pytest.skip("this Blender was built without USD")
+    usd = pytest.importorskip("pxr.Usd", reason="usd-core is missing: `make setup` installs it")
+    path = tmp_path / f"hair{suffix}"
+    assert cards(path, "--levels", "3") == 0
+    stage = usd.Stage.Open(str(path))
+
+    def shown() -> list[str]:
+        return [prim.GetName() for prim in stage.Traverse() if prim.GetTypeName() == "Mesh"]
+
+    assert shown() == ["hair_LOD0"]
+    variants = stage.GetPrimAtPath("/hair").GetVariantSet("LOD")
+    assert variants.GetVariantNames() == ["LOD0", "LOD1", "LOD2"]
+    variants.SetVariantSelection("LOD2")
+    assert shown() == ["hair_LOD2"]
 
 
 def test_both_models_give_all_their_values(tmp_path: Path) -> None:

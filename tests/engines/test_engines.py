@@ -185,6 +185,8 @@ def test_godot_draws_cards_as_we_do(asset: Asset, sandbox: str) -> None:
     assert drawn.is_file(), result.stdout + result.stderr
     assert "SCRIPT ERROR" not in result.stderr and "SHADER ERROR" not in result.stderr
     check(asset, drawn)
+    shown = json.loads((project / "asset" / "levels.json").read_text(encoding="utf-8"))
+    assert shown == {"plain": ["cards_LOD0"], "second": ["cards_LOD1"]}
 
 
 def test_three_js_draws_cards_as_we_do(asset: Asset, sandbox: str) -> None:
@@ -195,7 +197,11 @@ def test_three_js_draws_cards_as_we_do(asset: Asset, sandbox: str) -> None:
     shutil.copytree(ENGINES, site / "hairloom")
     shutil.copytree(THREE, site / "three")
     shutil.copytree(asset.folder, site / "asset", ignore=shutil.ignore_patterns("godot", "web"))
-    command = [sandbox, "run", "python3", str(site / "draw.py")]
+    shutil.copy2(REPOSITORY / "tools" / "draw_page.py", site)
+    command = [sandbox, "run", "python3", str(site / "draw_page.py")]
     result = subprocess.run(command, capture_output=True, text=True, timeout=300)
     assert result.returncode == 0, result.stderr
     check(asset, site / "three.png")
+    shown = json.loads((site / "levels.json").read_text(encoding="utf-8"))
+    sidecar = json.loads((asset.folder / "cards.hairloom.json").read_text(encoding="utf-8"))
+    assert shown == {"plain": ["cards_LOD0"], "second": sidecar["levels"][1]["triangles"]}

@@ -30,16 +30,20 @@ from ...cards.occlusion_settings import CardOcclusionSettings
 from ...cards.settings import CardSettings
 from ...cards.steps import map_progress, result_of
 from ...errors import HairloomError
+from ...exchange.textures.card_textures import of_one_size
 from ...params import SettingsMap
 from ...pipeline import Pose, Rig
 from ...render.atlas_pass import baked_maps, baking
 from ...render.card_snapshot import CardSnapshot
 from ...render.card_textures import CardTextures, packed_textures
 from ...shading.ambient_settings import AmbientSettings
+from ...shading.card_look import plain_albedo
 from ...shading.drawn_strands import (
     brightest_look,
+    card_color,
     drawn_color,
     drawn_radius,
+    in_color,
     mean_look,
     strand_variation,
 )
@@ -143,10 +147,17 @@ class CardMaps:
     def has_tangent_map(self) -> bool:
         return self.highlights == "tangent"
 
-    @property
-    def card(self) -> Floats:
-        """Base as it is written and alpha, (height, width, 4)."""
-        return replace(self.textures, base=self.by_name["base"]).card
+    def plain_card(self, shading: ShadingSettings) -> Floats:
+        """The albedo of the strands, whatever the model and the pigment, and alpha: what a plain
+        material shows, (height, width, 4) linear."""
+        look = shading if self.base_color is None else in_color(self.base_color, shading)
+        base = self.textures.base
+        if "along" in self.by_name:
+            along = of_one_size({"base": base, "along": self.by_name["along"]})["along"]
+        else:  # one row of tiles, from the root to the tip
+            along = np.linspace(0.0, 1.0, len(base))[:, None]
+        color = plain_albedo(np.clip(base * card_color(along, look), 0.0, 1.0))
+        return replace(self.textures, base=color.astype(np.float32)).card
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,7 @@ from ...exchange.cards.card_formats import FBX, GLB, OBJ, USD, CardFormat
 from ...exchange.files.names import plain_name
 from ...exchange.textures.srgb import srgb_decoded
 from ...strands.vectors import unit
-from .material import Color, fill_image, named_image, new_material
+from .material import fill_image, named_image, new_material
 from .mesh import OCCLUSION_LAYER, fill_mesh
 
 _MADE_IN = ("objects", "meshes", "materials", "images", "scenes")
@@ -34,19 +34,17 @@ _COLORS = "Occlusion color"
 
 @dataclass(frozen=True)
 class CardLook:
-    """The plain material of the file: what its textures and its colour are.
+    """The plain material of the file: which textures it has.
 
     card: (height, width, 4) linear with straight alpha, row 0 the lowest, to be packed into the
         file; or None.
     base, alpha: files beside it, for formats that name files. alpha is read from the channel "a" of
         the same file, else from the red of its own.
-    color: scene-linear, multiplies the texture.
     """
 
     card: Floats | None = None
     base: str | None = None
     alpha: str | None = None
-    color: Color = (1.0, 1.0, 1.0)
 
 
 def level_names(name: str, count: int) -> tuple[str, ...]:
@@ -331,12 +329,12 @@ def _new_material(look: CardLook, name: str, file_format: CardFormat) -> bpy.typ
     """glTF's file holds its picture; the other exporters name those that are linked straight."""
     if file_format == GLB:
         packed = None if look.card is None else _packed_image(look.card, name)
-        return new_material(name, look.color, packed, packed, blending="BLENDED")
+        return new_material(name, packed, packed, blending="BLENDED")
     base = None if look.base is None else named_image(look.base, "sRGB")
     alpha = base
     if look.alpha != look.base:
         alpha = None if look.alpha is None else named_image(look.alpha, "Non-Color")
-    return new_material(name, look.color, base, alpha, blending="BLENDED", is_tinted=False)
+    return new_material(name, base, alpha, blending="BLENDED")
 
 
 def _packed_image(texture: Floats, name: str) -> bpy.types.Image:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import bpy
+import numpy as np
 
 from ...arrays import Floats, Ints
 from ...cards.build import CardBuild
@@ -19,11 +20,16 @@ from ...cards.settings import CardSettings
 from ...cards.steps import map_progress, result_of
 from ...cards.vertex_animation import motion_layout
 from ...errors import HairloomError
-from ...exchange.cards.card_formats import CardFormat, format_of
+from ...exchange.cards.card_formats import GLB, USD, CardFormat, format_of
+from ...exchange.cards.glb_file import GlbFile
+from ...exchange.cards.glb_plain import screen_coverage, with_levels, with_material
 from ...exchange.cards.index_buffer import index_buffer
 from ...exchange.cards.sidecar import SUFFIX, CardFile, files_of_earlier, sidecar_text
 from ...exchange.files.atomic import check_place
 from ...exchange.files.file_set import kept_aside, written_together
+from ...exchange.textures.card_textures import WrittenTexture, of_one_size
+from ...exchange.textures.texture_packing import packed
+from ...exchange.usd.usd_levels import with_level_variants
 from ...params import Settings, SettingsMap
 from ...shading.card_look import VIEW_COMPENSATED_ALPHA
 from ...shading.drawn_strands import in_color
@@ -32,6 +38,7 @@ from ...shading.marschner.look import fibre_of, pack_fibre
 from ...shading.marschner.settings import MarschnerSettings
 from ...shading.settings import ShadingSettings, SharedSettings
 from ..bakes.guide_motion import BakedGuides, GuideMotion
+from ..base.images import write_texture
 from ..base.outcome import Outcome
 from ..base.report import hairloom_version
 from ..base.thread_work import ThreadWork
@@ -67,6 +74,10 @@ _UNITS = {
     "pixels": "px",
     "none": "1",
 }
+#: Maps that glTF's own material knows beside the colour.
+_DIRECTIONS: tuple[str, ...] = ("normal", "tangent")
+#: Texels of the ramp that gives back a number between 0 and 1.
+_RAMP_SIZE = 256
 #: of Marschner's model alone, though both models share the panel that they are drawn in
 _PIGMENT = {"pigment", "melanin", "redness", "absorption"}
 #: of strands alone: a material of cards has what they do in its textures
@@ -214,11 +225,9 @@ class _Writer:
         levels, backs = zip(*parts, strict=True)
         if motion is None or self.output.settings.motion == "none":
             yield "Writing", None
-            self._write(levels, backs)
-            return ()
+            return self._write(levels, backs)
         if self.output.settings.motion == "texture":
-            yield from self._write_with_texture(levels, backs, motion)
-            return ()
+            return (yield from self._write_with_texture(levels, backs, motion))
         return (yield from self._write_with_joints(levels, backs, motion))
 
     def _write_with_joints(
@@ -235,13 +244,11 @@ class _Writer:
             )
         self.motion = joints.facts
         yield "Writing", None
-        self._write(levels, backs)
-        joints.complete(self.path, level_names(self._name, len(levels)))
-        return joints.notes
+        return (*joints.notes, *self._write(levels, backs, joints=joints))
 
     def _write_with_texture(
         self, levels: Sequence[CardMesh], backs: Sequence[Ints], motion: GuideMotion
-    ) -> FileSteps[None]:
+    ) -> FileSteps[tuple[str, ...]]:
         settings = self.output.settings
         count = sum(len(mesh.positions) for mesh in levels)
         motion_layout(count, len(motion.frames), str(self.path))  # refused before the work
@@ -252,7 +259,7 @@ class _Writer:
         texture = TextureMotion.of(moved, settings, self.file_format, str(self.path))
         with self.stage("write motion texture"):
             self.motion = texture.facts(texture.write(self.path))
-        self._write(levels, backs, texture.texels)
+        return self._write(levels, backs, texture.texels)
 
     @property
     def _name(self) -> str:
@@ -263,19 +270,22 @@ class _Writer:
         levels: Sequence[CardMesh],
         backs: Sequence[Ints],
         texels: Sequence[Floats] = (),
-    ) -> None:
-        """Textures, mesh, indices, and the sidecar last."""
+        joints: JointMotion | None = None,
+    ) -> tuple[str, ...]:
+        """Textures, mesh, indices, and the sidecar last; what the artist should know."""
         path, build, maps = self.path, self.made.build, self.made.maps
-        settings = self.output.settings
+        settings, nodes = self.output.settings, level_names(self._name, len(levels))
         shading = self.settings[ShadingSettings]
         if maps.base_color is not None:
             shading = in_color(maps.base_color, shading)
+        card = maps.plain_card(self.settings[ShadingSettings])
         with self.stage("write textures"):
             grid = build.finest.atlas
-            written = write_textures(path.parent, path.stem, maps.by_name, grid, settings)
+            named = {**maps.by_name, "color": card[..., :3]}
+            written = write_textures(path.parent, path.stem, named, grid, settings)
             tables = write_tables(path.parent, path.stem, shading)
-        roles = texture_roles(written, maps.by_name)
-        look = _look(maps, roles, shading)
+        roles = texture_roles(written, named)
+        look = _look(card, written, roles)
         with self.stage("write cards"):
             write_card_mesh(
                 path,
@@ -286,6 +296,9 @@ class _Writer:
                 portable=not settings.attributes,
                 texels=texels,
             )
+            if joints is not None:
+                joints.complete(path, nodes)
+            notes = self._complete(levels, nodes)
         indices = None
         if settings.index_buffer:
             indices = f"{path.stem}.indices.bin", index_buffer(levels, backs)
@@ -294,7 +307,7 @@ class _Writer:
             path.name,
             self.file_format,
             tuple(levels),
-            level_names(self._name, len(levels)),
+            nodes,
             errors=build.errors,
             portable=not settings.attributes,
             textures=roles,
@@ -308,17 +321,54 @@ class _Writer:
             generator=hairloom_version(),
         )
         path.with_name(path.stem + SUFFIX).write_text(sidecar_text(sidecar), encoding="utf-8")
+        return notes
+
+    def _complete(self, levels: Sequence[CardMesh], nodes: Sequence[str]) -> tuple[str, ...]:
+        """What Blender's exporters do not write: which level is shown, and maps of a GLB."""
+        if self.file_format == USD and len(levels) > 1:
+            try:
+                with_level_variants(self.path, nodes)
+            except HairloomError as error:
+                return (f"{error} Until then viewers show all levels at once.",)
+        if self.file_format == GLB:
+            file = GlbFile.of(self.path.read_bytes(), str(self.path))
+            with_levels(file, nodes, screen_coverage(levels, self.made.build.errors))
+            ramp = np.linspace(0.0, 1.0, _RAMP_SIZE, dtype=np.float32)[None, :, None]
+            maps = _direction_pictures(self.path, self.made.maps)
+            with_material(file, maps, _png(self.path, ramp))
+            self.path.write_bytes(file.data())
+        return ()
+
+
+def _direction_pictures(path: Path, maps: CardMaps) -> dict[str, bytes]:
+    """PNG files of the directions that glTF's own material knows."""
+    directions = {name: maps.by_name[name] for name in _DIRECTIONS if name in maps.by_name}
+    if not directions:
+        return {}
+    made = packed(of_one_size(directions), "gltf")
+    by_name = {each.suffix.removeprefix("_"): each.pixels for each in made}
+    return {name: _png(path, by_name[name]) for name in ("normal", "anisotropy") if name in by_name}
+
+
+def _png(path: Path, pixels: Floats) -> bytes:
+    """(height, width, channels) as a PNG of 8 bits; `path` lies in the folder it may use."""
+    picture = path.with_name(".picture.png")
+    write_texture(picture, pixels, is_color=False, depth="uint8", is_packed=True)
+    data = picture.read_bytes()
+    picture.unlink()
+    return data
 
 
 def _look(
-    maps: CardMaps, roles: Mapping[str, Mapping[str, str]], shading: ShadingSettings
+    card: Floats, written: Iterable[WrittenTexture], roles: Mapping[str, Mapping[str, str]]
 ) -> CardLook:
-    """The material of the mesh's own file: base, and alpha where plain nodes can name it."""
-    base, alpha = roles.get("base", {}).get("file"), roles.get("alpha", {}).get("file")
-    if roles.get("alpha", {}).get("channels") != ("a" if alpha == base else "r"):
-        alpha = None
-    red, green, blue = (min(value * maps.base_gain, 1.0) for value in shading.base_color)
-    return CardLook(maps.card, base, alpha, (red, green, blue))
+    """The material of the mesh's own file: colour, and alpha where plain nodes can name it."""
+    (colored,) = (texture for texture in written if "color" in texture.layout.sources)
+    file = colored.path.name
+    if colored.layout.has_coverage:
+        return CardLook(card, file, file)
+    has_own_file = roles["alpha"]["channels"] == "r"
+    return CardLook(card, file, roles["alpha"]["file"] if has_own_file else None)
 
 
 def material_of(shading: ShadingSettings, tables: Mapping[str, str]) -> dict[str, Any]:

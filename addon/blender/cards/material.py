@@ -15,28 +15,21 @@ ROUGHNESS = 0.5
 #: glTF elongates the highlight along u, across the strands, as hair does.
 ANISOTROPY = 0.5
 
-type Color = tuple[float, float, float]
-
 
 def new_material(
     name: str,
-    color: Color,
     base: bpy.types.Image | None,
     alpha: bpy.types.Image | None,
     *,
     blending: str,
-    is_tinted: bool = True,
     occlusion: str = "",
 ) -> bpy.types.Material:
     """A material that is seen from both sides.
 
     Args:
-        color: scene-linear; alone where there is no picture.
         base: its colour.
         alpha: the alpha of `base` where it is the same picture, else the red of its own.
         blending: "BLENDED", which exporters of glTF read as such, or "DITHERED".
-        is_tinted: whether `base` is multiplied by the colour. Exporters but that of glTF know
-            those pictures alone that are linked straight.
         occlusion: an attribute that `base` is multiplied by; "" for none.
     """
     material = bpy.data.materials.new(name)
@@ -45,7 +38,6 @@ def new_material(
     nodes, links = material.node_tree.nodes, material.node_tree.links
     nodes.clear()
     surface = nodes.new("ShaderNodeBsdfPrincipled")
-    surface.inputs["Base Color"].default_value = (*color, 1.0)
     surface.inputs["Roughness"].default_value = ROUGHNESS
     surface.inputs["Anisotropic"].default_value = ANISOTROPY
     links.new(surface.outputs[0], nodes.new("ShaderNodeOutputMaterial").inputs["Surface"])
@@ -53,9 +45,6 @@ def new_material(
     if base is not None:
         picture = _new_picture(material, base)
         shown = picture.outputs["Color"]
-        if is_tinted:  # exporters of glTF make it baseColorFactor
-            shown, factor = _product(material, shown)
-            factor.default_value = (*color, 1.0)
         if occlusion:
             shown, factor = _product(material, shown)
             attribute = nodes.new("ShaderNodeAttribute")

@@ -19,7 +19,7 @@ from ...shading.settings import ShadingSettings
 from ..base.objects import Handle, head_of, matrix_of
 from ..base.thread_work import ThreadWork
 from .build import MappedCards, built_in_thread, order_line, read_inputs
-from .material import Color, fill_image, new_material
+from .material import fill_image, new_material
 from .mesh import OCCLUSION_IS_OURS, OCCLUSION_LAYER, fill_mesh
 
 
@@ -60,8 +60,8 @@ class CardObjectJob:
         for obj in card_objects(hair):
             _check_editable(obj)
         self.notes += tuple(f"{hair.name}: {note}." for note in made.notes)
-        color = made.maps.base_color or self._inputs.settings[ShadingSettings].base_color
-        self.objects = _write(hair, build, made.maps.textures.card, color, self._matrix)
+        card = made.maps.plain_card(self._inputs.settings[ShadingSettings])
+        self.objects = _write(hair, build, card, self._matrix)
         self.order = order_line(build.wrong_fraction)
 
 
@@ -127,7 +127,6 @@ def _write(
     hair: bpy.types.Object,
     build: CardBuild,
     texture: Floats,
-    color: Color,
     matrix: Floats,
 ) -> list[bpy.types.Object]:
     """Fill the objects of this groom, make those that are missing, remove those too many."""
@@ -141,7 +140,7 @@ def _write(
     for level, cards in enumerate(build.levels):
         obj = there.get(level)
         if obj is None:
-            material = material or _new_material(f"{hair.name} Cards", image, color)
+            material = material or _new_material(f"{hair.name} Cards", image)
             obj = _new_object(hair, level, matrix)
             obj.data.materials.append(material)
         obj.hairloom.card_object.image = image
@@ -152,9 +151,9 @@ def _write(
     return objects
 
 
-def _new_material(name: str, image: bpy.types.Image, color: Color) -> bpy.types.Material:
+def _new_material(name: str, image: bpy.types.Image) -> bpy.types.Material:
     """The one that cards start with; afterwards it is the artist's."""
-    return new_material(name, color, image, image, blending="DITHERED", occlusion="occlusion")
+    return new_material(name, image, image, blending="DITHERED", occlusion="occlusion")
 
 
 def _first_material(obj: bpy.types.Object | None) -> bpy.types.Material | None:

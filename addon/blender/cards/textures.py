@@ -6,13 +6,11 @@ from collections.abc import Collection, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from ...arrays import Floats
 from ...cards.atlas_grid import AtlasGrid
 from ...cards.export_settings import CardExportSettings
 from ...errors import HairloomError
-from ...exchange.textures.card_textures import WrittenTexture, write_card_textures
+from ...exchange.textures.card_textures import WrittenTexture, of_one_size, write_card_textures
 from ...exchange.textures.texture_files import has_openimageio
 from ...shading.marschner.look import fibre_of
 from ...shading.marschner.tables import marschner_tables, shape_of
@@ -90,7 +88,7 @@ def write_textures(
         for those in _together(maps, settings)
         for texture in write_card_textures(
             folder / stem,
-            _of_one_size(those),
+            of_one_size(those),
             settings.packing,
             file_format=settings.textures,
             grid=grid,
@@ -137,18 +135,6 @@ def _together(
     if settings.packing == "hairloom" and not settings.textures.startswith("dds"):
         return [{name: image} for name, image in maps.items()]
     return [maps]
-
-
-def _of_one_size(maps: Mapping[str, Floats]) -> dict[str, Floats]:
-    """All maps in the largest size; pixels are repeated."""
-    height, width = np.max([image.shape[:2] for image in maps.values()], axis=0)
-    row, column = np.arange(height)[:, None], np.arange(width)
-    return {
-        name: image
-        if image.shape[:2] == (height, width)
-        else image[row * len(image) // height, column * image.shape[1] // width]
-        for name, image in maps.items()
-    }
 
 
 def write_tables(folder: Path, stem: str, shading: ShadingSettings) -> dict[str, str]:

@@ -86,20 +86,25 @@ class GlbFile:
             kind: such as "VEC3".
             target: 34962 for attributes of vertices.
         """
-        self.binary += b"\0" * (-len(self.binary) % 4)
-        view = {"buffer": 0, "byteOffset": len(self.binary), "byteLength": values.nbytes}
+        view = self.add_bytes(np.ascontiguousarray(values).tobytes())
         if target is not None:
-            view["target"] = target
+            self.content["bufferViews"][view]["target"] = target
         accessor = {
-            "bufferView": self.append("bufferViews", view),
+            "bufferView": view,
             "componentType": _COMPONENTS[values.dtype.name],
             "count": len(values),
             "type": kind,
         }
         if kind == "SCALAR":  # times of animations must have them
             accessor |= {"min": [float(values.min())], "max": [float(values.max())]}
-        self.binary += np.ascontiguousarray(values).tobytes()
         return self.append("accessors", accessor)
+
+    def add_bytes(self, data: bytes) -> int:
+        """Put bytes into the file; the number of their view."""
+        self.binary += b"\0" * (-len(self.binary) % 4)
+        view = {"buffer": 0, "byteOffset": len(self.binary), "byteLength": len(data)}
+        self.binary += data
+        return self.append("bufferViews", view)
 
     def append(self, kind: str, entry: dict[str, Any]) -> int:
         """Put an entry at the end of a list such as "nodes"; its number there."""

@@ -49,6 +49,11 @@ VIEW_COMPENSATED_ALPHA = (
 )
 #: role of a texture -> its color space in files of integers, and what it says
 ROLES = {
+    "color": (
+        "sRGB",
+        "the strands' own colour, for plain materials; base and the values of the material make "
+        "the same",
+    ),
     "base": (
         "sRGB",
         "times gain it is what the hair's colour is multiplied by; with Marschner by an absorption "
@@ -74,7 +79,8 @@ ENGINES = {
     "material.forceSinglePass = true draws the file's order once",
     "Godot": "gives blended materials a depth pre-pass; set Transparency to Alpha for the file's "
     "order in one pass",
-    "levels": "all levels lie in one place: show one. FBX has them in a LOD group; in other files "
-    "they are known by the nodes' names, which end in _LOD0, _LOD1 and so on",
+    "levels": "all levels lie in one place: show one. GLB names the coarser ones by MSFT_lod, "
+    "outside of its scene; FBX has them in a LOD group, USD in a variant set, OBJ as objects. The "
+    "nodes' names end in _LOD0, _LOD1 and so on",
     "others": "one blended double-sided pass in index order is nearly right from every side",
 }

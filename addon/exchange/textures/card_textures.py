@@ -6,6 +6,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from ...arrays import Floats
 from ...cards.atlas_grid import AtlasGrid
 from ...errors import HairloomError
@@ -68,6 +70,18 @@ def write_card_textures(
             write(path, layout.packed(maps), is_color=layout.is_color, depth=depth, is_packed=True)
         written.append(WrittenTexture(path, layout))
     return written
+
+
+def of_one_size(maps: Mapping[str, Floats]) -> dict[str, Floats]:
+    """All maps in the largest size; pixels are repeated."""
+    height, width = np.max([image.shape[:2] for image in maps.values()], axis=0)
+    row, column = np.arange(height)[:, None], np.arange(width)
+    return {
+        name: image
+        if image.shape[:2] == (height, width)
+        else image[row * len(image) // height, column * image.shape[1] // width]
+        for name, image in maps.items()
+    }
 
 
 def _write_dds(

@@ -28,7 +28,8 @@ from ...errors import HairloomError
 #: What a map says, in a few words; and what stands in its place where it is missing.
 MEANINGS = {
     "alpha": ("coverage", 1.0),
-    "base": ("colour", 1.0),
+    "color": ("colour as a plain material shows it", 1.0),
+    "base": ("colour as a factor of the hair's", 1.0),
     "normal": ("normal", 0.5),
     "tangent": ("way of the strand from root to tip", 0.5),
     "depth": ("depth, larger further from the head, 0.5 in the card's plane", 0.5),
@@ -39,7 +40,13 @@ MEANINGS = {
     "noise": ("breaks up the second highlight", 1.0),
     "roughness": ("roughness", 0.4),
 }
-_AXES = {"base": "red green blue", "normal": "x y z", "tangent": "x y z"}
+_AXES = {
+    "color": "red green blue",
+    "base": "red green blue",
+    "normal": "x y z",
+    "tangent": "x y z",
+}
+_COLORS = ("color", "base")
 
 
 @dataclass(frozen=True)
@@ -66,8 +73,8 @@ class Channel:
         if self.source not in _AXES:
             return f"{self.source}: {'1 - ' if self.is_inverted else ''}{about}"
         axis = _AXES[self.source].split()[self.component]
-        if self.source == "base":
-            return f"base: {axis}"
+        if self.source in _COLORS:
+            return f"{self.source}: {axis}"
         value = f"0.5 - 0.5 {axis}" if self.is_inverted else f"0.5 + 0.5 {axis}"
         return f"{self.source}: {value} of the {about}"
 
@@ -169,7 +176,9 @@ def _three(name: str, *inverted: int) -> tuple[Channel, ...]:
 
 
 _GREEN = 1
-_COLOR = _three("base")
+_COLOR = _three("color")
+#: for shaders that colour hair themselves, beside what a plain material shows
+_BASE = TextureLayout("_base", _three("base"), is_color=True)
 #: The direction across the strands, in the card's plane: (y, -x) of their tangent.
 _ACROSS = (Channel("tangent", 1), Channel("tangent", 0, is_inverted=True))
 _FINE = "uint16"
@@ -177,8 +186,9 @@ _STRANDS = (Channel("along"), Channel("strand_id"), Channel("depth"))
 
 PRESETS: dict[str, tuple[TextureLayout, ...]] = {
     "hairloom": (
+        TextureLayout("_color", _COLOR, is_color=True),
         TextureLayout("_alpha", _one("alpha")),
-        TextureLayout("_base", _COLOR, is_color=True),
+        _BASE,
         TextureLayout("_normal", _three("normal"), is_normal_map=True),
         TextureLayout("_tangent", _three("tangent"), depth=_FINE),
         TextureLayout("_depth", _one("depth"), depth=_FINE),
@@ -196,6 +206,7 @@ PRESETS: dict[str, tuple[TextureLayout, ...]] = {
         ),
         TextureLayout("_normal", _three("normal"), is_normal_map=True),
         TextureLayout("_anisotropy", (*_ACROSS, Channel(constant=1.0))),
+        _BASE,
     ),
     "unreal": (
         TextureLayout("_Depth", _one("depth")),
@@ -209,6 +220,7 @@ PRESETS: dict[str, tuple[TextureLayout, ...]] = {
             "_Auxiliary",
             (Channel("occlusion"), Channel("shift"), Channel("noise"), Channel(constant=1.0)),
         ),
+        _BASE,
     ),
     "unreal_compact": (
         TextureLayout("_TangentCoordU", (*_three("tangent", _GREEN), Channel("along"))),
@@ -216,6 +228,7 @@ PRESETS: dict[str, tuple[TextureLayout, ...]] = {
             "_CoverageDepthSeed", (Channel("alpha"), Channel("depth"), Channel("strand_id"))
         ),
         TextureLayout("_ColorRoughness", (*_COLOR, Channel("roughness")), is_color=True),
+        _BASE,
     ),
     "unity_hdrp": (
         TextureLayout("_BaseColorMap", (*_COLOR, Channel("alpha")), is_color=True),
@@ -224,6 +237,7 @@ PRESETS: dict[str, tuple[TextureLayout, ...]] = {
         TextureLayout("_SmoothnessMask", _one("noise")),
         TextureLayout("_HairStrandDirection", _three("tangent")),
         TextureLayout("_RootIdDepth", _STRANDS),
+        _BASE,
     ),
     "godot": (
         TextureLayout("_albedo", (*_COLOR, Channel("alpha")), is_color=True),
@@ -231,6 +245,7 @@ PRESETS: dict[str, tuple[TextureLayout, ...]] = {
         TextureLayout("_flow", (*_ACROSS, Channel(constant=0.5), Channel(constant=1.0))),
         TextureLayout("_ao", _one("occlusion")),
         TextureLayout("_rootIdDepth", _STRANDS),
+        _BASE,
     ),
 }
 

@@ -21,7 +21,11 @@ static func load_cards(path: String, level := 0, folder := HERE) -> Node3D:
 		return null
 	var document := GLTFDocument.new()
 	var state := GLTFState.new()
-	if document.append_from_file(path, state) != OK:
+	var levels := AllLevels.new()
+	GLTFDocument.register_gltf_document_extension(levels)
+	var read := document.append_from_file(path, state)
+	GLTFDocument.unregister_gltf_document_extension(levels)
+	if read != OK:
 		push_error("%s: cannot be read; export the cards again" % path)
 		return null
 	var scene := document.generate_scene(state)
@@ -98,3 +102,16 @@ static func _texture(entry: Dictionary, folder: String, is_table: bool) -> Image
 	else:
 		image.generate_mipmaps()
 	return ImageTexture.create_from_image(image)
+
+
+## The file's scene holds the finest level alone (MSFT_lod); here the others stand beside it.
+class AllLevels extends GLTFDocumentExtension:
+	func _import_preflight(state: GLTFState, _extensions: PackedStringArray) -> Error:
+		var nodes: Array = state.json.get("nodes", [])
+		for number in nodes.size():
+			var lod: Dictionary = nodes[number].get("extensions", {}).get("MSFT_lod", {})
+			for holder in nodes + state.json.get("scenes", []):
+				for key in ["children", "nodes"]:
+					if float(number) in holder.get(key, []):
+						holder[key].append_array(lod.get("ids", []))
+		return OK

@@ -27,14 +27,12 @@ export async function loadHairloomCards(url, { level = 0, shading = SHADING } = 
     uniformsOf(sidecar, address),
     backIndexOf(sidecar, sidecar.levels[level], address),
   ]);
+  // Coarser levels are no part of the scene (MSFT_lod), so the node is asked for by its number.
+  const { nodes } = gltf.parser.json;
+  const number = nodes.findIndex(({ name }) => name === sidecar.levels[level].node);
+  const node = await gltf.parser.getDependency('node', number);
   const hair = new THREE.Group();
-  gltf.scene.updateMatrixWorld(true);
-  gltf.scene.traverse((node) => {
-    const name = node.userData.name ?? node.name; // three.js removes spaces and dots from names
-    if (node.isMesh && name === sidecar.levels[level].node) {
-      hair.add(...passesOf(node, sidecar, backIndex, formulas, uniforms));
-    }
-  });
+  hair.add(...passesOf(node, sidecar, backIndex, formulas, uniforms));
   return hair;
 }
 
@@ -45,7 +43,6 @@ function passesOf(node, sidecar, backIndex, formulas, uniforms) {
     const isBack = backIndex && pass.cull === 'front';
     const geometry = isBack ? node.geometry.clone().setIndex(backIndex) : node.geometry;
     const mesh = new THREE.Mesh(geometry, materialOf(pass, sidecar, formulas, uniforms));
-    mesh.applyMatrix4(node.matrixWorld);
     mesh.renderOrder = 1 + number; // after all opaque meshes, including the head
     return mesh;
   });

@@ -1,5 +1,6 @@
 extends Node3D
-## Draws asset/cards.glb as asset/view.json asks and saves it as godot.png.
+## Draws asset/cards.glb as asset/view.json asks and saves it as godot.png; levels.json says which
+## meshes are shown by Godot alone, and as the loader's second level.
 
 
 func _ready() -> void:
@@ -26,7 +27,23 @@ func _ready() -> void:
 	await RenderingServer.frame_post_draw
 	await RenderingServer.frame_post_draw
 	get_viewport().get_texture().get_image().save_png("res://asset/godot.png")
+	var document := GLTFDocument.new()
+	var state := GLTFState.new()
+	document.append_from_file("res://asset/cards.glb", state)
+	var shown := {"plain": _shown(document.generate_scene(state)), "second": _shown(
+			load("res://hairloom/godot/hairloom_cards.gd").load_cards("res://asset/cards.glb", 1))}
+	var file := FileAccess.open("res://asset/levels.json", FileAccess.WRITE)
+	file.store_string(JSON.stringify(shown))
+	file.close()
 	get_tree().quit()
+
+
+func _shown(scene: Node) -> Array:
+	var meshes := scene.find_children("*", "MeshInstance3D", true, false)
+	var visible := meshes.filter(func(mesh): return mesh.visible)
+	var names := visible.map(func(mesh): return String(mesh.name))
+	scene.free()
+	return names
 
 
 func _vector(values: Array) -> Vector3:

@@ -25,7 +25,7 @@ needs_compressor = pytest.mark.skipif(find_spec("etcpak") is None, reason="there
 SIZE = (48, 32)
 #: between two bytes, so that rounding to them changes nothing
 THRESHOLD = 152.5 / 255
-THREE = ("base", "normal", "tangent")
+THREE = ("color", "base", "normal", "tangent")
 EACH_FORMAT = [
     pytest.param(each, marks=needs_compressor) if each == "dds" else each for each in FORMATS
 ]
@@ -107,7 +107,7 @@ def test_what_lies_beside_the_hair_never_shows_in_smaller_levels(tmp_path: Path)
     alpha[:, 5::8] = 1.0
     base = np.zeros((32, 32, 3), np.float32)
     base[:, 5::8] = 1.0
-    (_, written) = write_card_textures(
+    (*_, written) = write_card_textures(
         tmp_path / "a", {"alpha": alpha, "base": base}, "hairloom", file_format="dds_plain"
     )
     assert written.layout.suffix == "_base"
@@ -128,7 +128,7 @@ def test_the_writer_can_be_another(tmp_path: Path) -> None:
     assert told[0] == (
         "a_TangentCoordU.png", 4, {"is_color": False, "depth": "uint8", "is_packed": True},
     )  # fmt: skip
-    assert [each[2]["is_color"] for each in told] == [False, False, True]
+    assert [each[2]["is_color"] for each in told] == [False, False, True, True]
 
 
 def test_other_formats_are_named(tmp_path: Path) -> None:
@@ -146,19 +146,19 @@ def test_without_the_compressor_other_formats_still_work(
     assert not os.listdir(tmp_path)
     for file_format in ("png", "exr", "dds_plain"):
         assert len(write_card_textures(tmp_path / "a", smooth_maps(), "gltf",
-                                       file_format=file_format)) == 4  # fmt: skip
+                                       file_format=file_format)) == 5  # fmt: skip
 
 
 @pytest.mark.parametrize("file_format", EACH_FORMAT)
 def test_a_full_disk_leaves_the_old_files(file_format: str, tmp_path: Path) -> None:
     asset = tmp_path / "a"
     noise = np.random.default_rng(3).random((96, 96, 3)).astype(np.float32)
-    maps = {"base": noise, "alpha": noise[..., 0]}
+    maps = {"color": noise, "alpha": noise[..., 0]}
     (written,) = write_card_textures(asset, maps, "gltf", file_format=file_format)[:1]
     before, names = written.path.read_bytes(), sorted(os.listdir(tmp_path))
     assert len(before) > 8000
     with full_disk(4000), pytest.raises(HairloomError, match="cannot be written"):
-        write_card_textures(asset, {"base": noise, "alpha": noise[..., 1]}, "gltf",
+        write_card_textures(asset, {"color": noise, "alpha": noise[..., 1]}, "gltf",
                             file_format=file_format)  # fmt: skip
     assert written.path.read_bytes() == before
     assert sorted(os.listdir(tmp_path)) == names
@@ -181,8 +181,8 @@ def test_a_folder_that_may_not_be_written_to(file_format: str, tmp_path: Path) -
 def test_a_writer_that_fails_midway_leaves_the_old_file(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    path = tmp_path / "a_alpha.png"
-    maps = {"alpha": smooth_maps()["alpha"]}
+    path = tmp_path / "a_along.png"
+    maps = {"along": smooth_maps()["along"]}
     write_card_textures(tmp_path / "a", maps, "hairloom")
     before = path.read_bytes()
 

@@ -12,7 +12,8 @@ from hairloom.addon.cards.atlas_maps import MAPS
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.exchange.textures.texture_packing import MEANINGS, PRESETS, layouts, packed
 
-THREE = ("base", "normal", "tangent")
+COLORS = ("color", "base")
+THREE = ("color", "base", "normal", "tangent")
 
 
 def random_maps() -> dict[str, np.ndarray]:
@@ -49,8 +50,8 @@ def test_unpacking_by_the_roles_gives_the_maps_back(preset: str) -> None:
         original = maps[name]
         if axis:
             original = (
-                original[..., ("red green blue" if name == "base" else "xyz").split().index(axis)]
-                if name == "base"
+                original[..., ("red green blue" if name in COLORS else "xyz").split().index(axis)]
+                if name in COLORS
                 else original[..., "xyz".index(axis)]
             )
         np.testing.assert_allclose(values, original, atol=1e-6)
@@ -63,20 +64,20 @@ def test_the_names_and_channels_that_unreal_asks_for() -> None:
         "_Coverage": "alpha",
         "_Tangent": "tangent tangent tangent",
         "_Attributes": "always along strand_id",
-        "_Material": "base base base roughness",
+        "_Material": "color color color roughness",
         "_Auxiliary": "occlusion shift noise always",
     }
     compact = {
         "_TangentCoordU": "tangent tangent tangent along",
         "_CoverageDepthSeed": "alpha depth strand_id",
-        "_ColorRoughness": "base base base roughness",
+        "_ColorRoughness": "color color color roughness",
     }
     for preset, wanted in (("unreal", slots), ("unreal_compact", compact)):
         found = {
             layout.suffix: " ".join(role.split(":")[0].split()[0] for role in layout.roles.values())
             for layout in PRESETS[preset]
         }
-        assert found == wanted
+        assert found == wanted | {"_base": "base base base"}  # for our own shaders
 
 
 @pytest.mark.parametrize(
@@ -125,7 +126,7 @@ def test_anisotropy_stretches_highlights_across_strands(preset: str, suffix: str
 @pytest.mark.parametrize("preset", PRESETS)
 def test_colours_are_srgb_and_nothing_else_is(preset: str) -> None:
     for layout in PRESETS[preset]:
-        assert layout.is_color == ("base" in layout.sources)
+        assert layout.is_color == bool(layout.sources & set(COLORS))
         assert layout.color_space == ("sRGB" if layout.is_color else "linear")
         assert layout.depth in ("uint8", "uint16")
         assert layout.has_coverage == (layout.roles.get("a") == "alpha: coverage")
@@ -135,7 +136,7 @@ def test_colours_are_srgb_and_nothing_else_is(preset: str) -> None:
 @pytest.mark.parametrize("preset", PRESETS)
 def test_every_preset_has_what_a_card_needs(preset: str) -> None:
     held = set().union(*(layout.sources for layout in PRESETS[preset]))
-    assert {"alpha", "base", "tangent"} <= held <= set(MEANINGS)
+    assert {"alpha", "color", "base", "tangent"} <= held <= set(MEANINGS)
     suffixes = [layout.suffix for layout in PRESETS[preset]]
     assert len({suffix.lower() for suffix in suffixes}) == len(suffixes)
 
@@ -147,7 +148,7 @@ def test_all_maps_of_an_atlas_can_be_packed() -> None:
 
 
 def test_missing_maps_are_taken_as_nothing_out_of_the_ordinary() -> None:
-    maps = {name: values for name, values in random_maps().items() if name in ("alpha", "base")}
+    maps = {name: values for name, values in random_maps().items() if name in ("alpha", "color")}
     assert [each.suffix for each in layouts("unreal", maps)] == ["_Coverage", "_Material"]
     (tangent,) = layouts("unreal_compact", maps | {"along": maps["alpha"]})[:1]
     np.testing.assert_allclose(tangent.packed(maps)[0, 0], [0.5, 0.0, 0.5, 0.0])  # down is tipwards
@@ -177,7 +178,7 @@ def test_the_documentation_has_the_same_tables() -> None:
     sections = re.split(r"^### (\w+)$", page.read_text(encoding="utf-8"), flags=re.MULTILINE)
     written = dict(zip(sections[1::2], sections[2::2], strict=True))
     assert list(written) == list(PRESETS)
-    axes = {"base": "rgb", "normal": "xyz", "tangent": "xyz"}
+    axes = {"color": "rgb", "base": "rgb", "normal": "xyz", "tangent": "xyz"}
     for preset, section in written.items():
         rows = [[cell.strip() for cell in row.split("|")[1:-1]] for row in section.splitlines()
                 if row.startswith("| `")]  # fmt: skip

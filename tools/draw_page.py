@@ -1,6 +1,7 @@
-"""Serves this folder to a browser without a window, which draws it and sends back the picture.
+"""Serves the folder it lies in to a browser without a window, and keeps what its page sends back.
 
-python3 draw.py: writes three.png beside it; exit code 1 and the reason where that fails.
+python3 draw_page.py: what index.html posts to NAME becomes the file NAME, until it posts "done";
+exit code 1 and the reason where it posts that to "failed".
 """
 
 from __future__ import annotations
@@ -23,15 +24,19 @@ BROWSER += ("--enable-unsafe-swiftshader", "--disable-dev-shm-usage")
 class Handler(http.server.SimpleHTTPRequestHandler):
     """Hands out files, and takes what index.html posts."""
 
-    answer: tuple[str, bytes] = ("/failed", b"the browser never answered")
+    problem: str | None = "the browser never answered"
     answered = threading.Event()
 
     def do_POST(self) -> None:
         body = self.rfile.read(int(self.headers["Content-Length"]))
-        Handler.answer = (self.path, body)
+        name = self.path.strip("/")
+        if name in ("done", "failed"):
+            Handler.problem = None if name == "done" else body.decode()
+            Handler.answered.set()
+        else:
+            (FOLDER / Path(name).name).write_bytes(body)
         self.send_response(204)
         self.end_headers()
-        Handler.answered.set()
 
     def log_message(self, format: str, *arguments: object) -> None:
         """Quiet: what fails comes as an answer."""
@@ -50,11 +55,9 @@ def main() -> int:
         finally:
             browser.kill()
             browser.wait()
-    path, body = Handler.answer
-    if path != "/drawn":
-        print(body.decode(), file=sys.stderr)
+    if Handler.problem is not None:
+        print(Handler.problem, file=sys.stderr)
         return 1
-    (FOLDER / "three.png").write_bytes(body)
     return 0
 
 

@@ -1,0 +1,108 @@
+"""What makes a GLB of cards right in a viewer that knows nothing of Hairloom.
+
+One level of detail is in its scene: the others are named by MSFT_lod, and viewers without it never
+meet them. The material has all maps that glTF knows: see `with_material`.
+
+Khronos, "glTF 2.0 Specification", sections 3.9 and 5.19; vendor extension MSFT_lod; extension
+KHR_materials_anisotropy.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from ...cards.card_mesh import CardMesh
+from .glb_file import GlbFile
+
+_LOD, _ANISOTROPY = "MSFT_lod", "KHR_materials_anisotropy"
+_SPECULAR = "KHR_materials_specular"
+#: Of the light that a smooth surface reflects, what hair does: measured with bench engines.
+SPECULAR = 0.9
+#: Height of a screen [pixels] on which the next level is off by one of them where it takes over.
+SCREEN_HEIGHT = 1080.0
+#: Where a level's error is not known: it takes over at this fraction of the height of the last.
+_STEP = 0.5
+_CLAMPED, _LINEAR, _MIP_MAPPED = 33071, 9729, 9987
+#: the second UV map's first component is ambient occlusion, which a ramp of grey gives back
+_OCCLUSION_UV = 1
+
+
+def with_levels(file: GlbFile, nodes: Sequence[str], coverage: Sequence[float]) -> None:
+    """Leave the finest level in the scene, and name the others by it.
+
+    Args:
+        nodes: of the levels, the finest first.
+        coverage: see `screen_coverage`.
+    """
+    finest, *others = (file.node(name) for name in nodes)
+    if not others:
+        return
+    for node in (*file.content["nodes"], *file.content["scenes"]):
+        for key in ("children", "nodes"):
+            if key in node:
+                node[key] = [each for each in node[key] if each not in others]
+    node = file.content["nodes"][finest]
+    node.setdefault("extensions", {})[_LOD] = {"ids": others}
+    node.setdefault("extras", {})["MSFT_screencoverage"] = list(coverage)
+    _use(file, _LOD)
+
+
+def screen_coverage(levels: Sequence[CardMesh], errors: Sequence[float]) -> list[float]:
+    """Of each level the least fraction of the screen that the hair takes up while it is shown; 0 of
+    the last. A level gives way to the next where that one is off by a pixel of SCREEN_HEIGHT.
+
+    Args:
+        errors: of each level [m], as CardBuild has them; empty where they are not known.
+    """
+    points = levels[0].positions
+    height = float((points.max(axis=0) - points.min(axis=0)).max())
+    fractions = [1.0]
+    for number in range(1, len(levels)):
+        error = errors[number] if errors else 0.0
+        own = height / (error * SCREEN_HEIGHT) if error > 0.0 else _STEP * fractions[-1]
+        fractions.append(min(own, fractions[-1]))
+    return [round(fraction * fraction, 6) for fraction in fractions[1:]] + [0.0]
+
+
+def with_material(file: GlbFile, pictures: Mapping[str, bytes], ramp: bytes) -> None:
+    """Give the cards' material its maps beside the colour, which Blender's exporter has written.
+
+    Args:
+        pictures: PNG files of the maps "normal" and "anisotropy", as `texture_packing` packs them
+            for glTF; those that are not there are left out.
+        ramp: a PNG from black at the left to white at the right.
+    """
+    (material,) = file.content["materials"]
+    extensions = material.setdefault("extensions", {})
+    extensions[_SPECULAR] = {"specularFactor": SPECULAR}
+    _use(file, _SPECULAR)
+    occlusion = _texture(file, ramp, "occlusion ramp", _LINEAR)
+    material["occlusionTexture"] = {"index": occlusion, "texCoord": _OCCLUSION_UV}
+    if "normal" in pictures:
+        normal = _texture(file, pictures["normal"], "normal", _MIP_MAPPED)
+        material["normalTexture"] = {"index": normal}
+    if "anisotropy" in pictures:
+        extension = extensions.setdefault(_ANISOTROPY, {})
+        extension.pop("anisotropyRotation", None)
+        texture = _texture(file, pictures["anisotropy"], "anisotropy", _MIP_MAPPED)
+        extension["anisotropyTexture"] = {"index": texture}
+        _use(file, _ANISOTROPY)
+
+
+def _texture(file: GlbFile, picture: bytes, name: str, small: int) -> int:
+    view = file.add_bytes(picture)
+    image = {"name": name, "mimeType": "image/png", "bufferView": view}
+    sampler: dict[str, Any] = {"magFilter": _LINEAR, "minFilter": small}
+    sampler |= {"wrapS": _CLAMPED, "wrapT": _CLAMPED}
+    texture = {
+        "source": file.append("images", image),
+        "sampler": file.append("samplers", sampler),
+    }
+    return file.append("textures", texture)
+
+
+def _use(file: GlbFile, extension: str) -> None:
+    used = file.content.setdefault("extensionsUsed", [])
+    if extension not in used:
+        used.append(extension)

@@ -1,0 +1,37 @@
+"""Levels of detail in a USD file of cards: of all that lie in one place, one is there."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from .usd_library import usd_library
+
+#: the name of the set, and of each variant
+VARIANT_SET, _VARIANT = "LOD", "LOD{}"
+
+
+def with_level_variants(path: Path, nodes: Sequence[str]) -> None:
+    """Make the levels variants of what holds them; the finest is chosen.
+
+    Args:
+        nodes: the levels' names, the finest first, which are siblings.
+
+    Raises:
+        HairloomError: this Python has no OpenUSD.
+    """
+    pxr = usd_library(path)
+    stage = pxr.Usd.Stage.Open(str(path))
+    levels = [prim for prim in stage.Traverse() if prim.GetName() in nodes and prim.IsA("Xform")]
+    levels.sort(key=lambda prim: nodes.index(prim.GetName()))
+    holder = levels[0].GetParent()
+    variants = holder.GetVariantSets().AddVariantSet(VARIANT_SET)
+    for number, shown in enumerate(levels):
+        name = _VARIANT.format(number)
+        variants.AddVariant(name)
+        variants.SetVariantSelection(name)
+        with variants.GetVariantEditContext():
+            for level in levels:
+                level.SetActive(level == shown)
+    variants.SetVariantSelection(_VARIANT.format(0))
+    stage.Save()
