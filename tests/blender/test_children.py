@@ -293,6 +293,7 @@ def test_undo_brings_the_children_back(hair, evaluated):
     np.testing.assert_allclose(grid_of(session), before, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_cards_are_one_a_guide_and_tressfx_holds_all(hair, evaluated, tmp_path, capfd):
     settings = hair.data.hairloom
     settings.cards.source, settings.atlas.size = "guides", "512"

@@ -105,6 +105,7 @@ def test_previews_keep_the_youngest_fields_only(new_hair, sphere, evaluated, ext
     assert oldest() is None
 
 
+@pytest.mark.slow
 def test_a_preview_takes_no_field_from_hair_that_waits_for_it(new_hair, sphere, evaluated, gate):
     waiting = previews.start(new_hair(sphere), evaluated())
     previews.play(evaluated(), blocking=False)

@@ -224,16 +224,7 @@ def test_landmarks_are_guessed_where_they_are_on_another_person() -> None:
     assert [obj.hairloom.landmark for obj in again] == ["nose"]
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        "curls",
-        *(
-            pytest.param(n, marks=pytest.mark.slow)
-            for n in ("long_straight", "full_beard", "brows")
-        ),
-    ],
-)
+@pytest.mark.parametrize("name", few_in_commits(["brows", "curls", "long_straight", "full_beard"]))
 def test_on_a_scan_roots_are_on_the_skin_and_no_strand_is_in_it(name: str) -> None:
     head, style = scan(), named_hairstyle(name)
     made = added(name, head)

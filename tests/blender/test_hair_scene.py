@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tiers import few_in_commits
 
 bpy = pytest.importorskip("bpy", reason="these tests need Blender or the bpy module")
 
@@ -252,6 +253,7 @@ def test_where_the_hair_cannot_be_laid_over_blender_draws_it(
     assert wrong == "gone" or problem in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_cameras_that_change_in_an_animation_are_followed(
     cycles: Any, hairy: Any, tmp_path: Path
 ) -> None:
@@ -300,7 +302,7 @@ def test_a_hair_scene_goes_with_the_scene_whose_hair_it_draws(cycles: Any, tmp_p
     assert hair not in bpy.data.scenes
 
 
-@pytest.mark.parametrize("is_baked", [False, True])
+@pytest.mark.parametrize("is_baked", few_in_commits([True, False]))
 def test_moving_hair_is_blurred_and_baked_as_by_our_own_engine(
     cycles: Any, hairy: Any, sphere: Any, tmp_path: Path, is_baked: bool
 ) -> None:
@@ -326,6 +328,7 @@ def test_moving_hair_is_blurred_and_baked_as_by_our_own_engine(
     np.testing.assert_allclose(over[..., 3], own[..., 3], atol=1e-5)
 
 
+@pytest.mark.slow
 def test_a_border_that_is_rendered_alone_has_its_hair(
     cycles: Any, hairy: Any, tmp_path: Path
 ) -> None:

@@ -261,6 +261,7 @@ def test_this_blender_brings_all_node_groups_that_styles_use(head: bpy.types.Obj
 
 @pytest.mark.draws
 @pytest.mark.usefixtures("few")
+@pytest.mark.slow
 def test_the_command_line_draws_and_saves_a_style(tmp_path: Path, capsys) -> None:
     scene = tmp_path / "styled.blend"
     arguments = ["run", "add_hairstyle", "--set", "style=buzz_cut", "--output", str(scene)]

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import bpy
 import pytest
+from tiers import few_in_commits
 
 pytestmark = pytest.mark.skipif(
     not (sys.platform.startswith("linux") and bpy.app.module), reason="hides Linux's drivers"
@@ -68,7 +69,9 @@ def test_the_engine_says_so() -> None:
 
 @pytest.mark.parametrize(
     "arguments",
-    [["render", *SMALL, *FEW], ["turntable", "--frames", "2", *SMALL, *FEW], ["self-test"]],
+    few_in_commits(
+        [["self-test"], ["render", *SMALL, *FEW], ["turntable", "--frames", "2", *SMALL, *FEW]]
+    ),
     ids=lambda arguments: arguments[0],
 )
 def test_verbs_that_draw_say_so_and_write_nothing(arguments: list[str], tmp_path: Path) -> None:
@@ -81,6 +84,7 @@ def test_verbs_that_draw_say_so_and_write_nothing(arguments: list[str], tmp_path
     assert "Traceback" not in done.stderr and list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_cards_are_made_all_the_same(tmp_path: Path) -> None:
     """Their atlas is drawn by numpy then."""
     output = tmp_path / "cards.glb"

@@ -90,6 +90,7 @@ def test_a_scene_of_another_size_moves_and_warns_the_same(
 
 
 @pytest.mark.parametrize("unit", few_in_commits([0.01, 1000.0]))
+@pytest.mark.slow
 def test_the_unit_scale_only_changes_how_numbers_are_shown(
     sphere: Any, new_hair: Callable[..., Any], evaluated: Callable[[], Any], unit: float
 ) -> None:

@@ -294,6 +294,7 @@ def test_particle_hair_becomes_curves(scene: Path) -> None:
     assert len(made.data.curves) == 30 and made.data.surface == bpy.data.objects["Head"]
 
 
+@pytest.mark.slow
 def test_a_sample_scene_is_shown_when_its_file_is_opened(extension: None, tmp_path: Path) -> None:
     path = tmp_path / "sample.blend"
     assert command_line.run(["run", "sample_scene", "--output", str(path)]) == 0

@@ -29,7 +29,7 @@ def larger(matrix: np.ndarray, factor: float) -> np.ndarray:
 
 
 @pytest.mark.parametrize("collider", few_in_commits(["mesh", "ball"]))
-@pytest.mark.parametrize("solver", ["direct", "relaxation"])
+@pytest.mark.parametrize("solver", few_in_commits(["direct", "relaxation"]))
 def test_hair_moves_the_same_at_any_size(kit, shake, collider, solver):
     """With gravity as much stronger: on a head that shakes, combed through a ball or a box."""
 

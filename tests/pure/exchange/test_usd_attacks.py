@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tiers import few_in_commits
 
 pytest.importorskip("pxr", reason="it is missing: `make setup` installs it")
 
@@ -60,7 +61,7 @@ ATTACKS: dict[str, Callable[[], str]] = {
 }
 
 
-@pytest.mark.parametrize("name", ATTACKS)
+@pytest.mark.parametrize("name", few_in_commits(ATTACKS))
 def test_an_attack_is_refused_in_time(name: str, tmp_path: Path) -> None:
     path = tmp_path / "attack.usda"
     path.write_text(ATTACKS[name]())

@@ -68,7 +68,9 @@ def hits(rig: pipeline.Rig, rays: int = 400) -> Floats:
     return met
 
 
-@pytest.mark.parametrize(("across", "length"), [(50, 0.024), (32, 0.04)])
+@pytest.mark.parametrize(
+    ("across", "length"), few_in_commits([pytest.param(32, 0.04), pytest.param(50, 0.024)])
+)
 def test_few_strands_get_the_children_that_cover_the_body(across: int, length: float) -> None:
     bare, covered = (
         rig_of(fur(across, length), sheet(), "none"),
