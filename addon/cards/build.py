@@ -33,6 +33,8 @@ from .strip import Strips, UncutCards, guide_strips, scattered_tiles, strip_mesh
 _COARSER_VIEWS = 16
 #: Views in which it is counted how often the order is wrong.
 _CHECKED_VIEWS = 8
+#: The fraction of wrong pixels from which on a note is worth it: fewer are hard to see.
+_WRONG_ENOUGH = 0.1
 #: Each card represents about this many strands; there are at most this many cards.
 _STRANDS_PER_CARD, _MAX_CARDS = 12, 600
 
@@ -69,6 +71,7 @@ class CardBuild:
     plan: what is to be baked into the atlas; None where its tiles are made at random.
     wrong_fraction: of the pixels of the finest level those that are drawn in a wrong order, see
         `order_check.wrong_fraction`.
+    order_notes: where that is much, what can be done.
     """
 
     levels: tuple[CardMesh, ...]
@@ -76,6 +79,7 @@ class CardBuild:
     errors: tuple[float, ...]
     plan: AtlasPlan | None
     wrong_fraction: float = 0.0
+    order_notes: tuple[str, ...] = ()
 
     @property
     def finest(self) -> CardMesh:
@@ -84,7 +88,7 @@ class CardBuild:
     @property
     def notes(self) -> tuple[str, ...]:
         """What the artist should know."""
-        return () if self.plan is None else self.plan.notes
+        return (*(() if self.plan is None else self.plan.notes), *self.order_notes)
 
 
 #: Gives the alpha of the atlas, (height, width), or None for opaque cards; may bake it from the
@@ -142,7 +146,20 @@ def card_steps(
         levels=tuple(in_order(mesh, each.front) for mesh, each in pairs),
         backs=tuple(mesh.triangles[each.back] for mesh, each in pairs),
         wrong_fraction=wrong,
+        order_notes=_order_notes(wrong, settings),
     )
+
+
+def _order_notes(wrong: float, settings: CardSettings) -> tuple[str, ...]:
+    if wrong <= _WRONG_ENOUGH:
+        return ()
+    remedy = (
+        "Give hair that hangs away from the head a group of its own, or let your engine sort cards "
+        "for each view"
+        if settings.order_by == "pieces"
+        else "Set Order By to Pieces"
+    )
+    return (f"{wrong:.0%} of the hair's pixels blend in the wrong order: {remedy}",)
 
 
 def _occlusion_steps(

@@ -258,7 +258,7 @@ def test_the_panel_draws_what_there_is(hair):
     draw_made_cards(Layout(), hair)
     assert said[0] == "Make Cards Again"
     assert said[1].startswith("Hair Cards: 12 cards, 384 triangles")
-    assert said[-2].startswith("Order: ") and said[-2].endswith(" % of pixels wrong")
+    assert said[-2].endswith(" % of pixels blend in the wrong order")
     assert said[-1] == "Texture 128 x 32"
 
 

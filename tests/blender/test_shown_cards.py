@@ -186,7 +186,7 @@ def test_lines_say_what_is_built_and_what_is_shown(in_window):
     mesh = drawn(session).cards.mesh
     assert (cards, triangles, vertices) == (60, len(mesh.triangles), len(mesh.positions))
     assert session.cards.lines[0] == f"60 cards, {triangles:,} triangles"
-    assert "% of pixels wrong" in session.cards.lines[1]
+    assert "% of pixels blend in the wrong order" in session.cards.lines[1]
     hair.data.hairloom.card_drawing.shown_as = "strands"
     assert session.cards.lines == () and session.cards.counts == (0, 0, 0)
     hair.data.hairloom.card_drawing.shown_as = "cards"

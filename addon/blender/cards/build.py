@@ -208,8 +208,8 @@ def built_in_thread(work: ThreadWork[Any], inputs: CardInputs) -> MappedCards:
 
 
 def order_line(wrong_fraction: float) -> str:
-    """How often the order of cards is wrong, such as "Order: 18 % of pixels wrong"."""
-    return f"Order: {100.0 * wrong_fraction:.0f} % of pixels wrong"
+    """How often the order of cards is wrong, such as "18 % of pixels blend in the wrong order"."""
+    return f"{100.0 * wrong_fraction:.0f} % of pixels blend in the wrong order"
 
 
 def card_maps(inputs: CardInputs, build: CardBuild, draw: AtlasDraw) -> CardMaps:

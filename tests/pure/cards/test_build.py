@@ -311,3 +311,19 @@ def test_half_a_million_strands_become_cards() -> None:
     groom = CardGroom(strands, np.arange(0, 500_000, 500), radius, normal, None)
     cards, _ = uncut_cards(groom, CardSettings(source="clusters"), replace(MADE))
     assert len(cards) >= 800
+
+
+def test_much_that_blends_wrongly_comes_with_a_remedy(monkeypatch: pytest.MonkeyPatch) -> None:
+    for wrong, order_by, remedy in (
+        (0.05, "distance", None),
+        (0.2, "distance", "Set Order By to Pieces"),
+        (0.2, "pieces", "a group of its own"),
+    ):
+        monkeypatch.setattr(
+            "hairloom.addon.cards.build.wrong_fraction", lambda *_, wrong=wrong, **__: wrong
+        )
+        notes = built(falling(200), order_by=order_by, card_count=5, levels=1).order_notes
+        if remedy is None:
+            assert notes == ()
+        else:
+            assert remedy in notes[0] and notes[0].startswith("20% of the hair's pixels")
