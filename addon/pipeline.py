@@ -22,7 +22,7 @@ from .dynamics.step import Drive, grid_at_frame_end
 from .dynamics.step import advance as advance_dynamics
 from .errors import HairloomError
 from .groom.automatic_children import are_few, automatic
-from .groom.children import Children, make_children
+from .groom.children import Children, Growth, make_children
 from .groom.children_settings import ChildrenSettings
 from .groom.counter_random import named, uniform
 from .groom.guides import choose_guides, grouped
@@ -70,6 +70,20 @@ class Pose:
     anchors: Floats | None = None
 
 
+@dataclass(frozen=True, eq=False)
+class Grown:
+    """How the children of a rig have grown, so that those of combed curves can be shaped again.
+
+    parents: which of the artist's own strands they grew between. shapes: these, of one point count.
+    kept: which of the children that grew the rig has.
+    """
+
+    growth: Growth
+    parents: Ints
+    shapes: StrandSet
+    kept: Ints
+
+
 @dataclass(frozen=True)
 class Rig:
     """A groom made ready to move: all strands, their guides and weights.
@@ -84,6 +98,7 @@ class Rig:
     widths: how wide the strands are, and why.
     children_line: what automatic children there are, and why; empty where there are none.
     holds: where strands are held by ties or by a surface; None: nowhere.
+    grown: how its children have grown; None without any, and where it comes from a bake.
     """
 
     strands: StrandSet
@@ -97,6 +112,7 @@ class Rig:
     widths: Widths = field(default_factory=Widths)
     children_line: str = ""
     holds: Holds | None = None
+    grown: Grown | None = None
 
     @property
     def guides_line(self) -> str:
@@ -356,7 +372,7 @@ def _with_children(
     parents, cv_count = _parents(own), rig.guide_grid.shape[1]
     shapes, notes = _parent_shapes(own.take(parents), settings.strand_count)
     made = make_children(shapes, head, settings, ground.density, ground.partings, place=place)
-    made = _outside(made, ground.field(), _hair_length(shapes))
+    made, kept = _outside(made, ground.field(), _hair_length(shapes))
     strands = joined(own, with_needed_points(made.strands, cv_count))
     if len(rig.guides) < own.strand_count:
         # shaped by their neighbours among all strands, they move as guides do
@@ -376,17 +392,19 @@ def _with_children(
         _frames(strands, head),
         (*rig.notes, *made.notes, *notes),
         own_count=own.strand_count,
+        grown=Grown(made.growth, parents, shapes, kept),
     )
 
 
-def _outside(made: Children, head: DistanceField | None, length: float) -> Children:
-    """Children that are led out of the head, without those that nothing leads out.
+def _outside(made: Children, head: DistanceField | None, length: float) -> tuple[Children, Ints]:
+    """Children that are led out of the head, without those that nothing leads out, and which of
+    all these are.
 
     Args:
         length: the hair's [m].
     """
     if head is None:
-        return made
+        return made, np.arange(made.strands.strand_count)
     led, is_out = led_out_at_rest(made.strands, head, length)
     chosen, lost = np.flatnonzero(is_out), int((~is_out).sum())
     notes = made.notes
@@ -396,7 +414,7 @@ def _outside(made: Children, head: DistanceField | None, length: float) -> Child
             " Comb the curves around them farther out.",
         )
     weights = GuideWeights(made.weights.guide[chosen], made.weights.weight[chosen])
-    return Children(led.take(chosen), weights, notes)
+    return Children(led.take(chosen), weights, notes, made.growth), chosen
 
 
 def _parent_shapes(parents: StrandSet, child_count: int) -> tuple[StrandSet, tuple[str, ...]]:

@@ -9,9 +9,12 @@ strands stay as many on average, and no child ever changes its clump.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import dataclass
+
 import numpy as np
 
-from ..arrays import Floats, Ints
+from ..arrays import Bools, Floats, Ints
 from ..params.curve import along
 from ..strands.nearest import nearest_points
 from .children_settings import ChildrenSettings
@@ -27,9 +30,34 @@ _REACH = 3.0
 _CHUNK = 2048
 
 
+@dataclass(frozen=True, eq=False)
+class Clumps:
+    """Which child draws which, and how far, as it was decided when they grew.
+
+    middle: (child_count,), itself where nothing draws it. strength: (child_count,) 0 to 1.
+    """
+
+    middle: Ints
+    strength: Floats
+
+    def with_middles(self, chosen: Ints) -> Ints:
+        """These children and all that their shapes depend on, ascending."""
+        found = np.unique(chosen)
+        while len(more := np.setdiff1d(self.middle[found], found)):
+            found = np.union1d(found, more)
+        return found
+
+    def with_members(self, chosen: Bools) -> Bools:
+        """These children (child_count,) and all whose shapes depend on them."""
+        found = chosen
+        while (more := found | found[self.middle]).sum() > found.sum():
+            found = more
+        return found
+
+
 def clump(
     grid: Floats, group: Ints, settings: ChildrenSettings, partings: Partings | None = None
-) -> None:
+) -> Clumps:
     """Draw the children of each clump towards its middle, in place; roots stay.
 
     Args:
@@ -37,24 +65,60 @@ def clump(
         group: (child_count,).
         partings: no clump has strands on both sides of these.
     """
+    clumps = Clumps(np.arange(len(grid)), np.zeros(len(grid)))
     if not settings.clump or settings.clump_size == 1:
-        return
-    fraction = settings.clump * along(settings.clump_along, np.linspace(0.0, 1.0, grid.shape[1]))
-    fraction[0] = 0.0
-    first, last = 0, _FIRST_LEVEL
-    while first < len(grid):
+        return clumps
+    fraction = _fraction(settings, grid.shape[1])
+    for first, last in _levels(len(grid)):
         middle_count = max(1, round(last / settings.clump_size))
         member = np.arange(max(first, middle_count), min(last, len(grid)))
         if len(member):
             middle, strength = _middles(
                 grid, group, member, middle_count, settings.parting, partings
             )
-            for start in range(0, len(member), _CHUNK):
-                chunk = slice(start, start + _CHUNK)
-                pull = (strength[chunk, None] * fraction).astype(np.float32)[..., None]
-                own = grid[member[chunk]]
-                grid[member[chunk]] = own + pull * (grid[middle[chunk]] - own)
+            clumps.middle[member], clumps.strength[member] = middle, strength
+            _pull(grid, member, middle, strength, fraction)
+    return clumps
+
+
+def clump_again(grid: Floats, number: Ints, clumps: Clumps, settings: ChildrenSettings) -> None:
+    """`clump` of some children, in place, by the middles that they had.
+
+    Args:
+        grid: (n, cv_count, 3) float32 [m]. number: (n,) ascending, which children these are; with
+            all their middles.
+    """
+    fraction = _fraction(settings, grid.shape[1])
+    for first, last in _levels(int(number.max(initial=-1)) + 1):
+        is_drawn = (number >= first) & (number < last) & (clumps.strength[number] > 0.0)
+        member = np.flatnonzero(is_drawn)
+        own = number[member]
+        middle = np.searchsorted(number, clumps.middle[own])
+        _pull(grid, member, middle, clumps.strength[own], fraction)
+
+
+def _levels(count: int) -> Iterator[tuple[int, int]]:
+    """Children that grew at each level: the first of them, and the first of the next level."""
+    first, last = 0, _FIRST_LEVEL
+    while first < count:
+        yield first, last
         first, last = last, 2 * last
+
+
+def _fraction(settings: ChildrenSettings, cv_count: int) -> Floats:
+    """How far CVs are drawn, (cv_count,)."""
+    fraction = settings.clump * along(settings.clump_along, np.linspace(0.0, 1.0, cv_count))
+    fraction[0] = 0.0
+    return fraction
+
+
+def _pull(grid: Floats, member: Ints, middle: Ints, strength: Floats, fraction: Floats) -> None:
+    """Draw strands of the grid towards others, in place."""
+    for start in range(0, len(member), _CHUNK):
+        chunk = slice(start, start + _CHUNK)
+        pull = (strength[chunk, None] * fraction).astype(np.float32)[..., None]
+        own = grid[member[chunk]]
+        grid[member[chunk]] = own + pull * (grid[middle[chunk]] - own)
 
 
 def _middles(

@@ -69,6 +69,21 @@ def child_roots(
     """
     density = checked_weights(density, surface, "density")
     guided = _Guided.by(guides, surface, is_painted=density is not None)
+    where = guided.place, guided.normal, guided.spacing
+    return surface.latest(_roots_among, *where, density, count, seed)
+
+
+def _roots_among(
+    surface: Surface,
+    place: Floats,
+    normal: Floats,
+    spacing: Floats,
+    density: Floats | None,
+    count: int,
+    seed: int,
+) -> ChildRoots:
+    """As `child_roots`, of guides that stand at these places; see `_Guided`."""
+    guided = _Guided(place, normal, spacing, density is not None)
     everywhere = Pieces.of(surface, density)
     require_area(everywhere.mass)
     pieces = _near_guides(everywhere, guided)

@@ -14,11 +14,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import Floats
+from ..arrays import Bools, Floats, Ints
 from ..errors import HairloomError
 from ..strands import StrandSet, Surface
 from ..strands.nearest import nearest_points
-from .child_clumps import clump
+from .child_clumps import Clumps, clump, clump_again
 from .child_roots import ChildRoots, child_roots
 from .child_shape import frizz, mixed, shorten
 from .children_settings import ChildrenSettings
@@ -37,11 +37,50 @@ class Children:
     """strands: bound, of the guides' CV count, in the space of the surface.
     weights: guide (child_count, 3), indices into the guides.
     notes: what the artist should know, each with a remedy; empty if all is well.
+    growth: how they were made.
     """
 
     strands: StrandSet
     weights: GuideWeights
     notes: tuple[str, ...]
+    growth: Growth
+
+
+@dataclass(frozen=True, eq=False)
+class Growth:
+    """What children keep when their guides are combed; their shapes follow from it and from these.
+
+    root: (child_count, 3) float32 [m]. key: (child_count,) what is random about each depends on.
+    clumps: as they were found. size: the median length of the guides [m].
+    """
+
+    root: Floats
+    key: Ints
+    weights: GuideWeights
+    clumps: Clumps
+    settings: ChildrenSettings
+    size: float
+
+    def touched(self, guides: Bools) -> Bools:
+        """Children (child_count,) whose shapes these guides (guide_count,) have a part in."""
+        weights = self.weights
+        is_mixed = (guides[weights.guide] & (weights.weight > 0.0)).any(axis=1)
+        return self.clumps.with_members(is_mixed)
+
+    def shapes(self, guide_grid: Floats, chosen: Ints) -> Floats:
+        """Some children as these guides shape them, (n, cv_count, 3) float32 [m].
+
+        Args:
+            guide_grid: (guide_count, cv_count, 3) float32 [m].
+            chosen: (n,) ascending.
+        """
+        number = self.clumps.with_middles(chosen)
+        weights = GuideWeights(self.weights.guide[number], self.weights.weight[number])
+        grid = mixed(self.root[number], guide_grid, weights)
+        clump_again(grid, number, self.clumps, self.settings)
+        grid = grid[np.searchsorted(number, chosen)]
+        _vary(grid, self.key[chosen], self.settings, self.size)
+        return grid
 
 
 def make_children(
@@ -74,9 +113,9 @@ def make_children(
     weights = _weights(roots, guides, settings, partings)
     group = guides.group[weights.guide[:, 0]]
     grid = mixed(roots.point, guides.grid, weights)
-    clump(grid, group, settings, partings)
-    shorten(grid, roots.key, settings)
-    frizz(grid, roots.key, settings, float(np.median(guides.lengths())))
+    clumps = clump(grid, group, settings, partings)
+    size = float(np.median(guides.lengths()))
+    _vary(grid, roots.key, settings, size)
     cv_count = grid.shape[1]
     strands = StrandSet(
         points=grid.reshape(-1, 3),
@@ -89,7 +128,14 @@ def make_children(
         has_widths=guides.has_widths,
         color=_color(guides, weights),
     )
-    return Children(strands, weights, roots.notes + _notes(guides, settings))
+    growth = Growth(roots.point, roots.key, weights, clumps, settings, size)
+    return Children(strands, weights, roots.notes + _notes(guides, settings), growth)
+
+
+def _vary(grid: Floats, key: Ints, settings: ChildrenSettings, size: float) -> None:
+    """What is each child's own, in place."""
+    shorten(grid, key, settings)
+    frizz(grid, key, settings, size)
 
 
 def _weights(

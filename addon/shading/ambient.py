@@ -19,7 +19,7 @@ import numpy as np
 from ..arrays import Floats
 from ..strands import StrandSet, Surface
 from .ambient_settings import AmbientSettings
-from .density_grid import body_depth, grid_around, hair_depth, sample
+from .density_grid import Grid, body_depth, grid_around, hair_depth, sample
 
 #: From a cell to one of its 26 neighbours.
 type Step = tuple[int, int, int]
@@ -46,10 +46,15 @@ def ambient_occlusion(
     grid = grid_around(strands, settings.cell_count)
     depth = hair_depth(strands, grid) * np.float32(settings.extinction)
     if body is not None:
-        depth = np.maximum(depth, body_depth(body, grid))
+        depth = np.maximum(depth, body.latest(_body_depth, grid.low, grid.cell, grid.shape))
     openness = sky_openness(depth, settings.upper_fraction)
     seen = sample(openness, grid.coordinates(points)) / settings.ao_bias
     return (1.0 - settings.strength * (1.0 - np.minimum(seen, 1.0))).astype(np.float32)
+
+
+def _body_depth(body: Surface, low: Floats, cell: float, shape: tuple[int, int, int]) -> Floats:
+    """See `body_depth`; of the numbers of a grid, since hair that is combed often keeps its box."""
+    return body_depth(body, Grid(low, cell, shape))
 
 
 def sky_openness(depth: Floats, upper_fraction: float) -> Floats:

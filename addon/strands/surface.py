@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Concatenate
 
 import numpy as np
 
@@ -80,6 +80,22 @@ class Surface:
         found: T = kept[make]
         return found
 
+    def latest[**Rest, T](
+        self,
+        make: Callable[Concatenate[Surface, Rest], T],
+        *arguments: Rest.args,
+        **named: Rest.kwargs,
+    ) -> T:
+        """What `make` makes of this very surface and of arguments, numbers and arrays, kept until
+        others come: hair that is combed keeps its roots."""
+        kept: dict[Any, tuple[tuple[Any, ...], Any]] = vars(self).setdefault("_made_last", {})
+        given = (*arguments, *named.values())
+        known = kept.get(make)
+        if known is None or not _are_equal(known[0], given):
+            kept[make] = known = given, make(self, *arguments, **named)
+        found: T = known[1]
+        return found
+
     def transformed(self, matrix: Floats) -> Surface:
         """Moved by an affine (4, 4) matrix; a mirroring one turns the triangles over."""
         positions = moved(self.positions, matrix)
@@ -87,6 +103,10 @@ class Surface:
             return replace(self, positions=positions)
         uv = None if self.corner_uv is None else self.corner_uv[:, ::-1]
         return replace(self, positions=positions, triangles=self.triangles[:, ::-1], corner_uv=uv)
+
+
+def _are_equal(some: tuple[Any, ...], others: tuple[Any, ...]) -> bool:
+    return len(some) == len(others) and all(map(np.array_equal, some, others))
 
 
 def _broken(problem: str) -> HairloomError:

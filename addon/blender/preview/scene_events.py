@@ -75,8 +75,9 @@ def updated(depsgraph: bpy.types.Depsgraph) -> None:
     """Blender has evaluated the scene: follow what moved, read again what was edited."""
     moved, edited, light_changed = changes(depsgraph)
     for preview, session in _grooms():
+        is_combed = is_edited(session, edited)
         if (
-            is_edited(session, edited)
+            is_combed
             or weights_changed(session, edited)
             or session.has_other_holders(edited)
             or session.has_other_partings()
@@ -88,7 +89,7 @@ def updated(depsgraph: bpy.types.Depsgraph) -> None:
         if occluders_changed(session, moved, depsgraph.view_layer):
             _shade_again_soon(preview)
         follows = preview.phase is not Phase.FREE and is_among(session, moved)
-        update = partial(_update, preview, session, depsgraph, follows, light_changed)
+        update = partial(_update, preview, session, depsgraph, follows, light_changed, is_combed)
         attempt(preview, depsgraph, update)
 
 
@@ -98,9 +99,12 @@ def _update(
     depsgraph: bpy.types.Depsgraph,
     follows: bool,
     light_changed: bool,
+    is_combed: bool,
 ) -> None:
     if light_changed:
         session.light(depsgraph)
+    if is_combed and preview.phase is Phase.REST:
+        session.comb(depsgraph)
     if follows:
         preview.keep_or_rest(depsgraph)
 
@@ -161,6 +165,15 @@ def undone() -> None:
         preview.session.is_stale = preview.cards_are_stale = True
     if previews:
         _read_again_soon()
+        bpy.app.timers.register(follow_undo, first_interval=0.0)
+
+
+def follow_undo() -> None:
+    """A timer of Blender's: curves that were put back are followed as those under a brush are."""
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    for preview, session in _grooms():
+        if preview.phase is Phase.REST:
+            attempt(preview, depsgraph, partial(session.comb, depsgraph))
 
 
 def _read_again_soon() -> None:
@@ -206,7 +219,7 @@ def clear() -> None:
     registry.end()
     view_transform.forget()
     latest_job.unwatch_all()
-    for timer in (_read_again, _refine):
+    for timer in (_read_again, _refine, follow_undo):
         if bpy.app.timers.is_registered(timer):
             bpy.app.timers.unregister(timer)
 

@@ -10,11 +10,12 @@ from dataclasses import replace
 import bpy
 import numpy as np
 
-from ...arrays import Floats
+from ...arrays import Floats, Ints
 from ...pipeline import Pose, Rig
 from ...shading.ambient_settings import AmbientSettings
 from ...strands import StrandSet
 from ...strands.affine import moved
+from ...strands.clean import Cleaned
 from ...strands.colors import color_notes
 from ..bakes.baked_rig import BakedRig, RestMatrices
 from ..bakes.groom_hashes import groom_frame_hash, groom_rig_hash
@@ -25,6 +26,10 @@ from ..scene.partings import is_same_state, parting_state, read_partings
 from ..scene.poses import check_finite, read_pose
 from ..scene.source import read_density, read_source, usable_curves
 from .prepared_groom import BuildRequest, rig_of
+
+#: Points that lie nearer than this to where they were have not moved, as a part of how far they are
+#: from the origin.
+_ROUNDING = 1e-6
 
 
 class GroomSource:
@@ -45,6 +50,7 @@ class GroomSource:
         self.hair = Body.at_rest(hair, depsgraph)
         self._holding = Holding.of(hair, depsgraph)
         self.source = replace(read_source(hair, depsgraph), holders=self._holding.holders)
+        self._combed = self.source.strands
         uses_head = self.source.head is not None and head is not None
         self.head = Body.at_rest(head, depsgraph) if uses_head else None
         self._head_uid = head and head.session_uid
@@ -127,9 +133,7 @@ class GroomSource:
         """
         hair, known = self.hair.found(), self.request
         before = known.source
-        read = usable_curves(hair, depsgraph)
-        back = self.hair.rest @ np.linalg.pinv(matrix_of(hair, depsgraph))
-        strands = read.strands if np.allclose(back, np.eye(4)) else read.strands.transformed(back)
+        read, strands, back = self._read_curves(hair, depsgraph)
         if _same(strands, before.strands, back):
             strands = before.strands
         density, warning = read_density(hair, before.head, depsgraph)
@@ -166,9 +170,40 @@ class GroomSource:
         self.request = request
         return request
 
+    def _read_curves(
+        self, hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph
+    ) -> tuple[Cleaned, StrandSet, Floats]:
+        """The curves, these as strands at rest, and the way back there (4, 4)."""
+        read = usable_curves(hair, depsgraph)
+        back = self.hair.rest @ np.linalg.pinv(matrix_of(hair, depsgraph))
+        is_there = np.allclose(back, np.eye(4))
+        return read, read.strands if is_there else read.strands.transformed(back), back
+
+    def moved_curves(self, depsgraph: bpy.types.Depsgraph) -> tuple[StrandSet, Ints] | None:
+        """The curves that have moved since this was last asked for, or since other hair was
+        accepted, and which of all they are; None where others have come or gone, or none has moved.
+
+        Raises:
+            HairloomError: the hair is gone, or none that can be used is left.
+        """
+        before = self._combed
+        _, strands, back = self._read_curves(self.hair.found(), depsgraph)
+        if not np.array_equal(strands.offsets, before.offsets):
+            return None
+        away = np.abs(strands.points - before.points).max(axis=1)
+        farthest = max(np.abs(strands.points).max(initial=0.0), np.abs(back[:3, 3]).max())
+        number = np.flatnonzero(
+            np.maximum.reduceat(away, strands.offsets[:-1]) > _ROUNDING * farthest
+        )
+        if not len(number):
+            return None
+        self._combed = strands
+        return strands.take(number), number
+
     def accept(self, request: BuildRequest) -> None:
         """Its hair is shown from now on; what acts at once is as it is set now."""
         self.source, self._holding = request.source, request.holding
+        self._combed = self.source.strands
         self.settings = GroomSettings.of(self.hair.found()).at_once(request.settings)
 
     def take_settings(self) -> bool:
@@ -203,7 +238,7 @@ def _same(one: StrandSet, other: StrandSet, back: Floats) -> bool:
     farthest = max(np.abs(one.points).max(initial=0.0), np.abs(back[:3, 3]).max())
     return (
         np.array_equal(one.offsets, other.offsets)
-        and np.allclose(one.points, other.points, rtol=0.0, atol=1e-6 * farthest)
+        and np.allclose(one.points, other.points, rtol=0.0, atol=_ROUNDING * farthest)
         and np.allclose(one.radius, other.radius, rtol=1e-5)
         and np.array_equal(one.group, other.group)
         and _same_colors(one.color, other.color)

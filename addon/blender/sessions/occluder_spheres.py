@@ -29,7 +29,8 @@ class OccluderSpheres:
 
     Args:
         head: world space at rest.
-        roots: (n, 3) [m], of the hair; other parts of a body hide none of it.
+        roots: (n, 3) [m], of the hair, or the corners of their box; other parts of a body hide none
+            of it.
     """
 
     def __init__(self, head: Surface, roots: Floats) -> None:

@@ -171,7 +171,9 @@ def prepared(
     report("what the head hides")
     occluders = None if known is None else known.occluders
     if occluders is None and rig.head is not None and with_occluders:
-        occluders = OccluderSpheres(rig.head, rig.strands.roots)
+        roots = rig.strands.roots
+        corners = np.stack([roots.min(axis=0), roots.max(axis=0)])
+        occluders = rig.head.latest(OccluderSpheres, corners)
     rank = pipeline.strand_ranks(rig)
     _ = rig.riders  # found in the thread that builds, as the window's first frame would wait for it
     return PreparedGroom(rig, ambient, occlusion, rank, occluders)

@@ -12,6 +12,7 @@ import numpy as np
 
 from ... import pipeline
 from ...arrays import Floats
+from ...comb_flow import combed
 from ...dynamics.colliders import PosedCollider
 from ...dynamics.figures import Figures, Measure
 from ...dynamics.settings import DynamicsSettings
@@ -31,6 +32,7 @@ from ..scene.source import Source, dynamics_warnings, refuse_own_dynamics
 from ..scene.wind import gravity_of, scene_wind
 from .groom_source import GroomSource
 from .measures import FrameTimes
+from .numpy_solver import NumpySolver
 from .prepared_groom import BuildRequest, PreparedGroom, build, placeholder
 from .snapshots import GroomPicture
 from .solvers import Solver, computed_on, form_of, solver_of
@@ -169,12 +171,8 @@ class Session:
         """Have made what was requested last, once nothing else is being made."""
         request = self._source.request
         self._job.want(
-            request, lambda: partial(_build_in_thread, request=request, before=self._before)
+            request, lambda: partial(_build_in_thread, request=request, before=self._made)
         )
-
-    @property
-    def _before(self) -> tuple[BuildRequest, PreparedGroom]:
-        return self._made_from, self.groom
 
     @property
     def snapshot(self) -> Snapshot:
@@ -212,7 +210,8 @@ class Session:
 
         Hair that plays goes on, unless its guides are others now.
         """
-        self._made_from, self.groom = request, groom
+        self._made = request, groom
+        self.groom = groom
         self._source.accept(request)
         is_same = before is not None and before.rig is groom.rig
         goes_on = before is not None and self.is_playing and _same_guides(groom.rig, before.rig)
@@ -236,6 +235,7 @@ class Session:
         made = self._job.take()
         if made is not None:
             self._take(*made, self.groom, depsgraph)
+            self.comb(depsgraph)  # a brush has gone on meanwhile
 
     def finish(self, depsgraph: bpy.types.Depsgraph) -> None:
         """Wait for the hair that is being made, and show it.
@@ -260,14 +260,33 @@ class Session:
         request = self._source.read_again(depsgraph)
         self.is_stale = False
         if request is not None and blocking and not self.is_pending:
-            groom = build(request, self._before, is_drawn=self._is_drawn)
+            groom = build(request, self._made, is_drawn=self._is_drawn)
             self._take(request, groom, self.groom, depsgraph)
             return
         self.take_settings()
         if request is not None:
             self._begin()
+        elif self.groom is not self._made[1] and not self.is_pending:
+            self._take(*self._made, self.groom, depsgraph)  # combed, and back by an undo
         if blocking:
             self.finish(depsgraph)
+
+    def comb(self, depsgraph: bpy.types.Depsgraph) -> None:
+        """Have hair at rest follow curves that a brush has moved, as far as that is done at once;
+        `read_again` is to come.
+
+        Raises:
+            HairloomError: as `rest`.
+        """
+        if self.is_playing or not self.is_made:
+            return
+        moved = self._source.moved_curves(depsgraph)
+        if moved is None:
+            return
+        self.groom = replace(self.groom, rig=combed(self.rig, *moved))
+        self.solver = NumpySolver(self.rig)
+        self.solver.rest(self._pose(depsgraph))
+        self._show()
 
     def take_settings(self) -> None:
         """Take over what acts at once; settings of guides, children and ambient light make the

@@ -1,0 +1,76 @@
+"""The flow of hair under a brush: what a stroke has touched follows at once.
+
+Curves that moved, and the children that they have a part in, are shaped again; each keeps its root,
+its guides and their weights, its clump, its random numbers and its point count. So nothing else
+changes, and what was found for the whole groom, such as ambient occlusion, stays. What it leaves
+to `pipeline.prepare`, which is to follow: points by need, children that are led out of the head or
+change guides, widths.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from .arrays import Floats, Ints
+from .pipeline import Grown, Rig
+from .strands import StrandSet
+from .strands.center_lines import center_lines
+from .strands.resample import evenly_spaced, resample
+
+
+def combed(rig: Rig, curves: StrandSet, number: Ints) -> Rig:
+    """The rig with some of the artist's curves elsewhere.
+
+    Args:
+        curves: (n,) world space at rest, as they are now.
+        number: (n,) ascending, which of the rig's own strands these are.
+    """
+    strands, cv_count = rig.strands, rig.guide_grid.shape[1]
+    points = strands.points.copy()
+    _put(points, strands.offsets, number, curves)
+    guide_grid = rig.guide_grid.copy()
+    guides = np.flatnonzero(np.isin(rig.guides, number))
+    if len(guides):
+        moved = curves.take(np.searchsorted(number, rig.guides[guides]))
+        guide_grid[guides] = center_lines(moved, cv_count).grid
+    grown, own = rig.grown, rig.own_count
+    if grown is not None and own is not None:
+        grown, touched = _grown(grown, curves, number)
+        if len(touched):
+            children = _strands(grown.growth.shapes(grown.shapes.grid, grown.kept[touched]))
+            _put(points, strands.offsets, own + touched, children)
+    return replace(rig, strands=replace(strands, points=points), guide_grid=guide_grid, grown=grown)
+
+
+def _grown(grown: Grown, curves: StrandSet, number: Ints) -> tuple[Grown, Ints]:
+    """The children's parents as they are now, and which of the rig's children they shape again."""
+    is_moved = np.isin(grown.parents, number)
+    parents = np.flatnonzero(is_moved)
+    if not len(parents):
+        return grown, parents
+    grid = grown.shapes.grid.copy()
+    moved = curves.take(np.searchsorted(number, grown.parents[parents]))
+    grid[parents] = resample(moved, grid.shape[1]).grid
+    shapes = replace(grown.shapes, points=grid.reshape(-1, 3))
+    touched = np.flatnonzero(grown.growth.touched(is_moved)[grown.kept])
+    return replace(grown, shapes=shapes), touched
+
+
+def _strands(grid: Floats) -> StrandSet:
+    """Of the points alone, (n, count, 3)."""
+    count, points = grid.shape[1], grid.reshape(-1, 3)
+    offsets = np.arange(len(grid) + 1) * count
+    return StrandSet(points, offsets, np.ones(len(points)), np.zeros(len(grid)))
+
+
+def _put(points: Floats, offsets: Ints, number: Ints, strands: StrandSet) -> None:
+    """Write strands in place of those of these numbers, by as many points as those have."""
+    counts = (offsets[1:] - offsets[:-1])[number]
+    for count in np.unique(counts).tolist():
+        some = np.flatnonzero(counts == count)
+        taken = strands.take(some)
+        if (taken.point_counts != count).any():
+            taken = evenly_spaced(taken, count)
+        points[offsets[number[some], None] + np.arange(count)] = taken.grid

@@ -1,0 +1,149 @@
+"""Hair follows a brush at once; what follows later is what it would be without the brush."""
+
+import bpy
+import numpy as np
+import pytest
+from waiting import take_steps_until
+
+from hairloom.addon.blender.base import latest_job
+from hairloom.addon.blender.preview import previews, scene_events
+from hairloom.addon.blender.scene.curves import curve_offsets, curve_points, put_points
+from hairloom.addon.blender.sessions.session import Session
+
+
+@pytest.fixture
+def hair(new_hair, sphere):
+    hair = new_hair(sphere)
+    children = hair.data.hairloom.children
+    children.method, children.strand_count = "multi", 2000
+    return hair
+
+
+@pytest.fixture
+def session(hair, evaluated, monkeypatch):
+    """Previewed as in a window."""
+    made = previews.start(hair, evaluated())
+    monkeypatch.setattr(latest_job, "is_blocking", lambda: False)
+    yield made
+    scene_events.clear()
+
+
+def stroke(hair, curves, angle=0.3):
+    """Turns curves around their roots, as a brush does that keeps lengths."""
+    points, offsets = curve_points(hair.data), curve_offsets(hair.data)
+    turn = np.eye(3, dtype=np.float32)
+    turn[:2, :2] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
+    for curve in curves:
+        own = slice(offsets[curve], offsets[curve + 1])
+        points[own] = points[own][0] + (points[own] - points[own][0]) @ turn.T
+    put_points(hair.data, points)
+    bpy.context.view_layer.update()
+
+
+def drawn(session):
+    return np.array(session.strands)
+
+
+def arrive(session, evaluated):
+    scene_events.catch_up(evaluated())
+    take_steps_until(lambda: not session.is_pending)
+
+
+def rebuilt(hair, evaluated):
+    """What a preview begun now shows."""
+    fresh = Session(hair, evaluated())
+    return fresh.rig.strands.points, fresh.snapshot.occlusion
+
+
+def test_strands_follow_with_the_update_and_nothing_else_moves(hair, session, evaluated):
+    before, snapshot = drawn(session), session.snapshot
+    stroke(hair, range(5))
+    after = drawn(session)
+    own = session.rig.strands.offsets[5]
+    assert np.abs(after[:own] - before[:own]).max() > 1e-3
+    is_child = np.arange(len(after)) >= session.rig.strands.offsets[session.rig.own_count]
+    moved = np.abs(after - before).max(axis=1) > 0.0
+    assert 0.02 < moved[is_child].mean() < 0.6
+    assert session.snapshot.layout is snapshot.layout
+    assert session.snapshot.occlusion is snapshot.occlusion
+    assert session.is_stale, "the rest is to come"
+
+
+def test_at_the_end_it_is_bit_for_bit_what_a_rebuild_makes(hair, session, evaluated):
+    for number in range(3):
+        stroke(hair, range(4 * number, 4 * number + 4))
+    arrive(session, evaluated)
+    points, occlusion = rebuilt(hair, evaluated)
+    np.testing.assert_array_equal(session.rig.strands.points, points)
+    np.testing.assert_array_equal(session.snapshot.occlusion, occlusion)
+    assert not session.is_stale
+
+
+def test_an_undo_brings_back_the_very_hair(hair, session, evaluated):
+    """Before the rest has come, and after it: there children keep the guides of the combed hair
+    until the rest comes again."""
+    before, points = drawn(session), curve_points(hair.data)
+    own = session.rig.strands.offsets[session.rig.own_count]
+    stroke(hair, range(5))
+    put_points(hair.data, points)
+    bpy.context.view_layer.update()
+    np.testing.assert_allclose(drawn(session), before, atol=1e-6)
+    arrive(session, evaluated)
+    np.testing.assert_array_equal(drawn(session), before)
+    stroke(hair, range(5))
+    arrive(session, evaluated)
+    put_points(hair.data, points)
+    bpy.context.view_layer.update()
+    np.testing.assert_allclose(drawn(session)[:own], before[:own], atol=1e-6)
+    arrive(session, evaluated)
+    np.testing.assert_array_equal(drawn(session), before)
+
+
+def test_blenders_undo_and_redo_are_followed(hair, session, evaluated):
+    bpy.ops.ed.undo_push(message="before")
+    before = drawn(session)
+    stroke(hair, range(5))
+    bpy.ops.ed.undo_push(message="combed")
+    combed = drawn(session)
+    for back, wanted in ((bpy.ops.ed.undo, before), (bpy.ops.ed.redo, combed)):
+        back()
+        scene_events.follow_undo()
+        np.testing.assert_allclose(drawn(session), wanted, atol=1e-6)
+
+
+def test_a_stroke_amid_a_build_is_not_lost_when_that_arrives(hair, session, evaluated):
+    stroke(hair, range(5))
+    scene_events.catch_up(evaluated())
+    stroke(hair, range(10, 15))
+    shown = drawn(session)
+    take_steps_until(lambda: not session.is_pending)
+    own = session.rig.strands.offsets[session.rig.own_count]
+    np.testing.assert_allclose(drawn(session)[:own], shown[:own], atol=1e-6)
+    arrive(session, evaluated)
+    np.testing.assert_array_equal(session.rig.strands.points, rebuilt(hair, evaluated)[0])
+
+
+def test_hair_that_plays_is_not_put_to_rest_by_the_first_touch(hair, session, evaluated):
+    previews.play(evaluated())
+    previews.advance(evaluated(), 1.0 / 60.0)
+    solver = session.solver
+    stroke(hair, range(5))
+    assert session.solver is solver and session.is_playing
+
+
+def test_new_curves_are_no_stroke(hair, session, evaluated):
+    before = drawn(session)
+    hair.data.add_curves([6])
+    bpy.context.view_layer.update()
+    np.testing.assert_array_equal(drawn(session), before)
+
+
+def test_a_combed_head_that_moved_since_takes_hair_along(hair, session, evaluated):
+    """Curves are compared at rest, wherever hair and head are now."""
+    hair.parent.location.x += 0.5
+    bpy.context.view_layer.update()
+    before = drawn(session)
+    stroke(hair, range(5))
+    own = session.rig.strands.offsets[5]
+    away = np.abs(drawn(session) - before).max(axis=1)
+    assert away[:own].max() > 1e-3 and (away > 1e-5).mean() < 0.6
