@@ -9,6 +9,7 @@ from hairloom.addon.blender.base import latest_job
 from hairloom.addon.blender.preview import previews, scene_events
 from hairloom.addon.blender.scene.curves import curve_offsets, curve_points, put_points
 from hairloom.addon.blender.sessions.session import Session
+from hairloom.addon.blender.viewport import overlay
 
 
 @pytest.fixture
@@ -82,7 +83,7 @@ def test_at_the_end_it_is_bit_for_bit_what_a_rebuild_makes(hair, session, evalua
 def test_an_undo_brings_back_the_very_hair(hair, session, evaluated):
     """Before the rest has come, and after it: there children keep the guides of the combed hair
     until the rest comes again."""
-    before, points = drawn(session), curve_points(hair.data)
+    before, points, groom = drawn(session), curve_points(hair.data), session.groom
     own = session.rig.strands.offsets[session.rig.own_count]
     stroke(hair, range(5))
     put_points(hair.data, points)
@@ -90,6 +91,7 @@ def test_an_undo_brings_back_the_very_hair(hair, session, evaluated):
     np.testing.assert_allclose(drawn(session), before, atol=1e-6)
     arrive(session, evaluated)
     np.testing.assert_array_equal(drawn(session), before)
+    assert session.groom is groom, "made once, not again"
     stroke(hair, range(5))
     arrive(session, evaluated)
     put_points(hair.data, points)
@@ -129,6 +131,28 @@ def test_hair_that_plays_is_not_put_to_rest_by_the_first_touch(hair, session, ev
     solver = session.solver
     stroke(hair, range(5))
     assert session.solver is solver and session.is_playing
+
+
+def test_guides_are_lines_while_brushes_comb_them(hair, session, evaluated):
+    """Blender's own curves stay hidden; those on the far side of the head are not drawn."""
+    assert overlay.drawing_of(session.uid).lines == ()
+    bpy.ops.object.mode_set(mode="SCULPT_CURVES")
+    bpy.context.view_layer.update()
+    assert hair.evaluated_get(evaluated()).display_type == "BOUNDS"
+    (lines,) = overlay.drawing_of(session.uid).lines
+    grid = session.rig.guide_grid
+    np.testing.assert_allclose(lines.points.reshape(len(grid), -1, 2, 3)[:, :, 0], grid[:, :-1])
+    np.testing.assert_allclose(lines.points.reshape(len(grid), -1, 2, 3)[:, :, 1], grid[:, 1:])
+    seen = lines.seen_from(np.array([0.0, 0.0, 5.0, 1.0])).points
+    assert 0 < len(seen) < len(lines.points) and seen[:, 2].min() > -0.05
+    stroke(hair, range(5))
+    (combed,) = overlay.drawing_of(session.uid).lines
+    assert np.abs(combed.points - lines.points).max() > 1e-3
+    hair.hairloom.hide_original = False
+    bpy.context.view_layer.update()
+    assert overlay.drawing_of(session.uid).lines == ()
+    assert hair.evaluated_get(evaluated()).display_type != "BOUNDS"
+    bpy.ops.object.mode_set(mode="OBJECT")
 
 
 def test_new_curves_are_no_stroke(hair, session, evaluated):

@@ -14,7 +14,7 @@ def test_a_line_is_drawn_through_what_is_in_front_of_it() -> None:
     import gpu
     from mathutils import Matrix
 
-    from hairloom.addon.blender.viewport.debug_lines import draw_lines
+    from hairloom.addon.blender.viewport.debug_lines import Lines, draw_lines
 
     offscreen: Any = gpu.types.GPUOffScreen(32, 32, format="RGBA16F")
     points = np.array([[-1.0, 0.03, 0.5], [1.0, 0.03, 0.5]], np.float32)
@@ -24,7 +24,7 @@ def test_a_line_is_drawn_through_what_is_in_front_of_it() -> None:
         gpu.matrix.load_matrix(Matrix.Identity(4))
         gpu.matrix.load_projection_matrix(Matrix.Identity(4))
         gpu.state.depth_test_set("LESS_EQUAL")
-        draw_lines(points, (0.0, 1.0, 0.0, 1.0))
+        draw_lines(Lines((0.0, 1.0, 0.0, 1.0), points))
         assert gpu.state.depth_test_get() == "LESS_EQUAL"
         gpu.state.depth_test_set("NONE")
         read = framebuffer.read_color(0, 0, 32, 32, 4, 0, "FLOAT")

@@ -26,6 +26,7 @@ from ..base.redraw import redraw_panels, redraw_views, refresh_panels
 from ..colliders import fields
 from ..sessions.session import Session
 from ..viewport import overlay
+from ..viewport.debug_lines import is_combed
 from .phases import Event, Phase
 from .preview import Bake, Preview, rig_for
 
@@ -335,9 +336,9 @@ def publish(preview: Preview, depsgraph: bpy.types.Depsgraph) -> None:
     if is_missing_lines and not fields.are_made():
         watch((session.uid, "lines"), partial(_show_lines, preview))
     refresh_panels()
-    # our own strands come into the place of Blender's where nobody edits these, and not before
-    # they are made; an overlay that has failed shows nothing
-    is_replaced = hair.mode == "OBJECT" and not overlay.failure()
+    # our own strands come into the place of Blender's where nobody edits these or a brush combs
+    # them, and not before they are made; an overlay that has failed shows nothing
+    is_replaced = (hair.mode == "OBJECT" or is_combed(hair)) and not overlay.failure()
     hides = is_replaced and hair.hairloom.hide_original and session.is_made
     volume = session.settings[VolumeSettings]
     has_own_shadow = volume.on_body and volume.shadows != "none"

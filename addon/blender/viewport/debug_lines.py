@@ -1,4 +1,5 @@
-"""What acts on the hair, as thin lines in the 3D view: colliders, wind and lights."""
+"""What acts on the hair, as thin lines in the 3D view: colliders, wind and lights; and the guides,
+while brushes comb them and Blender's own thick strands are hidden."""
 
 from __future__ import annotations
 
@@ -20,6 +21,7 @@ from ...dynamics.colliders import (
 from ...dynamics.settings import DynamicsSettings
 from ...dynamics.wind import Air, air_of
 from ...errors import HairloomError
+from ...pipeline import carried_guides, root_normals, root_turns
 from ...render import gpu_objects
 from ...shading.lights import Light
 from ...strands.affine import moved
@@ -33,6 +35,8 @@ COLORS = {
     "wind": (0.2, 0.55, 1.0, 0.9),
     "lights": (1.0, 0.8, 0.25, 0.7),
 }
+#: Of guides under a brush.
+GUIDES = (0.9, 0.9, 0.9, 0.35)
 #: Corners of a circle.
 _CORNERS = 32
 #: More spheres of a set than these only clutter the view.
@@ -45,19 +49,40 @@ _AWAY = 1.6
 
 @dataclass(frozen=True, eq=False)
 class Lines:
-    """Lines of one colour. points: (2n, 3) float32 [m] world, two for each line."""
+    """Lines of one colour.
+
+    points: (2n, 3) float32 [m] world, two for each line.
+    roots, normals: (n, 3) where each line is held on a head, and that head's normal there; lines on
+        its far side are not seen. None: all are.
+    """
 
     color: tuple[float, float, float, float]
     points: Floats
+    roots: Floats | None = None
+    normals: Floats | None = None
+
+    def seen_from(self, eye: Floats) -> Lines:
+        """Those that no head hides.
+
+        Args:
+            eye: (4,), homogeneous, as Camera.eye.
+        """
+        if self.roots is None or self.normals is None:
+            return self
+        to_eye = eye[:3] - eye[3] * self.roots
+        is_seen = np.einsum("ij,ij->i", to_eye, self.normals) > 0.0
+        return Lines(self.color, self.points.reshape(-1, 2, 3)[is_seen].reshape(-1, 3))
 
 
 def debug_lines_of(
     session: Session, hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph
 ) -> tuple[Lines, ...]:
     """The lines that the artist wants to see of this groom."""
-    wanted = hair.hairloom.shown_overlays
+    wanted, combed = hair.hairloom.shown_overlays, ()
+    if is_combed(hair) and hair.hairloom.hide_original and session.is_made:
+        combed = (guide_lines(session),)
     if not wanted:
-        return ()
+        return combed
     points = session.snapshot.root_center, _radius(session)
     made = {
         "colliders": lambda: collider_lines(session, depsgraph),
@@ -66,17 +91,29 @@ def debug_lines_of(
         ),
         "lights": lambda: light_lines(session.snapshot.lights, *points),
     }
-    return tuple(
+    return combed + tuple(
         Lines(COLORS[kind], lines.astype(np.float32))
         for kind, _, _ in OVERLAYS
         if kind in wanted and len(lines := made[kind]())
     )
 
 
-def _radius(session: Session) -> float:
-    """Of the hair at rest [m]."""
-    low, high = session.rig.strands.bounds()
-    return float(np.linalg.norm(high - low)) / 2.0
+def is_combed(hair: bpy.types.Object) -> bool:
+    """Whether Blender's brushes are at work on it."""
+    return bool(hair.mode == "SCULPT_CURVES")
+
+
+def guide_lines(session: Session) -> Lines:
+    """The guides at rest where their roots are now."""
+    rig, pose = session.rig, session.solver.pose
+    grid = carried_guides(rig, pose)
+    turns = root_turns(rig, pose)
+    normals = np.einsum("nij,nj->ni", turns, root_normals(rig)[rig.guides])
+    points = np.stack([grid[:, :-1], grid[:, 1:]], axis=2).reshape(-1, 3)
+    each = grid.shape[1] - 1
+    return Lines(
+        GUIDES, points, np.repeat(grid[:, 0], each, axis=0), np.repeat(normals, each, axis=0)
+    )
 
 
 def collider_lines(session: Session, depsgraph: bpy.types.Depsgraph) -> Floats:
@@ -182,15 +219,16 @@ def _across(along: Floats) -> tuple[Floats, Floats]:
     return side, np.cross(along, side)
 
 
-def draw_lines(points: Floats, color: tuple[float, float, float, float]) -> None:
+def draw_lines(lines: Lines) -> None:
     """Into the view that is being drawn, in front of everything; leaves the state as it was."""
+    points = lines.points
     shader = gpu.shader.from_builtin("UNIFORM_COLOR")
     depth, blend = gpu.state.depth_test_get(), gpu.state.blend_get()
     gpu.state.depth_test_set("NONE")
     gpu.state.blend_set("ALPHA")
     try:
         shader.bind()
-        shader.uniform_float("color", color)
+        shader.uniform_float("color", lines.color)
         layout = gpu.types.GPUVertFormat()
         layout.attr_add(id="pos", comp_type="F32", len=3, fetch_mode="FLOAT")
         vertices = gpu_objects.vertex_buffer(layout, len(points))

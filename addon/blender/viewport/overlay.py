@@ -195,7 +195,7 @@ def _draw(what: Callable[[Any], None]) -> None:
 def _draw_strands(context: Any) -> None:
     look_at_layers()
     space, view = context.space_data, context.region_data
-    camera = Camera(np.array(view.view_matrix), np.array(view.window_matrix))
+    camera = _camera(view)
     address, studio = space.as_pointer(), three_point_lights(camera.view)
     display = view_transform.display_of(space.shading, context.scene)
     for uid, drawing in shown_in(context):
@@ -208,6 +208,10 @@ def _draw_strands(context: Any) -> None:
         shown_by = display if snapshot.debug_view == "none" else None
         with ONE_AT_A_TIME, drawing.times.measured("drawing"):
             _draw_groom(drawn, snapshot, camera, shown_by, shades_body=shades_body)
+
+
+def _camera(view: Any) -> Camera:
+    return Camera(np.array(view.view_matrix), np.array(view.window_matrix))
 
 
 def _draw_groom(
@@ -242,9 +246,10 @@ def _draw_groom(
 def _draw_debug_lines(context: Any) -> None:
     """Through all that is in front of them, as Blender's own gizmos are."""
     if context.space_data.overlay.show_overlays:
+        eye = _camera(context.region_data).eye
         for _, drawing in shown_in(context):
             for lines in drawing.lines:
-                draw_lines(lines.points, lines.color)
+                draw_lines(lines.seen_from(eye))
 
 
 def _draw_counts(context: Any) -> None:

@@ -1,0 +1,99 @@
+"""A style of 20,000 children on the built-in head, combed as a brush does, and painted.
+
+What is measured is what the window does, without its drawing: from Blender's evaluation of the
+curves until the snapshot that the next redraw draws has all strands. In the window a pause and the
+look for what has arrived come before and after what is made in a thread; both are added.
+"""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+import bpy
+import numpy as np
+
+from hairloom.addon.blender.base.latest_job import ARRIVAL_TIME
+from hairloom.addon.blender.preview import previews, scene_events
+from hairloom.addon.blender.scene.curves import curve_offsets, curve_points, put_points
+
+STRANDS, STROKES = 20_000, 7
+#: how far the brush reaches [m], and how far it turns hair [rad]
+RADIUS, TURN = 0.03, 0.2
+
+
+def styled(style: str) -> Any:
+    """This hairstyle, previewed with as many children."""
+    bpy.ops.hairloom.add_hairstyle(style=style, plays=False)
+    hair = bpy.context.object
+    hair.data.hairloom.children.strand_count = STRANDS
+    _catch_up()
+    return hair
+
+
+def combed(hair: Any) -> dict[str, float]:
+    """Medians [ms]: a stroke, all that follows from it, and its undo."""
+    first, rest, undo = [], [], []
+    session, count = previews.session_of(hair), len(hair.data.curves)
+    assert session is not None
+    for stroke in range(STROKES):
+        before, strands = curve_points(hair.data), session.rig.strands.points
+        put_points(hair.data, _turned(hair, stroke * count // STROKES))
+        first.append(_update())
+        assert session.rig.strands.points is not strands, "the strands do not follow"
+        if stroke % 2:
+            put_points(hair.data, before)
+            undo.append(_update())
+        rest.append(_catch_up())
+    return {
+        "comb_ms": float(np.median(first)),
+        "comb_undo_ms": float(np.median(undo)),
+        "comb_all_ms": float(np.median(rest[::2])),
+    }
+
+
+def painted(hair: Any) -> float:
+    """A dab of a brush on the weights by which children grow, until they do [ms]."""
+    head, took = hair.parent, []
+    group = head.vertex_groups[hair.hairloom.children_density]
+    session = previews.session_of(hair)
+    assert session is not None
+    positions = np.empty(3 * len(head.data.vertices), np.float32)
+    head.data.vertices.foreach_get("co", positions)
+    roots = session.source.strands.roots
+    for dab in range(3):
+        away = np.linalg.norm(positions.reshape(-1, 3) - roots[dab * 50], axis=1)
+        strands = session.rig.strands
+        group.add(np.flatnonzero(away < RADIUS).tolist(), 0.5, "REPLACE")
+        head.data.update_tag()
+        update = _update()
+        took.append(update + _catch_up())
+        assert session.rig.strands is not strands, "painting changes nothing"
+    return float(np.median(took))
+
+
+def _update() -> float:
+    began = time.perf_counter()
+    bpy.context.view_layer.update()
+    return 1000.0 * (time.perf_counter() - began)
+
+
+def _catch_up() -> float:
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    began = time.perf_counter()
+    scene_events.catch_up(depsgraph)
+    took = time.perf_counter() - began
+    return 1000.0 * (took + scene_events.SETTLING_TIME + ARRIVAL_TIME)
+
+
+def _turned(hair: Any, curve: int) -> np.ndarray:
+    """Points of all curves, those around this one turned about Z, tips most; lengths are kept."""
+    points, offsets = curve_points(hair.data), curve_offsets(hair.data)
+    roots = points[offsets[:-1]]
+    for near in np.flatnonzero(np.linalg.norm(roots - roots[curve], axis=1) < RADIUS):
+        own = points[offsets[near] : offsets[near + 1]]
+        step, angle = np.diff(own, axis=0), TURN * np.linspace(0.0, 1.0, len(own))[1:]
+        x = step[:, 0] * np.cos(angle) - step[:, 1] * np.sin(angle)
+        y = step[:, 0] * np.sin(angle) + step[:, 1] * np.cos(angle)
+        own[1:] = own[0] + np.cumsum(np.stack([x, y, step[:, 2]], axis=1), axis=0)
+    return points

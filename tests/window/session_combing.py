@@ -1,0 +1,154 @@
+"""Combing under the preview: in Sculpt Mode the brush is dragged over a head of hair, and the whole
+style follows, with guides as thin lines instead of Blender's thick curves; Ctrl-Z puts it back.
+"""
+
+import sys
+import time
+from pathlib import Path
+
+import bpy
+import numpy as np
+from bpy_extras.view3d_utils import location_3d_to_region_2d
+
+sys.path.append(str(Path(__file__).parent))
+import driver
+import traces
+from artist import (
+    changed,
+    click,
+    hair_is_made,
+    hide_floor,
+    look_from_front,
+    new_head,
+    open_our_sidebar,
+    pixels,
+    press,
+    region,
+    sidebar_button,
+)
+from dice import press as press_in_view
+from dice import select
+from driver import of_hairloom, until
+from open_panels import SIDEBAR, only_our_panels, show
+
+log = traces.Log()
+GUIDES, CHILDREN, LENGTH = 300, 20_000, 0.15
+
+
+def steps():
+    yield from press("ESC")
+    driver.enable_extension()
+    only_our_panels()
+    hair = yield from groom()
+    yield from sculpt(hair)
+    yield from comb(hair)
+    yield from undo(hair)
+    assert "Traceback" not in log.added(), "something has raised"
+
+
+def groom():
+    show([SIDEBAR])
+    yield from open_our_sidebar()
+    new_head()
+    hide_floor()
+    look_from_front(0.9)
+    bpy.ops.hairloom.grow(strand_count=GUIDES, length=LENGTH)
+    hair = bpy.context.object
+    children = hair.data.hairloom.children
+    children.method, children.strand_count = "multi", CHILDREN
+    bpy.ops.ed.undo_push(message="hair")
+    select(hair)
+    yield
+    yield from click(*sidebar_button("hairloom.preview"))
+    yield from hair_is_made()
+    yield
+    return hair
+
+
+def session():
+    (one,) = of_hairloom("previews").sessions()
+    return one
+
+
+def evaluated(hair):
+    return hair.evaluated_get(bpy.context.evaluated_depsgraph_get())
+
+
+def sculpt(hair):
+    """Blender's curves stay hidden, ours are there as lines."""
+    before = pixels("before_sculpting")
+    bpy.ops.object.mode_set(mode="SCULPT_CURVES")
+    yield
+    assert hair.mode == "SCULPT_CURVES"
+    yield from until(lambda: evaluated(hair).display_type == "BOUNDS", "Blender's curves are shown")
+    drawing = of_hairloom("overlay").drawing_of(session().uid)
+    (lines,) = drawing.lines
+    assert 0 < len(lines.seen_from(np.array([0.0, -9.0, 0.0, 1.0])).points) < len(lines.points)
+    assert len(lines.points) == 2 * len(session().rig.guides) * (
+        session().rig.guide_grid.shape[1] - 1
+    )
+    yield
+    shot = pixels("sculpting")
+    moved = changed(before, shot, 0.4)
+    assert moved < 0.05, f"{100 * moved:.1f} % of the picture is other than hair"
+
+
+def comb(hair):
+    """The mouse drags the brush across the hair: it follows while the button is down."""
+    window, (x, y) = bpy.context.window, in_front()
+    before, shot, offsets = session().strands, pixels("uncombed"), session().rig.strands.offsets
+    window.event_simulate("MOUSEMOVE", "NOTHING", x=x, y=y)
+    yield 1
+    window.event_simulate("LEFTMOUSE", "PRESS", x=x, y=y)
+    yield 1
+    for along in range(5, 80, 5):
+        window.event_simulate("MOUSEMOVE", "NOTHING", x=x + along, y=y)
+        yield 1
+    during = session().strands
+    own = offsets[session().rig.own_count]
+    moved = np.abs(during - before).max(axis=1)
+    assert moved[:own].max() > 0.005, "the brush combs nothing"
+    assert moved[own:].max() > 0.005, "children do not follow while the button is down"
+    assert (moved == 0.0).mean() > 0.2, "what the brush did not touch has moved"
+    window.event_simulate("LEFTMOUSE", "RELEASE", x=x + 80, y=y)
+    yield 1
+    assert (yield from settled()) is not None
+    yield
+    follows = changed(shot, pixels("combed"))
+    assert follows > 0.002, f"the picture stands still: {follows:.4f} of it has changed"
+
+
+def in_front():
+    """Where the window shows the middle of the guide that is nearest to the eye."""
+    view, grid = region("WINDOW"), session().rig.guide_grid
+    point = grid[grid[:, -1, 1].argmin(), grid.shape[1] // 2]
+    place = location_3d_to_region_2d(view, view.data, point)
+    return int(view.x + place.x), int(view.y + place.y)
+
+
+def settled():
+    """Until the rest has come; how long that took [s]."""
+    began = time.monotonic()
+    yield from until(
+        lambda: not (session().is_stale or session().is_pending), "the rest does not come"
+    )
+    took = time.monotonic() - began
+    print(f"the rest came after {took:.2f} s")
+    return took
+
+
+def undo(hair):
+    combed = session().rig.guide_grid
+    yield from press_in_view("Z", ctrl=True)
+    yield from until(
+        lambda: np.abs(session().rig.guide_grid - combed).max() > 0.005, "Ctrl-Z is not followed"
+    )
+    yield from settled()
+    yield
+    driver.screenshot("undone")
+    bpy.ops.object.mode_set(mode="OBJECT")
+    yield
+    assert not of_hairloom("overlay").drawing_of(session().uid).lines
+
+
+driver.play(steps())
