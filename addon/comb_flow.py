@@ -62,7 +62,7 @@ def _strands(grid: Floats) -> StrandSet:
     """Of the points alone, (n, count, 3)."""
     count, points = grid.shape[1], grid.reshape(-1, 3)
     offsets = np.arange(len(grid) + 1) * count
-    return StrandSet(points, offsets, np.ones(len(points)), np.zeros(len(grid)))
+    return StrandSet(points, offsets, np.ones(len(points)), np.zeros(len(grid), np.int32))
 
 
 def _put(points: Floats, offsets: Ints, number: Ints, strands: StrandSet) -> None:

@@ -597,9 +597,18 @@ def _ridden(rig: Rig, pose: Pose, guides_now: Floats) -> tuple[Floats, RootMotio
 
 def strands_at_rest(rig: Rig, pose: Pose) -> Floats:
     """All strands in their style, in the shape of `strands_at`."""
+    if rig.holds is None and _is_unmoved(rig, pose):
+        return rig.strands.points  # as `carried` would, bit for bit
     if held_guides(rig, pose) is None:
         return held_strands(rig, pose, carried(rig, pose))  # guides at rest move nothing
     return strands_at(rig, pose, style_of_guides(rig, pose))
+
+
+def _is_unmoved(rig: Rig, pose: Pose) -> bool:
+    """Whether the body is where it was when the rig was made."""
+    if rig.head is None or pose.head_positions is None:
+        return np.array_equal(pose.matrix, np.eye(4))
+    return np.array_equal(pose.head_positions, rig.head.positions)
 
 
 def held_strands(rig: Rig, pose: Pose, points: Floats) -> Floats:

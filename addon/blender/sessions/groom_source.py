@@ -190,11 +190,11 @@ class GroomSource:
         _, strands, back = self._read_curves(self.hair.found(), depsgraph)
         if not np.array_equal(strands.offsets, before.offsets):
             return None
-        away = np.abs(strands.points - before.points).max(axis=1)
         farthest = max(np.abs(strands.points).max(initial=0.0), np.abs(back[:3, 3]).max())
-        number = np.flatnonzero(
-            np.maximum.reduceat(away, strands.offsets[:-1]) > _ROUNDING * farthest
-        )
+        other = np.flatnonzero((strands.points != before.points).any(axis=1))
+        away = np.abs(strands.points[other] - before.points[other]).max(axis=1)
+        points = other[away > _ROUNDING * farthest]
+        number = np.unique(np.searchsorted(strands.offsets, points, side="right") - 1)
         if not len(number):
             return None
         self._combed = strands

@@ -78,7 +78,8 @@ def debug_lines_of(
     session: Session, hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph
 ) -> tuple[Lines, ...]:
     """The lines that the artist wants to see of this groom."""
-    wanted, combed = hair.hairloom.shown_overlays, ()
+    wanted = hair.hairloom.shown_overlays
+    combed: tuple[Lines, ...] = ()
     if is_combed(hair) and hair.hairloom.hide_original and session.is_made:
         combed = (guide_lines(session),)
     if not wanted:
@@ -114,6 +115,12 @@ def guide_lines(session: Session) -> Lines:
     return Lines(
         GUIDES, points, np.repeat(grid[:, 0], each, axis=0), np.repeat(normals, each, axis=0)
     )
+
+
+def _radius(session: Session) -> float:
+    """Of the hair at rest [m]."""
+    low, high = session.rig.strands.bounds()
+    return float(np.linalg.norm(high - low)) / 2.0
 
 
 def collider_lines(session: Session, depsgraph: bpy.types.Depsgraph) -> Floats:
