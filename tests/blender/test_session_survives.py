@@ -132,12 +132,12 @@ def test_another_scene_in_the_window_does_not_end_the_preview(preview):
     assert drawn(session) == pytest.approx(before + np.array([1.0, 0.0, 0.0]), abs=1e-6)
 
 
-def test_sculpting_shows_blenders_own_strands(preview, evaluated):
+def test_sculpting_hides_blenders_own_strands(preview, evaluated):
     hair, _, session = preview
     bpy.ops.object.mode_set(mode="SCULPT_CURVES")
     hair.data.position_data[7].vector = (0.0, 0.0, 0.5)
     update()
-    assert hair.evaluated_get(evaluated()).display_type == "TEXTURED"
+    assert hair.evaluated_get(evaluated()).display_type == "BOUNDS"
     scene_events.catch_up(evaluated())
     assert drawn(session)[0, -1] == pytest.approx([0.0, 0.0, 0.5], abs=1e-5)
     bpy.ops.object.mode_set(mode="OBJECT")
