@@ -121,7 +121,7 @@ def test_a_promise_that_nobody_holds_is_seen() -> None:
     ]
 
 
-def test_one_module_opens_usd_files_of_others() -> None:
+def test_one_module_opens_usd_files() -> None:
     """The program that another process runs; what is written here is made in memory, but for cards,
     which Blender's exporter has just written."""
     opens = re.compile(r"(Stage|Layer)\.(Open|FindOrOpen|OpenAsAnonymous)\w*\(")
