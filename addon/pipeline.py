@@ -457,8 +457,12 @@ def carried(rig: Rig, pose: Pose) -> Floats:
 
 def carried_guides(rig: Rig, pose: Pose, precision: type = np.float32) -> Floats:
     """The same of the guides, (guide_count, cv_count, 3)."""
+    return _carried_guides(rig, motions_of(rig, pose, rig.guides), precision)
+
+
+def _carried_guides(rig: Rig, motions: RootMotions, precision: type) -> Floats:
     grid: Floats = rig.guide_grid.astype(precision)
-    offsets, motions = np.arange(len(grid) + 1) * grid.shape[1], motions_of(rig, pose, rig.guides)
+    offsets = np.arange(len(grid) + 1) * grid.shape[1]
     return follow(grid.reshape(-1, 3), offsets, motions).reshape(grid.shape)
 
 
@@ -591,7 +595,7 @@ def _ridden(rig: Rig, pose: Pose, guides_now: Floats) -> tuple[Floats, RootMotio
     """All strands riding on guides, and how their roots have moved."""
     motions = motions_of(rig, pose)
     # as precise as the guides are, so that those which their roots carry turn by exactly nothing
-    by_roots = carried_guides(rig, pose, guides_now.dtype.type)
+    by_roots = _carried_guides(rig, motions.of(rig.guides), guides_now.dtype.type)
     return ride(rig.strands.points, rig.riders, by_roots, guides_now, motions), motions
 
 

@@ -23,7 +23,7 @@ from functools import cache, cached_property
 
 import numpy as np
 
-from ..arrays import Floats, Ints
+from ..arrays import Bools, Floats, Ints
 from ..dynamics.colliders import Pose, PosedCollider, signed_distance
 from ..dynamics.colliders.signed_distance import (
     are_outside_meshes,
@@ -161,14 +161,16 @@ def lead_out(
     """
     poses, kept = poses_now(colliders), clearance.kept
     held = _hold(points, carry, offsets, clearance)
-    index, distance = nearer_than(points, poses, clearance.reach)
+    index, distance, outward = nearer_than(points, poses, clearance.reach)
     owner = _owners(index, offsets)
     away = _size(points[index] - carry(index, owner))
     wanted = np.minimum(clearance.points[index] + away, np.float32(kept))
     is_near = distance < wanted - np.float32(SLACK * kept)
     strands, first = np.unique(owner[is_near], return_index=True)
     if len(strands):
-        near = _Near.of(strands, index[is_near][first], points, carry, offsets, clearance)
+        first = is_near.nonzero()[0][first]
+        found = index[first], distance[first], outward.T[first]
+        near = _Near.of(strands, found, points, carry, offsets, clearance)
         points[near.index] = _led(near, kept, poses)
     return np.union1d(held, strands)
 
@@ -220,6 +222,7 @@ class _Near:
     """Strands that are too near, one after the other.
 
     begins, ends: (n,) their points among these. firsts: (n,) the first of each that is too near.
+    found: its distance (n,) [m] and way out (n, 3); None where these are to be asked for.
     index: (m,) which points these are of all. points, carried: (m, 3) where they ride, and where
     their roots carry them. wanted: (m,) [m].
     """
@@ -227,6 +230,7 @@ class _Near:
     begins: Ints
     ends: Ints
     firsts: Ints
+    found: tuple[Floats, Floats] | None
     index: Ints
     points: Floats
     carried: Floats
@@ -236,13 +240,17 @@ class _Near:
     def of(
         cls,
         strands: Ints,
-        firsts: Ints,
+        found: tuple[Ints, Floats, Floats],
         points: Floats,
         carry: Carry,
         offsets: Ints,
         clearance: Clearance,
     ) -> _Near:
-        """Those of all strands (point_count, 3) whose first points that are too near these are."""
+        """Those of all strands (point_count, 3).
+
+        Args:
+            found: the first point of each that is too near, its distance and its way out.
+        """
         counts = np.diff(offsets)[strands]
         ends, index = np.cumsum(counts), points_of(strands, offsets)
         some, carried = points[index], carry(index, np.repeat(strands, counts))
@@ -250,7 +258,8 @@ class _Near:
         return cls(
             ends - counts,
             ends,
-            firsts - offsets[strands] + ends - counts,
+            found[0] - offsets[strands] + ends - counts,
+            found[1:],
             index,
             some.astype(np.float64),
             carried.astype(np.float64),
@@ -267,6 +276,7 @@ class _Near:
             begins,
             ends,
             begins + 1,
+            None,
             self.index[index],
             self.points[index],
             self.carried[index],
@@ -310,62 +320,154 @@ def _led_by(
     nearer than it must be, (n,) [m].
 
     A strand of which any is nearer by more than `given_up` (n,) [m] is led no further.
-
-    Each round asks the colliders once, for all strands: where a strand searches, of its next
-    points, and where one of them is too near, of the place to which this has been moved.
     """
-    worst = np.zeros(len(farther))
-    lengths = _size(_steps(near.points, near.begins))
-    goal = near.wanted + np.repeat(farther, near.ends - near.begins)
-    slack, toward = SLACK * kept, unit(_steps(near.carried, near.begins))
-    # each point that is led moves all that come after it along, up to the next one that is
-    shifts, is_led = np.zeros_like(near.points), np.zeros(len(near.points), bool)
-    is_led[near.begins] = True
-    at, shift = near.firsts.copy(), np.zeros((len(farther), 3))
-    sweep, here = np.zeros(len(farther), np.int64), np.zeros((len(farther), 3))
-    left = np.flatnonzero(at < near.ends)
-    while len(left):
-        is_searching = sweep[left] == 0
-        searching, moved = left[is_searching], left[~is_searching]
-        index = np.minimum(at[searching, None] + _AHEAD, near.ends[searching, None] - 1)
-        ahead = near.points[index] + shift[searching, None]
-        asked = np.concatenate([ahead.reshape(-1, 3), here[moved]])
-        distance, outward = distance_of_few(asked, poses)
-        lack = goal[np.append(index.ravel(), at[moved])] - distance
-        is_bad = (lack[: index.size] > slack).reshape(index.shape)
-        number = np.flatnonzero(is_bad.any(axis=1))
-        place = is_bad[number].argmax(axis=1)
-        at[searching] = index[:, -1] + 1
-        at[searching[number]] = index[number, place]
-        here[searching[number]] = ahead[number, place]
-        # from here on only those that have a point which is too near
-        some = np.append(searching[number], moved)
-        asked = np.append(number * len(_AHEAD) + place, np.arange(index.size, len(lack)))
-        lack, outward, point = lack[asked], outward[asked], at[some]
-        start, length = near.points[point - 1] + shift[some], lengths[point]
-        is_out = lack <= slack
-        is_tried = (sweep[some] == SWEEPS) | (lack > DEEPEST * length)
-        go = np.flatnonzero(~is_out & ~is_tried)
-        arm = here[some[go]] - start[go]
-        arm += outward[go] * _going_out(arm, outward[go], length[go], lack[go])[:, None]
-        here[some[go]] = _at_length(start[go], arm, length[go])
-        sweep[some[go]] += 1
-        go = np.flatnonzero(~is_out & is_tried)
-        if len(go):
-            one = some[go]
-            arm = here[one] - start[go]
-            here[one], left_over = _turned_out(
-                start[go], arm, length[go], toward[point[go]], goal[point[go]], poses
-            )
-            worst[one] = np.maximum(worst[one], left_over - farther[one])
-        go = np.flatnonzero(is_out | is_tried)
-        one, point = some[go], point[go]
-        shift[one] = shifts[point] = here[one] - near.points[point]
-        is_led[point] = True
-        at[one], sweep[one] = point + 1, 0
-        left = left[(at[left] < near.ends[left]) & (worst[left] <= given_up[left])]
-    last = np.maximum.accumulate(np.where(is_led, np.arange(len(is_led)), 0))
-    return near.points + shifts[last], worst
+    walk = _Walk.of(near, farther, SLACK * kept, poses)
+    every = np.arange(len(farther))
+    waiting = every[:0] if near.found is None else walk.meet(every, *near.found)
+    going = walk.underway(every, given_up)
+    while len(going) + len(waiting):
+        if len(waiting) > len(going):  # a turn asks much: as many strands at once as can be
+            walk.turn(waiting)
+            going, waiting = np.append(going, walk.underway(waiting, given_up)), waiting[:0]
+        else:
+            stuck = walk.step(going)
+            going, waiting = walk.underway(going, given_up), np.append(waiting, stuck)
+    return walk.led(), walk.worst
+
+
+@dataclass(frozen=True, eq=False)
+class _Walk:
+    """Strands on their way from root to tip, each at its own point and attempt, in place.
+
+    goal: (m,) [m], how far each point of `near` shall be, but for `slack` [m]. toward: (m, 3) unit
+        vectors, where roots carry segments. lengths: (m,) [m], of segments.
+    at: (n,) the point that each strand is at. sweep: (n,) how often that went straight out; 0:
+        it is still searched for. here: (n, 3) where it is by now. is_waiting: (n,) for a turn.
+    shift: (n, 3) what the last point that was led moves all that come after it by, until the next
+        one that is. shifts, is_led: of points, (m, 3) and (m,).
+    farther, worst: see `_led_by`.
+    """
+
+    near: _Near
+    goal: Floats
+    toward: Floats
+    lengths: Floats
+    slack: float
+    poses: Sequence[Pose]
+    at: Ints
+    sweep: Ints
+    here: Floats
+    is_waiting: Bools
+    shift: Floats
+    shifts: Floats
+    is_led: Bools
+    farther: Floats
+    worst: Floats
+
+    @classmethod
+    def of(cls, near: _Near, farther: Floats, slack: float, poses: Sequence[Pose]) -> _Walk:
+        count, points = len(farther), near.points
+        is_led = np.zeros(len(points), bool)
+        is_led[near.begins] = True
+        return cls(
+            near,
+            near.wanted + np.repeat(farther, near.ends - near.begins),
+            unit(_steps(near.carried, near.begins)),
+            _size(_steps(points, near.begins)),
+            slack,
+            poses,
+            near.firsts.copy(),
+            np.zeros(count, np.int64),
+            points[np.minimum(near.firsts, len(points) - 1)],
+            np.zeros(count, bool),
+            np.zeros((count, 3)),
+            np.zeros_like(points),
+            is_led,
+            farther,
+            np.zeros(count),
+        )
+
+    def underway(self, some: Ints, given_up: Floats) -> Ints:
+        """Those of some strands that are neither at their tips, nor given up, nor waiting."""
+        is_going = self.at[some] < self.near.ends[some]
+        is_going &= (self.worst[some] <= given_up[some]) & ~self.is_waiting[some]
+        return some[is_going]
+
+    def step(self, going: Ints) -> Ints:
+        """Move some strands on, by one question to the colliders for all of them: where one
+        searches, of its next points, and where one of these is too near, of the place to which it
+        has been moved. Which of them (k,) go out only if their segments turn."""
+        is_searching = self.sweep[going] == 0
+        searching, moved = going[is_searching], going[~is_searching]
+        last = self.near.ends[searching, None] - 1
+        index = np.minimum(self.at[searching, None] + _AHEAD, last)
+        ahead = self.near.points[index] + self.shift[searching, None]
+        asked = np.concatenate([ahead.reshape(-1, 3), self.here[moved]])
+        distance, outward = distance_of_few(asked, self.poses)
+        lack = self.goal[index] - distance[: index.size].reshape(index.shape)
+        is_bad = lack > self.slack
+        number = is_bad.any(axis=1).nonzero()[0]
+        place, found = is_bad[number].argmax(axis=1), searching[number]
+        self.at[searching] = index[:, -1] + 1
+        self.at[found] = index[number, place]
+        self.here[found] = ahead[number, place]
+        asked = np.append(number * len(_AHEAD) + place, np.arange(index.size, len(distance)))
+        return self.meet(np.append(found, moved), distance[asked], outward[asked])
+
+    def meet(self, some: Ints, distance: Floats, outward: Floats) -> Ints:
+        """Move some strands on whose points have these distances (k,) [m] and ways out (k, 3)."""
+        lack = self.goal[self.at[some]] - distance
+        is_out = lack <= self.slack
+        is_tried = self.sweep[some] == SWEEPS
+        is_tried |= lack > DEEPEST * self.lengths[self.at[some]]
+        go = (~is_out & ~is_tried).nonzero()[0]
+        self._go_out(some[go], lack[go], outward[go])
+        self._leave(some[is_out])
+        stuck: Ints = some[~is_out & is_tried]
+        self.is_waiting[stuck] = True
+        return stuck
+
+    def turn(self, some: Ints) -> None:
+        """Turn the segments of some strands until they are out."""
+        point = self.at[some]
+        start = self._start(some)
+        self.here[some], lack = _turned_out(
+            start,
+            self.here[some] - start,
+            self.lengths[point],
+            self.toward[point],
+            self.goal[point],
+            self.poses,
+        )
+        self.worst[some] = np.maximum(self.worst[some], lack - self.farther[some])
+        self.is_waiting[some] = False
+        self._leave(some)
+
+    def led(self) -> Floats:
+        """Where all points are led to, (m, 3)."""
+        last = np.maximum.accumulate(np.where(self.is_led, np.arange(len(self.is_led)), 0))
+        return self.near.points + self.shifts[last]
+
+    def _start(self, some: Ints) -> Floats:
+        """Where the segments begin that end at the points of some strands, (k, 3)."""
+        start: Floats = self.near.points[self.at[some] - 1] + self.shift[some]
+        return start
+
+    def _go_out(self, some: Ints, lack: Floats, outward: Floats) -> None:
+        """Straight out by what some strands lack (k,) [m], and back to the length."""
+        start, length = self._start(some), self.lengths[self.at[some]]
+        arm = self.here[some] - start
+        arm += outward * _going_out(arm, outward, length, lack)[:, None]
+        self.here[some] = _at_length(start, arm, length)
+        self.sweep[some] += 1
+
+    def _leave(self, some: Ints) -> None:
+        """Some strands' points are where they are led to: on to the next ones."""
+        point = self.at[some]
+        shift = self.here[some] - self.near.points[point]
+        self.shift[some] = self.shifts[point] = shift
+        self.is_led[point] = True
+        self.at[some], self.sweep[some] = point + 1, 0
 
 
 def _going_out(arm: Floats, outward: Floats, length: Floats, lack: Floats) -> Floats:

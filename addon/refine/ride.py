@@ -34,6 +34,9 @@ from .curls import drawn_out, guide_axes
 SHORTEST = 1.0e-12
 #: Below this a quaternion that turns one direction into another is that of a full reversal.
 REVERSED = 1.0e-6
+#: Quaternions whose real parts are larger turn by less than a right angle, so no two of them point
+#: to different sides, nor do their blends.
+SMALL = 0.7072
 
 
 class Weights(Protocol):
@@ -52,9 +55,7 @@ class Riders:
 
     offsets: (strand_count + 1,), strand s is points offsets[s]:offsets[s + 1].
     weights: of all strands.
-    blocks: all strands, those of about as many points beside each other.
-    stations: of each block (count - 1, n) float32 [m], how far along its guides the middle of each
-        segment takes its rotation from.
+    blocks: all strands, those of about as many points beside each other, and where these ride.
     reach: (strand_count,) float32, the length of each centre line as a fraction of its strand's.
     segments_per_meter: (guide_count,) float32 [1/m], of each guide.
     gives: (guide_count, cv_count - 1), which segments of guides are curls, which may be drawn out;
@@ -65,8 +66,7 @@ class Riders:
 
     offsets: Ints
     weights: Weights
-    blocks: tuple[Block, ...]
-    stations: tuple[Floats, ...]
+    blocks: tuple[tuple[Block, Seats], ...]
     reach: Floats
     segments_per_meter: Floats
     gives: Bools | None = None
@@ -92,15 +92,50 @@ class Riders:
         stations *= np.repeat(reach, strands.point_counts)
         gives = None if room is None else room > 0.0
         per_meter = per_meter.astype(np.float32)
-        blocks = tuple(blocks_of(strands.offsets))
-        placed = tuple(block.planes(stations)[:-1] for block in blocks)
-        return cls(strands.offsets, weights, blocks, placed, reach, per_meter, gives)
+        blocks = tuple(
+            (block, Seats.of(block, stations, per_meter, weights, guides.shape[1] - 1))
+            for block in blocks_of(strands.offsets)
+        )
+        return cls(strands.offsets, weights, blocks, reach, per_meter, gives)
 
-    def of_block(self, block: Block) -> Iterator[tuple[Ints, Floats]]:
-        """Guides (n,) and their weights (n,) of some strands, one guide after the other."""
-        guide, weight = self.weights.guide[block.strands], self.weights.weight[block.strands]
-        for column in range(guide.shape[1]):
-            yield guide[:, column].astype(np.int64), weight[:, column].astype(np.float32)
+
+@dataclass(frozen=True, eq=False)
+class Seats:
+    """Where the segments of the strands of a block ride on their guides, as if the segments of all
+    guides lay one after the other.
+
+    guide, weight: (3, n), which guides of each strand, and by how much.
+    before, fraction: (3, count - 1, n), the guide's segment whose middle is last before the place
+        that a segment takes its rotation from, and how far that is on the way to the next one's.
+    """
+
+    guide: Ints
+    weight: Floats
+    before: Ints
+    fraction: Floats
+
+    @classmethod
+    def of(
+        cls, block: Block, stations: Floats, per_meter: Floats, weights: Weights, segments: int
+    ) -> Seats:
+        """Args:
+        stations: (point_count,) float32 [m], how far along its guides each segment rides.
+        per_meter: see `Riders.segments_per_meter`. segments: of a guide.
+        """
+        guide = np.ascontiguousarray(weights.guide[block.strands].T, np.int64)
+        weight = np.ascontiguousarray(weights.weight[block.strands].T, np.float32)
+        place = block.planes(stations)[:-1] * per_meter[guide][:, None]
+        place -= np.float32(0.5)
+        np.clip(place, np.float32(0.0), np.float32(segments - 1), out=place)
+        whole = np.trunc(place)
+        place -= whole
+        before = whole.astype(np.int32)
+        before += (guide * segments).astype(np.int32)[:, None]
+        return cls(guide, weight, before, place)
+
+    def each(self) -> Iterator[tuple[Floats, Ints, Floats]]:
+        """Weight (n,), `before` and `fraction` (count - 1, n), one guide after the other."""
+        return zip(self.weight, self.before, self.fraction, strict=True)
 
 
 def _middles(points: Floats, offsets: Ints) -> Floats:
@@ -134,18 +169,20 @@ def ride(
     moved = np.array(points, np.float32)
     if not len(moved):
         return moved
-    table = _with_steps(guide_turns(guide_rest, guide_now).transpose(2, 1, 0))
+    turns = guide_turns(guide_rest, guide_now)
+    table, are_small = _with_steps(turns.transpose(2, 1, 0)), bool((turns[3] > SMALL).all())
     axes = None if riders.gives is None else guide_axes(guide_rest, guide_now, riders.gives)
     axes = None if axes is None else _with_steps(axes)
     shifts = np.asarray(guide_now[:, 0] - guide_rest[:, 0], np.float32)
-    for block, station in zip(riders.blocks, riders.stations, strict=True):
+    for block, seats in riders.blocks:
         rest = block.planes(moved)
         if motions is not None:  # to the bit as `groom.roots.follow` does
             rest += motions.change(rest, block.strands)
         change, edge = np.zeros_like(rest), rest[:, 1:] - rest[:, :-1]
-        for guide, weight in riders.of_block(block) if shifts.any() else ():
-            change[:, 0] += weight * shifts[guide].T
-        _turn(edge, change[:, 1:], riders, block, station, table, axes)
+        if shifts.any():
+            for guide, weight in zip(seats.guide, seats.weight, strict=True):
+                change[:, 0] += weight * shifts[guide].T
+        _turn(edge, change[:, 1:], riders.are_lines, seats, table, are_small, axes)
         _sum(change)
         change += rest
         block.put(moved, change)
@@ -243,38 +280,31 @@ def _with_steps(values: Floats) -> Floats:
 def _turn(
     edge: Floats,
     change: Floats,
-    riders: Riders,
-    block: Block,
-    station: Floats,
+    are_lines: bool,
+    seats: Seats,
     table: Floats,
+    are_small: bool,
     axes: Floats | None,
 ) -> None:
     """Add to `change` what turning and drawing out add to segments (3, count - 1, n)."""
-    shape, last = edge.shape[1:], table.shape[1] - 1
     blend: Floats | None = None
-    axis = None if axes is None else np.zeros((4, *shape), np.float32)
-    for guide, weight in riders.of_block(block):
-        place = station * riders.segments_per_meter[guide]
-        place -= np.float32(0.5)
-        np.clip(place, np.float32(0.0), np.float32(last), out=place)
-        whole = np.trunc(place)
-        place -= whole
-        before = whole.astype(np.int32) + guide * (last + 1)
-        turn = _between(table, before, place)
+    axis = None if axes is None else np.zeros((4, *edge.shape[1:]), np.float32)
+    for weight, before, fraction in seats.each():
+        turn = _between(table, before, fraction)
         if axes is not None and axis is not None:
-            here = _between(axes, before, place)
+            here = _between(axes, before, fraction)
             here *= weight
             axis += here
         if blend is None:
             blend = turn
             blend *= weight
         else:  # of two quaternions of one rotation the nearer
-            turn *= np.copysign(weight, _dot(turn, blend))
+            turn *= weight if are_small else np.copysign(weight, _dot(turn, blend))
             blend += turn
     assert blend is not None
     blend[3] += _dot(blend, blend) < REVERSED  # opposite turns that leave nothing
     if axis is not None and axis[3].any():
-        drawn = edge * axis[3] if riders.are_lines else drawn_out(edge, axis)
+        drawn = edge * axis[3] if are_lines else drawn_out(edge, axis)
         edge += drawn
         change += drawn
     change += turn_change(blend, edge)

@@ -38,7 +38,7 @@ class RootMotions:
             rows: (3, n) one point of each strand, or (3, m, n) m of each.
             strands: (n,) which.
         """
-        of = self._of(strands, rows.ndim)
+        of = self.of(strands, rows.ndim)
         local = rows - of.origin
         result = of.turn[:, 0] * local[0]
         result += of.shift
@@ -56,7 +56,7 @@ class RootMotions:
         rest = points.take(index, axis=0)
         return rest + self.change(np.ascontiguousarray(rest.T), strands).T
 
-    def _of(self, strands: Ints | slice, dimensions: int) -> RootMotions:
+    def of(self, strands: Ints | slice, dimensions: int = 2) -> RootMotions:
         """Those of some strands, for arrays of two or three dimensions."""
         found = []
         for values in (self.turn, self.shift, self.origin):

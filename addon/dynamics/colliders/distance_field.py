@@ -128,18 +128,20 @@ class DistanceField:
         return (STEP * self.cell) ** 2 / (2.0 * max(most, 1.0e-3 * self.cell))
 
     def near(self, points: Floats, reach: Floats | float) -> Ints:
-        """Points whose nearest node is no farther away than `reach` plus the distance to that node:
-        the distance changes by no more than the way, so no point within `reach` is missed."""
-        place = self._in_cells(points)
-        held = self._held(place)
-        place -= held
-        np.abs(place, out=place)
-        outside = np.maximum(np.maximum(place[0], place[1]), place[2])  # along one axis will do
-        held += np.float32(0.5)
-        limit = reach + self.cell * 0.8661  # half the diagonal of a cell
-        is_near = self._flat.take(self._index(held)) < limit
-        kept: Ints = (is_near & (outside < reach / self.cell)).nonzero()[0]
-        return kept
+        """Points in a half of a cell where a distance within `reach` is looked up; its gradient,
+        which `world_distance` divides by, is no longer than sqrt(3)."""
+        place, least = self._in_cells(points), self._least
+        limit = np.broadcast_to(np.float32(1.7321) * reach, place.shape[1:])
+        held = np.maximum(place, np.float32(0.0))
+        np.minimum(held, self._below_top, out=held)
+        x, y, z = (held * np.float32(2.0)).astype(np.int32)
+        index = (x * least.shape[1] + y) * least.shape[2] + z
+        kept = (least.ravel().take(index) < limit).nonzero()[0]
+        outside = np.abs(place.take(kept, axis=1) - held.take(kept, axis=1)).max(
+            axis=0
+        )  # along one axis
+        result: Ints = kept[outside * np.float32(self.cell) <= np.maximum(limit.take(kept), 0.0)]
+        return result
 
     def distance(self, points: Floats) -> tuple[Floats, Floats]:
         """Trilinear distance [m] (n,) and its exact gradient (3, n).
@@ -147,29 +149,7 @@ class DistanceField:
         Outside of the grid the distance grows by the way to the grid's box.
         """
         held, beyond = self._split(self._in_cells(points))
-        return self._looked_up(held, beyond, self._index(held))
-
-    def nearer(self, points: Floats, reach: Floats | float) -> tuple[Ints, Floats, Floats]:
-        """Points (3, n) that may be closer than `reach` [m], one or (n,) float32, with `distance`
-        of these alone."""
-        place = self._in_cells(points)
-        held = np.maximum(place, np.float32(0.0))
-        index = self._index(np.minimum(held, self._below_top, out=held))
-        # what is looked up is within its cell's corners, and grows by sqrt(3) at most
-        limit = np.broadcast_to(np.float32(1.7321) * reach, index.shape)
-        kept = (self._least.take(index) < limit).nonzero()[0]
-        index, place = index.take(kept), place.take(kept, axis=1, mode="clip")
-        distance, gradient = self._looked_up(*self._split(place), index)
-        near = (distance < limit.take(kept)).nonzero()[0]
-        return kept.take(near), distance.take(near), gradient.take(near, axis=1)
-
-    def _looked_up(self, held: Floats, beyond: Floats, index: Ints) -> tuple[Floats, Floats]:
-        """Distance [m] (n,) and gradient (3, n).
-
-        Args:
-            held, beyond: see `_split`.
-            index: (n,) of the node below each.
-        """
+        index = self._index(held)
         fx, fy, fz = held - np.trunc(held)
         # the corners of cells, by y and z, and then by x
         corner = self._squares.take(index + self._along_x, axis=0)
@@ -215,9 +195,16 @@ class DistanceField:
 
     @cached_property
     def _least(self) -> Floats:
-        """The least value at a corner of the cell above each node, flat."""
-        of_squares = self._squares.min(axis=1)
-        return np.minimum(of_squares, np.roll(of_squares, -self._strides[0]))
+        """The least that is looked up in each half of a cell along x, y and z: in a box of a cell
+        that is at one of its corners."""
+        result = self.values
+        for axis in range(3):
+            low, high = np.moveaxis(result, axis, 0)[:-1], np.moveaxis(result, axis, 0)[1:]
+            middle = (low + high) * np.float32(0.5)
+            halves = np.empty((2 * len(low), *low.shape[1:]), np.float32)
+            halves[::2], halves[1::2] = np.minimum(low, middle), np.minimum(middle, high)
+            result = np.moveaxis(halves, 0, axis)
+        return np.ascontiguousarray(result)
 
     def _held(self, place: Floats) -> Floats:
         """Places (3, n) in cells, brought inside of the grid; sooner than by np.clip."""

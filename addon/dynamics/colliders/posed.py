@@ -201,13 +201,7 @@ def world_distance(pose: Pose, local: Floats, flattest: float = 0.0) -> tuple[Fl
         flattest: how long a gradient counts at least: a sampled one is short where two sides of the
             collider are as near, and distances would have no bound there.
     """
-    return to_world(pose, *pose.collider.distance(local), flattest)
-
-
-def to_world(
-    pose: Pose, distance: Floats, gradient: Floats, flattest: float = 0.0
-) -> tuple[Floats, Floats]:
-    """`world_distance` of a distance and its gradient in object space."""
+    distance, gradient = pose.collider.distance(local)
     normal = np.einsum("ji,jn->in", pose.inverse[:3, :3], gradient)
     scale = np.maximum(np.sqrt(dot_rows(normal, normal)), TINY)
     normal /= scale

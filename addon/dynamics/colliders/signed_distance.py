@@ -5,7 +5,7 @@ The twin on the GPU is gpu_shaders/lib_signed_distance.glsl.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -15,15 +15,14 @@ from .posed import (
     Pose,
     PosedCollider,
     poses_through,
-    to_world,
     transform_points,
     world_distance,
 )
 
 #: How long the gradient of a sampled distance counts at least, see `world_distance`.
 FLATTEST = 0.5
-#: Points that are looked for at once.
-_CHUNK = 16384
+#: Points that are looked for at once: as many as stay in the processor's cache.
+_CHUNK = 32768
 
 
 def signed_distance(
@@ -52,21 +51,29 @@ def distance_to(points: Floats, poses: Sequence[Pose], reach: float) -> tuple[Fl
     """`signed_distance` for whoever asks often."""
     distance = np.full(len(points), reach, np.float32)
     outward = np.zeros((len(points), 3), np.float32)
-    for index, found, normal in _nearer(points, poses, reach):
-        distance[index] = found
-        outward[index] = normal.T
+    index, found, normal = nearer_than(points, poses, reach)
+    distance[index] = found
+    outward[index] = normal.T
     return distance, outward
 
 
-def nearer_than(points: Floats, poses: Sequence[Pose], reach: Floats) -> tuple[Ints, Floats]:
-    """Which points (n, 3) are nearer than their reach, (n,) float32 [m], ascending, and their
-    distance [m]."""
-    indices: list[Ints] = [np.zeros(0, np.int64)]
-    distances: list[Floats] = [np.zeros(0, np.float32)]
-    for index, distance, _ in _nearer(points, poses, reach):
-        indices.append(index)
-        distances.append(distance)
-    return np.concatenate(indices), np.concatenate(distances)
+def nearer_than(
+    points: Floats, poses: Sequence[Pose], reach: Floats | float
+) -> tuple[Ints, Floats, Floats]:
+    """Which points (n, 3) are nearer than `reach` [m], one or (n,), ascending: their indices,
+    distances and normals (3, m)."""
+    reaches = np.broadcast_to(np.float32(reach), len(points))
+    found = [_near(pose, points, reaches) for pose in poses]
+    if len(found) == 1:
+        return found[0]
+    none = (np.zeros(0, np.int64), np.zeros(0, np.float32), np.zeros((3, 0), np.float32))
+    index, distance, outward = (
+        np.concatenate(each, axis=-1) for each in zip(none, *found, strict=True)
+    )
+    order = np.lexsort((distance, index))  # of each point the nearest collider first
+    index, chosen = np.unique(index.take(order), return_index=True)
+    chosen = order.take(chosen)
+    return index, distance.take(chosen), outward.take(chosen, axis=1)
 
 
 def distance_of_few(points: Floats, poses: Sequence[Pose]) -> tuple[Floats, Floats]:
@@ -84,40 +91,24 @@ def distance_of_few(points: Floats, poses: Sequence[Pose]) -> tuple[Floats, Floa
     return distance, outward.T
 
 
-def _nearer(
-    points: Floats, poses: Sequence[Pose], reach: Floats | float
-) -> Iterator[tuple[Ints, Floats, Floats]]:
-    """Which points (n, 3) are nearer than `reach` [m], one or (n,), ascending: their indices,
-    distances and normals (3, m). As many at once as stay in the processor's cache."""
-    reaches = np.broadcast_to(np.float32(reach), len(points))
-    for first in range(0, len(points) if poses else 0, _CHUNK):
-        rows = np.ascontiguousarray(points[first : first + _CHUNK].T, np.float32)
-        found = [_near(pose, rows, reaches[first : first + _CHUNK]) for pose in poses]
-        index, distance, outward = found[0]
-        if len(found) > 1:
-            index = np.concatenate([each[0] for each in found])
-            distance = np.concatenate([each[1] for each in found])
-            order = np.lexsort((distance, index))  # of each point the nearest collider first
-            index, chosen = np.unique(index.take(order), return_index=True)
-            chosen = order.take(chosen)
-            distance = distance.take(chosen)
-            outward = np.concatenate([each[2] for each in found], axis=1).take(chosen, axis=1)
-        yield index + first, distance, outward
-
-
-def _near(pose: Pose, rows: Floats, reach: Floats) -> tuple[Ints, Floats, Floats]:
-    """Points (3, n) world that are nearer to a collider than their reach, (n,) [m], ascending:
+def _near(pose: Pose, points: Floats, reach: Floats) -> tuple[Ints, Floats, Floats]:
+    """Points (n, 3) world that are nearer to a collider than their reach, (n,) [m], ascending:
     their indices, distances and normals (3, m)."""
-    local, collider = transform_points(pose.inverse, rows), pose.collider
-    own_reach = reach / np.float32(pose.scale)
-    if isinstance(collider, DistanceField):
-        index, distance, normal = collider.nearer(local, own_reach)
-    else:
-        index = collider.near(local, own_reach)
-        distance, normal = collider.distance(local.take(index, axis=1))
-    distance, normal = to_world(pose, distance, normal, FLATTEST)
+    maybe: list[Ints] = [np.zeros(0, np.int64)]
+    for first in range(0, len(points), _CHUNK):
+        some = slice(first, first + _CHUNK)
+        near = pose.collider.near(_local(pose, points[some]), reach[some] / np.float32(pose.scale))
+        maybe.append(near + first)
+    index = np.concatenate(maybe)
+    local = _local(pose, points.take(index, axis=0))
+    distance, normal = world_distance(pose, local, FLATTEST)
     nearer = (distance < reach.take(index)).nonzero()[0]
     return index.take(nearer), distance.take(nearer), normal.take(nearer, axis=1)
+
+
+def _local(pose: Pose, points: Floats) -> Floats:
+    """Points (n, 3) world in the space of a collider, (3, n)."""
+    return transform_points(pose.inverse, np.ascontiguousarray(points.T, np.float32))
 
 
 def are_outside_meshes(points: Floats, colliders: Sequence[PosedCollider]) -> Bools:
