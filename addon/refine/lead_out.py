@@ -61,6 +61,34 @@ type Carry = Callable[[Ints, Ints], Floats]
 
 
 @dataclass(frozen=True, eq=False)
+class HeldParts:
+    """Strands that go with their roots up to some of their points.
+
+    strands: (n,) which. index, owners: (k,) these points, and the strand that each belongs to.
+    every, along: (m,) all points of these strands, and with which of the k each goes.
+    """
+
+    strands: Ints
+    index: Ints
+    owners: Ints
+    every: Ints
+    along: Ints
+
+    @classmethod
+    def of(cls, held: Ints, offsets: Ints) -> HeldParts:
+        """Args:
+        held: of all strands, see `Clearance`.
+        """
+        strands = held.nonzero()[0]
+        counts, last = np.diff(offsets)[strands], held[strands]
+        every, ends = points_of(strands, offsets), np.cumsum(counts)
+        number = np.arange(len(every)) - np.repeat(ends - counts, counts)
+        is_held = number <= np.repeat(last, counts)
+        along = np.maximum.accumulate(np.where(is_held, np.cumsum(is_held) - 1, 0))
+        return cls(strands, every[is_held], np.repeat(strands, last + 1), every, along)
+
+
+@dataclass(frozen=True, eq=False)
 class Clearance:
     """How far strands stay from colliders where their roots carry them.
 
@@ -74,6 +102,14 @@ class Clearance:
     kept: float
     points: Floats
     held: Ints
+    _held_parts: HeldParts | None = None
+
+    def held_parts(self, offsets: Ints) -> HeldParts:
+        """Of all strands, which never have other points: found once."""
+        if self._held_parts is None:
+            object.__setattr__(self, "_held_parts", HeldParts.of(self.held, offsets))
+        assert self._held_parts is not None
+        return self._held_parts
 
     @cached_property
     def reach(self) -> Floats:
@@ -183,14 +219,10 @@ def _owners(index: Ints, offsets: Ints) -> Ints:
 def _hold(points: Floats, carry: Carry, offsets: Ints, clearance: Clearance) -> Ints:
     """Bring what goes with its root there, in place, and along what comes after it, in its shape;
     and which strands (n,) have such a part."""
-    strands = clearance.held.nonzero()[0]
-    counts, last = np.diff(offsets)[strands], clearance.held[strands]
-    index, ends = points_of(strands, offsets), np.cumsum(counts)
-    shift = carry(index, np.repeat(strands, counts)) - points[index]
-    number = np.arange(len(index)) - np.repeat(ends - counts, counts)
-    shift = shift[np.minimum(number, np.repeat(last, counts)) + np.repeat(ends - counts, counts)]
-    points[index] += shift
-    return strands
+    held = clearance.held_parts(offsets)
+    shift = carry(held.index, held.owners) - points[held.index]
+    points[held.every] += shift[held.along]
+    return held.strands
 
 
 def _steps(points: Floats, begins: Ints) -> Floats:
@@ -339,8 +371,8 @@ def _led_by(
 class _Walk:
     """Strands on their way from root to tip, each at its own point and attempt, in place.
 
-    goal: (m,) [m], how far each point of `near` shall be, but for `slack` [m]. toward: (m, 3) unit
-        vectors, where roots carry segments. lengths: (m,) [m], of segments.
+    goal: (m,) [m], how far each point of `near` shall be, but for `slack` [m]. lengths: (m,) [m],
+        of segments.
     at: (n,) the point that each strand is at. sweep: (n,) how often that went straight out; 0:
         it is still searched for. here: (n, 3) where it is by now. is_waiting: (n,) for a turn.
     shift: (n, 3) what the last point that was led moves all that come after it by, until the next
@@ -350,7 +382,6 @@ class _Walk:
 
     near: _Near
     goal: Floats
-    toward: Floats
     lengths: Floats
     slack: float
     poses: Sequence[Pose]
@@ -372,7 +403,6 @@ class _Walk:
         return cls(
             near,
             near.wanted + np.repeat(farther, near.ends - near.begins),
-            unit(_steps(near.carried, near.begins)),
             _size(_steps(points, near.begins)),
             slack,
             poses,
@@ -435,7 +465,7 @@ class _Walk:
             start,
             self.here[some] - start,
             self.lengths[point],
-            self.toward[point],
+            unit(self.near.carried[point] - self.near.carried[point - 1]),
             self.goal[point],
             self.poses,
         )

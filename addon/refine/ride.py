@@ -302,7 +302,8 @@ def _turn(
             turn *= weight if are_small else np.copysign(weight, _dot(turn, blend))
             blend += turn
     assert blend is not None
-    blend[3] += _dot(blend, blend) < REVERSED  # opposite turns that leave nothing
+    if not are_small:
+        blend[3] += _dot(blend, blend) < REVERSED  # opposite turns that leave nothing
     if axis is not None and axis[3].any():
         drawn = edge * axis[3] if are_lines else drawn_out(edge, axis)
         edge += drawn
