@@ -4,7 +4,8 @@ Sintel, the TressFX ponytail, the built-in groom, and 8,000 coils of 20 turns, b
 and without children, which would hide the curves that there are. Two seconds of the demo's shake
 at 24 frames a second, and of one of 5 Hz and 3.1 m/s at 60. Each strand counts by its worst frame.
 Depths are distances from the mesh's own triangles, of points inside of it that were outside at
-rest, as if the hair's median length were 25 cm: grooms come in any unit.
+rest, as if the hair's median length were 25 cm: grooms come in any unit. So are jumps: by how much
+what leading out adds to where strands ride changes from one frame to the next.
 
 What it costs, of Sintel: see `_strands_cost`.
 
@@ -44,6 +45,7 @@ from hairloom.addon.strands.closest_point import ClosestPointSearch
 REFERENCE = "strands at rest, and the triangles of the head"
 SECONDS, FPS, FAST_FPS = 2.0, 24.0, 60.0
 MEDIAN_LENGTH = 0.25  # [m]
+JUMP = 0.025  # [m], what leading out adds to the path of a strand in a frame, that is seen
 GRAVITY = np.array([0.0, 0.0, -9.81])
 #: of the coils [m]; points of each before it is made ready
 COILS, TURNS, COIL_RADIUS, COIL_LENGTH, COIL_POINTS = 8000, 20, 0.004, 0.15, 400
@@ -128,6 +130,8 @@ def shaken(rig: Rig, shake: Any, fps: float) -> dict[str, float]:
     were_inside[_inside(rest, np.eye(4), collider, rig.head)[0]] = True
     segments, rest_lengths = steps(rest, offsets), lengths(rest, offsets)
     change, depth, worst = (np.zeros(rig.strands.strand_count) for _ in range(3))
+    scale = MEDIAN_LENGTH / np.median(rest_lengths)
+    correction, jumped = np.zeros_like(rest), []
     for motion, matrix in played(rig, collider, shake, fps):
         points = pipeline.strands_and_led(rig, motion)[0]
         assert np.isfinite(points).all()
@@ -139,7 +143,11 @@ def shaken(rig: Rig, shake: Any, fps: float) -> dict[str, float]:
         if len(index):
             deep[index] = np.where(were_inside[index], 0.0, search.closest(local).distance)
         np.maximum(depth, np.maximum.reduceat(deep, offsets[:-1]), out=depth)
-    depth *= MEDIAN_LENGTH / np.median(rest_lengths)
+        before = correction
+        correction = points - pipeline.strands_at(rig, motion.pose, motion.guides)
+        jump = np.linalg.norm(correction - before, axis=1)
+        jumped.append(np.maximum.reduceat(jump, offsets[:-1]) * scale)
+    depth *= scale
     return {
         "length_p99_percent": float(np.quantile(change, 0.99)) * 100.0,
         "length_worst_percent": float(change.max()) * 100.0,
@@ -147,6 +155,8 @@ def shaken(rig: Rig, shake: Any, fps: float) -> dict[str, float]:
         "depth_p99_mm": float(np.quantile(depth, 0.99)) * 1000.0,
         "depth_worst_mm": float(depth.max()) * 1000.0,
         "strands_inside_percent": 100.0 * float((depth > 0.001).mean()),
+        "jump_worst_mm": 1000.0 * float(np.max(jumped)),
+        "strands_jump_percent": 100.0 * float((np.array(jumped) > JUMP).mean()),
     }
 
 
@@ -219,6 +229,8 @@ def main(names: list[str]) -> int:
         fast = shaken(rig, fast_shake_at, FAST_FPS)
         figures |= {"depth_fast_worst_mm": fast["depth_worst_mm"]}
         figures |= {"strands_fast_inside_percent": fast["strands_inside_percent"]}
+        figures |= {"jump_fast_worst_mm": fast["jump_worst_mm"]}
+        figures |= {"strands_fast_jump_percent": fast["strands_jump_percent"]}
         if name == "sintel":
             figures |= cost_of(rig)
         if name == "coil":

@@ -170,7 +170,7 @@ def ride(
     if not len(moved):
         return moved
     turns = guide_turns(guide_rest, guide_now)
-    table, are_small = _with_steps(turns.transpose(2, 1, 0)), bool((turns[3] > SMALL).all())
+    table, is_small = _with_steps(turns.transpose(2, 1, 0)), (turns[3] > SMALL).all(axis=0)
     axes = None if riders.gives is None else guide_axes(guide_rest, guide_now, riders.gives)
     axes = None if axes is None else _with_steps(axes)
     shifts = np.asarray(guide_now[:, 0] - guide_rest[:, 0], np.float32)
@@ -182,6 +182,7 @@ def ride(
         if shifts.any():
             for guide, weight in zip(seats.guide, seats.weight, strict=True):
                 change[:, 0] += weight * shifts[guide].T
+        are_small = bool(is_small[seats.guide].all())
         _turn(edge, change[:, 1:], riders.are_lines, seats, table, are_small, axes)
         _sum(change)
         change += rest

@@ -117,6 +117,17 @@ def test_near_misses_none(ball):
         assert len(chosen) < points.shape[1]
 
 
+def test_near_misses_none_of_what_is_looked_up_and_keeps_few_others(ball):
+    points = scattered(0.2)
+    distance, _ = ball.distance(points)
+    for reach in (-0.02, 0.0, 0.001, 0.01):
+        chosen = ball.near(points, reach)
+        assert np.isin(np.flatnonzero(distance < np.sqrt(3.0) * reach), chosen).all()
+        chosen = chosen[np.abs(points[:, chosen]).max(axis=0) < 0.1]
+        # half a cell is no longer than this from corner to corner
+        assert (distance[chosen] < np.sqrt(3.0) * reach + 0.87 * ball.cell).all()
+
+
 def test_outside_of_the_grid_distance_goes_on(ball):
     points = np.array([[0.5, 0.0, -0.3], [0.0, 0.9, 0.3], [0.0, 0.0, 0.3]], np.float32)
     distance, gradient = ball.distance(points)

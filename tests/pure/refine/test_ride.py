@@ -10,7 +10,7 @@ import pytest
 
 from hairloom.addon.arrays import Floats, Ints
 from hairloom.addon.groom.weights import GuideWeights
-from hairloom.addon.refine.ride import Riders, guide_turns, ride
+from hairloom.addon.refine.ride import SMALL, Riders, guide_turns, ride
 from hairloom.addon.strands import StrandSet
 from hairloom.addon.strands.center_lines import center_lines
 
@@ -120,6 +120,18 @@ def test_agrees_with_the_rotations_one_by_one(strand_count: int, cv_count: int) 
     found = rode(rest, weights, guides, now)
     assert found.dtype == np.float32
     assert found == pytest.approx(one_by_one(rest, weights, guides, now), abs=2e-6)
+
+
+def test_small_turns_need_no_look_at_their_signs(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The shorter path gives the very bits of the one that looks."""
+    guides, rest = walks(9, 16, 2), walks(60, 16, 3)
+    now = guides + np.linspace(0.0, 0.03, 16)[:, None] * np.float32([1.0, 0.5, 0.2])
+    weights = random_weights(60, 9)
+    assert (guide_turns(guides, now)[3] > SMALL).all()
+    short = rode(rest, weights, guides, now)
+    monkeypatch.setattr("hairloom.addon.refine.ride.SMALL", 2.0)
+    np.testing.assert_array_equal(short, rode(rest, weights, guides, now))
+    np.testing.assert_allclose(short, one_by_one(rest, weights, guides, now), atol=2e-6)
 
 
 def test_guides_at_rest_leave_every_bit() -> None:
