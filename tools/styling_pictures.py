@@ -76,11 +76,52 @@ def parting(folder: Path) -> None:
     sheet(folder, "parting.jpg", [*pictures, picture(hair)])
 
 
+#: strokes of a swept fringe on the built-in head: what they go through, on its skin or near [m]
+STROKES = {
+    "Fringe": ((0.035, -0.04, 0.1), (-0.01, -0.065, 0.09), (-0.06, -0.06, 0.05)),
+    "Top": ((0.035, 0.01, 0.115), (-0.03, 0.0, 0.11), (-0.07, -0.02, 0.06)),
+    "Back Top": ((0.035, 0.05, 0.11), (-0.02, 0.07, 0.1), (-0.07, 0.05, 0.04)),
+    "Other Side": ((0.04, -0.03, 0.1), (0.065, -0.02, 0.07), (0.08, 0.02, 0.0)),
+    "Behind": ((0.04, 0.04, 0.1), (0.07, 0.06, 0.06), (0.075, 0.07, -0.02)),
+    "Brow": ((0.045, -0.06, 0.085), (0.07, -0.045, 0.05), (0.08, 0.0, 0.0)),
+    "Crown": ((0.02, 0.08, 0.11), (-0.02, 0.1, 0.08), (-0.05, 0.1, 0.02)),
+    "Temple": ((-0.06, -0.04, 0.06), (-0.08, 0.01, 0.02), (-0.08, 0.05, -0.03)),
+    "Nape": ((0.0, 0.09, 0.09), (0.0, 0.11, 0.03), (0.0, 0.1, -0.05)),
+}
+
+
+def stroke_on(head: Any, name: str, places: Any) -> Any:
+    """A curve on the head near these places, as the Draw tool leaves it."""
+    data = bpy.data.curves.new(name, "CURVE")
+    data.dimensions = "3D"
+    spline = data.splines.new("BEZIER")
+    spline.bezier_points.add(len(places) - 1)
+    for point, place in zip(spline.bezier_points, places, strict=True):
+        _, point.co, _, _ = head.closest_point_on_mesh(place)
+        point.handle_left_type = point.handle_right_type = "AUTO"
+    stroke = bpy.data.objects.new(name, data)
+    bpy.context.collection.objects.link(stroke)
+    stroke.parent = head
+    return stroke
+
+
+def flow(folder: Path) -> None:
+    hair = grown(method="normals", length=0.1)
+    pictures = [picture(hair)]
+    strokes = [stroke_on(hair.parent, name, places) for name, places in STROKES.items()]
+    for stroke in strokes:
+        stroke.select_set(True)
+    bpy.ops.hairloom.add_stroke()
+    bpy.ops.hairloom.comb_flow(reach=1.0, falloff=0.5, lift=0.15)
+    sheet(folder, "flow.jpg", [*pictures, picture(hair)])
+
+
 def main(folder: Path) -> None:
     gpu.init()
     load_package().register()
     settle(folder)
     parting(folder)
+    flow(folder)
 
 
 if __name__ == "__main__":

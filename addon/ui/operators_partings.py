@@ -9,6 +9,7 @@ from ..blender.base.outcome import report
 from ..blender.properties.groups import operator_properties
 from ..blender.properties.properties import settings_of
 from ..blender.scene import partings
+from ..blender.scene.drawn_lines import check_on_surface, chosen_lines, new_line
 from ..blender.sessions.parting import comb_parting
 from ..groom.parting_settings import PartingSettings
 from .operators_start import in_object_mode
@@ -32,12 +33,11 @@ class HAIRLOOM_OT_add_parting(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         hair = chosen_hair(context)[0]
         depsgraph = context.evaluated_depsgraph_get()
-        lines = [obj for obj in context.selected_objects if obj.type == "CURVE"]
-        lines += [obj for obj in context.selected_objects if partings.is_wire(obj)]
+        lines = chosen_lines(context)
         for line in lines:
-            partings.check_on_surface(line, hair, depsgraph)
+            check_on_surface(line, hair, depsgraph)
         if not lines:
-            lines = [partings.new_parting(hair, context)]
+            lines = [new_line(hair, "Parting", context)]
         partings.add_partings(hair, lines, context.scene)
         names = ", ".join(line.name for line in lines)
         report(self, "INFO", f"{hair.name} is parted along {names}")

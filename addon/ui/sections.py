@@ -15,6 +15,7 @@ from .drawing import Draw, draw_section
 from .messages import draw_lines
 from .operators_bake import draw_bake
 from .operators_colliders import draw_colliders
+from .operators_flow import draw_flow
 from .operators_measure import draw_measure
 from .operators_partings import draw_partings
 from .operators_settle import draw_settle
@@ -173,7 +174,7 @@ SUB_SECTIONS: dict[str, tuple[Section, ...]] = {
         for panel in ALL_SETTINGS["shading"].panels
     ),
     "shadows": (("skin", "Soft Shadow on Skin", draw_skin),),
-    "children": (("partings", "Partings", draw_partings),),
+    "children": (("partings", "Partings", draw_partings), ("flow", "Flow", draw_flow)),
     "dynamics": (
         ("style", "Style", _panel("dynamics", "Style")),
         ("medium", "Medium & Wind", _panel("dynamics", "Medium & Wind")),

@@ -9,7 +9,8 @@ from hairloom.addon.blender.command_line import command_line
 from hairloom.addon.blender.preview import previews
 from hairloom.addon.blender.properties.groom_settings import GroomSettings
 from hairloom.addon.blender.scene.curves import curve_points
-from hairloom.addon.blender.scene.partings import partings_of, pieces_of
+from hairloom.addon.blender.scene.drawn_lines import pieces_of
+from hairloom.addon.blender.scene.partings import partings_of
 from hairloom.addon.strands import StrandSet
 
 RADIUS = 0.1

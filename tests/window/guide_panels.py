@@ -14,7 +14,7 @@ PICTURES: dict[str, tuple[tuple[str, ...], ...]] = {
     "shadows": (("data_shadows",), ("data_shadows_skin", "data_shafts")),
     "strands": (
         ("data_strands", "data_detail", "data_guides"),
-        ("data_children", "data_children_partings"),
+        ("data_children", "data_children_partings", "data_children_flow"),
     ),
     "dynamics": (
         ("data_dynamics", "data_dynamics_style"),

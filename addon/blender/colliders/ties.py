@@ -20,7 +20,7 @@ from ...groom.holds import Holds, anchors_of
 from ...groom.ties import Holders, Tie, TipSurface, find_holds
 from ...strands.affine import moved
 from ..base.objects import Body, Handle, head_of, matrix_of
-from ..scene.own_collections import put_into, take_out
+from ..scene.own_collections import objects_in, put_into, take_out
 from ..scene.source import usable_curves
 from ..scene.surfaces import read_positions, read_surface
 from .carriers import is_deforming, is_left_out
@@ -211,9 +211,7 @@ class Holding:
 
 def ties_of(hair: bpy.types.Object) -> tuple[bpy.types.Object, ...]:
     """The objects that may hold this hair as ties, each once."""
-    collection = hair.hairloom.tie_collection
-    objects = () if collection is None else collection.all_objects
-    return tuple(obj for obj in dict.fromkeys(objects) if obj is not None and obj != hair)
+    return objects_in(hair, "tie_collection")
 
 
 def holders_of(hair: bpy.types.Object) -> tuple[bpy.types.Object, ...]:

@@ -256,6 +256,13 @@ class HAIRLOOM_PG_character(bpy.types.PropertyGroup):
             update=lambda self, _context: changed.settings(self.id_data),
             override=OVERRIDABLE,
         ),
+        "stroke_collection": PointerProperty(
+            type=bpy.types.Collection,
+            name="Strokes",
+            description="Collection of curves drawn on the surface, which Comb along Flow combs "
+            "hair along, from their first points to their last",
+            override=OVERRIDABLE,
+        ),
         "tip_surface": PointerProperty(
             type=bpy.types.Object,
             name="Held Tips",

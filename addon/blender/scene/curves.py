@@ -37,14 +37,19 @@ def read_curves(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Cleane
     return _read(evaluated.data, np.array(evaluated.matrix_world))
 
 
-def read_own_curves(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Cleaned:
+def read_own_curves(
+    obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, points: Floats | None = None
+) -> Cleaned:
     """The same before all modifiers, as brushes comb it.
+
+    Args:
+        points: (point_count, 3) object space, instead of the curves' own.
 
     Raises:
         HairloomError: the object holds no hair curves.
     """
     _check_curves(obj)
-    return _read(obj.data, np.array(obj.evaluated_get(depsgraph).matrix_world))
+    return _read(obj.data, np.array(obj.evaluated_get(depsgraph).matrix_world), points)
 
 
 def _check_curves(obj: bpy.types.Object) -> None:
@@ -59,13 +64,13 @@ def _check_curves(obj: bpy.types.Object) -> None:
         )
 
 
-def _read(curves: bpy.types.Curves, matrix: Floats) -> Cleaned:
+def _read(curves: bpy.types.Curves, matrix: Floats, points: Floats | None = None) -> Cleaned:
     radius = read_attribute(curves, "radius", "POINT")
     group = next(
         filter(_is_there, (read_attribute(curves, n, "CURVE") for n in GROUP_ATTRIBUTES)), None
     )
     return clean(
-        moved(curve_points(curves), matrix),
+        moved(curve_points(curves) if points is None else points, matrix),
         curve_offsets(curves),
         radius=None if radius is None else radius * np.float32(mean_scale(matrix)),
         group=group,

@@ -7,6 +7,13 @@ import bpy
 from ...errors import HairloomError
 
 
+def objects_in(hair: bpy.types.Object, setting: str) -> tuple[bpy.types.Object, ...]:
+    """What is in a collection of the hair, each once."""
+    collection = getattr(hair.hairloom, setting)
+    objects = () if collection is None else collection.all_objects
+    return tuple(obj for obj in dict.fromkeys(objects) if obj is not None and obj != hair)
+
+
 def put_into(
     hair: bpy.types.Object,
     setting: str,

@@ -7,26 +7,15 @@ import numpy as np
 
 from ...arrays import Floats
 from ...errors import HairloomError
-from ...strands.affine import moved
-from ...strands.closest_point import search_of
-from ..base.objects import head_of, matrix_of
-from .own_collections import put_into, take_out
-from .surfaces import read_surface
+from .drawn_lines import pieces_of
+from .own_collections import objects_in, put_into, take_out
 
-#: types of objects that can be a parting
-PARTING_TYPES = ("CURVE", "MESH")
 _NONE = np.zeros((0, 2, 3), np.float32)
-#: A line is on the surface within this part of the surface's diagonal.
-_ON = 0.1
-#: A new parting: points, and how far it goes over the head, as parts of its depth from the front.
-_POINTS, _FRONT, _BACK = 9, 0.12, 0.62
 
 
 def partings_of(hair: bpy.types.Object) -> tuple[bpy.types.Object, ...]:
     """The objects that part this hair, each once."""
-    collection = hair.hairloom.parting_collection
-    objects = () if collection is None else collection.all_objects
-    return tuple(obj for obj in dict.fromkeys(objects) if obj is not None and obj != hair)
+    return objects_in(hair, "parting_collection")
 
 
 def parting_state(hair: bpy.types.Object) -> tuple[Floats | str, ...]:
@@ -78,84 +67,6 @@ def read_partings(
     return np.concatenate(found), tuple(unusable)
 
 
-def pieces_of(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Floats:
-    """Those of one object, as it is drawn.
-
-    Raises:
-        HairloomError: it cannot be a parting.
-    """
-    if obj.type not in PARTING_TYPES:
-        raise HairloomError(
-            f"it is a {obj.type.lower()} object, which has no line to part hair along",
-            place=obj.name,
-            remedy="Draw a curve on the surface (Add > Curve > Bezier, then the Draw tool)",
-        )
-    matrix = matrix_of(obj, depsgraph)
-    evaluated = obj.evaluated_get(depsgraph)
-    mesh = evaluated.to_mesh()
-    try:
-        if mesh is not None and len(mesh.polygons):
-            raise HairloomError(
-                "it has faces, so it is no line to part hair along",
-                place=obj.name,
-                remedy="Set its bevel and extrusion to 0, or delete its faces and keep the line",
-            )
-        count = 0 if mesh is None else len(mesh.edges)
-        points, ends = np.empty((0, 3), np.float32), np.empty(2 * count, np.int32)
-        if count:
-            points = np.empty((len(mesh.vertices), 3), np.float32)
-            mesh.vertices.foreach_get("co", points.ravel())
-            mesh.edges.foreach_get("vertices", ends)
-    finally:
-        evaluated.to_mesh_clear()
-    pieces = moved(points, matrix)[ends].reshape(-1, 2, 3)
-    if not np.isfinite(pieces).all():
-        raise HairloomError(
-            "its points are not finite numbers", place=obj.name, remedy="Correct its transforms"
-        )
-    pieces = pieces[(pieces[:, 0] != pieces[:, 1]).any(axis=1)]
-    if not len(pieces):
-        raise HairloomError(
-            "it has no length, so it parts no hair",
-            place=obj.name,
-            remedy="Draw a line of two points or more",
-        )
-    return pieces
-
-
-def is_wire(obj: bpy.types.Object) -> bool:
-    """Whether it is a mesh of edges without faces."""
-    return bool(obj.type == "MESH" and len(obj.data.edges) and not len(obj.data.polygons))
-
-
-def check_on_surface(
-    line: bpy.types.Object, hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph
-) -> None:
-    """Raises:
-    HairloomError: it cannot be a parting of this hair: it has no line, or is away from the surface.
-    """
-    pieces, head = pieces_of(line, depsgraph), head_of(hair)
-    if head is None:
-        raise _no_surface(hair)
-    surface = read_surface(head, depsgraph, need_uv=False, place=head.name)
-    away = search_of(surface).closest(pieces.reshape(-1, 3)).distance
-    low, high = surface.bounds()
-    if float(np.median(away)) > _ON * float(np.linalg.norm(high - low)):
-        raise HairloomError(
-            f"it is {100.0 * float(np.median(away)):.1f} cm away from {head.name}",
-            place=line.name,
-            remedy="Draw it on the surface: in the Draw tool, set Depth to Surface",
-        )
-
-
-def _no_surface(hair: bpy.types.Object) -> HairloomError:
-    return HairloomError(
-        "it has no surface to draw a parting on",
-        place=hair.name,
-        remedy="Set Surface in its Data properties",
-    )
-
-
 def add_partings(
     hair: bpy.types.Object, lines: list[bpy.types.Object], scene: bpy.types.Scene
 ) -> None:
@@ -192,41 +103,3 @@ def copy_partings(
     line.parent = head
     hair.hairloom.parting_collection = bpy.data.collections.new("Partings")
     hair.hairloom.parting_collection.objects.link(line)
-
-
-def new_parting(hair: bpy.types.Object, context: bpy.types.Context) -> bpy.types.Object:
-    """A line over the middle of the surface from the front to the crown, that goes with it.
-
-    Raises:
-        HairloomError: the hair has no surface, or nothing of it is up there.
-    """
-    head = head_of(hair)
-    if head is None:
-        raise _no_surface(hair)
-    evaluated = head.evaluated_get(context.evaluated_depsgraph_get())
-    low, high = np.array(evaluated.bound_box)[[0, 6]]
-    points = []
-    for part in np.linspace(_FRONT, _BACK, _POINTS):
-        above = (0.5 * (low[0] + high[0]), low[1] + part * (high[1] - low[1]), high[2] + 1.0)
-        is_hit, place, _, _ = evaluated.ray_cast(above, (0.0, 0.0, -1.0))
-        if is_hit:
-            points.append(place)
-    if len(points) < 2:
-        raise HairloomError(
-            "nothing of its surface is below its middle line, so no parting can be drawn there",
-            place=head.name,
-            remedy="Draw a curve on the surface, select it and the hair, and press Add Parting",
-        )
-    data = bpy.data.curves.new("Parting", "CURVE")
-    data.dimensions = "3D"
-    spline = data.splines.new("BEZIER")
-    spline.bezier_points.add(len(points) - 1)
-    for point, place in zip(spline.bezier_points, points, strict=True):
-        point.co = place
-        point.handle_left_type = point.handle_right_type = "AUTO"
-    line = bpy.data.objects.new("Parting", data)
-    line.show_in_front = True
-    hair.users_collection[0].objects.link(line)
-    line.parent = head
-    context.view_layer.update()
-    return line

@@ -6,14 +6,13 @@ does so after they have fallen. The combed shape stays with them, as an attribut
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Generator
 
 import bpy
 import numpy as np
 
 from ... import pipeline, settle_flow
-from ...arrays import Bools, Floats
+from ...arrays import Floats
 from ...dynamics.colliders import PosedCollider
 from ...dynamics.settings import DynamicsSettings
 from ...dynamics.settle_settings import SettleSettings
@@ -22,30 +21,24 @@ from ...groom.settings import GuideSettings
 from ...pipeline import Rig
 from ...shading.ambient_settings import AmbientSettings
 from ...strands.clean import Cleaned
-from ..base.attributes import read_attribute, set_attribute
 from ..base.outcome import Outcome
 from ..colliders.fields import solid_of
 from ..colliders.obstacles import Obstacles
-from ..scene.curves import (
-    curve_offsets,
-    curve_points,
-    put_points,
-    read_own_curves,
-    write_own_curves,
-)
+from ..scene.curves import read_own_curves, write_own_curves
+from ..scene.kept_shape import KeptShape
 from ..scene.wind import gravity_of
+from .combing import check_own
 from .groom_source import GroomSource
 from .prepared_groom import PreparedGroom
 
-#: attribute of the points: where they were before the hair settled, object space [m]
-COMBED = "hairloom_combed"
-#: custom properties: of the curves, what settled last; of the object, its Sag Compensation before
-_SETTLED, _SAG = "hairloom_settled", "hairloom_combed_sag"
+COMBED = KeptShape("hairloom_combed", "hairloom_settled")
+#: custom property of the object: its Sag Compensation before
+_SAG = "hairloom_combed_sag"
 
 
 def is_settled(hair: bpy.types.Object) -> bool:
     """Whether there is a combed shape to go back to."""
-    return COMBED in hair.data.attributes
+    return COMBED.is_there(hair)
 
 
 def settle_hair(
@@ -59,10 +52,7 @@ def settle_hair(
         HairloomError: no hair that can be used, it is linked from another file, its roots are away
             from its surface, or the surface is gone.
     """
-    if not hair.data.is_editable:
-        raise HairloomError(
-            "it is linked from another file", place=hair.name, remedy="Make it local in Blender"
-        )
+    check_own(hair)
     source = GroomSource(hair, depsgraph)
     own = read_own_curves(hair, depsgraph)
     guides = settle_flow.guides_that_fall(own.strands, source.settings[GuideSettings])
@@ -103,32 +93,15 @@ def back_to_combed(hair: bpy.types.Object) -> None:
     Raises:
         HairloomError: there is no such shape.
     """
-    curves = hair.data
-    combed = read_attribute(curves, COMBED, "POINT", 3)
-    if combed is None:
+    if not COMBED.back(hair):
         raise HairloomError(
             "it has not settled, so there is no combed shape to go back to",
             place=hair.name,
             remedy="Press Settle first",
         )
-    points, offsets = curve_points(curves), curve_offsets(curves)
-    is_known = np.repeat(_have_extent(combed, offsets), np.diff(offsets))
-    points[is_known] = combed[is_known]
-    put_points(curves, points)
-    curves.attributes.remove(curves.attributes[COMBED])
-    curves.pop(_SETTLED, None)
     sag = hair.pop(_SAG, None)
     if sag is not None:
         hair.hairloom.dynamics.sag_compensation = sag
-
-
-def _have_extent(points: Floats, offsets: np.ndarray) -> Bools:
-    """Curves (curve_count,) whose points are not all the same: Blender gives new ones zeros."""
-    if len(offsets) < 2:
-        return np.zeros(0, bool)
-    low, high = (find.reduceat(points, offsets[:-1], axis=0) for find in (np.minimum, np.maximum))
-    is_extended: Bools = (high > low).any(axis=1)
-    return is_extended
 
 
 def _check_roots(hair: bpy.types.Object, rig: Rig) -> None:
@@ -163,16 +136,9 @@ def _store(
 ) -> None:
     """Write the settled shape (point_count, 3), world space, and keep the combed one; hair that
     settles a second time without having been combed keeps the first."""
-    curves = hair.data
-    points = curve_points(curves)
-    if curves.get(_SETTLED) != _digest(points) or not is_settled(hair):
-        set_attribute(curves, COMBED, "POINT", points)
+    COMBED.keep(hair)
     write_own_curves(hair, own, settled, depsgraph)
-    curves[_SETTLED] = _digest(curve_points(curves))
-
-
-def _digest(points: Floats) -> str:
-    return hashlib.blake2b(points.tobytes(), digest_size=16).hexdigest()
+    COMBED.seal(hair)
 
 
 def _carry_whole_weight(hair: bpy.types.Object) -> tuple[str, ...]:

@@ -1,0 +1,143 @@
+"""Lines that are drawn on the surface of hair: curves, or meshes of edges."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+
+from ...arrays import Floats
+from ...errors import HairloomError
+from ...strands.affine import moved
+from ...strands.closest_point import search_of
+from ..base.objects import head_of, matrix_of
+from .surfaces import read_surface
+
+#: types of objects that can be a line
+LINE_TYPES = ("CURVE", "MESH")
+#: A line is on the surface within this part of the surface's diagonal.
+_ON = 0.1
+#: A new line: points, and how far it goes over the head, as parts of its depth from the front.
+_POINTS, _FRONT, _BACK = 9, 0.12, 0.62
+
+
+def chosen_lines(context: bpy.types.Context) -> list[bpy.types.Object]:
+    """The lines that are selected."""
+    chosen = context.selected_objects
+    return [obj for obj in chosen if obj.type == "CURVE" or is_wire(obj)]
+
+
+def pieces_of(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Floats:
+    """The straight pieces of a line as it is drawn, (n, 2, 3) float32 [m] world space; those of a
+    curve from its first point to its last.
+
+    Raises:
+        HairloomError: it has no line.
+    """
+    if obj.type not in LINE_TYPES:
+        raise HairloomError(
+            f"it is a {obj.type.lower()} object, which is no line on a surface",
+            place=obj.name,
+            remedy="Draw a curve on the surface (Add > Curve > Bezier, then the Draw tool)",
+        )
+    matrix = matrix_of(obj, depsgraph)
+    evaluated = obj.evaluated_get(depsgraph)
+    mesh = evaluated.to_mesh()
+    try:
+        if mesh is not None and len(mesh.polygons):
+            raise HairloomError(
+                "it has faces, so it is no line",
+                place=obj.name,
+                remedy="Set its bevel and extrusion to 0, or delete its faces and keep the line",
+            )
+        count = 0 if mesh is None else len(mesh.edges)
+        points, ends = np.empty((0, 3), np.float32), np.empty(2 * count, np.int32)
+        if count:
+            points = np.empty((len(mesh.vertices), 3), np.float32)
+            mesh.vertices.foreach_get("co", points.ravel())
+            mesh.edges.foreach_get("vertices", ends)
+    finally:
+        evaluated.to_mesh_clear()
+    pieces = moved(points, matrix)[ends].reshape(-1, 2, 3)
+    if not np.isfinite(pieces).all():
+        raise HairloomError(
+            "its points are not finite numbers", place=obj.name, remedy="Correct its transforms"
+        )
+    pieces = pieces[(pieces[:, 0] != pieces[:, 1]).any(axis=1)]
+    if not len(pieces):
+        raise HairloomError(
+            "it has no length, so no hair goes by it",
+            place=obj.name,
+            remedy="Draw a line of two points or more",
+        )
+    return pieces
+
+
+def is_wire(obj: bpy.types.Object) -> bool:
+    """Whether it is a mesh of edges without faces."""
+    return bool(obj.type == "MESH" and len(obj.data.edges) and not len(obj.data.polygons))
+
+
+def check_on_surface(
+    line: bpy.types.Object, hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph
+) -> None:
+    """Raises:
+    HairloomError: it has no line, or is away from the surface of this hair.
+    """
+    pieces, head = pieces_of(line, depsgraph), head_of(hair)
+    if head is None:
+        raise _no_surface(hair)
+    surface = read_surface(head, depsgraph, need_uv=False, place=head.name)
+    away = search_of(surface).closest(pieces.reshape(-1, 3)).distance
+    low, high = surface.bounds()
+    if float(np.median(away)) > _ON * float(np.linalg.norm(high - low)):
+        raise HairloomError(
+            f"it is {100.0 * float(np.median(away)):.1f} cm away from {head.name}",
+            place=line.name,
+            remedy="Draw it on the surface: in the Draw tool, set Depth to Surface",
+        )
+
+
+def _no_surface(hair: bpy.types.Object) -> HairloomError:
+    return HairloomError(
+        "it has no surface to draw a line on",
+        place=hair.name,
+        remedy="Set Surface in its Data properties",
+    )
+
+
+def new_line(hair: bpy.types.Object, name: str, context: bpy.types.Context) -> bpy.types.Object:
+    """A line over the middle of the surface from the front to the crown, that goes with it.
+
+    Raises:
+        HairloomError: the hair has no surface, or nothing of it is up there.
+    """
+    head = head_of(hair)
+    if head is None:
+        raise _no_surface(hair)
+    evaluated = head.evaluated_get(context.evaluated_depsgraph_get())
+    low, high = np.array(evaluated.bound_box)[[0, 6]]
+    points = []
+    for part in np.linspace(_FRONT, _BACK, _POINTS):
+        above = (0.5 * (low[0] + high[0]), low[1] + part * (high[1] - low[1]), high[2] + 1.0)
+        is_hit, place, _, _ = evaluated.ray_cast(above, (0.0, 0.0, -1.0))
+        if is_hit:
+            points.append(place)
+    if len(points) < 2:
+        raise HairloomError(
+            "nothing of its surface is below its middle line, so no line can be drawn there",
+            place=head.name,
+            remedy="Draw a curve on the surface, and select it beside the hair",
+        )
+    data = bpy.data.curves.new(name, "CURVE")
+    data.dimensions = "3D"
+    spline = data.splines.new("BEZIER")
+    spline.bezier_points.add(len(points) - 1)
+    for point, place in zip(spline.bezier_points, points, strict=True):
+        point.co = place
+        point.handle_left_type = point.handle_right_type = "AUTO"
+    line = bpy.data.objects.new(name, data)
+    line.show_in_front = True
+    hair.users_collection[0].objects.link(line)
+    line.parent = head
+    context.view_layer.update()
+    return line

@@ -1,0 +1,40 @@
+"""Strokes of one groom: curves that its hair follows, the objects of a collection."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+
+from ...arrays import Floats
+from ...errors import HairloomError
+from .drawn_lines import pieces_of
+from .own_collections import objects_in
+
+#: setting of the hair that names the collection, and what is in it
+SETTING, KIND = "stroke_collection", "Strokes"
+
+
+def strokes_of(hair: bpy.types.Object) -> tuple[bpy.types.Object, ...]:
+    """The objects that this hair is combed along, each once."""
+    return objects_in(hair, SETTING)
+
+
+def read_strokes(
+    hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph
+) -> tuple[tuple[Floats, ...], tuple[str, ...]]:
+    """All strokes from their first point to their last, (m, 3) [m] world space each; and what
+    cannot be used."""
+    found: list[Floats] = []
+    unusable: list[str] = []
+    for obj in strokes_of(hair):
+        try:
+            found += _lines(pieces_of(obj, depsgraph))
+        except HairloomError as error:
+            unusable.append(str(error))
+    return tuple(found), tuple(unusable)
+
+
+def _lines(pieces: Floats) -> list[Floats]:
+    """Pieces (n, 2, 3) that follow each other, as lines (m, 3)."""
+    ends = np.flatnonzero((pieces[1:, 0] != pieces[:-1, 1]).any(axis=1)) + 1
+    return [np.concatenate([line[:, 0], line[-1:, 1]]) for line in np.split(pieces, ends)]

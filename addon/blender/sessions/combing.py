@@ -1,0 +1,86 @@
+"""What all tools do that comb the curves of one hair, before their modifiers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import bpy
+import numpy as np
+
+from ...arrays import Floats
+from ...errors import HairloomError
+from ...groom.roots import bind_roots
+from ...refine.lead_out_at_rest import led_out_at_rest
+from ...strands import StrandSet, Surface
+from ..base.objects import head_of
+from ..colliders.fields import solid_of
+from ..scene.curves import read_own_curves, write_own_curves
+from ..scene.surfaces import read_surface
+
+
+@dataclass(frozen=True)
+class Combed:
+    """changed, all: numbers of curves. dropped: reason -> number of curves that cannot be used."""
+
+    changed: int
+    all: int
+    dropped: dict[str, int]
+
+
+def check_own(hair: bpy.types.Object) -> None:
+    """Raises:
+    HairloomError: the curves are not the file's own, so that nothing can be done to them.
+    """
+    if not hair.data.is_editable:
+        raise HairloomError(
+            "it is linked from another file", place=hair.name, remedy="Make it local in Blender"
+        )
+
+
+def surface_to_comb_on(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Surface:
+    """What the hair grows on, in world space.
+
+    Raises:
+        HairloomError: it has no surface, or one that cannot be used; or see `check_own`.
+    """
+    check_own(hair)
+    head = head_of(hair)
+    if head is None:
+        raise HairloomError(
+            "it has no surface, which it is combed by",
+            place=hair.name,
+            remedy="Set Surface in its Data properties",
+        )
+    return read_surface(head, depsgraph, need_uv=False, place=head.name)
+
+
+def comb(
+    hair: bpy.types.Object,
+    surface: Surface,
+    depsgraph: bpy.types.Depsgraph,
+    points_of: Callable[[StrandSet], Floats],
+    begin: Floats | None = None,
+) -> Combed:
+    """Give the hair's curves other points; those that change are led out of the surface.
+
+    Args:
+        points_of: strands that are bound to the surface, world space -> their points.
+        begin: (point_count, 3) object space, the points to begin with; None: as they are.
+
+    Raises:
+        HairloomError: no curves that can be used.
+    """
+    own = read_own_curves(hair, depsgraph, begin)
+    bound = bind_roots(own.strands, surface, place=hair.name).strands
+    points = points_of(bound)
+    is_changed = np.zeros(bound.strand_count, bool)
+    other = np.flatnonzero((points != bound.points).any(axis=1))
+    is_changed[np.searchsorted(bound.offsets, other, side="right") - 1] = True
+    changed, solid = np.flatnonzero(is_changed), solid_of(surface)
+    if solid is not None and len(changed):
+        some = replace(bound, points=points.copy()).take(changed)
+        led, _ = led_out_at_rest(some, solid, float(np.median(bound.lengths())))
+        points[np.repeat(is_changed, bound.point_counts)] = led.points
+    write_own_curves(hair, own, points, depsgraph)
+    return Combed(len(changed), bound.strand_count, own.dropped)

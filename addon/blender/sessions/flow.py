@@ -1,0 +1,63 @@
+"""Hair combed along its strokes, which can be taken back and done again with other strokes."""
+
+from __future__ import annotations
+
+import bpy
+
+from ...errors import HairloomError
+from ...groom.flow import combed_along
+from ...groom.flow_settings import FlowSettings
+from ..base.outcome import Outcome
+from ..scene.kept_shape import KeptShape
+from ..scene.strokes import read_strokes
+from .combing import check_own, comb, surface_to_comb_on
+
+BEFORE_FLOW = KeptShape("hairloom_before_flow", "hairloom_flowed")
+
+
+def comb_flow(
+    hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph, settings: FlowSettings
+) -> Outcome:
+    """Let the curves of this hair follow its strokes, before their modifiers. Hair that nothing
+    else has changed since it was combed so begins again from its shape before.
+
+    Raises:
+        HairloomError: no hair that can be used, no surface, no stroke, or it is linked from
+            another file.
+    """
+    surface = surface_to_comb_on(hair, depsgraph)
+    lines, unusable = read_strokes(hair, depsgraph)
+    if not lines:
+        reason = " ".join(unusable)
+        raise HairloomError(
+            f"it has no strokes{f' ({reason})' if reason else ''}",
+            place=hair.name,
+            remedy="Draw a curve on the surface and press Add Stroke",
+        )
+    before = BEFORE_FLOW.before(hair)
+    BEFORE_FLOW.keep(hair)
+    done = comb(
+        hair,
+        surface,
+        depsgraph,
+        lambda bound: combed_along(bound, lines, surface, settings),
+        before,
+    )
+    BEFORE_FLOW.seal(hair)
+    result = f"{hair.name}: {done.changed:,} of {done.all:,} curves follow its strokes"
+    return Outcome(result, done.dropped, unusable)
+
+
+def take_flow_back(hair: bpy.types.Object) -> None:
+    """Give curves the shape that they had before they followed strokes.
+
+    Raises:
+        HairloomError: there is no such shape, or it is linked from another file.
+    """
+    check_own(hair)
+    if not BEFORE_FLOW.back(hair):
+        raise HairloomError(
+            "it has not been combed along strokes, so there is no shape to go back to",
+            place=hair.name,
+            remedy="Press Comb along Flow first",
+        )

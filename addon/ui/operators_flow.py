@@ -1,0 +1,144 @@
+"""Flow: Add Stroke, Remove Stroke, Comb along Flow and Take Flow Back, and their panel."""
+
+from __future__ import annotations
+
+import bpy
+from bpy.props import StringProperty
+
+from ..blender.base.outcome import report
+from ..blender.properties.groups import operator_properties
+from ..blender.properties.properties import settings_of
+from ..blender.scene.drawn_lines import check_on_surface, chosen_lines, new_line
+from ..blender.scene.own_collections import put_into, take_out
+from ..blender.scene.strokes import KIND, SETTING, strokes_of
+from ..blender.sessions.flow import BEFORE_FLOW, comb_flow, take_flow_back
+from ..groom.flow_settings import FlowSettings
+from .operators_start import in_object_mode
+from .reports import reporting, tell, waiting
+from .selection import chosen_hair, needs_hair
+
+
+class HAIRLOOM_OT_add_stroke(bpy.types.Operator):
+    """Let the hair be combed along the selected curves, which are drawn on its surface. If none is
+    selected, a stroke from the forehead to the crown is added, to be edited like any curve"""
+
+    bl_idname = "hairloom.add_stroke"
+    bl_label = "Add Stroke"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return in_object_mode(cls, context) and needs_hair(cls, context)
+
+    @reporting
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        hair = chosen_hair(context)[0]
+        depsgraph = context.evaluated_depsgraph_get()
+        strokes = chosen_lines(context)
+        for stroke in strokes:
+            check_on_surface(stroke, hair, depsgraph)
+        if not strokes:
+            strokes = [new_line(hair, "Stroke", context)]
+        put_into(hair, SETTING, KIND, strokes, context.scene)
+        names = ", ".join(stroke.name for stroke in strokes)
+        report(self, "INFO", f"{hair.name} can be combed along {names}")
+        return {"FINISHED"}
+
+
+class HAIRLOOM_OT_remove_stroke(bpy.types.Operator):
+    """Comb the hair along this stroke no longer. The object itself stays in the scene, and hair
+    that was combed stays as it is"""
+
+    bl_idname = "hairloom.remove_stroke"
+    bl_label = "Remove Stroke"
+    bl_options = {"REGISTER", "UNDO"}
+
+    __annotations__ = {
+        "stroke": StringProperty(
+            name="Stroke", description="Name of the object", options={"SKIP_SAVE"}
+        )
+    }
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return needs_hair(cls, context)
+
+    @reporting
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        take_out(chosen_hair(context)[0], SETTING, KIND, self.stroke, context.scene)
+        return {"FINISHED"}
+
+
+class HAIRLOOM_OT_comb_flow(bpy.types.Operator):
+    """Comb the selected hair along its strokes, from their first points to their last. Pressed
+    again, it begins from the shape before"""
+
+    bl_idname = "hairloom.comb_flow"
+    bl_label = "Comb along Flow"
+    bl_options = {"REGISTER", "UNDO"}
+
+    __annotations__ = operator_properties("flow")
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if not (in_object_mode(cls, context) and needs_hair(cls, context)):
+            return False
+        if any(map(strokes_of, chosen_hair(context))):
+            return True
+        cls.poll_message_set("The selected hair has no strokes: press Add Stroke first")
+        return False
+
+    @reporting
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        settings = settings_of(self, FlowSettings)
+        with waiting(context):
+            for hair in filter(strokes_of, chosen_hair(context)):
+                depsgraph = context.evaluated_depsgraph_get()
+                tell(self, comb_flow(hair, depsgraph, settings))
+        return {"FINISHED"}
+
+
+class HAIRLOOM_OT_take_flow_back(bpy.types.Operator):
+    """Give the selected hair the shape that it had before it was combed along strokes"""
+
+    bl_idname = "hairloom.take_flow_back"
+    bl_label = "Take Flow Back"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if not (in_object_mode(cls, context) and needs_hair(cls, context)):
+            return False
+        if any(map(BEFORE_FLOW.is_there, chosen_hair(context))):
+            return True
+        cls.poll_message_set("The selected hair does not follow strokes: press Comb along Flow")
+        return False
+
+    @reporting
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        for hair in filter(BEFORE_FLOW.is_there, chosen_hair(context)):
+            take_flow_back(hair)
+            report(self, "INFO", f"{hair.name} is as it was before it followed strokes")
+        return {"FINISHED"}
+
+
+def draw_flow(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
+    """Draw what the hair is combed along."""
+    column = layout.column()
+    column.prop(hair.hairloom, SETTING)
+    for obj in strokes_of(hair):
+        row = column.row(align=True)
+        row.label(text=obj.name, icon="CURVE_PATH")
+        row.operator("hairloom.remove_stroke", text="", icon="X").stroke = obj.name
+    column.operator("hairloom.add_stroke", icon="CURVE_PATH")
+    row = column.row(align=True)
+    row.operator("hairloom.comb_flow", icon="FORCE_CURVE")
+    row.operator("hairloom.take_flow_back", icon="LOOP_BACK")
+
+
+CLASSES = (
+    HAIRLOOM_OT_add_stroke,
+    HAIRLOOM_OT_remove_stroke,
+    HAIRLOOM_OT_comb_flow,
+    HAIRLOOM_OT_take_flow_back,
+)
