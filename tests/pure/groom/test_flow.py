@@ -64,20 +64,17 @@ def test_lift_and_strokes_that_rise_lift_hair_by_their_slope() -> None:
 
 
 def test_it_fades_with_the_distance_and_ends_at_the_reach() -> None:
-    """By the smooth step: half of the amount in the middle of where it fades."""
+    """By the smooth step, of hair so short that it is everywhere as far away as its root."""
     line = [[0.0, 0.5, 0.0], [1.0, 0.5, 0.0]]
-    y = np.array([0.5, 0.55, 0.6, 0.64, 0.7])
-    strands = standing(np.stack([0.0 * y + 0.4, y, 0.0 * y], axis=1), cv_count=2)
-    combed = comb(strands, line, reach=1.0, falloff=1.0, amount=0.5)
-    direction = (combed[:, 1] - combed[:, 0]) / 0.2
-    x = np.clip((y - 0.5) / 0.2, 0.0, 1.0)
+    y = np.array([0.53, 0.55, 0.6, 0.64, 0.7])
+    strands = standing(np.stack([0.0 * y + 0.4, y, 0.0 * y], axis=1), length=2e-3, cv_count=2)
+    combed = comb(strands, line, reach=100.0, falloff=1.0, amount=0.5)
+    along = (combed[:, 1] - combed[:, 0])[:4]
+    x = (y[:4] - 0.5) / 0.2
     weight = 0.5 * (1.0 - x * x * (3.0 - 2.0 * x))
-    # the midpoint of a strand is as far away as its middle is above the sheet
-    assert (np.diff(direction[:, 0]) < 0.0).all()
+    assert along[:, 0] / along[:, 2] == pytest.approx(weight / (1.0 - weight), rel=0.02)
     assert combed[-1].tobytes() == strands.grid[-1].tobytes()
-    assert direction[0, 0] > 0.4 > direction[2, 0] > 0.0
-    assert weight[2] == pytest.approx(0.25)
-    sharp = comb(strands, line, reach=0.5, falloff=0.0)
+    sharp = comb(strands, line, reach=45.0, falloff=0.0)
     assert np.abs(sharp[:2, 1, 2]).max() < 1e-6
     assert (sharp[2:] == strands.grid[2:]).all()
 
@@ -114,6 +111,22 @@ def test_hair_stays_on_a_sphere_that_it_follows(egg: Surface) -> None:
     assert np.abs(combed[:, 2]).max() < 1e-3
     height = (combed[:, 0] / 0.08) ** 2 + (combed[:, 1] / 0.1) ** 2
     assert np.abs(height - 1.0).max() < 0.04
+
+
+def test_a_direction_turns_with_the_surface_between_stroke_and_hair(egg: Surface) -> None:
+    """A stroke along the equator, and hair a sixth of it farther: along the ellipse there."""
+    angle = np.linspace(-0.02, 0.02, 9)
+    stroke = np.stack([0.08 * np.cos(angle), 0.1 * np.sin(angle), 0.0 * angle], axis=1)
+    there = np.pi / 3.0
+    root = np.array([0.08 * np.cos(there), 0.1 * np.sin(there), 0.0])
+    grid = root * np.array([1.0, 1.03])[:, None]
+    bare = StrandSet(grid, np.array([0, 2]), np.full(2, 1e-4), np.zeros(1, int))
+    strands = bind_roots(bare, egg, place="test").strands
+    combed = comb(strands, stroke, surface=egg, reach=80.0)[0]
+    tangent = np.array([-0.08 * np.sin(there), 0.1 * np.cos(there), 0.0])
+    cosine = (combed[1] - combed[0]) @ tangent
+    cosine /= np.linalg.norm(combed[1] - combed[0]) * np.linalg.norm(tangent)
+    assert cosine > np.cos(0.12)  # the egg has flat faces
 
 
 def test_nothing_near_changes_nothing() -> None:
