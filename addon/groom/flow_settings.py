@@ -12,7 +12,7 @@ class FlowSettings(Settings):
     """How hair follows strokes that are drawn on its surface."""
 
     section = "flow"
-    title = "Comb along Flow"
+    title = "Comb Along Flow"
 
     amount: float = number(
         1.0,

@@ -1,4 +1,4 @@
-"""Flow: Add Stroke, Remove Stroke, Comb along Flow and Take Flow Back, and their panel."""
+"""Flow: Add Stroke, Remove Stroke, Comb Along Flow and Take Flow Back, and their panel."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ class HAIRLOOM_OT_comb_flow(bpy.types.Operator):
     again, it begins from the shape before"""
 
     bl_idname = "hairloom.comb_flow"
-    bl_label = "Comb along Flow"
+    bl_label = "Comb Along Flow"
     bl_options = {"REGISTER", "UNDO"}
 
     __annotations__ = operator_properties("flow")
@@ -111,7 +111,7 @@ class HAIRLOOM_OT_take_flow_back(bpy.types.Operator):
             return False
         if any(map(BEFORE_FLOW.is_there, chosen_hair(context))):
             return True
-        cls.poll_message_set("The selected hair does not follow strokes: press Comb along Flow")
+        cls.poll_message_set("The selected hair does not follow strokes: press Comb Along Flow")
         return False
 
     @reporting

@@ -259,7 +259,7 @@ class HAIRLOOM_PG_character(bpy.types.PropertyGroup):
         "stroke_collection": PointerProperty(
             type=bpy.types.Collection,
             name="Strokes",
-            description="Collection of curves drawn on the surface, which Comb along Flow combs "
+            description="Collection of curves drawn on the surface, which Comb Along Flow combs "
             "hair along, from their first points to their last",
             override=OVERRIDABLE,
         ),

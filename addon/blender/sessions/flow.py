@@ -59,5 +59,5 @@ def take_flow_back(hair: bpy.types.Object) -> None:
         raise HairloomError(
             "it has not been combed along strokes, so there is no shape to go back to",
             place=hair.name,
-            remedy="Press Comb along Flow first",
+            remedy="Press Comb Along Flow first",
         )
