@@ -333,6 +333,7 @@ def test_doubtful_cards_are_noted(sphere, evaluated):
 
 
 @pytest.mark.parametrize("name", few_in_commits(["long01", "ponytail01"]))
+@pytest.mark.slow
 def test_real_cards_leave_blender_in_their_order(
     extension, evaluated, shared_data: Path, tmp_path: Path, name: str
 ):

@@ -229,6 +229,7 @@ def test_a_bake_keeps_what_there_was_to_say(new_hair, evaluated, tmp_path):
     assert playback.rig_in(playback.cache_of(hair)).rig.notes == (note,)
 
 
+@pytest.mark.slow
 def test_a_bake_says_when_children_have_changed(moving, sphere, evaluated):
     upper_half(sphere, "Top")
     session = previews.start(moving, evaluated())
@@ -323,6 +324,7 @@ def on_the_command_line(sphere, tmp_path, verb, *more):
     return code, json.loads(report.read_text()) if code == 0 else {}
 
 
+@pytest.mark.slow
 def test_the_command_line_makes_children(sphere, tmp_path, capfd):
     upper_half(sphere, "Top")
     code, report = on_the_command_line(

@@ -99,6 +99,7 @@ def made_beside(surface):
     return weakref.ref(made[0])
 
 
+@pytest.mark.slow
 def test_previews_keep_the_youngest_fields_only(new_hair, sphere, evaluated, extension):
     oldest = made_beside(surface_of(sphere, evaluated))
     previews.start(new_hair(sphere), evaluated())

@@ -245,6 +245,7 @@ def test_on_a_scan_roots_are_on_the_skin_and_no_strand_is_in_it(name: str) -> No
         assert strands.lengths().mean() / own == pytest.approx(LARGER, rel=0.12)
 
 
+@pytest.mark.slow
 def test_hair_is_led_out_of_what_other_heads_have() -> None:
     """A ball beside the neck, where long hair falls on the built-in head."""
     head, middle, radius = scan(), stood(np.array([[0.10, 0.02, -0.16]]))[0], 0.03 * LARGER

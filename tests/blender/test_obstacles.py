@@ -235,6 +235,7 @@ def test_a_mesh_that_an_armature_turns_and_its_object_carries(scene):
     np.testing.assert_allclose(posed.matrix_now, TURN @ Matrix.Rotation(0.5, 4, "Z"), atol=1e-5)
 
 
+@pytest.mark.slow
 def test_the_head_is_followed_at_its_roots_where_the_body_bends(scene):
     """A long body whose upper half turns: its collider goes with the vertices at the top, in the
     body's shape."""

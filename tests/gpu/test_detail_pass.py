@@ -391,7 +391,7 @@ def head_of_hair(frame: Any, detail: DetailSettings) -> Any:
     )
 
 
-@pytest.mark.parametrize("seen", few_in_commits(["inside", "whole", "orthographic"], 2))
+@pytest.mark.parametrize("seen", few_in_commits(["inside", "whole", "orthographic"]))
 @pytest.mark.parametrize("mode", few_in_commits(["adaptive", "fixed"]))
 def test_hidden_strands_change_no_pixel(frame: Any, mode: str, seen: str) -> None:
     camera, pictures, strands = cameras(frame)[seen], [], []

@@ -100,6 +100,7 @@ def test_separation_sets_where_marschners_two_lie(draw: Any) -> None:
     assert second == pytest.approx(-2.0 * tilt, abs=1.5)
 
 
+@pytest.mark.slow
 def test_the_outline_shines_against_the_light_on_blond_alone(draw: Any) -> None:
     """The third highlight, TT: as bright as the others without what lights the front."""
     behind = (-0.5, 0.0, 0.87)

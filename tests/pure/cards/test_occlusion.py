@@ -151,6 +151,7 @@ def test_deep_inside_it_is_dark_and_outside_light() -> None:
     assert np.median(found[ring][inner]) < 0.2 < 0.6 < np.median(found[ring][outer])
 
 
+@pytest.mark.slow
 def test_below_a_wide_square_only_the_light_past_its_edge_arrives() -> None:
     """Form factor of a square from below its middle: Lambert's formula for four equal edges."""
     mesh = stacked([0.0, 1.0])

@@ -97,7 +97,7 @@ def test_held_cvs(kit, shake, solver):
 
 
 @pytest.mark.parametrize("held", few_in_commits([True, False]))
-@pytest.mark.parametrize("solver", ["direct", "relaxation"])
+@pytest.mark.parametrize("solver", few_in_commits(["direct", "relaxation"]))
 def test_curls_that_give(kit, shake, solver, held):
     """Some guides, some segments of these, with ties and a ball, the weight carried in part."""
     room = np.random.default_rng(4).uniform(-0.5, 1.5, (6, 9)).clip(0.0, None)
@@ -170,8 +170,10 @@ def balls() -> SphereSetCollider:
 
 @pytest.mark.parametrize(
     "collider",
-    [balls(), CapsuleCollider((0.12, 0.0, 0.05), (0.05, 0.1, 0.16), 0.04)],
-    ids=["sphere set", "capsule"],
+    [
+        pytest.param(CapsuleCollider((0.12, 0.0, 0.05), (0.05, 0.1, 0.16), 0.04), id="capsule"),
+        pytest.param(balls(), id="sphere set", marks=pytest.mark.slow),
+    ],
 )
 @pytest.mark.parametrize("bowed", few_in_commits([True, False]))
 def test_with_a_sphere_set_and_a_capsule(kit, shake, collider, bowed):
