@@ -51,8 +51,8 @@ VIEW_COMPENSATED_ALPHA = (
 ROLES = {
     "color": (
         "sRGB",
-        "the strands' own colour, for plain materials; base and the values of the material make "
-        "the same",
+        "what a plain material shows: the strands' own colour, as much darker as shadows between "
+        "them make it; base and the values of the material are for shaders of hair",
     ),
     "base": (
         "sRGB",
