@@ -8,7 +8,7 @@ from bpy.props import StringProperty
 from ..blender.base.outcome import report
 from ..blender.properties.groups import operator_properties
 from ..blender.properties.properties import settings_of
-from ..blender.scene.drawn_lines import check_on_surface, chosen_lines, new_line
+from ..blender.scene.drawn_lines import chosen_or_new_lines
 from ..blender.scene.own_collections import put_into, take_out
 from ..blender.scene.strokes import KIND, SETTING, strokes_of
 from ..blender.sessions.flow import BEFORE_FLOW, comb_flow, take_flow_back
@@ -33,12 +33,7 @@ class HAIRLOOM_OT_add_stroke(bpy.types.Operator):
     @reporting
     def execute(self, context: bpy.types.Context) -> set[str]:
         hair = chosen_hair(context)[0]
-        depsgraph = context.evaluated_depsgraph_get()
-        strokes = chosen_lines(context)
-        for stroke in strokes:
-            check_on_surface(stroke, hair, depsgraph)
-        if not strokes:
-            strokes = [new_line(hair, "Stroke", context)]
+        strokes = chosen_or_new_lines(hair, "Stroke", context)
         put_into(hair, SETTING, KIND, strokes, context.scene)
         names = ", ".join(stroke.name for stroke in strokes)
         report(self, "INFO", f"{hair.name} can be combed along {names}")

@@ -9,7 +9,7 @@ from ..blender.base.outcome import report
 from ..blender.properties.groups import operator_properties
 from ..blender.properties.properties import settings_of
 from ..blender.scene import partings
-from ..blender.scene.drawn_lines import check_on_surface, chosen_lines, new_line
+from ..blender.scene.drawn_lines import chosen_or_new_lines
 from ..blender.sessions.parting import comb_parting
 from ..groom.parting_settings import PartingSettings
 from .operators_start import in_object_mode
@@ -32,12 +32,7 @@ class HAIRLOOM_OT_add_parting(bpy.types.Operator):
     @reporting
     def execute(self, context: bpy.types.Context) -> set[str]:
         hair = chosen_hair(context)[0]
-        depsgraph = context.evaluated_depsgraph_get()
-        lines = chosen_lines(context)
-        for line in lines:
-            check_on_surface(line, hair, depsgraph)
-        if not lines:
-            lines = [new_line(hair, "Parting", context)]
+        lines = chosen_or_new_lines(hair, "Parting", context)
         partings.add_partings(hair, lines, context.scene)
         names = ", ".join(line.name for line in lines)
         report(self, "INFO", f"{hair.name} is parted along {names}")

@@ -141,3 +141,18 @@ def new_line(hair: bpy.types.Object, name: str, context: bpy.types.Context) -> b
     line.parent = head
     context.view_layer.update()
     return line
+
+
+def chosen_or_new_lines(
+    hair: bpy.types.Object, name: str, context: bpy.types.Context
+) -> list[bpy.types.Object]:
+    """The selected curves, which are drawn on its surface; a new line of this name where none is.
+
+    Raises:
+        HairloomError: the hair has no surface, or a curve is not on it.
+    """
+    depsgraph = context.evaluated_depsgraph_get()
+    lines = chosen_lines(context)
+    for line in lines:
+        check_on_surface(line, hair, depsgraph)
+    return lines or [new_line(hair, name, context)]
