@@ -52,8 +52,8 @@ DEEP = 0.5
 #: A strand that is stuck all the same, as in a fold, is led from its root again, farther out by
 #: this much of its mean segment; how often it is led at most.
 MARGIN, ATTEMPTS = 0.5, 3
-#: How many points of a strand are looked at together, for the next one that is too near.
-_AHEAD = np.arange(4)
+#: How many points of a strand are looked at together, for the first one that is too near.
+_AHEAD = np.arange(5)
 _TINY = 1.0e-30
 
 #: Where roots carry points (n,) of all, which belong to the strands (n,): (n, 3) world [m].
@@ -355,7 +355,9 @@ def _led_by(
     """
     walk = _Walk.of(near, farther, SLACK * kept, poses)
     every = np.arange(len(farther))
-    waiting = every[:0] if near.found is None else walk.meet(every, *near.found)
+    waiting: Ints = every[:0]
+    if near.found is not None:
+        waiting = walk.push(every, walk.goal[near.firsts] - near.found[0], near.found[1])
     going = walk.underway(every, given_up)
     while len(going) + len(waiting):
         if len(waiting) > len(going):  # a turn asks much: as many strands at once as can be
@@ -374,9 +376,10 @@ class _Walk:
     goal: (m,) [m], how far each point of `near` shall be, but for `slack` [m]. lengths: (m,) [m],
         of segments.
     at: (n,) the point that each strand is at. sweep: (n,) how often that went straight out; 0:
-        it is still searched for. here: (n, 3) where it is by now. is_waiting: (n,) for a turn.
+        it may not have to. is_waiting: (n,) for a turn.
     shift: (n, 3) what the last point that was led moves all that come after it by, until the next
-        one that is. shifts, is_led: of points, (m, 3) and (m,).
+        one that is; own_shift: the same of the point that it is at.
+    shifts, is_led: of points, (m, 3) and (m,).
     farther, worst: see `_led_by`.
     """
 
@@ -387,9 +390,9 @@ class _Walk:
     poses: Sequence[Pose]
     at: Ints
     sweep: Ints
-    here: Floats
     is_waiting: Bools
     shift: Floats
+    own_shift: Floats
     shifts: Floats
     is_led: Bools
     farther: Floats
@@ -408,8 +411,8 @@ class _Walk:
             poses,
             near.firsts.copy(),
             np.zeros(count, np.int64),
-            points[np.minimum(near.firsts, len(points) - 1)],
             np.zeros(count, bool),
+            np.zeros((count, 3)),
             np.zeros((count, 3)),
             np.zeros_like(points),
             is_led,
@@ -424,80 +427,91 @@ class _Walk:
         return some[is_going]
 
     def step(self, going: Ints) -> Ints:
-        """Move some strands on, by one question to the colliders for all of them: where one
-        searches, of its next points, and where one of these is too near, of the place to which it
-        has been moved. Which of them (k,) go out only if their segments turn."""
-        is_searching = self.sweep[going] == 0
-        searching, moved = going[is_searching], going[~is_searching]
-        last = self.near.ends[searching, None] - 1
-        index = np.minimum(self.at[searching, None] + _AHEAD, last)
-        ahead = self.near.points[index] + self.shift[searching, None]
-        asked = np.concatenate([ahead.reshape(-1, 3), self.here[moved]])
-        distance, outward = distance_of_few(asked, self.poses)
-        lack = self.goal[index] - distance[: index.size].reshape(index.shape)
-        is_bad = lack > self.slack
-        number = is_bad.any(axis=1).nonzero()[0]
-        place, found = is_bad[number].argmax(axis=1), searching[number]
-        self.at[searching] = index[:, -1] + 1
-        self.at[found] = index[number, place]
-        self.here[found] = ahead[number, place]
-        asked = np.append(number * len(_AHEAD) + place, np.arange(index.size, len(distance)))
-        return self.meet(np.append(found, moved), distance[asked], outward[asked])
+        """Move some strands on, by one question to the colliders for all of them: of the points
+        that they are at, and of the next ones, as if these were out. Which of them (k,) go out
+        only if their segments turn."""
+        index = self.at.take(going)[:, None] + _AHEAD
+        np.minimum(index, self.near.ends.take(going)[:, None] - 1, out=index)
+        places = self.near.points.take(index, axis=0)
+        places += self.own_shift.take(going, axis=0)[:, None]
+        distance, outward = distance_of_few(places.reshape(-1, 3), self.poses)
+        lack = self.goal.take(index).ravel()
+        lack -= distance
+        is_in = (lack > self.slack).reshape(index.shape)
+        first = is_in.argmax(axis=1)  # 0 where none is
+        found = np.arange(0, index.size, len(_AHEAD)) + first
+        is_found = is_in.take(found)
+        first[~is_found] = len(_AHEAD)
+        self._go_on(going, first)
+        found = found.compress(is_found)
+        return self.push(going.compress(is_found), lack.take(found), outward.take(found, axis=0))
 
-    def meet(self, some: Ints, distance: Floats, outward: Floats) -> Ints:
-        """Move some strands on whose points have these distances (k,) [m] and ways out (k, 3)."""
-        lack = self.goal[self.at[some]] - distance
-        is_out = lack <= self.slack
-        is_tried = self.sweep[some] == SWEEPS
-        is_tried |= lack > DEEPEST * self.lengths[self.at[some]]
-        go = (~is_out & ~is_tried).nonzero()[0]
-        self._go_out(some[go], lack[go], outward[go])
-        self._leave(some[is_out])
-        stuck: Ints = some[~is_out & is_tried]
+    def push(self, some: Ints, lack: Floats, outward: Floats) -> Ints:
+        """Straight out with some strands' points, which lack this (k,) [m] along their ways out
+        (k, 3), but for those that this will not bring out: which these are."""
+        is_tried = self.sweep.take(some) == SWEEPS
+        is_tried |= lack > DEEPEST * self.lengths.take(self.at.take(some))
+        is_going = ~is_tried
+        self._go_out(
+            some.compress(is_going), lack.compress(is_going), outward.compress(is_going, axis=0)
+        )
+        stuck: Ints = some.compress(is_tried)
         self.is_waiting[stuck] = True
         return stuck
 
     def turn(self, some: Ints) -> None:
         """Turn the segments of some strands until they are out."""
         point = self.at[some]
-        start = self._start(some)
-        self.here[some], lack = _turned_out(
+        start, arm, length = self._arms(some, point)
+        end, lack = _turned_out(
             start,
-            self.here[some] - start,
-            self.lengths[point],
+            arm,
+            length,
             unit(self.near.carried[point] - self.near.carried[point - 1]),
             self.goal[point],
             self.poses,
         )
+        self.own_shift[some] = end - self.near.points[point]
+        self.sweep[some] = SWEEPS
         self.worst[some] = np.maximum(self.worst[some], lack - self.farther[some])
         self.is_waiting[some] = False
-        self._leave(some)
+        self._go_on(some, np.ones_like(some))
 
     def led(self) -> Floats:
         """Where all points are led to, (m, 3)."""
         last = np.maximum.accumulate(np.where(self.is_led, np.arange(len(self.is_led)), 0))
         return self.near.points + self.shifts[last]
 
-    def _start(self, some: Ints) -> Floats:
-        """Where the segments begin that end at the points of some strands, (k, 3)."""
-        start: Floats = self.near.points[self.at[some] - 1] + self.shift[some]
-        return start
+    def _arms(self, some: Ints, point: Ints) -> tuple[Floats, Floats, Floats]:
+        """The segments that end at some strands' points: where they begin, the way from there to
+        where the points are now, (k, 3) each, and their lengths (k,) [m]."""
+        start = self.near.points.take(point - 1, axis=0)
+        start += self.shift.take(some, axis=0)
+        arm = self.near.points.take(point, axis=0)
+        arm += self.own_shift.take(some, axis=0)
+        arm -= start
+        return start, arm, self.lengths.take(point)
 
     def _go_out(self, some: Ints, lack: Floats, outward: Floats) -> None:
         """Straight out by what some strands lack (k,) [m], and back to the length."""
-        start, length = self._start(some), self.lengths[self.at[some]]
-        arm = self.here[some] - start
+        point = self.at.take(some)
+        start, arm, length = self._arms(some, point)
         arm += outward * _going_out(arm, outward, length, lack)[:, None]
-        self.here[some] = _at_length(start, arm, length)
+        here = _at_length(start, arm, length)
+        here -= self.near.points.take(point, axis=0)
+        self.own_shift[some] = here
         self.sweep[some] += 1
 
-    def _leave(self, some: Ints) -> None:
-        """Some strands' points are where they are led to: on to the next ones."""
-        point = self.at[some]
-        shift = self.here[some] - self.near.points[point]
-        self.shift[some] = self.shifts[point] = shift
+    def _go_on(self, some: Ints, count: Ints) -> None:
+        """Some strands go on by so many points (k,): where they are is where they are led to."""
+        is_out = count > 0
+        is_led = is_out & (self.sweep.take(some) > 0)
+        led = some.compress(is_led)
+        point, shift = self.at.take(led), self.own_shift.take(led, axis=0)
+        self.shift[led] = self.shifts[point] = shift
         self.is_led[point] = True
-        self.at[some], self.sweep[some] = point + 1, 0
+        self.at[some] += count
+        self.sweep[some.compress(is_out)] = 0
 
 
 def _going_out(arm: Floats, outward: Floats, length: Floats, lack: Floats) -> Floats:

@@ -198,20 +198,21 @@ def guide_turns(rest: Floats, now: Floats) -> Floats:
         rest, now: (guide_count, cv_count, 3) [m].
     """
     before, after = _directions(rest), _directions(now)
+    has_none = ~(before.any(axis=0) & after.any(axis=0))
     turns = np.empty((4, *before.shape[1:]), np.float32)
     turn = np.zeros((4, before.shape[2]), np.float32)
     turn[3] = 1.0
     for segment in range(before.shape[1]):
         # further: from where the turns before have brought this segment to where it is
         here = before[:, segment] + turn_change(turn, before[:, segment])
-        turn = _product(minimal_rotation(here, after[:, segment]), turn)
+        turn = _product(minimal_rotation(here, after[:, segment], has_none[segment]), turn)
         turns[:, segment] = turn
     return turns
 
 
-def minimal_rotation(one: Floats, other: Floats) -> Floats:
+def minimal_rotation(one: Floats, other: Floats, has_none: Bools) -> Floats:
     """The quaternions (4, n) of the least rotations from unit vectors to others, (3, n) each; the
-    identity where either has no length.
+    identity where either has no direction, (n,).
     """
     # by the difference, so that there is exactly no rotation where there is none
     change = other - one
@@ -225,8 +226,8 @@ def minimal_rotation(one: Floats, other: Floats) -> Floats:
         axis[np.abs(back).argmin(axis=0), np.arange(back.shape[1])] = 1.0
         turn[:3, is_reversed] = cross_rows(back, axis)
         turn[3, is_reversed] = 0.0
-    has_none = ~(one.any(axis=0) & other.any(axis=0))
-    turn[:, has_none] = np.array([[0.0], [0.0], [0.0], [1.0]], np.float32)
+    if has_none.any():
+        turn[:, has_none] = np.array([[0.0], [0.0], [0.0], [1.0]], np.float32)
     turn /= np.sqrt(_dot(turn, turn))
     return turn
 

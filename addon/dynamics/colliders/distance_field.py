@@ -130,16 +130,20 @@ class DistanceField:
     def near(self, points: Floats, reach: Floats | float) -> Ints:
         """Points in a half of a cell where a distance within `reach` is looked up; its gradient,
         which `world_distance` divides by, is no longer than sqrt(3)."""
-        place, least = self._in_cells(points), self._least
-        limit = np.broadcast_to(np.float32(1.7321) * reach, place.shape[1:])
-        held = np.maximum(place, np.float32(0.0))
-        np.minimum(held, self._below_top, out=held)
-        x, y, z = (held * np.float32(2.0)).astype(np.int32)
-        index = (x * least.shape[1] + y) * least.shape[2] + z
-        kept = (least.ravel().take(index) < limit).nonzero()[0]
-        outside = np.abs(place.take(kept, axis=1) - held.take(kept, axis=1)).max(
-            axis=0
-        )  # along one axis
+        limit = np.broadcast_to(np.float32(1.7321) * reach, points.shape[1:])
+        halves, least = np.float32(2.0 / self.cell), self._least
+        held = points * halves
+        held -= self.low[:, None] * halves
+        np.maximum(held, np.float32(0.0), out=held)
+        np.minimum(held, self._below_top * np.float32(2.0), out=held)
+        x, y, z = held.astype(np.int32)
+        x *= least.shape[1]
+        x += y
+        x *= least.shape[2]
+        x += z
+        kept = (least.ravel().take(x) < limit).nonzero()[0]
+        _, beyond = self._split(self._in_cells(points.take(kept, axis=1)))
+        outside = np.abs(beyond).max(axis=0)  # along one axis
         result: Ints = kept[outside * np.float32(self.cell) <= np.maximum(limit.take(kept), 0.0)]
         return result
 

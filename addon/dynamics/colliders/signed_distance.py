@@ -79,12 +79,13 @@ def nearer_than(
 def distance_of_few(points: Floats, poses: Sequence[Pose]) -> tuple[Floats, Floats]:
     """`distance_to` at any distance; sooner than that where points are few, or near anyway."""
     rows = np.ascontiguousarray(points.T, np.float32)
+    if len(poses) == 1:
+        found, normal = world_distance(poses[0], transform_points(poses[0].inverse, rows), FLATTEST)
+        return found, normal.T
     distance = np.full(rows.shape[1], np.inf, np.float32)
     outward = np.zeros_like(rows)
     for pose in poses:
         found, normal = world_distance(pose, transform_points(pose.inverse, rows), FLATTEST)
-        if len(poses) == 1:
-            return found, normal.T
         is_nearer = found < distance
         np.copyto(distance, found, where=is_nearer)
         np.copyto(outward, normal, where=is_nearer)
