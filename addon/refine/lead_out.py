@@ -503,7 +503,7 @@ class _Walk:
         self.sweep[some] += 1
 
     def _go_on(self, some: Ints, count: Ints) -> None:
-        """Some strands go on by a number of points (k,): where they are is where they are led to."""
+        """Some strands go on by some points each (k,): where they are is where they are led to."""
         is_out = count > 0
         is_led = is_out & (self.sweep.take(some) > 0)
         led = some.compress(is_led)
