@@ -55,14 +55,22 @@ class CyclesRoom:
         return thing
 
     def strands(
-        self, points: np.ndarray, radius: float | np.ndarray, casts_shadow: bool = True
+        self,
+        points: np.ndarray,
+        radius: float | np.ndarray,
+        casts_shadow: bool = True,
+        counts: np.ndarray | None = None,
     ) -> None:
-        """In place of those before: (strand_count, cv_count, 3), root first; radii or one."""
+        """In place of those before: (strand_count, cv_count, 3), root first; radii or one. Strands
+        that have each their own count of points come as (point_count, 3).
+        """
         curves = bpy.data.hair_curves.new("Strands")
-        curves.add_curves([points.shape[1]] * points.shape[0])
+        curves.add_curves(
+            [points.shape[1]] * points.shape[0] if counts is None else counts.tolist()
+        )
         curves.attributes["position"].data.foreach_set("vector", points.astype(np.float32).ravel())
         width = curves.attributes.get("radius") or curves.attributes.new("radius", "FLOAT", "POINT")
-        radii = np.broadcast_to(np.float32(radius), points.shape[:2])
+        radii = np.broadcast_to(np.float32(radius), points.shape[:-1])
         width.data.foreach_set("value", radii.ravel())
         curves.materials.append(self._material)
         if self._strands is not None:

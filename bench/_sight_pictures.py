@@ -36,7 +36,8 @@ from hairloom.addon.blender.sessions.prepared_groom import prepared
 from hairloom.addon.exchange.textures.srgb import srgb_encoded
 from hairloom.addon.groom.children_settings import ChildrenSettings
 from hairloom.addon.groom.face_hair import grow_with_face
-from hairloom.addon.groom.settings import GrowSettings, GuideSettings
+from hairloom.addon.groom.grow import grow
+from hairloom.addon.groom.settings import GrowSettings
 from hairloom.addon.pipeline import Rig
 from hairloom.addon.render.camera import Camera
 from hairloom.addon.render.snapshot import SKIN
@@ -46,7 +47,7 @@ from hairloom.addon.shading.lights import Light
 from hairloom.addon.shading.marschner.principled import PrincipledHair, settings_from
 from hairloom.addon.shading.settings import ShadingSettings, StrandSettings
 from hairloom.addon.shading.stage_settings import StageSettings
-from hairloom.addon.strands.resample import resample
+from hairloom.addon.strands.arc_length import along
 
 SIZE, SAMPLES = 320, 3
 #: Cycles' pictures of one colour, each with a seed of its own and denoised; paths a pixel; bounces
@@ -90,7 +91,9 @@ def count_figures() -> dict[str, float]:
 
 def _count_figures(children: str) -> dict[str, float]:
     head = built_in_head()
-    grown = grow_with_face(head.surface, GrowSettings(strand_count=COUNTS[-1]), head.weights)
+    # without brows and lashes: an even part of those leaves bare skin, as no groom has
+    settings = GrowSettings(strand_count=COUNTS[-1])
+    grown = grow(head.surface, settings, head.weights["scalp"])
     whole = rig_of((grown, head.surface), "built-in", "none")
     order = np.argsort(pipeline.strand_ranks(whole), kind="stable")
     studio = _studio(whole)
@@ -131,9 +134,11 @@ def cycles_figures() -> dict[str, float]:
     grown = grow_with_face(head.surface, GrowSettings(), head.weights)
     rig = rig_of((grown, head.surface), "built-in")
     room, camera = CyclesRoom(), _studio(rig)._camera(1.0)
-    strands = resample(rig.strands, GuideSettings().cv_count)
-    drawn = drawn_radius(strands.radius.reshape(strands.strand_count, -1), StrandSettings())
-    room.strands(strands.grid, drawn)
+    strands = rig.strands
+    drawn = drawn_radius(
+        strands.radius, StrandSettings(), along(strands.points, strands.offsets)
+    )
+    room.strands(strands.points, drawn, counts=strands.point_counts)
     room.body(head.surface.positions, head.surface.triangles, SKIN, casts_shadow=True)
     room.look(camera)
     room.sun(SUN, STRENGTH)

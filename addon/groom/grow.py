@@ -49,6 +49,9 @@ _MAX_PILE, _MAX_CLEARANCE = 0.12, 0.06
 _RISEN = 1.6
 #: Hair shorter than this turns within its own length, but is stiffer, as a shorter beam is [m].
 _STIFF = 0.05
+#: How often hair is drawn out of hollows, how far towards the middle of its neighbours each time,
+#: and how often the directions in which it goes are averaged over neighbours.
+_PULLS, _PULL, _NORMALS_BLURRED = 40, 0.9, 6
 #: The sharpest turn from one segment to the next that a clump or a wave may make [rad].
 _SHARPEST_TURN = np.radians(60.0)
 
@@ -102,7 +105,7 @@ def _grow_combed(
     comb = unit(comb + uncombed[:, None] * (grown - comb))
     lift = settings.lift * (1.0 + uncombed * random.normal(0.0, _LIFT_VARIES, len(root)))
     grid = _fallen(root, normal, comb, np.clip(lift, 0.0, 1.0), plan, settings)
-    grid = _laid(style_clumps(grid, clump, settings, random), plan)
+    grid = _laid(_taut(style_clumps(grid, clump, settings, random), plan), plan)
     return bound_strands(grid, triangle, barycentric, surface)
 
 
@@ -228,6 +231,23 @@ def _fallen(
     return grid
 
 
+def _taut(grid: Floats, plan: _Plan) -> Floats:
+    """The strands stretched over hollows of the skin that they would follow: around an ear hair
+    bridges them. Points move away from the skin alone; lengths are left to `_laid`.
+    """
+    grid = grid.copy()
+    normal = plan.skin.nearest_normal(grid[:, 1:].reshape(-1, 3)).reshape(grid[:, 1:].shape)
+    # of a stretch of hair: the rim of an ear by itself faces along the hair that crosses it
+    for _ in range(_NORMALS_BLURRED):
+        normal[:, 1:-1] = (normal[:, :-2] + normal[:, 1:-1] + normal[:, 2:]) / 3.0
+    away = unit(normal[:, 1:-1])
+    for _ in range(_PULLS):
+        hollow = 0.5 * (grid[:, 1:-2] + grid[:, 3:]) - grid[:, 2:-1]
+        depth = np.maximum(np.einsum("scj,scj->sc", hollow, away), 0.0)
+        grid[:, 2:-1] += _PULL * depth[..., None] * away
+    return grid
+
+
 def _laid(styled: Floats, plan: _Plan) -> Floats:
     """The styled strands with their own segment lengths again, unfolded, and outside of the skin.
 
@@ -235,7 +255,7 @@ def _laid(styled: Floats, plan: _Plan) -> Floats:
     """
     grid = styled.copy()
     for cv in range(1, grid.shape[1]):
-        direction = unit(styled[:, cv] - grid[:, cv - 1])
+        direction = unit(styled[:, cv] - styled[:, cv - 1])
         if cv > 1:
             direction = _turn_limited(unit(grid[:, cv - 1] - grid[:, cv - 2]), direction)
         grid[:, cv] = plan.step(cv, grid[:, cv - 1], direction)

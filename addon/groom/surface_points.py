@@ -30,6 +30,12 @@ class GrowthSurface:
         """Smooth unit normals at points of the surface, (n, 3)."""
         return unit(np.einsum("nk,nkj->nj", barycentric, self._normals[self._triangles[triangle]]))
 
+    def nearest_normal(self, points: Floats) -> Floats:
+        """Smooth unit normals of the skin nearest to points (n, 3), (n, 3); 0 beyond its reach."""
+        closest = self._search.closest(points, self._reach)
+        is_near = closest.distance < self._reach
+        return is_near[:, None] * self.normal(closest.triangle, closest.barycentric)
+
     def outside(self, points: Floats, clearance: Floats) -> Floats:
         """The points (n, 3), those nearer than their clearance (n,) lifted along the normal."""
         closest = self._search.closest(points, self._reach)
