@@ -52,6 +52,8 @@ _STIFF = 0.05
 #: How often hair is drawn out of hollows, how far towards the middle of its neighbours each time,
 #: and how often the directions in which it goes are averaged over neighbours.
 _PULLS, _PULL, _NORMALS_BLURRED = 40, 0.9, 6
+#: The side of the cells in which the skin is looked up, in units of half the cranium's depth.
+_CELL = 0.04
 #: The sharpest turn from one segment to the next that a clump or a wave may make [rad].
 _SHARPEST_TURN = np.radians(60.0)
 
@@ -96,7 +98,7 @@ def _grow_combed(
     cranium = find_cranium(surface.positions)
     clump = assign_clumps(root, settings, random, np.where(root[:, 0] < cranium.center[0], -1, 1))
     factor = None if length is None else at_roots(length, surface, triangle, barycentric)
-    plan = _plan(surface, clump, factor, settings, random)
+    plan = _plan(surface, cranium, clump, factor, settings, random)
 
     normal = plan.skin.normal(triangle, barycentric)
     uncombed = settings.whorl * _uncombed(plan.length, cranium)
@@ -132,6 +134,7 @@ class _Plan:
 
 def _plan(
     surface: Surface,
+    cranium: Cranium,
     clump: Ints,
     factor: Floats | None,
     settings: GrowSettings,
@@ -141,9 +144,8 @@ def _plan(
     if factor is not None:
         segment *= factor[:, None]
     height = _heights(clump, segment.sum(axis=1), settings, random)
-    return _Plan(
-        segment, height, GrowthSurface(surface, reach=float((segment + height).max(initial=0.0)))
-    )
+    reach = float((segment + height).max(initial=0.0))
+    return _Plan(segment, height, GrowthSurface(surface, reach, _CELL * cranium.half_depth))
 
 
 def _segments(clump: Ints, settings: GrowSettings, random: np.random.Generator) -> Floats:

@@ -102,7 +102,18 @@ class ClosestPointSearch:
                 that is farther than this as well. Much faster where few points are near.
         """
         local = np.asarray(points, np.float64).reshape(-1, 3) - self._center
-        triangle = self._nearest(local, reach)
+        return self._measured(local, self._nearest(local, reach))
+
+    def nearest(self, points: Floats, reach: float) -> Ints:
+        """The triangle alone, (point_count,), searched for each point by itself: it depends on no
+        other points, not even where two triangles are as near."""
+        return self._search_all(np.asarray(points, np.float64) - self._center, reach)
+
+    def closest_on(self, points: Floats, triangle: Ints) -> ClosestPoints:
+        """The closest point of the triangle that is named for each point (point_count, 3)."""
+        return self._measured(np.asarray(points, np.float64) - self._center, triangle)
+
+    def _measured(self, local: Floats, triangle: Ints) -> ClosestPoints:
         barycentric = self._forms.closest(local, triangle)
         closest = np.einsum("ni,nij->nj", barycentric, self._corners[triangle])
         distance = np.linalg.norm(local - closest, axis=1)
