@@ -14,6 +14,7 @@ from .blender.command_line.command_line import run
 from .blender.engine import engine, hair_scene
 from .blender.preview import handlers, scene_events
 from .blender.properties import groups, previews
+from .blender.strands import growing
 from .ui import (
     engine_panels,
     long_work,
@@ -23,10 +24,10 @@ from .ui import (
     operators_cards,
     operators_colliders,
     operators_export_check,
-    operators_files,
     operators_fins,
     operators_fix,
     operators_flow,
+    operators_grow,
     operators_hairstyles,
     operators_make_real,
     operators_measure,
@@ -62,7 +63,7 @@ CLASSES: tuple[type[Any], ...] = (
     *operators_flow.CLASSES,
     *operators_measure.CLASSES,
     *operators_settle.CLASSES,
-    *operators_files.CLASSES,
+    *operators_grow.CLASSES,
     *operators_strand_import.CLASSES,
     *operators_strand_export.CLASSES,
     *operators_export_check.CLASSES,
@@ -130,6 +131,7 @@ def _steps() -> tuple[Step, ...]:
         (translations.register, translations.unregister),
         (operators_adopted.register, operators_adopted.unregister),
         (handlers.register, handlers.unregister),
+        (growing.register, growing.unregister),
         (hair_scene.register, hair_scene.unregister),
         (_register_command, _unregister_command),
     )

@@ -6,9 +6,12 @@ the same scene after *Make Real*: Blender's own curves, drawn again. FLIP is And
 
 `comb_ms` is a stroke on long straight hair of 20,000 children until all strands have followed,
 `comb_all_ms` until the rest has come, `comb_undo_ms` the stroke taken back; see `_combing`.
+`grow_edit_ms` is a setting of growth given to 4,095 strands until these and their children follow;
+see `_growing`.
 
 make bench NAME=seat                some five minutes
 tools/bench.py seat comb            combing alone
+tools/bench.py seat grow            growing alone
 """
 
 from __future__ import annotations
@@ -22,6 +25,7 @@ import bpy
 import flip_evaluator
 import numpy as np
 from _combing import combed, styled
+from _growing import edited
 from _report import start, tell
 
 import hairloom
@@ -29,7 +33,13 @@ from hairloom.addon.blender.setup.sample_scene import add_sample_scene
 from hairloom.addon.blender.strands.make_real import make_real
 
 REFERENCE = "the same scene before Make Real"
-MOST = {"make_real_flip": 0.05, "comb_ms": 100.0, "comb_undo_ms": 100.0, "comb_all_ms": 1000.0}
+MOST = {
+    "make_real_flip": 0.05,
+    "comb_ms": 100.0,
+    "comb_undo_ms": 100.0,
+    "comb_all_ms": 1000.0,
+    "grow_edit_ms": 500.0,
+}
 SIZE = 480
 #: what else is compared, without a limit: a look with all that a colour for each strand has to hold
 TINTED = {"tip_tint": 0.5, "grey_fraction": 0.1}
@@ -39,8 +49,12 @@ _CHANGED = 0.01
 def main(parts: list[str]) -> int:
     start()
     hairloom.register()
-    found = combed(styled("long_straight"))
-    if parts != ["comb"]:
+    found: dict[str, float] = {}
+    if "comb" in parts or not parts:
+        found |= combed(styled("long_straight"))
+    if "grow" in parts or not parts:
+        found |= edited()
+    if not parts:
         found |= _figures({})
         found |= {f"{name}_tinted": value for name, value in _figures(TINTED).items()}
     missed = [name for name, most in MOST.items() if found.get(name, 0.0) > most]

@@ -60,6 +60,17 @@ def sheet(folder: Path, name: str, pictures: list[np.ndarray]) -> None:
         write_small(Path(drawn) / "sheet.png", folder / name)
 
 
+def grow(folder: Path) -> None:
+    """One groom, edited."""
+    hair = grown(length=0.24)
+    own = hair.data.hairloom.grow
+    pictures = [picture(hair)]
+    own.length, own.volume = 0.1, 0.02
+    pictures.append(picture(hair))
+    own.length, own.comb_back, own.wave, own.clump = 0.3, 0.2, 0.014, 0.6
+    sheet(folder, "grow.jpg", [*pictures, picture(hair)])
+
+
 def settle(folder: Path) -> None:
     hair = grown(method="normals", length=0.24)
     pictures = [picture(hair)]
@@ -119,6 +130,7 @@ def flow(folder: Path) -> None:
 def main(folder: Path) -> None:
     gpu.init()
     load_package().register()
+    grow(folder)
     settle(folder)
     parting(folder)
     flow(folder)

@@ -92,7 +92,7 @@ class ChildrenSettings(Settings):
     )
     clump_size: int = integer(
         12,
-        label="Strands per Clump",
+        label="Clump Size",
         description="Average number of children in a clump; 1 turns clumps off",
         soft=(1, 100),
         hard=(1, 100_000),

@@ -17,6 +17,7 @@ class GrowSettings(Settings):
 
     section = "grow"
     title = "Grow"
+    owner = "groom"
 
     method: str = choice(
         "combed",
@@ -144,7 +145,7 @@ class GrowSettings(Settings):
     )
     clump_size: int = integer(
         30,
-        label="Strands per Clump",
+        label="Clump Size",
         description="Average number of strands in a clump",
         soft=(1, 100),
         hard=(1, 100_000),

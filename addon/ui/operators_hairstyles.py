@@ -56,7 +56,6 @@ class HAIRLOOM_OT_add_hairstyle(bpy.types.Operator):
         description="Vertex group or float attribute on points of the head that says where this "
         "hair grows; empty: the one named as the hairstyle says, such as scalp",
         search=names_of_weights,
-        search_options={"SUGGESTION"},
     )
     plays: BoolProperty(
         name="Play", description="Simulate the hair as soon as it is there", default=True

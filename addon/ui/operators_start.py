@@ -17,7 +17,7 @@ from ..blender.scene.particle_hair import convert_particle_hair, hair_systems
 from ..blender.setup.sample_scene import add_sample_scene
 from ..blender.setup.starting import new_groom, take_over
 from ..errors import HairloomError
-from .grow_options import GROW_PROPERTIES, draw_grow
+from .grow_options import GROW_PROPERTIES, draw_where_settings_are
 from .operators_preview import start_preview
 from .preferences import NEW_GROOM, chosen_presets, preferences
 from .reports import reporting, waiting
@@ -71,7 +71,9 @@ class HAIRLOOM_OT_add_groom(bpy.types.Operator):
 
     def draw(self, _context: bpy.types.Context) -> None:
         self.layout.use_property_split = True
-        draw_grow(self.layout, self, self.__annotations__)
+        for name in (*NEW_GROOM, "fits"):
+            self.layout.prop(self, name)
+        draw_where_settings_are(self.layout)
 
 
 class HAIRLOOM_OT_sample_scene(bpy.types.Operator):

@@ -16,6 +16,7 @@ from .messages import draw_lines
 from .operators_bake import draw_bake
 from .operators_colliders import draw_colliders
 from .operators_flow import draw_flow
+from .operators_grow import draw_grow
 from .operators_measure import draw_measure
 from .operators_partings import draw_partings
 from .operators_settle import draw_settle
@@ -142,6 +143,7 @@ SECTIONS = _with_declared(
     (
         ("look", "Look", draw_look),
         ("shadows", "Shadows", draw_volume),
+        ("grow", "Grow", draw_grow),
         ("strands", "Strands", draw_strands),
         ("children", "Children", draw_children),
         ("dynamics", "Dynamics", draw_dynamics),
@@ -151,7 +153,9 @@ SECTIONS = _with_declared(
     )
 )
 #: those that the sidebar has too: what is done to the hair, not what it is
-SESSION_SECTIONS = frozenset({"look", "dynamics", "ties", "bake", "show", "cards", "export"})
+SESSION_SECTIONS = frozenset(
+    {"look", "grow", "dynamics", "ties", "bake", "show", "cards", "export"}
+)
 
 
 def _switch(section: str) -> tuple[Callable[[bpy.types.Object], Any], str]:

@@ -51,10 +51,10 @@ def test_dynamics_go_onto_the_object(hair: bpy.types.Object) -> None:
 
 def test_settings_that_a_groom_does_not_keep_are_refused(hair: bpy.types.Object) -> None:
     """All that it does keep are named."""
-    with pytest.raises(HairloomError, match="no 'grow' settings") as told:
-        presets.apply(ALL_SETTINGS["grow"](), hair)
+    with pytest.raises(HairloomError, match="no 'settle' settings") as told:
+        presets.apply(ALL_SETTINGS["settle"](), hair)
     assert "shading, " in str(told.value) and "volume" in str(told.value)
-    assert "dynamics" in str(told.value) and " grow," not in str(told.value)
+    assert "dynamics" in str(told.value) and " settle," not in str(told.value)
 
 
 def test_an_unknown_name_is_reported_with_those_that_are_known(hair: bpy.types.Object) -> None:

@@ -76,6 +76,24 @@ def test_hair_grows_where_a_group_says(scene: Path) -> None:
     assert roots[:, 2].min() > 0.02
 
 
+def test_hair_that_has_grown_follows_its_settings(scene: Path) -> None:
+    run(scene, "grow", "--head", "Head", "--name", "Tuft", *FEW)
+    assert bpy.data.objects["Tuft"].data.hairloom.grow.length == pytest.approx(0.05)
+    grown = scene.with_name("out.blend").rename(scene.with_name("grown.blend"))
+    run(grown, "run", "--object", "Tuft", "--set", "grow.strand_count=30")
+    assert len(bpy.data.objects["Tuft"].data.curves) == 30
+
+
+def test_hair_from_elsewhere_grows_only_by_its_button(
+    scene: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    job = ["run", "--scene", str(scene), "--object", "Hair", *FEW]
+    assert command_line.run([*job, "--output", str(scene.with_name("out.blend"))]) == 1
+    assert "growing again would lose" in capsys.readouterr().err
+    run(scene, "run", "grow_again", "--object", "Hair", *FEW)
+    assert len(bpy.data.objects["Hair"].data.curves) == 40
+
+
 def test_settings_go_onto_the_hair_that_is_named(scene: Path) -> None:
     run(scene, "run", "--object", "Hair", "--preset", "dynamics/soft", "--set", "cards.levels=2")
     hair = bpy.data.objects["Hair"]

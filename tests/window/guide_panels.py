@@ -12,6 +12,7 @@ PICTURES: dict[str, tuple[tuple[str, ...], ...]] = {
         + ("data_look_look_fibre", "data_look_look_variation"),
     ),
     "shadows": (("data_shadows",), ("data_shadows_skin", "data_shafts")),
+    "grow": (("data_grow",),),
     "strands": (
         ("data_strands", "data_detail", "data_guides"),
         ("data_children", "data_children_partings", "data_children_flow"),
@@ -41,7 +42,14 @@ PICTURES: dict[str, tuple[tuple[str, ...], ...]] = {
 OTHERS = ("window", "start", "presets", "check", "sort", "export_cards", "export_strands")
 OTHERS += ("preferences",)
 #: sections that the sidebar has too: they are pictured in Properties > Data
-TWINS = ("sidebar_look", "sidebar_dynamics", "sidebar_show", "sidebar_cards", "sidebar_export")
+TWINS = (
+    "sidebar_look",
+    "sidebar_grow",
+    "sidebar_dynamics",
+    "sidebar_show",
+    "sidebar_cards",
+    "sidebar_export",
+)
 
 
 def pictured(name: str) -> bool:

@@ -29,7 +29,9 @@ def grow(job: Job) -> None:
             length_group=options.length_group,
         )
     hair.name = options.name or hair.name
-    put_settings(hair, options.preset, options.set)
+    # by what is set of growth it has grown, and been fitted, already
+    others = [each for each in options.set if not each.startswith("grow.")]
+    put_settings(hair, options.preset, others)
     if options.children_density:
         hair.hairloom.children_density = options.children_density
     count = len(hair.data.curves)

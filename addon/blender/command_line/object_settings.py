@@ -14,6 +14,7 @@ from ..base.objects import objects_in
 from ..properties.presets import named_preset
 from ..properties.properties import settings_of
 from ..scene.fin_modifier import fin_modifier
+from ..strands.growing import is_behind, losses
 from .overrides import overrides
 
 
@@ -80,11 +81,17 @@ def own_settings(obj: bpy.types.Object) -> dict[str, Settings]:
     }
 
 
-def put_settings(obj: bpy.types.Object, presets: list[str], assignments: list[str]) -> None:
+def put_settings(
+    obj: bpy.types.Object, presets: list[str], assignments: list[str], *, grows_again: bool = False
+) -> None:
     """Change the object's own settings by --preset and --set, as the artist would.
 
+    Args:
+        grows_again: hair that was combed is to grow again afterwards, by what is set here.
+
     Raises:
-        HairloomError: no such preset or parameter, or a value that it cannot have.
+        HairloomError: no such preset or parameter, or a value that it cannot have; or hair that was
+            combed does not follow settings of growth.
     """
     chosen: dict[str, Settings] = {}
     for name in presets:
@@ -97,6 +104,23 @@ def put_settings(obj: bpy.types.Object, presets: list[str], assignments: list[st
         own = settings_of(group, ALL_SETTINGS[section]) if settings is None else settings
         changed = type(own).from_dict(own.as_dict() | values, "--set")
         _write(group, changed)
+        if section == "grow" and not grows_again:
+            _check_growth(obj)
+
+
+def _check_growth(obj: bpy.types.Object) -> None:
+    """Raises:
+    HairloomError: the hair is not as its settings of growth say now.
+    """
+    problem = obj.data.hairloom.grow.problem
+    if not problem and is_behind(obj.data):
+        problem = f"growing again would lose: {', '.join(losses(obj.data))}"
+    if problem:
+        raise HairloomError(
+            f"the hair does not follow these settings of growth ({problem})",
+            place=obj.name,
+            remedy="Leave out --set grow, or press `run grow_again` with it",
+        )
 
 
 def check_sections(objects: list[bpy.types.Object], assignments: list[str]) -> None:

@@ -29,6 +29,7 @@ _OF_SCENES = (
     "show_in_renders",
     "mute_hair_dynamics",
     "apply_preset",
+    "grow_again",
     "look_from_material",
     "look_to_material",
     "make_real",
@@ -233,7 +234,8 @@ def _change_settings(job: Job, assignments: list[str]) -> None:
         check_sections(chosen, assignments)
     for obj in chosen:
         check_editable(obj)
-        put_settings(obj, job.options.preset, assignments)
+        grows_again = job.options.operator == "grow_again"
+        put_settings(obj, job.options.preset, assignments, grows_again=grows_again)
     job.report.facts["objects"] = [obj.name for obj in chosen]
 
 

@@ -11,6 +11,7 @@ type Listener = Callable[[bpy.types.ID], None]
 #: kind of change -> its subscribers
 _listeners: dict[str, list[Listener]] = {
     "settings": [],
+    "grow": [],
     "display": [],
     "bake": [],
     "hair_scene": [],
@@ -29,6 +30,11 @@ def unsubscribe(kind: str, listener: Listener) -> None:
 def settings(owner: bpy.types.ID) -> None:
     """A setting of a groom or of its object was changed."""
     _call("settings", owner)
+
+
+def grow(owner: bpy.types.ID) -> None:
+    """A setting by which hair grows was changed."""
+    _call("grow", owner)
 
 
 def display(owner: bpy.types.ID) -> None:

@@ -74,12 +74,23 @@ def _is_mesh(_group: Any, obj: bpy.types.Object) -> bool:
     return obj.type == "MESH"
 
 
-def _densities(group: Any, _context: bpy.types.Context, typed: str) -> list[str]:
-    """What children may grow by on the head of this hair."""
-    hair = group.id_data
-    head = head_of(hair) if hair.type == "CURVES" else None
-    names = [] if head is None else weight_names(head)
+def _weights(group: Any, _context: bpy.types.Context, typed: str) -> list[str]:
+    """The weights on the surface of this hair, by which it and its children may grow."""
+    owner, head = group.id_data, None
+    if isinstance(owner, bpy.types.Curves):
+        head = owner.surface
+    elif owner.type == "CURVES":
+        head = head_of(owner)
+    names = [] if head is None or head.type != "MESH" else weight_names(head)
     return [name for name in names if typed.lower() in name.lower()]
+
+
+def _grow_changed(group: Any, _context: bpy.types.Context) -> None:
+    changed.grow(group.id_data)
+
+
+def _hidden_text(name: str, description: str) -> Any:
+    return StringProperty(name=name, description=description, options={"HIDDEN"})
 
 
 #: section -> its class of properties, of all that a file keeps
@@ -87,6 +98,28 @@ SECTION_GROUPS = {
     section: property_group(kind, _redraw if kind.owner == "scene" else changed.settings)
     for section, kind in ALL_SETTINGS.items()
     if kind.owner != "job"
+}
+SECTION_GROUPS["grow"] = property_group(ALL_SETTINGS["grow"], changed.grow, is_animated=False)
+SECTION_GROUPS["grow"].__annotations__ |= {
+    "density_group": StringProperty(
+        name="Density",
+        description="Vertex group or float attribute on points of the surface that sets how "
+        "densely hair grows. If empty, combed hair grows on the scalp, other hair everywhere",
+        search=_weights,
+        options=set(),
+        update=_grow_changed,
+    ),
+    "length_group": StringProperty(
+        name="Length Factor",
+        description="Vertex group or float attribute on points of the surface that the length is "
+        "multiplied by. If empty, all hair has the same length",
+        search=_weights,
+        options=set(),
+        update=_grow_changed,
+    ),
+    "shape": _hidden_text("Shape", "Digest of the curves as they grew; empty: they have not grown"),
+    "made_by": _hidden_text("Made By", "Digest of the settings by which the curves grew last"),
+    "problem": _hidden_text("Problem", "Why the curves could not follow the settings"),
 }
 SECTION_GROUPS["fin"].__annotations__ |= {
     "enabled": BoolProperty(
@@ -188,8 +221,7 @@ class HAIRLOOM_PG_character(bpy.types.PropertyGroup):
             name="Density",
             description="Vertex group or float attribute on points of the surface that says how "
             "densely children grow; empty: wherever guides are near",
-            search=_densities,
-            search_options={"SUGGESTION"},
+            search=_weights,
             update=lambda self, _context: changed.settings(self.id_data),
             override=OVERRIDABLE,
         ),

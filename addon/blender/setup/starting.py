@@ -19,7 +19,7 @@ from ..scene.hair_material import put_look_material
 from ..scene.principled import has_principled_hair, look_from_material
 from ..scene.source import mute_own_dynamics
 from ..scene.surfaces import read_positions
-from ..strands.groom_files import grow_on
+from ..strands.growing import grow_on
 
 #: Smallest extent [m] of a head of human size; lengths are declared for it.
 _HEAD_SIZE = 0.19
@@ -88,7 +88,7 @@ def new_groom(
         fits: whether lengths and motion follow the mesh's size if it is not a head's.
 
     Raises:
-        HairloomError: see `groom_files.grow_on`; or there is no such preset.
+        HairloomError: see `growing.grow_on`; or there is no such preset.
     """
     settings = settings_of(values, GrowSettings)
     factor = fitting_factor(head, depsgraph) if fits else 1.0

@@ -1,0 +1,203 @@
+"""Hair that grows on a mesh, and again as its settings are edited, as long as nobody has combed it.
+
+The settings are the groom's own. With them is kept what they made: the curves follow an edit only
+if they are still as they grew.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import replace
+from typing import Any
+
+import bpy
+import numpy as np
+
+from ...arrays import Floats
+from ...errors import HairloomError
+from ...groom.grow import grow, scalp_density
+from ...groom.settings import GrowSettings
+from ...groom.widths import with_widths
+from ...strands import StrandSet, Surface
+from ..base.attributes import read_attribute
+from ..base.objects import head_of
+from ..base.vertex_weights import read_weights
+from ..properties import changed
+from ..properties.properties import settings_of
+from ..scene.curves import curve_offsets, curve_points, fill_curves, write_curves
+from ..scene.surfaces import read_surface
+
+#: what hair has as it grows; Blender's own names of what is selected or hidden begin with a dot
+_OWN_ATTRIBUTES = ("position", "radius", "surface_uv_coordinate")
+#: The mesh that hair grew on last: growing again finds there what was searched.
+_last_surface: list[Surface] = []
+
+
+def grow_on(
+    head: bpy.types.Object,
+    depsgraph: bpy.types.Depsgraph,
+    collection: bpy.types.Collection,
+    values: Any,
+    *,
+    density_group: str = "",
+    length_group: str = "",
+) -> bpy.types.Object:
+    """Hair curves grown on a mesh, with the settings that they grow by.
+
+    Args:
+        values: an operator or group with the properties of GrowSettings.
+        density_group, length_group: vertex groups or float attributes on points, by name. Without
+            a density combed hair grows on the scalp of an upright head, hair along the normals
+            everywhere; without a length all is as long as the settings say.
+
+    Raises:
+        HairloomError: it has no faces to grow on, there is no group of this name, or all is 0.
+    """
+    settings = settings_of(values, GrowSettings)
+    strands = _grown(head, depsgraph, settings, density_group, length_group)
+    hair = write_curves(f"{head.name} Hair", strands, head, collection)
+    own = hair.data.hairloom.grow
+    for name, value in settings.as_dict().items():
+        setattr(own, name, value)
+    own.density_group, own.length_group = density_group, length_group
+    _seal(hair.data)
+    return hair
+
+
+def grow_again(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> None:
+    """Give hair the curves that its settings make now, whatever was done to those that it has.
+
+    Raises:
+        HairloomError: it has no mesh to grow on, or as `grow_on`. It is as it was then.
+    """
+    head, curves = head_of(hair), hair.data
+    if head is None:
+        raise HairloomError(
+            "it has no surface to grow on",
+            place=hair.name,
+            remedy="Set Surface in its Data properties",
+        )
+    own = curves.hairloom.grow
+    strands = _grown(
+        head, depsgraph, settings_of(own, GrowSettings), own.density_group, own.length_group
+    )
+    strands = _with_widths(strands, curves)
+    back = np.linalg.inv(np.array(hair.evaluated_get(depsgraph).matrix_world, np.float64))
+    curves.remove_curves()
+    for name in _other_attributes(curves):
+        curves.attributes.remove(curves.attributes[name])
+    fill_curves(curves, strands.transformed(back))
+    curves.update_tag()
+    own.problem = ""
+    _seal(curves)
+
+
+def follow_settings(curves: bpy.types.ID) -> None:
+    """A setting by which hair grows was edited: hair that is still as it grew grows again."""
+    assert isinstance(curves, bpy.types.Curves)
+    own = curves.hairloom.grow
+    if not curves.is_editable or own.made_by == _settings_digest(own) or losses(curves):
+        return
+    users = (obj for obj in bpy.data.objects if obj.data == curves)
+    hair = next((obj for obj in users if head_of(obj) is not None), None)
+    try:
+        if hair is not None:
+            grow_again(hair, bpy.context.evaluated_depsgraph_get())
+    except HairloomError as error:  # the panel shows it; the settings may be on their way
+        own.problem = str(error)
+
+
+def losses(curves: bpy.types.Curves) -> tuple[str, ...]:
+    """What growing again would lose, in a few words each; nothing: it follows its settings."""
+    own = curves.hairloom.grow
+    if not own.shape:
+        return (f"{len(curves.curves):,} curves",) if len(curves.curves) else ()
+    is_combed = own.shape != _shape_digest(curves)
+    return (*(("combed shape",) if is_combed else ()), *_other_attributes(curves))
+
+
+def has_grown(curves: bpy.types.Curves) -> bool:
+    """Whether they come from settings, and not from a file or a brush."""
+    return bool(curves.hairloom.grow.shape)
+
+
+def is_behind(curves: bpy.types.Curves) -> bool:
+    """Whether the settings are others than those by which they have grown."""
+    own = curves.hairloom.grow
+    return bool(own.made_by != _settings_digest(own))
+
+
+def _grown(
+    head: bpy.types.Object,
+    depsgraph: bpy.types.Depsgraph,
+    settings: GrowSettings,
+    density_group: str,
+    length_group: str,
+) -> StrandSet:
+    """In world space, on the head as it is posed now."""
+    surface = _known(read_surface(head, depsgraph, need_uv=False, place=head.name))
+    density = read_weights(head, depsgraph, density_group) if density_group else None
+    length = read_weights(head, depsgraph, length_group) if length_group else None
+    if density is None and settings.method == "combed":
+        density = surface.once(scalp_density)
+    return grow(surface, settings, density, length)
+
+
+def _with_widths(strands: StrandSet, before: bpy.types.Curves) -> StrandSet:
+    """Strands as wide as the curves that they replace, or, where there are more or fewer, with
+    widths that are found for them."""
+    radius: Floats | None = read_attribute(before, "radius", "POINT")
+    if radius is not None and np.array_equal(curve_offsets(before), strands.offsets):
+        return replace(strands, radius=radius, has_widths=True)
+    return with_widths(strands, "found")[0]
+
+
+def _known(surface: Surface) -> Surface:
+    """The surface that hair grew on last if this is the same."""
+    if not any(_is_same(surface, last) for last in _last_surface):
+        _last_surface[:] = [surface]
+    return _last_surface[0]
+
+
+def _is_same(one: Surface, other: Surface) -> bool:
+    return np.array_equal(one.positions, other.positions) and np.array_equal(
+        one.triangles, other.triangles
+    )
+
+
+def _other_attributes(curves: bpy.types.Curves) -> tuple[str, ...]:
+    """Names of what curves have beside what has grown, such as painted colours."""
+    names = (attribute.name for attribute in curves.attributes)
+    return tuple(n for n in names if n not in _OWN_ATTRIBUTES and not n.startswith("."))
+
+
+def _seal(curves: bpy.types.Curves) -> None:
+    """These curves are what these settings make."""
+    own = curves.hairloom.grow
+    own.shape, own.made_by = _shape_digest(curves), _settings_digest(own)
+
+
+def _shape_digest(curves: bpy.types.Curves) -> str:
+    radius: Floats | None = read_attribute(curves, "radius", "POINT")
+    parts = (curve_offsets(curves), curve_points(curves), radius)
+    return _digest(b"".join(part.tobytes() for part in parts if part is not None))
+
+
+def _settings_digest(own: Any) -> str:
+    settings = settings_of(own, GrowSettings).as_dict()
+    return _digest(repr((settings, own.density_group, own.length_group)).encode())
+
+
+def _digest(data: bytes) -> str:
+    return hashlib.blake2b(data, digest_size=16).hexdigest()
+
+
+LISTENER = ("grow", follow_settings)
+
+
+def register() -> None:
+    changed.subscribe(*LISTENER)
+
+
+def unregister() -> None:
+    changed.unsubscribe(*LISTENER)

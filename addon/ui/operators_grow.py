@@ -1,0 +1,107 @@
+"""Grow Hair, Grow Again, and the panel of what hair grows by."""
+
+from __future__ import annotations
+
+import bpy
+
+from ..blender.strands.growing import grow_again, grow_on, has_grown, is_behind, losses
+from .drawing import draw_section
+from .grow_options import GROW_PROPERTIES, draw_where_settings_are
+from .messages import draw_message
+from .operators_start import in_object_mode
+from .reports import reporting, waiting
+from .selection import chosen_hair, ground_mesh, make_active, needs_hair
+
+#: More names than these are only counted.
+_NAMED = 2
+
+
+class HAIRLOOM_OT_grow(bpy.types.Operator):
+    """Grow hair curves on the active mesh"""
+
+    bl_idname = "hairloom.grow"
+    bl_label = "Grow Hair"
+    bl_options = {"REGISTER", "UNDO"}
+
+    __annotations__ = GROW_PROPERTIES
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if ground_mesh(context) is not None:
+            return True
+        cls.poll_message_set("Select the mesh to grow hair on")
+        return False
+
+    @reporting
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        head, depsgraph = ground_mesh(context), context.evaluated_depsgraph_get()
+        with waiting(context):
+            hair = grow_on(
+                head,
+                depsgraph,
+                context.collection,
+                self,
+                density_group=self.density_group,
+                length_group=self.length_group,
+            )
+        make_active(context, [hair])
+        return {"FINISHED"}
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        draw_where_settings_are(self.layout)
+
+
+class HAIRLOOM_OT_grow_again(bpy.types.Operator):
+    """Give the selected hair the curves that its settings make now. What was combed, cut, settled
+    or painted on its curves since it grew is lost"""
+
+    bl_idname = "hairloom.grow_again"
+    bl_label = "Grow Again"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return in_object_mode(cls, context) and needs_hair(cls, context)
+
+    @reporting
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        with waiting(context):
+            for hair in chosen_hair(context):
+                grow_again(hair, context.evaluated_depsgraph_get())
+        return {"FINISHED"}
+
+
+def draw_grow(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
+    """Whether the hair follows its settings, what it would lose by growing again, and these."""
+    curves = hair.data
+    lost = losses(curves)
+    lines = layout.column(align=True)
+    lines.label(text=_state(curves, lost), icon="UNLOCKED" if not lost else "LOCKED")
+    lines.label(text=f"Growing again loses: {_listed(lost)}", icon="BLANK1")
+    button = lines.row()
+    button.active = bool(lost)
+    button.operator("hairloom.grow_again", icon="FILE_REFRESH")
+    groom = curves.hairloom
+    if groom.grow.problem:
+        draw_message(layout, bpy.context, groom.grow.problem, "ERROR")
+    draw_section(layout, groom, "grow")
+    for name in ("density_group", "length_group"):
+        layout.prop(groom.grow, name, icon="GROUP_VERTEX")
+
+
+def _state(curves: bpy.types.Curves, lost: tuple[str, ...]) -> str:
+    if not lost:
+        return "Follows these settings"
+    if not has_grown(curves):
+        return "Has not grown from these"
+    return "Behind these settings" if is_behind(curves) else "Changed since it grew"
+
+
+def _listed(lost: tuple[str, ...]) -> str:
+    """A few names, or how many there are: a line has room for no more."""
+    if len(lost) > _NAMED:
+        return f"{lost[0]}, {len(lost) - 1} attributes"
+    return ", ".join(lost) or "nothing"
+
+
+CLASSES = (HAIRLOOM_OT_grow, HAIRLOOM_OT_grow_again)

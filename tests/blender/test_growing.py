@@ -1,0 +1,180 @@
+"""Hair keeps the settings that it grows by, and follows them as long as nobody has combed it."""
+
+import bpy
+import numpy as np
+import pytest
+
+from hairloom.addon.blender.preview import previews, scene_events
+from hairloom.addon.blender.properties.properties import settings_of
+from hairloom.addon.blender.scene.curves import curve_points, put_points, read_curves
+from hairloom.addon.blender.strands.growing import has_grown, is_behind, losses
+from hairloom.addon.groom.grow import grow, scalp_density
+from hairloom.addon.groom.settings import GrowSettings
+from hairloom.addon.strands import Surface
+
+pytestmark = pytest.mark.usefixtures("extension")
+FEW = {"strand_count": 60, "length": 0.1, "cv_count": 8}
+
+
+@pytest.fixture
+def grown(sphere):
+    bpy.ops.hairloom.grow(**FEW)
+    return bpy.context.object
+
+
+def lengths(hair):
+    bpy.context.view_layer.update()
+    return read_curves(hair, bpy.context.evaluated_depsgraph_get()).strands.lengths()
+
+
+def comb(hair):
+    put_points(hair.data, curve_points(hair.data) * np.float32(1.05))
+
+
+def test_a_groom_keeps_what_it_has_grown_by(grown):
+    own = grown.data.hairloom.grow
+    assert settings_of(own, GrowSettings) == GrowSettings(**FEW)
+    assert has_grown(grown.data) and losses(grown.data) == () and not is_behind(grown.data)
+
+
+def test_an_edit_makes_the_hair_that_its_settings_say(grown, sphere):
+    """The same as grown from the start, by the pure function alone."""
+    before = lengths(grown)
+    own = grown.data.hairloom.grow
+    own.length, own.droop = 0.05, 0.2
+    assert lengths(grown).max() == pytest.approx(0.5 * before.max(), rel=0.03)
+    mesh = sphere.data
+    mesh.calc_loop_triangles()
+    surface = Surface(
+        np.array([vertex.co for vertex in mesh.vertices]),
+        np.array([triangle.vertices for triangle in mesh.loop_triangles]),
+    )
+    settings = GrowSettings(**{**FEW, "length": 0.05, "droop": 0.2})
+    wanted = grow(surface, settings, scalp_density(surface)).points
+    assert curve_points(grown.data) == pytest.approx(wanted, abs=1e-5)
+
+
+def test_more_strands_and_more_points_are_made_too(grown):
+    own = grown.data.hairloom.grow
+    own.strand_count = 90
+    own.cv_count = 10
+    assert len(grown.data.curves) == 90 and len(grown.data.points) == 900
+    own.strand_count, own.cv_count = FEW["strand_count"], FEW["cv_count"]
+    again = curve_points(grown.data)
+    bpy.ops.hairloom.grow_again()
+    assert np.array_equal(curve_points(grown.data), again), "it depends on what was there before"
+
+
+def test_hair_of_a_head_that_was_moved_grows_on_it(grown, sphere):
+    at_first = curve_points(grown.data)
+    sphere.location = (0.5, 0.0, -0.25)
+    bpy.ops.hairloom.grow_again()
+    away = np.abs(curve_points(grown.data) - at_first)
+    assert np.quantile(away, 0.95) < 1e-4, "it grows where the head has been"
+
+
+@pytest.mark.parametrize("change", ["combed", "cut", "painted"])
+def test_hair_that_was_changed_is_not_lost_to_a_slider(grown, change):
+    if change == "combed":
+        comb(grown)
+        lost = ("combed shape",)
+    elif change == "cut":
+        grown.data.remove_curves(indices=[3, 4])
+        lost = ("combed shape",)
+    else:
+        grown.data.attributes.new("Mask", "FLOAT", "POINT")
+        lost = ("Mask",)
+    points = curve_points(grown.data)
+    grown.data.hairloom.grow.length = 0.05
+    assert np.array_equal(curve_points(grown.data), points), "what was done to it is gone"
+    assert losses(grown.data) == lost and is_behind(grown.data)
+    assert bpy.ops.hairloom.grow_again() == {"FINISHED"}
+    assert losses(grown.data) == () and len(grown.data.curves) == FEW["strand_count"]
+    assert lengths(grown).max() < 0.052
+    grown.data.hairloom.grow.length = 0.1
+    assert lengths(grown).max() > 0.09, "it does not follow again"
+
+
+def test_hair_that_has_not_grown_here_stays_until_it_is_asked_to(new_hair, sphere):
+    hair = new_hair(sphere)
+    points = curve_points(hair.data)
+    hair.data.hairloom.grow.strand_count = 40
+    assert np.array_equal(curve_points(hair.data), points)
+    assert losses(hair.data) == (f"{len(hair.data.curves):,} curves",)
+    hair.data.hairloom.grow.length = 0.1
+    bpy.ops.hairloom.grow_again()
+    assert len(hair.data.curves) == 40 and has_grown(hair.data)
+
+
+def test_hair_without_a_surface_says_that_it_cannot_grow(new_hair):
+    new_hair()
+    with pytest.raises(RuntimeError, match="no surface to grow on"):
+        bpy.ops.hairloom.grow_again()
+
+
+def test_weights_come_from_a_group_and_a_problem_is_told_and_goes(grown, sphere):
+    group = sphere.vertex_groups.new(name="Top")
+    positions = np.array([vertex.co for vertex in sphere.data.vertices])
+    group.add(np.flatnonzero(positions[:, 2] > 0.05).tolist(), 1.0, "REPLACE")
+    sphere.vertex_groups.new(name="Empty")
+    own = grown.data.hairloom.grow
+    own.density_group = "Top"
+    roots = curve_points(grown.data)[:: FEW["cv_count"]]
+    assert roots[:, 2].min() > 0.03
+    own.density_group = "Empty"
+    assert "0 on every vertex" in own.problem
+    assert np.array_equal(curve_points(grown.data)[:: FEW["cv_count"]], roots), "it is half done"
+    own.density_group = ""
+    assert own.problem == "" and curve_points(grown.data)[:, 2].min() < 0.03
+
+
+def test_undo_takes_setting_and_hair_back_together(grown):
+    bpy.ops.hairloom.preview()
+    (session,) = previews.sessions()
+    points = curve_points(grown.data)
+    bpy.ops.ed.undo_push(message="grown")
+    grown.data.hairloom.grow.length = 0.05
+    bpy.ops.ed.undo_push(message="length")
+    shorter = curve_points(grown.data)
+    bpy.ops.ed.undo()
+    hair = bpy.context.object
+    assert hair.data.hairloom.grow.length == pytest.approx(0.1)
+    assert np.array_equal(curve_points(hair.data), points)
+    assert losses(hair.data) == () and not is_behind(hair.data)
+    bpy.ops.ed.redo()
+    hair = bpy.context.object
+    assert np.array_equal(curve_points(hair.data), shorter)
+    scene_events.catch_up(bpy.context.evaluated_depsgraph_get())
+    assert previews.sessions() == (session,)
+    assert session.rig.strands.lengths()[: FEW["strand_count"]].max() < 0.052
+
+
+def test_the_preview_follows_at_once(grown):
+    bpy.ops.hairloom.preview()
+    (session,) = previews.sessions()
+    before = session.rig.strands.points
+    grown.data.hairloom.grow.droop = 0.1
+    bpy.context.view_layer.update()
+    assert session.rig.strands.points is not before
+
+
+def test_settings_and_what_was_made_of_them_are_saved(grown, tmp_path):
+    grown.data.hairloom.grow.length = 0.08
+    file = str(tmp_path / "hair.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=file)
+    bpy.ops.wm.open_mainfile(filepath=file)
+    hair = next(obj for obj in bpy.data.objects if obj.type == "CURVES")
+    assert hair.data.hairloom.grow.length == pytest.approx(0.08)
+    assert losses(hair.data) == ()
+    hair.data.hairloom.grow.length = 0.04
+    assert lengths(hair).max() < 0.042
+
+
+def test_a_copy_follows_its_own_settings(grown):
+    copy = grown.copy()
+    copy.data = grown.data.copy()
+    bpy.context.collection.objects.link(copy)
+    points = curve_points(grown.data)
+    copy.data.hairloom.grow.length = 0.05
+    assert np.array_equal(curve_points(grown.data), points)
+    assert lengths(copy).max() < 0.052

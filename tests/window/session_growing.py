@@ -1,0 +1,138 @@
+"""Growing stays editable: a slider of the panel Grow is dragged and the hair follows while the
+button is down; Ctrl-Z puts both back; hair that was combed stays until Grow Again is pressed; a
+vertex group is chosen from a list.
+"""
+
+import sys
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+sys.path.append(str(Path(__file__).parent))
+import driver
+import traces
+from artist import (
+    changed,
+    click,
+    field,
+    hair_is_made,
+    hide_floor,
+    look_from_front,
+    new_head,
+    open_our_sidebar,
+    pixels_at_rest,
+    press,
+    viewport,
+)
+from dice import press as press_in_view
+from driver import of_hairloom, until
+from open_panels import SIDEBAR, only_our_panels, show
+
+log = traces.Log()
+STRANDS, LENGTH = 600, 0.15
+#: [pixels] from one row of a panel to the next
+ROW = 20
+
+
+def steps():
+    yield from press("ESC")
+    driver.enable_extension()
+    only_our_panels()
+    yield from groom()
+    yield from drag_a_slider()
+    yield from undo()
+    yield from combed_hair_stays()
+    yield from a_group_from_a_list()
+    assert "Traceback" not in log.added(), "something has raised"
+
+
+def hair():
+    return next(obj for obj in bpy.context.scene.objects if obj.type == "CURVES")
+
+
+def points():
+    return of_hairloom("curves").curve_points(hair().data)
+
+
+def groom():
+    show([SIDEBAR + "_grow"])
+    yield from open_our_sidebar()
+    head = new_head()
+    top = head.vertex_groups.new(name="Top")
+    top.add([v.index for v in head.data.vertices if v.co.z > 0.06], 1.0, "REPLACE")
+    hide_floor()
+    look_from_front(0.9)
+    bpy.ops.hairloom.add_groom(strand_count=STRANDS, length=LENGTH, plays=False)
+    bpy.ops.ed.undo_push(message="hair")
+    yield from hair_is_made()
+    yield
+
+
+def drag_a_slider():
+    """The hair gets shorter while the button is down, in curves and preview."""
+    long = yield from pixels_at_rest("long")
+    (session,) = of_hairloom("previews").sessions()
+    before = session.rig.strands
+    window, (x, y) = bpy.context.window, (yield from field(viewport(), "UI", "grow.length"))
+    window.event_simulate("LEFTMOUSE", "PRESS", x=x, y=y)
+    yield 1
+    seen = set()
+    for along in range(4, 64, 4):
+        window.event_simulate("MOUSEMOVE", "NOTHING", x=x - along, y=y)
+        yield 1
+        seen.add(round(float(np.ptp(points()[:, 2])), 3))
+    assert len(seen) > 3, f"the curves do not follow the slider: {seen}"
+    window.event_simulate("LEFTMOUSE", "RELEASE", x=x - 64, y=y)
+    yield 1
+    own = hair().data.hairloom.grow
+    assert own.length < 0.8 * LENGTH, f"the slider was not dragged: {own.length}"
+    yield from until(lambda: session.rig.strands is not before, "the preview does not follow")
+    short = yield from pixels_at_rest("short")
+    assert changed(long, short) > 0.02, "the picture stands still"
+
+
+def undo():
+    shape = points()
+    yield from press_in_view("Z", ctrl=True)
+    yield from until(lambda: hair().data.hairloom.grow.length > 0.95 * LENGTH, "no undo")
+    assert np.abs(points() - shape).max() > 0.01, "the hair is not undone"
+    growing = of_hairloom("growing")
+    assert growing.losses(hair().data) == () and not growing.is_behind(hair().data)
+    yield
+
+
+def combed_hair_stays():
+    growing = of_hairloom("growing")
+    shape = points() * np.float32(1.02)
+    of_hairloom("curves").put_points(hair().data, shape)
+    bpy.ops.ed.undo_push(message="comb")
+    hair().data.hairloom.grow.length = 0.5 * LENGTH
+    yield
+    driver.screenshot("combed")
+    assert np.array_equal(points(), shape), "what was combed is lost"
+    assert growing.losses(hair().data) == ("combed shape",)
+    x, y = yield from field(viewport(), "UI", "grow.method")
+    yield from click(x, y + ROW)  # Grow Again stands above it
+    yield from until(lambda: growing.losses(hair().data) == (), "Grow Again does nothing")
+    yield
+    driver.screenshot("grown-again")
+
+
+def a_group_from_a_list():
+    """A click opens the list; its one entry is chosen by arrow and Return."""
+    x, y = yield from field(viewport(), "UI", "grow.density_group")
+    yield from click(x, y)
+    yield
+    driver.screenshot("list")
+    for key in ("DOWN_ARROW", "RET"):
+        yield from press(key)
+    own = hair().data.hairloom.grow
+    yield from until(lambda: own.density_group == "Top", f"'{own.density_group}' is chosen")
+    roots = points().reshape(STRANDS, -1, 3)[:, 0]
+    assert roots[:, 2].min() > 0.03, "it does not grow by the group"
+    yield
+    driver.screenshot("by-group")
+
+
+driver.play(steps())
