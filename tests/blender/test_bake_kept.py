@@ -72,13 +72,13 @@ def test_a_copy_shows_no_bake_of_other_strands(hair, new_hair, sphere, tmp_path,
 def test_a_file_that_cannot_be_opened_leaves_hair_to_be_seen(hair, evaluated, tmp_path):
     session = previews.start(hair, evaluated())
     assert session is not None
-    assert hair.evaluated_get(evaluated()).display_type == "BOUNDS"
+    assert hair.evaluated_get(evaluated()).display_type == "WIRE"
     (tmp_path / "broken.blend").write_bytes(b"no file of Blender's")
     with pytest.raises(RuntimeError):
         bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "broken.blend"))
     hair = bpy.data.objects["Hair"]
     assert previews.session_of(hair) is None
-    assert hair.evaluated_get(evaluated()).display_type == hair.display_type != "BOUNDS"
+    assert hair.evaluated_get(evaluated()).display_type == hair.display_type != "WIRE"
 
 
 @pytest.mark.parametrize(

@@ -138,7 +138,7 @@ def test_guides_are_lines_while_brushes_comb_them(hair, session, evaluated):
     assert overlay.drawing_of(session.uid).lines == ()
     bpy.ops.object.mode_set(mode="SCULPT_CURVES")
     bpy.context.view_layer.update()
-    assert hair.evaluated_get(evaluated()).display_type == "BOUNDS"
+    assert hair.evaluated_get(evaluated()).display_type == "WIRE"
     (lines,) = overlay.drawing_of(session.uid).lines
     grid = session.rig.guide_grid
     np.testing.assert_allclose(lines.points.reshape(len(grid), -1, 2, 3)[:, :, 0], grid[:, :-1])
@@ -151,7 +151,7 @@ def test_guides_are_lines_while_brushes_comb_them(hair, session, evaluated):
     hair.hairloom.hide_original = False
     bpy.context.view_layer.update()
     assert overlay.drawing_of(session.uid).lines == ()
-    assert hair.evaluated_get(evaluated()).display_type != "BOUNDS"
+    assert hair.evaluated_get(evaluated()).display_type != "WIRE"
     bpy.ops.object.mode_set(mode="OBJECT")
 
 

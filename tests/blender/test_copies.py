@@ -52,7 +52,7 @@ def test_a_duplicate_beside_hair_that_plays_is_shown_by_blender(linked, playing,
     twin, _ = duplicated(playing.hair, linked=linked)
     goes_on(playing)
     assert twin.evaluated_get(evaluated()).display_type == "TEXTURED"
-    assert playing.hair.evaluated_get(evaluated()).display_type == "BOUNDS"
+    assert playing.hair.evaluated_get(evaluated()).display_type == "WIRE"
     assert twin.hairloom.dynamics.device == "numpy"
     twin.hairloom.dynamics.gusts, twin.data.hairloom.shading.ambient = 0.875, 0.25
     bpy.data.objects.remove(twin)

@@ -69,7 +69,7 @@ def shown(session):
 
 
 def is_box(hair, evaluated):
-    return hair.evaluated_get(evaluated()).display_type == "BOUNDS"
+    return hair.evaluated_get(evaluated()).display_type == "WIRE"
 
 
 def test_a_preview_shows_blenders_strands_until_its_own_are_made(hair, evaluated, gate):

@@ -171,7 +171,7 @@ def test_another_surface_begins_the_preview_anew(preview, evaluated):
 
 def test_blenders_own_strands_are_hidden_in_the_evaluated_copy_only(preview, evaluated):
     hair, head, session = preview
-    shown, hidden = ("TEXTURED", True), ("BOUNDS", False)
+    shown, hidden = ("TEXTURED", True), ("WIRE", False)
 
     def display(obj):
         return obj.display_type, obj.visible_camera

@@ -137,12 +137,12 @@ def test_sculpting_hides_blenders_own_strands(preview, evaluated):
     bpy.ops.object.mode_set(mode="SCULPT_CURVES")
     hair.data.position_data[7].vector = (0.0, 0.0, 0.5)
     update()
-    assert hair.evaluated_get(evaluated()).display_type == "BOUNDS"
+    assert hair.evaluated_get(evaluated()).display_type == "WIRE"
     scene_events.catch_up(evaluated())
     assert drawn(session)[0, -1] == pytest.approx([0.0, 0.0, 0.5], abs=1e-5)
     bpy.ops.object.mode_set(mode="OBJECT")
     update()
-    assert hair.evaluated_get(evaluated()).display_type == "BOUNDS"
+    assert hair.evaluated_get(evaluated()).display_type == "WIRE"
 
 
 @pytest.mark.slow

@@ -30,7 +30,7 @@ def displays(layers):
 def test_blenders_strands_go_and_come_in_every_view_layer(layers):
     previews.start(bpy.data.objects["Hair"], layers[0].depsgraph)
     update(layers)
-    assert displays(layers) == ["BOUNDS", "BOUNDS"]
+    assert displays(layers) == ["WIRE", "WIRE"]
     previews.stop_all()
     assert displays(layers) == ["TEXTURED", "TEXTURED"]
 
@@ -54,7 +54,7 @@ def test_a_layer_that_a_window_changes_to_is_evaluated(layers):
     bpy.data.objects["Hair"].evaluated_get(layers[1].depsgraph).display_type = "TEXTURED"
     timer()
     update(layers)
-    assert displays(layers) == ["BOUNDS", "BOUNDS"]
+    assert displays(layers) == ["WIRE", "WIRE"]
     window.view_layer = layers[1]
     overlay.look_at_layers()
     overlay.forget_layers()

@@ -80,7 +80,7 @@ def sculpt(hair):
     bpy.ops.object.mode_set(mode="SCULPT_CURVES")
     yield
     assert hair.mode == "SCULPT_CURVES"
-    yield from until(lambda: evaluated(hair).display_type == "BOUNDS", "Blender's curves are shown")
+    yield from until(lambda: evaluated(hair).display_type == "WIRE", "Blender's curves are shown")
     drawing = of_hairloom("overlay").drawing_of(session().uid)
     (lines,) = drawing.lines
     assert 0 < len(lines.seen_from(np.array([0.0, -9.0, 0.0, 1.0])).points) < len(lines.points)

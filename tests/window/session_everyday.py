@@ -208,7 +208,7 @@ def duplicates_by_keys():
         yield from still_plays(f"beside a copy by {held}")
         driver.screenshot(f"copy-by-{next(iter(held))}")
         shown = {name: shown_as(name) for name in (copy, "Hair")}
-        assert shown == {copy: "TEXTURED", "Hair": "BOUNDS"}, shown
+        assert shown == {copy: "TEXTURED", "Hair": "WIRE"}, shown
         yield from press_in_view("Z", ctrl=True)
         yield from until(lambda: set(bpy.data.objects.keys()) == names, "Ctrl-Z leaves the copy")
         yield from still_plays("after Ctrl-Z")

@@ -94,7 +94,7 @@ def ours_alone(label, mine):
 def is_box(layer):
     """Whether Blender's own strands are out of the way in a view layer."""
     depsgraph = layer.depsgraph  # None before a window has shown it
-    return depsgraph and hair().evaluated_get(depsgraph).display_type == "BOUNDS"
+    return depsgraph and hair().evaluated_get(depsgraph).display_type == "WIRE"
 
 
 def played_in_both(head):

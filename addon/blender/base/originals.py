@@ -12,7 +12,9 @@ def show_originals(
     show: bool,
     has_own_shadow: bool = False,
 ) -> None:
-    """Solid view leaves out what is shown as its bounds, EEVEE what no camera can see.
+    """Solid view leaves out hair that is shown as wires, EEVEE what no camera can see. Of hair as
+    wires Blender draws nothing but, where it is selected, the outline of the strands; as bounds it
+    would draw a box, selected or not.
 
     Touches the evaluated copy only.
 
@@ -22,7 +24,7 @@ def show_originals(
     evaluated = hair.evaluated_get(depsgraph)
     if not evaluated.is_evaluated:
         return
-    display, is_seen = (hair.display_type, hair.visible_camera) if show else ("BOUNDS", False)
+    display, is_seen = (hair.display_type, hair.visible_camera) if show else ("WIRE", False)
     if evaluated.display_type != display:
         evaluated.display_type = display
     if evaluated.visible_camera != is_seen:

@@ -1,7 +1,7 @@
 """What follows from Blender's events for all previewed grooms and fins.
 
 Reactions only read; they write nothing into bpy.data. There are two exceptions. The evaluated copy
-of a previewed object is shown as a box, so that Blender's own strands do not stand among ours: that
+of a previewed object is shown as wires, so that Blender's own strands do not stand among ours: that
 is no data of the artist's, neither saved nor undone nor rendered, and Blender makes a fresh copy
 when it evaluates the object again. And a fin shows itself by an attribute of its own mesh.
 """

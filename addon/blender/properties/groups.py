@@ -317,7 +317,8 @@ class HAIRLOOM_PG_character(bpy.types.PropertyGroup):
         ),
         "hide_original": BoolProperty(
             name="Hide Blender's Strands",
-            description="While previewing, show Blender's own drawing of these curves as a box",
+            description="While previewing, show nothing of Blender's own drawing of these curves "
+            "but their outline when they are selected",
             default=True,
             update=lambda self, _context: changed.display(self.id_data),
             override=OVERRIDABLE,

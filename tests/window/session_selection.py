@@ -1,0 +1,115 @@
+"""Selected hair under the preview: no box around it, none of Blender's strands, and around the hair
+the orange outline that Blender draws around its own; alike in Solid, X-Ray and Wireframe.
+"""
+
+import sys
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+sys.path.append(str(Path(__file__).parent))
+import driver
+import traces
+from artist import (
+    changed,
+    hair_is_made,
+    hide_floor,
+    look_from_front,
+    new_head,
+    pixels_at_rest,
+    press,
+    viewport,
+)
+from driver import of_hairloom
+
+log = traces.Log()
+
+
+def steps():
+    yield from press("ESC")
+    driver.enable_extension()
+    yield from groom()
+    yield from selection_is_shown()
+    yield from nothing_is_left_without_selection()
+    assert "Traceback" not in log.added(), "something has raised"
+
+
+def groom():
+    new_head()
+    hide_floor()
+    look_from_front(0.9)
+    bpy.ops.hairloom.grow(strand_count=800, length=0.15)
+    hair = bpy.context.object
+    hair.name = "Hair"
+    hair.data.hairloom.children.method = "none"
+    bpy.ops.hairloom.preview()
+    yield from hair_is_made()
+    yield
+
+
+def choose(is_chosen):
+    hair = bpy.data.objects["Hair"]
+    hair.select_set(is_chosen)
+    bpy.context.view_layer.objects.active = hair if is_chosen else None
+
+
+def outline(label):
+    """Where the orange of what is selected is drawn."""
+    choose(True)
+    selected = yield from pixels_at_rest(f"{label}-selected")
+    choose(False)
+    alone = yield from pixels_at_rest(f"{label}-unselected")
+    return is_orange(selected) & ~is_orange(alone)
+
+
+def is_orange(picture):
+    red, green, blue = np.moveaxis(picture, 2, 0)
+    return (red > 0.75) & (green > 0.2) & (green < 0.75) & (blue < 0.3)
+
+
+def selection_is_shown():
+    ours = yield from outline("ours")
+    of_hairloom("previews").stop_all()
+    blenders = yield from outline("blenders")
+    assert ours.sum() > 500, f"selection is not seen: {ours.sum()} pixels"
+    beside = (ours & ~near(blenders)).sum()
+    assert beside < 0.02 * ours.sum(), f"{beside} pixels are beside Blender's outline, as a box is"
+    choose(True)
+    bpy.ops.hairloom.preview()
+    yield from hair_is_made()
+    yield
+
+
+def near(mask, reach=2):
+    """Also what is this many pixels beside it."""
+    found = mask.copy()
+    for axis in (0, 1):
+        for step in range(1, reach + 1):
+            found |= np.roll(mask, step, axis) | np.roll(mask, -step, axis)
+    return found
+
+
+def nothing_is_left_without_selection():
+    """With our own strands not drawn, the view is that of hidden hair: no strand and no line."""
+    hair, space = bpy.data.objects["Hair"], viewport().spaces.active
+    drawn = of_hairloom("overlay")._overlay.drawn
+    kept = dict(drawn)
+    for kind, is_xray in (("SOLID", False), ("SOLID", True), ("WIREFRAME", True)):
+        space.shading.type, label = kind, f"{kind.lower()}-{is_xray}"
+        setattr(space.shading, "show_xray" if kind == "SOLID" else "show_xray_wireframe", is_xray)
+        choose(False)
+        shown = yield from pixels_at_rest(f"{label}-shown")
+        drawn.clear()
+        empty = yield from pixels_at_rest(f"{label}-empty")
+        hair.hide_set(True)
+        hidden = yield from pixels_at_rest(f"{label}-hidden")
+        hair.hide_set(False)
+        drawn.update(kept)
+        yield
+        assert changed(shown, empty) > 0.01, "our strands are not drawn"
+        left = changed(empty, hidden)
+        assert left < 1e-4, f"{kind}, X-Ray {is_xray}: Blender draws {left:.4f} of the view"
+
+
+driver.play(steps())
