@@ -13,6 +13,9 @@ from ..strands.closest_point import ClosestPointSearch
 from ..strands.strand_set import ROOT_POINTS
 from .holds import Holds
 
+#: A surface holds tips where its weight is at least this.
+HOLDING = 0.5
+
 
 @dataclass(frozen=True, eq=False)
 class Tie:
@@ -30,10 +33,14 @@ class Tie:
 
 @dataclass(frozen=True, eq=False)
 class TipSurface:
-    """A surface that holds the tips near to it; world space at rest."""
+    """A surface that holds the tips near to it; world space at rest.
+
+    weight: (vertex_count,), it holds tips only where this is HOLDING or more; None: everywhere.
+    """
 
     name: str
     surface: Surface
+    weight: Floats | None = None
 
 
 @dataclass(frozen=True)
@@ -100,8 +107,8 @@ def idle(holds: Holds, holders: Holders) -> tuple[str, ...]:
     surface = holders.tip_surface
     if surface is not None and holds.tie_count not in busy:
         notes.append(
-            f"No tip is near {surface.name}, so it holds none. Raise Tip Distance, or move it and "
-            "press Preview again."
+            f"No tip is near {surface.name}, or near the part of it that holds tips, so it holds "
+            "none. Raise Tip Distance, or move it and press Preview again."
         )
     return tuple(notes)
 
@@ -150,6 +157,9 @@ def _tips_near(strands: StrandSet, tips: TipSurface, distance: float) -> tuple[I
     near = np.flatnonzero(is_near)
     closest = ClosestPointSearch(tips.surface).closest(points[near], distance)
     kept = closest.distance <= distance
+    if tips.weight is not None:
+        of_corners = tips.weight[tips.surface.triangles[closest.triangle]]
+        kept &= (of_corners * closest.barycentric).sum(axis=1) >= HOLDING
     barycentric: Floats = closest.barycentric[kept].astype(np.float32)
     return near[kept], closest.triangle[kept], barycentric
 

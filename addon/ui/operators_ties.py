@@ -73,6 +73,7 @@ def draw_ties(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
     column.operator("hairloom.add_hair_tie", icon="MESH_CIRCLE")
     layout.column().prop(hair.hairloom, "tip_surface")
     if hair.hairloom.tip_surface is not None:
+        layout.column().prop(hair.hairloom, "tip_group")
         draw_section(layout, hair.data.hairloom, "guides", "Ties")
 
 

@@ -221,6 +221,42 @@ def test_tips_on_a_mesh_follow_its_deformation(swinging, evaluated):
     assert np.abs(after[:, 0] - before[:, 0]).max() < 1e-6
 
 
+def test_tips_are_held_where_a_vertex_group_says(swinging, evaluated):
+    """Where it is one half between vertices, so within one of them; a bake knows it, and a message
+    names one that is missing."""
+    hair, head = swinging
+    bpy.ops.mesh.primitive_uv_sphere_add(radius=0.18, segments=24, ring_count=12)
+    bun = bpy.context.object
+    bun.name, bun.parent = "Bun", head
+    hair.hairloom.tip_surface = bun
+    hair.data.hairloom.guides.tip_distance = 0.1
+    session = previews.start(hair, evaluated())
+    everywhere = set(session.rig.holds.strand)
+    tips = session.rig.strands.points[session.rig.strands.offsets[1:] - 1]
+    list(Bake.of([hair], bpy.context.scene).steps())
+    cache = playback.cache_of(hair)
+    on_right = [vertex.index for vertex in bun.data.vertices if vertex.co.x > 0.01]
+    bun.vertex_groups.new(name="Right").add(on_right, 1.0, "REPLACE")
+    assert changed_since(hair, cache, evaluated()) == ()
+    hair.hairloom.tip_group = "Right"
+    assert changed_since(hair, cache, evaluated()) == ("ties",)
+    session = previews.start(hair, evaluated())
+    held = set(session.rig.holds.strand)
+    spacing = 0.18 * 2.0 * np.pi / 24
+    local = moved_by(np.linalg.inv(np.array(bun.matrix_world)), tips)[:, 0]
+    on_it = {one for one in everywhere if local[one] > spacing}
+    assert on_it and on_it <= held < everywhere
+    assert all(local[one] > -spacing for one in held)
+    hair.hairloom.tip_group = "Left"
+    session = previews.start(hair, evaluated())
+    assert session.rig.holds is None
+    assert any("Bun: it has neither" in text and "'Left'" in text for text in session.warnings)
+
+
+def moved_by(matrix, points):
+    return points @ matrix[:3, :3].T + matrix[:3, 3]
+
+
 def test_a_bake_keeps_what_ties_hold(swinging, evaluated):
     hair, _ = swinging
     one = ring()

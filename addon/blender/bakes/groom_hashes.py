@@ -45,7 +45,7 @@ def groom_rig_hash(
     if settings[ChildrenSettings].method != "none":
         grown["children"] = (
             settings[ChildrenSettings],
-            _density_before_modifiers(head, settings),
+            _weights_before_modifiers(head, settings.children_density),
         )
     lines = _parting_shapes(hair)
     if lines:
@@ -142,6 +142,8 @@ def _tie_shapes(hair: bpy.types.Object) -> tuple[Floats | Ints | str, ...]:
             parts.append(f"{obj.empty_display_type} {obj.empty_display_size}")
         elif obj.type == "MESH":
             parts += mesh_parts(obj)
+        if obj == hair.hairloom.tip_surface and hair.hairloom.tip_group:
+            parts.append(_weights_before_modifiers(obj, hair.hairloom.tip_group))
         if obj.animation_data is None and not len(obj.constraints):
             parts += [np.array(obj.matrix_parent_inverse), np.array(obj.matrix_basis)]
     return tuple(parts)
@@ -161,12 +163,11 @@ def frame_rate(scene: bpy.types.Scene) -> float:
     return float(scene.render.fps) / float(scene.render.fps_base)
 
 
-def _density_before_modifiers(head: bpy.types.Object | None, settings: GroomSettings) -> Hashed:
-    """What children grow by on the head; the name alone where modifiers make it."""
-    name = settings.children_density
-    if head is None or name not in weight_names(head):
+def _weights_before_modifiers(obj: bpy.types.Object | None, name: str) -> Floats | str:
+    """Weights of a mesh; the name alone where modifiers make them."""
+    if obj is None or name not in weight_names(obj):
         return name
-    return weights_on(head, head.data, name)
+    return weights_on(obj, obj.data, name)
 
 
 def _curves_parts(hair: bpy.types.Object) -> tuple[Floats | Ints | str, ...]:

@@ -8,7 +8,7 @@ them. What is gone or disabled holds nothing.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import bpy
 import numpy as np
@@ -20,6 +20,7 @@ from ...groom.holds import Holds, anchors_of
 from ...groom.ties import Holders, Tie, TipSurface, find_holds
 from ...strands.affine import moved
 from ..base.objects import Body, Handle, head_of, matrix_of
+from ..base.vertex_weights import read_weights
 from ..scene.own_collections import objects_in, put_into, take_out
 from ..scene.source import usable_curves
 from ..scene.surfaces import read_positions, read_surface
@@ -278,6 +279,7 @@ def copy_holders(
         for tie in ties:
             hair.hairloom.tie_collection.objects.link(tie)
     hair.hairloom.tip_surface = copies.get(source.hairloom.tip_surface)
+    hair.hairloom.tip_group = source.hairloom.tip_group
 
 
 def held_by(
@@ -382,7 +384,9 @@ def _read_tips(
     if is_left_out(obj, depsgraph):
         raise _disabled(obj.name)
     surface = read_surface(obj, depsgraph, need_uv=False, place=obj.name)
-    return TipSurface(obj.name, surface.transformed(back))
+    group = hair.hairloom.tip_group
+    weight = read_weights(obj, depsgraph, group) if group else None
+    return TipSurface(obj.name, surface.transformed(back), weight)
 
 
 def _again(read: _TrackedTie, known: Holding | None) -> _TrackedTie:
@@ -413,7 +417,7 @@ def _same_surface(read: TipSurface, known: TipSurface | None) -> TipSurface:
         return read
     one, other = read.surface.triangles, known.surface.triangles
     is_same = one.shape == other.shape and bool((one == other).all())
-    return known if is_same else read
+    return replace(known, weight=read.weight) if is_same else read
 
 
 def _disabled(name: str) -> HairloomError:

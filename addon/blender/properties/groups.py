@@ -81,7 +81,17 @@ def _weights(group: Any, _context: bpy.types.Context, typed: str) -> list[str]:
         head = owner.surface
     elif owner.type == "CURVES":
         head = head_of(owner)
-    names = [] if head is None or head.type != "MESH" else weight_names(head)
+    return _weights_of(head, typed)
+
+
+def _tip_groups(group: Any, _context: bpy.types.Context, typed: str) -> list[str]:
+    """Where the mesh that holds tips may hold them."""
+    return _weights_of(group.tip_surface, typed)
+
+
+def _weights_of(obj: bpy.types.Object | None, typed: str) -> list[str]:
+    """The weights of a mesh that what was typed may mean."""
+    names = [] if obj is None or obj.type != "MESH" else weight_names(obj)
     return [name for name in names if typed.lower() in name.lower()]
 
 
@@ -300,6 +310,16 @@ class HAIRLOOM_PG_character(bpy.types.PropertyGroup):
             name="Held Tips",
             description="Mesh that holds the tips near it, such as a bun",
             poll=_is_mesh,
+            update=lambda self, _context: changed.settings(self.id_data),
+            override=OVERRIDABLE,
+        ),
+        "tip_group": StringProperty(
+            name="Tip Group",
+            description="Vertex group or float attribute of that mesh: it holds tips only where "
+            "this is one half or more, as on the cheeks of a head that holds sideburns. If empty, "
+            "it holds them everywhere",
+            search=_tip_groups,
+            search_options={"SUGGESTION"},
             update=lambda self, _context: changed.settings(self.id_data),
             override=OVERRIDABLE,
         ),

@@ -32,6 +32,7 @@ _POINTERS = (
     "collider_shape",
     "tie_collection",
     "tip_surface",
+    "tip_group",
     "parting_collection",
 )
 
