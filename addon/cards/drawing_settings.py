@@ -22,7 +22,7 @@ class CardDrawingSettings(Settings):
             ("strands", "Strands", "Draw every strand as a ribbon"),
             ("cards", "Cards", "Draw hair cards instead of the strands"),
         ),
-        label="Show As",
+        label="Drawn As",
         description="How hair is drawn, in the viewport and in renders",
     )
     passes: str = choice(

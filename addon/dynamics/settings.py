@@ -57,7 +57,7 @@ class DynamicsSettings(MotionSettings):
     )
     sag_compensation: float = number(
         1.0,
-        label="Sag Compensation",
+        label="Sag Correction",
         description="Fraction of the weight that the style compensates; at 1 a groom does not sag "
         "when it comes to rest",
         soft=(0.0, 1.0),

@@ -15,7 +15,8 @@ def draw_cards(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
     draw_preset_row(layout, hair, "cards")
     draw_section(layout, hair.data.hairloom, "card_drawing")
     session = previews.session_of(hair)
-    for line in () if session is None else session.cards.lines:
+    lines = () if session is None else session.cards.lines
+    for line in (*lines, "", "")[:2]:  # also without cards: what is below keeps its place
         layout.label(text=line)
     draw_made_cards(layout, hair)
 

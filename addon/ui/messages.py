@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
 import textwrap
 
 import bpy
 
 #: width of a letter in pixels at UI scale 1, for breaking lines
 _LETTER_WIDTH = 7.0
+#: letters that the edges of a panel take
+_EDGES = 6
 
 
 def draw_message(
@@ -18,8 +21,24 @@ def draw_message(
 
 
 def draw_lines(
-    column: bpy.types.UILayout, context: bpy.types.Context, text: str, icon: str = "NONE"
+    column: bpy.types.UILayout,
+    context: bpy.types.Context,
+    text: str,
+    icon: str = "NONE",
+    *,
+    room: int = 0,
+    width: float = 0.0,
 ) -> None:
-    letters = context.region.width / (_LETTER_WIDTH * context.preferences.system.ui_scale)
-    for index, line in enumerate(textwrap.wrap(text, max(int(letters) - 6, 16))):
+    """Draw a text as lines.
+
+    Args:
+        room: letters for which there is room even if the text is shorter, so that what is below
+            keeps its place.
+        width: of a popup, in pixels at UI scale 1; 0: that of the region.
+    """
+    region = context.region.width / context.preferences.system.ui_scale
+    letters = max(int((width or region) / _LETTER_WIDTH) - _EDGES, 16)
+    lines = textwrap.wrap(text, letters)
+    lines += [""] * (math.ceil(room / letters) - len(lines))
+    for index, line in enumerate(lines):
         column.label(text=line, icon="BLANK1" if index and icon != "NONE" else icon)

@@ -10,14 +10,13 @@ import bpy
 from ..blender.preview import previews
 from ..blender.scene.particle_hair import hair_systems
 from ..blender.setup.foreign_heads import may_be_head
-from ..blender.setup.starting import is_untouched
 from .drawing import Draw
 from .operators_adopted import draw_sort
 from .operators_strand_export import draw_strand_exports
 from .operators_strand_import import draw_imports
 from .sections import SECTIONS, SESSION_SECTIONS, SUB_SECTIONS, SWITCHES
 from .selection import active_mesh, chosen_hair
-from .state import draw_issues, draw_notice, draw_state
+from .state import NAMES, draw_notice, draw_problems_row, draw_state
 
 
 def _hair(context: bpy.types.Context) -> bpy.types.Object | None:
@@ -43,21 +42,21 @@ def draw_preview(layout: bpy.types.UILayout, context: bpy.types.Context) -> None
     row.operator("hairloom.reset", text="Reset", icon="FILE_REFRESH")
     if hair is not None:
         layout.prop(hair.hairloom.bake, "follows")
-    if session is not None:
-        draw_state(layout, context, session)
-    draw_notice(layout, context)
     if hair is None:
         draw_start(layout, context)
+        draw_notice(layout, context)
         return
-    if session is None and is_untouched(hair):
-        layout.operator("hairloom.use_groom", icon="OUTLINER_OB_CURVES")
-    draw_issues(layout, context, hair, session)
+    draw_state(layout, session)
+    draw_problems_row(layout, hair, session)
+    layout.operator("hairloom.use_groom", icon="OUTLINER_OB_CURVES")
     if hair.hairloom.hairstyle:
         row = layout.row(align=True)
         row.operator("hairloom.place_landmarks", text="Landmarks", icon="EMPTY_AXIS")
         row.operator("hairloom.fit_again", icon="FILE_REFRESH")
-    row = layout.row(align=True)
-    row.prop(hair.hairloom, "debug_view")
+    parts = layout.split(factor=NAMES)
+    parts.label(text="Colour By")
+    row = parts.row(align=True)
+    row.prop(hair.hairloom, "debug_view", text="")
     row.prop(hair.hairloom, "show_counts", text="", icon="INFO")
     layout.row(align=True).prop(hair.hairloom, "shown_overlays")
     layout.prop(hair.hairloom, "hide_original")

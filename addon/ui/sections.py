@@ -24,6 +24,8 @@ from .operators_show import draw_show
 from .operators_ties import draw_ties
 from .preset_chooser import draw_preset_row
 
+#: letters that are kept free for what the preview says of strands, guides or children
+_LINE = 140
 #: name, label, what draws it
 type Section = tuple[str, str, Draw]
 
@@ -77,13 +79,21 @@ def draw_look(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
     draw_section(layout, hair.data.hairloom, "shading")
 
 
+def _said(hair: bpy.types.Object, what: Callable[[Any], str]) -> str:
+    """What the preview says of its strands; empty before they are made."""
+    session = previews.session_of(hair)
+    text = "" if session is None or not session.is_made else what(session.rig)
+    return f"{text}." if text else ""
+
+
 def draw_strands(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
     """What is said of widths and guides, their settings, and Blender's hair nodes."""
-    session = previews.session_of(hair)
-    if session is not None and session.is_made:
-        column = layout.column(align=True)
-        draw_lines(column, bpy.context, f"{session.rig.widths.line}.")
-        draw_lines(column, bpy.context, f"{session.rig.guides_line}.")
+    column = layout.column(align=True)
+    for text in (
+        _said(hair, lambda rig: rig.widths.line),
+        _said(hair, lambda rig: rig.guides_line),
+    ):
+        draw_lines(column, bpy.context, text, room=_LINE)
     draw_section(layout, hair.data.hairloom, "widths")
     draw_section(layout, hair.data.hairloom, "strands")
     layout.label(text=ALL_SETTINGS["ambient"].title)
@@ -109,9 +119,10 @@ def draw_skin(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
 
 def draw_children(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
     """What the preview has; where there are none, only how to get some."""
-    groom, session = hair.data.hairloom, previews.session_of(hair)
-    if session is not None and session.is_made and session.rig.children_line:
-        draw_lines(layout.column(align=True), bpy.context, f"{session.rig.children_line}.")
+    groom = hair.data.hairloom
+    if groom.children.method == "auto":
+        text = _said(hair, lambda rig: rig.children_line)
+        draw_lines(layout.column(align=True), bpy.context, text, room=_LINE)
     layout.prop(groom.children, "method")
     if groom.children.method != "none":
         layout.prop(hair.hairloom, "children_density")

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import dataclass
+
 import bpy
 
 from ..blender.base.outcome import dropped_phrase
 from ..blender.preview import previews as registry
-from ..blender.preview.diagnostics import Issue, instances_note, issues_of
+from ..blender.preview.diagnostics import instances_note, issues_of
 from ..blender.preview.phases import Phase
 from ..blender.preview.previews import previews
 from ..blender.sessions.measures import PARTS, array_bytes
@@ -16,79 +19,130 @@ from ..blender.viewport.overlay import statistics_of
 from .messages import draw_lines, draw_message
 
 _MEGABYTE = 1 << 20
+#: of a line for the name of what it says
+NAMES = 0.36
+#: where there is no number yet
+_NONE = "-"
 
 
-def draw_state(layout: bpy.types.UILayout, context: bpy.types.Context, session: Session) -> None:
-    """Counts, times and memory of a previewed groom."""
+@dataclass(frozen=True)
+class Problem:
+    """What is wrong, or worth knowing. operator, button: what fixes it, if one can."""
+
+    text: str
+    operator: str = ""
+    button: str = ""
+
+
+def draw_state(layout: bpy.types.UILayout, session: Session | None) -> None:
+    """What moves the hair, counts, memory and times: as many lines in any state, each short, or
+    what is below would move away from under the mouse."""
     lines = layout.column(align=True)
+    for name, text in (("State", _state(session)), *_figures(session)):
+        row = lines.split(factor=NAMES)
+        row.label(text=name)
+        row.label(text=text)
+
+
+def _state(session: Session | None) -> str:
+    """What moves the hair at the moment."""
+    if session is None:
+        return "not previewed"
     if not session.is_made:
-        draw_lines(lines, context, f"It {registry.BUILDING}")
-        return
-    rig = session.rig
-    lines.label(text=f"{rig.strands.strand_count:,} strands, {len(rig.guides):,} guides")
+        return registry.BUILDING
+    preview = previews[session.uid]
+    if preview.phase is Phase.BAKED and preview.bake is not None:
+        return "baked, out of date" if preview.bake.changed else "baked"
+    if session.is_pending:
+        return "being made again"
+    if preview.phase is Phase.WAITING or preview.is_deferred:
+        return "waits for collider"
+    device = session.computed_on.partition(" ")[0]
+    return f"{'simulated' if session.is_playing else 'at rest'}, {device}"
+
+
+def _figures(session: Session | None) -> Iterator[tuple[str, str]]:
+    """Name and value of each, of hair that is not there too."""
+    rig = None if session is None or not session.is_made else session.rig
+    shown: tuple[str, ...] = (_NONE, _NONE)
+    if session is not None and rig is not None:
+        shown = _shown(session)
+    yield "Strands", _NONE if rig is None else f"{rig.strands.strand_count:,}"
+    yield "Guides", _NONE if rig is None else f"{len(rig.guides):,}"
+    yield from zip(("Drawn", ""), shown, strict=True)
+    size = 0 if session is None or rig is None else array_bytes(rig, session.snapshot)
+    yield "Memory", f"{size / _MEGABYTE:,.0f} MB" if size else _NONE
+    for part in PARTS:
+        spent = None if session is None else session.times.milliseconds(part)
+        yield part.capitalize(), _milliseconds(spent)
+
+
+def _shown(session: Session) -> tuple[str, str]:
+    """What is drawn, and what that consists of."""
     if session.snapshot.cards is not None:
         cards, triangles, _ = session.cards.counts
-        lines.label(text=f"Shown: {cards:,} cards, {triangles:,} triangles")
-    else:
-        drawn = statistics_of(session.uid)
-        lines.label(text=f"Shown: {drawn.strands:,} strands, {drawn.vertices:,} vertices")
-    size = array_bytes(rig, session.snapshot) / _MEGABYTE
-    lines.label(text=f"Memory: {size:,.0f} MB" if size >= 10.0 else f"Memory: {size:.1f} MB")
-    for part in PARTS:  # also without a number: lines that come and go move all below
-        spent = session.times.milliseconds(part)
-        lines.label(text=f"{part.capitalize()}: {_shown(spent)}")
-    draw_lines(lines, context, _moved_by(session))
+        return f"{cards:,} cards", f"{triangles:,} triangles"
+    drawn = statistics_of(session.uid)
+    return f"{drawn.strands:,} strands", f"{drawn.vertices:,} vertices"
 
 
-def _shown(spent: float | None) -> str:
+def _milliseconds(spent: float | None) -> str:
     if spent is None:
-        return "-"
+        return _NONE
     return f"{spent:,.0f} ms" if spent >= 100.0 else f"{spent:.1f} ms"
 
 
-def draw_issues(
-    layout: bpy.types.UILayout,
-    context: bpy.types.Context,
-    hair: bpy.types.Object,
-    session: Session | None,
-) -> None:
-    """What is wrong, each with the button that fixes it; then what else the artist should know."""
+def problems_of(hair: bpy.types.Object, session: Session | None) -> tuple[Problem, ...]:
+    """What is wrong, worst first, then what else the artist should know."""
+    ended = [Problem(registry.notice())] if registry.notice() else []
     issues = issues_of(hair, session)
-    for issue in issues:
-        _draw_issue(layout, context, issue)
+    found = [*ended, *(Problem(one.text, one.operator, one.button) for one in issues)]
     if session is None:
-        return
+        return tuple(found)
     if session.source.dropped:
-        draw_message(layout, context, dropped_phrase(session.source.dropped).capitalize(), "INFO")
+        found.append(Problem(dropped_phrase(session.source.dropped).capitalize()))
     reported = {issue.instead_of for issue in issues}
     problems = previews[session.uid].problems
     drawn = statistics_of(session.uid).notes
     others = filter(None, (problems, view_transform.problem(), instances_note(hair), *drawn))
     for warning in dict.fromkeys((*session.warnings, *others)):
         if warning not in reported:
-            draw_message(layout, context, warning.removeprefix(f"{hair.name}: "), "ERROR")
+            found.append(Problem(warning.removeprefix(f"{hair.name}: ")))
+    return tuple(found)
 
 
-def _draw_issue(layout: bpy.types.UILayout, context: bpy.types.Context, issue: Issue) -> None:
-    box = layout.box().column(align=True)
-    draw_lines(box, context, issue.text, "ERROR")
-    box.operator(issue.operator, text=issue.button, icon="MODIFIER")
+def draw_problems_row(
+    layout: bpy.types.UILayout, hair: bpy.types.Object, session: Session | None
+) -> None:
+    """One row in any state: how many problems there are, which a click shows, and the button that
+    fixes the worst."""
+    problems, row = problems_of(hair, session), layout.row(align=True)
+    if not problems:
+        row.label(text="No problems", icon="CHECKMARK")
+        return
+    text = "1 problem" if len(problems) == 1 else f"{len(problems)} problems"
+    row.operator("hairloom.show_problems", text=text, icon="ERROR")
+    fixed = next((one for one in problems if one.operator), None)
+    if fixed is not None:
+        row.operator(fixed.operator, text=fixed.button, icon="MODIFIER")
 
 
-def _moved_by(session: Session) -> str:
-    """What moves the hair at the moment, such as "Simulated on the GPU (OpenGL, llvmpipe)"."""
-    preview = previews[session.uid]
-    if preview.phase is Phase.BAKED and preview.bake is not None:
-        return "Shown from the bake" + (", which is out of date" if preview.bake.changed else "")
-    if session.is_pending:
-        return f"Other hair {registry.BUILDING}"
-    if preview.phase is Phase.WAITING or preview.is_deferred:
-        return f"It {registry.WAITING}"
-    computed = "Simulated" if session.is_playing else "To be simulated"
-    return f"{computed} on the {session.computed_on}"
+def draw_problems(
+    layout: bpy.types.UILayout,
+    context: bpy.types.Context,
+    hair: bpy.types.Object,
+    session: Session | None,
+    width: float,
+) -> None:
+    """All of them in full, each with its button; width: of the popup, see `draw_lines`."""
+    for one in problems_of(hair, session):
+        box = layout.box().column(align=True)
+        draw_lines(box, context, one.text, "ERROR", width=width)
+        if one.operator:
+            box.operator(one.operator, text=one.button, icon="MODIFIER")
 
 
 def draw_notice(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
-    """Why a preview has ended by itself, if one has."""
+    """Why a preview has ended by itself, if one has, where there is no hair."""
     if registry.notice():
         draw_message(layout, context, registry.notice(), "ERROR")

@@ -20,6 +20,7 @@ DOCS = Path(__file__).parents[2] / "docs"
 
 #: buttons that act on a view or a session alone, and leave nothing behind
 WINDOW_ONLY = {
+    "show_problems",
     "preview",
     "play",
     "pause",

@@ -177,7 +177,7 @@ _SWITCHES = {
         "volume", "shadows", ("none", "deep"), "Shadows", "Let hair shade itself and what is near"
     ),
     "use_cards": _switch(
-        "card_drawing", "shown_as", ("strands", "cards"), "Show Cards", "Show cards, not strands"
+        "card_drawing", "shown_as", ("strands", "cards"), "Draw Cards", "Draw cards, not strands"
     ),
 }
 
@@ -247,7 +247,7 @@ class HAIRLOOM_PG_character(bpy.types.PropertyGroup):
         ),
         "debug_view": EnumProperty(
             items=_DEBUG_VIEWS,
-            name="Show",
+            name="Colour By",
             description="What the strands of the preview are coloured by",
             update=lambda self, _context: changed.settings(self.id_data),
             override=OVERRIDABLE,

@@ -32,7 +32,7 @@ from .groom_source import GroomSource
 from .prepared_groom import PreparedGroom
 
 COMBED = KeptShape("hairloom_combed", "hairloom_settled")
-#: custom property of the object: its Sag Compensation before
+#: custom property of the object: its Sag Correction before
 _SAG = "hairloom_combed_sag"
 
 
@@ -152,6 +152,6 @@ def _carry_whole_weight(hair: bpy.types.Object) -> tuple[str, ...]:
         hair[_SAG] = before
     dynamics.sag_compensation = 1.0
     return (
-        f"{hair.name}: Sag Compensation was {before:.2g} and is 1 now, as settled hair hangs under "
+        f"{hair.name}: Sag Correction was {before:.2g} and is 1 now, as settled hair hangs under "
         "its weight already",
     )

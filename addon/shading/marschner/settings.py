@@ -199,7 +199,7 @@ class MarschnerSettings(Settings):
     )
     volume_shadow: float = number(
         1.0,
-        label="Volume Shadow Term",
+        label="Volume Shadow",
         description="Darkens the side of the groom that faces away from lights without shadows",
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),

@@ -1,0 +1,45 @@
+"""Problems: what is wrong with the selected hair in full, as a popup that moves nothing."""
+
+from __future__ import annotations
+
+import bpy
+
+from ..blender.base.outcome import report
+from ..blender.preview import previews
+from .reports import reporting
+from .selection import chosen_hair, needs_hair
+from .state import draw_problems, problems_of
+
+#: of the popup, in pixels at UI scale 1
+_WIDTH = 360
+
+
+class HAIRLOOM_OT_show_problems(bpy.types.Operator):
+    """Show what is wrong with the selected hair, each problem with the button that fixes it"""
+
+    bl_idname = "hairloom.show_problems"
+    bl_label = "Problems"
+    bl_options = {"INTERNAL"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return needs_hair(cls, context)
+
+    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
+        return context.window_manager.invoke_popup(self, width=_WIDTH)
+
+    @reporting
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """For scripts: all of them as reports."""
+        hair = chosen_hair(context)[0]
+        for problem in problems_of(hair, previews.session_of(hair)):
+            report(self, "WARNING", problem.text)
+        return {"FINISHED"}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        hair = chosen_hair(context)[0]
+        self.layout.label(text=f"{hair.name}: problems")
+        draw_problems(self.layout, context, hair, previews.session_of(hair), _WIDTH)
+
+
+CLASSES = (HAIRLOOM_OT_show_problems,)

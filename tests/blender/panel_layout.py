@@ -1,0 +1,66 @@
+"""What a panel draws, counted without a window: how many rows high it is, and its texts."""
+
+from typing import Any
+
+
+class Layout:
+    """In place of Blender's UILayout: rows are 1 high, what stands side by side counts once.
+
+    texts: of labels, buttons and fields, each with the fraction of the panel's width that it has.
+    """
+
+    def __init__(self, texts: list[tuple[str, float]], width: float = 1.0, *, is_row: bool = False):
+        self.texts, self.width, self.is_row = texts, width, is_row
+        self.parts: list[float | Layout] = []
+        self.scale_y = 1.0
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        object.__setattr__(self, name, value)  # active, enabled, use_property_split and others
+
+    @property
+    def height(self) -> float:
+        heights = [one.height if isinstance(one, Layout) else one for one in self.parts]
+        total = (max(heights, default=0.0) if self.is_row else sum(heights)) * self.scale_y
+        return float(total)
+
+    def _inner(self, *, is_row: bool, width: float | None = None) -> "Layout":
+        inner = Layout(self.texts, self.width if width is None else width, is_row=is_row)
+        self.parts.append(inner)
+        return inner
+
+    def row(self, **_: Any) -> "Layout":
+        return self._inner(is_row=True)
+
+    def column(self, **_: Any) -> "Layout":
+        return self._inner(is_row=False)
+
+    box = column
+
+    def split(self, **_: Any) -> "Layout":
+        return self._inner(is_row=True)
+
+    def _element(self, text: str) -> None:
+        self.texts.append((text, self.width))
+        self.parts.append(1.0)
+
+    def label(self, text: str = "", **_: Any) -> None:
+        self._element(text)
+
+    def operator(self, name: str, text: str | None = None, **_: Any) -> Any:
+        self._element(name if text is None else text)
+        return type("Properties", (), {})()
+
+    def prop(self, data: Any, name: str, text: str | None = None, **_: Any) -> None:
+        self._element(data.bl_rna.properties[name].name if text is None else text)
+
+    def menu(self, name: str, text: str = "", **_: Any) -> None:
+        self._element(text)
+
+    def progress(self, text: str = "", **_: Any) -> None:
+        self._element(text)
+
+    def template_ID(self, *_: Any, text: str = "", **__: Any) -> None:
+        self._element(text)
+
+    def separator(self, **_: Any) -> None:
+        self.parts.append(0.5)
