@@ -12,7 +12,7 @@ from functools import cached_property, partial
 
 import numpy as np
 
-from .arrays import Floats, Ints
+from .arrays import Bools, Floats, Ints
 from .dynamics.clearance import GuideClearance, farthest_kept, guide_clearance
 from .dynamics.colliders import DistanceField, PosedCollider
 from .dynamics.held import Held
@@ -42,9 +42,11 @@ from .shading.ambient import ambient_occlusion, skin_occlusion
 from .shading.ambient_settings import AmbientSettings
 from .shading.strand_noise import SEED_LIMIT
 from .strands import StrandSet, Surface
+from .strands.arc_length import typical
 from .strands.center_lines import center_lines, curl_room
 from .strands.face import is_face_hair
 from .strands.join import joined
+from .strands.kept import NOTHING_KEPT, Kept
 from .strands.needed_points import LOST, MAX_POINTS, with_needed_points
 from .strands.resample import resample
 from .strands.root_motions import RootMotions
@@ -221,6 +223,7 @@ def prepare(
     holders: Holders = NO_HOLDERS,
     partings: Floats | None = None,
     head_field: Callable[[], DistanceField | None] = lambda: None,
+    kept: Kept = NOTHING_KEPT,
 ) -> Rig:
     """Bind strands to the head, choose the guides, weigh them for every strand, find all widths,
     and what is held.
@@ -235,6 +238,8 @@ def prepare(
         holders: ties and a surface of tips, at rest.
         partings: (n, 2, 3) [m] the straight pieces of lines on the head, at rest; None: no line.
         head_field: is called if there are children: what they are led out of; None: of nothing.
+        kept: of the groom that was made last, which may be the same but for what an artist combs
+            or paints; it changes nothing but the time.
 
     Raises:
         HairloomError: no strands, or a groom of another scale than the head.
@@ -258,13 +263,13 @@ def prepare(
     weights = _weights(lines, guide_lines, kind, guide_kind, parted)
     notes = _lost_length(bound, own)
     rig = Rig(own, head, guides, guide_lines.grid, weights, _frames(own, head), notes)
-    ground = _Ground(density, parted, head_field)
+    ground = _Ground(density, parted, head_field, kept)
     if children is not None and children.method == "auto":
         rig = _automatic(rig, children, ground, widths, place)
     else:
         if children is not None and children.method != "none":
             rig = _with_children(rig, children, ground, place)
-        strands, found = with_widths(rig.strands, widths)
+        strands, found = with_widths(rig.strands, widths, number=_numbers(rig), kept=kept)
         rig = replace(rig, strands=strands, widths=found)
     if holds is None:
         return rig
@@ -276,11 +281,19 @@ def prepare(
 
 @dataclass(frozen=True)
 class _Ground:
-    """What matters to children of the head that they grow on; the arguments of `prepare`."""
+    """What matters to children beside the artist's strands; the arguments of `prepare`."""
 
     density: Floats | None
     partings: Partings | None
     field: Callable[[], DistanceField | None]
+    kept: Kept
+
+
+def _numbers(rig: Rig) -> Ints | None:
+    """Which strands a rig has of those that it would have if no child were left out; None: all."""
+    if rig.grown is None or rig.own_count is None:
+        return None
+    return np.concatenate([np.arange(rig.own_count), rig.own_count + rig.grown.kept])
 
 
 def _lost_length(strands: StrandSet, own: StrandSet) -> tuple[str, ...]:
@@ -297,7 +310,7 @@ def _lost_length(strands: StrandSet, own: StrandSet) -> tuple[str, ...]:
 
 
 def _hair_length(strands: StrandSet) -> float:
-    return float(np.median(strands.lengths()))
+    return typical(strands.lengths())
 
 
 def _automatic(
@@ -320,7 +333,7 @@ def _automatic(
         )
     if parts > 1.0 and rig.head is None:
         parts, line = 1.0, "Children: none, since the hair has no surface on which they could grow"
-    own, found = with_widths(rig.strands, widths, parts)
+    own, found = with_widths(rig.strands, widths, parts, kept=ground.kept)
     rig = replace(rig, strands=own, widths=found)
     if parts > 1.0:
         with_children = _with_children(rig, settings, ground, place)
@@ -362,7 +375,7 @@ def _with_children(
     place: str,
 ) -> Rig:
     """The artist's own strands, and children grown between them."""
-    own, head = rig.strands, rig.head
+    own, head, kept = rig.strands, rig.head, ground.kept
     if head is None:
         note = (
             "Children need a surface to grow from, so there are none. Give the hair a surface, or "
@@ -371,13 +384,15 @@ def _with_children(
         return replace(rig, notes=(*rig.notes, note))
     parents, cv_count = _parents(own), rig.guide_grid.shape[1]
     shapes, notes = _parent_shapes(own.take(parents), settings.strand_count)
-    made = make_children(shapes, head, settings, ground.density, ground.partings, place=place)
-    made, kept = _outside(made, ground.field(), _hair_length(shapes))
-    strands = joined(own, with_needed_points(made.strands, cv_count))
+    made = make_children(
+        shapes, head, settings, ground.density, ground.partings, place=place, kept=kept
+    )
+    made, chosen = _outside(made, ground.field(), _hair_length(shapes), kept)
+    strands = joined(own, with_needed_points(made.strands, cv_count, kept=kept))
     if len(rig.guides) < own.strand_count:
         # shaped by their neighbours among all strands, they move as guides do
         lines = center_lines(own.take(rig.guides), cv_count)
-        weights = _weights(center_lines(made.strands, cv_count), lines, partings=ground.partings)
+        weights = _weights(_lines(made.strands, cv_count, kept), lines, partings=ground.partings)
     else:
         weights = replace(made.weights, guide=parents[made.weights.guide])
     return Rig(
@@ -392,11 +407,28 @@ def _with_children(
         _frames(strands, head),
         (*rig.notes, *made.notes, *notes),
         own_count=own.strand_count,
-        grown=Grown(made.growth, parents, shapes, kept),
+        grown=Grown(made.growth, parents, shapes, chosen),
     )
 
 
-def _outside(made: Children, head: DistanceField | None, length: float) -> tuple[Children, Ints]:
+def _lines(children: StrandSet, cv_count: int, kept: Kept) -> StrandSet:
+    """The centre lines of children, which are of one point count; their widths do not matter."""
+
+    def of(some: Ints) -> tuple[Floats]:
+        return (center_lines(children.take(some), cv_count).grid,)
+
+    (grid,) = kept.rows("lines", (cv_count,), (children.grid,), of)
+    return StrandSet(
+        grid.reshape(-1, 3),
+        np.arange(len(grid) + 1) * cv_count,
+        np.ones(len(grid) * cv_count),
+        children.group,
+    )
+
+
+def _outside(
+    made: Children, head: DistanceField | None, length: float, kept: Kept
+) -> tuple[Children, Ints]:
     """Children that are led out of the head, without those that nothing leads out, and which of
     all these are.
 
@@ -405,7 +437,13 @@ def _outside(made: Children, head: DistanceField | None, length: float) -> tuple
     """
     if head is None:
         return made, np.arange(made.strands.strand_count)
-    led, is_out = led_out_at_rest(made.strands, head, length)
+
+    def led_out(some: Ints) -> tuple[Floats, Bools]:
+        led, is_out = led_out_at_rest(made.strands.take(some), head, length)
+        return led.grid, is_out
+
+    grid, is_out = kept.rows("led out", (head, length), (made.strands.grid,), led_out)
+    led = made.strands.with_points(grid.reshape(-1, 3))
     chosen, lost = np.flatnonzero(is_out), int((~is_out).sum())
     notes = made.notes
     if lost > MANY_INSIDE * len(is_out):

@@ -28,3 +28,16 @@ def curves(count: int = 60) -> StrandSet:
     along = np.linspace(0.0, 1.0, 6)[:, None] * np.array([0.05, 0.0, 0.1])
     points = (root[:, None] + along).reshape(-1, 3)
     return StrandSet(points, np.arange(count + 1) * 6, np.full(6 * count, 1e-4), np.zeros(count))
+
+
+def turned(strands: StrandSet, number: np.ndarray, angle: float) -> StrandSet:
+    """The same with some strands turned around their roots, about Z."""
+    points = strands.points.copy()
+    turn = np.array(
+        [[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]]
+    )
+    for strand in number:
+        own = slice(strands.offsets[strand], strands.offsets[strand + 1])
+        root = points[own][0]
+        points[own] = root + (points[own] - root) @ turn.T
+    return strands.with_points(points)

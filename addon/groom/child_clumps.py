@@ -16,7 +16,7 @@ import numpy as np
 
 from ..arrays import Bools, Floats, Ints
 from ..params.curve import along
-from ..strands.nearest import nearest_points
+from ..strands.kept import NOTHING_KEPT, Kept
 from .children_settings import ChildrenSettings
 from .partings import Partings
 from .weights import by_group, directions, likeness
@@ -56,7 +56,11 @@ class Clumps:
 
 
 def clump(
-    grid: Floats, group: Ints, settings: ChildrenSettings, partings: Partings | None = None
+    grid: Floats,
+    group: Ints,
+    settings: ChildrenSettings,
+    partings: Partings | None = None,
+    kept: Kept = NOTHING_KEPT,
 ) -> Clumps:
     """Draw the children of each clump towards its middle, in place; roots stay.
 
@@ -64,6 +68,7 @@ def clump(
         grid: (child_count, cv_count, 3) float32 [m], in the order in which they grew.
         group: (child_count,).
         partings: no clump has strands on both sides of these.
+        kept: of the children that were drawn last.
     """
     clumps = Clumps(np.arange(len(grid)), np.zeros(len(grid)))
     if not settings.clump or settings.clump_size == 1:
@@ -74,7 +79,14 @@ def clump(
         member = np.arange(max(first, middle_count), min(last, len(grid)))
         if len(member):
             middle, strength = _middles(
-                grid, group, member, middle_count, settings.parting, partings
+                grid,
+                group,
+                member,
+                middle_count,
+                settings.parting,
+                partings,
+                kept,
+                f"middles from {first}",
             )
             clumps.middle[member], clumps.strength[member] = middle, strength
             _pull(grid, member, middle, strength, fraction)
@@ -128,17 +140,20 @@ def _middles(
     middle_count: int,
     parting: float,
     partings: Partings | None,
+    kept: Kept,
+    level: str,
 ) -> tuple[Ints, Floats]:
     """The middle of each member's clump (n,), and how far it draws the member, 0 to 1."""
     root = grid[:, 0]
     middle, strength = member.copy(), np.zeros(len(member))
     member_direction = directions(grid[member], root[member])
     middle_direction = directions(grid[:middle_count], root[:middle_count])
-    reach = _REACH * _apart(root[:middle_count])
+    reach = _REACH * _apart(root[:middle_count], kept, f"{level}, apart")
     for of_group, middles in by_group(group[member], group[:middle_count]):
         if not len(middles):
             continue
-        near, gap = nearest_points(root[member[of_group]], root[middles], _CANDIDATES)
+        name = f"{level}, group {group[middles[0]]}"
+        near, gap = kept.nearest(name, root[member[of_group]], root[middles], _CANDIDATES)
         near = middles[near]
         alike = likeness(member_direction[of_group, None], middle_direction[near], parting)
         alike[gap > reach] = 0.0
@@ -150,9 +165,9 @@ def _middles(
     return middle, strength
 
 
-def _apart(root: Floats) -> float:
+def _apart(root: Floats, kept: Kept, name: str) -> float:
     """Typical distance from one root to the next [m]; infinite for a single one."""
     if len(root) < 2:
         return np.inf
-    _, gap = nearest_points(root, root, 2)
+    _, gap = kept.nearest(name, root, root, 2)
     return float(np.median(gap[:, 1]))

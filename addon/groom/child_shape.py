@@ -6,6 +6,7 @@ import numpy as np
 
 from ..arrays import Floats, Ints
 from ..params.curve import along
+from ..strands.arc_length import first_as_far
 from .children_settings import ChildrenSettings
 from .counter_random import named, uniform
 from .weights import GuideWeights
@@ -59,30 +60,35 @@ def _cut(grid: Floats, kept: Floats) -> Floats:
     """Strands (n, cv_count, 3) cut to this part of their length, (n,)."""
     reached = arc_length(grid)
     wanted = reached * kept[:, None]
-    last = grid.shape[1] - 2
-    left = np.zeros(wanted.shape, np.int64)
-    for cv in range(1, last + 1):
-        left += reached[:, cv, None] <= wanted
-    before = np.take_along_axis(reached, left, axis=1)
-    span = np.take_along_axis(reached, left + 1, axis=1) - before
+    offsets = np.arange(len(grid) + 1) * grid.shape[1]
+    right = first_as_far(reached.ravel(), offsets, wanted)
+    left = np.maximum(right - 1, offsets[:-1, None])
+    before = reached.take(left)
+    span = reached.take(left + 1) - before
     inside = np.divide(wanted - before, span, out=np.zeros_like(span), where=span > 0.0)
-    return _on_curve(grid, left, np.clip(inside, 0.0, 1.0).astype(np.float32)[..., None])
+    left -= offsets[:-1, None]
+    return _on_curve(grid, left, np.clip(inside, 0.0, 1.0).astype(np.float32))
 
 
 def _on_curve(grid: Floats, left: Ints, t: Floats) -> Floats:
     """Points of the uniform Catmull-Rom curve through the CVs, which goes on straight at its ends.
 
     Args:
-        left: (n, k) segments. t: (n, k, 1) places in them, 0 to 1.
+        left: (n, k) segments. t: (n, k) places in them, 0 to 1.
     """
     ends = [2.0 * grid[:, :1] - grid[:, 1:2], grid, 2.0 * grid[:, -1:] - grid[:, -2:-1]]
     extended = np.concatenate(ends, axis=1)
-    p0, p1, p2, p3 = (
-        np.take_along_axis(extended, left[..., None] + step, axis=1) for step in range(4)
-    )
-    m1, m2 = 0.5 * (p2 - p0), 0.5 * (p3 - p1)  # the tangents
-    chord = p2 - p1
-    return p1 + t * (m1 + t * (3.0 * chord - 2.0 * m1 - m2 + t * (m1 + m2 - 2.0 * chord)))
+    number = left + np.arange(len(grid))[:, None] * extended.shape[1]
+    result = np.empty_like(grid)
+    for axis in range(3):  # one by one, as numpy is slow at rows of three
+        along = np.ascontiguousarray(extended[..., axis])
+        p0, p1, p2, p3 = (along.take(number + step) for step in range(4))
+        m1, m2 = 0.5 * (p2 - p0), 0.5 * (p3 - p1)  # the tangents
+        chord = p2 - p1
+        result[..., axis] = p1 + t * (
+            m1 + t * (3.0 * chord - 2.0 * m1 - m2 + t * (m1 + m2 - 2.0 * chord))
+        )
+    return result
 
 
 def frizz(grid: Floats, key: Ints, settings: ChildrenSettings, size: float) -> None:
@@ -111,8 +117,9 @@ def frizz(grid: Floats, key: Ints, settings: ChildrenSettings, size: float) -> N
         for wave in range(2):
             height, around, phase, pitch = own[chunk, wave].T
             swing = np.sin(_TURN * (turns * (0.75 + 0.5 * pitch)[:, None] + phase[:, None]))
-            direction = _on_sphere(height, around)[:, None]
-            grid[chunk] += (0.5 * strayed * swing)[..., None] * direction
+            swing *= 0.5 * strayed
+            for axis, part in enumerate(_on_sphere(height, around).T):
+                grid[chunk, :, axis] += swing * part[:, None]
 
 
 def arc_length(grid: Floats) -> Floats:

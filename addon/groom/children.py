@@ -10,13 +10,15 @@ its root, and nothing is measured over all children.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..arrays import Bools, Floats, Ints
 from ..errors import HairloomError
 from ..strands import StrandSet, Surface
+from ..strands.arc_length import typical
+from ..strands.kept import NOTHING_KEPT, Kept
 from ..strands.nearest import nearest_points
 from .child_clumps import Clumps, clump, clump_again
 from .child_roots import ChildRoots, child_roots
@@ -91,6 +93,7 @@ def make_children(
     partings: Partings | None = None,
     *,
     place: str,
+    kept: Kept = NOTHING_KEPT,
 ) -> Children:
     """Strands between guides or around them, at rest; none of them crosses a group or a parting.
 
@@ -100,6 +103,7 @@ def make_children(
             are near.
         partings: lines that the artist has drawn; None: there are none.
         place: names the groom in error messages.
+        kept: of the children that were made last.
 
     Raises:
         HairloomError: there are no guides, the surface has no area on which hair may grow, or the
@@ -110,12 +114,19 @@ def make_children(
             "it has no guides to grow children from", place=place, remedy="Draw some strands"
         )
     roots = child_roots(guides, surface, settings.strand_count, density, settings.seed)
-    weights = _weights(roots, guides, settings, partings)
+    weights = _weights(roots, guides, settings, partings, kept)
     group = guides.group[weights.guide[:, 0]]
     grid = mixed(roots.point, guides.grid, weights)
-    clumps = clump(grid, group, settings, partings)
-    size = float(np.median(guides.lengths()))
-    _vary(grid, roots.key, settings, size)
+    clumps = clump(grid, group, settings, partings, kept)
+    size = typical(guides.lengths())
+
+    def varied(some: Ints) -> tuple[Floats]:
+        own = grid[some]
+        _vary(own, roots.key[some], settings, size)
+        return (own,)
+
+    fixed = replace(settings, strand_count=ChildrenSettings().strand_count), size
+    (grid,) = kept.rows("varied", fixed, (grid, roots.key), varied)
     cv_count = grid.shape[1]
     strands = StrandSet(
         points=grid.reshape(-1, 3),
@@ -139,7 +150,11 @@ def _vary(grid: Floats, key: Ints, settings: ChildrenSettings, size: float) -> N
 
 
 def _weights(
-    roots: ChildRoots, guides: StrandSet, settings: ChildrenSettings, partings: Partings | None
+    roots: ChildRoots,
+    guides: StrandSet,
+    settings: ChildrenSettings,
+    partings: Partings | None,
+    kept: Kept,
 ) -> GuideWeights:
     if settings.method != "single":
         place = _scattered(roots, guides.roots, settings)
@@ -151,6 +166,7 @@ def _weights(
             settings.parting,
             partings,
             roots.point,
+            kept,
         )
     nearest, _, _ = nearest_before(partings, roots.point, guides.roots, 1, roots.point)
     weight = np.zeros((len(nearest), GUIDES_PER_STRAND), np.float32)

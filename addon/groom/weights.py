@@ -19,6 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays import Bools, Floats, Ints
+from ..strands.kept import NOTHING_KEPT, Kept
 from ..strands.nearest import nearest_points
 from .partings import Partings
 
@@ -128,6 +129,7 @@ def child_weights(
     parting: float,
     partings: Partings | None = None,
     grown: Floats | None = None,
+    kept: Kept = NOTHING_KEPT,
 ) -> GuideWeights:
     """The three guides that a child at each root mixes: all of one group, all on one side.
 
@@ -143,15 +145,23 @@ def child_weights(
             none mixes guides with one between them.
         grown: (child_count, 3) [m], where they grow, if `root` is where they take shapes from; this
             decides about partings.
+        kept: of the children that were asked about last.
     """
     grown = root if grown is None else grown
     guide = np.zeros((len(root), GUIDES_PER_STRAND), np.int32)
     weight = np.zeros((len(root), GUIDES_PER_STRAND), np.float32)
     guide_direction = directions(guide_grid, guide_root)
-    of_child = _nearest_group(root, guide_root, guide_group, partings, grown)
+    of_child = _nearest_group(root, guide_root, guide_group, partings, grown, kept)
     for children, guides in by_group(of_child, guide_group):
+        name = f"guides, group {guide_group[guides[0]]}"
         near, gap, crossed = nearest_before(
-            partings, root[children], guide_root[guides], _CHILD_CANDIDATES, grown[children]
+            partings,
+            root[children],
+            guide_root[guides],
+            _CHILD_CANDIDATES,
+            grown[children],
+            kept,
+            name,
         )
         near = guides[near]
         alike = likeness(guide_direction[near[:, :1]], guide_direction[near], parting)
@@ -172,20 +182,31 @@ def _nearest_group(
     guide_group: Ints,
     partings: Partings | None,
     grown: Floats,
+    kept: Kept,
 ) -> Ints:
     """Group of the guide that is nearest to each root on its side of partings, (n,)."""
     if (guide_group == guide_group[0]).all():
         return np.full(len(root), guide_group[0])
-    nearest, _, _ = nearest_before(partings, root, guide_root, 1, grown)
+    nearest, _, _ = nearest_before(partings, root, guide_root, 1, grown, kept, "guides, all")
     return guide_group[nearest[:, 0]]
 
 
 def nearest_before(
-    partings: Partings | None, root: Floats, among: Floats, count: int, grown: Floats
+    partings: Partings | None,
+    root: Floats,
+    among: Floats,
+    count: int,
+    grown: Floats,
+    kept: Kept = NOTHING_KEPT,
+    name: str = "",
 ) -> tuple[Ints, Floats, Bools | None]:
     """`nearest_points`, but where one is behind a parting, seen from `grown`, those nearest to that
-    place, with all behind partings as the last; and which these are."""
-    near, gap = nearest_points(root, among, count)
+    place, with all behind partings as the last; and which these are.
+
+    Args:
+        kept: of the places that were asked for last by this name.
+    """
+    near, gap = kept.nearest(name, root, among, count)
     if partings is None:
         return near, gap, None
     crossed = partings.crossed(grown, among[near])

@@ -19,6 +19,7 @@ import numpy as np
 from ..arrays import Floats, Ints
 from ..strands import StrandSet
 from ..strands.face import is_face_hair
+from ..strands.kept import NOTHING_KEPT, Kept
 from ..strands.nearest import nearest_points
 
 #: of a head: how many hairs, and the width of one in terms of the root of the area they grow on.
@@ -103,12 +104,20 @@ class Widths:
 
 
 def with_widths(
-    strands: StrandSet, method: str = "auto", parts: float = 1.0
+    strands: StrandSet,
+    method: str = "auto",
+    parts: float = 1.0,
+    *,
+    number: Ints | None = None,
+    kept: Kept = NOTHING_KEPT,
 ) -> tuple[StrandSet, Widths]:
     """The strands as wide as `METHODS` says, all in one space.
 
     Args:
         parts: how many strands are drawn for each of these, itself included.
+        number: (strand_count,) ascending, which they are of all that there might be: which of them
+            are measured hardly changes where one is left out. None: all.
+        kept: of the strands that were measured last.
     """
     if not strands.strand_count:
         return strands, Widths()
@@ -116,7 +125,8 @@ def with_widths(
     median = float(np.median(own))
     if method == "own":
         return strands, Widths(False, median)
-    found = _found(strands, parts)
+    number = np.arange(strands.strand_count) if number is None else number
+    found = _found(strands, parts, number, kept)
     reason = "" if method == "found" else _why_not(strands, median, found)
     if method == "auto" and not reason:
         return strands, Widths(False, median)
@@ -192,12 +202,29 @@ class _Hair:
     middle: float
 
     @classmethod
-    def of(cls, strands: StrandSet) -> Self:
+    def of(
+        cls,
+        strands: StrandSet,
+        number: Ints | None = None,
+        kept: Kept = NOTHING_KEPT,
+        name: str = "",
+    ) -> Self:
+        """Args:
+        number: see `with_widths`. kept: of the strands that were measured last by this name.
+        """
+        number = np.arange(strands.strand_count) if number is None else number
+        last = number[-1] if len(number) else 0
+        wanted = np.linspace(0, last, min(len(number), _SAMPLES)).astype(np.int64)
+        chosen = np.unique(np.searchsorted(number, wanted))
+
+        def spacing(at: Ints, where: str) -> Floats:
+            return _spacing(strands.points[at], chosen, kept, f"{name}, {where}")
+
         length = strands.lengths()
         first, last = strands.offsets[:-1], strands.offsets[1:] - 1
-        at_roots = _spacing(strands, first)
+        at_roots = spacing(first, "roots")
         # the hair of a ponytail or a mohawk is wider apart further out
-        beyond = np.maximum(_spacing(strands, (first + last) // 2), _spacing(strands, last))
+        beyond = np.maximum(spacing((first + last) // 2, "middles"), spacing(last, "tips"))
         apart = np.maximum(at_roots, beyond)
         typical = np.clip(length, *np.percentile(length, (25, 95)))
         # where most roots coincide, as in tufts, they do not tell how the hair is spread
@@ -230,7 +257,7 @@ class _Hair:
         return np.minimum(_OF_SPACING * self.apart, _OF_LENGTH * self.typical)
 
 
-def _found(strands: StrandSet, parts: float = 1.0) -> _Found:
+def _found(strands: StrandSet, parts: float, number: Ints, kept: Kept) -> _Found:
     """Found widths of hair, and on their own those of brows and lashes, which are short and grow
     close together however much hair is on the head.
 
@@ -239,13 +266,15 @@ def _found(strands: StrandSet, parts: float = 1.0) -> _Found:
     """
     is_face = is_face_hair(strands.group)
     if not is_face.any():
-        return _found_of(_Hair.of(strands), parts)
-    face = _Hair.of(strands.take(np.flatnonzero(is_face)))
+        return _found_of(_Hair.of(strands, number, kept, "hair"), parts)
+    face = _Hair.of(strands.take(np.flatnonzero(is_face)), None, kept, "face")
     of_face = _found_of(face)
     of_face = replace(of_face, width=np.minimum(of_face.width, _OF_FACE * face.typical))
     if is_face.all():
         return of_face
-    found = _found_of(_Hair.of(strands.take(np.flatnonzero(~is_face))), parts)
+    other = np.flatnonzero(~is_face)
+    hair = _Hair.of(strands.take(other), number[other], kept, "hair")
+    found = _found_of(hair, parts)
     width = np.empty(strands.strand_count)
     width[~is_face], width[is_face] = found.width, of_face.width
     return replace(found, width=width)
@@ -281,21 +310,26 @@ def _evened(spacing: Floats) -> Floats:
     return evened
 
 
-def _spacing(strands: StrandSet, at: Ints) -> Floats:
-    """How far strands are from their neighbours at these points of theirs, (strand_count,) [m].
+def _spacing(places: Floats, chosen: Ints, kept: Kept, name: str) -> Floats:
+    """How far strands are from their neighbours at these places of theirs, (strand_count,) [m].
 
     It is the side of the square that a strand has for itself if its neighbours are spread evenly.
+
+    Args:
+        chosen: the strands that are measured; others are as far apart as the nearest of these.
+        kept: see `Kept.nearest`.
     """
-    count, places = strands.strand_count, strands.points[at]
-    neighbours = min(_NEIGHBOURS, count - 1)
+    neighbours = min(_NEIGHBOURS, len(places) - 1)
     if not neighbours:
-        return np.zeros(count)
-    chosen = np.unique(np.linspace(0, count - 1, min(count, _SAMPLES)).astype(np.int64))
-    reach = nearest_points(places[chosen], places, neighbours + 1)[1][:, -1]
-    spacing = _smoothed(np.sqrt(np.pi / neighbours) * reach, places[chosen])
-    if len(chosen) == count:
+        return np.zeros(len(places))
+    measured = places[chosen]
+    reach = kept.nearest(f"{name}, reach", measured, places, neighbours + 1)[1][:, -1]
+    count = min(_NEIGHBOURS, len(chosen))
+    around, _ = kept.nearest(f"{name}, around", measured, measured, count)
+    spacing: Floats = np.median((np.sqrt(np.pi / neighbours) * reach)[around], axis=1)
+    if len(chosen) == len(places):
         return spacing
-    near, _ = nearest_points(places, places[chosen], 1)
+    near, _ = kept.nearest(f"{name}, all", places, measured, 1)
     return spacing[near[:, 0]]
 
 
@@ -307,13 +341,6 @@ def _is_row(roots: Floats) -> bool:
     gap = nearest_points(some, roots, _NEIGHBOURS + 1)[1][:, [2, _NEIGHBOURS]]
     gap = gap[gap[:, 0] > 0.0]
     return bool(len(gap)) and float(np.median(gap[:, 1] / gap[:, 0])) > _IN_ROW
-
-
-def _smoothed(values: Floats, places: Floats) -> Floats:
-    """The median of each place and its neighbours, (n,)."""
-    near, _ = nearest_points(places, places, min(_NEIGHBOURS, len(places)))
-    smooth: Floats = np.median(values[near], axis=1)
-    return smooth
 
 
 def _why_not(strands: StrandSet, own: float, found: _Found) -> str:

@@ -14,7 +14,7 @@ from ..dynamics.colliders.distance_field import UNCOVERED
 from ..dynamics.colliders.winding import winding_number
 from ..dynamics.settings import DynamicsSettings
 from ..strands import StrandSet
-from ..strands.arc_length import steps
+from ..strands.arc_length import reached
 from ..strands.closest_point import search_of
 from .lead_out import Clearance, beside_meshes, lead_out
 
@@ -38,9 +38,8 @@ def led_out_at_rest(
     posed = (PosedCollider(head, np.eye(4), np.eye(4)),)
     offsets, points = strands.offsets, strands.points.copy()
     distance, _ = signed_distance(points, posed, kept)
-    reached = np.cumsum(steps(strands.points, offsets), dtype=np.float64)
-    reached -= np.repeat(reached[offsets[:-1]], strands.point_counts)
-    wanted = np.minimum(kept, LIFT * reached).astype(np.float32)
+    along = reached(strands.points, offsets)
+    wanted = np.minimum(kept, LIFT * along).astype(np.float32)
     wanted[offsets[:-1]] = -np.inf
     wanted[beside_meshes(points, distance, posed, kept)] = -np.inf
     clearance = Clearance(kept, wanted, np.zeros(strands.strand_count, np.int32))

@@ -46,14 +46,16 @@ def ambient_occlusion(
     grid = grid_around(strands, settings.cell_count)
     depth = hair_depth(strands, grid) * np.float32(settings.extinction)
     if body is not None:
-        depth = np.maximum(depth, body.latest(_body_depth, grid.low, grid.cell, grid.shape))
+        whole = grid.in_blocks()
+        of_body = body.latest(_body_depth, whole.low, whole.cell, whole.shape)
+        depth = np.maximum(depth, grid.part(of_body, whole))
     openness = sky_openness(depth, settings.upper_fraction)
     seen = sample(openness, grid.coordinates(points)) / settings.ao_bias
     return (1.0 - settings.strength * (1.0 - np.minimum(seen, 1.0))).astype(np.float32)
 
 
 def _body_depth(body: Surface, low: Floats, cell: float, shape: tuple[int, int, int]) -> Floats:
-    """See `body_depth`; of the numbers of a grid, since hair that is combed often keeps its box."""
+    """See `body_depth`; of the numbers of a grid, since hair that is combed keeps its blocks."""
     return body_depth(body, Grid(low, cell, shape))
 
 

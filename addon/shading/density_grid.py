@@ -9,23 +9,28 @@ half below its surface, so that hair at its root is not shut in by the cell that
 
 from __future__ import annotations
 
-import itertools
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 
 from ..arrays import Bools, Floats, Ints
 from ..strands import StrandSet, Surface
 from ..strands.closest_point import search_of
+from ..strands.vectors import dot_rows
 
 #: How far below the surface the middle of the body's shell lies [cells].
 _SHELL_DEPTH = 2.5
+#: Sizes that cells may have, in each doubling, and cells along the side of a block.
+_SIZES, _BLOCK = 16, 16
 #: Hair smaller than this gets cells as if it were that large [m].
 _SMALLEST_HAIR = 1.0e-9
+#: Nor may cells be smaller than this part of how far the hair is from the origin.
+_FINEST = 1.0e-9
 #: Optical depth of a cell of the body: exp(-30) is nothing.
 _OPAQUE = 30.0
-#: Segments that are cut up at once: numpy lets no other thread go on while it repeats and counts,
-#: so that more of them would stop the window.
+#: Segments that are cut up at once: numpy lets no other thread go on while it counts, so that more
+#: of them would stop the window.
 _AT_ONCE = 1 << 17
 
 
@@ -37,45 +42,83 @@ class Grid:
     cell: float
     shape: tuple[int, int, int]
 
+    @classmethod
+    def of_cells(cls, first: Ints, count: Ints, cell: float) -> Self:
+        """Cells (x, y, z) of the lattice through the origin."""
+        return cls(first * cell, cell, (int(count[0]), int(count[1]), int(count[2])))
+
+    @property
+    def first(self) -> Ints:
+        """Number of the low corner's cell in the lattice, (3,)."""
+        return np.rint(self.low / self.cell).astype(np.int64)
+
+    def in_blocks(self) -> Grid:
+        """The grid of whole blocks of the lattice that holds this one."""
+        first = self.first // _BLOCK * _BLOCK
+        last = -(-(self.first + np.array(self.shape)) // _BLOCK) * _BLOCK
+        return Grid.of_cells(first, last - first, self.cell)
+
+    def part(self, values: Floats, whole: Grid) -> Floats:
+        """Of the values of a grid that holds this one, its own."""
+        begin = self.first - whole.first
+        x, y, z = map(slice, begin, begin + np.array(self.shape))
+        return values[x, y, z]
+
     def coordinates(self, points: Floats) -> Floats:
         """Points (n, 3) [m] in cells; cell i has its centre at i."""
-        return ((points - self.low) / self.cell - 0.5).astype(np.float32)
+        low = self.low.astype(np.float32)
+        return (points - low) * np.float32(1.0 / self.cell) - np.float32(0.5)
 
 
 def grid_around(strands: StrandSet, cell_count: int) -> Grid:
-    """Cells over all strands, with two empty ones on each side."""
+    """Cells over all strands, with two empty ones on each side, at most `cell_count` without those.
+
+    They are cells of one of few lattices through the origin: hair that is combed keeps its own.
+    """
     low, high = (corner.astype(np.float64) for corner in strands.bounds())
-    cell = max(float((high - low).max()), _SMALLEST_HAIR) / cell_count
-    shape = np.ceil((high - low) / cell).astype(int) + 4
-    return Grid(low - 2.0 * cell, cell, (int(shape[0]), int(shape[1]), int(shape[2])))
+    farthest = float(np.maximum(np.abs(low), np.abs(high)).max())
+    size = max(float((high - low).max()), _SMALLEST_HAIR, _FINEST * farthest)
+    least = size / (cell_count - 1)
+    cell = 2.0 ** (np.ceil(np.log2(least) * _SIZES) / _SIZES)
+    first = np.floor(low / cell).astype(np.int64) - 2
+    last = np.floor(high / cell).astype(np.int64) + 2
+    return Grid.of_cells(first, last + 1 - first, float(cell))
 
 
 def hair_depth(strands: StrandSet, grid: Grid) -> Floats:
     """Optical depth of the hair across each cell, sigma x cell, of the grid's shape."""
-    is_segment = np.ones(strands.point_count - 1, bool)
-    is_segment[strands.offsets[1:-1] - 1] = False  # from one strand's tip to the next one's root
-    starts = np.flatnonzero(is_segment)
     splat = np.zeros(int(np.prod(grid.shape)))
-    for first in range(0, len(starts), _AT_ONCE):
-        splat += _area_in_cells(strands, starts[first : first + _AT_ONCE], grid)
+    tips = strands.offsets[1:] - 1
+    for first in range(0, strands.point_count - 1, _AT_ONCE):
+        some = slice(first, min(first + _AT_ONCE, strands.point_count - 1))
+        to_next_root = tips[np.searchsorted(tips, some.start) : np.searchsorted(tips, some.stop)]
+        splat += _area_in_cells(strands, some, to_next_root - first, grid)
     # area per volume x cell = area / cell^2; spread as a trilinear splat would, on average
     return _spread((splat / grid.cell**2).reshape(grid.shape).astype(np.float32))
 
 
-def _area_in_cells(strands: StrandSet, start: Ints, grid: Grid) -> Floats:
-    """Seen area of the segments that begin at these CVs in each cell, (cell_count,) [m^2]."""
-    step = strands.points[start + 1] - strands.points[start]
-    length = np.linalg.norm(step, axis=1)
-    piece_count = np.maximum(1, np.ceil(length / (0.7 * grid.cell))).astype(np.int64)
-    segment = np.repeat(np.arange(len(start)), piece_count)
-    first = np.repeat(np.cumsum(piece_count) - piece_count, piece_count)
-    along = (np.arange(len(segment)) - first + 0.5) / piece_count[segment]
-    middle = strands.points[start][segment] + step[segment] * along[:, None].astype(np.float32)
+def _area_in_cells(strands: StrandSet, some: slice, none: Ints, grid: Grid) -> Floats:
+    """Seen area of the segments that begin at these CVs in each cell, (cell_count,) [m^2].
 
-    radius = 0.5 * (strands.radius[start] + strands.radius[start + 1])
-    area = (np.pi / 4.0) * 2.0 * radius * length / piece_count
-    cell_count = int(np.prod(grid.shape))
-    found: Floats = np.bincount(_flat_index(middle, grid), area[segment], minlength=cell_count)
+    Args:
+        none: which of these begin no segment, since they are tips.
+    """
+    # by axes, as numpy is slow at rows of three
+    points = grid.coordinates(strands.points[some.start : some.stop + 1]).T + np.float32(0.5)
+    points = np.ascontiguousarray(points)
+    start, step = points[:, :-1], points[:, 1:] - points[:, :-1]
+    length = np.sqrt(dot_rows(step, step))  # in cells
+    length[none] = 0.0
+    pieces = np.maximum(1, np.ceil(length / np.float32(0.7))).astype(np.int64)
+    radius = strands.radius[some.start : some.stop + 1]
+    area = (np.pi / 4.0 * grid.cell) * (radius[1:] + radius[:-1]) * length / pieces
+    found: Floats = np.zeros(int(np.prod(grid.shape)))
+    for count in np.unique(pieces).tolist():
+        own = np.flatnonzero(pieces == count)
+        begin, whole, part = start[:, own], step[:, own], area[own]
+        for piece in range(count):
+            middle = begin + whole * np.float32((piece + 0.5) / count)
+            found += np.bincount(_flat_index(middle, grid), part, minlength=len(found))
     return found
 
 
@@ -124,29 +167,38 @@ def _is_below(points: Floats, body: Surface, depth: float) -> Bools:
 
 
 def sample(values: Floats, coordinates: Floats) -> Floats:
-    """Trilinear look-up in a grid, (n,); outside of it, its border's value."""
-    limit = np.array(values.shape, np.float32) - 1.0
-    inside = np.clip(coordinates, 0.0, limit)
-    cell = np.minimum(inside.astype(np.int32), np.array(values.shape, np.int32) - 2)
-    fraction = inside - cell
-    strides = np.array([values.shape[1] * values.shape[2], values.shape[2], 1])
-    flat, index = values.ravel(), cell @ strides
-    total = np.zeros(len(coordinates), np.float32)
-    for corner in itertools.product((0, 1), repeat=3):
-        weight = np.prod(
-            [
-                fraction[:, axis] if far else 1.0 - fraction[:, axis]
-                for axis, far in enumerate(corner)
-            ],
-            axis=0,
-        )
-        total += weight * flat[index + int(strides @ corner)]
-    return total
+    """Trilinear look-up in a grid, (n,) float32; outside of it, its border's value."""
+    # by axes, as numpy is slow at rows of three
+    inside = np.ascontiguousarray(coordinates.T, np.float32)
+    for place, count in zip(inside, values.shape, strict=True):
+        np.clip(place, 0.0, count - 1, out=place)
+    cell = np.minimum(inside.astype(np.int32), np.array(values.shape, np.int32)[:, None] - 2)
+    inside -= cell
+    along_x, along_y = values.shape[1] * values.shape[2], values.shape[2]
+    flat, index = values.ravel(), cell[0] * along_x + cell[1] * along_y + cell[2]
+
+    def along_z(corner: int) -> Floats:
+        low = flat.take(index + corner)
+        return _between(low, flat.take(index + (corner + 1)), inside[2])
+
+    near = _between(along_z(0), along_z(along_y), inside[1])
+    far = _between(along_z(along_x), along_z(along_x + along_y), inside[1])
+    return _between(near, far, inside[0])
+
+
+def _between(one: Floats, other: Floats, part: Floats) -> Floats:
+    """On the way from values to others, in place of the first."""
+    other -= one
+    other *= part
+    one += other
+    return one
 
 
 def _flat_index(points: Floats, grid: Grid) -> Ints:
-    cell = ((points - grid.low.astype(np.float32)) / np.float32(grid.cell)).astype(np.int32)
-    x, y, z = np.clip(cell, 0, np.array(grid.shape, np.int32) - 1).T
+    """Of the cells in which points (3, n) in cells from the low corner lie."""
+    x, y, z = points.astype(np.int32)
+    for axis, count in zip((x, y, z), grid.shape, strict=True):
+        np.clip(axis, 0, count - 1, out=axis)
     return (x * grid.shape[1] + y) * grid.shape[2] + z
 
 

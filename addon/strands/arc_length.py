@@ -8,6 +8,8 @@ from ..arrays import Floats, Ints
 
 #: Points that lie nearer than this to where evenly spaced ones are count as such, in lengths.
 _EVEN = 0.02
+#: Parts of a power of two by which a typical length counts.
+_TYPICAL = 512
 
 
 def steps(points: Floats, offsets: Ints) -> Floats:
@@ -27,19 +29,39 @@ def steps(points: Floats, offsets: Ints) -> Floats:
 
 def lengths(points: Floats, offsets: Ints) -> Floats:
     """Arc length of each strand, (strand_count,) float32 [m]; arguments as of `steps`."""
-    totals = np.concatenate([[0.0], np.cumsum(steps(points, offsets))])
-    return (totals[offsets[1:]] - totals[offsets[:-1]]).astype(np.float32)
+    if len(offsets) < 2:
+        return np.zeros(0, np.float32)
+    total: Floats = np.add.reduceat(steps(points, offsets), offsets[:-1])
+    return total.astype(np.float32)
+
+
+def typical(length: Floats) -> float:
+    """The median of lengths (n,) by its first binary digits: a brush that touches some strands does
+    not change what is measured by it everywhere else."""
+    mantissa, exponent = np.frexp(np.median(length))
+    return float(np.ldexp(np.round(mantissa * _TYPICAL), exponent)) / _TYPICAL
+
+
+def reached(points: Floats, offsets: Ints) -> Floats:
+    """The distance from the root along its strand at each point, (point_count,) float64 [m]; that
+    of one strand does not depend on others, nor by rounding. Arguments as of `steps`.
+    """
+    length, counts = steps(points, offsets), np.diff(offsets)
+    if len(counts) and (counts == counts[0]).all():
+        return np.cumsum(length.reshape(len(counts), -1), axis=1).ravel()
+    for count in np.unique(counts).tolist():
+        own = offsets[:-1][counts == count, None] + np.arange(count)
+        length[own] = np.cumsum(length[own], axis=1)
+    return length
 
 
 def along(points: Floats, offsets: Ints) -> Floats:
     """The fraction of its strand's length at which each point lies, (point_count,) float64; by the
     points' numbers where a strand has no length. Arguments as of `steps`.
     """
-    counts = np.diff(offsets)
-    total = np.cumsum(steps(points, offsets))
-    reached = total - np.repeat(total[offsets[:-1]], counts)
-    length = np.repeat(total[offsets[1:] - 1] - total[offsets[:-1]], counts)
-    fraction = np.divide(reached, length, out=even(offsets), where=length > 0.0)
+    length = reached(points, offsets)
+    whole = np.repeat(length[offsets[1:] - 1], np.diff(offsets))
+    fraction = np.divide(length, whole, out=even(offsets), where=whole > 0.0)
     fraction[offsets[1:] - 1] = 1.0
     return np.minimum(fraction, 1.0)
 
@@ -57,3 +79,22 @@ def even(offsets: Ints) -> Floats:
     counts = np.diff(offsets)
     number = np.arange(offsets[-1]) - np.repeat(offsets[:-1], counts)
     return number / np.repeat(np.maximum(counts - 1, 1), counts)
+
+
+def first_as_far(along: Floats, offsets: Ints, wanted: Floats) -> Ints:
+    """The first point of each strand that is as far along it as wanted, (strand_count, n).
+
+    Args:
+        along: see `reached`. wanted: (strand_count, n) [m], no farther than its tip.
+    """
+    number = np.arange(len(wanted))
+    length = np.maximum(along[offsets[1:] - 1], np.finfo(np.float64).tiny)
+    # ascending over all strands, so that one search serves them all; as the number of a strand
+    # takes of its digits, it may find the point before or after
+    every = along / np.repeat(length, np.diff(offsets)) + 2.0 * np.repeat(number, np.diff(offsets))
+    asked = wanted / length[:, None] + 2.0 * number[:, None]
+    right = np.searchsorted(every, asked.ravel(), side="left").reshape(wanted.shape)
+    low, high = offsets[:-1, None], offsets[1:, None] - 1
+    right = np.clip(right, low, high)
+    right = np.where(along[np.maximum(right - 1, low)] >= wanted, np.maximum(right - 1, low), right)
+    return np.where(along[right] < wanted, np.minimum(right + 1, high), right)

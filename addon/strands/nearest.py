@@ -27,8 +27,8 @@ def nearest_points(places: Floats, among: Floats, count: int) -> tuple[Ints, Flo
     kept = min(count, len(among))
     index = np.zeros((len(places), kept), np.int64)
     distance = np.zeros((len(places), kept))
-    middle = np.asarray(among, np.float64).mean(axis=0)
-    place, point = places - middle, among - middle
+    # as they are, so that an answer does not depend on what else is asked, nor by rounding
+    place, point = np.asarray(places, np.float64), np.asarray(among, np.float64)
     parts: list[tuple[Ints, Ints]] = []
     if len(places):
         parts.append((np.arange(len(places)), np.arange(len(among))))

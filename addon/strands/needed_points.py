@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 
 from ..arrays import Bools, Floats, Ints
-from .arc_length import along
+from .arc_length import along, typical
 from .join import joined
+from .kept import NOTHING_KEPT, Kept
 from .resample import resample
 from .strand_set import StrandSet
 
@@ -24,17 +25,30 @@ _STEP = 1.25
 _CHUNK = 100_000
 
 
-def with_needed_points(strands: StrandSet, least: int, most: int = MAX_POINTS) -> StrandSet:
+def with_needed_points(
+    strands: StrandSet, least: int, most: int = MAX_POINTS, kept: Kept = NOTHING_KEPT
+) -> StrandSet:
     """The same strands with fewer points where these do, and more where there are few.
 
     A strand is resampled evenly to as few points as it takes to lose at most LOST of its length and
     to stray by at most STRAY of the median length of all. Where that is no fewer than its own, it
     keeps its own, and one of fewer than `least` gets more between them.
+
+    Args:
+        kept: of the strands that were asked about last, if they are of one point count.
     """
     own = strands.point_counts
     if not strands.strand_count or (own == least).all():
         return strands
-    needed, is_even = _needed(strands, least, most)
+    stray = STRAY * typical(strands.lengths())
+
+    def of(some: Ints) -> tuple[Ints, Bools]:
+        return _needed(strands.take(some), least, most, stray)
+
+    if strands.is_uniform:
+        needed, is_even = kept.rows("points", (least, most, stray), (strands.grid,), of)
+    else:
+        needed, is_even = _needed(strands, least, most, stray)
     if np.array_equal(needed, own) and not is_even.any():
         return strands
     parts, order = [], []
@@ -51,7 +65,7 @@ def with_needed_points(strands: StrandSet, least: int, most: int = MAX_POINTS) -
     return whole.take(np.argsort(np.concatenate(order)))
 
 
-def _needed(strands: StrandSet, least: int, most: int) -> tuple[Ints, Bools]:
+def _needed(strands: StrandSet, least: int, most: int, stray: float) -> tuple[Ints, Bools]:
     """How many points each strand gets, and whether evenly, (strand_count,) each.
 
     The least of all strands is tried first, as it suffices for most, then the next below its own,
@@ -63,7 +77,6 @@ def _needed(strands: StrandSet, least: int, most: int) -> tuple[Ints, Bools]:
     low = np.zeros(len(own), np.int64)
     last = np.where(own == least, 0, np.maximum(counts.searchsorted(own), 1))
     high = last.copy()
-    stray = STRAY * float(np.median(strands.lengths()))
     tried = np.zeros(len(own), np.int64)
     while (left := np.flatnonzero(low < high)).size:
         for number in np.unique(tried[left]).tolist():

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..arrays import Floats, Ints
-from .arc_length import steps
+from .arc_length import first_as_far, reached
 from .strand_set import StrandSet
 
 
@@ -48,13 +48,10 @@ def arc_length_positions(strands: StrandSet, cv_count: int) -> tuple[Ints, Float
         left: (strand_count, cv_count) indices into points.
         weight: (strand_count, cv_count) in [0, 1].
     """
-    # ascending over all strands, so one search serves them all
-    along = np.cumsum(steps(strands.points, strands.offsets))
+    along = reached(strands.points, strands.offsets)
     first, last = strands.offsets[:-1], strands.offsets[1:] - 1
-
-    fraction = np.linspace(0.0, 1.0, cv_count)
-    wanted = along[first, None] + (along[last] - along[first])[:, None] * fraction
-    right = np.searchsorted(along, wanted.ravel(), side="left").reshape(wanted.shape)
+    wanted = along[last, None] * np.linspace(0.0, 1.0, cv_count)
+    right = first_as_far(along, strands.offsets, wanted)
     right = np.clip(right, first[:, None] + 1, last[:, None])
     left = right - 1
     span = along[right] - along[left]

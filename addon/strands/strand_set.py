@@ -127,7 +127,9 @@ class StrandSet:
         """Lowest and highest corner of all points, each (3,) [m]; zeros for an empty set."""
         if not self.point_count:
             return np.zeros(3, np.float32), np.zeros(3, np.float32)
-        return self.points.min(axis=0), self.points.max(axis=0)
+        axes = self.points.T  # one by one, as numpy is slow at rows of three
+        low, high = [axis.min() for axis in axes], [axis.max() for axis in axes]
+        return np.array(low), np.array(high)
 
     def lengths(self) -> Floats:
         """Arc length of each strand, (strand_count,) [m]."""

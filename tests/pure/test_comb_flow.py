@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from small_wig import GUIDES, curves, sheet
+from small_wig import GUIDES, curves, sheet, turned
 
 from hairloom.addon import pipeline
 from hairloom.addon.comb_flow import combed
@@ -13,19 +13,6 @@ from hairloom.addon.groom.children_settings import ChildrenSettings
 from hairloom.addon.strands import StrandSet
 
 COMBED = np.array([3, 17, 40])
-
-
-def turned(strands: StrandSet, number: np.ndarray, angle: float) -> StrandSet:
-    """The same with some strands turned around their roots, about Z."""
-    points = strands.points.copy()
-    turn = np.array(
-        [[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]]
-    )
-    for strand in number:
-        own = slice(strands.offsets[strand], strands.offsets[strand + 1])
-        root = points[own][0]
-        points[own] = root + (points[own] - root) @ turn.T
-    return strands.with_points(points)
 
 
 def rig_of(strands: StrandSet, settings: ChildrenSettings) -> pipeline.Rig:

@@ -22,7 +22,7 @@ from ...errors import HairloomError
 from .thread_work import ThreadWork
 
 #: What is on its way is looked for this often [s], or where it waits for this thread.
-ARRIVAL_TIME, SERVING_PAUSE = 0.1, 0.01
+ARRIVAL_TIME, SERVING_PAUSE = 0.05, 0.01
 
 type Step = Callable[[], float | None]
 type Work[Result] = Callable[[ThreadWork[Result]], Result]

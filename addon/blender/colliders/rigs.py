@@ -10,16 +10,20 @@ from ...groom.settings import GuideSettings
 from ...groom.width_settings import WidthSettings
 from ...params import SettingsMap
 from ...pipeline import Rig
+from ...strands.kept import NOTHING_KEPT, Kept
 from ..properties.groom_settings import GroomSettings
 from ..scene.source import Source
 from .fields import solid_of
 
 
-def rig_from(source: Source, settings: SettingsMap, *, place: str) -> Rig:
+def rig_from(
+    source: Source, settings: SettingsMap, *, place: str, kept: Kept = NOTHING_KEPT
+) -> Rig:
     """The hair made ready, at rest as it was read; from arrays alone.
 
     Args:
         place: names the hair in messages.
+        kept: see `pipeline.prepare`.
 
     Raises:
         HairloomError: no hair that can be used.
@@ -35,6 +39,7 @@ def rig_from(source: Source, settings: SettingsMap, *, place: str) -> Rig:
         holders=source.holders,
         partings=source.partings,
         head_field=lambda: solid_of(source.head),
+        kept=kept,
     )
 
 

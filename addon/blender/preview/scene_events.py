@@ -26,7 +26,7 @@ from .preview import Preview
 from .previews import attempt, previews
 
 #: Edits come in bursts, as brush strokes do: read again when this long [s] nothing came.
-SETTLING_TIME = 0.2
+SETTLING_TIME = 0.1
 
 #: Shading is drawn by quick tables while a slider moves, by full ones when it rests this long [s].
 REFINING_TIME = 0.3

@@ -17,6 +17,7 @@ from ...strands import StrandSet
 from ...strands.affine import moved
 from ...strands.clean import Cleaned
 from ...strands.colors import color_notes
+from ...strands.kept import Kept
 from ..bakes.baked_rig import BakedRig, RestMatrices
 from ..bakes.groom_hashes import groom_frame_hash, groom_rig_hash
 from ..base.objects import Body, head_of, matrix_of
@@ -56,7 +57,10 @@ class GroomSource:
         self._head_uid = head and head.session_uid
         self._parting_state = parting_state(hair)
         self.settings = GroomSettings.of(hair, depsgraph)
-        self.request = BuildRequest(self.name, self.source, self.settings, holding=self._holding)
+        self._kept = Kept()
+        self.request = BuildRequest(
+            self.name, self.source, self.settings, holding=self._holding, kept=self._kept
+        )
         check_finite(hair.name, self.hair.rest)
 
     @property
@@ -155,7 +159,8 @@ class GroomSource:
             partings=partings,
             parting_warnings=parting_warnings,
         )
-        request = BuildRequest(self.name, source, GroomSettings.of(hair), holding=holding)
+        settings = GroomSettings.of(hair)
+        request = BuildRequest(self.name, source, settings, holding=holding, kept=self._kept)
         if (
             request.gives_rig_of(known)
             and request.settings[AmbientSettings] == known.settings[AmbientSettings]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Self
 
 import numpy as np
 
@@ -28,6 +29,13 @@ class NumpySolver:
         self._is_baked = False
         self._strands: Floats | None = None
         self._led = NOT_LED
+
+    @classmethod
+    def at_rest(cls, rig: Rig, pose: Pose) -> Self:
+        """With hair in its style in this pose, as `rest` brings it there."""
+        solver = cls(rig, pipeline.begin(rig, pose))
+        solver._strands = pipeline.strands_at_rest(rig, pose)
+        return solver
 
     @property
     def pose(self) -> Pose:

@@ -8,6 +8,7 @@ do. In the background it is made at once.
 from __future__ import annotations
 
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -21,6 +22,7 @@ from ...groom.settings import GuideSettings
 from ...pipeline import Rig
 from ...shading.ambient_settings import AmbientSettings
 from ...strands import StrandSet, Surface
+from ...strands.kept import NOTHING_KEPT, Kept
 from ..colliders.rigs import rig_from
 from ..colliders.ties import Holding
 from ..properties.groom_settings import GroomSettings
@@ -44,6 +46,7 @@ class BuildRequest:
 
     name: of the groom, in messages. rig: that of its bake; None: it is to be made.
     holding: what holds the hair beside its roots, and follows these objects.
+    kept: what was made last for the same session, which makes one thing at a time.
     """
 
     name: str
@@ -51,6 +54,7 @@ class BuildRequest:
     settings: GroomSettings
     rig: Rig | None = None
     holding: Holding = field(default_factory=Holding)
+    kept: Kept = NOTHING_KEPT
 
     def gives_rig_of(self, other: BuildRequest) -> bool:
         """Whether both give the same rig, as far as is known without building it."""
@@ -115,7 +119,8 @@ def rig_of(request: BuildRequest) -> Rig:
     """
     if request.rig is not None:
         return request.rig
-    return rig_from(request.source, request.settings.sections, place=request.name)
+    settings, kept = request.settings.sections, request.kept
+    return rig_from(request.source, settings, place=request.name, kept=kept)
 
 
 def build(
@@ -162,6 +167,22 @@ def prepared(
         report: is called before each stage with its name; may end it all by an exception.
     """
     report("ambient occlusion")
+    with ThreadPoolExecutor(1) as beside:
+        # here, as the window's first frame would wait for it; numpy leaves room for both
+        riders = beside.submit(lambda: rig.riders)
+        groom = _drawn(rig, ambient, known, with_occluders, report)
+        riders.result()
+    return groom
+
+
+def _drawn(
+    rig: Rig,
+    ambient: AmbientSettings,
+    known: PreparedGroom | None,
+    with_occluders: bool,
+    report: Report,
+) -> PreparedGroom:
+    """As `prepared`, without what moves it."""
     if known is not None and not _same_hair(known.rig, rig):
         known = None
     if known is not None and known.occlusion is not None and known.ambient == ambient:
@@ -175,7 +196,6 @@ def prepared(
         corners = np.stack([roots.min(axis=0), roots.max(axis=0)])
         occluders = rig.head.latest(OccluderSpheres, corners)
     rank = pipeline.strand_ranks(rig)
-    _ = rig.riders  # found in the thread that builds, as the window's first frame would wait for it
     return PreparedGroom(rig, ambient, occlusion, rank, occluders)
 
 

@@ -284,8 +284,7 @@ class Session:
         if moved is None:
             return
         self.groom = replace(self.groom, rig=combed(self.rig, *moved))
-        self.solver = NumpySolver(self.rig)
-        self.solver.rest(self._pose(depsgraph))
+        self.solver = NumpySolver.at_rest(self.rig, self._pose(depsgraph))
         self._show()
 
     def take_settings(self) -> None:

@@ -1,0 +1,117 @@
+"""What is kept changes nothing but the time."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hairloom.addon.strands.kept import NOTHING_KEPT, Kept
+from hairloom.addon.strands.nearest import nearest_points
+
+
+def cloud(count: int, seed: int, rounded: int | None = None) -> np.ndarray:
+    """Points in a cube; on a grid of this many places along its side, where many are as near."""
+    points = np.random.default_rng(seed).uniform(-1.0, 1.0, (count, 3))
+    return (points if rounded is None else np.round(points * rounded) / rounded).astype(np.float32)
+
+
+def change(points: np.ndarray, kind: str, seed: int) -> np.ndarray:
+    """Some of the points moved, taken away, added, or all of them shuffled."""
+    random = np.random.default_rng(seed)
+    some = random.choice(len(points), max(len(points) // 20, 1), replace=False)
+    if kind == "moved":
+        points = points.copy()
+        points[some] += random.normal(0.0, 0.05, (len(some), 3)).astype(np.float32)
+    elif kind == "fewer":
+        points = np.delete(points, some, axis=0)
+    elif kind == "more":
+        points = np.insert(points, np.sort(some), cloud(len(some), seed + 1), axis=0)
+    elif kind == "shuffled":
+        points = points[random.permutation(len(points))]
+    return points
+
+
+CHANGES = ("nothing", "moved", "fewer", "more", "shuffled")
+
+
+@pytest.mark.parametrize("rounded", [None, 5])
+@pytest.mark.parametrize("of_places", CHANGES)
+@pytest.mark.parametrize("of_points", CHANGES)
+def test_nearest_points_are_those_that_are_found_from_nothing(
+    of_places: str, of_points: str, rounded: int | None
+) -> None:
+    places, among, kept = cloud(300, 1, rounded), cloud(200, 2, rounded), Kept()
+    for step in range(4):
+        found = kept.nearest("here", places, among, 5)
+        wanted = nearest_points(places, among, 5)
+        for one, other in zip(found, wanted, strict=True):
+            np.testing.assert_array_equal(one, other)
+        places, among = (
+            change(places, of_places, 10 * step),
+            change(among, of_points, 10 * step + 5),
+        )
+
+
+def test_few_places_are_asked_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    from hairloom.addon.strands import kept as module
+
+    asked: list[int] = []
+
+    def counted(places: np.ndarray, among: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
+        if count > 1:
+            asked.append(len(places))
+        return nearest_points(places, among, count)
+
+    monkeypatch.setattr(module, "nearest_points", counted)
+    places, among, kept = cloud(2000, 1), cloud(2000, 2), Kept()
+    kept.nearest("here", places, among, 5)
+    among = among.copy()
+    among[7] += np.float32(0.01)
+    kept.nearest("here", places, among, 5)
+    assert asked[0] == 2000 and 0 < asked[1] < 30
+
+
+def test_only_new_rows_are_made() -> None:
+    """Wherever others have been; and numbers of any kind count bit by bit."""
+    kept, asked = Kept(), []
+    rows = np.random.default_rng(3).normal(size=(50, 4, 3)).astype(np.float32)
+    key = np.arange(50, dtype=np.uint64)
+
+    def made(rows: np.ndarray, key: np.ndarray, kept: Kept, factor: int = 2) -> np.ndarray:
+        def make(some: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+            asked.append(some)
+            return rows[some].sum(axis=1) * factor, key[some] + 1
+
+        total, after = kept.rows("sums", (factor,), (rows, key), make)
+        np.testing.assert_array_equal(total, rows.sum(axis=1) * factor)
+        np.testing.assert_array_equal(after, key + 1)
+        return asked[-1]
+
+    assert len(made(rows, key, kept)) == 50
+    other = rows.copy()
+    other[7, 2, 1] = np.nextafter(other[7, 2, 1], np.float32(9))
+    np.testing.assert_array_equal(made(other, key, kept), [7])
+    order = np.random.default_rng(4).permutation(50)[:30]
+    count = len(asked)
+    made(other[order], key[order], kept)
+    assert len(asked) == count, "all of them are known"
+    assert len(made(rows, key, kept)) == 21, "those that were not asked for last are forgotten"
+    key = key.copy()
+    key[3] = 1 << 40
+    np.testing.assert_array_equal(made(rows, key, kept), [3])
+    assert len(made(rows, key, kept, factor=3)) == 50
+    assert len(made(rows[:0], key[:0], kept, factor=4)) == 0
+    assert len(made(rows, key, NOTHING_KEPT, factor=3)) == 50
+    assert len(made(rows, key, NOTHING_KEPT, factor=3)) == 50
+
+
+def test_rows_that_swap_two_numbers_are_told_apart() -> None:
+    rows = np.array([[1.0, 2.0], [2.0, 1.0], [1.0, 2.0]], np.float32)
+    kept = Kept()
+
+    def first(rows: np.ndarray) -> list[float]:
+        return kept.rows("first", (), (rows,), lambda some: (rows[some, 0],))[0].tolist()
+
+    assert first(rows) == [1.0, 2.0, 1.0]
+    assert first(rows[::-1]) == [1.0, 2.0, 1.0]
+    assert first(rows[1:2]) == [2.0]

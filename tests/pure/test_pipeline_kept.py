@@ -1,0 +1,99 @@
+"""A groom that is made again while it is combed and painted is what is made of it from nothing, bit
+for bit."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from small_wig import curves, sheet, turned
+
+from hairloom.addon import pipeline
+from hairloom.addon.dynamics.colliders import DistanceField
+from hairloom.addon.groom.children_settings import ChildrenSettings
+from hairloom.addon.groom.settings import GuideSettings
+from hairloom.addon.strands import StrandSet, Surface
+from hairloom.addon.strands.kept import Kept
+
+STROKES = 3
+HEAD = sheet()
+
+
+def block() -> DistanceField:
+    """A box below the sheet and a bump on it, through which some children go."""
+    low, cell = np.array([-0.15, -0.15, -0.1]), 0.01
+    axes = [start + cell * np.arange(count) for start, count in zip(low, (31, 31, 31), strict=True)]
+    x, y, z = np.meshgrid(*axes, indexing="ij")
+    bump = np.sqrt(x * x + y * y + (z + 0.02) ** 2) - 0.05
+    return DistanceField(np.minimum(z + 0.005, bump).astype(np.float32), low, cell)
+
+
+def same(one: Any, other: Any, where: str = "rig") -> None:
+    """That all arrays and numbers are, down to the last bit."""
+    if isinstance(one, np.ndarray):
+        assert one.dtype == other.dtype, where
+        np.testing.assert_array_equal(one, other, where)
+    elif isinstance(one, Surface):
+        assert one is other, where
+    elif hasattr(one, "__dataclass_fields__"):
+        for name in one.__dataclass_fields__:
+            same(getattr(one, name), getattr(other, name), f"{where}.{name}")
+    else:
+        assert one == other, where
+
+
+def combed(strands: StrandSet, stroke: int) -> StrandSet:
+    number = np.random.default_rng(stroke).choice(strands.strand_count, 5, replace=False)
+    return turned(strands, number, 0.4 * (stroke + 1))
+
+
+def painted(stroke: int) -> np.ndarray:
+    """More and less hair in some places."""
+    x, y, _ = HEAD.positions.T
+    away = np.hypot(x - 0.03 * stroke, y - 0.02)
+    return np.where(away < 0.04, 0.3, 1.0).astype(np.float32)
+
+
+@pytest.mark.parametrize("does", [combed, painted])
+@pytest.mark.parametrize("guides", [30, 100])
+@pytest.mark.parametrize(
+    "settings",
+    [
+        ChildrenSettings(method="multi", strand_count=1500),
+        ChildrenSettings(method="single", strand_count=1500, length_variation=0.4),
+        ChildrenSettings(method="multi", strand_count=4500, clump=0.7, frizz=0.05),
+    ],
+    ids=["multi", "single", "clumped"],
+)
+def test_it_is_what_is_made_from_nothing(
+    settings: ChildrenSettings, guides: int, does: Callable[..., Any]
+) -> None:
+    kept, field = Kept(), block()
+    strands, density = curves(), np.ones(len(HEAD.positions), np.float32)
+
+    def made(kept: dict[str, Kept]) -> pipeline.Rig:
+        return pipeline.prepare(
+            strands,
+            HEAD,
+            GuideSettings(guide_count=guides, cv_count=8),
+            place="a wig",
+            children=settings,
+            density=density,
+            widths="found",
+            head_field=lambda: field,
+            **kept,
+        )
+
+    points = []
+    for stroke in range(STROKES):
+        again, fresh = made({"kept": kept}), made({})
+        same(again, fresh)
+        assert again.child_count > 100
+        points.append(again.strands.points)
+        if does is combed:
+            strands = combed(strands, stroke)
+        else:
+            density = painted(stroke)
+    assert all(not np.array_equal(one, points[-1]) for one in points[:-1])
