@@ -5,7 +5,8 @@ and without children, which would hide the curves that there are. Two seconds of
 at 24 frames a second, and of one of 5 Hz and 3.1 m/s at 60. Each strand counts by its worst frame.
 Depths are distances from the mesh's own triangles, of points inside of it that were outside at
 rest, as if the hair's median length were 25 cm: grooms come in any unit. So are jumps: by how much
-what leading out adds to where strands ride changes from one frame to the next.
+what leading out adds to where strands ride changes from one frame to the next. A jump is a flip if
+it is as far in one of 16 parts of the way between the two frames: the others go there steadily.
 
 What it costs, of Sintel: see `_strands_cost`.
 
@@ -19,6 +20,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -46,6 +48,8 @@ REFERENCE = "strands at rest, and the triangles of the head"
 SECONDS, FPS, FAST_FPS = 2.0, 24.0, 60.0
 MEDIAN_LENGTH = 0.25  # [m]
 JUMP = 0.025  # [m], what leading out adds to the path of a strand in a frame, that is seen
+#: frames from one to the next in which flips are looked for, and the parts of each
+FLIPS_EVERY, PARTS = 6, 16
 GRAVITY = np.array([0.0, 0.0, -9.81])
 #: of the coils [m]; points of each before it is made ready
 COILS, TURNS, COIL_RADIUS, COIL_LENGTH, COIL_POINTS = 8000, 20, 0.004, 0.15, 400
@@ -131,7 +135,8 @@ def shaken(rig: Rig, shake: Any, fps: float) -> dict[str, float]:
     segments, rest_lengths = steps(rest, offsets), lengths(rest, offsets)
     change, depth, worst = (np.zeros(rig.strands.strand_count) for _ in range(3))
     scale = MEDIAN_LENGTH / np.median(rest_lengths)
-    correction, jumped = np.zeros_like(rest), []
+    correction, jumped, flips = np.zeros_like(rest), [], np.zeros(2)
+    motion_before: Motion | None = None
     for motion, matrix in played(rig, collider, shake, fps):
         points = pipeline.strands_and_led(rig, motion)[0]
         assert np.isfinite(points).all()
@@ -145,8 +150,12 @@ def shaken(rig: Rig, shake: Any, fps: float) -> dict[str, float]:
         np.maximum(depth, np.maximum.reduceat(deep, offsets[:-1]), out=depth)
         before = correction
         correction = points - pipeline.strands_at(rig, motion.pose, motion.guides)
-        jump = np.linalg.norm(correction - before, axis=1)
-        jumped.append(np.maximum.reduceat(jump, offsets[:-1]) * scale)
+        jumped.append(_farthest(correction - before, offsets) * scale)
+        if motion_before is not None and len(jumped) % FLIPS_EVERY == 0:
+            is_far = jumped[-1] > JUMP
+            way = _farthest_in_parts(rig, collider, motion_before, motion, before) * scale
+            flips += is_far.sum(), (is_far & (way > JUMP)).sum()
+        motion_before = motion
     depth *= scale
     return {
         "length_p99_percent": float(np.quantile(change, 0.99)) * 100.0,
@@ -157,7 +166,35 @@ def shaken(rig: Rig, shake: Any, fps: float) -> dict[str, float]:
         "strands_inside_percent": 100.0 * float((depth > 0.001).mean()),
         "jump_worst_mm": 1000.0 * float(np.max(jumped)),
         "strands_jump_percent": 100.0 * float((np.array(jumped) > JUMP).mean()),
+        "flips_of_jumps_percent": 100.0 * float(flips[1] / max(flips[0], 1.0)),
     }
+
+
+def _farthest(displacement: Floats, offsets: Ints) -> Floats:
+    """Of each strand the farthest that any of its points goes (point_count, 3), (strand_count,)."""
+    return np.asarray(np.maximum.reduceat(np.linalg.norm(displacement, axis=1), offsets[:-1]))
+
+
+def _farthest_in_parts(
+    rig: Rig, collider: Collider, before: Motion, now: Motion, correction: Floats
+) -> Floats:
+    """Of each strand by how much what leading out adds to it changes, at most, in one part of the
+    way between two frames, on which guides and head go straight.
+
+    Args:
+        correction: (point_count, 3), what it adds in the frame before.
+    """
+    farthest = np.zeros(rig.strands.strand_count)
+    for part in np.arange(1, PARTS + 1) / PARTS:
+        matrix = before.pose.matrix + part * (now.pose.matrix - before.pose.matrix)
+        guides = before.guides + np.float32(part) * (now.guides - before.guides)
+        posed = (PosedCollider(collider, matrix, matrix),)
+        there = replace(now, pose=pose_of(rig, matrix), guides=guides, colliders=posed)
+        last = correction
+        correction = pipeline.strands_and_led(rig, there)[0]
+        correction -= pipeline.strands_at(rig, there.pose, guides)
+        np.maximum(farthest, _farthest(correction - last, rig.strands.offsets), out=farthest)
+    return farthest
 
 
 def _inside(
@@ -231,6 +268,7 @@ def main(names: list[str]) -> int:
         figures |= {"strands_fast_inside_percent": fast["strands_inside_percent"]}
         figures |= {"jump_fast_worst_mm": fast["jump_worst_mm"]}
         figures |= {"strands_fast_jump_percent": fast["strands_jump_percent"]}
+        figures |= {"flips_of_fast_jumps_percent": fast["flips_of_jumps_percent"]}
         if name == "sintel":
             figures |= cost_of(rig)
         if name == "coil":
