@@ -135,9 +135,7 @@ def cycles_figures() -> dict[str, float]:
     rig = rig_of((grown, head.surface), "built-in")
     room, camera = CyclesRoom(), _studio(rig)._camera(1.0)
     strands = rig.strands
-    drawn = drawn_radius(
-        strands.radius, StrandSettings(), along(strands.points, strands.offsets)
-    )
+    drawn = drawn_radius(strands.radius, StrandSettings(), along(strands.points, strands.offsets))
     room.strands(strands.points, drawn, counts=strands.point_counts)
     room.body(head.surface.positions, head.surface.triangles, SKIN, casts_shadow=True)
     room.look(camera)

@@ -43,7 +43,7 @@ def property_group(
 
     Args:
         changed: called with the data-block that owns the group, as soon as a value is edited.
-        is_animated: whether keyframes and drivers may change it, of which `changed` is not told.
+        is_animated: whether keyframes and drivers may change it, of which `changed` does not learn.
     """
     namespace = {
         "__doc__": settings.title,

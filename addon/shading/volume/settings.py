@@ -82,7 +82,7 @@ class VolumeSettings(Settings):
         shown_when=when("volume.shadows", "deep"),
     )
     bias: float = number(
-        0.01,
+        0.003,
         label="Bias",
         description="Minimum distance at which strands shade each other, as a fraction of the "
         "hair's size",
@@ -127,7 +127,7 @@ class VolumeSettings(Settings):
         active_when=_CAN_SCATTER,
     )
     density: float = number(
-        0.75,
+        0.88,
         label="Scattering Density",
         description="Density of the surrounding hair: 0 is a single strand, 1 is full of hair",
         soft=(0.5, 1.0),
