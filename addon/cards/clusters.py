@@ -170,7 +170,9 @@ def _k_means(features: Floats, count: int, random: np.random.Generator) -> Ints:
         means = (sums / np.maximum(sizes, 1)[:, None]).astype(np.float32)
         means[lost] = learnt[worst]
     label, _ = _nearest(features, means)
-    return np.unique(label, return_inverse=True)[1].astype(np.int32)
+    # strands that are the same may differ by a rounding in the distances, where means coincide
+    _, first, same = np.unique(features, axis=0, return_index=True, return_inverse=True)
+    return np.unique(label[first][same], return_inverse=True)[1].astype(np.int32)
 
 
 def _far_apart(features: Floats, count: int, random: np.random.Generator) -> Floats:
