@@ -43,6 +43,12 @@ float within_map(vec2 place)
   return clamp((0.5 - max(away.x, away.y)) / {{map_border}}, 0.0, 1.0);
 }
 
+// What of a place's depth is compared with that of meshes.
+float depth_before_meshes(Opacity opacity, float depth)
+{
+  return depth - max(opacity.bias, {{least_mesh_bias}});
+}
+
 // How broad a strand of the width 1 m is in a light's map, in texels. `across` is the unit vector
 // across it there, xyw its place before the division.
 float strand_breadth(Opacity opacity, int light, vec3 xyw, vec2 across)

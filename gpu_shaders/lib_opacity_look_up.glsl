@@ -82,7 +82,8 @@ vec3 light_path(int light, vec3 point)
     return vec3(0.0, 0.0, 1.0);
   }
   float depth = min(place.z, 1.0) - opacity.bias;
-  vec2 meshes = mesh_path(map, place.xy, depth), tau = vec2(0.0);
+  vec2 meshes = mesh_path(map, place.xy, depth_before_meshes(opacity, min(place.z, 1.0)));
+  vec2 tau = vec2(0.0);
 #if DEEP
   vec2 scaled = place.xy * float(opacity.resolution) - 0.5;
   vec2 fraction = scaled - floor(scaled);

@@ -46,7 +46,7 @@ float light_past_meshes(int index, vec3 point, vec3 normal, vec3 path)
     within = within_map(place.xy);
 #  ifdef MESH_SHADOWS
     // depths before and behind all hair are not distinguished
-    within = min(within, within_map(vec2(0.5, place.z - opacity.bias)));
+    within = min(within, within_map(vec2(0.5, depth_before_meshes(opacity, place.z))));
     within = map_is_finer(index, point) ? within : 0.0;
 #  endif
   }

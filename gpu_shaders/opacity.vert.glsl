@@ -18,7 +18,8 @@ vec4 map_position(vec3 point)
 bool is_hidden(vec4 clip, float around)
 {
   int side = textureSize(opacity_meshes, 0).x, map = int(opacity.light[light_index].x);
-  float w = max(clip.w, 1.0e-6), depth = 0.5 * clip.z / w + 0.5 - opacity.bias;
+  float w = max(clip.w, 1.0e-6);
+  float depth = depth_before_meshes(opacity, 0.5 * clip.z / w + 0.5);
   vec2 place = 0.5 * clip.xy / w + 0.5;
   for (int corner = 0; corner < 4; corner++) {
     vec2 aside = around * (2.0 * vec2(corner & 1, corner >> 1) - 1.0);

@@ -30,6 +30,9 @@ from .settings import VolumeSettings
 
 #: deep layers together are at least so thick
 MIN_THICKNESS = 1.0 / 1024.0
+#: meshes this close in front do not count, whatever the bias of strands: a facet that light grazes
+#: is as much deeper on one side of a texel than on the other
+LEAST_MESH_BIAS = 0.01
 #: fraction of a map's side over which the shadows of meshes on meshes fade to its border
 MAP_BORDER = 0.06
 #: pieces into which the reference cuts strands, in texels
@@ -96,7 +99,8 @@ def look_up(
         meshes: (side, side) depth of the first mesh, 1 where there is none; in texels of their own.
         ends: (n,).
         places: (m, 2) in 0..1. depth: (m,).
-        bias: strands and meshes this close in front do not count.
+        bias: strands this close in front do not count, nor do meshes, but for them it is at least
+            LEAST_MESH_BIAS.
         thickness: (resolution, resolution) of each texel's layers together; None is 1.
 
     Returns:
@@ -106,9 +110,10 @@ def look_up(
     resolution = len(layers)
     thick = np.ones_like(starts) if thickness is None else thickness
     inside = np.minimum(depth, 1.0) - bias
+    before_meshes = np.minimum(depth, 1.0) - max(bias, LEAST_MESH_BIAS)
     tau, beyond, lit = np.zeros((3, len(places)))
     for row, column, weight in _corners(places, len(meshes)):
-        lit += weight * (inside <= meshes[row, column])
+        lit += weight * (before_meshes <= meshes[row, column])
     for row, column, weight in _corners(places, resolution):
         sums, start = layers[row, column], starts[row, column]
         middle_row, middle_column = (
