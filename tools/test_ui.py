@@ -54,8 +54,10 @@ SCREENS = {
     "session_engine": _LARGE,
     "session_everyday": _LARGE,
     "session_guide_pictures": "1600x1500x24",
+    "session_midplay": _LARGE,
     "session_random": "800x600x24",
     "session_refinement": _LARGE,
+    "session_strand_export": _LARGE,
 }
 #: random actions, and how many of each seed
 SEEDS = os.environ.get("HAIRLOOM_SEEDS", "1 2 3 4 5").split()
