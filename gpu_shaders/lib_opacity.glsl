@@ -46,7 +46,7 @@ float within_map(vec2 place)
 // What of a place's depth is compared with that of meshes.
 float depth_before_meshes(Opacity opacity, float depth)
 {
-  return depth - max(opacity.bias, {{least_mesh_bias}});
+  return depth - max(opacity.bias, {{min_mesh_bias}});
 }
 
 // How broad a strand of the width 1 m is in a light's map, in texels. `across` is the unit vector

@@ -50,7 +50,7 @@ from ..shading.volume.mesh_light import (
     MESH_TAPS,
     STEEPEST,
 )
-from ..shading.volume.opacity import LEAST_MESH_BIAS, MAP_BORDER, MIN_THICKNESS
+from ..shading.volume.opacity import MAP_BORDER, MIN_MESH_BIAS, MIN_THICKNESS
 from ..shading.volume.transparency import UNSEEN_FRACTION
 from ..strands.vectors import GOLDEN_ANGLE
 from .pixel_parts import DEPTH_END
@@ -136,7 +136,7 @@ CONSTANTS: Mapping[str, str] = MappingProxyType(
         "shade_capacity": str(SHADE_CAPACITY),
         "layer_texel_capacity": str(LAYER_TEXEL_CAPACITY),
         "map_border": repr(MAP_BORDER),
-        "least_mesh_bias": repr(LEAST_MESH_BIAS),
+        "min_mesh_bias": repr(MIN_MESH_BIAS),
         "mesh_frame_capacity": str(MESH_FRAME_CAPACITY),
         "covers": repr(COVERS),
         "other_tau_lights": str(OTHER_TAU_LIGHTS),

@@ -32,7 +32,7 @@ from .settings import VolumeSettings
 MIN_THICKNESS = 1.0 / 1024.0
 #: meshes this close in front do not count, whatever the bias of strands: a facet that light grazes
 #: is as much deeper on one side of a texel than on the other
-LEAST_MESH_BIAS = 0.01
+MIN_MESH_BIAS = 0.01
 #: fraction of a map's side over which the shadows of meshes on meshes fade to its border
 MAP_BORDER = 0.06
 #: pieces into which the reference cuts strands, in texels
@@ -100,7 +100,7 @@ def look_up(
         ends: (n,).
         places: (m, 2) in 0..1. depth: (m,).
         bias: strands this close in front do not count, nor do meshes, but for them it is at least
-            LEAST_MESH_BIAS.
+            MIN_MESH_BIAS.
         thickness: (resolution, resolution) of each texel's layers together; None is 1.
 
     Returns:
@@ -110,7 +110,7 @@ def look_up(
     resolution = len(layers)
     thick = np.ones_like(starts) if thickness is None else thickness
     inside = np.minimum(depth, 1.0) - bias
-    before_meshes = np.minimum(depth, 1.0) - max(bias, LEAST_MESH_BIAS)
+    before_meshes = np.minimum(depth, 1.0) - max(bias, MIN_MESH_BIAS)
     tau, beyond, lit = np.zeros((3, len(places)))
     for row, column, weight in _corners(places, len(meshes)):
         lit += weight * (before_meshes <= meshes[row, column])
