@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 
 from hairloom.addon.errors import HairloomError
+from hairloom.addon.groom import grow as grow_module
 from hairloom.addon.groom.grow import _WHORL, grow, scalp_density
 from hairloom.addon.groom.roots import bind_roots
 from hairloom.addon.groom.scalp import find_cranium
 from hairloom.addon.groom.settings import GrowSettings
+from hairloom.addon.groom.surface_points import GrowthSurface
 from hairloom.addon.strands import StrandSet, Surface
 
 SMALL = GrowSettings(strand_count=400)
@@ -224,3 +226,20 @@ def test_all_extremes_of_the_sliders_give_finite_hair(egg: Surface, extreme: str
 def test_a_head_without_faces_is_told(egg: Surface) -> None:
     with pytest.raises(HairloomError):
         grow(Surface(egg.positions, np.zeros((0, 3))), SMALL)
+
+
+def test_hair_bridges_hollows_and_lies_over_bumps() -> None:
+    """Over a plane, in arcs of 5 mm: the hollow one bends half as much, the other stays."""
+    corners = np.array([[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, 1.0, 0.0]])
+    plane = Surface(corners, np.array([[0, 1, 2], [0, 2, 3]]))
+    along = np.linspace(0.0, 0.3, 16)
+    arc = 0.005 * np.sin(np.pi * along / 0.3)
+    height = 0.01 + np.stack([-arc, arc])
+    grid = np.stack([np.stack([along, np.zeros(16), each], axis=1) for each in height])
+    nothing = np.zeros((2, 15))
+    plan = grow_module._Plan(nothing, nothing, GrowthSurface(plane, reach=0.05, cell=0.004))
+    hollow, bump = grow_module._taut(grid, plan)[..., 2]
+    # the first segment keeps the way in which it leaves the skin
+    assert np.diff(hollow[1:], 2).max() < 0.5 * np.diff(height[0], 2).max()
+    assert (hollow >= height[0]).all() and hollow[8] > height[0, 8] + 0.001
+    assert np.allclose(bump[2:-1], height[1, 2:-1], atol=1e-9)
