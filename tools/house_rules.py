@@ -16,7 +16,16 @@ from pathlib import Path
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 ADDON = REPOSITORY / "addon"
-BLENDER = {"bpy", "bmesh", "bpy_extras", "addon_utils", "blf", "imbuf", "mathutils"}
+BLENDER = {
+    "bpy",
+    "bmesh",
+    "bpy_extras",
+    "rna_keymap_ui",
+    "addon_utils",
+    "blf",
+    "imbuf",
+    "mathutils",
+}
 
 #: modules that stand beside the rooms: the ground floor, and the flows over the pure rooms
 GROUND = {"errors", "arrays"}

@@ -9,14 +9,18 @@ from ..blender.properties.card_group import HAIRLOOM_PG_card_images
 from .drawing import Draw, draw_section
 from .operators_cards import draw_made_cards
 from .preset_chooser import draw_preset_row
+from .state import draw_card_progress
 
 
 def draw_cards(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
     draw_preset_row(layout, hair, "cards")
     draw_section(layout, hair.data.hairloom, "card_drawing")
     session = previews.session_of(hair)
-    lines = () if session is None else session.cards.lines
-    for line in (*lines, "", "")[:2]:  # also without cards: what is below keeps its place
+    # two lines in any state, so that what is below keeps its place
+    lines = ["", ""] if session is None else [*session.cards.lines, "", ""][:2]
+    if draw_card_progress(layout, session):
+        del lines[0]
+    for line in lines:
         layout.label(text=line)
     draw_made_cards(layout, hair)
 

@@ -55,6 +55,42 @@ class HAIRLOOM_OT_preview(bpy.types.Operator):
         return {"FINISHED"}
 
 
+class HAIRLOOM_OT_cancel_build(bpy.types.Operator):
+    """Stop what is being made of the selected hair: without cards its strands are shown, and hair
+    that is not there yet is no longer previewed"""
+
+    bl_idname = "hairloom.cancel_build"
+    bl_label = "Cancel"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if not needs_hair(cls, context):
+            return False
+        if any(map(_is_being_made, chosen_hair(context))):
+            return True
+        cls.poll_message_set("Nothing is being made of the selected hair")
+        return False
+
+    @reporting
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        for hair in filter(_is_being_made, chosen_hair(context)):
+            session = previews.session_of(hair)
+            if session is None or not session.is_made:
+                stop_preview([hair])
+                report(self, "INFO", f"{hair.name}: no longer previewed")
+            else:
+                hair.data.hairloom.use_cards = False
+                report(self, "INFO", f"{hair.name}: strands are shown, not cards")
+        return {"FINISHED"}
+
+
+def _is_being_made(hair: bpy.types.Object) -> bool:
+    """Whether something is on its way that can be done without."""
+    session = previews.session_of(hair)
+    return session is not None and (not session.is_made or session.cards.is_pending)
+
+
 class HAIRLOOM_OT_play(bpy.types.Operator):
     """Simulate previewed hair and fins in real time. Esc stops them"""
 
@@ -236,6 +272,7 @@ def stop_preview(hair: list[bpy.types.Object]) -> None:
 
 CLASSES = (
     HAIRLOOM_OT_preview,
+    HAIRLOOM_OT_cancel_build,
     HAIRLOOM_OT_play,
     HAIRLOOM_OT_stop,
     HAIRLOOM_OT_pause,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container, Iterable
+from collections.abc import Container, Iterable
 from typing import Any
 
 import bpy
@@ -12,8 +12,6 @@ from ..blender.scene.particle_hair import hair_systems
 from ..blender.setup.foreign_heads import may_be_head
 from .drawing import Draw
 from .operators_adopted import draw_sort
-from .operators_strand_export import draw_strand_exports
-from .operators_strand_import import draw_imports
 from .sections import SECTIONS, SESSION_SECTIONS, SUB_SECTIONS, SWITCHES
 from .selection import active_mesh, chosen_hair
 from .state import NAMES, draw_notice, draw_problems_row, draw_state
@@ -75,16 +73,6 @@ def draw_start(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
         column.operator("hairloom.convert_particles", icon="PARTICLES")
     column.operator("hairloom.sample_scene", text="Sample Scene", icon="SCENE_DATA")
     column.menu("HAIRLOOM_MT_import", text="Import", icon="IMPORT")
-
-
-class HAIRLOOM_MT_import(bpy.types.Menu):
-    """Grooms from files"""
-
-    bl_idname = "HAIRLOOM_MT_import"
-    bl_label = "Import Hair"
-
-    def draw(self, _context: bpy.types.Context) -> None:
-        draw_imports(self.layout)
 
 
 class HAIRLOOM_PT_sidebar(bpy.types.Panel):
@@ -186,42 +174,10 @@ class HAIRLOOM_PT_sidebar_mesh_cards(bpy.types.Panel):
         draw_sort(self, context)
 
 
-def draw_import(self: Any, _context: bpy.types.Context) -> None:
-    draw_imports(self.layout)
-
-
-def draw_exports(self: Any, _context: bpy.types.Context) -> None:
-    self.layout.operator("hairloom.export_cards", text="Hair cards (.glb/.fbx/.usd/.obj)")
-    draw_strand_exports(self.layout)
-
-
-def draw_add(self: Any, _context: bpy.types.Context) -> None:
-    self.layout.operator("hairloom.add_groom", icon="OUTLINER_OB_CURVES")
-    self.layout.menu("HAIRLOOM_MT_hairstyles", icon="USER")
-    self.layout.operator("hairloom.sample_scene", icon="SCENE_DATA")
-
-
-MENUS: tuple[tuple[str, Callable[[Any, bpy.types.Context], None]], ...] = (
-    ("TOPBAR_MT_file_import", draw_import),
-    ("TOPBAR_MT_file_export", draw_exports),
-    ("VIEW3D_MT_curve_add", draw_add),
-)
-
 CLASSES: tuple[type[Any], ...] = (
-    HAIRLOOM_MT_import,
     HAIRLOOM_PT_sidebar,
     *_sub_panels(HAIRLOOM_PT_sidebar, only=SESSION_SECTIONS),
     HAIRLOOM_PT_sidebar_mesh_cards,
     HAIRLOOM_PT_data,
     *_sub_panels(HAIRLOOM_PT_data),
 )
-
-
-def register() -> None:
-    for menu, entry in MENUS:
-        getattr(bpy.types, menu).append(entry)
-
-
-def unregister() -> None:
-    for menu, entry in reversed(MENUS):
-        getattr(bpy.types, menu).remove(entry)

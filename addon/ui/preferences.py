@@ -13,6 +13,7 @@ from ..blender.properties.groups import operator_properties
 from ..blender.properties.presets import names
 from ..blender.sessions.solvers import compute_problem
 from ..blender.setup.self_test import last_report
+from .menus import draw_shortcuts
 from .messages import draw_message
 
 #: the package that Blender knows, above this one
@@ -82,6 +83,10 @@ class HAIRLOOM_AP_preferences(bpy.types.AddonPreferences):
         if body:
             for name in self.__annotations__:
                 body.prop(self, name)
+        header, body = layout.panel("hairloom_shortcuts", default_closed=True)
+        header.label(text="Shortcuts")
+        if body:
+            draw_shortcuts(body, context)
         header, body = layout.panel("hairloom_this_machine")
         header.label(text="This Machine")
         if body:

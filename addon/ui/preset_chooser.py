@@ -1,17 +1,17 @@
-"""Presets in the panels: a button that shows all presets of a section with their pictures, and one
-that saves."""
+"""Presets in the panels: the picture of the one that the hair has, which opens those of all others,
+and the buttons that step through them, save and delete."""
 
 from __future__ import annotations
 
-import textwrap
 from typing import Any
 
 import bpy
-from bpy.props import EnumProperty
+from bpy.props import EnumProperty, PointerProperty
 
-from ..blender.properties.presets import Entry, own, shipped
+from ..blender.properties.presets import Entry, own, preset_of, shipped
 from ..blender.scene.principled import has_principled_hair
-from .selection import needs_hair
+from .messages import draw_message
+from .selection import chosen_hair
 
 #: section -> what its presets are called, and what they are about
 KINDS: dict[str, tuple[str, str]] = {
@@ -27,19 +27,39 @@ KIND = EnumProperty(
     items=[(section, *texts) for section, texts in KINDS.items()],
     options={"SKIP_SAVE"},
 )
-#: pictures of presets: how many side by side, and how large; the pixels at UI scale 1 and the
-#: letters that fit across them all
-_ACROSS, _PICTURE_SCALE, _WIDTH, _LETTERS = 3, 5.0, 330, 42
+#: size of the picture in the panel, and of those to choose from
+_SCALE, _POPUP_SCALE = 3.0, 5.0
+#: of hair that has none of the presets, and its number; presets count from 1
+_CUSTOM = ("CUSTOM", "Custom", "Settings that are no preset's", "OPTIONS", 0)
 
 
 def draw_preset_row(
-    layout: bpy.types.UILayout, hair: bpy.types.Object, section: str = "shading", text: str = ""
+    layout: bpy.types.UILayout, hair: bpy.types.Object, section: str = "shading"
 ) -> None:
-    """Draw the two buttons; for looks also those from and to a material."""
+    """Draw the picture of its preset and the buttons; for looks also those from and to a
+    material."""
+    entries, warnings = _entries(section)
+    now = _number(hair, entries)
     row = layout.row(align=True)
-    chooser = row.operator("hairloom.choose_preset", text=text or "Presets", icon="PRESET")
-    chooser.section = section
-    row.operator("hairloom.save_preset", text="", icon="ADD").section = section
+    row.template_icon_view(
+        bpy.context.window_manager.hairloom_presets,
+        section,
+        show_labels=True,
+        scale=_SCALE,
+        scale_popup=_POPUP_SCALE,
+    )
+    buttons = row.column(align=True)
+    steps = buttons.row(align=True)
+    for icon, step in (("TRIA_LEFT", -1), ("TRIA_RIGHT", 1)):
+        beside = entries[(max(now - 1, 0) + step) % len(entries)] if now else entries[0]
+        steps.operator("hairloom.apply_preset", text="", icon=icon).name = beside.name
+    buttons.label(text=entries[now - 1].title if now else _CUSTOM[1])
+    kept = buttons.row(align=True)
+    kept.operator("hairloom.save_preset", text="Save", icon="ADD").section = section
+    if now and entries[now - 1].is_own:
+        kept.operator("hairloom.delete_preset", text="", icon="X").name = entries[now - 1].name
+    for warning in warnings:
+        draw_message(layout, bpy.context, warning, "ERROR")
     if section != "shading":
         return
     materials = layout.row(align=True)
@@ -48,52 +68,63 @@ def draw_preset_row(
     materials.operator("hairloom.look_to_material", text="To Material", icon="MATERIAL")
 
 
-class HAIRLOOM_OT_choose_preset(bpy.types.Operator):
-    """Choose one of Hairloom's presets, or of your own"""
-
-    bl_idname = "hairloom.choose_preset"
-    bl_label = "Presets"
-
-    section: KIND
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return needs_hair(cls, context)
-
-    def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
-        return context.window_manager.invoke_popup(self, width=_WIDTH)
-
-    def execute(self, _context: bpy.types.Context) -> set[str]:
-        return {"FINISHED"}
-
-    def draw(self, _context: bpy.types.Context) -> None:
-        layout = self.layout
-        layout.label(text=KINDS[self.section][0])
-        _draw_grid(layout, shipped(self.section))
-        entries, warnings = own(self.section)
-        if entries:
-            layout.separator()
-            layout.label(text="Your Own")
-            _draw_grid(layout, entries)
-        for warning in warnings:
-            lines = layout.box().column(align=True)
-            for index, line in enumerate(textwrap.wrap(warning, _LETTERS)):
-                lines.label(text=line, icon="BLANK1" if index else "ERROR")
+def _entries(section: str) -> tuple[tuple[Entry, ...], tuple[str, ...]]:
+    """All presets of a section, and what is wrong with files among the artist's own."""
+    entries, warnings = own(section)
+    return (*shipped(section), *entries), warnings
 
 
-def _draw_grid(layout: bpy.types.UILayout, entries: tuple[Entry, ...]) -> None:
-    """Draw a button for each preset, below its picture if it has one."""
-    grid = layout.grid_flow(row_major=True, columns=_ACROSS, even_columns=True, align=False)
-    for entry in entries:
-        cell = grid.column(align=True)
-        if entry.icon:
-            cell.template_icon(icon_value=entry.icon, scale=_PICTURE_SCALE)
-        row = cell.row(align=True)
-        row.operator("hairloom.apply_preset", text=entry.title).name = entry.name
-        if entry.is_own:
-            row.operator("hairloom.delete_preset", text="", icon="X").name = entry.name
-    for _ in range(-len(entries) % _ACROSS):
-        grid.label(text="")
+def _number(hair: bpy.types.Object, entries: tuple[Entry, ...]) -> int:
+    """Which of these presets the hair has, counted from 1; 0 for none."""
+    found = preset_of(hair, entries)
+    return 0 if found is None else 1 + entries.index(found)
 
 
-CLASSES: tuple[type[Any], ...] = (HAIRLOOM_OT_choose_preset,)
+def _choice(section: str) -> Any:
+    """A property that is the preset of the hair that the panels are about; to set it applies
+    another one."""
+    shown: list[tuple[str, str, str, str | int, int]] = []  # Blender keeps no texts of its own
+
+    def items(_choices: Any, _context: bpy.types.Context | None) -> Any:
+        entries, _ = _entries(section)
+        shown[:] = [
+            (each.name, each.title, "", each.icon or "PRESET", number)
+            for number, each in enumerate(entries, start=1)
+        ]
+        if get(_choices) == 0:
+            shown.insert(0, _CUSTOM)
+        return shown
+
+    def get(_choices: Any) -> int:
+        hair = chosen_hair(bpy.context)
+        return _number(hair[0], _entries(section)[0]) if hair else 0
+
+    def choose(_choices: Any, number: int) -> None:
+        if number > 0:
+            name = _entries(section)[0][number - 1].name
+            bpy.ops.hairloom.apply_preset("EXEC_DEFAULT", True, name=name)
+
+    title, about = KINDS[section]
+    return EnumProperty(
+        name=title, description=f"{about}. Click to choose", items=items, get=get, set=choose
+    )
+
+
+class HAIRLOOM_PG_presets(bpy.types.PropertyGroup):
+    """The presets of the selected hair, of which the scene itself keeps only settings."""
+
+    __annotations__ = {section: _choice(section) for section in KINDS}
+
+
+CLASSES: tuple[type[Any], ...] = (HAIRLOOM_PG_presets,)
+
+
+def register() -> None:
+    """After CLASSES are registered."""
+    bpy.types.WindowManager.hairloom_presets = PointerProperty(
+        type=HAIRLOOM_PG_presets, name="Presets", description="Presets of the selected hair"
+    )
+
+
+def unregister() -> None:
+    del bpy.types.WindowManager.hairloom_presets

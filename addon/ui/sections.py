@@ -146,6 +146,7 @@ def draw_export(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
     layout.menu("HAIRLOOM_MT_export_strands", icon="EXPORT")
     layout.operator("hairloom.check_export", icon="CHECKMARK")
     layout.operator("hairloom.make_real", icon="OUTLINER_OB_CURVES")
+    layout.operator("hairloom.show_reports", icon="TEXT")
 
 
 #: those below Look that have nothing to show in another model

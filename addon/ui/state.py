@@ -39,9 +39,12 @@ def draw_state(layout: bpy.types.UILayout, session: Session | None) -> None:
     what is below would move away from under the mouse."""
     lines = layout.column(align=True)
     for name, text in (("State", _state(session)), *_figures(session)):
-        row = lines.split(factor=NAMES)
-        row.label(text=name)
+        parts = lines.split(factor=NAMES)
+        parts.label(text=name)
+        row = parts.row(align=True)
         row.label(text=text)
+        if name == "State" and session is not None and not session.is_made:
+            row.operator("hairloom.cancel_build", text="", icon="X")
 
 
 def _state(session: Session | None) -> str:
@@ -49,16 +52,31 @@ def _state(session: Session | None) -> str:
     if session is None:
         return "not previewed"
     if not session.is_made:
-        return registry.BUILDING
+        return _being_made(session.stage)
     preview = previews[session.uid]
     if preview.phase is Phase.BAKED and preview.bake is not None:
         return "baked, out of date" if preview.bake.changed else "baked"
     if session.is_pending:
-        return "being made again"
+        return _being_made(session.stage)
     if preview.phase is Phase.WAITING or preview.is_deferred:
         return "waits for collider"
     device = session.computed_on.partition(" ")[0]
     return f"{'simulated' if session.is_playing else 'at rest'}, {device}"
+
+
+def _being_made(stage: str) -> str:
+    return f"makes {stage[:1].lower()}{stage[1:] or 'hair'}"
+
+
+def draw_card_progress(layout: bpy.types.UILayout, session: Session | None) -> bool:
+    """What is done of cards that are being built, with a button that cancels it; False where none
+    are."""
+    if session is None or not session.cards.is_pending:
+        return False
+    row = layout.row(align=True)
+    row.label(text=f"Cards: {session.cards.stage or 'waiting'}", icon="SORTTIME")
+    row.operator("hairloom.cancel_build", text="", icon="X")
+    return True
 
 
 def _figures(session: Session | None) -> Iterator[tuple[str, str]]:

@@ -160,7 +160,8 @@ def by_barycentric(style: Hairstyle, positions: np.ndarray) -> np.ndarray:
     return np.array(found)
 
 
-@pytest.mark.parametrize("count", few_in_commits([WITH_HELPERS, BODY]))
+@pytest.mark.slow
+@pytest.mark.parametrize("count", [WITH_HELPERS, BODY])
 def test_a_posed_mesh_of_makehumans_has_roots_at_the_same_places_of_its_faces(count: int) -> None:
     human, style = makehuman(count), named_hairstyle("buzz_cut")
     assert has_makehuman_topology(human.data)

@@ -75,7 +75,7 @@ def everything() -> set[str]:
     return {each.name for kind in kinds for each in kind}
 
 
-@pytest.mark.parametrize("name", ON_HEADS)
+@pytest.mark.parametrize("name", few_in_commits(ON_HEADS, 8))
 def test_each_style_that_ships_is_curves_on_the_scalp_with_its_settings(
     name: str, head: bpy.types.Object
 ) -> None:
@@ -106,7 +106,8 @@ def monkey(size: float) -> bpy.types.Object:
     return bpy.context.object
 
 
-@pytest.mark.parametrize("name", few_in_commits(FUR))
+@pytest.mark.slow
+@pytest.mark.parametrize("name", FUR)
 def test_fur_grows_on_any_mesh_and_by_its_size(name: str) -> None:
     style, lengths = named_hairstyle(name), []
     assert style.guides is None and not style.masks

@@ -8,6 +8,7 @@ from hairloom.addon import registration
 from hairloom.addon.blender.preview import previews, scene_events
 from hairloom.addon.blender.properties import groups
 from hairloom.addon.blender.viewport import overlay
+from hairloom.addon.ui import menus
 
 pytestmark = pytest.mark.portable
 
@@ -54,10 +55,18 @@ def traces():
     own_attributes = [hasattr(bpy.types.Curves, "hairloom"), hasattr(bpy.types.Object, "hairloom")]
     timer = bpy.app.timers.is_registered(scene_events._read_again)
     operators = dir(bpy.ops.hairloom)
-    return handlers, menus, properties, classes, own_attributes, timer, operators
+    keymaps = bpy.context.window_manager.keyconfigs.addon.keymaps
+    keys = [item.idname for keymap in keymaps for item in keymap.keymap_items]
+    return handlers, menus, properties, classes, own_attributes, timer, operators, keys
 
 
-EXTENDED_MENUS = ("TOPBAR_MT_file_import", "TOPBAR_MT_file_export", "VIEW3D_MT_curve_add")
+EXTENDED_MENUS = (
+    "TOPBAR_MT_file_import",
+    "TOPBAR_MT_file_export",
+    "VIEW3D_MT_curve_add",
+    "VIEW3D_MT_object",
+    "VIEW3D_MT_object_context_menu",
+)
 
 
 @pytest.fixture(autouse=True)
@@ -146,3 +155,14 @@ def test_every_class_has_a_name_of_ours():
 
 def test_the_root_package_is_the_one_that_blender_knows():
     assert registration.ROOT_PACKAGE == "hairloom"
+
+
+def test_shortcuts_are_offered_without_keys(extension):
+    """They wait in Blender's keymap for a key that the artist gives them."""
+    keymap = bpy.context.window_manager.keyconfigs.addon.keymaps["3D View"]
+    offered = {operator for operator, _ in menus.SHORTCUTS}
+    ours = [item for item in keymap.keymap_items if item.idname in offered]
+    assert sorted(item.idname for item in ours) == sorted(offered)
+    assert all(item.type == "NONE" and item.name for item in ours)
+    (pie,) = (item for item in ours if item.idname == "wm.call_menu_pie")
+    assert hasattr(bpy.types, pie.properties.name)

@@ -50,6 +50,7 @@ def test_every_strand_is_there_at_its_place(hair: Any) -> None:
     assert real.parent == hair.parent and real.data.surface == hair.data.surface
 
 
+@pytest.mark.slow
 def test_it_is_drawn_as_the_hair_was(hair: Any, stage: Any, tmp_path: Path) -> None:
     """By our own engine: the very same picture, but for noise of each strand's own."""
     hair.data.hairloom.shading.shift_noise = hair.data.hairloom.shading.sparkle = 0.0

@@ -84,6 +84,17 @@ def test_a_preview_shows_blenders_strands_until_its_own_are_made(hair, evaluated
     assert shown(session).snapshot.strand_count == COUNT and is_box(hair, evaluated)
 
 
+def test_cancel_ends_the_preview_of_hair_that_is_being_made(hair, evaluated, gate):
+    session = previews.start(hair, evaluated())
+    hair.select_set(True)
+    bpy.context.view_layer.objects.active = hair
+    assert not session.is_made and bpy.ops.hairloom.cancel_build() == {"FINISHED"}
+    assert previews.session_of(hair) is None and not session.is_pending
+    gate.set()
+    take_steps_until(lambda: not latest_job.is_watched(session))
+    assert previews.session_of(hair) is None
+
+
 def test_what_a_thread_makes_is_the_same_to_the_bit(hair, evaluated, in_window):
     hair.data.hairloom.children.method = "multi"
     hair.data.hairloom.children.strand_count = 500

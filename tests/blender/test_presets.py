@@ -21,6 +21,7 @@ from hairloom.addon.parameters import ALL_SETTINGS
 from hairloom.addon.params.preset import PRESET_VERSION
 from hairloom.addon.shading.settings import ShadingSettings
 from hairloom.addon.shading.shafts_settings import ShaftSettings
+from hairloom.addon.ui import preset_chooser
 
 
 @pytest.fixture
@@ -41,6 +42,46 @@ def test_a_look_goes_onto_the_selected_hair(hair: bpy.types.Object, name: str) -
     for parameter, wanted in presets.named_preset(name).settings.as_dict().items():
         is_word = isinstance(wanted, str)
         assert applied[parameter] == (wanted if is_word else pytest.approx(wanted, rel=1e-6))
+
+
+@pytest.mark.parametrize("section", list(preset_chooser.KINDS))
+def test_the_panel_knows_which_preset_the_hair_has(hair: bpy.types.Object, section: str) -> None:
+    """Values are stored with seven digits, and each preset is found again by them."""
+    choices = bpy.context.window_manager.hairloom_presets
+    for entry in presets.shipped(section):
+        setattr(choices, section, entry.name)
+        assert presets.preset_of(hair, presets.shipped(section)) == entry
+        assert getattr(choices, section) == entry.name
+
+
+def test_hair_with_a_setting_of_its_own_has_no_preset(hair: bpy.types.Object) -> None:
+    choices = bpy.context.window_manager.hairloom_presets
+    choices.shading = "looks/blond"
+    hair.data.hairloom.shading.width_r *= 1.1
+    assert choices.shading == "CUSTOM"
+    choices.shading = "CUSTOM"  # changes nothing
+    assert presets.preset_of(hair, presets.shipped("shading")) is None
+    choices.shading = "looks/blond"
+    assert choices.shading == "looks/blond"
+
+
+def test_a_preset_of_two_sections_needs_both(hair: bpy.types.Object) -> None:
+    (crowd,) = (each for each in presets.shipped("cards") if each.name == "cards/crowd")
+    bpy.ops.hairloom.apply_preset(name=crowd.name)
+    hair.data.hairloom.atlas.columns += 1
+    assert presets.preset_of(hair, (crowd,)) is None
+
+
+def test_choosing_goes_to_all_selected_hair(
+    hair: bpy.types.Object, new_hair: Callable[..., bpy.types.Object]
+) -> None:
+    other = new_hair()
+    for each in (hair, other):
+        each.select_set(True)
+    bpy.context.window_manager.hairloom_presets.shading = "looks/red"
+    for each in (hair, other):
+        found = presets.preset_of(each, presets.shipped("shading"))
+        assert found is not None and found.name == "looks/red"
 
 
 def test_dynamics_go_onto_the_object(hair: bpy.types.Object) -> None:

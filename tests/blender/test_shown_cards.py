@@ -190,9 +190,21 @@ def test_lines_say_what_is_built_and_what_is_shown(in_window):
     hair.data.hairloom.card_drawing.shown_as = "strands"
     assert session.cards.lines == () and session.cards.counts == (0, 0, 0)
     hair.data.hairloom.card_drawing.shown_as = "cards"
-    assert session.cards.lines == ("Cards are being built",)
-    served(session)
-    assert len(session.cards.lines) == 2
+    assert session.cards.lines == () and session.cards.is_pending
+    stages = []
+    take_steps_until(lambda: stages.append(session.cards.stage) or not session.cards.is_pending)
+    assert {"Cards from strands", "Check of the order"} <= set(stages), stages
+    assert session.cards.stage == "" and len(session.cards.lines) == 2
+
+
+def test_cancel_shows_strands_in_place_of_cards_that_are_being_built(in_window):
+    hair, _, session = in_window
+    hair.select_set(True)
+    assert not bpy.ops.hairloom.cancel_build.poll(), "nothing is being made"
+    hair.data.hairloom.cards.segment_count += 1
+    assert session.cards.is_pending and bpy.ops.hairloom.cancel_build() == {"FINISHED"}
+    assert not session.cards.is_pending and not hair.data.hairloom.use_cards
+    assert drawn(session).cards is None and drawn(session).strand_count == 60
 
 
 def test_cards_of_the_rig_before_stay_until_those_of_other_hair_are_built(in_window, evaluated):

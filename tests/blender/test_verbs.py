@@ -21,7 +21,10 @@ DOCS = Path(__file__).parents[2] / "docs"
 #: buttons that act on a view or a session alone, and leave nothing behind
 WINDOW_ONLY = {
     "show_problems",
+    "show_reports",
+    "copy_reports",
     "preview",
+    "cancel_build",
     "play",
     "pause",
     "reset",
@@ -30,7 +33,6 @@ WINDOW_ONLY = {
     "fin_preview",
     "fin_reset",
     "choose_hairstyle",
-    "choose_preset",
     "show_settings",
 }
 

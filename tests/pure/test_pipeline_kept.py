@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from small_wig import curves, sheet, turned
+from tiers import few_in_commits
 
 from hairloom.addon import pipeline
 from hairloom.addon.dynamics.colliders import DistanceField
@@ -57,7 +58,7 @@ def painted(stroke: int) -> np.ndarray:
 
 
 @pytest.mark.parametrize("does", [combed, painted])
-@pytest.mark.parametrize("guides", [30, 100])
+@pytest.mark.parametrize("guides", few_in_commits([30, 100]))
 @pytest.mark.parametrize(
     "settings",
     [

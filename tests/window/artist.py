@@ -34,10 +34,11 @@ def region(kind: str) -> Any:
     return next(each for each in viewport().regions if each.type == kind)
 
 
-def press(key: str) -> Iterator[int]:
+def press(key: str, x: int = 0, y: int = 0) -> Iterator[int]:
+    """A key, with the mouse at a pixel of the window, from its lower left corner."""
     window = bpy.context.window
     for value in ("PRESS", "RELEASE"):
-        window.event_simulate(key, value)
+        window.event_simulate(key, value, x=x, y=y)
         yield 1
 
 

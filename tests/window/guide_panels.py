@@ -39,7 +39,7 @@ PICTURES: dict[str, tuple[tuple[str, ...], ...]] = {
     "meshes": (("sidebar_mesh_cards", "sidebar_fin"), ("sidebar_fin_bake",)),
 }
 #: pictures of what is no panel: the window, popups, and the options beside a list of files
-OTHERS = ("window", "start", "presets", "check", "sort", "export_cards", "export_strands")
+OTHERS = ("window", "start", "check", "sort", "export_cards", "export_strands")
 OTHERS += ("preferences",)
 #: sections that the sidebar has too: they are pictured in Properties > Data
 TWINS = (

@@ -51,6 +51,8 @@ def steps():
     yield from hair_on_a_mesh_of_ones_own()
     yield from undo_takes_it_away()
     yield from presets_have_pictures()
+    yield from a_menu_under_the_mouse()
+    yield from a_key_of_ones_own()
     yield from a_warning_mends()
     yield from to_the_engine()
     yield from the_page_in_the_preferences()
@@ -138,15 +140,49 @@ def presets_have_pictures():
     for section in ("shading", "dynamics", "volume", "cards"):
         entries = presets.shipped(section)
         assert entries and all(entry.icon for entry in entries), section
-        invoke("choose_preset", section=section)
-        yield
-        driver.screenshot(f"presets-{section}")
-        yield from press("ESC")
-        yield
     before = yield from picture("brown")
-    bpy.ops.hairloom.apply_preset("EXEC_DEFAULT", True, name="looks/blond")
+    bpy.context.window_manager.hairloom_presets.shading = "looks/blond"
     blond = yield from picture("blond")
     assert changed(before, blond) > 0.01, "the look is the same"
+
+
+def a_menu_under_the_mouse():
+    """A right click on hair offers what is done to hair."""
+    with in_view():
+        before = driver.screenshot("no-menu")
+        bpy.ops.wm.call_menu(name="HAIRLOOM_MT_object")
+    yield
+    assert changed(before / 255.0, driver.screenshot("object-menu") / 255.0) > 0.01
+    yield from press("ESC")
+    with in_view():
+        bpy.ops.wm.call_menu(name="VIEW3D_MT_object_context_menu")
+    yield
+    driver.screenshot("context-menu")
+    yield from press("ESC")
+    with in_view():
+        bpy.ops.wm.call_menu_pie("INVOKE_DEFAULT", name="HAIRLOOM_MT_pie")
+    yield
+    driver.screenshot("pie")
+    yield from press("ESC")
+
+
+def a_key_of_ones_own():
+    """The shortcut that is suggested for Preview gets a key, and the key presses the button."""
+    keymap = bpy.context.window_manager.keyconfigs.user.keymaps["3D View"]
+    (item,) = (each for each in keymap.keymap_items if each.idname == "hairloom.preview")
+    assert item.type == "NONE", "Hairloom takes a key that nobody gave it"
+    item.type = "F19"
+    count = len(live().sessions())
+    view = region("WINDOW")
+    x, y = view.x + view.width // 2, view.y + view.height // 2
+    bpy.context.window.event_simulate("MOUSEMOVE", "NOTHING", x=x, y=y)
+    yield
+    yield from press("F19", x, y)
+    yield from until(lambda: len(live().sessions()) != count, "the key does nothing")
+    yield from press("F19", x, y)
+    yield from until(lambda: len(live().sessions()) == count, "the key works once")
+    yield from hair_is_made()
+    item.type = "NONE"
 
 
 def a_warning_mends():

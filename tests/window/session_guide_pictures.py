@@ -7,7 +7,6 @@ import sys
 from pathlib import Path
 
 import bpy
-import numpy as np
 
 sys.path.append(str(Path(__file__).parent))
 import driver
@@ -36,8 +35,6 @@ COLUMN = 340
 USED = 0.8
 #: [pixels] Blender's own lines above an add-on's preferences; one names a folder of this machine
 BLENDERS = 228
-#: this many pixels are of colour where all pictures of looks are there
-COLOURED, COLOURED_COUNT = 40, 10_000
 
 
 def steps():
@@ -179,11 +176,10 @@ def choose(obj):
 
 
 def popups():
-    """The presets, the check before an export, and the options of sorting cards."""
+    """The check before an export, and the options of sorting cards."""
     of_hairloom("previews").stop_all()
     yield from popup("sort", "sort_cards")
     choose(bpy.data.objects["Hair"])
-    yield from popup("presets", "choose_preset", section="shading")
     yield from popup("check", "check_export")
     assert of_hairloom("export_check").count() == 0, "the check goes on unseen"
     bpy.ops.hairloom.preview()
@@ -199,19 +195,10 @@ def popup(name, operator, **settings):
     with bpy.context.temp_override(area=viewport(), region=view):
         getattr(bpy.ops.hairloom, operator)("INVOKE_DEFAULT", **settings)
     yield
-    if operator == "choose_preset":
-        yield from until(lambda: is_coloured(before, name), "pictures of presets do not come")
     screen = yield from whole_screen(f"part_{name}")
     keep(name, [screen[changed_box(before, screen)]])
     yield from press("ESC")
     yield
-
-
-def is_coloured(before, name):
-    """Whether the pictures of looks are there, which come one by one."""
-    now = driver.screenshot(f"part_{name}")
-    counts = [int(np.sum(np.ptp(each, axis=2) > COLOURED)) for each in (before, now)]
-    return counts[1] - counts[0] > COLOURED_COUNT
 
 
 def column():

@@ -33,6 +33,9 @@ LIT = ((0.5, (1.0, 0.4, 0.1), (0.04, 0.024, 0.012)), (2.0, (0.8, 0.45, 0.25), (0
 #: code values; what the table is off by, and the roundings of both to 8 bits
 TOLERANCE = 2.0
 NO_LIGHT = 0.0
+#: what differs where a popup lies; how many of these it has at least, and how far inside of its
+#: corner the first picture is, in pixels
+SEEN, POPUP_PIXELS, IN_CORNER = 8, 20_000, 40
 
 
 def session():
@@ -255,14 +258,10 @@ def own_presets():
     image.save(filepath=str(folder / "mine.png"))
     (entry,), (warning,) = presets.own("shading")
     assert entry.icon > 0 and warning.startswith("broken.json")
-    view = viewport()
-    bpy.context.window.cursor_warp(view.x + view.width // 3, view.y + view.height // 2)
-    yield
-    with bpy.context.temp_override(area=view, region=region("WINDOW")):
-        bpy.ops.hairloom.choose_preset("INVOKE_DEFAULT")
-    yield
+    chosen = bpy.context.window_manager.hairloom_presets
+    assert chosen.shading == entry.name
+    yield from open_our_sidebar()
     driver.screenshot("presets")
-    yield from press("ESC")
     assert bpy.ops.hairloom.delete_preset(name=entry.name) == {"FINISHED"}
     (folder / "broken.json").unlink()
     assert list(folder.iterdir()) == []
@@ -302,6 +301,43 @@ def the_panels_of_both_models():
         driver.screenshot(f"panel-{model}-{pigment}")
     assert bpy.ops.hairloom.look_from_material() == {"FINISHED"}
     assert look.model == "marschner" and look.pigment == "color"
+    yield from a_picture_is_a_button(hair)
+
+
+def a_picture_is_a_button(hair):
+    """A click on the picture of the hair's preset shows all, a click on one of these applies it,
+    and one undo takes it back."""
+    presets = of_hairloom("presets")
+    bpy.ops.hairloom.apply_preset("EXEC_DEFAULT", True, name="looks/dyed")
+    yield
+    before = driver.screenshot("picture")
+    yield from click(*_pink(before))
+    yield from until(lambda: _changed_corner(before) is not None, "no pictures to choose from")
+    yield from click(*_changed_corner(before))
+    name = bpy.context.window_manager.hairloom_presets.shading
+    assert name.startswith("looks/") and name != "looks/dyed", name
+    entry = presets.preset_of(hair, presets.shipped("shading"))
+    assert entry is not None and entry.name == name
+    bpy.ops.ed.undo()
+    yield
+    assert bpy.context.window_manager.hairloom_presets.shading == "looks/dyed"
+
+
+def _pink(screen):
+    """The middle of the hair in the picture of the look Dyed, the only thing that is pink there."""
+    red, green, blue = np.moveaxis(screen[:, : screen.shape[1] // 4].astype(int), 2, 0)
+    rows, columns = np.nonzero((red > green + 60) & (blue > green + 20))
+    assert len(rows) > 20, "no picture of the look is seen"
+    return int(np.median(columns)), len(screen) - int(np.median(rows))
+
+
+def _changed_corner(before):
+    """A pixel in the picture at the lower left of the popup that has come; None before it comes."""
+    now = driver.screenshot("pictures")
+    rows, columns = np.nonzero(np.abs(now.astype(int) - before).max(axis=2) > SEEN)
+    if len(rows) < POPUP_PIXELS:
+        return None
+    return int(columns.min()) + IN_CORNER, len(now) - int(rows.max()) + IN_CORNER
 
 
 driver.play(steps())

@@ -13,8 +13,26 @@ import bpy
 import gpu
 from driver import of_hairloom
 
-MENUS = ("TOPBAR_MT_file_import", "TOPBAR_MT_file_export", "VIEW3D_MT_curve_add")
+MENUS = (
+    "TOPBAR_MT_file_import",
+    "TOPBAR_MT_file_export",
+    "VIEW3D_MT_curve_add",
+    "VIEW3D_MT_object",
+    "VIEW3D_MT_object_context_menu",
+)
 OWNERS = ("Curves", "Object", "Scene", "WindowManager", "Mesh", "Material")
+
+
+def shortcuts() -> list[Any]:
+    """The items of Hairloom in Blender's keymaps for add-ons."""
+    keymaps = bpy.context.window_manager.keyconfigs.addon.keymaps
+    items = [item for keymap in keymaps for item in keymap.keymap_items]
+    return [
+        item
+        for item in items
+        if item.idname.startswith("hairloom.")
+        or (item.idname == "wm.call_menu_pie" and item.properties.name.startswith("HAIRLOOM"))
+    ]
 
 
 class Log:
@@ -50,6 +68,7 @@ def of_blender() -> dict[str, Any]:
         },
         "classes": [name for name in dir(bpy.types) if "hairloom" in name.lower()],
         "operators": dir(bpy.ops.hairloom),
+        "shortcuts": len(shortcuts()),
         "threads": sorted(each.name for each in threading.enumerate()),
     }
 

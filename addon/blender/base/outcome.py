@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import time
+from collections import deque
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import bpy
 
@@ -41,6 +44,21 @@ class Reports:
     error: HairloomError | None = None
 
 
+class PastReport(NamedTuple):
+    """A report of an operator, to be read again.
+
+    time: of the day, as text. source: the operator's label.
+    """
+
+    time: str
+    source: str
+    kind: str
+    text: str
+
+
+#: the last ones, the oldest first
+past_reports: deque[PastReport] = deque(maxlen=20)
+
 #: where reports go while a job without a window runs an operator; None: to Blender
 _collected: Reports | None = None
 
@@ -63,6 +81,9 @@ def report(operator: bpy.types.Operator, kind: str, message: str | HairloomError
         kind: "INFO", "WARNING" or "ERROR"; the message of an error is the error itself.
     """
     if _collected is None:
+        past_reports.append(
+            PastReport(time.strftime("%H:%M:%S"), operator.bl_label, kind, str(message))
+        )
         operator.report({kind}, str(message))
     elif isinstance(message, HairloomError):
         _collected.error = message

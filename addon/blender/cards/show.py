@@ -88,6 +88,11 @@ class ShownCards:
         return self._job.is_pending
 
     @property
+    def stage(self) -> str:
+        """What is done now of cards that are on their way."""
+        return self._job.stage
+
+    @property
     def has_arrived(self) -> bool:
         """Whether `collect` has something to take over."""
         return self._job.has_arrived
@@ -104,7 +109,7 @@ class ShownCards:
     def lines(self) -> tuple[str, ...]:
         """What is shown, for the panel."""
         if self._built is None or self._shown is None:
-            return ("Cards are being built",) if self.is_pending else ()
+            return ()
         cards, triangles, _ = self.counts
         return f"{cards:,} cards, {triangles:,} triangles", order_line(self._built.wrong_fraction)
 

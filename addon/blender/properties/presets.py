@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache, lru_cache
 from pathlib import Path
@@ -45,6 +46,7 @@ class Entry:
     name: str
     title: str
     path: Path
+    preset: Preset[Any]
 
     @property
     def is_own(self) -> bool:
@@ -64,7 +66,7 @@ def shipped(section: str) -> tuple[Entry, ...]:
         preset = read_any_preset(path, ALL_SETTINGS)
         if preset.settings.section == section:
             name = path.relative_to(PRESET_FOLDER).with_suffix("").as_posix()
-            found.append(Entry(name, preset.title, path))
+            found.append(Entry(name, preset.title, path, preset))
     return tuple(found)
 
 
@@ -74,13 +76,14 @@ def own(section: str) -> tuple[tuple[Entry, ...], tuple[str, ...]]:
     for path in _own_files():
         try:
             stat = path.stat()
-            title, found = _read(path, stat.st_mtime_ns, stat.st_size)
+            preset = _read(path, stat.st_mtime_ns, stat.st_size)
         except (HairloomError, OSError, RecursionError) as error:
             why = error.problem if isinstance(error, HairloomError) else error
             warnings.append(f"{path.name} is no preset: {why}")
             continue
-        if found == section:
-            entries.append(Entry(OWN + path.stem, title, path))
+        if preset.settings.section == section:
+            title = " ".join(preset.title.split())[:_LONGEST_TITLE] or path.stem
+            entries.append(Entry(OWN + path.stem, title, path, preset))
     return tuple(sorted(entries, key=lambda entry: entry.title.lower())), tuple(warnings)
 
 
@@ -99,11 +102,27 @@ def own_folder() -> Path:
 
 def kept_settings(hair: bpy.types.Object, section: str) -> tuple[Settings, ...]:
     """What a preset of this section keeps of a groom: that section, then those that go with it."""
-    owners, found = (hair.data.hairloom, hair.hairloom), []
-    for name in (section, *_TOGETHER.get(section, ())):
-        owner = next(each for each in owners if hasattr(each, name))
-        found.append(settings_of(getattr(owner, name), ALL_SETTINGS[name]))
-    return tuple(found)
+    return tuple(_kept(hair, name) for name in (section, *_TOGETHER.get(section, ())))
+
+
+def _kept(hair: bpy.types.Object, section: str) -> Settings:
+    """The settings of one section that a groom or its object keeps."""
+    owners = hair.data.hairloom, hair.hairloom
+    owner = next(each for each in owners if hasattr(each, section))
+    return settings_of(getattr(owner, section), ALL_SETTINGS[section])
+
+
+def preset_of(hair: bpy.types.Object, entries: Iterable[Entry]) -> Entry | None:
+    """The first of these presets whose values are all as this groom has them."""
+    kept: dict[str, Settings] = {}
+    for entry in entries:
+        wanted = entry.preset.all
+        for each in wanted:
+            if each.section not in kept:
+                kept[each.section] = _kept(hair, each.section)
+        if all(kept[each.section] == each for each in wanted):
+            return entry
+    return None
 
 
 def save_own(title: str, settings: Settings, *also: Settings) -> Path:
@@ -210,13 +229,11 @@ def _own_path(name: str) -> Path | None:
 
 
 @lru_cache(maxsize=256)
-def _read(path: Path, _changed: int, size: int) -> tuple[str, str]:
-    """Title and section of a preset file; read again only when it has changed."""
+def _read(path: Path, _changed: int, size: int) -> Preset[Any]:
+    """The preset of a file; read again only when it has changed."""
     if size > _LONGEST:
         raise HairloomError("it is too long", place=path.name, remedy="Delete it")
-    preset = read_any_preset(path, ALL_SETTINGS)
-    title = " ".join(preset.title.split())[:_LONGEST_TITLE]
-    return title or path.stem, preset.settings.section
+    return read_any_preset(path, ALL_SETTINGS)
 
 
 def _file_for(stem: str, title: str, section: str) -> Path:

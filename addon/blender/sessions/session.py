@@ -127,6 +127,11 @@ class Session:
         return self._job.is_pending
 
     @property
+    def stage(self) -> str:
+        """What is done now of hair that is being made."""
+        return self._job.stage
+
+    @property
     def has_arrived(self) -> bool:
         """Whether the hair that was being made can be taken over."""
         return self._job.has_arrived

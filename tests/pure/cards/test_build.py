@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tiers import few_in_commits
 
 from hairloom.addon import card_flow, pipeline
 from hairloom.addon.cards.atlas_settings import AtlasSettings
@@ -83,7 +84,7 @@ def test_levels_share_one_atlas_and_all_that_is_known_of_cards(way: str, source:
         np.testing.assert_array_equal(finest.tile, build.plan.tile)
 
 
-@pytest.mark.parametrize("factor", [2.0**-10, 2.0**10])
+@pytest.mark.parametrize("factor", few_in_commits([2.0**-10, 2.0**10]))
 @pytest.mark.parametrize(("method", "source"), [("clusters", "baked"), ("guides", "made")])
 def test_cards_are_the_same_at_any_scale(method: str, source: str, factor: float) -> None:
     """Their number, shape, tiles, light and order."""

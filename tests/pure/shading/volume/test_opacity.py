@@ -7,6 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from hair_ball import combed_strands
+from tiers import few_in_commits
 
 from hairloom.addon.shading.lights import Light
 from hairloom.addon.shading.volume.light_frame import ball_around, light_frame
@@ -192,7 +193,7 @@ def test_four_deep_layers_beat_sixteen_slices_on_a_head_of_hair() -> None:
     assert deep < even
 
 
-@pytest.mark.parametrize("radius", [1e-3, 3e-3])
+@pytest.mark.parametrize("radius", few_in_commits([3e-3, 1e-3]))
 def test_default_maps_leave_as_much_light_as_strands_counted_one_by_one(radius: float) -> None:
     """In the mean over a head of hair. A bias of a hundredth left thick hair 1.56 times as much."""
     strands, settings = combed_strands(6000), VolumeSettings()

@@ -1,0 +1,170 @@
+"""Hairloom in Blender's own menus, its pie menu, and shortcuts that artists can assign."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import bpy
+import rna_keymap_ui
+
+from ..blender.properties.presets import shipped
+from .operators_strand_export import draw_strand_exports
+from .operators_strand_import import draw_imports
+from .selection import active_mesh
+
+_PIE = "HAIRLOOM_MT_pie"
+#: operator, its settings: offered in the keymap of the 3D view, without keys
+SHORTCUTS: tuple[tuple[str, dict[str, str]], ...] = (
+    ("wm.call_menu_pie", {"name": _PIE}),
+    ("hairloom.preview", {}),
+    ("hairloom.play", {}),
+    ("hairloom.pause", {}),
+    ("hairloom.reset", {}),
+    ("hairloom.settle", {}),
+    ("hairloom.make_cards", {}),
+)
+_KEYMAP = "3D View"
+
+
+class HAIRLOOM_MT_import(bpy.types.Menu):
+    """Grooms from files"""
+
+    bl_idname = "HAIRLOOM_MT_import"
+    bl_label = "Import Hair"
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        draw_imports(self.layout)
+
+
+class HAIRLOOM_MT_looks(bpy.types.Menu):
+    """Looks that come with Hairloom"""
+
+    bl_idname = "HAIRLOOM_MT_looks"
+    bl_label = "Look"
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        for entry in shipped("shading"):
+            operator = self.layout.operator(
+                "hairloom.apply_preset", text=entry.title, icon_value=entry.icon
+            )
+            operator.name = entry.name
+
+
+class HAIRLOOM_MT_object(bpy.types.Menu):
+    """What is done to the selected hair, or to the mesh that hair is to grow on"""
+
+    bl_idname = "HAIRLOOM_MT_object"
+    bl_label = "Hairloom"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.layout
+        if active_mesh(context) is not None:
+            layout.operator("hairloom.add_groom", text="Add Hair", icon="OUTLINER_OB_CURVES")
+            layout.operator("hairloom.choose_hairstyle", icon="USER")
+            layout.separator()
+        layout.operator("hairloom.preview", icon="HIDE_OFF")
+        layout.operator("hairloom.play", icon="PLAY")
+        layout.operator("hairloom.settle")
+        layout.menu("HAIRLOOM_MT_looks", icon="SHADING_RENDERED")
+        layout.separator()
+        layout.operator("hairloom.make_cards", icon="MESH_GRID")
+        layout.operator("hairloom.make_real", icon="OUTLINER_OB_CURVES")
+        layout.operator("hairloom.export_cards", icon="EXPORT")
+        layout.operator("hairloom.show_settings", icon="PROPERTIES")
+
+
+class HAIRLOOM_MT_pie(bpy.types.Menu):
+    """What one needs while one combs, around the mouse"""
+
+    bl_idname = _PIE
+    bl_label = "Hairloom"
+
+    def draw(self, _context: bpy.types.Context) -> None:
+        pie = self.layout.menu_pie()
+        pie.operator("hairloom.preview", icon="HIDE_OFF")
+        pie.operator("hairloom.play", icon="PLAY")
+        comb = pie.operator("object.mode_set", text="Comb", icon="SCULPTMODE_HLT")
+        comb.mode, comb.toggle = "SCULPT_CURVES", True
+        pie.operator("hairloom.settle")
+        pie.operator("hairloom.reset", icon="FILE_REFRESH")
+        pie.operator("hairloom.pause", icon="PAUSE")
+        pie.operator("hairloom.make_cards", icon="MESH_GRID")
+        pie.operator("hairloom.show_settings", icon="PROPERTIES")
+
+
+def _draw_import(self: Any, _context: bpy.types.Context) -> None:
+    draw_imports(self.layout)
+
+
+def _draw_exports(self: Any, _context: bpy.types.Context) -> None:
+    self.layout.operator("hairloom.export_cards", text="Hair cards (.glb/.fbx/.usd/.obj)")
+    draw_strand_exports(self.layout)
+
+
+def _draw_add(self: Any, _context: bpy.types.Context) -> None:
+    self.layout.operator("hairloom.add_groom", icon="OUTLINER_OB_CURVES")
+    self.layout.menu("HAIRLOOM_MT_hairstyles", icon="USER")
+    self.layout.operator("hairloom.sample_scene", icon="SCENE_DATA")
+
+
+def _draw_object(self: Any, context: bpy.types.Context) -> None:
+    obj = context.active_object
+    if obj is not None and obj.type in {"CURVES", "MESH"}:
+        self.layout.separator()
+        self.layout.menu("HAIRLOOM_MT_object", icon="OUTLINER_OB_CURVES")
+
+
+MENUS: tuple[tuple[str, Callable[[Any, bpy.types.Context], None]], ...] = (
+    ("TOPBAR_MT_file_import", _draw_import),
+    ("TOPBAR_MT_file_export", _draw_exports),
+    ("VIEW3D_MT_curve_add", _draw_add),
+    ("VIEW3D_MT_object", _draw_object),
+    ("VIEW3D_MT_object_context_menu", _draw_object),
+)
+
+
+def draw_shortcuts(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    """The suggested shortcuts, each with the field that takes a key."""
+    keys = context.window_manager.keyconfigs.user
+    keymap = None if keys is None else keys.keymaps.get(_KEYMAP)
+    if keymap is not None:
+        for item in filter(_is_ours, keymap.keymap_items):
+            rna_keymap_ui.draw_kmi([], keys, keymap, item, layout, 0)
+
+
+def _is_ours(item: bpy.types.KeyMapItem) -> bool:
+    if item.idname == "wm.call_menu_pie":
+        return bool(item.properties.name == _PIE)
+    return item.idname.startswith("hairloom.")
+
+
+CLASSES: tuple[type[Any], ...] = (
+    HAIRLOOM_MT_import,
+    HAIRLOOM_MT_looks,
+    HAIRLOOM_MT_object,
+    HAIRLOOM_MT_pie,
+)
+
+
+def register() -> None:
+    for menu, entry in MENUS:
+        getattr(bpy.types, menu).append(entry)
+    keys = bpy.context.window_manager.keyconfigs.addon
+    if keys is None:  # there are none without a window
+        return
+    keymap = keys.keymaps.new(name=_KEYMAP, space_type="VIEW_3D")
+    for operator, settings in SHORTCUTS:
+        item = keymap.keymap_items.new(operator, "NONE", "PRESS")
+        for name, value in settings.items():
+            setattr(item.properties, name, value)
+
+
+def unregister() -> None:
+    keys = bpy.context.window_manager.keyconfigs.addon
+    keymap = None if keys is None else keys.keymaps.get(_KEYMAP)
+    if keymap is not None:
+        for item in filter(_is_ours, tuple(keymap.keymap_items)):
+            keymap.keymap_items.remove(item)
+    for menu, entry in reversed(MENUS):
+        getattr(bpy.types, menu).remove(entry)
