@@ -36,6 +36,8 @@ NO_LIGHT = 0.0
 #: what differs where a popup lies; how many of these it has at least, and how far inside of its
 #: corner the first picture is, in pixels
 SEEN, POPUP_PIXELS, IN_CORNER = 8, 20_000, 40
+#: a picture of the look Dyed has more that is pink
+PINK_PIXELS = 20
 
 
 def session():
@@ -309,7 +311,7 @@ def a_picture_is_a_button(hair):
     and one undo takes it back."""
     presets = of_hairloom("presets")
     bpy.ops.hairloom.apply_preset("EXEC_DEFAULT", True, name="looks/dyed")
-    yield
+    yield from until(lambda: _pink(driver.screenshot("picture")), "no picture of the look")
     before = driver.screenshot("picture")
     yield from click(*_pink(before))
     yield from until(lambda: _changed_corner(before) is not None, "no pictures to choose from")
@@ -324,10 +326,12 @@ def a_picture_is_a_button(hair):
 
 
 def _pink(screen):
-    """The middle of the hair in the picture of the look Dyed, the only thing that is pink there."""
+    """The middle of the hair in the picture of the look Dyed, the only thing that is pink there;
+    None before Blender has read that picture."""
     red, green, blue = np.moveaxis(screen[:, : screen.shape[1] // 4].astype(int), 2, 0)
     rows, columns = np.nonzero((red > green + 60) & (blue > green + 20))
-    assert len(rows) > 20, "no picture of the look is seen"
+    if len(rows) < PINK_PIXELS:
+        return None
     return int(np.median(columns)), len(screen) - int(np.median(rows))
 
 
