@@ -1,6 +1,6 @@
 # All that one does here, in one place. `make` alone lists it.
 .DEFAULT_GOAL := help
-.PHONY: help setup demo lint test tests-of-a-commit test-ui test-engines test-all bench docs gallery pictures styles zip lock clean
+.PHONY: help setup demo lint test tests-of-a-commit test-ui test-engines test-all bench docs site gallery pictures styles zip lock clean
 
 PYTHON = .venv/bin/python
 OUT = out
@@ -49,6 +49,9 @@ bench: setup ## one benchmark: NAME=x runs bench/x.py, no NAME lists them
 
 docs: setup ## write what the documentation takes from the code
 	$(PYTHON) tools/make_docs.py
+
+site: setup ## the documentation as a site in out/site, to be read from the folder or put on a server
+	$(PYTHON) tools/make_site.py
 
 gallery: setup ## draw docs/gallery.md: looks, stages, skins, kinds of hair, cards; NAME=x for one picture
 	$(PYTHON) tools/gallery.py $(NAME)

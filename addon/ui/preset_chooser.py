@@ -9,6 +9,7 @@ import bpy
 from bpy.props import EnumProperty, PointerProperty
 
 from ..blender.properties.presets import Entry, own, preset_of, shipped
+from ..blender.scene.curves import COLOR_ATTRIBUTE
 from ..blender.scene.principled import has_principled_hair
 from .messages import draw_message
 from .selection import chosen_hair
@@ -75,8 +76,12 @@ def _entries(section: str) -> tuple[tuple[Entry, ...], tuple[str, ...]]:
 
 
 def _number(hair: bpy.types.Object, entries: tuple[Entry, ...]) -> int:
-    """Which of these presets the hair has, counted from 1; 0 for none."""
-    found = preset_of(hair, entries)
+    """Which of these presets the hair has, counted from 1; 0 for none.
+
+    Hair without colours of its own has those of its look, whichever is asked for.
+    """
+    ignored = () if COLOR_ATTRIBUTE in hair.data.attributes else ("color_source",)
+    found = preset_of(hair, entries, ignored)
     return 0 if found is None else 1 + entries.index(found)
 
 

@@ -16,6 +16,7 @@ import bpy
 from hairloom.addon.blender.command_line import command_line, job_options
 from hairloom.addon.blender.properties import presets
 from hairloom.addon.blender.properties.properties import settings_of
+from hairloom.addon.blender.setup.starting import dress
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.parameters import ALL_SETTINGS
 from hairloom.addon.params.preset import PRESET_VERSION
@@ -63,6 +64,16 @@ def test_hair_with_a_setting_of_its_own_has_no_preset(hair: bpy.types.Object) ->
     assert presets.preset_of(hair, presets.shipped("shading")) is None
     choices.shading = "looks/blond"
     assert choices.shading == "looks/blond"
+
+
+def test_a_new_groom_has_the_look_that_it_was_given(hair: bpy.types.Object) -> None:
+    """It would keep colours of its own, and has none."""
+    choices = bpy.context.window_manager.hairloom_presets
+    dress(hair, ("looks/brown",))
+    assert hair.data.hairloom.shading.color_source == "own"
+    assert choices.shading == "looks/brown"
+    hair.data.attributes.new("color", "FLOAT_COLOR", "CURVE")
+    assert choices.shading == "CUSTOM"
 
 
 def test_a_preset_of_two_sections_needs_both(hair: bpy.types.Object) -> None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterable
+from collections.abc import Container, Iterable
 from dataclasses import dataclass
 from functools import cache, lru_cache
 from pathlib import Path
@@ -112,17 +112,28 @@ def _kept(hair: bpy.types.Object, section: str) -> Settings:
     return settings_of(getattr(owner, section), ALL_SETTINGS[section])
 
 
-def preset_of(hair: bpy.types.Object, entries: Iterable[Entry]) -> Entry | None:
-    """The first of these presets whose values are all as this groom has them."""
+def preset_of(
+    hair: bpy.types.Object, entries: Iterable[Entry], ignored: Container[str] = ()
+) -> Entry | None:
+    """The first of these presets whose values are all as this groom has them.
+
+    Args:
+        ignored: names of parameters that make no difference on this hair.
+    """
     kept: dict[str, Settings] = {}
     for entry in entries:
         wanted = entry.preset.all
         for each in wanted:
             if each.section not in kept:
                 kept[each.section] = _kept(hair, each.section)
-        if all(kept[each.section] == each for each in wanted):
+        if all(_is_same(kept[each.section], each, ignored) for each in wanted):
             return entry
     return None
+
+
+def _is_same(one: Settings, other: Settings, ignored: Container[str]) -> bool:
+    values = other.as_dict()
+    return all(name in ignored or value == values[name] for name, value in one.as_dict().items())
 
 
 def save_own(title: str, settings: Settings, *also: Settings) -> Path:
