@@ -62,7 +62,6 @@ class SharedSettings(Settings):
         label="Colour Source",
         description="Where the colour comes from; strands that have none of their own have the "
         "look's",
-        panel="Colour",
     )
     pigment: str = choice(
         "color",
@@ -70,14 +69,12 @@ class SharedSettings(Settings):
         label="Pigment",
         description="How absorption inside the hair is set",
         source=_PIGMENT,
-        panel="Colour",
         shown_when=when("shading.model", "marschner"),
     )
     base_color: tuple[float, float, float] = color(
         (0.03, 0.0145, 0.007),
         label="Colour",
         description="Colour of the hair; also tints the highlights",
-        panel="Colour",
         shown_when=_HAS_COLOR,
     )
     melanin: float = number(
@@ -88,7 +85,6 @@ class SharedSettings(Settings):
         hard=(0.0, 1.0),
         unit="factor",
         source=_PIGMENT,
-        panel="Colour",
         shown_when=_HAS_MELANIN,
     )
     redness: float = number(
@@ -99,7 +95,6 @@ class SharedSettings(Settings):
         hard=(0.0, 1.0),
         unit="factor",
         source=_PIGMENT,
-        panel="Colour",
         shown_when=_HAS_MELANIN,
     )
     absorption: tuple[float, float, float] = color(
@@ -108,7 +103,6 @@ class SharedSettings(Settings):
         description="Absorption of red, green and blue inside the hair, per length of its radius",
         maximum=100.0,
         source=_PIGMENT,
-        panel="Colour",
         shown_when=_HAS_ABSORPTION,
     )
     tip_tint: float = number(
@@ -118,13 +112,13 @@ class SharedSettings(Settings):
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),
         unit="factor",
-        panel="Colour",
+        panel="Tips & Brows",
     )
     tip_color: tuple[float, float, float] = color(
         (0.23, 0.145, 0.065),
         label="Tip Colour",
         description="Colour of the tips, blended in by Tip Tint",
-        panel="Colour",
+        panel="Tips & Brows",
         active_when=when("shading.tip_tint"),
     )
     tint_start: float = number(
@@ -134,7 +128,7 @@ class SharedSettings(Settings):
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),
         unit="factor",
-        panel="Colour",
+        panel="Tips & Brows",
         active_when=when("shading.tip_tint"),
     )
     tint_end: float = number(
@@ -144,7 +138,7 @@ class SharedSettings(Settings):
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),
         unit="factor",
-        panel="Colour",
+        panel="Tips & Brows",
         active_when=when("shading.tip_tint"),
     )
     brow_source: str = choice(
@@ -152,13 +146,13 @@ class SharedSettings(Settings):
         BROW_SOURCES,
         label="Brows and Lashes",
         description="Colour of brows and lashes, which are strands of the groups 9001 and 9002",
-        panel="Colour",
+        panel="Tips & Brows",
     )
     brow_color: tuple[float, float, float] = color(
         (0.03, 0.017, 0.011),
         label="Brow Colour",
         description="Colour of natural brows and lashes that have none of their own",
-        panel="Colour",
+        panel="Tips & Brows",
         active_when=when("shading.brow_source", "natural"),
     )
     color_variation: float = number(
@@ -212,6 +206,7 @@ class SharedSettings(Settings):
         description="Factor on ambient light from the world",
         soft=(0.0, 2.0),
         hard=(0.0, 100.0),
+        panel="Light",
     )
 
 
@@ -223,12 +218,13 @@ class ShadingSettings(MarschnerSettings, KajiyaKaySettings, SharedSettings):
     title = "Shading"
     owner = "groom"
     panels = (
-        "Colour",
         "First Highlight",
         "Second Highlight",
         "Rim Light",
-        "Fibre",
+        "Tips & Brows",
         "Variation",
+        "Fibre",
+        "Light",
     )
 
 

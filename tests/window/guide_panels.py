@@ -7,9 +7,9 @@ that are open below each other. tests/blender/test_user_guide.py holds that none
 PICTURES: dict[str, tuple[tuple[str, ...], ...]] = {
     "data": (("data",),),
     "look": (
-        ("data_look", "data_look_look_colour", "data_look_look_first"),
-        ("data_look_look_second", "data_look_look_rim")
-        + ("data_look_look_fibre", "data_look_look_variation"),
+        ("data_look", "data_look_look_first", "data_look_look_second"),
+        ("data_look_look_rim", "data_look_look_tips", "data_look_look_variation"),
+        ("data_look_look_fibre", "data_look_look_light"),
     ),
     "shadows": (("data_shadows",), ("data_shadows_skin", "data_shafts")),
     "grow": (("data_grow",),),

@@ -195,6 +195,7 @@ class MarschnerSettings(Settings):
         soft=(0.0, 2.0),
         hard=(0.0, 100.0),
         shown_when=when("shading.model", "marschner"),
+        panel="Light",
         active_when=_HAS_NO_SCATTERING,
     )
     volume_shadow: float = number(
@@ -206,5 +207,6 @@ class MarschnerSettings(Settings):
         unit="factor",
         source="Scheuermann 2004, highlights attenuated by the diffuse bias",
         shown_when=when("shading.model", "marschner"),
+        panel="Light",
         active_when=when("volume.shadows", "none"),
     )
