@@ -39,8 +39,7 @@ def combed(rig: Rig, curves: StrandSet, number: Ints) -> Rig:
     if grown is not None and own is not None:
         grown, touched = _grown(grown, curves, number)
         if len(touched):
-            children = _strands(grown.growth.shapes(grown.shapes.grid, grown.kept[touched]))
-            _put(points, strands.offsets, own + touched, children)
+            put_children(points, strands.offsets, grown, touched, own)
     return replace(rig, strands=replace(strands, points=points), guide_grid=guide_grid, grown=grown)
 
 
@@ -56,6 +55,17 @@ def _grown(grown: Grown, curves: StrandSet, number: Ints) -> tuple[Grown, Ints]:
     shapes = replace(grown.shapes, points=grid.reshape(-1, 3))
     touched = np.flatnonzero(grown.growth.touched(is_moved)[grown.kept])
     return replace(grown, shapes=shapes), touched
+
+
+def put_children(points: Floats, offsets: Ints, grown: Grown, chosen: Ints, own: int) -> None:
+    """Write some of a rig's children (n,) as they have grown, by as many points as they had.
+
+    Args:
+        chosen: numbers among the children whose growth ascends.
+        own: how many strands come before them.
+    """
+    children = _strands(grown.growth.shapes(grown.shapes.grid, grown.kept[chosen]))
+    _put(points, offsets, own + chosen, children)
 
 
 def _strands(grid: Floats) -> StrandSet:

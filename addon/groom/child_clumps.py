@@ -19,7 +19,7 @@ from ..params.curve import along
 from ..strands.kept import NOTHING_KEPT, Kept
 from .children_settings import ChildrenSettings
 from .partings import Partings
-from .weights import by_group, directions, likeness
+from .weights import by_group, directions, likeness, nearest_before
 
 #: Children of the first level.
 _FIRST_LEVEL = 4096
@@ -53,6 +53,37 @@ class Clumps:
         while (more := found | found[self.middle]).sum() > found.sum():
             found = more
         return found
+
+    def joined(
+        self,
+        root: Floats,
+        group: Ints,
+        near_root: Floats,
+        near_group: Ints,
+        near: Ints,
+        partings: Partings | None,
+    ) -> Clumps:
+        """And more children (n,), which follow in number: each in the clump of the nearest child
+        that is drawn by one, of its group and on its side of partings.
+
+        Args:
+            near: (m,) numbers of the children that may be their neighbours.
+        """
+        count = len(self.middle)
+        middle, strength = count + np.arange(len(root)), np.zeros(len(root))
+        is_drawn = self.strength[near] > 0.0
+        near, near_root, near_group = near[is_drawn], near_root[is_drawn], near_group[is_drawn]
+        for own, others in by_group(group, near_group):
+            if not len(others):
+                continue
+            found, _, crossed = nearest_before(partings, root[own], near_root[others], 1, root[own])
+            beside = near[others[found[:, 0]]]
+            joins = np.ones(len(own), bool) if crossed is None else ~crossed[:, 0]
+            middle[own[joins]] = self.middle[beside[joins]]
+            strength[own[joins]] = self.strength[beside[joins]]
+        return Clumps(
+            np.concatenate([self.middle, middle]), np.concatenate([self.strength, strength])
+        )
 
 
 def clump(

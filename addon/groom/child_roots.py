@@ -37,6 +37,8 @@ _FINE, _SPLITS = 0.5, 8
 _MAX_PIECES = 100_000
 #: Roots tried for each one wanted, before what was found has to do.
 _TRIES = 32
+#: Numbers of roots that are tried first, in each doubling.
+_STEPS = 4
 #: With less than this part of the painted area near guides, the artist gets a warning.
 _BARE = 0.95
 
@@ -53,6 +55,16 @@ class ChildRoots:
     point: Floats
     key: Ints
     notes: tuple[str, ...]
+
+    def take(self, chosen: Ints) -> ChildRoots:
+        """Some of them, without notes."""
+        return ChildRoots(
+            self.triangle[chosen],
+            self.barycentric[chosen],
+            self.point[chosen],
+            self.key[chosen],
+            (),
+        )
 
 
 def child_roots(
@@ -88,12 +100,19 @@ def _roots_among(
     require_area(everywhere.mass)
     pieces = _near_guides(everywhere, guided)
     is_near = guided.holds(pieces.point.mean(axis=1), pieces.normal)
-    mass_near, mass = float(pieces.mass[is_near].sum()), float(pieces.mass.sum())
-    tried = int(1.05 * count * min(_TRIES, mass / max(mass_near, 1e-300))) + 64
-    roots = _spread(pieces, everywhere, guided, count, tried, seed)
+    mass_near = float(pieces.mass[is_near].sum())
+    # as many as there would be at the peak everywhere; one dab of a brush mostly asks for no others
+    even = _peak(density) * float(pieces.area.sum()) / max(mass_near, 1e-300)
+    tried = 1.05 * count * min(_TRIES, even) + 64.0
+    tried = 2.0 ** (np.ceil(np.log2(tried) * _STEPS) / _STEPS)
+    roots = _spread(surface, guided, density, count, int(tried), seed)
     is_bare = density is not None and mass_near < _BARE * float(everywhere.mass.sum())
     notes = _notes(count, len(roots), is_bare, len(guided.place) == 1)
     return _on_surface(surface, roots, notes)
+
+
+def _peak(density: Floats | None) -> float:
+    return 1.0 if density is None else float(density.max())
 
 
 @dataclass(frozen=True)
@@ -124,6 +143,10 @@ class _Guided:
         _, gap = nearest_points(place, place, _NEIGHBOUR + 1)
         apart = gap[:, -1]
         return cls(place, normal, np.minimum(apart, _WIDEST * np.median(apart)), is_painted)
+
+    @property
+    def arguments(self) -> tuple[Floats, Floats, Floats, bool]:
+        return self.place, self.normal, self.spacing, self.is_painted
 
     @property
     def reach(self) -> Floats:
@@ -169,27 +192,69 @@ def _near_guides(pieces: Pieces, guided: _Guided) -> Pieces:
 
 
 def _spread(
-    pieces: Pieces, everywhere: Pieces, guided: _Guided, count: int, tried: int, seed: int
+    surface: Surface,
+    guided: _Guided,
+    density: Floats | None,
+    count: int,
+    tried: int,
+    seed: int,
 ) -> Samples:
     """Roots near guides, at most `count`, on triangles of the surface.
+
+    Of roots that are spread evenly, every beginning is. So where hair is to grow half as densely,
+    half as many of them, the first, are as many as of twice as many elsewhere: their numbers divided
+    by the density there are the order in which they come. What is painted changes the numbers of
+    no roots, so those elsewhere stay.
 
     Args:
         tried: how many roots may be enough to find them; more are tried where not.
     """
-    if not len(pieces):
-        return Samples.none()
+    is_wanted = np.ones(len(surface.triangles), bool)
+    if density is not None:
+        is_wanted = (density[surface.triangles] > 0.0).any(axis=1)
     most = _TRIES * max(count, 1000)
     while True:
-        roots = spread_roots(pieces, tried, seed, everywhere)
-        point = np.einsum("nk,nkj->nj", roots.barycentric, pieces.point[roots.triangle])
-        found = np.flatnonzero(guided.holds(point, pieces.normal[roots.triangle]))[:count]
-        if len(found) == count or tried >= most:
-            break
+        roots, number = surface.latest(_even_roots, *guided.arguments, is_wanted, tried, seed)
+        if density is not None:
+            weights = density[surface.triangles[roots.triangle]] / _peak(density)
+            of_root = np.einsum("nk,nk->n", roots.barycentric, weights)
+            never = np.full(len(roots), np.inf)
+            order = np.divide(number + 0.5, of_root, out=never, where=of_root > 0.0)
+        else:
+            order = number + 0.5
+        chosen = np.argsort(order, kind="stable")
+        chosen = chosen[order[chosen] < np.inf][:count]
+        is_sure = len(chosen) == count and order[chosen].max(initial=0.0) <= tried
+        if is_sure or not len(roots) or tried >= most:
+            return roots.take(chosen)
         tried = min(most, 2 * tried)
-    roots = roots.take(found)
+
+
+def _even_roots(
+    surface: Surface,
+    place: Floats,
+    normal: Floats,
+    spacing: Floats,
+    is_painted: bool,
+    is_wanted: Bools,
+    tried: int,
+    seed: int,
+) -> tuple[Samples, Ints]:
+    """Of roots spread evenly over some triangles of a surface, `tried` of them, those near guides,
+    on triangles of the surface, and their numbers (n,).
+    """
+    guided = _Guided(place, normal, spacing, is_painted)
+    everywhere = Pieces.of(surface, None)
+    pieces = _near_guides(everywhere.take(is_wanted), guided)
+    if not len(pieces):
+        return Samples.none(), np.zeros(0, np.int64)
+    roots = spread_roots(pieces, tried, seed, everywhere)
+    point = np.einsum("nk,nkj->nj", roots.barycentric, pieces.point[roots.triangle])
+    number = np.flatnonzero(guided.holds(point, pieces.normal[roots.triangle]))
+    roots = roots.take(number)
     piece = roots.triangle
     inside = np.einsum("nk,nkj->nj", roots.barycentric, pieces.corner[piece])
-    return replace(roots, triangle=pieces.parent[piece], barycentric=inside)
+    return replace(roots, triangle=pieces.parent[piece], barycentric=inside), number
 
 
 def _on_surface(surface: Surface, roots: Samples, notes: tuple[str, ...]) -> ChildRoots:

@@ -54,6 +54,7 @@ class Growth:
 
     root: (child_count, 3) float32 [m]. key: (child_count,) what is random about each depends on.
     clumps: as they were found. size: the median length of the guides [m].
+    partings: which they grew beside; None: none.
     """
 
     root: Floats
@@ -62,6 +63,7 @@ class Growth:
     clumps: Clumps
     settings: ChildrenSettings
     size: float
+    partings: Partings | None
 
     def touched(self, guides: Bools) -> Bools:
         """Children (child_count,) whose shapes these guides (guide_count,) have a part in."""
@@ -83,6 +85,34 @@ class Growth:
         grid = grid[np.searchsorted(number, chosen)]
         _vary(grid, self.key[chosen], self.settings, self.size)
         return grid
+
+    def with_more(self, roots: ChildRoots, guides: StrandSet, beside: Ints) -> Growth:
+        """And children at other roots, which follow in number: they mix guides as all do, and join
+        the clumps of their neighbours.
+
+        Args:
+            guides: between which these have grown.
+            beside: which children are neighbours, if they are drawn by clumps.
+        """
+        weights = _weights(roots, guides, self.settings, self.partings, NOTHING_KEPT)
+        more = self.clumps.joined(
+            roots.point,
+            guides.group[weights.guide[:, 0]],
+            self.root[beside],
+            guides.group[self.weights.guide[beside, 0]],
+            beside,
+            self.partings,
+        )
+        return replace(
+            self,
+            root=np.concatenate([self.root, roots.point]),
+            key=np.concatenate([self.key, roots.key]),
+            weights=GuideWeights(
+                np.concatenate([self.weights.guide, weights.guide]),
+                np.concatenate([self.weights.weight, weights.weight]),
+            ),
+            clumps=more,
+        )
 
 
 def make_children(
@@ -139,7 +169,7 @@ def make_children(
         has_widths=guides.has_widths,
         color=_color(guides, weights),
     )
-    growth = Growth(roots.point, roots.key, weights, clumps, settings, size)
+    growth = Growth(roots.point, roots.key, weights, clumps, settings, size, partings)
     return Children(strands, weights, roots.notes + _notes(guides, settings), growth)
 
 

@@ -62,7 +62,13 @@ class Pieces:
     @property
     def mass(self) -> Floats:
         """Area x density, (n,) [m^2]."""
-        return 0.5 * np.linalg.norm(self._cross, axis=1) * self.density.mean(axis=1)
+        return self.area * self.density.mean(axis=1)
+
+    @property
+    def area(self) -> Floats:
+        """(n,) [m^2]."""
+        area: Floats = 0.5 * np.linalg.norm(self._cross, axis=1)
+        return area
 
     @property
     def normal(self) -> Floats:

@@ -127,6 +127,11 @@ class _Nearest:
         return index, distance
 
 
+def same_rows(rows: Any, among: Any) -> Ints:
+    """Where rows (n, ...) are among others (m, ...), bit by bit, (n,); -1: nowhere."""
+    return _found(_bits(rows), _bits(among))
+
+
 def _back(among: Floats, before: Floats) -> Ints | None:
     """Which of the points (n, 3) each of those before (m, 3) is, (m,); -1: none. None where points
     coincide, or have changed their order, so that of two as near as each other the other counts."""

@@ -9,6 +9,7 @@ when it evaluates the object again. And a fin shows itself by an attribute of it
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from functools import partial
 
 import bpy
@@ -75,10 +76,10 @@ def updated(depsgraph: bpy.types.Depsgraph) -> None:
     """Blender has evaluated the scene: follow what moved, read again what was edited."""
     moved, edited, light_changed = changes(depsgraph)
     for preview, session in _grooms():
-        is_combed = is_edited(session, edited)
+        is_combed, is_painted = is_edited(session, edited), weights_changed(session, edited)
         if (
             is_combed
-            or weights_changed(session, edited)
+            or is_painted
             or session.has_other_holders(edited)
             or session.has_other_partings()
         ):
@@ -89,7 +90,8 @@ def updated(depsgraph: bpy.types.Depsgraph) -> None:
         if occluders_changed(session, moved, depsgraph.view_layer):
             _shade_again_soon(preview)
         follows = preview.phase is not Phase.FREE and is_among(session, moved)
-        update = partial(_update, preview, session, depsgraph, follows, light_changed, is_combed)
+        brushes = [session.comb] * is_combed + [session.paint] * is_painted
+        update = partial(_update, preview, session, depsgraph, follows, light_changed, brushes)
         attempt(preview, depsgraph, update)
 
 
@@ -99,12 +101,12 @@ def _update(
     depsgraph: bpy.types.Depsgraph,
     follows: bool,
     light_changed: bool,
-    is_combed: bool,
+    brushes: list[Callable[[bpy.types.Depsgraph], None]],
 ) -> None:
     if light_changed:
         session.light(depsgraph)
-    if is_combed and preview.phase is Phase.REST:
-        session.comb(depsgraph)
+    for brush in brushes if preview.phase is Phase.REST else ():
+        brush(depsgraph)
     if follows:
         preview.keep_or_rest(depsgraph)
 
@@ -174,6 +176,7 @@ def follow_undo() -> None:
     for preview, session in _grooms():
         if preview.phase is Phase.REST:
             attempt(preview, depsgraph, partial(session.comb, depsgraph))
+            attempt(preview, depsgraph, partial(session.paint, depsgraph))
 
 
 def _read_again_soon() -> None:

@@ -37,6 +37,7 @@ class GroomSource:
     """One groom as it was read.
 
     source, settings: of the hair that is shown.
+    painted_density: as it was read last; None: children grow wherever guides are near.
     request: what was read last, from which hair is being made unless it is shown already.
 
     Args:
@@ -51,7 +52,7 @@ class GroomSource:
         self.hair = Body.at_rest(hair, depsgraph)
         self._holding = Holding.of(hair, depsgraph)
         self.source = replace(read_source(hair, depsgraph), holders=self._holding.holders)
-        self._combed = self.source.strands
+        self._combed, self.painted_density = self.source.strands, self.source.density
         uses_head = self.source.head is not None and head is not None
         self.head = Body.at_rest(head, depsgraph) if uses_head else None
         self._head_uid = head and head.session_uid
@@ -205,10 +206,21 @@ class GroomSource:
         self._combed = strands
         return strands.take(number), number
 
+    def has_other_density(self, depsgraph: bpy.types.Depsgraph) -> bool:
+        """Whether children are to grow by another density than when this was last asked for, or
+        since other hair was accepted.
+
+        Raises:
+            HairloomError: the hair is gone.
+        """
+        before = self.painted_density
+        self.painted_density, _ = read_density(self.hair.found(), self.source.head, depsgraph)
+        return not np.array_equal(before, self.painted_density)  # type: ignore[arg-type]
+
     def accept(self, request: BuildRequest) -> None:
         """Its hair is shown from now on; what acts at once is as it is set now."""
         self.source, self._holding = request.source, request.holding
-        self._combed = self.source.strands
+        self._combed, self.painted_density = self.source.strands, self.source.density
         self.settings = GroomSettings.of(self.hair.found()).at_once(request.settings)
 
     def take_settings(self) -> bool:

@@ -18,6 +18,7 @@ from ...dynamics.figures import Figures, Measure
 from ...dynamics.settings import DynamicsSettings
 from ...dynamics.state import start
 from ...errors import HairloomError
+from ...paint_flow import painted
 from ...pipeline import Pose, Rig
 from ...render.snapshot import Snapshot
 from ...strands.arc_length import lengths
@@ -241,6 +242,7 @@ class Session:
         if made is not None:
             self._take(*made, self.groom, depsgraph)
             self.comb(depsgraph)  # a brush has gone on meanwhile
+            self.paint(depsgraph)
 
     def finish(self, depsgraph: bpy.types.Depsgraph) -> None:
         """Wait for the hair that is being made, and show it.
@@ -289,6 +291,21 @@ class Session:
         if moved is None:
             return
         self.groom = replace(self.groom, rig=combed(self.rig, *moved))
+        self.solver = NumpySolver.at_rest(self.rig, self._pose(depsgraph))
+        self._show()
+
+    def paint(self, depsgraph: bpy.types.Depsgraph) -> None:
+        """Have children at rest follow a density that a brush has painted, as far as that is done
+        at once; `read_again` is to come. Hair that is held, and that of bakes, waits for it.
+
+        Raises:
+            HairloomError: as `rest`.
+        """
+        if self.is_playing or self.rig.grown is None or self.rig.holds is not None:
+            return
+        if not self._source.has_other_density(depsgraph):
+            return
+        self.groom = replace(self.groom, rig=painted(self.rig, self._source.painted_density))
         self.solver = NumpySolver.at_rest(self.rig, self._pose(depsgraph))
         self._show()
 

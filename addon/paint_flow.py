@@ -1,0 +1,102 @@
+"""The flow of hair under a brush on its density: children come and go at once.
+
+Children that the new density does not want make room for those that it wants now: these get their
+points, as many as they were, and shapes as all children grow, in the clumps of their neighbours.
+So nothing else changes, and what was found for the whole groom stays, as in `comb_flow`. What it
+leaves to `pipeline.prepare`, which is to follow: how many children there are, occlusion where they
+have come, guides in motion, and all that `comb_flow` leaves to it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from .arrays import Floats, Ints
+from .comb_flow import put_children
+from .groom.child_roots import ChildRoots, child_roots
+from .groom.roots import RootFrames, root_frames
+from .pipeline import Grown, Rig
+from .strands.kept import same_rows
+
+
+def painted(rig: Rig, density: Floats | None) -> Rig:
+    """The rig with its children where they grow by another density.
+
+    Args:
+        rig: with children that have grown.
+        density: (vertex_count,), see `pipeline.prepare`.
+
+    Raises:
+        HairloomError: as `child_roots`.
+    """
+    grown, own, head = rig.grown, rig.own_count, rig.head
+    assert grown is not None and own is not None and head is not None
+    settings = grown.growth.settings
+    roots = child_roots(grown.shapes, head, settings.strand_count, density, settings.seed)
+    number, grown = _grown(roots, grown)
+    is_wanted = np.zeros(len(grown.growth.root), bool)
+    is_wanted[number] = True
+    gone = np.flatnonzero(~is_wanted[grown.kept])
+    is_wanted[grown.kept] = False
+    come = np.flatnonzero(is_wanted)
+    if not len(gone):
+        return rig
+    # fewer that come are drawn more than once until it is known how many there are
+    come = np.sort(np.resize(come if len(come) else number, len(gone)))
+    kept = grown.kept.copy()
+    kept[gone] = come
+    grown = replace(grown, kept=kept)
+    return replace(_moved(rig, roots, grown, own + gone, number, come), grown=grown)
+
+
+def _grown(roots: ChildRoots, grown: Grown) -> tuple[Ints, Grown]:
+    """Which child of the growth each root belongs to, (n,), and the growth with all of them."""
+    growth = grown.growth
+    number = same_rows(roots.point, growth.root)
+    new = np.flatnonzero(number < 0)
+    number[new] = len(growth.root) + np.arange(len(new))
+    if not len(new):
+        return number, grown
+    more = growth.with_more(roots.take(new), grown.shapes, grown.kept)
+    return number, replace(grown, growth=more)
+
+
+def _moved(
+    rig: Rig, roots: ChildRoots, grown: Grown, strand: Ints, number: Ints, come: Ints
+) -> Rig:
+    """The rig with some of its strands as children that have grown.
+
+    Args:
+        roots: of which each is that of the child `number` (n,) of the growth.
+        strand: which of the rig's strands are others now, (m,).
+        come: which children of the growth they are, (m,) ascending.
+    """
+    strands, own, head = rig.strands, rig.own_count, rig.head
+    assert own is not None and head is not None and rig.rest_frames is not None
+    points = strands.points.copy()
+    put_children(points, strands.offsets, grown, strand - own, own)
+    order = np.argsort(number)
+    of_root = order[np.searchsorted(number[order], come)]
+    triangle, barycentric = roots.triangle[of_root], roots.barycentric[of_root]
+    frames = root_frames(head.positions, head.triangles, triangle, barycentric)
+    moved = replace(
+        strands,
+        points=points,
+        root_triangle=_with(strands.root_triangle, strand, triangle),
+        root_barycentric=_with(strands.root_barycentric, strand, barycentric),
+    )
+    rest_frames = RootFrames(
+        _with(rig.rest_frames.origin, strand, frames.origin),
+        _with(rig.rest_frames.rotation, strand, frames.rotation),
+    )
+    return replace(rig, strands=moved, rest_frames=rest_frames)
+
+
+def _with(rows: Floats | Ints | None, chosen: Ints, others: Floats | Ints) -> Floats | Ints:
+    """Rows (n, ...) with some of them others."""
+    assert rows is not None
+    found = rows.copy()
+    found[chosen] = others
+    return found
