@@ -10,7 +10,8 @@ fur, to Blender's monkey.
   strands are in these: MakeHuman's base mesh shaped as another person, Sintel's, and one
   like a scan of that person: few triangles with noise and holes, turned, in centimetres.
 - edit_ms: a stroke over curls, 20,000 of them by Blender's nodes and our children, until all
-  strands have followed; paint_ms: a dab on the density of 20,000 children; see `_combing`.
+  strands have followed; paint_ms: a dab on the density of 20,000 children, until they stand where
+  they are painted; paint_all_ms: all that follows from it; see `_combing`.
 
 Exit code 1: a limit is missed.
 
@@ -292,7 +293,7 @@ def main(names: list[str]) -> int:
         missed += [key for key, most in FIT_LIMITS.items() if found[key] > most]
     if not names or "edit" in names:
         hair = styled("curls")
-        found |= {"edit_ms": combed(hair)["comb_ms"], "paint_ms": painted(hair)}
+        found |= {"edit_ms": combed(hair)["comb_ms"], **painted(hair)}
         missed += [key for key, most in EDIT_LIMITS.items() if found[key] > most]
     parts = ("fit", "edit")
     for name in [name for name in names if name not in parts] or (styles if not names else []):

@@ -11,6 +11,7 @@ from ..arrays import Bools, Floats, Ints
 from ..strands import StrandSet, Surface
 from ..strands.nearest import nearest_points
 from .blue_noise import require_area, spread_roots
+from .counter_random import named
 from .dart_throwing import Samples
 from .grown import checked_weights
 from .triangle_subdivision import Pieces
@@ -39,6 +40,8 @@ _MAX_PIECES = 100_000
 _TRIES = 32
 #: Numbers of roots that are tried first, in each doubling.
 _STEPS = 4
+#: Cells of the lattice along all guides, by which the surface is looked at where hair grows.
+_CELLS = 8
 #: With less than this part of the painted area near guides, the artist gets a warning.
 _BARE = 0.95
 
@@ -96,23 +99,37 @@ def _roots_among(
 ) -> ChildRoots:
     """As `child_roots`, of guides that stand at these places; see `_Guided`."""
     guided = _Guided(place, normal, spacing, density is not None)
-    everywhere = Pieces.of(surface, density)
-    require_area(everywhere.mass)
-    pieces = _near_guides(everywhere, guided)
-    is_near = guided.holds(pieces.point.mean(axis=1), pieces.normal)
-    mass_near = float(pieces.mass[is_near].sum())
-    # as many as there would be at the peak everywhere; one dab of a brush mostly asks for no others
+    mass = Pieces.of(surface, density).mass
+    require_area(mass)
+    is_wanted = _where_wanted(surface, density, place)
+    pieces, is_near = surface.latest(_near_guides, *guided.arguments, is_wanted)
+    mass_near = float(pieces.with_density(surface, density).mass[is_near].sum())
+    # as many as there would be at the peak everywhere
     even = _peak(density) * float(pieces.area.sum()) / max(mass_near, 1e-300)
     tried = 1.05 * count * min(_TRIES, even) + 64.0
+    # one dab of a brush mostly asks for no others
     tried = 2.0 ** (np.ceil(np.log2(tried) * _STEPS) / _STEPS)
-    roots = _spread(surface, guided, density, count, int(tried), seed)
-    is_bare = density is not None and mass_near < _BARE * float(everywhere.mass.sum())
+    roots = _spread(surface, guided, is_wanted, density, count, int(tried), seed)
+    is_bare = density is not None and mass_near < _BARE * float(mass.sum())
     notes = _notes(count, len(roots), is_bare, len(guided.place) == 1)
     return _on_surface(surface, roots, notes)
 
 
 def _peak(density: Floats | None) -> float:
     return 1.0 if density is None else float(density.max())
+
+
+def _where_wanted(surface: Surface, density: Floats | None, place: Floats) -> Bools:
+    """Triangles (triangle_count,) in cells of a lattice in which hair grows anywhere: a brush at
+    the edge of the hair mostly paints no other cells."""
+    if density is None:
+        return np.ones(len(surface.triangles), bool)
+    grows = (density[surface.triangles] > 0.0).any(axis=1)
+    size = max(float(np.linalg.norm(np.ptp(place, axis=0))) / _CELLS, 1e-6)
+    cell = np.floor(surface.corners.mean(axis=1) / size).astype(np.int64)
+    _, number = np.unique(named(cell[:, 0], cell[:, 1], cell[:, 2]), return_inverse=True)
+    is_wanted: Bools = np.bincount(number, grows)[number] > 0.0
+    return is_wanted
 
 
 @dataclass(frozen=True)
@@ -168,12 +185,22 @@ class _Guided:
         return is_near & ((one_sided <= _ONE_SIDED) | is_beside)
 
 
-def _near_guides(pieces: Pieces, guided: _Guided) -> Pieces:
-    """What may be near guides, large triangles split so that little else comes with it.
+def _near_guides(
+    surface: Surface,
+    place: Floats,
+    normal: Floats,
+    spacing: Floats,
+    is_painted: bool,
+    is_wanted: Bools,
+) -> tuple[Pieces, Bools]:
+    """What may be near guides of some triangles, large ones split so that little else comes with
+    it; and whether its middle is.
 
     Roots that are thrown away cost as much as others, and guides may stand on a small part of a
     large mesh, or of a large triangle.
     """
+    guided = _Guided(place, normal, spacing, is_painted)
+    pieces = Pieces.of(surface, None).take(is_wanted)
     done, most = [], len(pieces) + _MAX_PIECES
     pieces = pieces.take(pieces.mass > 0.0)
     for split in range(_SPLITS + 1):
@@ -188,12 +215,14 @@ def _near_guides(pieces: Pieces, guided: _Guided) -> Pieces:
         if split == _SPLITS or 4 * len(pieces) > most:
             break
         pieces = pieces.split()
-    return functools.reduce(Pieces.and_also, [*done, pieces])
+    near = functools.reduce(Pieces.and_also, [*done, pieces])
+    return near, guided.holds(near.point.mean(axis=1), near.normal)
 
 
 def _spread(
     surface: Surface,
     guided: _Guided,
+    is_wanted: Bools,
     density: Floats | None,
     count: int,
     tried: int,
@@ -202,16 +231,14 @@ def _spread(
     """Roots near guides, at most `count`, on triangles of the surface.
 
     Of roots that are spread evenly, every beginning is. So where hair is to grow half as densely,
-    half as many of them, the first, are as many as of twice as many elsewhere: their numbers divided
-    by the density there are the order in which they come. What is painted changes the numbers of
-    no roots, so those elsewhere stay.
+    the first half of those elsewhere is enough: the numbers of roots divided by the density at them
+    are the order in which they come. What is painted changes no numbers, so that all those stay at
+    which nothing was painted.
 
     Args:
+        is_wanted: triangles, all those on which hair grows among them.
         tried: how many roots may be enough to find them; more are tried where not.
     """
-    is_wanted = np.ones(len(surface.triangles), bool)
-    if density is not None:
-        is_wanted = (density[surface.triangles] > 0.0).any(axis=1)
     most = _TRIES * max(count, 1000)
     while True:
         roots, number = surface.latest(_even_roots, *guided.arguments, is_wanted, tried, seed)
@@ -244,11 +271,10 @@ def _even_roots(
     on triangles of the surface, and their numbers (n,).
     """
     guided = _Guided(place, normal, spacing, is_painted)
-    everywhere = Pieces.of(surface, None)
-    pieces = _near_guides(everywhere.take(is_wanted), guided)
+    pieces, _ = surface.latest(_near_guides, *guided.arguments, is_wanted)
     if not len(pieces):
         return Samples.none(), np.zeros(0, np.int64)
-    roots = spread_roots(pieces, tried, seed, everywhere)
+    roots = spread_roots(pieces, tried, seed, Pieces.of(surface, None))
     point = np.einsum("nk,nkj->nj", roots.barycentric, pieces.point[roots.triangle])
     number = np.flatnonzero(guided.holds(point, pieces.normal[roots.triangle]))
     roots = roots.take(number)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -79,6 +79,12 @@ class Pieces:
     def _cross(self) -> Floats:
         edge = self.point[:, 1:] - self.point[:, :1]
         return np.cross(edge[:, 0], edge[:, 1])
+
+    def with_density(self, surface: Surface, density: Floats | None) -> Pieces:
+        """As if they were made of all triangles with this density (vertex_count,), see `of`."""
+        weights = np.ones(len(surface.positions)) if density is None else density
+        whole = weights[surface.triangles[self.parent]]
+        return replace(self, density=np.einsum("nck,nk->nc", self.corner, whole))
 
     def take(self, chosen: Bools) -> Pieces:
         return Pieces(

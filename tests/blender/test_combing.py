@@ -133,6 +133,75 @@ def test_hair_that_plays_is_not_put_to_rest_by_the_first_touch(hair, session, ev
     assert session.solver is solver and session.is_playing
 
 
+@pytest.fixture
+def group(hair, sphere):
+    """By which its children grow."""
+    group = sphere.vertex_groups.new(name="Hair")
+    group.add([v.index for v in sphere.data.vertices], 1.0, "REPLACE")
+    hair.hairloom.children_density = "Hair"
+    return group
+
+
+def paint(group, weight):
+    """Half of the head, as a brush does."""
+    sphere = next(obj for obj in bpy.data.objects if group.name in obj.vertex_groups)
+    group.add([v.index for v in sphere.data.vertices if v.co.x > 0.0], weight, "REPLACE")
+    sphere.data.update_tag()
+    bpy.context.view_layer.update()
+
+
+def roots(session):
+    own = session.rig.own_count
+    return {root.tobytes() for root in session.rig.strands.roots[own:]}
+
+
+def test_children_follow_a_density_with_the_update(hair, group, session, evaluated):
+    arrive(session, evaluated)
+    before, snapshot = roots(session), session.snapshot
+    paint(group, 0.2)
+    after, drawn_now = roots(session), drawn(session)
+    assert 0.1 < len(before - after) / len(before) < 0.6
+    assert session.snapshot.layout is snapshot.layout
+    assert session.is_stale, "the rest is to come"
+    assert {p.tobytes() for p in drawn_now[session.rig.strands.offsets[:-1]]} >= after
+    arrive(session, evaluated)
+    assert roots(session) == after
+    points, occlusion = rebuilt(hair, evaluated)
+    np.testing.assert_array_equal(session.rig.strands.points, points)
+    np.testing.assert_array_equal(session.snapshot.occlusion, occlusion)
+
+
+def test_an_undo_of_painting_brings_back_the_very_hair(hair, group, session, evaluated):
+    arrive(session, evaluated)
+    before, groom = drawn(session), session.groom
+    paint(group, 0.2)
+    paint(group, 1.0)
+    arrive(session, evaluated)
+    np.testing.assert_array_equal(drawn(session), before)
+    assert session.groom is groom, "made once, not again"
+
+
+def test_painting_amid_a_build_is_not_lost_when_that_arrives(hair, group, session, evaluated):
+    arrive(session, evaluated)
+    paint(group, 0.5)
+    scene_events.catch_up(evaluated())
+    paint(group, 0.1)
+    painted = roots(session)
+    take_steps_until(lambda: not session.is_pending)
+    assert roots(session) == painted
+    arrive(session, evaluated)
+    np.testing.assert_array_equal(session.rig.strands.points, rebuilt(hair, evaluated)[0])
+
+
+def test_hair_that_plays_waits_for_what_is_made_of_the_paint(hair, group, session, evaluated):
+    arrive(session, evaluated)
+    previews.play(evaluated())
+    previews.advance(evaluated(), 1.0 / 60.0)
+    solver, before = session.solver, roots(session)
+    paint(group, 0.2)
+    assert session.solver is solver and roots(session) == before
+
+
 def test_guides_are_lines_while_brushes_comb_them(hair, session, evaluated):
     """Blender's own curves stay hidden; those on the far side of the head are not drawn."""
     assert overlay.drawing_of(session.uid).lines == ()

@@ -165,6 +165,25 @@ def test_a_density_says_where_and_how_many() -> None:
     assert (at[:, 0] > 0.55).sum() / (at[:, 0] < 0.45).sum() == pytest.approx(3.0, rel=0.1)
 
 
+def test_a_brush_moves_those_alone_that_it_touches() -> None:
+    """Of fewer where it paints less, all were there before; elsewhere more are added, as there are
+    as many of all."""
+    surface = sheet(20)
+    guides = spread_guides(surface, 300)
+    away = np.linalg.norm(surface.positions[:, :2] - [0.4, 0.5], axis=1)
+
+    def roots(weight: float) -> tuple[set[bytes], set[bytes]]:
+        density = np.where(away < 0.2, weight, 1.0)
+        made = make_children(guides, surface, settings(strand_count=2000), density, place="test")
+        at = made.strands.roots
+        gap = np.linalg.norm(at[:, :2] - [0.4, 0.5], axis=1)
+        return {p.tobytes() for p in at[gap < 0.13]}, {p.tobytes() for p in at[gap > 0.27]}
+
+    (inside, outside), (fewer, more) = roots(1.0), roots(0.4)
+    assert fewer < inside and outside < more
+    assert len(fewer) / len(inside) == pytest.approx(0.4 * len(more) / len(outside), rel=0.15)
+
+
 def test_a_painted_area_without_guides_stays_bare_and_is_told() -> None:
     surface = sheet(20, 10.0)
     guides = spread_guides(surface, 100)
