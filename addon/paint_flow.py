@@ -10,6 +10,7 @@ have come, guides in motion, and all that `comb_flow` leaves to it.
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -94,9 +95,10 @@ def _moved(
     return replace(rig, strands=moved, rest_frames=rest_frames)
 
 
-def _with(rows: Floats | Ints | None, chosen: Ints, others: Floats | Ints) -> Floats | Ints:
+def _with[Rows: np.ndarray](rows: Rows | None, chosen: Ints, others: Rows) -> Rows:
     """Rows (n, ...) with some of them others."""
     assert rows is not None
-    found = rows.copy()
+    found: Any = rows.copy()
     found[chosen] = others
-    return found
+    whole: Rows = found
+    return whole

@@ -9,7 +9,7 @@ when it evaluates the object again. And a fin shows itself by an attribute of it
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 
 import bpy
@@ -101,7 +101,7 @@ def _update(
     depsgraph: bpy.types.Depsgraph,
     follows: bool,
     light_changed: bool,
-    brushes: list[Callable[[bpy.types.Depsgraph], None]],
+    brushes: Sequence[Callable[[bpy.types.Depsgraph], None]],
 ) -> None:
     if light_changed:
         session.light(depsgraph)
