@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
 import bpy
 from bpy.props import StringProperty
+from bpy_extras.io_utils import ImportHelper, poll_file_object_drop
 
 from ..blender.base.outcome import report
 from ..blender.properties.presets import (
@@ -21,6 +26,9 @@ from ..blender.scene.principled import has_principled_hair, look_from_material
 from .preset_chooser import KIND
 from .reports import reporting
 from .selection import chosen_hair, needs_hair
+
+#: of preset files
+_SUFFIX = ".json"
 
 
 class HAIRLOOM_OT_apply_preset(bpy.types.Operator):
@@ -40,13 +48,59 @@ class HAIRLOOM_OT_apply_preset(bpy.types.Operator):
 
     @reporting
     def execute(self, context: bpy.types.Context) -> set[str]:
-        preset = named_preset(self.name)
-        for hair in chosen_hair(context):
-            for settings in preset.all:
-                apply(settings, hair)
-            if has_look_material(hair.data):
-                _put_material(hair)
+        _apply(named_preset(self.name).all, context)
         return {"FINISHED"}
+
+
+def _apply(all_settings: Iterable[Any], context: bpy.types.Context) -> None:
+    """Put a preset onto the selected hair, whose material follows if it is one of ours."""
+    for hair in chosen_hair(context):
+        for settings in all_settings:
+            apply(settings, hair)
+        if has_look_material(hair.data):
+            _put_material(hair)
+
+
+class HAIRLOOM_OT_add_preset(bpy.types.Operator, ImportHelper):
+    """Apply a preset file to the selected hair, and keep it as one of your own presets"""
+
+    bl_idname = "hairloom.add_preset"
+    bl_label = "Add Preset File"
+    bl_options = {"REGISTER", "UNDO"}
+
+    filter_glob: StringProperty(default=f"*{_SUFFIX}", options={"HIDDEN"})
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return needs_hair(cls, context)
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        if self.properties.is_property_set("filepath"):  # it was dropped
+            return self.execute(context)
+        return super().invoke(context, event)
+
+    @reporting
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        path = Path(bpy.path.abspath(self.filepath))
+        preset = named_preset(str(path))
+        _apply(preset.all, context)
+        title = free_title(preset.title or path.stem, preset.settings.section)
+        save_own(title, *preset.all)
+        report(self, "INFO", f"'{title}' is applied, and one of your own presets now")
+        return {"FINISHED"}
+
+
+class HAIRLOOM_FH_preset(bpy.types.FileHandler):
+    """Preset files dropped into the viewport"""
+
+    bl_idname = "HAIRLOOM_FH_preset"
+    bl_label = "Hairloom Preset"
+    bl_import_operator = HAIRLOOM_OT_add_preset.bl_idname
+    bl_file_extensions = _SUFFIX
+
+    @classmethod
+    def poll_drop(cls, context: bpy.types.Context) -> bool:
+        return poll_file_object_drop(context) and bool(chosen_hair(context))
 
 
 class HAIRLOOM_OT_save_preset(bpy.types.Operator):
@@ -157,6 +211,8 @@ def _put_material(hair: bpy.types.Object) -> tuple[bpy.types.Material, tuple[str
 
 CLASSES = (
     HAIRLOOM_OT_apply_preset,
+    HAIRLOOM_OT_add_preset,
+    HAIRLOOM_FH_preset,
     HAIRLOOM_OT_save_preset,
     HAIRLOOM_OT_delete_preset,
     HAIRLOOM_OT_look_from_material,

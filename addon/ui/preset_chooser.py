@@ -57,6 +57,7 @@ def draw_preset_row(
     buttons.label(text=entries[now - 1].title if now else _CUSTOM[1])
     kept = buttons.row(align=True)
     kept.operator("hairloom.save_preset", text="Save", icon="ADD").section = section
+    kept.operator("hairloom.add_preset", text="", icon="FILE_FOLDER")
     if now and entries[now - 1].is_own:
         kept.operator("hairloom.delete_preset", text="", icon="X").name = entries[now - 1].name
     for warning in warnings:

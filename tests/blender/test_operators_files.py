@@ -199,7 +199,10 @@ def test_cards_are_written_with_their_sidecar(sphere, tmp_path, told):
         "cards.glb",
         "cards.hairloom.json",
         *sorted(
-            [f"cards_{name}.png" for name in ("alpha", "base", "noise", "shift", "tangent")]
+            [
+                f"cards_{name}.png"
+                for name in ("alpha", "base", "color", "noise", "shift", "tangent")
+            ]
             + [f"cards_{name}.exr" for name in ("azimuthal", "longitudinal", "paths")]
         ),
     ]

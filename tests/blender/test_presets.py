@@ -130,6 +130,37 @@ def test_the_command_line_takes_presets_and_single_values_over_them(tmp_path: Pa
     assert shading["base_color"] == blond["base_color"]
 
 
+def test_a_preset_file_is_applied_and_kept(
+    hair: bpy.types.Object, own_folder: Path, tmp_path: Path
+) -> None:
+    """As one drops it into the viewport; another one of the same title is kept beside it."""
+    file = tmp_path / "theirs.json"
+    data = json.loads((presets.PRESET_FOLDER / "looks" / "red.json").read_text())
+    file.write_text(json.dumps(data | {"title": "Theirs"}))
+    for titles in (["Theirs"], ["Theirs", "Theirs 2"]):
+        assert bpy.ops.hairloom.add_preset(filepath=str(file)) == {"FINISHED"}
+        entries, warnings = presets.own("shading")
+        assert [entry.title for entry in entries] == titles and not warnings
+    assert presets.preset_of(hair, entries) == entries[0]
+
+
+@pytest.mark.parametrize(
+    ("content", "why"),
+    [
+        ("{", "cannot be read"),
+        ('{"hairloom": 1, "section": "shading", "values": {"model": "plaid"}}', "plaid"),
+        ((presets.PRESET_FOLDER / "stage" / "plain.json").read_text(), "keeps no 'stage'"),
+    ],
+)
+def test_what_is_no_preset_of_hair_is_refused_and_not_kept(
+    hair: bpy.types.Object, own_folder: Path, tmp_path: Path, content: str, why: str
+) -> None:
+    (tmp_path / "theirs.json").write_text(content)
+    with pytest.raises(RuntimeError, match=why):
+        bpy.ops.hairloom.add_preset(filepath=str(tmp_path / "theirs.json"))
+    assert not own_folder.exists()
+
+
 @pytest.fixture
 def own_folder(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
     """Where the artist's own presets go in a test; not made yet."""

@@ -378,9 +378,7 @@ def material_of(shading: ShadingSettings, tables: Mapping[str, str]) -> dict[str
         tables: name -> file of the tables that lie beside it, see `write_tables`.
     """
     own: type[Settings] = KajiyaKaySettings if shading.model == "kajiya_kay" else MarschnerSettings
-    left_out = {"model", "color_source", "brow_source", "brow_color"} | (
-        _PIGMENT if own is KajiyaKaySettings else set()
-    )
+    left_out = _OF_STRANDS | (_PIGMENT if own is KajiyaKaySettings else set())
     every = (*SharedSettings.parameters(), *own.parameters())
     parameters = [each for each in every if each.name not in left_out]
     content: dict[str, Any] = {

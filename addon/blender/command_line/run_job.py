@@ -29,6 +29,7 @@ _OF_SCENES = (
     "show_in_renders",
     "mute_hair_dynamics",
     "apply_preset",
+    "add_preset",
     "grow_again",
     "look_from_material",
     "look_to_material",
