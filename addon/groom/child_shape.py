@@ -7,6 +7,7 @@ import numpy as np
 from ..arrays import Floats, Ints
 from ..params.curve import along
 from ..strands.arc_length import first_as_far
+from ..strands.catmull_rom import on_curve
 from .children_settings import ChildrenSettings
 from .counter_random import named, uniform
 from .weights import GuideWeights
@@ -67,28 +68,7 @@ def _cut(grid: Floats, kept: Floats) -> Floats:
     span = reached.take(left + 1) - before
     inside = np.divide(wanted - before, span, out=np.zeros_like(span), where=span > 0.0)
     left -= offsets[:-1, None]
-    return _on_curve(grid, left, np.clip(inside, 0.0, 1.0).astype(np.float32))
-
-
-def _on_curve(grid: Floats, left: Ints, t: Floats) -> Floats:
-    """Points of the uniform Catmull-Rom curve through the CVs, which goes on straight at its ends.
-
-    Args:
-        left: (n, k) segments. t: (n, k) places in them, 0 to 1.
-    """
-    ends = [2.0 * grid[:, :1] - grid[:, 1:2], grid, 2.0 * grid[:, -1:] - grid[:, -2:-1]]
-    extended = np.concatenate(ends, axis=1)
-    number = left + np.arange(len(grid))[:, None] * extended.shape[1]
-    result = np.empty_like(grid)
-    for axis in range(3):  # one by one, as numpy is slow at rows of three
-        along = np.ascontiguousarray(extended[..., axis])
-        p0, p1, p2, p3 = (along.take(number + step) for step in range(4))
-        m1, m2 = 0.5 * (p2 - p0), 0.5 * (p3 - p1)  # the tangents
-        chord = p2 - p1
-        result[..., axis] = p1 + t * (
-            m1 + t * (3.0 * chord - 2.0 * m1 - m2 + t * (m1 + m2 - 2.0 * chord))
-        )
-    return result
+    return on_curve(grid, left, np.clip(inside, 0.0, 1.0).astype(np.float32))
 
 
 def frizz(grid: Floats, key: Ints, settings: ChildrenSettings, size: float) -> None:

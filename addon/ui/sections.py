@@ -22,6 +22,7 @@ from .operators_partings import draw_partings
 from .operators_settle import draw_settle
 from .operators_show import draw_show
 from .operators_ties import draw_ties
+from .operators_trim import draw_trim
 from .preset_chooser import draw_preset_row
 
 #: letters that are kept free for what the preview says of strands, guides or children
@@ -190,7 +191,11 @@ SUB_SECTIONS: dict[str, tuple[Section, ...]] = {
         for panel in ALL_SETTINGS["shading"].panels
     ),
     "shadows": (("skin", "Soft Shadow on Skin", draw_skin),),
-    "children": (("partings", "Partings", draw_partings), ("flow", "Flow", draw_flow)),
+    "children": (
+        ("partings", "Partings", draw_partings),
+        ("flow", "Flow", draw_flow),
+        ("trim", "Trim", draw_trim),
+    ),
     "dynamics": (
         ("style", "Style", _panel("dynamics", "Style")),
         ("medium", "Medium & Wind", _panel("dynamics", "Medium & Wind")),

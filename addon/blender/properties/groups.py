@@ -305,6 +305,13 @@ class HAIRLOOM_PG_character(bpy.types.PropertyGroup):
             "hair along, from their first points to their last",
             override=OVERRIDABLE,
         ),
+        "trim_collection": PointerProperty(
+            type=bpy.types.Collection,
+            name="Trim Shapes",
+            description="Collection of closed meshes, flat meshes and Empties that Trim to Shape "
+            "cuts the hair by",
+            override=OVERRIDABLE,
+        ),
         "tip_surface": PointerProperty(
             type=bpy.types.Object,
             name="Held Tips",

@@ -1,0 +1,93 @@
+"""What trims a groom: closed meshes, and Empties or flat meshes as planes, of a collection."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+
+from ...arrays import Bools, Floats
+from ...dynamics.colliders.winding import winding_number
+from ...errors import HairloomError
+from ...groom.trim import Plane, Shape, flat, is_closed
+from ...strands import Surface
+from ...strands.crossings import first_crossings
+from ..base.objects import head_of, matrix_of
+from .own_collections import objects_in
+from .surfaces import read_surface
+
+#: setting of the hair that names the collection, and what is in it
+SETTING, KIND = "trim_collection", "Trim Shapes"
+
+
+@dataclass(frozen=True, eq=False)
+class Solid:
+    """A closed mesh, in world space."""
+
+    surface: Surface
+
+    def has_inside(self, roots: Floats) -> Bools:
+        return np.asarray(np.abs(winding_number(roots, self.surface)) > 0.5)
+
+    def left_at(self, lines: Floats) -> Floats:
+        return first_crossings(lines, self.surface)
+
+
+def trim_shapes_of(hair: bpy.types.Object) -> tuple[bpy.types.Object, ...]:
+    """The objects that trim this hair, each once."""
+    return objects_in(hair, SETTING)
+
+
+def may_trim(obj: bpy.types.Object, hair: bpy.types.Object) -> bool:
+    """Whether an object that is selected beside the hair is meant to trim it."""
+    return obj.type in {"MESH", "EMPTY"} and obj != head_of(hair)
+
+
+def read_shapes(
+    objects: tuple[bpy.types.Object, ...], depsgraph: bpy.types.Depsgraph
+) -> tuple[tuple[Shape, ...], tuple[str, ...]]:
+    """The shapes in world space, and what cannot be used."""
+    found: list[Shape] = []
+    unusable: list[str] = []
+    for obj in objects:
+        try:
+            found.append(read_shape(obj, depsgraph))
+        except HairloomError as error:
+            unusable.append(str(error))
+    return tuple(found), tuple(unusable)
+
+
+def read_shape(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Shape:
+    """A shape in world space: of an Empty the plane across its Z axis.
+
+    Raises:
+        HairloomError: it is no Empty and no mesh, has no size, or is open and not flat.
+    """
+    if obj.type == "EMPTY":
+        return _plane_of(obj, depsgraph)
+    surface = read_surface(obj, depsgraph, need_uv=False, place=obj.name)
+    shape = flat(surface)
+    if shape is not None:
+        return shape
+    if not is_closed(surface):
+        raise HairloomError(
+            "it is neither closed nor flat, so it has no inside",
+            place=obj.name,
+            remedy="Fill its holes (Mesh > Clean Up > Fill Holes), or use a flat mesh or an Empty",
+        )
+    return Solid(surface)
+
+
+def _plane_of(empty: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Plane:
+    matrix = matrix_of(empty, depsgraph)
+    # across X and Y, which a sheared parent may not leave across Z
+    normal = np.cross(matrix[:3, 0], matrix[:3, 1])
+    size = float(np.linalg.norm(normal))
+    if not (np.isfinite(matrix).all() and size > 0.0):
+        raise HairloomError(
+            "it has no size, so its plane faces nowhere",
+            place=empty.name,
+            remedy="Set its scale to 1 (Object > Clear > Scale)",
+        )
+    return Plane(matrix[:3, 3], normal / size)

@@ -1,0 +1,59 @@
+"""Hair cut by its trim shapes, which can be taken back and done again with other shapes."""
+
+from __future__ import annotations
+
+import bpy
+
+from ...errors import HairloomError
+from ...groom.trim import trimmed
+from ..base.outcome import Outcome
+from ..scene.curves import read_own_curves, write_own_curves
+from ..scene.kept_shape import KeptShape
+from ..scene.trim_shapes import read_shapes, trim_shapes_of
+from .combing import check_own
+
+BEFORE_TRIM = KeptShape("hairloom_before_trim", "hairloom_trimmed")
+
+
+def trim_to_shapes(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Outcome:
+    """End the curves of this hair where they leave its trim shapes, before their modifiers. Hair
+    that nothing else has changed since it was trimmed begins again from its shape before.
+
+    Raises:
+        HairloomError: no hair that can be used, no shape, or it is linked from another file.
+    """
+    check_own(hair)
+    shapes, unusable = read_shapes(trim_shapes_of(hair), depsgraph)
+    if not shapes:
+        reason = " ".join(unusable)
+        raise HairloomError(
+            f"it has nothing to be trimmed to{f' ({reason})' if reason else ''}",
+            place=hair.name,
+            remedy="Select a closed mesh, a flat one or an Empty beside the hair",
+        )
+    own = read_own_curves(hair, depsgraph, BEFORE_TRIM.before(hair))
+    cut = trimmed(own.strands, shapes)
+    BEFORE_TRIM.keep(hair)
+    write_own_curves(hair, own, cut.points, depsgraph)
+    BEFORE_TRIM.seal(hair)
+    trimmed_count = int(cut.is_trimmed.sum())
+    left, outside = len(cut.is_trimmed) - trimmed_count, int(cut.is_outside.sum())
+    result = f"{hair.name}: {trimmed_count:,} curves trimmed, {left:,} left as they are"
+    if outside:
+        result += f", {outside:,} of them with roots outside"
+    return Outcome(result, own.dropped, unusable)
+
+
+def take_trim_back(hair: bpy.types.Object) -> None:
+    """Give curves the shape that they had before they were trimmed.
+
+    Raises:
+        HairloomError: there is no such shape, or it is linked from another file.
+    """
+    check_own(hair)
+    if not BEFORE_TRIM.back(hair):
+        raise HairloomError(
+            "it has not been trimmed, so there is no shape to go back to",
+            place=hair.name,
+            remedy="Press Trim to Shape first",
+        )

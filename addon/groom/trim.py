@@ -1,0 +1,151 @@
+"""Trim: strands end where they first leave a shape.
+
+A shape is a closed mesh, which strands leave, or a plane, which they pass: unbounded, or as far as
+a flat mesh reaches. Of a plane the side on which most roots are is the inside. What grows outside
+of a shape is not cut by it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from ..arrays import Bools, Floats
+from ..strands import StrandSet, Surface
+from ..strands.arc_length import first_as_far
+from ..strands.catmull_rom import evenly_on_curve
+from ..strands.crossings import first_crossings
+
+#: Pieces of a segment in which strands are looked at.
+_PIECES = 8
+#: Strands looked at together, so that their pieces stay in memory.
+_CHUNK = 4096
+#: A mesh is flat where it is no thicker than this part of its extent.
+_FLAT = 1.0e-4
+
+
+class Shape(Protocol):
+    """What cuts. All in the space of the strands."""
+
+    def has_inside(self, roots: Floats) -> Bools:
+        """Which roots (n, 3) are inside, (n,); of all strands, since a plane asks where most
+        are."""
+        ...
+
+    def left_at(self, lines: Floats) -> Floats:
+        """Where lines (n, count, 3) that start inside first leave it, (n,) in segments from their
+        start; infinite where they do not."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Plane:
+    """origin: (3,) [m]. normal: (3,) unit. faces: as far as it reaches; None: without bounds."""
+
+    origin: Floats
+    normal: Floats
+    faces: Surface | None = None
+
+    def has_inside(self, roots: Floats) -> Bools:
+        is_before = self._height(roots) >= 0.0
+        return is_before if 2 * is_before.sum() >= len(roots) else ~is_before
+
+    def left_at(self, lines: Floats) -> Floats:
+        if self.faces is not None:
+            return first_crossings(lines, self.faces)
+        height = self._height(lines)
+        is_through = (height[:, 1:] >= 0.0) != (height[:, :1] >= 0.0)
+        number = is_through.argmax(axis=1)[:, None]
+        before, after = (
+            np.take_along_axis(height, each, axis=1)[:, 0] for each in (number, number + 1)
+        )
+        passed = is_through.any(axis=1)
+        place = np.full(len(lines), np.inf)
+        np.divide(before, before - after, out=place, where=passed)
+        return place + number[:, 0]
+
+    def _height(self, points: Floats) -> Floats:
+        return np.asarray((points.astype(np.float64) - self.origin) @ self.normal)
+
+
+def flat(surface: Surface) -> Plane | None:
+    """The plane that a mesh lies in, as far as it reaches; None where it is not flat."""
+    places = surface.positions[np.unique(surface.triangles)].astype(np.float64)
+    origin = places.mean(axis=0)
+    _, extent, axes = np.linalg.svd(places - origin, full_matrices=False)
+    is_flat = len(extent) == 3 and extent[2] <= _FLAT * extent[0] and extent[1] > 0.0
+    return Plane(origin, axes[2], surface) if is_flat else None
+
+
+def is_closed(surface: Surface) -> bool:
+    """Whether the mesh has an inside: each edge is passed as often one way as the other. Vertices
+    at one place are one, since files part them along seams."""
+    _, same = np.unique(surface.positions, axis=0, return_inverse=True)
+    corners = same.reshape(-1)[surface.triangles].astype(np.int64)
+    start, end = corners.ravel(), np.roll(corners, -1, axis=1).ravel()
+    low, high = np.minimum(start, end), np.maximum(start, end)
+    _, edge = np.unique(low * len(surface.positions) + high, return_inverse=True)
+    return not np.bincount(edge.reshape(-1), np.sign(end - start)).any()
+
+
+@dataclass(frozen=True, eq=False)
+class Trimmed:
+    """points: (point_count, 3) float32 [m]. is_trimmed, is_outside: (strand_count,), shorter than
+    before; with its root outside of all shapes."""
+
+    points: Floats
+    is_trimmed: Bools
+    is_outside: Bools
+
+
+def trimmed(strands: StrandSet, shapes: Sequence[Shape]) -> Trimmed:
+    """Strands up to where they first leave a shape that their root is in; they keep their point
+    counts, and what stays of their curve with its points spaced as before."""
+    points = strands.points.copy()
+    inside = np.array([shape.has_inside(strands.roots) for shape in shapes])
+    inside = inside.reshape(len(shapes), strands.strand_count)
+    is_trimmed = np.zeros(strands.strand_count, bool)
+    for count in np.unique(strands.point_counts).tolist():
+        of_count = np.flatnonzero(strands.point_counts == count)
+        for start in range(0, len(of_count), _CHUNK):
+            some = of_count[start : start + _CHUNK]
+            places = strands.offsets[some, None] + np.arange(count)
+            fine = evenly_on_curve(strands.points[places], (count - 1) * _PIECES + 1)
+            left = np.full(len(some), np.inf)
+            for shape, of_shape in zip(shapes, inside[:, some], strict=True):
+                within = np.flatnonzero(of_shape)
+                left[within] = np.minimum(left[within], shape.left_at(fine[within]))
+            is_cut = np.isfinite(left)
+            is_trimmed[some] = is_cut
+            points[places[is_cut]] = _up_to(fine[is_cut], left[is_cut])
+    return Trimmed(points, is_trimmed, ~inside.any(axis=0))
+
+
+def _up_to(fine: Floats, left: Floats) -> Floats:
+    """Every _PIECES-th of the points (n, count, 3), moved along their lines so that the last one is
+    as far as the line goes, `left` segments, and the others are as far in proportion."""
+    step = np.linalg.norm(np.diff(fine.astype(np.float64), axis=1), axis=2)
+    reached = np.concatenate([np.zeros((len(fine), 1)), np.cumsum(step, axis=1)], axis=1)
+    own = reached[:, ::_PIECES]
+    end = _at(reached, left[:, None])[:, 0]
+    wanted = own * (end / np.maximum(own[:, -1], 1.0e-30))[:, None]
+    offsets = np.arange(len(fine) + 1) * fine.shape[1]
+    far = first_as_far(reached.ravel(), offsets, wanted) - offsets[:-1, None]
+    segment = np.clip(far - 1, 0, fine.shape[1] - 2)
+    before, after = (np.take_along_axis(reached, segment + k, axis=1) for k in (0, 1))
+    span = after - before
+    part = np.divide(wanted - before, span, out=np.zeros_like(wanted), where=span > 0.0)
+    place = segment + np.clip(part, 0.0, 1.0)
+    place[:, -1] = left  # exactly: the last point is the one on the shape
+    axes = (np.ascontiguousarray(fine[..., axis]) for axis in range(3))
+    return np.stack([_at(axis, place) for axis in axes], axis=-1)
+
+
+def _at(values: Floats, place: Floats) -> Floats:
+    """Values of points (n, count) at places (n, k) in segments."""
+    segment = np.clip(place.astype(np.int64), 0, values.shape[1] - 2)
+    before, after = (np.take_along_axis(values, segment + k, axis=1) for k in (0, 1))
+    return np.asarray(before + (place - segment) * (after - before))

@@ -1,0 +1,77 @@
+"""Where lines first pass through the triangles of a mesh."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from ..arrays import Floats, Ints
+from .surface import Surface
+from .triangle_tree import TriangleTree, build_tree
+
+#: Segments looked at together, and pairs of them with boxes held at once.
+_CHUNK, _PAIR_LIMIT = 1 << 14, 100_000
+#: A hair more than half a segment, so that rounding leaves nothing out.
+_HAIR = 1.0 + 1.0e-6
+#: A line begins on the surface where it passes it within this part of its first segment.
+_AT_START = 1.0e-4
+
+
+def first_crossings(lines: Floats, surface: Surface) -> Floats:
+    """Where each line first passes through the surface, (n,) in segments from its start; infinite
+    where it does not. A line that begins on the surface is no crossing there.
+
+    Args:
+        lines: (n, count, 3) points, in the space of the surface, which has triangles.
+    """
+    corners = surface.corners.astype(np.float64)
+    tree = build_tree(corners)
+    segments = lines.shape[1] - 1
+    start = lines[:, :-1].reshape(-1, 3).astype(np.float64)
+    end = lines[:, 1:].reshape(-1, 3).astype(np.float64)
+    first = np.full(len(start), np.inf)
+    for begin in range(0, len(start), _CHUNK):
+        some = np.arange(begin, min(begin + _CHUNK, len(start)))
+        for segment, triangle in _near(tree, start, end, some):
+            place = _places(start[segment], end[segment], corners[triangle])
+            place[(segment % segments == 0) & (place < _AT_START)] = np.inf
+            np.minimum.at(first, segment, place)
+    reached = np.arange(segments) + first.reshape(len(lines), segments)
+    found: Floats = reached.min(axis=1, initial=np.inf)
+    return found
+
+
+def _near(
+    tree: TriangleTree, start: Floats, end: Floats, some: Ints
+) -> Iterator[tuple[Ints, Ints]]:
+    """Pairs of segment and triangle that may meet, some at a time."""
+    middle, half = 0.5 * (start[some] + end[some]), 0.5 * (end[some] - start[some])
+    within = np.einsum("ij,ij->i", half, half) * _HAIR + 1.0e-30
+    found = tree.leaves_within(middle, within, _PAIR_LIMIT)
+    if found is None:
+        for part in np.array_split(some, 2):
+            yield from _near(tree, start, end, part)
+        return
+    segment, leaf, _ = found
+    triangles = tree.leaf_triangles[leaf]
+    yield np.repeat(some[segment], triangles.shape[1]), triangles.ravel()
+
+
+def _places(start: Floats, end: Floats, corners: Floats) -> Floats:
+    """How far along its segment each triangle is passed, (n,) from 0 to 1, pair by pair; infinite
+    where it is not.
+
+    A segment passes a triangle if its ends are on both sides of the plane, and it goes past all
+    three edges on one side (the signs of three volumes). A volume changes its sign alone, bit for
+    bit, with the direction of the edge, so none slips through between two triangles.
+    """
+    a, b, c = np.moveaxis(corners - start[:, None], 1, 0)
+    step = end - start
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    before, after = (-np.einsum("ij,ij->i", normal, p) for p in (a, a - step))
+    volumes = np.stack([np.einsum("ij,ij->i", step, np.cross(*p)) for p in ((a, b), (b, c), (c, a))])
+    is_past = (volumes >= 0.0).all(axis=0) | (volumes <= 0.0).all(axis=0)
+    is_through = is_past & ((before >= 0.0) != (after >= 0.0))
+    place = np.full(len(start), np.inf)
+    return np.divide(before, before - after, out=place, where=is_through)

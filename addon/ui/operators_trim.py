@@ -1,0 +1,122 @@
+"""Trim to Shape, Take Trim Back and what hair is trimmed to, and their buttons."""
+
+from __future__ import annotations
+
+import bpy
+from bpy.props import StringProperty
+
+from ..blender.base.outcome import report
+from ..blender.scene.own_collections import put_into, take_out
+from ..blender.scene.trim_shapes import KIND, SETTING, may_trim, read_shape, trim_shapes_of
+from ..blender.sessions.trimming import BEFORE_TRIM, take_trim_back, trim_to_shapes
+from .operators_start import in_object_mode
+from .reports import reporting, tell, waiting
+from .selection import chosen_hair, needs_hair
+
+
+class HAIRLOOM_OT_trim_to_shape(bpy.types.Operator):
+    """Cut the selected hair where it leaves a closed mesh, or passes a plane: an Empty (across its
+    Z axis) or a flat mesh. Meshes and Empties that are selected beside the hair become its shapes.
+    Pressed again, it begins from the lengths before"""
+
+    bl_idname = "hairloom.trim_to_shape"
+    bl_label = "Trim to Shape"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if not (in_object_mode(cls, context) and needs_hair(cls, context)):
+            return False
+        if any(trim_shapes_of(hair) or _chosen(hair, context) for hair in chosen_hair(context)):
+            return True
+        cls.poll_message_set("Select a closed mesh, a flat mesh or an Empty beside the hair")
+        return False
+
+    @reporting
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        depsgraph = context.evaluated_depsgraph_get()
+        with waiting(context):
+            for hair in chosen_hair(context):
+                chosen = _chosen(hair, context)
+                for obj in chosen:
+                    read_shape(obj, depsgraph)
+                if chosen:
+                    put_into(hair, SETTING, KIND, chosen, context.scene)
+                if trim_shapes_of(hair):
+                    tell(self, trim_to_shapes(hair, depsgraph))
+        return {"FINISHED"}
+
+
+class HAIRLOOM_OT_remove_trim_shape(bpy.types.Operator):
+    """Trim the hair to this shape no longer. The object itself stays in the scene, and hair that
+    was trimmed stays as it is"""
+
+    bl_idname = "hairloom.remove_trim_shape"
+    bl_label = "Remove Trim Shape"
+    bl_options = {"REGISTER", "UNDO"}
+
+    __annotations__ = {
+        "shape": StringProperty(
+            name="Shape", description="Name of the object", options={"SKIP_SAVE"}
+        )
+    }
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return needs_hair(cls, context)
+
+    @reporting
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        take_out(chosen_hair(context)[0], SETTING, KIND, self.shape, context.scene)
+        return {"FINISHED"}
+
+
+class HAIRLOOM_OT_take_trim_back(bpy.types.Operator):
+    """Give the selected hair the lengths that it had before it was trimmed"""
+
+    bl_idname = "hairloom.take_trim_back"
+    bl_label = "Take Trim Back"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if not (in_object_mode(cls, context) and needs_hair(cls, context)):
+            return False
+        if any(map(BEFORE_TRIM.is_there, chosen_hair(context))):
+            return True
+        cls.poll_message_set("The selected hair is not trimmed: press Trim to Shape")
+        return False
+
+    @reporting
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        for hair in filter(BEFORE_TRIM.is_there, chosen_hair(context)):
+            take_trim_back(hair)
+            report(self, "INFO", f"{hair.name} is as long as before it was trimmed")
+        return {"FINISHED"}
+
+
+def _chosen(hair: bpy.types.Object, context: bpy.types.Context) -> list[bpy.types.Object]:
+    """What is selected to trim this hair: without hair beside it, a mesh is selected for its
+    own sake."""
+    chosen = context.selected_objects
+    return [obj for obj in chosen if may_trim(obj, hair)] if hair in chosen else []
+
+
+def draw_trim(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
+    """Draw what the hair is trimmed to."""
+    column = layout.column()
+    column.prop(hair.hairloom, SETTING)
+    for obj in trim_shapes_of(hair):
+        row = column.row(align=True)
+        row.label(text=obj.name, icon="EMPTY_AXIS" if obj.type == "EMPTY" else "MESH_DATA")
+        row.operator("hairloom.remove_trim_shape", text="", icon="X").shape = obj.name
+    row = column.row(align=True)
+    row.operator("hairloom.trim_to_shape", icon="MOD_BOOLEAN")
+    row.operator("hairloom.take_trim_back", icon="LOOP_BACK")
+
+
+CLASSES = (
+    HAIRLOOM_OT_trim_to_shape,
+    HAIRLOOM_OT_remove_trim_shape,
+    HAIRLOOM_OT_take_trim_back,
+)
