@@ -70,7 +70,9 @@ def _places(start: Floats, end: Floats, corners: Floats) -> Floats:
     step = end - start
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     before, after = (-np.einsum("ij,ij->i", normal, p) for p in (a, a - step))
-    volumes = np.stack([np.einsum("ij,ij->i", step, np.cross(*p)) for p in ((a, b), (b, c), (c, a))])
+    volumes = np.stack(
+        [np.einsum("ij,ij->i", step, np.cross(*p)) for p in ((a, b), (b, c), (c, a))]
+    )
     is_past = (volumes >= 0.0).all(axis=0) | (volumes <= 0.0).all(axis=0)
     is_through = is_past & ((before >= 0.0) != (after >= 0.0))
     place = np.full(len(start), np.inf)

@@ -18,6 +18,7 @@ from .operators_colliders import draw_colliders
 from .operators_flow import draw_flow
 from .operators_grow import draw_grow
 from .operators_measure import draw_measure
+from .operators_mirror import draw_mirror
 from .operators_partings import draw_partings
 from .operators_settle import draw_settle
 from .operators_show import draw_show
@@ -130,6 +131,11 @@ def draw_children(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
         draw_section(layout, groom, "children", leave_out={"method"})
 
 
+def draw_trim_and_mirror(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
+    draw_trim(layout, hair)
+    draw_mirror(layout)
+
+
 def draw_dynamics(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
     draw_preset_row(layout, hair, "dynamics")
     draw_section(layout, hair.hairloom, "dynamics")
@@ -194,7 +200,7 @@ SUB_SECTIONS: dict[str, tuple[Section, ...]] = {
     "children": (
         ("partings", "Partings", draw_partings),
         ("flow", "Flow", draw_flow),
-        ("trim", "Trim", draw_trim),
+        ("trim", "Trim & Mirror", draw_trim_and_mirror),
     ),
     "dynamics": (
         ("style", "Style", _panel("dynamics", "Style")),

@@ -22,6 +22,11 @@ _LAYOUTS: dict[str, tuple[str, int, Any]] = {
     "BYTE_COLOR": ("color", 4, np.float32),
     "INT": ("value", 1, np.int32),
     "INT8": ("value", 1, np.int32),
+    "INT16_2D": ("value", 2, np.int32),
+    "INT32_2D": ("value", 2, np.int32),
+    "FLOAT4": ("vector", 4, np.float32),
+    "QUATERNION": ("value", 4, np.float32),
+    "FLOAT4X4": ("value", 16, np.float32),
 }
 _FLOATS = {1: "FLOAT", 2: "FLOAT2", 3: "FLOAT_VECTOR", 4: "FLOAT_COLOR"}
 
@@ -66,6 +71,20 @@ def set_attribute(
     part, _, dtype = _LAYOUTS[kind]
     if len(values):
         attribute.data.foreach_set(part, np.ascontiguousarray(values, dtype).ravel())
+
+
+def copy_elements(attribute: bpy.types.Attribute, source: Ints, target: Ints) -> None:
+    """Give some elements of an attribute the values of as many others."""
+    if attribute.data_type not in _LAYOUTS:  # texts, one by one
+        texts = [attribute.data[number].value for number in source.tolist()]
+        for number, text in zip(target.tolist(), texts, strict=True):
+            attribute.data[number].value = text
+        return
+    part, width, dtype = _LAYOUTS[attribute.data_type]
+    values = np.empty((len(attribute.data), width), dtype)
+    attribute.data.foreach_get(part, values.ravel())
+    values[target] = values[source]
+    attribute.data.foreach_set(part, values.ravel())
 
 
 def _data_type(values: Floats | Ints | Bools) -> str:

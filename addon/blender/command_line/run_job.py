@@ -48,6 +48,7 @@ _OF_SCENES = (
     "trim_to_shape",
     "remove_trim_shape",
     "take_trim_back",
+    "mirror_hair",
     "settle",
     "back_to_combed",
     "fit_spheres",

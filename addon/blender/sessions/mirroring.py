@@ -1,0 +1,161 @@
+"""Hair mirrored from one side of its surface to the other, with all that its curves carry."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+
+from ...arrays import Bools, Floats, Ints
+from ...errors import HairloomError
+from ...groom.mirror import Mirrored, mirrored, reflection, sides
+from ...groom.mirror_settings import MirrorSettings
+from ...refine.lead_out_at_rest import led_out_at_rest
+from ...strands import Surface
+from ...strands.affine import moved
+from ..base.attributes import copy_elements, read_attribute, set_attribute
+from ..base.objects import head_of, matrix_of
+from ..base.outcome import Outcome
+from ..colliders.fields import solid_of
+from ..scene.curves import curve_offsets, curve_points, put_points, read_own_curves
+from ..scene.groom_attributes import CLOSEST_GUIDES, STRAND_ID
+from .combing import surface_to_comb_on
+from .flow import BEFORE_FLOW
+from .settling import COMBED
+from .trimming import BEFORE_TRIM
+
+#: attributes of points that are places in object space, beside the position
+_PLACES = (
+    "handle_left",
+    "handle_right",
+    *(shape.attribute for shape in (BEFORE_FLOW, BEFORE_TRIM, COMBED)),
+)
+
+
+def mirror_hair(
+    hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph, settings: MirrorSettings
+) -> Outcome:
+    """Replace the curves of one side by those of the other, before their modifiers. Curves in the
+    middle stay.
+
+    Raises:
+        HairloomError: no surface, no hair on the side that is to be mirrored, or it is linked from
+            another file.
+    """
+    surface = surface_to_comb_on(hair, depsgraph)
+    head = head_of(hair)
+    assert head is not None, "there is a surface"
+    frame = matrix_of(head, depsgraph)
+    own = read_own_curves(hair, depsgraph)
+    side = sides(own.strands.roots, surface, frame, settings)
+    if not (side > 0).any():
+        raise HairloomError(
+            f"it has no curves on the {settings.side} side of {settings.axis.upper()}",
+            place=hair.name,
+            remedy="Choose the other side, or another axis",
+        )
+    source = np.flatnonzero(side > 0)
+    across = reflection(frame, settings.axis)
+    made = _led_out(mirrored(own.strands.take(source), surface, across), surface)
+    replaced = own.kept[side < 0]
+    hair_frame = matrix_of(hair, depsgraph)
+    to_own = np.linalg.inv(hair_frame)
+    _replace(
+        hair.data,
+        own.kept[source],
+        replaced,
+        made,
+        to_own,
+        to_own @ across @ hair_frame,
+    )
+    middle = int((side == 0).sum())
+    result = f"{hair.name}: {len(source):,} curves mirrored, {len(replaced):,} replaced"
+    if middle:
+        result += f", {middle:,} in the middle left as they are"
+    return Outcome(result, own.dropped)
+
+
+def _led_out(made: Mirrored, surface: Surface) -> Mirrored:
+    """What the surface's own asymmetry has put into it is led out."""
+    shifted = np.flatnonzero(made.is_shifted)
+    solid = solid_of(surface) if len(shifted) else None
+    if solid is None:
+        return made
+    strands = made.strands
+    led, _ = led_out_at_rest(strands.take(shifted), solid, float(np.median(strands.lengths())))
+    points = strands.points.copy()
+    points[np.repeat(made.is_shifted, strands.point_counts)] = led.points
+    return Mirrored(strands.with_points(points), made.shift)
+
+
+def _replace(
+    curves: bpy.types.Curves,
+    source: Ints,
+    replaced: Ints,
+    made: Mirrored,
+    to_own: Floats,
+    across: Floats,
+) -> None:
+    """Take curves away, and add mirrored ones that are like their sources in all else.
+
+    Args:
+        source, replaced: numbers of curves.
+        to_own: (4, 4), from world to object space. across: (4, 4), the mirror in object space.
+    """
+    count = len(curves.curves)
+    stays = np.ones(count, bool)
+    stays[replaced] = False
+    if len(replaced):
+        curves.remove_curves(indices=replaced.tolist())
+    source = (np.cumsum(stays) - 1)[source]
+    offsets = curve_offsets(curves)
+    counts = np.diff(offsets)[source]
+    curves.add_curves(counts.tolist())
+    old = np.repeat(offsets[:-1][source], counts) + _inside(counts)
+    new = offsets[-1] + np.arange(len(old))
+    new_curves = stays.sum() + np.arange(len(source))
+    for attribute in curves.attributes.values():
+        pair = (old, new) if attribute.domain == "POINT" else (source, new_curves)
+        copy_elements(attribute, *pair)
+    points = curve_points(curves)
+    points[new] = moved(made.strands.points, to_own)
+    shift = np.repeat(made.shift @ to_own[:3, :3].T.astype(np.float32), counts, axis=0)
+    for name in _PLACES:
+        places = read_attribute(curves, name, "POINT", 3)
+        if places is not None:
+            places[new] = moved(places[old], across) + shift
+            set_attribute(curves, name, "POINT", places)
+    if made.strands.root_uv is not None:
+        uv = read_attribute(curves, "surface_uv_coordinate", "CURVE", 2)
+        uv = np.zeros((len(curves.curves), 2), np.float32) if uv is None else uv
+        uv[new_curves] = made.strands.root_uv
+        set_attribute(curves, "surface_uv_coordinate", "CURVE", uv)
+    _name_again(curves, source, new_curves)
+    put_points(curves, points)
+
+
+def _inside(counts: Ints) -> Ints:
+    """The number of each point in its own curve."""
+    return np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
+
+
+def _name_again(curves: bpy.types.Curves, source: Ints, new: Ints) -> None:
+    """IDs of their own for mirrored curves, and mirrored guides as their closest ones."""
+    ids = read_attribute(curves, STRAND_ID, "CURVE")
+    if ids is None:
+        return
+    known = ids[source]
+    ids[new] = ids[: new[0]].max() + 1 + np.arange(len(new))
+    order = np.argsort(known, kind="stable")
+    for name in CLOSEST_GUIDES:
+        closest = read_attribute(curves, name, "CURVE")
+        if closest is not None:
+            closest[new] = _renamed(closest[new], known[order], ids[new][order])
+            set_attribute(curves, name, "CURVE", closest)
+    set_attribute(curves, STRAND_ID, "CURVE", ids)
+
+
+def _renamed(values: Ints, known: Ints, other: Ints) -> Ints:
+    """Values that are among the known ones, ascending, replaced by their others."""
+    place = np.minimum(np.searchsorted(known, values), len(known) - 1)
+    is_known: Bools = known[place] == values
+    return np.where(is_known, other[place], values)

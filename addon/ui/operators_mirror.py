@@ -1,0 +1,51 @@
+"""Mirror Hair, and its button."""
+
+from __future__ import annotations
+
+import bpy
+
+from ..blender.properties.groups import operator_properties
+from ..blender.properties.properties import settings_of
+from ..blender.sessions.mirroring import mirror_hair
+from ..groom.mirror_settings import MirrorSettings
+from .operators_start import in_object_mode
+from .reports import reporting, tell, waiting
+from .selection import chosen_hair, needs_hair
+
+
+class HAIRLOOM_OT_mirror_hair(bpy.types.Operator):
+    """Mirror the curves of one side of the surface to the other, whose curves they replace. Roots
+    go to the surface; widths, colors and other attributes are those of the curves that are
+    mirrored"""
+
+    bl_idname = "hairloom.mirror_hair"
+    bl_label = "Mirror Hair"
+    bl_options = {"REGISTER", "UNDO"}
+
+    __annotations__ = operator_properties("mirror")
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return in_object_mode(cls, context) and needs_hair(cls, context)
+
+    @reporting
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        settings = settings_of(self, MirrorSettings)
+        with waiting(context):
+            for hair in chosen_hair(context):
+                tell(self, mirror_hair(hair, context.evaluated_depsgraph_get(), settings))
+        return {"FINISHED"}
+
+
+def draw_mirror(layout: bpy.types.UILayout) -> None:
+    """Draw a button for each side."""
+    row = layout.row(align=True)
+    for side, text, icon in (
+        ("positive", "Mirror +X to -X", "TRIA_LEFT"),
+        ("negative", "Mirror -X to +X", "TRIA_RIGHT"),
+    ):
+        button = row.operator("hairloom.mirror_hair", text=text, icon=icon)
+        button.side, button.axis = side, "x"
+
+
+CLASSES = (HAIRLOOM_OT_mirror_hair,)
