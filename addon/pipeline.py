@@ -22,7 +22,13 @@ from .dynamics.step import Drive, grid_at_frame_end
 from .dynamics.step import advance as advance_dynamics
 from .errors import HairloomError
 from .groom.automatic_children import are_few, automatic
-from .groom.children import Children, Growth, make_children
+from .groom.children import (
+    CHILD_POINTS,
+    FEWEST_CHILD_POINTS,
+    Children,
+    Growth,
+    make_children,
+)
 from .groom.children_settings import ChildrenSettings
 from .groom.counter_random import named, uniform
 from .groom.guides import choose_guides, grouped
@@ -52,8 +58,6 @@ from .strands.resample import resample
 from .strands.root_motions import RootMotions
 
 NO_WIND = np.zeros(3)
-#: Points that children are mixed from, of all of them together, and of each one at least.
-CHILD_POINTS, FEWEST_CHILD_POINTS = 12_000_000, 16
 #: Of children that cannot be led out of the head, the part from which on a note says so.
 MANY_INSIDE = 0.01
 

@@ -49,5 +49,7 @@ def automatic(own: StrandSet, settings: ChildrenSettings) -> tuple[ChildrenSetti
         clump=0.0,
         frizz=_STRAY,
         frizz_length=_WAVE,
+        fly_aways=0.0,
+        curl=0.0,
         width=1.0,
     ), parts

@@ -40,6 +40,13 @@ class Clumps:
     middle: Ints
     strength: Floats
 
+    def outermost(self) -> Ints:
+        """The middle of the largest clump that each child is in, (child_count,)."""
+        found = np.where(self.strength > 0.0, self.middle, np.arange(len(self.middle)))
+        while not np.array_equal(found, further := found[found]):
+            found = further
+        return found
+
     def with_middles(self, chosen: Ints) -> Ints:
         """These children and all that their shapes depend on, ascending."""
         found = np.unique(chosen)

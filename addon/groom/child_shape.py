@@ -1,13 +1,17 @@
-"""The shape of children at rest: mixed from guides, cut to their lengths, and frizzed."""
+"""The shape of children at rest: mixed from guides, cut to their lengths, bent, curled, frizzed."""
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 
 from ..arrays import Floats, Ints
 from ..params.curve import along
 from ..strands.arc_length import first_as_far
-from ..strands.catmull_rom import on_curve
+from ..strands.catmull_rom import even_places, evenly_on_curve, on_curve
+from ..strands.frames import tangents, transported_normals
+from ..strands.vectors import dot, unit
 from .children_settings import ChildrenSettings
 from .counter_random import named, uniform
 from .weights import GuideWeights
@@ -19,6 +23,13 @@ _CHUNK = 2048
 _SEGMENTS_PER_WAVE = 3.0
 #: Random numbers of a child's own, beside that of its place (`children`).
 _LENGTH, _WAVES = 2, 3
+#: Those up to 4 have part in where children grow, too: fly-aways would be in patches by these.
+_STRAYS, _STRAY_WAVES, _CURLS = 5, 6, 7
+#: How far fly-aways turn from their path at their tips, as a tangent: of the calmest and the
+#: wildest; and waves along one of them, which is as low as stray hair's are.
+_CALM, _WILD, _STRAY_TURNS = 0.2, 0.55, 0.8
+#: Points of a turn of a curl, which keep its shape, and fewest of one, which show that it turns.
+_POINTS_PER_TURN, _FEWEST_PER_TURN = 24, 6
 
 
 def mixed(root: Floats, guide_grid: Floats, weights: GuideWeights) -> Floats:
@@ -100,6 +111,87 @@ def frizz(grid: Floats, key: Ints, settings: ChildrenSettings, size: float) -> N
             swing *= 0.5 * strayed
             for axis, part in enumerate(_on_sphere(height, around).T):
                 grid[chunk, :, axis] += swing * part[:, None]
+
+
+def stray(grid: Floats, key: Ints, settings: ChildrenSettings) -> None:
+    """Let some strands wander off their path, in place; roots and lengths stay.
+
+    Each segment turns from its direction towards a vector across it that wanders slowly along the
+    strand and grows to its tip. More fly-aways are those of fewer and others.
+
+    Args:
+        grid: (child_count, cv_count, 3) float32 [m].
+        key: (child_count,) what is random about each depends on.
+    """
+    if not settings.fly_aways:
+        return
+    strayed = np.flatnonzero(uniform(key, _STRAYS) < settings.fly_aways)
+    along = np.linspace(0.0, 1.0, grid.shape[1])[1:, None]
+    for start in range(0, len(strayed), _CHUNK):
+        chunk = strayed[start : start + _CHUNK]
+        own = uniform(named(key[chunk, None], np.arange(6)), _STRAY_WAVES)
+        step = np.diff(grid[chunk].astype(np.float64), axis=1)
+        size = np.linalg.norm(step, axis=2, keepdims=True)
+        swing = np.sin(_TURN * (_STRAY_TURNS * along + own[:, None, 5:6]))
+        aside = _on_sphere(own[:, 0], own[:, 1])[:, None]
+        aside = aside + swing * _on_sphere(own[:, 2], own[:, 3])[:, None]
+        wildness = _CALM + (_WILD - _CALM) * own[:, None, 4:5]
+        direction = unit(step)
+        aside = aside - direction * dot(aside, direction)[..., None]
+        turned = size * unit(direction + wildness * along * aside)
+        grid[chunk, 1:] = grid[chunk, :1] + np.cumsum(turned, axis=1)
+
+
+def curl_points(longest: float, settings: ChildrenSettings, size: float) -> int:
+    """How many points a child needs to show its curls; 0 without any.
+
+    Args:
+        longest: length of the longest guide [m]. size: the median of these.
+    """
+    if not (settings.curl and size):
+        return 0
+    turns = min(longest / (settings.curl_length * size), 1.0e6)
+    return _POINTS_PER_TURN * math.ceil(turns) + 1
+
+
+def curled(grid: Floats, lock: Ints, settings: ChildrenSettings, size: float, count: int) -> Floats:
+    """Strands that wind around their paths as helices, of `count` points each; roots stay.
+
+    The point at arc length s of the path goes aside by r (cos a e1 + sin a e2), a = 2 pi s / length
+    of a turn, where e1 and e2 are frames that do not twist along the path. Points lie outside of
+    the helix by as much as keeps its length: r is multiplied by (d / 2) / sin(d / 2), where d is
+    the angle from one point to the next.
+
+    Args:
+        grid: (child_count, cv_count, 3) float32 [m].
+        lock: (child_count,) what is random about the curls of each depends on: those of one number
+            wind alike.
+        size: the median length of the guides [m], in which curls are given.
+    """
+    result = np.empty((len(grid), count, 3), np.float32)
+    radius = settings.curl * size * along(settings.curl_along, np.linspace(0.0, 1.0, count))
+    radius[0] = 0.0
+    left, part = even_places(grid.shape[1], count)
+    random = uniform(named(lock[:, None], np.arange(2)), _CURLS)
+    for start in range(0, len(grid), _CHUNK):
+        chunk = slice(start, start + _CHUNK)
+        coarse = transported_normals(
+            tangents(grid[chunk]), _on_sphere(*random[chunk].T).astype(np.float32)
+        )
+        path = evenly_on_curve(grid[chunk], count)
+        normal = coarse[:, left] + part[:, None] * (coarse[:, left + 1] - coarse[:, left])
+        tangent = tangents(path)
+        normal = unit(normal - tangent * dot(normal, tangent)[..., None])
+        reached = arc_length(path)
+        shortest = _FEWEST_PER_TURN / (count - 1) * reached[:, -1:]
+        turn = np.maximum(settings.curl_length * size, shortest)
+        angle = _TURN * np.divide(reached, turn, out=np.zeros_like(reached), where=turn > 0.0)
+        half = np.maximum(angle[:, -1:] / (2 * (count - 1)), 1.0e-9)
+        wide = radius * half / np.sin(half)
+        aside = (wide * np.cos(angle))[..., None] * normal
+        aside += (wide * np.sin(angle))[..., None] * np.cross(tangent, normal)
+        result[chunk] = path + aside
+    return result
 
 
 def arc_length(grid: Floats) -> Floats:

@@ -18,16 +18,20 @@ from ..arrays import Bools, Floats, Ints
 from ..errors import HairloomError
 from ..strands import StrandSet, Surface
 from ..strands.arc_length import typical
+from ..strands.catmull_rom import even_places
 from ..strands.kept import NOTHING_KEPT, Kept
 from ..strands.nearest import nearest_points
+from ..strands.needed_points import MAX_POINTS
 from .child_clumps import Clumps, clump, clump_again
 from .child_roots import ChildRoots, child_roots
-from .child_shape import frizz, mixed, shorten
+from .child_shape import curl_points, curled, frizz, mixed, shorten, stray
 from .children_settings import ChildrenSettings
 from .counter_random import named, normal
 from .partings import Partings
 from .weights import GUIDES_PER_STRAND, GuideWeights, child_weights, nearest_before
 
+#: Points that children have, all of them together, and each one at least.
+CHILD_POINTS, FEWEST_CHILD_POINTS = 12_000_000, 16
 #: Guides are as far apart as this neighbour is, in the middle.
 _NEIGHBOUR = 3
 #: Random numbers of where a child takes its shape from; those of its shape are in `child_shape`.
@@ -55,6 +59,7 @@ class Growth:
     root: (child_count, 3) float32 [m]. key: (child_count,) what is random about each depends on.
     clumps: as they were found. size: the median length of the guides [m].
     partings: which they grew beside; None: none.
+    cv_count: of the children, more than their guides' where they curl.
     """
 
     root: Floats
@@ -64,6 +69,22 @@ class Growth:
     settings: ChildrenSettings
     size: float
     partings: Partings | None
+    cv_count: int
+
+    def varied(self, grid: Floats, chosen: Ints) -> Floats:
+        """With what is each child's own, (n, cv_count, 3) float32 [m].
+
+        Args:
+            grid: (n, guides' cv_count, 3) float32 [m], clumped, which is changed. chosen: (n,).
+        """
+        key, settings = self.key[chosen], self.settings
+        shorten(grid, key, settings)
+        stray(grid, key, settings)
+        if settings.curl:
+            lock = self.key[self.clumps.outermost()[chosen]]
+            grid = curled(grid, lock, settings, self.size, self.cv_count)
+        frizz(grid, key, settings, self.size)
+        return grid
 
     def touched(self, guides: Bools) -> Bools:
         """Children (child_count,) whose shapes these guides (guide_count,) have a part in."""
@@ -82,9 +103,7 @@ class Growth:
         weights = GuideWeights(self.weights.guide[number], self.weights.weight[number])
         grid = mixed(self.root[number], guide_grid, weights)
         clump_again(grid, number, self.clumps, self.settings)
-        grid = grid[np.searchsorted(number, chosen)]
-        _vary(grid, self.key[chosen], self.settings, self.size)
-        return grid
+        return self.varied(grid[np.searchsorted(number, chosen)], chosen)
 
     def with_more(self, roots: ChildRoots, guides: StrandSet, beside: Ints) -> Growth:
         """And children at other roots, which follow in number: they mix guides as all do, and join
@@ -149,34 +168,45 @@ def make_children(
     grid = mixed(roots.point, guides.grid, weights)
     clumps = clump(grid, group, settings, partings, kept)
     size = typical(guides.lengths())
+    needed = max(curl_points(float(guides.lengths().max()), settings, size), grid.shape[1])
+    cv_count = max(min(needed, _room(settings)), grid.shape[1])
+    growth = Growth(roots.point, roots.key, weights, clumps, settings, size, partings, cv_count)
 
     def varied(some: Ints) -> tuple[Floats]:
-        own = grid[some]
-        _vary(own, roots.key[some], settings, size)
-        return (own,)
+        return (growth.varied(grid[some], some),)
 
-    fixed = replace(settings, strand_count=ChildrenSettings().strand_count), size
-    (grid,) = kept.rows("varied", fixed, (grid, roots.key), varied)
-    cv_count = grid.shape[1]
+    fixed = replace(settings, strand_count=ChildrenSettings().strand_count), size, cv_count
+    lock = roots.key[clumps.outermost()] if settings.curl else roots.key
+    (shaped,) = kept.rows("varied", fixed, (grid, roots.key, lock), varied)
     strands = StrandSet(
-        points=grid.reshape(-1, 3),
-        offsets=np.arange(len(grid) + 1) * cv_count,
-        radius=_radius(guides, weights, settings),
+        points=shaped.reshape(-1, 3),
+        offsets=np.arange(len(shaped) + 1) * cv_count,
+        radius=_by_points(_radius(guides, weights, settings), cv_count).ravel(),
         group=group,
         root_uv=_root_uv(roots, surface),
         root_triangle=roots.triangle,
         root_barycentric=roots.barycentric,
         has_widths=guides.has_widths,
-        color=_color(guides, weights),
+        color=_color(guides, weights, cv_count),
     )
-    growth = Growth(roots.point, roots.key, weights, clumps, settings, size, partings)
-    return Children(strands, weights, roots.notes + _notes(guides, settings), growth)
+    notes = roots.notes + _notes(guides, settings, needed, cv_count)
+    return Children(strands, weights, notes, growth)
 
 
-def _vary(grid: Floats, key: Ints, settings: ChildrenSettings, size: float) -> None:
-    """What is each child's own, in place."""
-    shorten(grid, key, settings)
-    frizz(grid, key, settings, size)
+def _room(settings: ChildrenSettings) -> int:
+    """Points that each child may have at the most."""
+    room = max(CHILD_POINTS // max(settings.strand_count, 1), FEWEST_CHILD_POINTS)
+    return min(room, MAX_POINTS)
+
+
+def _by_points(values: Floats, count: int) -> Floats:
+    """Values of CVs (n, cv_count, ...) at `count` points each, which lie evenly between these."""
+    if values.shape[1] == count:
+        return values
+    left, part = even_places(values.shape[1], count)
+    part = part.reshape(-1, *(1 for _ in values.shape[2:]))
+    found: Floats = values[:, left] * (1.0 - part) + values[:, left + 1] * part
+    return found
 
 
 def _weights(
@@ -214,15 +244,15 @@ def _scattered(roots: ChildRoots, guide_root: Floats, settings: ChildrenSettings
 
 
 def _radius(guides: StrandSet, weights: GuideWeights, settings: ChildrenSettings) -> Floats:
-    """Mixed as the points are, (child_count x cv_count,) [m]."""
+    """Mixed as the points are, (child_count, guides' cv_count) [m]."""
     own = guides.radius.reshape(guides.strand_count, -1) * np.float32(settings.width)
     total = np.zeros((len(weights.guide), own.shape[1]), np.float32)
     for guide, weight in zip(weights.guide.T, weights.weight.T, strict=True):
         total += own[guide] * weight[:, None]
-    return total.ravel()
+    return total
 
 
-def _color(guides: StrandSet, weights: GuideWeights) -> Floats | None:
+def _color(guides: StrandSet, weights: GuideWeights, cv_count: int) -> Floats | None:
     """Mixed as the points are, of the guides that have a colour, (child_count x cv_count, 3)."""
     if guides.color is None:
         return None
@@ -235,7 +265,8 @@ def _color(guides: StrandSet, weights: GuideWeights) -> Floats | None:
         total += own[guide] * weight[:, None, None]
     whole = known.sum(axis=1)[:, None, None]
     none = np.full_like(total, np.nan)
-    return np.divide(total, whole, out=none, where=whole > 0.0).reshape(-1, 3)
+    mixed_colors = np.divide(total, whole, out=none, where=whole > 0.0)
+    return _by_points(mixed_colors, cv_count).reshape(-1, 3)
 
 
 def _root_uv(roots: ChildRoots, surface: Surface) -> Floats | None:
@@ -244,8 +275,17 @@ def _root_uv(roots: ChildRoots, surface: Surface) -> Floats | None:
     return np.einsum("nk,nkj->nj", roots.barycentric, surface.corner_uv[roots.triangle])
 
 
-def _notes(guides: StrandSet, settings: ChildrenSettings) -> tuple[str, ...]:
-    few = guides.strand_count < GUIDES_PER_STRAND and settings.method != "single"
-    if few:
-        return ("There are fewer than three guides, so children are all alike. Draw more guides.",)
-    return ()
+def _notes(
+    guides: StrandSet, settings: ChildrenSettings, needed: int, cv_count: int
+) -> tuple[str, ...]:
+    notes: tuple[str, ...] = ()
+    if guides.strand_count < GUIDES_PER_STRAND and settings.method != "single":
+        notes += (
+            "There are fewer than three guides, so children are all alike. Draw more guides.",
+        )
+    if needed > cv_count:
+        notes += (
+            f"Curls need {needed:,} points a child and have {cv_count:,}, so they are coarse or "
+            "longer than Curl Length. Use a longer one, or fewer children.",
+        )
+    return notes

@@ -125,6 +125,43 @@ class ChildrenSettings(Settings):
         shown_when=when("children.method", "multi", "single"),
         active_when=when("children.frizz"),
     )
+    fly_aways: float = number(
+        0.0,
+        label="Fly-Aways",
+        description="Fraction of the children that wander off their clump, the farther the nearer "
+        "to their tips",
+        unit="factor",
+        soft=(0.0, 0.2),
+        hard=(0.0, 1.0),
+        shown_when=when("children.method", "multi", "single"),
+    )
+    curl: float = number(
+        0.0,
+        label="Curl",
+        description="Radius of the curls that children wind around their path, as a fraction of "
+        "the hair's length",
+        soft=(0.0, 0.05),
+        hard=(0.0, 1.0),
+        shown_when=when("children.method", "multi", "single"),
+    )
+    curl_length: float = number(
+        0.12,
+        label="Curl Length",
+        description="Length of the path from one turn of a curl to the next, as a fraction of the "
+        "hair's length",
+        soft=(0.02, 1.0),
+        hard=(0.001, 100.0),
+        shown_when=when("children.method", "multi", "single"),
+        active_when=when("children.curl"),
+    )
+    curl_along: tuple[float, float, float, float, float] = curve(
+        (0.0, 0.5, 0.9, 1.0, 1.0),
+        label="Curl Along",
+        description="Fraction of Curl along the strand, from root to tip",
+        hard=(0.0, 1.0),
+        shown_when=when("children.method", "multi", "single"),
+        active_when=when("children.curl"),
+    )
     width: float = number(
         1.0,
         label="Width",

@@ -201,10 +201,13 @@ def _combed(cranium: Cranium, root: Floats, normal: Floats, settings: GrowSettin
     side = np.clip((root[:, 0] - cranium.center[0]) / (0.5 * cranium.half_depth), -1.0, 1.0)
     # away from the parting from the root on, or hair at the forehead would fall over the face
     parted = _PARTED * smooth_step((cranium.center[1] - root[:, 1]) / cranium.half_depth + _CROWN)
+    is_right = settings.each_side & (side < 0.0)
     side = np.where(side < 0.0, -1.0, 1.0) * (parted + (1.0 - parted) * np.abs(side))
+    back = np.where(is_right, settings.right_back, settings.comb_back)
+    aside = np.where(is_right, settings.right_aside, settings.comb_aside)
     comb = np.empty_like(root)
-    comb[:, 0] = (1.0 - settings.comb_back) * side
-    comb[:, 1] = settings.comb_back
+    comb[:, 0] = (1.0 - np.abs(back)) * aside * side
+    comb[:, 1] = back
     comb[:, 2] = -0.35
     return unit(_along_skin(comb, normal))
 

@@ -8,6 +8,7 @@ from ..params import Settings, both, choice, either, integer, number, toggle, wh
 
 _NALU = "Nguyen and Donnelly 2005, GPU Gems 2, chapter 23"
 _HAS_THRESHOLD = both(when("grow.method", "normals"), when("grow.per_vertex"))
+_HAS_RIGHT = both(when("grow.method", "combed"), when("grow.each_side"))
 _HAS_COUNT = either(when("grow.method", "combed"), when("grow.per_vertex", False))
 
 
@@ -109,11 +110,46 @@ class GrowSettings(Settings):
     comb_back: float = number(
         0.65,
         label="Comb Back",
-        description="Comb hair to the back of the head (world +Y) rather than to its sides",
+        description="Comb hair to the back of the head (world +Y) rather than to its sides; below "
+        "0 forward, over the face",
         unit="factor",
-        soft=(0.0, 1.0),
-        hard=(0.0, 1.0),
+        soft=(-1.0, 1.0),
+        hard=(-1.0, 1.0),
         shown_when=when("grow.method", "combed"),
+    )
+    comb_aside: float = number(
+        1.0,
+        label="Comb Aside",
+        description="Comb hair away from the middle, as far as it is not combed back or forward; "
+        "below 0 over the middle to the other side",
+        unit="factor",
+        soft=(-1.0, 1.0),
+        hard=(-1.0, 1.0),
+        shown_when=when("grow.method", "combed"),
+    )
+    each_side: bool = toggle(
+        False,
+        label="Each Side",
+        description="Comb the right side of the head (world -X) by values of its own",
+        shown_when=when("grow.method", "combed"),
+    )
+    right_back: float = number(
+        0.65,
+        label="Right Comb Back",
+        description="Comb Back of the right side",
+        unit="factor",
+        soft=(-1.0, 1.0),
+        hard=(-1.0, 1.0),
+        shown_when=_HAS_RIGHT,
+    )
+    right_aside: float = number(
+        1.0,
+        label="Right Comb Aside",
+        description="Comb Aside of the right side; -1 is to the left, as where hair is swept over",
+        unit="factor",
+        soft=(-1.0, 1.0),
+        hard=(-1.0, 1.0),
+        shown_when=_HAS_RIGHT,
     )
     comb_fraction: float = number(
         0.45,

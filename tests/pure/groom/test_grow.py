@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -243,3 +245,45 @@ def test_hair_bridges_hollows_and_lies_over_bumps() -> None:
     assert np.diff(hollow[1:], 2).max() < 0.5 * np.diff(height[0], 2).max()
     assert (hollow >= height[0]).all() and hollow[8] > height[0, 8] + 0.001
     assert np.allclose(bump[2:-1], height[1, 2:-1], atol=1e-9)
+
+
+@pytest.mark.parametrize("back", [1.0, -1.0])
+def test_hair_is_combed_back_or_forward_along_the_skin(egg: Surface, back: float) -> None:
+    """By (0, +-1, -0.35) without its part across the egg, whose normal is the gradient of its
+    equation."""
+    settings = replace(
+        PLAIN, comb_back=back, lift=0.0, droop=0.0, whorl=0.0, volume=0.0, clearance=0.0
+    )
+    grid = grow(egg, settings, scalp_density(egg)).grid.astype(np.float64)
+    root, way = grid[:, 0], grid[:, 1] - grid[:, 0]
+    normal = root / np.square([0.08, 0.1, 0.12])
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    comb = np.array([0.0, back, -0.35])
+    comb = comb - normal * (normal @ comb)[:, None]
+    cosine = np.einsum("ij,ij->i", comb, way)
+    cosine /= np.linalg.norm(comb, axis=1) * np.linalg.norm(way, axis=1)
+    assert np.quantile(cosine, 0.05) > np.cos(np.radians(15.0))
+    tips = grid[:, -1] - root
+    assert np.median(tips[:, 1]) * back > 0.03
+
+
+def test_each_side_has_a_direction_of_its_own(egg: Surface) -> None:
+    both = grow(egg, replace(PLAIN, comb_back=0.9), scalp_density(egg))
+    alike = replace(PLAIN, comb_back=0.9, each_side=True, right_back=0.9, right_aside=1.0)
+    assert np.array_equal(grow(egg, alike, scalp_density(egg)).points, both.points)
+    parted = grow(egg, replace(alike, right_back=-0.9), scalp_density(egg)).grid
+    is_right = parted[:, 0, 0] < find_cranium(egg.positions).center[0]
+    assert np.array_equal(parted[~is_right], both.grid[~is_right])
+    ahead = parted[is_right, 5, 1] - both.grid[is_right, 5, 1]
+    assert (ahead < 0.0).mean() > 0.95
+
+
+def test_hair_of_one_side_is_combed_over_to_the_other(egg: Surface) -> None:
+    over = replace(PLAIN, comb_back=0.1, each_side=True, right_back=0.1, right_aside=-1.0)
+    grid = grow(egg, over, scalp_density(egg)).grid
+    is_above = grid[:, 0, 2] > 0.08
+    assert is_above.sum() > 30
+    gone = grid[is_above, 5, 0] - grid[is_above, 0, 0]
+    assert (gone > 0.0).mean() > 0.95
+    right = grow(egg, replace(over, right_aside=1.0), scalp_density(egg)).grid[is_above]
+    assert ((right[:, 5, 0] < right[:, 0, 0]) == (right[:, 0, 0] < 0.0)).mean() > 0.9

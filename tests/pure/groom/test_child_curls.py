@@ -1,0 +1,140 @@
+"""Children that curl, by the formula of helices, and those that fly away."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from flat_ground import guides_at, settings, sheet
+
+from hairloom.addon import pipeline
+from hairloom.addon.arrays import Floats
+from hairloom.addon.groom.children import CHILD_POINTS, make_children
+from hairloom.addon.groom.children_settings import ChildrenSettings
+from hairloom.addon.groom.settings import GuideSettings
+from hairloom.addon.params.curve import along
+from hairloom.addon.strands import StrandSet
+from hairloom.addon.strands.arc_length import typical
+
+SURFACE = sheet()
+LENGTH = 0.2
+EVEN = (1.0, 1.0, 1.0, 1.0, 1.0)
+
+
+def standing(cv_count: int = 9) -> StrandSet:
+    """Straight guides of one length on all of the sheet."""
+    x, y = np.meshgrid(*[np.linspace(0.05, 0.95, 8)] * 2)
+    root = np.stack([x.ravel(), y.ravel(), 0.0 * x.ravel()], axis=1)
+    return guides_at(SURFACE, root, np.tile([0.0, 0.0, LENGTH], (len(root), 1)), cv_count=cv_count)
+
+
+def grown(wanted: ChildrenSettings, cv_count: int = 9) -> Floats:
+    """Points of each child from its root, (child_count, cv_count, 3)."""
+    grid = make_children(standing(cv_count), SURFACE, wanted, place="test").strands.grid
+    return (grid - grid[:, :1]).astype(np.float64)
+
+
+def helix_length(wanted: ChildrenSettings) -> float:
+    """Of the helix around a straight guide, by 100,000 chords."""
+    part, size = np.linspace(0.0, 1.0, 100_001), typical(standing().lengths())
+    radius = wanted.curl * size * along(wanted.curl_along, part)
+    angle = 2.0 * np.pi * part * LENGTH / (wanted.curl_length * size)
+    places = np.stack([radius * np.cos(angle), radius * np.sin(angle), LENGTH * part])
+    return float(np.linalg.norm(np.diff(places), axis=0).sum())
+
+
+@pytest.mark.parametrize(("curl", "turn"), [(0.03, 0.2), (0.1, 0.11)])
+def test_curls_are_helices_around_the_path(curl: float, turn: float) -> None:
+    grid = grown(settings(curl=curl, curl_length=turn, curl_along=EVEN))[:, 1:]
+    part, size = np.linspace(0.0, 1.0, grid.shape[1] + 1)[1:], typical(standing().lengths())
+    step = 2.0 * np.pi * part[0] * LENGTH / (turn * size)
+    away = np.hypot(grid[..., 0], grid[..., 1])
+    expected = curl * size * (step / 2.0) / np.sin(step / 2.0)
+    assert np.abs(away - expected).max() < 1e-6
+    assert expected < 1.01 * curl * LENGTH
+    assert np.abs(grid[..., 2] - LENGTH * part).max() < 1e-6
+    turned = np.unwrap(np.arctan2(grid[..., 1], grid[..., 0]))
+    assert np.abs(turned - turned[:, :1] - step * np.arange(len(part))).max() < 1e-3
+
+
+@pytest.mark.parametrize(("curl", "turn"), [(0.02, 0.5), (0.03, 0.12), (0.02, 0.06), (0.05, 0.05)])
+def test_no_curl_loses_more_length_than_points_by_need_may(curl: float, turn: float) -> None:
+    wanted = settings(curl=curl, curl_length=turn, strand_count=100)
+    rig = pipeline.prepare(
+        standing(16), SURFACE, GuideSettings(cv_count=16), place="test", children=wanted
+    )
+    children = rig.strands.take(np.arange(64, rig.strands.strand_count))
+    kept = children.lengths() / helix_length(wanted)
+    assert kept.min() >= 0.995
+    assert kept.max() < 1.001
+    assert not any("Curls need" in note for note in rig.notes)
+
+
+def test_a_clump_winds_as_one_and_clumps_each_their_own_way() -> None:
+    wanted = settings(curl=0.04, curl_along=EVEN, clump=0.05, clump_size=200)
+    made = make_children(standing(), SURFACE, wanted, place="test")
+    plain = make_children(standing(), SURFACE, settings(clump=0.05, clump_size=200), place="test")
+    count = made.strands.grid.shape[1]
+    path = plain.strands.grid[:, [0, -1]]
+    aside = made.strands.grid[:, -1] - path[:, -1]
+    clump = made.growth.clumps.outermost()
+    assert count > plain.strands.grid.shape[1]
+    middles = np.unique(clump)
+    assert 15 < len(middles) <= 20
+    for middle in middles:
+        own = aside[clump == middle]
+        assert np.linalg.norm(own - own.mean(axis=0), axis=1).max() < 0.3 * 0.04 * LENGTH
+    angle = np.sort(np.arctan2(*aside[middles, :2].T[::-1]))
+    assert np.diff(angle).max() < 2.0  # all around
+
+
+def test_curls_that_have_no_room_say_so_and_are_finite() -> None:
+    wanted = settings(curl=0.02, curl_length=0.005, strand_count=100)
+    made = make_children(standing(), SURFACE, wanted, place="test")
+    assert made.strands.grid.shape[1] == 512
+    assert any("Curls need 4,801 points a child and have 512" in each for each in made.notes)
+    many = settings(curl=0.02, curl_length=0.1, strand_count=CHILD_POINTS // 50)
+    count = make_children(standing(), SURFACE, many, place="test").growth.cv_count
+    assert count == 50
+
+
+def test_without_curls_and_fly_aways_nothing_changes() -> None:
+    plain = grown(settings(frizz=0.01, clump=0.5))
+    other = settings(frizz=0.01, clump=0.5, curl_length=0.5, curl_along=EVEN)
+    assert np.array_equal(plain, grown(other))
+
+
+def test_combed_children_curl_and_stray_as_they_grew() -> None:
+    """Their shapes follow from what they keep, bit for bit."""
+    wanted = settings(curl=0.03, fly_aways=0.3, clump=0.5, frizz=0.01, length_variation=0.3)
+    guides = standing()
+    made = make_children(guides, SURFACE, wanted, place="test")
+    chosen = np.arange(3, 400, 7)
+    shapes = made.growth.shapes(guides.grid, chosen)
+    assert np.array_equal(shapes, made.strands.grid[chosen])
+
+
+def test_fly_aways_are_as_many_as_they_should_and_keep_their_lengths() -> None:
+    plain = grown(settings(strand_count=3000))
+    few, more = (grown(settings(strand_count=3000, fly_aways=part)) for part in (0.1, 0.25))
+    strays, others = ((each != plain).any(axis=(1, 2)) for each in (few, more))
+    assert strays.mean() == pytest.approx(0.1, abs=4.0 * np.sqrt(0.09 / 3000))
+    assert others.mean() == pytest.approx(0.25, abs=4.0 * np.sqrt(0.19 / 3000))
+    assert np.array_equal(few[strays], more[strays])
+    length = np.linalg.norm(np.diff(more, axis=1), axis=2).sum(axis=1)
+    assert np.abs(length - LENGTH).max() < 1e-6
+    fewer = grown(settings(strand_count=1000, fly_aways=0.25))
+    assert np.array_equal(fewer, more[:1000])
+
+
+def test_fly_aways_stray_smoothly_and_the_farther_the_nearer_to_their_tips() -> None:
+    grid = grown(settings(strand_count=2000, fly_aways=1.0), cv_count=17)
+    away = np.linalg.norm(grid - [0.0, 0.0, 1.0] * grid[..., 2:], axis=2).mean(axis=0)
+    assert (np.diff(away) > 0.0).all()
+    assert (np.diff(away, n=2) > -1e-4 * LENGTH).all()  # it leaves its path along it
+    assert 0.05 < away[-1] / LENGTH < 0.35
+    step = np.diff(grid, axis=1)
+    step /= np.linalg.norm(step, axis=2, keepdims=True)
+    turn = np.arccos(np.clip(np.einsum("scj,scj->sc", step[:, 1:], step[:, :-1]), -1.0, 1.0))
+    # the tangent is at most 0.55 (1 + 1) and grows with the part, its wave turns 0.8 times
+    most = 0.55 * (2.0 + 2.0 * np.pi * 0.8) / 16
+    assert turn.max() < most
