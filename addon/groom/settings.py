@@ -135,7 +135,7 @@ class GrowSettings(Settings):
     )
     right_back: float = number(
         0.65,
-        label="Right Comb Back",
+        label="Right Back",
         description="Comb Back of the right side",
         unit="factor",
         soft=(-1.0, 1.0),
@@ -144,7 +144,7 @@ class GrowSettings(Settings):
     )
     right_aside: float = number(
         1.0,
-        label="Right Comb Aside",
+        label="Right Aside",
         description="Comb Aside of the right side; -1 is to the left, as where hair is swept over",
         unit="factor",
         soft=(-1.0, 1.0),

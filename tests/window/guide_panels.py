@@ -15,7 +15,7 @@ PICTURES: dict[str, tuple[tuple[str, ...], ...]] = {
     "grow": (("data_grow",),),
     "strands": (
         ("data_strands", "data_detail", "data_guides"),
-        ("data_children", "data_children_partings", "data_children_flow"),
+        ("data_children", "data_children_partings", "data_children_flow", "data_children_trim"),
     ),
     "dynamics": (
         ("data_dynamics", "data_dynamics_style"),
