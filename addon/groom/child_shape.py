@@ -181,15 +181,15 @@ def curled(grid: Floats, lock: Ints, settings: ChildrenSettings, size: float, co
         path = evenly_on_curve(grid[chunk], count)
         normal = coarse[:, left] + part[:, None] * (coarse[:, left + 1] - coarse[:, left])
         tangent = tangents(path)
-        normal = unit(normal - tangent * dot(normal, tangent)[..., None])
+        across: Floats = unit(normal - tangent * dot(normal, tangent)[..., None])
         reached = arc_length(path)
         shortest = _FEWEST_PER_TURN / (count - 1) * reached[:, -1:]
         turn = np.maximum(settings.curl_length * size, shortest)
         angle = _TURN * np.divide(reached, turn, out=np.zeros_like(reached), where=turn > 0.0)
         half = np.maximum(angle[:, -1:] / (2 * (count - 1)), 1.0e-9)
         wide = radius * half / np.sin(half)
-        aside = (wide * np.cos(angle))[..., None] * normal
-        aside += (wide * np.sin(angle))[..., None] * np.cross(tangent, normal)
+        aside = (wide * np.cos(angle))[..., None] * across
+        aside += (wide * np.sin(angle))[..., None] * np.cross(tangent, across)
         result[chunk] = path + aside
     return result
 
