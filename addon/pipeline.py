@@ -40,7 +40,15 @@ from .groom.ties import NO_HOLDERS, Holders, find_holds, idle
 from .groom.weights import GuideWeights, guide_weights
 from .groom.widths import Widths, with_widths
 from .refine.hold import hold
-from .refine.lead_out import NOT_LED, Clearance, LedOut, clearance_at, lead_out
+from .refine.lead_out import (
+    NO_LEANS,
+    NOT_LED,
+    Clearance,
+    Leans,
+    LedOut,
+    clearance_at,
+    lead_out,
+)
 from .refine.lead_out_at_rest import led_out_at_rest
 from .refine.ride import Riders, ride
 from .refine.thinning import even_ranks
@@ -185,6 +193,7 @@ class Motion:
     colliders: as they stand at its end.
     clearance: how far strands stay from these; None before there are any.
     guide_clearance: the same of guides.
+    leans: how strands were bent that were led out in the frame before.
     """
 
     dynamics: DynamicsState
@@ -196,6 +205,7 @@ class Motion:
     colliders: tuple[PosedCollider, ...] = ()
     clearance: Clearance | None = None
     guide_clearance: GuideClearance | None = None
+    leans: Leans = NO_LEANS
 
     def drive(
         self,
@@ -561,6 +571,7 @@ def advance(
     gravity: Floats,
     duration: float,
     scene_wind: Floats = NO_WIND,
+    led: LedOut = NOT_LED,
 ) -> Motion:
     """One frame of motion: the roots go with the head, the dynamics moves the rest.
 
@@ -568,6 +579,8 @@ def advance(
         gravity: (3,) [m/s^2], world space.
         duration: time since the motion's pose [s].
         scene_wind: (3,) [m/s], world space.
+        led: the strands that were led out at this moment of the motion: from how they were bent
+            the next frame's are led.
     """
     target = style_of_guides(rig, pose)
     motion = with_clearance(rig, motion, colliders, settings)
@@ -584,6 +597,7 @@ def advance(
         colliders,
         motion.clearance,
         motion.guide_clearance,
+        led.leans,
     )
 
 
@@ -615,9 +629,10 @@ def strands_and_led(rig: Rig, motion: Motion) -> tuple[Floats, LedOut]:
     if motion.clearance is None:
         return held_strands(rig, pose, points), NOT_LED
     carry = partial(motions.carried, rig.strands.points)
-    led = lead_out(points, carry, offsets, motion.colliders, motion.clearance)
+    leans = motion.leans.after(motion.duration)
+    led, leans = lead_out(points, carry, offsets, motion.colliders, motion.clearance, leans)
     points = held_strands(rig, pose, points)
-    return points, LedOut.of(led, points, offsets)
+    return points, LedOut.of(led, points, offsets, leans)
 
 
 def strands_at(rig: Rig, pose: Pose, guides_now: Floats, led: LedOut = NOT_LED) -> Floats:

@@ -6,7 +6,8 @@ at 24 frames a second, and of one of 5 Hz and 3.1 m/s at 60. Each strand counts 
 Depths are distances from the mesh's own triangles, of points inside of it that were outside at
 rest, as if the hair's median length were 25 cm: grooms come in any unit. So are jumps: by how much
 what leading out adds to where strands ride changes from one frame to the next. A jump is a flip if
-it is as far in one of 16 parts of the way between the two frames: the others go there steadily.
+it is as far in one of 16 parts of the way between the two frames: the others go there steadily. It
+is a flip of leading out if where the strand rides does not jump as far in that part.
 
 What it costs, of Sintel: see `_strands_cost`.
 
@@ -40,6 +41,7 @@ from hairloom.addon.dynamics.measure import length_changes
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.dynamics.trajectory import curvature
 from hairloom.addon.pipeline import Motion, Pose, Rig
+from hairloom.addon.refine.lead_out import NOT_LED, LedOut
 from hairloom.addon.strands import StrandSet, Surface
 from hairloom.addon.strands.arc_length import lengths, steps
 from hairloom.addon.strands.closest_point import ClosestPointSearch
@@ -101,21 +103,31 @@ def fast_shake_at(time: float, _centre: Floats) -> Floats:
     return matrix
 
 
-def played(rig: Rig, collider: Collider, shake: Any, fps: float) -> Iterator[tuple[Motion, Floats]]:
-    """The motion in each frame, and the head's matrix."""
+def played(
+    rig: Rig, collider: Collider, shake: Any, fps: float
+) -> Iterator[tuple[Motion, Floats, Floats, LedOut]]:
+    """The motion in each frame, the head's matrix, all strands, and those that were led out."""
     assert rig.head is not None
     centre = rig.head.positions.mean(axis=0).astype(np.float64)
     motion = pipeline.begin(rig, rig.rest_pose)
-    earlier, before = None, np.eye(4)
+    earlier, before, led = None, np.eye(4), NOT_LED
     for frame in range(1, round(SECONDS * fps) + 1):
         matrix = shake(frame / fps, centre)
         bent = None if earlier is None else curvature(earlier, before, matrix, 1.0)
         posed = (PosedCollider(collider, before, matrix, bent),)
         motion = pipeline.advance(
-            rig, motion, pose_of(rig, matrix), posed, DynamicsSettings(), GRAVITY, 1.0 / fps
+            rig,
+            motion,
+            pose_of(rig, matrix),
+            posed,
+            DynamicsSettings(),
+            GRAVITY,
+            1.0 / fps,
+            led=led,
         )
         earlier, before = before, matrix
-        yield motion, matrix
+        points, led = pipeline.strands_and_led(rig, motion)
+        yield motion, matrix, points, led
 
 
 def pose_of(rig: Rig, matrix: Floats) -> Pose:
@@ -135,10 +147,9 @@ def shaken(rig: Rig, shake: Any, fps: float) -> dict[str, float]:
     segments, rest_lengths = steps(rest, offsets), lengths(rest, offsets)
     change, depth, worst = (np.zeros(rig.strands.strand_count) for _ in range(3))
     scale = MEDIAN_LENGTH / np.median(rest_lengths)
-    correction, jumped, flips = np.zeros_like(rest), [], np.zeros(2)
-    motion_before: Motion | None = None
-    for motion, matrix in played(rig, collider, shake, fps):
-        points = pipeline.strands_and_led(rig, motion)[0]
+    correction, jumped, flips = np.zeros_like(rest), [], np.zeros(3)
+    motion_before, led_before = None, NOT_LED
+    for motion, matrix, points, led in played(rig, collider, shake, fps):
         assert np.isfinite(points).all()
         np.maximum(change, length_changes(points, offsets, rest_lengths), out=change)
         off = np.abs(steps(points, offsets) - segments) / np.maximum(segments, 1.0e-5)
@@ -153,9 +164,10 @@ def shaken(rig: Rig, shake: Any, fps: float) -> dict[str, float]:
         jumped.append(_farthest(correction - before, offsets) * scale)
         if motion_before is not None and len(jumped) % FLIPS_EVERY == 0:
             is_far = jumped[-1] > JUMP
-            way = _farthest_in_parts(rig, collider, motion_before, motion, before) * scale
-            flips += is_far.sum(), (is_far & (way > JUMP)).sum()
-        motion_before = motion
+            moments = motion_before, motion
+            farthest = _farthest_in_parts(rig, collider, moments, led_before, before, JUMP / scale)
+            flips += is_far.sum(), *((is_far & (way * scale > JUMP)).sum() for way in farthest)
+        motion_before, led_before = motion, led
     depth *= scale
     return {
         "length_p99_percent": float(np.quantile(change, 0.99)) * 100.0,
@@ -167,6 +179,7 @@ def shaken(rig: Rig, shake: Any, fps: float) -> dict[str, float]:
         "jump_worst_mm": 1000.0 * float(np.max(jumped)),
         "strands_jump_percent": 100.0 * float((np.array(jumped) > JUMP).mean()),
         "flips_of_jumps_percent": 100.0 * float(flips[1] / max(flips[0], 1.0)),
+        "led_flips_of_jumps_percent": 100.0 * float(flips[2] / max(flips[0], 1.0)),
     }
 
 
@@ -176,25 +189,52 @@ def _farthest(displacement: Floats, offsets: Ints) -> Floats:
 
 
 def _farthest_in_parts(
-    rig: Rig, collider: Collider, before: Motion, now: Motion, correction: Floats
+    rig: Rig,
+    collider: Collider,
+    moments: tuple[Motion, Motion],
+    led: LedOut,
+    correction: Floats,
+    jump: float,
 ) -> Floats:
     """Of each strand by how much what leading out adds to it changes, at most, in one part of the
-    way between two frames, on which guides and head go straight.
+    way between two frames, on which guides and head go straight; and the same of those parts in
+    which the strand does not jump where it rides, as seen from the head, (2, strand_count).
 
     Args:
-        correction: (point_count, 3), what it adds in the frame before.
+        led: in the frame before.
+        correction: (point_count, 3), what it adds then.
+        jump: how far a jump is [m].
     """
-    farthest = np.zeros(rig.strands.strand_count)
+    (before, now), offsets = moments, rig.strands.offsets
+    farthest = np.zeros((2, rig.strands.strand_count))
+    ridden = _as_head(pipeline.strands_at(rig, before.pose, before.guides), before.pose.matrix)
     for part in np.arange(1, PARTS + 1) / PARTS:
         matrix = before.pose.matrix + part * (now.pose.matrix - before.pose.matrix)
         guides = before.guides + np.float32(part) * (now.guides - before.guides)
         posed = (PosedCollider(collider, matrix, matrix),)
-        there = replace(now, pose=pose_of(rig, matrix), guides=guides, colliders=posed)
-        last = correction
-        correction = pipeline.strands_and_led(rig, there)[0]
-        correction -= pipeline.strands_at(rig, there.pose, guides)
-        np.maximum(farthest, _farthest(correction - last, rig.strands.offsets), out=farthest)
+        there = replace(
+            now,
+            pose=pose_of(rig, matrix),
+            guides=guides,
+            colliders=posed,
+            duration=now.duration / PARTS,
+            leans=led.leans,
+        )
+        last, ridden_before = correction, ridden
+        correction, led = pipeline.strands_and_led(rig, there)
+        rides = pipeline.strands_at(rig, there.pose, guides)
+        correction -= rides
+        ridden = _as_head(rides, matrix)
+        way = _farthest(correction - last, offsets)
+        is_steady = _farthest(ridden - ridden_before, offsets) <= jump
+        np.maximum(farthest, [way, way * is_steady], out=farthest)
     return farthest
+
+
+def _as_head(points: Floats, matrix: Floats) -> Floats:
+    """Points (n, 3) of the world as seen from the head."""
+    seen: Floats = (points - matrix[:3, 3]) @ matrix[:3, :3]
+    return seen
 
 
 def _inside(
@@ -231,8 +271,7 @@ def coil_figures(rig: Rig, made_of: StrandSet) -> dict[str, float]:
     """How much of their length coils keep, and how far their radius is off, after the shake."""
     assert rig.head is not None
     collider = field_of(rig.head, DynamicsSettings(), place="head")
-    motion = list(played(rig, collider, shake_at, FPS))[-1][0]
-    points, offsets = pipeline.strands_and_led(rig, motion)[0], rig.strands.offsets
+    points, offsets = list(played(rig, collider, shake_at, FPS))[-1][2], rig.strands.offsets
     kept = lengths(points, offsets) / lengths(made_of.points, made_of.offsets)
     grid = points.reshape(rig.strands.strand_count, -1, 3).astype(np.float64)
     a_turn = grid.shape[1] // TURNS
@@ -252,7 +291,7 @@ def coil_figures(rig: Rig, made_of: StrandSet) -> dict[str, float]:
 def cost_of(rig: Rig) -> dict[str, float]:
     assert rig.head is not None
     collider = field_of(rig.head, DynamicsSettings(), place="head")
-    return cost_figures(rig, [motion for motion, _ in played(rig, collider, shake_at, FPS)])
+    return cost_figures(rig, [frame[0] for frame in played(rig, collider, shake_at, FPS)])
 
 
 def main(names: list[str]) -> int:
@@ -269,6 +308,7 @@ def main(names: list[str]) -> int:
         figures |= {"jump_fast_worst_mm": fast["jump_worst_mm"]}
         figures |= {"strands_fast_jump_percent": fast["strands_jump_percent"]}
         figures |= {"flips_of_fast_jumps_percent": fast["flips_of_jumps_percent"]}
+        figures |= {"led_flips_of_fast_jumps_percent": fast["led_flips_of_jumps_percent"]}
         if name == "sintel":
             figures |= cost_of(rig)
         if name == "coil":

@@ -7,19 +7,24 @@
 //   IS_COUNTED  how many of these each block of strands has: writes `near_counts`
 //   IS_LISTED   which: writes `near_strands`, one after the other, and behind all how many there are,
 //               so that the next steps lose no lanes to the others
+//   IS_BENT     bends them as they were in the frame before: changes cv_points, and in `leans` is then
+//               by how much each segment is bent
 //   IS_LED      leads them: writes `led_points`
-//   IS_PUT      copies these into cv_points
+//   IS_PUT      copies these into cv_points, adds to `leans` how that has bent them
 //
 // Where drivers bear it, the first two are done as strands ride, see ride.comp.glsl.
-// One invocation a strand, a block of strands in IS_COUNTED and IS_LISTED; in IS_LED and IS_PUT every
-// lane_count-th of the strands that are too near.
+// One invocation a strand, a block of strands in IS_COUNTED and IS_LISTED; in IS_BENT, IS_LED and IS_PUT
+// every lane_count-th of the strands that are too near.
 //
-// states: x 1 where the strand is moved, y its first point that is too near, 0 for none, z by how much
+// states: x 1 where the strand is moved, 2 where it was bent in the frame before, after IS_PUT in this one, y its first point that is too near, 0 for none, z by how much
 // [m] any point is nearer than it must be, w 1 when it is out. The fourth number of strand_spans is the
 // last point that goes with the root. clearances: how far [m] a point stays from colliders.
 #include "lib_strand_texel.glsl"
 #if defined(IS_NEAR) || defined(IS_LED)
 #include "lib_signed_distance.glsl"
+#endif
+#if defined(IS_BENT) || defined(IS_PUT)
+#include "lib_turn.glsl"
 #endif
 
 #define SWEEPS {{lead_sweeps}}
@@ -46,6 +51,7 @@ vec3 riding_at(StrandSpan span, int point)
 
 #include "lib_root_frame.glsl"
 
+#ifndef IS_BENT
 // Where the root of a strand carries it.
 RootMotion motion_of(int strand)
 {
@@ -56,6 +62,7 @@ vec3 carried_at(StrandSpan span, int point, RootMotion motion)
 {
   return follow(texelFetch(rest_points, span_texel(span, point), 0).xyz, motion);
 }
+#endif
 
 #if defined(IS_NEAR) || defined(IS_LED)
 // How far [m] a point stays from colliders that rides so far from where its root carries it.
@@ -83,7 +90,11 @@ void take(int strand, StrandSpan span, int end)
     vec3 place = point > last ? riding.xyz + shift : carried_at(span, point, motion);
     imageStore(cv_points, texel, vec4(place, riding.w));
   }
-  imageStore(states, strand_texel(strand, 0, 1), vec4(last > 0 ? 1.0 : 0.0, 0.0, 0.0, 0.0));
+  // a strand that was bent in the frame before is led on from its root
+  bool was_bent = is_going_on > 0 && imageLoad(states, strand_texel(strand, 0, 1)).x > 1.5;
+  float is_moved = was_bent ? 2.0 : last > 0 ? 1.0 : 0.0;
+  vec4 state = vec4(is_moved, was_bent ? 1.0 : 0.0, 0.0, 0.0);
+  imageStore(states, strand_texel(strand, 0, 1), state);
 }
 #endif
 
@@ -99,7 +110,7 @@ void take(int strand, StrandSpan span, int end)
     float lack = wanted_at(span, point, away) - signed_distance(solid, here, kept).w;
     state.y = lack > {{lead_slack}} * kept ? float(point) : state.y;
   }
-  state.x = state.y > 0.5 ? 1.0 : state.x;
+  state.x = state.y > 0.5 ? max(state.x, 1.0) : state.x;
   imageStore(states, strand_texel(strand, 0, 1), state);
 }
 #endif
@@ -234,31 +245,67 @@ void take(int strand, StrandSpan span, int end)
 #ifdef IS_PUT
 void take(int strand, StrandSpan span, int end)
 {
-  vec4 state = texelFetch(states, strand_texel(strand, 0, 1), 0);
-  if (state.y < 0.5) {
-    return;
-  }
+  vec4 state = imageLoad(states, strand_texel(strand, 0, 1));
   RootMotion motion = motion_of(strand);
   bool is_stuck = state.z > kept;  // then it is as its root carries it
-  for (int point = is_stuck ? first_point : max(first_point, int(state.y)); point < end; point++) {
+  vec3 riding_start = riding_at(span, 0);
+  vec3 start = riding_start;
+  float most = 0.0;
+  for (int point = 0; point < end; point++) {
     ivec2 texel = span_texel(span, point);
-    vec3 place = texelFetch(led_points, texel, 0).xyz;
+    vec4 riding = imageLoad(cv_points, texel);
+    vec3 place = point < int(state.y) ? riding.xyz : texelFetch(led_points, texel, 0).xyz;
     place = is_stuck ? carried_at(span, point, motion) : place;
-    imageStore(cv_points, texel, vec4(place, imageLoad(cv_points, texel).w));
+    vec3 lean = direction_of(place - start) - direction_of(riding.xyz - riding_start);
+    lean += imageLoad(leans, texel).xyz;
+    most = max(most, length(lean));
+    imageStore(leans, texel, vec4(lean, 0.0));
+    imageStore(cv_points, texel, vec4(place, riding.w));
+    riding_start = riding.xyz;
+    start = place;
+  }
+  state.x = most > {{lead_upright}} && !is_stuck ? 2.0 : 1.0;
+  imageStore(states, strand_texel(strand, 0, 1), state);
+}
+#endif
+
+#ifdef IS_BENT
+void take(int strand, StrandSpan span, int end)
+{
+  bool was_bent = texelFetch(states, strand_texel(strand, 0, 1), 0).x > 1.5;
+  vec3 shift = vec3(0.0);
+  vec3 riding_start = riding_at(span, 0);
+  for (int point = 0; point < end; point++) {
+    ivec2 texel = span_texel(span, point);
+    vec4 riding = imageLoad(cv_points, texel);
+    vec3 segment = riding.xyz - riding_start;
+    vec3 along = direction_of(segment);
+    vec3 lean = was_bent ? imageLoad(leans, texel).xyz : vec3(0.0);
+    lean *= max(1.0 - turned_back / max(length(lean), TINY), 0.0);
+    vec3 bent = at_length(vec3(0.0), along + lean, length(segment));
+    bool is_lean = lean != vec3(0.0);  // what is not bent stays bit for bit
+    shift += is_lean ? bent - segment : vec3(0.0);
+    imageStore(leans, texel, vec4(is_lean ? direction_of(bent) - along : vec3(0.0), 0.0));
+    imageStore(cv_points, texel, vec4(riding.xyz + shift, riding.w));
+    riding_start = riding.xyz;
   }
 }
 #endif
 
-#if defined(IS_LED) || defined(IS_PUT)
+#if defined(IS_BENT) || defined(IS_LED) || defined(IS_PUT)
 void main()
 {
   int near_count = int(texelFetch(near_strands, strand_texel(strand_count, 0, 1), 0).x);
   for (int number = int(gl_GlobalInvocationID.x); number < near_count; number += lane_count) {
     int strand = int(texelFetch(near_strands, strand_texel(number, 0, 1), 0).x);
     StrandSpan span = strand_span(strand_spans, strand);
+#ifdef IS_LED
     if (first_point < span.count) {
       take(strand, span, min(point_end, span.count));
     }
+#else
+    take(strand, span, span.count);
+#endif
   }
 }
 #elif defined(IS_COUNTED)

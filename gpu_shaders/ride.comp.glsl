@@ -50,7 +50,9 @@ void main()
 #ifdef HAS_CLEARANCE
   int held = span.factors;  // the last point that goes with the root
   displacement = held > 0 ? vec3(0.0) : displacement;
-  int first_near = 0;
+  // a strand that was bent in the frame before is led on from its root
+  bool was_bent = is_going_on > 0 && imageLoad(states, strand_texel(strand, 0, 1)).x > 1.5;
+  int first_near = was_bent ? 1 : 0;
   Solid solid = solid_at(0);
 #endif
   float reached = 0.0;
@@ -99,7 +101,7 @@ void main()
     rest = next;
   }
 #ifdef HAS_CLEARANCE
-  float is_moved = held > 0 || first_near > 0 ? 1.0 : 0.0;
+  float is_moved = was_bent ? 2.0 : held > 0 || first_near > 0 ? 1.0 : 0.0;
   imageStore(states, strand_texel(strand, 0, 1), vec4(is_moved, float(first_near), 0.0, 0.0));
 #endif
 }

@@ -12,6 +12,10 @@ outside of the mesh itself. There the grid does not tell which way is out, so a 
 root up to its last such point, and only what comes after that rides. A strand that nothing leads
 out is as its root carries it.
 
+Where a strand rides straight into a collider, all ways out are as near, and which one it takes
+would change from frame to frame. So it starts from how it was bent in the frame before, see
+`Leans`, and turns back from there to where it rides within a fraction of a second.
+
 The twin on the GPU is gpu_shaders/lead_out.comp.glsl.
 """
 
@@ -52,6 +56,10 @@ DEEP = 0.5
 #: A strand that is stuck all the same, as in a fold, is led from its root again, farther out by
 #: this much of its mean segment; how often it is led at most.
 MARGIN, ATTEMPTS = 0.5, 3
+#: How quickly segments turn back to where they ride once nothing leads them out [1/s], in radians.
+TURNING_BACK = 20.0
+#: A strand of which no segment leans by more than this is where it rides.
+UPRIGHT = 1.0e-3
 #: How many points of a strand are looked at together, for the first one that is too near.
 _AHEAD = np.arange(5)
 _TINY = 1.0e-30
@@ -119,20 +127,74 @@ class Clearance:
 
 
 @dataclass(frozen=True, eq=False)
+class Leans:
+    """How leading out has bent strands in one frame, for the next one.
+
+    strands: (n,) ascending, those that are not where they ride.
+    values: (m, 3) float32, of all their points, one strand after the other: what was added to the
+        direction of length 1 of the segment that ends there, world axes.
+    """
+
+    strands: Ints
+    values: Floats
+
+    @classmethod
+    def between(cls, strands: Ints, ridden: Floats, led: Floats, offsets: Ints) -> Leans:
+        """Args:
+        strands: (n,). ridden, led: (m, 3) where they ride, and where they were led to.
+        """
+        counts = np.diff(offsets)[strands]
+        begins = np.cumsum(counts) - counts
+        values = unit(_steps(led, begins)) - unit(_steps(ridden, begins))
+        values[begins] = 0.0
+        is_bent = np.zeros(len(strands), bool)
+        if len(strands):
+            is_bent = np.maximum.reduceat(_size(values), begins) > UPRIGHT
+        return cls(
+            strands[is_bent], values[np.repeat(is_bent, counts)].astype(np.float32, copy=False)
+        )
+
+    def after(self, duration: float) -> Leans:
+        """What is left of them after some time [s]."""
+        size = np.maximum(_size(self.values), np.float32(_TINY))
+        left = np.maximum(np.float32(1.0) - np.float32(TURNING_BACK * duration) / size, 0.0)
+        return Leans(self.strands, self.values * left[:, None])
+
+    def bend(self, points: Floats, offsets: Ints) -> None:
+        """All strands (point_count, 3) by them, in place; segments keep their lengths."""
+        if not len(self.strands):
+            return
+        counts, index = np.diff(offsets)[self.strands], points_of(self.strands, offsets)
+        begins = np.cumsum(counts) - counts
+        ridden = points[index].astype(np.float64)
+        steps = _steps(ridden, begins)
+        length = _size(steps)
+        change = _at_length(0.0, unit(steps) + self.values, length) - steps
+        shift = np.cumsum(change, axis=0)
+        shift -= np.repeat(shift[begins], counts, axis=0)
+        points[index] = ridden + shift
+
+
+NO_LEANS = Leans(np.zeros(0, np.int64), np.zeros((0, 3), np.float32))
+
+
+@dataclass(frozen=True, eq=False)
 class LedOut:
     """Strands that were led out of colliders in one frame.
 
     strands: (n,) int32, ascending.
     points: (m, 3) float32 world [m], all points of these, one strand after the other.
+    leans: how they were bent, where that is known.
     """
 
     strands: Ints
     points: Floats
+    leans: Leans = NO_LEANS
 
     @classmethod
-    def of(cls, strands: Ints, points: Floats, offsets: Ints) -> LedOut:
+    def of(cls, strands: Ints, points: Floats, offsets: Ints, leans: Leans = NO_LEANS) -> LedOut:
         """These of all strands, (point_count, 3)."""
-        return cls(strands.astype(np.int32), points[points_of(strands, offsets)])
+        return cls(strands.astype(np.int32), points[points_of(strands, offsets)], leans)
 
     def fits(self, offsets: Ints) -> bool:
         """Whether it is of strands with these points."""
@@ -185,30 +247,41 @@ def lead_out(
     offsets: Ints,
     colliders: Sequence[PosedCollider],
     clearance: Clearance,
-) -> Ints:
+    leans: Leans = NO_LEANS,
+) -> tuple[Ints, Leans]:
     """Lead strands out of colliders, in place.
 
     Args:
         carry: where their roots carry points.
         points, offsets, colliders: as of `clearance_at`.
+        leans: what is left of those of the frame before.
 
     Returns:
-        (n,) the strands that were too near, ascending.
+        (n,) the strands that are not where they ride, ascending; and how they are bent.
     """
     poses, kept = poses_now(colliders), clearance.kept
     held = _hold(points, carry, offsets, clearance)
+    leaning = points_of(leans.strands, offsets)
+    upright = points[leaning]
+    leans.bend(points, offsets)
     index, distance, outward = nearer_than(points, poses, clearance.reach)
     owner = _owners(index, offsets)
     away = _size(points[index] - carry(index, owner))
     wanted = np.minimum(clearance.points[index] + away, np.float32(kept))
     is_near = distance < wanted - np.float32(SLACK * kept)
     strands, first = np.unique(owner[is_near], return_index=True)
+    bent = np.union1d(leans.strands, strands)
+    every = points_of(bent, offsets)
+    ridden = points[every]
+    ridden[np.searchsorted(every, leaning)] = upright
     if len(strands):
         first = is_near.nonzero()[0][first]
         found = index[first], distance[first], outward.T[first]
         near = _Near.of(strands, found, points, carry, offsets, clearance)
-        points[near.index] = _led(near, kept, poses)
-    return np.union1d(held, strands)
+        points[near.index], is_lost = _led(near, kept, poses)
+        lost = np.searchsorted(every, near.index[is_lost])
+        ridden[lost] = points[every[lost]]  # which way they were bent is no matter
+    return np.union1d(held, bent), Leans.between(bent, ridden, points[every], offsets)
 
 
 def _owners(index: Ints, offsets: Ints) -> Ints:
@@ -322,8 +395,8 @@ class _Near:
         return np.add.reduceat(length, self.begins) / (self.ends - self.begins - 1)
 
 
-def _led(near: _Near, kept: float, poses: Sequence[Pose]) -> Floats:
-    """Where they are led to, (m, 3)."""
+def _led(near: _Near, kept: float, poses: Sequence[Pose]) -> tuple[Floats, Bools]:
+    """Where they are led to, (m, 3), and which points nothing leads out, (m,)."""
     count = len(near.begins)
     led, lack = _led_by(near, np.zeros(count), np.full(count, SLACK * kept), kept, poses)
     stuck = np.flatnonzero(lack > SLACK * kept)
@@ -342,7 +415,7 @@ def _led(near: _Near, kept: float, poses: Sequence[Pose]) -> Floats:
         from_ = points_of(chosen, np.append(again.begins, again.ends[-1:]))
         led[points_of(stuck, np.append(near.begins, near.ends[-1:]))] = found[from_]
     is_lost = np.repeat(lack > kept, near.ends - near.begins)
-    return np.where(is_lost[:, None], near.carried, led)
+    return np.where(is_lost[:, None], near.carried, led), is_lost
 
 
 def _led_by(

@@ -7,6 +7,7 @@ textures in the layouts of `strand_layout`.
     clearances    R32F: how far from colliders each point stays where its root carries it [m]
     states        RGBA32F: of each strand x whether it is led out, see lead_out.comp.glsl
     near_strands, near_counts RGBA32F: which strands are too near, see lead_out.comp.glsl
+    leans         RGBA32F: xyz how the segment that ends at a point was bent, see lead_out.Leans
     led_points    RGBA32F: xyz where points are led to [m, world]
     led_texels    RG32F: the texels of points that were led earlier
     cv_points     RGBA32F: xyz position now [m, world], changed in place
@@ -22,7 +23,15 @@ import numpy as np
 
 from ..arrays import Ints
 from ..dynamics.colliders import PosedCollider
-from ..refine.lead_out import ATTEMPTS, HALVINGS, SWEEPS, TRIES, Clearance, LedOut
+from ..refine.lead_out import (
+    ATTEMPTS,
+    HALVINGS,
+    SWEEPS,
+    TRIES,
+    TURNING_BACK,
+    Clearance,
+    LedOut,
+)
 from . import gpu_objects
 from .collider_textures import ColliderTextures, SolidKinds, UploadedColliders
 from .shader_program import ShaderRecipe, program
@@ -33,16 +42,19 @@ from .textures import texture_from, texture_to_array
 _GROUP = (64, 1)
 #: what infinity is on the GPU [m]
 _ENDLESS = np.float32(1.0e30)
+#: no segment leans by more
+_UPRIGHT_AGAIN = 4.0
 #: Software drivers end a shader after about this many rounds of all its loops.
 _ROUNDS = 60_000
 #: step -> its images
 _STEPS = {
-    "HELD": (("cv_points", "READ_WRITE"), ("states", "WRITE")),
+    "HELD": (("cv_points", "READ_WRITE"), ("states", "READ_WRITE")),
     "NEAR": (("states", "READ_WRITE"),),
     "COUNTED": (("near_counts", "WRITE"),),
     "LISTED": (("near_strands", "WRITE"),),
+    "BENT": (("cv_points", "READ_WRITE"), ("leans", "READ_WRITE")),
     "LED": (("states", "READ_WRITE"), ("led_points", "READ_WRITE")),
-    "PUT": (("cv_points", "READ_WRITE"),),
+    "PUT": (("cv_points", "READ_WRITE"), ("states", "READ_WRITE"), ("leans", "READ_WRITE")),
 }
 _CARRYING = ("strand_spans", "rest_points", "root_motions")
 _TEXTURES = {
@@ -50,20 +62,24 @@ _TEXTURES = {
     "NEAR": (*_CARRYING, "cv_points", "clearances"),
     "COUNTED": ("states",),
     "LISTED": ("states", "near_counts"),
+    "BENT": ("strand_spans", "near_strands", "states"),
     "LED": (*_CARRYING, "near_strands", "cv_points", "clearances"),
-    "PUT": (*_CARRYING, "near_strands", "states", "led_points"),
+    "PUT": (*_CARRYING, "near_strands", "led_points"),
 }
 _OF_POINTS = ("mover_count", "first_point", "point_end")
 _INTEGERS = {
-    "HELD": _OF_POINTS,
+    "HELD": (*_OF_POINTS, "is_going_on"),
     "NEAR": _OF_POINTS,
     "COUNTED": (),
     "LISTED": (),
+    "BENT": ("lane_count",),
     "LED": (*_OF_POINTS, "lane_count", "first_attempt", "attempt_end"),
-    "PUT": (*_OF_POINTS, "lane_count"),
+    "PUT": ("mover_count", "lane_count"),
 }
 #: strands of an invocation, at most
-_INVOCATION = {"COUNTED": LEAD_BLOCK, "LISTED": LEAD_BLOCK, "LED": 4, "PUT": 4}
+_INVOCATION = {"COUNTED": LEAD_BLOCK, "LISTED": LEAD_BLOCK, "BENT": 4, "LED": 4, "PUT": 4}
+#: step -> its numbers
+_NUMBERS = {"NEAR": ("kept",), "BENT": ("turned_back",), "LED": ("kept",), "PUT": ("kept",)}
 #: steps that ask colliders
 _ASKING = ("NEAR", "LED")
 PUT_RECIPE = ShaderRecipe(
@@ -95,7 +111,7 @@ def lead_out_recipe(step: str, solids: SolidKinds | None) -> ShaderRecipe:
         textures=tuple(("FLOAT_2D", name) for name in names),
         images=tuple(("RGBA32F", name, access) for name, access in _STEPS[step]),
         integers=integers,
-        numbers=(("FLOAT", "kept"),) if step in ("NEAR", "LED", "PUT") else (),
+        numbers=tuple(("FLOAT", name) for name in _NUMBERS.get(step, ())),
         group_size=_GROUP,
         defines=defines,
     )
@@ -121,12 +137,15 @@ class LeadOutPass:
             self.release()
             self._clearance = clearance
 
-    def begin(self, posed: tuple[PosedCollider, ...], point_rounds: int) -> Seen | None:
+    def begin(
+        self, posed: tuple[PosedCollider, ...], point_rounds: int, since: float = np.inf
+    ) -> Seen | None:
         """What a frame needs where strands are to be led out of these; None where they are not.
 
         Args:
             point_rounds: how many rounds of its loops the pass that moves strands takes for a point
                 of one, see `Seen.at_once`.
+            since: time since the frame from which it goes on [s]; infinite: from none.
 
         Raises:
             HairloomError: a collider that the GPU cannot have.
@@ -148,8 +167,9 @@ class LeadOutPass:
             textures,
             self._textures["states"],
             kinds,
-            {name: len(posed) for name in kinds.integers},
+            {name: len(posed) for name in kinds.integers} | {"is_going_on": int(since < np.inf)},
             self._clearance.kept,
+            min(TURNING_BACK * since, _UPRIGHT_AGAIN),
             rounds <= _ROUNDS,
         )
 
@@ -166,14 +186,17 @@ class LeadOutPass:
         """
         textures = self._textures | carrying | seen.textures | {"cv_points": cv_points}
         integers = {"mover_count": mover_count, **seen.integers}
+        numbers = {"kept": seen.kept, "turned_back": seen.turned_back}
         for step in (() if seen.at_once else ("HELD", "NEAR")) + ("COUNTED", "LISTED"):
-            self._run(step, textures, integers)
+            self._run(step, textures, integers, numbers)
+        self._run("BENT", textures, integers, numbers)
         # all attempts in one go where drivers bear it
         is_short = self._points_at_once() >= ATTEMPTS * int(self._layout.counts.max())
         for attempt in (0,) if is_short else range(ATTEMPTS):
             end = ATTEMPTS if is_short else attempt + 1
-            self._run("LED", textures, {**integers, "first_attempt": attempt, "attempt_end": end})
-        self._run("PUT", textures, integers)
+            now = {**integers, "first_attempt": attempt, "attempt_end": end}
+            self._run("LED", textures, now, numbers)
+        self._run("PUT", textures, integers, numbers)
 
     def put(self, cv_points: Any, led: LedOut) -> None:
         """Put strands where they were led to earlier, see `LedOut.put`.
@@ -222,6 +245,7 @@ class LeadOutPass:
             spans[:, 0, 3] = clearance.held
             textures["strand_spans"] = texture_from(strand_rows(spans), "RGBA32F")
             textures["led_points"] = _empty(layout.size)
+            textures["leans"] = _empty(layout.size)
             blocks = -(-layout.strand_count // LEAD_BLOCK)
             textures["near_counts"] = _empty(strand_rows_size(blocks, 1))
             textures["near_strands"] = _empty(strand_rows_size(layout.strand_count + 1, 1))
@@ -229,7 +253,13 @@ class LeadOutPass:
             size = strand_rows_size(layout.strand_count, 1)
             textures["states"] = _empty(size)
 
-    def _run(self, step: str, taken: dict[str, Any], integers: dict[str, int]) -> None:
+    def _run(
+        self,
+        step: str,
+        taken: dict[str, Any],
+        integers: dict[str, int],
+        numbers: dict[str, float],
+    ) -> None:
         """One step over all points of all strands, as many at once as drivers bear."""
         assert self._solids is not None
         recipe = lead_out_recipe(step, self._solids.kinds if step in _ASKING else None)
@@ -238,14 +268,13 @@ class LeadOutPass:
         known = integers | {"strand_count": count, "lane_count": invocations}
         at_once = self._points_at_once() if step in _ASKING else _ROUNDS
         end = int(self._layout.counts.max()) if "first_point" in recipe.integers else 1
-        assert self._clearance is not None
         for first in range(0, end, at_once):
             known |= {"first_point": first, "point_end": first + at_once}
             shader.bind(
                 textures={name: taken[name] for _, name in recipe.textures},
                 images={name: taken[name] for _, name, *_ in recipe.images},
                 integers={name: known[name] for name in recipe.integers},
-                numbers={name: self._clearance.kept for _, name in recipe.numbers},
+                numbers={name: numbers[name] for _, name in recipe.numbers},
             )
             gpu.compute.dispatch(shader.shader, -(-invocations // _GROUP[0]), 1, 1)
             gpu.shader.unbind()
@@ -262,7 +291,8 @@ class Seen:
     """What strands are led out of in one frame.
 
     textures: strand_spans, clearances and the colliders. states: an image. kinds, integers: of the
-    colliders. kept: [m]. at_once: whether the pass that moves strands can do the steps HELD and
+    colliders. kept: [m]. turned_back: by how much segments have turned back since the frame before
+    [radians]. at_once: whether the pass that moves strands can do the steps HELD and
     NEAR.
     """
 
@@ -271,6 +301,7 @@ class Seen:
     kinds: SolidKinds
     integers: dict[str, int]
     kept: float
+    turned_back: float
     at_once: bool
 
 

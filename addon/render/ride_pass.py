@@ -86,12 +86,15 @@ def _ride_recipe(*, curls: bool, solids: SolidKinds | None = None) -> ShaderReci
     if solids is not None:
         names += ["clearances", *solids.textures]
         defines += ("HAS_CLEARANCE", 1), *solids.defines
-        integers += solids.integers
+        integers += ("is_going_on", *solids.integers)
     return ShaderRecipe(
         name="ride",
         compute="ride.comp.glsl",
         textures=tuple(("FLOAT_2D", name) for name in names),
-        images=(("RGBA32F", "cv_points"), *[("RGBA32F", "states")] * (solids is not None)),
+        images=(
+            ("RGBA32F", "cv_points"),
+            *[("RGBA32F", "states", "READ_WRITE")] * (solids is not None),
+        ),
         integers=tuple(integers),
         numbers=() if solids is None else (("FLOAT", "kept"),),
         group_size=(64, 1),
@@ -166,6 +169,7 @@ class RidePass:
         anchors: Floats | None = None,
         colliders: tuple[PosedCollider, ...] = (),
         led: LedOut = NOT_LED,
+        since: float = np.inf,
     ) -> None:
         """Show every strand carried by its root and moved with its guides.
 
@@ -175,6 +179,7 @@ class RidePass:
                 holds them in the layout of strand_layout.strand_rows.
             colliders: what strands are led out of, once `leading` knows their clearance.
             led: strands that were led out of colliders earlier.
+            since: time since the frame that was shown last [s], if this one goes on from there.
 
         Raises:
             HairloomError: a collider that the GPU cannot have.
@@ -188,7 +193,7 @@ class RidePass:
                 raise ValueError(f"guides have shape {guides_now.shape}, not {wanted}")
             guides_now = texture_from(strand_rows(_padded(guides_now)), "RGBA32F")
         self._run_guides(guides_now)
-        self._run_ride("guide_turns", anchors, colliders, led)
+        self._run_ride("guide_turns", anchors, colliders, led, since)
 
     def read(self) -> Floats:
         """The strands as they are shown, (point_count, 3) float32 [m], world space."""
@@ -304,10 +309,11 @@ class RidePass:
         anchors: Floats | None,
         colliders: tuple[PosedCollider, ...] = (),
         led: LedOut = NOT_LED,
+        since: float = np.inf,
     ) -> None:
         textures, count = self._textures, self._strands.strand_count
         is_curled = self._riders.gives is not None and turns == "guide_turns"
-        seen = self.leading.begin(colliders, _POINT_ROUNDS)
+        seen = self.leading.begin(colliders, _POINT_ROUNDS, since)
         taken = _named(textures, "root_motions", "guide_weights", "rest_points", "strand_spans")
         taken |= {"guide_turns": textures[turns]}
         taken |= _named(textures, "guide_axes") if is_curled else {}

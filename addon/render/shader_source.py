@@ -109,6 +109,7 @@ CONSTANTS: Mapping[str, str] = MappingProxyType(
         "flattest": repr(FLATTEST),
         "lead_sweeps": str(lead_out.SWEEPS),
         "lead_slack": repr(lead_out.SLACK),
+        "lead_upright": repr(lead_out.UPRIGHT),
         "lead_tries": str(lead_out.TRIES),
         "lead_halvings": str(lead_out.HALVINGS),
         "lead_margin": repr(lead_out.MARGIN),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 from dataclasses import replace
+from itertools import pairwise
 from typing import Any
 
 import bpy
@@ -18,6 +19,7 @@ from hairloom.addon.blender.scene.built_in_head import built_in_head
 from hairloom.addon.blender.sessions import solvers
 from hairloom.addon.blender.sessions.compute_solver import ComputeSolver
 from hairloom.addon.blender.sessions.numpy_solver import NumpySolver
+from hairloom.addon.dynamics.colliders import PosedCollider, SphereCollider
 from hairloom.addon.dynamics.measure import length_changes
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.errors import HairloomError
@@ -127,6 +129,29 @@ def test_coils_bounce_alike_and_keep_their_lengths() -> None:
             assert length_changes(found, offsets, length).max() < 1.0e-5
     assert max(heights) > 1.1 * 0.2 and min(heights) < 0.95 * 0.2
     assert heights[-1] == pytest.approx(0.2, rel=0.02)
+
+
+@pytest.mark.usefixtures("gpu_context")
+def test_strands_that_are_led_out_do_not_depend_on_who_looks(rig: Rig, poses: list[Pose]) -> None:
+    """They go on from how they were bent in the frame before, shown or not; a rest forgets it."""
+    low, high = rig.head.bounds()
+    ball = SphereCollider(tuple((low + high) / 2.0), 0.55 * float(np.max(high - low)))
+
+    def play(solver: Any, *, looks: bool) -> np.ndarray:
+        solver.rest(rig.rest_pose)
+        for before, now in pairwise(poses[:8]):
+            posed = (PosedCollider(ball, before.matrix, now.matrix),)
+            solver.advance(now, posed, SETTINGS, GRAVITY, 1.0 / RATE)
+            if looks:
+                solver.strands()
+        return solver.strands()
+
+    for form in (NumpySolver, ComputeSolver):
+        solver = form(rig)
+        seen = play(solver, looks=True)
+        assert len(solver.led().strands) > 10
+        np.testing.assert_array_equal(play(solver, looks=False), seen)
+        np.testing.assert_array_equal(play(form(rig), looks=False), seen)
 
 
 @pytest.mark.usefixtures("gpu_context")

@@ -105,7 +105,9 @@ def test_equals_numpy(fewest: int, most: int) -> None:
     clearance = with_held(clearance_at(points, offsets, posed(moved=-0.05), KEPT), offsets)
     leading.take(clearance)
     expected = points.copy()
-    led = lead_out(expected, lambda index, _: carried[index], offsets, posed(moved=0.0), clearance)
+    led, _ = lead_out(
+        expected, lambda index, _: carried[index], offsets, posed(moved=0.0), clearance
+    )
     lead(now, posed(moved=0.0))
     assert 100 < len(led) < 550
     assert len(np.setxor1d(led, leading.led())) <= 2, "rounding decides few"

@@ -14,7 +14,7 @@ from hairloom.addon.groom.roots import root_frames
 from hairloom.addon.groom.settings import GuideSettings
 from hairloom.addon.groom.weights import GuideWeights
 from hairloom.addon.pipeline import Pose, Rig
-from hairloom.addon.refine.lead_out import Clearance, clearance_at
+from hairloom.addon.refine.lead_out import NO_LEANS, Clearance, clearance_at
 from hairloom.addon.strands import StrandSet, Surface
 
 pytestmark = pytest.mark.usefixtures("gpu_context")
@@ -302,3 +302,35 @@ def test_strands_that_ride_are_led_out(monkeypatch: pytest.MonkeyPatch, rounds: 
     assert off[is_held].max() < TOLERANCE
     shift = pipeline.carried(rig, pose) - pipeline.strands_at(rig, pose, guides)
     assert np.abs(shift[is_held]).max() > 0.01
+
+    # the next frames start from how those before them were bent
+    along = np.linspace(0.0, 1.0, guides.shape[1])[:, None]
+    for frame in (1.0, 2.0, 3.0):
+        moved = guides + frame * np.float32([0.0, 0.004, 0.0]) * along
+        after = replace(motion, guides=moved, duration=1.0 / 60.0, leans=led.leans)
+        expected, led = pipeline.strands_and_led(rig, after)
+        ride.ride(pose.head_positions, pose.matrix, moved, None, posed, since=1.0 / 60.0)
+        found = ride.read_led()
+        assert len(np.setxor1d(found.strands, led.strands)) <= 3, "rounding decides few"
+        off = np.abs(ride.read() - expected).max(axis=1)
+        assert (np.maximum.reduceat(off, offsets[:-1]) > TOLERANCE).mean() < 0.05
+    forgotten = pipeline.strands_and_led(rig, replace(after, leans=NO_LEANS))[0]
+    is_other = np.abs(expected - forgotten).max(axis=1) > 10.0 * TOLERANCE
+    assert np.maximum.reduceat(is_other, offsets[:-1]).mean() > 0.1
+    # a jump to this frame remembers nothing
+    ride.ride(pose.head_positions, pose.matrix, moved, None, posed)
+    found = ride.read()
+    off = np.abs(found - forgotten).max(axis=1)
+    assert (np.maximum.reduceat(off, offsets[:-1]) > TOLERANCE).mean() < 0.03
+    first = pass_of(rig)
+    first.leading.take(clearance)
+    first.ride(pose.head_positions, pose.matrix, moved, None, posed)
+    np.testing.assert_array_equal(first.read(), found)
+    # long after, nothing has led them, and they are where they ride
+    ride.ride(pose.head_positions, pose.matrix, guides, None, posed)
+    beyond = turned(0.0, (9.0, 0.0, 0.0))
+    far = (PosedCollider(head, beyond, beyond),)
+    ride.ride(pose.head_positions, pose.matrix, moved, None, far, since=1.0)
+    found = ride.read()
+    ride.ride(pose.head_positions, pose.matrix, moved, None, far)
+    np.testing.assert_allclose(found, ride.read(), atol=TOLERANCE)

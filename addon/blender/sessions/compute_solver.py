@@ -36,6 +36,7 @@ class ComputeSolver:
         self._is_baked = False
         self._is_resting = motion is None
         self._is_drawn = False
+        self._since = np.inf  # time since the frame that leading out goes on from [s]
         self._dynamics: DynamicsPass | None = None
         self._led = NOT_LED
         self._colliders = UploadedColliders()
@@ -81,6 +82,9 @@ class ComputeSolver:
     ) -> None:
         if self._is_baked:
             self._take(self.motion)
+        if self._motion.clearance is not None and not self._is_resting:
+            self._draw()  # what was not shown counts too: motion does not depend on who looks
+            self._since = duration
         motion = self._motion = pipeline.with_clearance(
             self._rig, self._motion, colliders, settings
         )
@@ -143,7 +147,7 @@ class ComputeSolver:
         if self._dynamics is not None:
             self._dynamics.release()
             self._dynamics = None
-        self._motion, self._led = motion, NOT_LED
+        self._motion, self._led, self._since = motion, NOT_LED, np.inf
         self._ride.leading.take(motion.clearance)
         self._is_baked = self._is_resting = self._is_drawn = False
 
@@ -158,5 +162,5 @@ class ComputeSolver:
         else:
             guides = self._motion.guides if texture is None else texture
             colliders = self._motion.colliders
-            self._ride.ride(head, matrix, guides, anchors, colliders, self._led)
+            self._ride.ride(head, matrix, guides, anchors, colliders, self._led, self._since)
         self._is_drawn = True

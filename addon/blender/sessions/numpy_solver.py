@@ -58,9 +58,19 @@ class NumpySolver:
         duration: float,
         scene_wind: Floats = pipeline.NO_WIND,
     ) -> None:
+        # what was not shown counts too: motion does not depend on who looks
+        led = NOT_LED if self._motion.clearance is None else self.led()
         self._take(
             pipeline.advance(
-                self._rig, self.motion, pose, colliders, settings, gravity, duration, scene_wind
+                self._rig,
+                self.motion,
+                pose,
+                colliders,
+                settings,
+                gravity,
+                duration,
+                scene_wind,
+                led,
             )
         )
 

@@ -17,7 +17,15 @@ from hairloom.addon.dynamics.colliders import (
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.groom.weights import GuideWeights
 from hairloom.addon.pipeline import Pose, Rig
-from hairloom.addon.refine.lead_out import SLACK, Carry, LedOut, clearance_at, lead_out
+from hairloom.addon.refine.lead_out import (
+    NO_LEANS,
+    SLACK,
+    TURNING_BACK,
+    Carry,
+    LedOut,
+    clearance_at,
+    lead_out,
+)
 from hairloom.addon.strands import StrandSet, Surface
 from hairloom.addon.strands.arc_length import steps
 
@@ -62,7 +70,7 @@ def test_strands_go_around_a_ball_and_keep_their_segments(across) -> None:
     clearance = clearance_at(points + 10.0, offsets, colliders, KEPT)
     assert (clearance.points[offsets[:-1]] == -np.inf).all()
     now = points.copy()
-    led = lead_out(now, at(points), offsets, colliders, clearance)
+    led, _ = lead_out(now, at(points), offsets, colliders, clearance)
     depth = np.linalg.norm(points, axis=1) - 0.1
     were_near = np.minimum.reduceat(depth, offsets[:-1]) < KEPT * (1.0 - SLACK)
     np.testing.assert_array_equal(led, np.flatnonzero(were_near))
@@ -81,7 +89,7 @@ def test_what_comes_after_goes_along_in_its_shape() -> None:
     points = points.astype(np.float32)
     now, offsets = points.copy(), np.array([0, 4])
     clearance = clearance_at(points + 1, offsets, still(BALL), KEPT)
-    led = lead_out(now, at(points), offsets, still(BALL), clearance)
+    led, _ = lead_out(now, at(points), offsets, still(BALL), clearance)
     assert led.tolist() == [0]
     np.testing.assert_allclose(np.diff(now[1:], axis=0), np.diff(points[1:], axis=0), atol=1e-7)
     assert np.linalg.norm(now[1]) >= 0.1 + KEPT * (1.0 - SLACK)
@@ -92,10 +100,10 @@ def test_what_was_inside_may_stay_as_deep_and_no_deeper(across) -> None:
     colliders = still(BALL)
     clearance = clearance_at(points, offsets, colliders, KEPT)
     now = points.copy()
-    assert not len(lead_out(now, at(points), offsets, colliders, clearance))
+    assert not len(lead_out(now, at(points), offsets, colliders, clearance)[0])
     np.testing.assert_array_equal(now, points)
     moved = still(BALL, 0.02, 0.0, 0.0)
-    led = lead_out(now, at(points), offsets, moved, clearance)
+    led, _ = lead_out(now, at(points), offsets, moved, clearance)
     assert len(led)
     lack = clearance.points - signed_distance(now, moved, KEPT)[0]
     assert lack.max() <= SLACK * KEPT + 1e-7
@@ -133,7 +141,7 @@ def test_a_fold_from_which_no_segment_leads_out() -> None:
     colliders = still(bowl)
     clearance = clearance_at(points + 1.0, offsets, colliders, KEPT)
     now = points.copy()
-    led = lead_out(now, at(points), offsets, colliders, clearance)
+    led, _ = lead_out(now, at(points), offsets, colliders, clearance)
     assert len(led) > 40
     distance = signed_distance(now, colliders, KEPT)[0]
     assert distance.min() > KEPT * (1.0 - 2.0 * SLACK)
@@ -151,7 +159,7 @@ def test_strands_without_length_and_of_two_points_stay_finite() -> None:
     np.testing.assert_allclose(steps(now, offsets), steps(points, offsets), atol=1e-7)
     none = np.zeros((0, 3), np.float32)
     clearance = clearance_at(none, np.array([0]), still(BALL), KEPT)
-    assert not len(lead_out(none, at(none), np.array([0]), still(BALL), clearance))
+    assert not len(lead_out(none, at(none), np.array([0]), still(BALL), clearance)[0])
 
 
 def test_led_strands_are_put_where_they_were(across) -> None:
@@ -224,7 +232,7 @@ def test_hair_beside_a_sheet_that_its_grid_makes_thicker_stays_on_its_side() -> 
     clearance = clearance_at(carried, offsets, colliders, KEPT)
     assert (clearance.held > 8).all()
     now = ridden.copy()
-    led = lead_out(now, at(carried), offsets, colliders, clearance)
+    led, _ = lead_out(now, at(carried), offsets, colliders, clearance)
     assert (ridden @ turn)[:, 1].min() < -0.003
     assert (now @ turn)[:, 1].min() > half[1]
     assert len(led) == 8
@@ -246,5 +254,58 @@ def test_a_strand_that_nothing_leads_out_is_as_its_root_carries_it() -> None:
     clearance = clearance_at(carried, offsets, shell, KEPT)
     longer = carried * np.float32(12.5)  # each point of it is in the shell
     now = longer.copy()
-    assert lead_out(now, at(carried), offsets, shell, clearance).tolist() == [0]
+    assert lead_out(now, at(carried), offsets, shell, clearance)[0].tolist() == [0]
     np.testing.assert_array_equal(now, carried)
+
+
+def dives(tilt: float) -> np.ndarray:
+    """Down into the ball from above, nearly straight."""
+    along = np.linspace(0.0, 0.15, 12)[:, None]
+    return (np.array([0.0, 0.0, 0.12]) + along * [tilt, 0.0, -1.0]).astype(np.float32)
+
+
+def test_a_strand_that_could_go_either_way_goes_where_it_went_before() -> None:
+    offsets, rest, colliders = np.array([0, 12]), dives(0.0), still(BALL)
+    clearance = clearance_at(rest + 1.0, offsets, colliders, KEPT)
+
+    def led(tilts: list[float], *, remembers: bool) -> np.ndarray:
+        """The tip, frame by frame."""
+        tips, leans = [], NO_LEANS
+        for tilt in tilts:
+            now = dives(tilt)
+            left = leans.after(1.0 / 60.0) if remembers else NO_LEANS
+            _, leans = lead_out(now, at(rest), offsets, colliders, clearance, left)
+            assert np.linalg.norm(now, axis=1).min() > 0.1 + KEPT * (1.0 - 2.0 * SLACK)
+            np.testing.assert_allclose(steps(now, offsets), steps(dives(tilt), offsets), atol=1e-7)
+            tips.append(now[-1])
+        return np.array(tips)
+
+    wobbles = [0.1, -0.1] * 4
+    assert np.linalg.norm(np.diff(led(wobbles, remembers=False), axis=0), axis=1).min() > 0.1
+    tips = led(wobbles, remembers=True)
+    assert np.linalg.norm(np.diff(tips, axis=0), axis=1).max() < 0.045
+    np.testing.assert_array_equal(led(wobbles, remembers=True), tips)
+    # where it clearly goes to the other side, it follows
+    there = led([0.1, *np.linspace(0.0, -0.6, 20), *[-0.6] * 20], remembers=True)[-1]
+    np.testing.assert_allclose(there, led([-0.6], remembers=False)[0], atol=0.004)
+
+
+def test_what_nothing_leads_out_any_more_turns_back_steadily() -> None:
+    offsets, rest = np.array([0, 12]), dives(0.02)
+    clearance = clearance_at(rest + 1.0, offsets, still(BALL), KEPT)
+    now, frame, gone = rest.copy(), 1.0 / 60.0, still(BALL, 9.0, 0.0, 0.0)
+    strands, leans = lead_out(now, at(rest), offsets, still(BALL), clearance)
+    assert strands.tolist() == leans.strands.tolist() == [0]
+    before, frames = now, 0
+    while len(leans.strands):
+        now = rest.copy()
+        _, leans = lead_out(now, at(rest), offsets, gone, clearance, leans.after(frame))
+        turned = np.linalg.norm(np.diff(now - before, axis=0), axis=1) / steps(rest, offsets)[1:]
+        assert turned.max() < 1.3 * TURNING_BACK * frame
+        np.testing.assert_allclose(steps(now, offsets), steps(rest, offsets), atol=1e-7)
+        before, frames = now, frames + 1
+    assert 2 <= frames <= np.ceil(2.0 / (TURNING_BACK * frame)) + 1
+    np.testing.assert_allclose(now, rest, atol=1e-6)
+    now = rest.copy()
+    lead_out(now, at(rest), offsets, gone, clearance)
+    np.testing.assert_array_equal(now, rest)
