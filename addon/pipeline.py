@@ -629,7 +629,7 @@ def strands_and_led(rig: Rig, motion: Motion) -> tuple[Floats, LedOut]:
     if motion.clearance is None:
         return held_strands(rig, pose, points), NOT_LED
     carry = partial(motions.carried, rig.strands.points)
-    leans = motion.leans.after(motion.duration)
+    leans = motion.leans.after(motion.duration, offsets)
     led, leans = lead_out(points, carry, offsets, motion.colliders, motion.clearance, leans)
     points = held_strands(rig, pose, points)
     return points, LedOut.of(led, points, offsets, leans)

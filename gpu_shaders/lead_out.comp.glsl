@@ -7,8 +7,8 @@
 //   IS_COUNTED  how many of these each block of strands has: writes `near_counts`
 //   IS_LISTED   which: writes `near_strands`, one after the other, and behind all how many there are,
 //               so that the next steps lose no lanes to the others
-//   IS_BENT     bends them as they were in the frame before: changes cv_points, and in `leans` is then
-//               by how much each segment is bent
+//   IS_BENT     bends those that were bent in the frame before: changes cv_points, and in `leans` is then
+//               by how much each segment of these is bent
 //   IS_LED      leads them: writes `led_points`
 //   IS_PUT      copies these into cv_points, adds to `leans` how that has bent them
 //
@@ -16,9 +16,10 @@
 // One invocation a strand, a block of strands in IS_COUNTED and IS_LISTED; in IS_BENT, IS_LED and IS_PUT
 // every lane_count-th of the strands that are too near.
 //
-// states: x 1 where the strand is moved, 2 where it was bent in the frame before, after IS_PUT in this one, y its first point that is too near, 0 for none, z by how much
-// [m] any point is nearer than it must be, w 1 when it is out. The fourth number of strand_spans is the
-// last point that goes with the root. clearances: how far [m] a point stays from colliders.
+// states: x 1 where the strand is moved, 2 where it was bent in the frame before, y its first point that
+// is too near, 0 for none, z by how much [m] any point is nearer than it must be, after IS_PUT by how much
+// any segment is bent, w 1 when it is out. The fourth number of strand_spans is the last point that goes
+// with the root. clearances: how far [m] a point stays from colliders.
 #include "lib_strand_texel.glsl"
 #if defined(IS_NEAR) || defined(IS_LED)
 #include "lib_signed_distance.glsl"
@@ -91,7 +92,7 @@ void take(int strand, StrandSpan span, int end)
     imageStore(cv_points, texel, vec4(place, riding.w));
   }
   // a strand that was bent in the frame before is led on from its root
-  bool was_bent = is_going_on > 0 && imageLoad(states, strand_texel(strand, 0, 1)).x > 1.5;
+  bool was_bent = imageLoad(states, strand_texel(strand, 0, 1)).z > turned_back;
   float is_moved = was_bent ? 2.0 : last > 0 ? 1.0 : 0.0;
   vec4 state = vec4(is_moved, was_bent ? 1.0 : 0.0, 0.0, 0.0);
   imageStore(states, strand_texel(strand, 0, 1), state);
@@ -248,6 +249,7 @@ void take(int strand, StrandSpan span, int end)
   vec4 state = imageLoad(states, strand_texel(strand, 0, 1));
   RootMotion motion = motion_of(strand);
   bool is_stuck = state.z > kept;  // then it is as its root carries it
+  bool was_bent = state.x > 1.5;
   vec3 riding_start = riding_at(span, 0);
   vec3 start = riding_start;
   float most = 0.0;
@@ -257,14 +259,15 @@ void take(int strand, StrandSpan span, int end)
     vec3 place = point < int(state.y) ? riding.xyz : texelFetch(led_points, texel, 0).xyz;
     place = is_stuck ? carried_at(span, point, motion) : place;
     vec3 lean = direction_of(place - start) - direction_of(riding.xyz - riding_start);
-    lean += imageLoad(leans, texel).xyz;
+    lean += was_bent ? imageLoad(leans, texel).xyz : vec3(0.0);
     most = max(most, length(lean));
     imageStore(leans, texel, vec4(lean, 0.0));
     imageStore(cv_points, texel, vec4(place, riding.w));
     riding_start = riding.xyz;
     start = place;
   }
-  state.x = most > {{lead_upright}} && !is_stuck ? 2.0 : 1.0;
+  state.x = 1.0;
+  state.z = most > {{lead_upright}} && !is_stuck ? most : 0.0;
   imageStore(states, strand_texel(strand, 0, 1), state);
 }
 #endif
@@ -272,7 +275,7 @@ void take(int strand, StrandSpan span, int end)
 #ifdef IS_BENT
 void take(int strand, StrandSpan span, int end)
 {
-  bool was_bent = texelFetch(states, strand_texel(strand, 0, 1), 0).x > 1.5;
+  end = texelFetch(states, strand_texel(strand, 0, 1), 0).x > 1.5 ? end : 0;
   vec3 shift = vec3(0.0);
   vec3 riding_start = riding_at(span, 0);
   for (int point = 0; point < end; point++) {
@@ -280,7 +283,7 @@ void take(int strand, StrandSpan span, int end)
     vec4 riding = imageLoad(cv_points, texel);
     vec3 segment = riding.xyz - riding_start;
     vec3 along = direction_of(segment);
-    vec3 lean = was_bent ? imageLoad(leans, texel).xyz : vec3(0.0);
+    vec3 lean = imageLoad(leans, texel).xyz;
     lean *= max(1.0 - turned_back / max(length(lean), TINY), 0.0);
     vec3 bent = at_length(vec3(0.0), along + lean, length(segment));
     bool is_lean = lean != vec3(0.0);  // what is not bent stays bit for bit
@@ -295,8 +298,12 @@ void take(int strand, StrandSpan span, int end)
 #if defined(IS_BENT) || defined(IS_LED) || defined(IS_PUT)
 void main()
 {
+  int lane = int(gl_GlobalInvocationID.x);
+  if (lane >= lane_count) {
+    return;  // what it would do another one does
+  }
   int near_count = int(texelFetch(near_strands, strand_texel(strand_count, 0, 1), 0).x);
-  for (int number = int(gl_GlobalInvocationID.x); number < near_count; number += lane_count) {
+  for (int number = lane; number < near_count; number += lane_count) {
     int strand = int(texelFetch(near_strands, strand_texel(number, 0, 1), 0).x);
     StrandSpan span = strand_span(strand_spans, strand);
 #ifdef IS_LED

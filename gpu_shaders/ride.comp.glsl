@@ -51,7 +51,7 @@ void main()
   int held = span.factors;  // the last point that goes with the root
   displacement = held > 0 ? vec3(0.0) : displacement;
   // a strand that was bent in the frame before is led on from its root
-  bool was_bent = is_going_on > 0 && imageLoad(states, strand_texel(strand, 0, 1)).x > 1.5;
+  bool was_bent = imageLoad(states, strand_texel(strand, 0, 1)).z > turned_back;
   int first_near = was_bent ? 1 : 0;
   Solid solid = solid_at(0);
 #endif

@@ -145,20 +145,24 @@ class Leans:
         """
         counts = np.diff(offsets)[strands]
         begins = np.cumsum(counts) - counts
-        values = unit(_steps(led, begins)) - unit(_steps(ridden, begins))
-        values[begins] = 0.0
-        is_bent = np.zeros(len(strands), bool)
-        if len(strands):
-            is_bent = np.maximum.reduceat(_size(values), begins) > UPRIGHT
-        return cls(
-            strands[is_bent], values[np.repeat(is_bent, counts)].astype(np.float32, copy=False)
-        )
+        values = _steps(led - ridden, begins)  # over lengths, which both have in common
+        values /= np.maximum(_size(_steps(ridden, begins)), np.float32(_TINY))[:, None]
+        return cls(strands, values)._where(_size(values) > UPRIGHT, counts)
 
-    def after(self, duration: float) -> Leans:
+    def after(self, duration: float, offsets: Ints) -> Leans:
         """What is left of them after some time [s]."""
-        size = np.maximum(_size(self.values), np.float32(_TINY))
-        left = np.maximum(np.float32(1.0) - np.float32(TURNING_BACK * duration) / size, 0.0)
-        return Leans(self.strands, self.values * left[:, None])
+        size, turned = _size(self.values), np.float32(TURNING_BACK * duration)
+        left = self._where(size > turned, np.diff(offsets)[self.strands])
+        size = np.maximum(_size(left.values), np.float32(_TINY))
+        kept = np.maximum(np.float32(1.0) - turned / size, np.float32(0.0))
+        return Leans(left.strands, left.values * kept[:, None])
+
+    def _where(self, is_bent: Bools, counts: Ints) -> Leans:
+        """Those of strands of these point counts (n,) with any point that is bent (m,)."""
+        if not len(self.strands):
+            return self
+        chosen = np.logical_or.reduceat(is_bent, np.cumsum(counts) - counts)
+        return Leans(self.strands[chosen], self.values[np.repeat(chosen, counts)])
 
     def bend(self, points: Floats, offsets: Ints) -> None:
         """All strands (point_count, 3) by them, in place; segments keep their lengths."""

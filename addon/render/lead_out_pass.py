@@ -68,7 +68,7 @@ _TEXTURES = {
 }
 _OF_POINTS = ("mover_count", "first_point", "point_end")
 _INTEGERS = {
-    "HELD": (*_OF_POINTS, "is_going_on"),
+    "HELD": _OF_POINTS,
     "NEAR": _OF_POINTS,
     "COUNTED": (),
     "LISTED": (),
@@ -79,7 +79,13 @@ _INTEGERS = {
 #: strands of an invocation, at most
 _INVOCATION = {"COUNTED": LEAD_BLOCK, "LISTED": LEAD_BLOCK, "BENT": 4, "LED": 4, "PUT": 4}
 #: step -> its numbers
-_NUMBERS = {"NEAR": ("kept",), "BENT": ("turned_back",), "LED": ("kept",), "PUT": ("kept",)}
+_NUMBERS = {
+    "HELD": ("turned_back",),
+    "NEAR": ("kept",),
+    "BENT": ("turned_back",),
+    "LED": ("kept",),
+    "PUT": ("kept",),
+}
 #: steps that ask colliders
 _ASKING = ("NEAR", "LED")
 PUT_RECIPE = ShaderRecipe(
@@ -167,7 +173,7 @@ class LeadOutPass:
             textures,
             self._textures["states"],
             kinds,
-            {name: len(posed) for name in kinds.integers} | {"is_going_on": int(since < np.inf)},
+            {name: len(posed) for name in kinds.integers},
             self._clearance.kept,
             min(TURNING_BACK * since, _UPRIGHT_AGAIN),
             rounds <= _ROUNDS,

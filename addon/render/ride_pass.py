@@ -86,7 +86,7 @@ def _ride_recipe(*, curls: bool, solids: SolidKinds | None = None) -> ShaderReci
     if solids is not None:
         names += ["clearances", *solids.textures]
         defines += ("HAS_CLEARANCE", 1), *solids.defines
-        integers += ("is_going_on", *solids.integers)
+        integers += solids.integers
     return ShaderRecipe(
         name="ride",
         compute="ride.comp.glsl",
@@ -96,7 +96,7 @@ def _ride_recipe(*, curls: bool, solids: SolidKinds | None = None) -> ShaderReci
             *[("RGBA32F", "states", "READ_WRITE")] * (solids is not None),
         ),
         integers=tuple(integers),
-        numbers=() if solids is None else (("FLOAT", "kept"),),
+        numbers=() if solids is None else (("FLOAT", "kept"), ("FLOAT", "turned_back")),
         group_size=(64, 1),
         defines=defines,
     )
@@ -327,7 +327,8 @@ class RidePass:
         if seen is not None and seen.at_once:
             solids = seen.kinds
             taken, images = taken | seen.textures, images | {"states": seen.states}
-            integers, numbers["kept"] = integers | seen.integers, seen.kept
+            integers = integers | seen.integers
+            numbers = {"kept": seen.kept, "turned_back": seen.turned_back}
         shader = program(_ride_recipe(curls=is_curled, solids=solids))
         shader.bind(textures=taken, images=images, integers=integers, numbers=numbers)
         _dispatch(shader, count, 1)

@@ -273,7 +273,7 @@ def test_a_strand_that_could_go_either_way_goes_where_it_went_before() -> None:
         tips, leans = [], NO_LEANS
         for tilt in tilts:
             now = dives(tilt)
-            left = leans.after(1.0 / 60.0) if remembers else NO_LEANS
+            left = leans.after(1.0 / 60.0, offsets) if remembers else NO_LEANS
             _, leans = lead_out(now, at(rest), offsets, colliders, clearance, left)
             assert np.linalg.norm(now, axis=1).min() > 0.1 + KEPT * (1.0 - 2.0 * SLACK)
             np.testing.assert_allclose(steps(now, offsets), steps(dives(tilt), offsets), atol=1e-7)
@@ -299,7 +299,7 @@ def test_what_nothing_leads_out_any_more_turns_back_steadily() -> None:
     before, frames = now, 0
     while len(leans.strands):
         now = rest.copy()
-        _, leans = lead_out(now, at(rest), offsets, gone, clearance, leans.after(frame))
+        _, leans = lead_out(now, at(rest), offsets, gone, clearance, leans.after(frame, offsets))
         turned = np.linalg.norm(np.diff(now - before, axis=0), axis=1) / steps(rest, offsets)[1:]
         assert turned.max() < 1.3 * TURNING_BACK * frame
         np.testing.assert_allclose(steps(now, offsets), steps(rest, offsets), atol=1e-7)
