@@ -1,10 +1,11 @@
-"""The flow of hair under a brush on its density: children come and go at once.
+"""The flow of hair under a brush on its density and its masks: children come and go at once.
 
 Children that the new density does not want make room for those that it wants now: these get their
 points, as many as they were, and shapes as all children grow, in the clumps of their neighbours.
 So nothing else changes, and what was found for the whole groom stays, as in `comb_flow`. What it
 leaves to `pipeline.prepare`, which is to follow: how many children there are, occlusion where they
-have come, guides in motion, and all that `comb_flow` leaves to it.
+have come, guides in motion, and all that `comb_flow` leaves to it. Children that a mask shapes in
+another way are shaped again, as combed ones are.
 """
 
 from __future__ import annotations
@@ -17,26 +18,29 @@ import numpy as np
 from .arrays import Floats, Ints
 from .comb_flow import put_children
 from .groom.child_roots import ChildRoots, child_roots
+from .groom.masks import NO_MASKS, Masks
 from .groom.roots import RootFrames, root_frames
 from .pipeline import Grown, Rig
+from .strands import Surface
 from .strands.kept import same_rows
 
 
-def painted(rig: Rig, density: Floats | None) -> Rig:
-    """The rig with its children where they grow by another density.
+def painted(rig: Rig, density: Floats | None, masks: Masks = NO_MASKS) -> Rig:
+    """The rig with its children where they grow by another density, and as other masks shape them.
 
     Args:
         rig: with children that have grown.
-        density: (vertex_count,), see `pipeline.prepare`.
+        density: (vertex_count,), see `pipeline.prepare`. masks: of the settings of children.
 
     Raises:
         HairloomError: as `child_roots`.
     """
+    rig = _masked(rig, masks)
     grown, own, head = rig.grown, rig.own_count, rig.head
     assert grown is not None and own is not None and head is not None
     settings = grown.growth.settings
     roots = child_roots(grown.shapes, head, settings.strand_count, density, settings.seed)
-    number, grown = _grown(roots, grown)
+    number, grown = _grown(roots, head, grown)
     is_wanted = np.zeros(len(grown.growth.root), bool)
     is_wanted[number] = True
     gone = np.flatnonzero(~is_wanted[grown.kept])
@@ -52,7 +56,7 @@ def painted(rig: Rig, density: Floats | None) -> Rig:
     return replace(_moved(rig, roots, grown, own + gone, number, come), grown=grown)
 
 
-def _grown(roots: ChildRoots, grown: Grown) -> tuple[Ints, Grown]:
+def _grown(roots: ChildRoots, head: Surface, grown: Grown) -> tuple[Ints, Grown]:
     """Which child of the growth each root belongs to, (n,), and the growth with all of them."""
     growth = grown.growth
     number = same_rows(roots.point, growth.root)
@@ -60,8 +64,30 @@ def _grown(roots: ChildRoots, grown: Grown) -> tuple[Ints, Grown]:
     number[new] = len(growth.root) + np.arange(len(new))
     if not len(new):
         return number, grown
-    more = growth.with_more(roots.take(new), grown.shapes, grown.kept)
+    more = growth.with_more(roots.take(new), head, grown.shapes, grown.kept)
     return number, replace(grown, growth=more)
+
+
+def _masked(rig: Rig, masks: Masks) -> Rig:
+    """The rig with its children as these masks shape them."""
+    grown, own, strands, head = rig.grown, rig.own_count, rig.strands, rig.head
+    assert grown is not None and own is not None and head is not None
+    growth, kept = grown.growth, grown.kept
+    if masks == growth.masks:
+        return rig
+    assert strands.root_triangle is not None and strands.root_barycentric is not None
+    factors = masks.at(head, strands.root_triangle[own:], strands.root_barycentric[own:])
+    was = growth.factors.take(kept)
+    is_other = np.zeros(len(growth.root), bool)
+    for one, other in zip(factors.rows, was.rows, strict=True):
+        is_other[kept[one != other]] = True
+    others = growth.factors.with_others(kept, factors)
+    growth = replace(growth, masks=masks, factors=others)
+    grown = replace(grown, growth=growth)
+    touched = np.flatnonzero(growth.clumps.with_members(is_other)[kept])
+    points = strands.points.copy()
+    put_children(points, strands.offsets, grown, touched, own)
+    return replace(rig, strands=replace(strands, points=points), grown=grown)
 
 
 def _moved(

@@ -33,6 +33,7 @@ from .groom.children_settings import ChildrenSettings
 from .groom.counter_random import named, uniform
 from .groom.guides import choose_guides, grouped
 from .groom.holds import Holds
+from .groom.masks import NO_MASKS, Masks
 from .groom.partings import Partings
 from .groom.roots import RootFrames, bind_roots, follow, root_frames, root_motions
 from .groom.settings import GuideSettings
@@ -233,6 +234,7 @@ def prepare(
     place: str,
     children: ChildrenSettings | None = None,
     density: Floats | None = None,
+    masks: Masks = NO_MASKS,
     widths: str = "own",
     holders: Holders = NO_HOLDERS,
     partings: Floats | None = None,
@@ -248,6 +250,7 @@ def prepare(
         place: names the groom in error messages.
         children: None is none.
         density: (vertex_count,) how densely children grow; None: wherever guides are near.
+        masks: by what the settings of children are multiplied on the head.
         widths: one of `groom.widths.METHODS`.
         holders: ties and a surface of tips, at rest.
         partings: (n, 2, 3) [m] the straight pieces of lines on the head, at rest; None: no line.
@@ -277,7 +280,7 @@ def prepare(
     weights = _weights(lines, guide_lines, kind, guide_kind, parted)
     notes = _lost_length(bound, own)
     rig = Rig(own, head, guides, guide_lines.grid, weights, _frames(own, head), notes)
-    ground = _Ground(density, parted, head_field, kept)
+    ground = _Ground(density, masks, parted, head_field, kept)
     if children is not None and children.method == "auto":
         rig = _automatic(rig, children, ground, widths, place)
     else:
@@ -298,6 +301,7 @@ class _Ground:
     """What matters to children beside the artist's strands; the arguments of `prepare`."""
 
     density: Floats | None
+    masks: Masks
     partings: Partings | None
     field: Callable[[], DistanceField | None]
     kept: Kept
@@ -399,7 +403,14 @@ def _with_children(
     parents, cv_count = _parents(own), rig.guide_grid.shape[1]
     shapes, notes = _parent_shapes(own.take(parents), settings.strand_count)
     made = make_children(
-        shapes, head, settings, ground.density, ground.partings, place=place, kept=kept
+        shapes,
+        head,
+        settings,
+        ground.density,
+        ground.partings,
+        ground.masks,
+        place=place,
+        kept=kept,
     )
     made, chosen = _outside(made, ground.field(), _hair_length(shapes), kept)
     strands = joined(own, with_needed_points(made.strands, cv_count, kept=kept))

@@ -97,6 +97,7 @@ def clump(
     grid: Floats,
     group: Ints,
     settings: ChildrenSettings,
+    painted: Floats,
     partings: Partings | None = None,
     kept: Kept = NOTHING_KEPT,
 ) -> Clumps:
@@ -105,6 +106,7 @@ def clump(
     Args:
         grid: (child_count, cv_count, 3) float32 [m], in the order in which they grew.
         group: (child_count,).
+        painted: (child_count,) by which the setting is multiplied.
         partings: no clump has strands on both sides of these.
         kept: of the children that were drawn last.
     """
@@ -127,16 +129,19 @@ def clump(
                 f"middles from {first}",
             )
             clumps.middle[member], clumps.strength[member] = middle, strength
-            _pull(grid, member, middle, strength, fraction)
+            _pull(grid, member, middle, strength * painted[member], fraction)
     return clumps
 
 
-def clump_again(grid: Floats, number: Ints, clumps: Clumps, settings: ChildrenSettings) -> None:
+def clump_again(
+    grid: Floats, number: Ints, clumps: Clumps, settings: ChildrenSettings, painted: Floats
+) -> None:
     """`clump` of some children, in place, by the middles that they had.
 
     Args:
         grid: (n, cv_count, 3) float32 [m]. number: (n,) ascending, which children these are; with
             all their middles.
+        painted: (n,) by which the setting is multiplied.
     """
     fraction = _fraction(settings, grid.shape[1])
     for first, last in _levels(int(number.max(initial=-1)) + 1):
@@ -144,7 +149,7 @@ def clump_again(grid: Floats, number: Ints, clumps: Clumps, settings: ChildrenSe
         member = np.flatnonzero(is_drawn)
         own = number[member]
         middle = np.searchsorted(number, clumps.middle[own])
-        _pull(grid, member, middle, clumps.strength[own], fraction)
+        _pull(grid, member, middle, clumps.strength[own] * painted[member], fraction)
 
 
 def _levels(count: int) -> Iterator[tuple[int, int]]:
@@ -166,7 +171,7 @@ def _pull(grid: Floats, member: Ints, middle: Ints, strength: Floats, fraction: 
     """Draw strands of the grid towards others, in place."""
     for start in range(0, len(member), _CHUNK):
         chunk = slice(start, start + _CHUNK)
-        pull = (strength[chunk, None] * fraction).astype(np.float32)[..., None]
+        pull = np.minimum(strength[chunk, None] * fraction, 1.0).astype(np.float32)[..., None]
         own = grid[member[chunk]]
         grid[member[chunk]] = own + pull * (grid[middle[chunk]] - own)
 

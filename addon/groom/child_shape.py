@@ -21,6 +21,8 @@ _TURN = 2.0 * np.pi
 _CHUNK = 2048
 #: Segments of a strand in one wave of frizz, at least: shorter ones it could not show.
 _SEGMENTS_PER_WAVE = 3.0
+#: Of its length a child keeps this much, whatever is painted: what has none has no direction.
+_SHORTEST = 0.001
 #: Random numbers of a child's own, beside that of its place (`children`).
 _LENGTH, _WAVES = 2, 3
 #: Those up to 4 have part in where children grow, too: fly-aways would be in patches by these.
@@ -53,16 +55,19 @@ def mixed(root: Floats, guide_grid: Floats, weights: GuideWeights) -> Floats:
     return grid.reshape(len(grid), cv_count, 3)
 
 
-def shorten(grid: Floats, key: Ints, settings: ChildrenSettings) -> None:
-    """Cut each strand to a random length along its curve, in place, and space its CVs as before.
+def shorten(grid: Floats, key: Ints, settings: ChildrenSettings, painted: Floats) -> None:
+    """Cut each strand to its length along its curve, in place, and space its CVs as before.
 
     Args:
         grid: (child_count, cv_count, 3) float32 [m].
         key: (child_count,) what is random about each depends on.
+        painted: (child_count,) by which lengths are multiplied.
     """
-    if not settings.length_variation:
+    whole = settings.length * painted
+    if not settings.length_variation and (whole >= 1.0).all():
         return
-    kept = 1.0 - settings.length_variation * uniform(key, _LENGTH)
+    kept = whole * (1.0 - settings.length_variation * uniform(key, _LENGTH))
+    kept = np.clip(kept, _SHORTEST, 1.0)
     for start in range(0, len(grid), _CHUNK):
         chunk = slice(start, start + _CHUNK)
         grid[chunk] = _cut(grid[chunk], kept[chunk])
@@ -82,7 +87,9 @@ def _cut(grid: Floats, kept: Floats) -> Floats:
     return on_curve(grid, left, np.clip(inside, 0.0, 1.0).astype(np.float32))
 
 
-def frizz(grid: Floats, key: Ints, settings: ChildrenSettings, size: float) -> None:
+def frizz(
+    grid: Floats, key: Ints, settings: ChildrenSettings, size: float, painted: Floats
+) -> None:
     """Let each strand stray from its path in waves, in place; roots stay.
 
     Two waves across each other, with each child's own direction, phase and pitch, and together no
@@ -92,6 +99,7 @@ def frizz(grid: Floats, key: Ints, settings: ChildrenSettings, size: float) -> N
         grid: (child_count, cv_count, 3) float32 [m].
         key: (child_count,) what is random about each depends on.
         size: the median length of the guides [m], in which frizz is given.
+        painted: (child_count,) by which frizz is multiplied.
     """
     if not settings.frizz:
         return
@@ -108,7 +116,7 @@ def frizz(grid: Floats, key: Ints, settings: ChildrenSettings, size: float) -> N
         for wave in range(2):
             height, around, phase, pitch = own[chunk, wave].T
             swing = np.sin(_TURN * (turns * (0.75 + 0.5 * pitch)[:, None] + phase[:, None]))
-            swing *= 0.5 * strayed
+            swing *= 0.5 * strayed * painted[chunk, None]
             for axis, part in enumerate(_on_sphere(height, around).T):
                 grid[chunk, :, axis] += swing * part[:, None]
 

@@ -27,6 +27,7 @@ from .child_roots import ChildRoots, child_roots
 from .child_shape import curl_points, curled, frizz, mixed, shorten, stray
 from .children_settings import ChildrenSettings
 from .counter_random import named, normal
+from .masks import NO_MASKS, Factors, Masks
 from .partings import Partings
 from .weights import GUIDES_PER_STRAND, GuideWeights, child_weights, nearest_before
 
@@ -60,6 +61,7 @@ class Growth:
     clumps: as they were found. size: the median length of the guides [m].
     partings: which they grew beside; None: none.
     cv_count: of the children, more than their guides' where they curl.
+    masks, factors: what was painted, and what that is at each child.
     """
 
     root: Floats
@@ -70,6 +72,8 @@ class Growth:
     size: float
     partings: Partings | None
     cv_count: int
+    masks: Masks
+    factors: Factors
 
     def varied(self, grid: Floats, chosen: Ints) -> Floats:
         """With what is each child's own, (n, cv_count, 3) float32 [m].
@@ -77,13 +81,13 @@ class Growth:
         Args:
             grid: (n, guides' cv_count, 3) float32 [m], clumped, which is changed. chosen: (n,).
         """
-        key, settings = self.key[chosen], self.settings
-        shorten(grid, key, settings)
+        key, settings, factors = self.key[chosen], self.settings, self.factors.take(chosen)
+        shorten(grid, key, settings, factors["length"])
         stray(grid, key, settings)
         if settings.curl:
             lock = self.key[self.clumps.outermost()[chosen]]
             grid = curled(grid, lock, settings, self.size, self.cv_count)
-        frizz(grid, key, settings, self.size)
+        frizz(grid, key, settings, self.size, factors["frizz"])
         return grid
 
     def touched(self, guides: Bools) -> Bools:
@@ -102,10 +106,12 @@ class Growth:
         number = self.clumps.with_middles(chosen)
         weights = GuideWeights(self.weights.guide[number], self.weights.weight[number])
         grid = mixed(self.root[number], guide_grid, weights)
-        clump_again(grid, number, self.clumps, self.settings)
+        clump_again(grid, number, self.clumps, self.settings, self.factors["clump"][number])
         return self.varied(grid[np.searchsorted(number, chosen)], chosen)
 
-    def with_more(self, roots: ChildRoots, guides: StrandSet, beside: Ints) -> Growth:
+    def with_more(
+        self, roots: ChildRoots, surface: Surface, guides: StrandSet, beside: Ints
+    ) -> Growth:
         """And children at other roots, which follow in number: they mix guides as all do, and join
         the clumps of their neighbours.
 
@@ -131,6 +137,9 @@ class Growth:
                 np.concatenate([self.weights.weight, weights.weight]),
             ),
             clumps=more,
+            factors=self.factors.and_also(
+                self.masks.at(surface, roots.triangle, roots.barycentric)
+            ),
         )
 
 
@@ -140,6 +149,7 @@ def make_children(
     settings: ChildrenSettings,
     density: Floats | None = None,
     partings: Partings | None = None,
+    masks: Masks = NO_MASKS,
     *,
     place: str,
     kept: Kept = NOTHING_KEPT,
@@ -151,6 +161,7 @@ def make_children(
         density: (vertex_count,), how densely children grow, not negative; None: wherever guides
             are near.
         partings: lines that the artist has drawn; None: there are none.
+        masks: what the artist has painted.
         place: names the groom in error messages.
         kept: of the children that were made last.
 
@@ -166,18 +177,30 @@ def make_children(
     weights = _weights(roots, guides, settings, partings, kept)
     group = guides.group[weights.guide[:, 0]]
     grid = mixed(roots.point, guides.grid, weights)
-    clumps = clump(grid, group, settings, partings, kept)
+    factors = masks.at(surface, roots.triangle, roots.barycentric)
+    clumps = clump(grid, group, settings, factors["clump"], partings, kept)
     size = typical(guides.lengths())
     needed = max(curl_points(float(guides.lengths().max()), settings, size), grid.shape[1])
     cv_count = max(min(needed, _room(settings)), grid.shape[1])
-    growth = Growth(roots.point, roots.key, weights, clumps, settings, size, partings, cv_count)
+    growth = Growth(
+        roots.point,
+        roots.key,
+        weights,
+        clumps,
+        settings,
+        size,
+        partings,
+        cv_count,
+        masks,
+        factors,
+    )
 
     def varied(some: Ints) -> tuple[Floats]:
         return (growth.varied(grid[some], some),)
 
     fixed = replace(settings, strand_count=ChildrenSettings().strand_count), size, cv_count
     lock = roots.key[clumps.outermost()] if settings.curl else roots.key
-    (shaped,) = kept.rows("varied", fixed, (grid, roots.key, lock), varied)
+    (shaped,) = kept.rows("varied", fixed, (grid, roots.key, lock, *factors.rows), varied)
     strands = StrandSet(
         points=shaped.reshape(-1, 3),
         offsets=np.arange(len(shaped) + 1) * cv_count,

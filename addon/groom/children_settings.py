@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from ..params import Settings, choice, curve, either, integer, number, when
+from ..params import Settings, choice, curve, either, integer, mask, number, when
 
 _NALU = "Nguyen and Donnelly 2005, GPU Gems 2, chapter 23"
 _TARIQ = "Tariq 2008, Real-time hair rendering on the GPU"
@@ -64,6 +64,16 @@ class ChildrenSettings(Settings):
         hard=(0.0, 100.0),
         shown_when=when("children.method", "multi"),
     )
+    length: float = number(
+        1.0,
+        label="Length",
+        description="Length of children relative to their guides",
+        unit="factor",
+        soft=(0.1, 1.0),
+        hard=(0.001, 1.0),
+        shown_when=when("children.method", "multi", "single"),
+    )
+    length_mask: str = mask("length", label="Length Mask")
     length_variation: float = number(
         0.2,
         label="Length Variation",
@@ -82,6 +92,7 @@ class ChildrenSettings(Settings):
         hard=(0.0, 1.0),
         shown_when=when("children.method", "multi", "single"),
     )
+    clump_mask: str = mask("clump", label="Clump Mask")
     clump_along: tuple[float, float, float, float, float] = curve(
         (0.0, 0.25, 0.5, 0.75, 1.0),
         label="Clump Along",
@@ -108,6 +119,7 @@ class ChildrenSettings(Settings):
         hard=(0.0, 1.0),
         shown_when=when("children.method", "multi", "single"),
     )
+    frizz_mask: str = mask("frizz", label="Frizz Mask")
     frizz_along: tuple[float, float, float, float, float] = curve(
         (0.0, 0.4, 0.7, 0.9, 1.0),
         label="Frizz Along",

@@ -13,7 +13,7 @@ from typing import Any, ClassVar, Literal, Self, TypedDict, Unpack
 from ..errors import HairloomError
 from .curve import PLACES, Curve
 
-Kind = Literal["number", "integer", "toggle", "color", "choice", "curve"]
+Kind = Literal["number", "integer", "toggle", "color", "choice", "curve", "mask"]
 #: length [m], angle [rad], time [s], rate [1/s], speed [m/s], factor [0..1], acceleration [m/s^2]
 Unit = Literal[
     "none",
@@ -47,6 +47,7 @@ class Parameter:
     `source` names the paper or equation, or says "Hairloom".
     `panel` is the panel below that of the section in which it is drawn; none: in that one itself.
     It is drawn where `shown_when` holds, and greyed out where `active_when` does not.
+    `of` is the parameter beside which a mask is drawn, and which it multiplies.
     """
 
     name: str
@@ -62,6 +63,7 @@ class Parameter:
     panel: str = ""
     shown_when: Condition | None = None
     active_when: Condition | None = None
+    of: str = ""
 
     def checked(self, value: Any, place: str) -> Any:
         """The value in its canonical type, or HairloomError naming the value and its range."""
@@ -81,6 +83,10 @@ class Parameter:
             if value not in [identifier for identifier, _, _ in self.choices]:
                 raise ValueError("that is not one of its choices")
             return str(value)
+        if self.kind == "mask":
+            if not isinstance(value, str):
+                raise TypeError("it must be a name")
+            return value
         if self.kind == "color":
             red, green, blue = (self._in_range(_finite(channel)) for channel in value)
             return (red, green, blue)
@@ -104,6 +110,8 @@ class Parameter:
     def _remedy(self) -> str:
         if self.choices:
             return "Use one of " + ", ".join(identifier for identifier, _, _ in self.choices)
+        if self.kind == "mask":
+            return "Use the name of a vertex group or of a float attribute"
         if self.hard_range:
             low, high = self.hard_range
             return f"Use a value from {low:g} to {high:g} (default {self.default})"
@@ -320,6 +328,17 @@ def curve(
             "", "curve", tuple(default), label, description, source, "none", hard, hard, **drawn
         )
     )
+
+
+def mask(of: str, *, label: str) -> Any:
+    """Declare that a number of this name may be painted: this names the weights on the surface by
+    which it is multiplied."""
+    what = label.removesuffix(" Mask")
+    description = (
+        f"Vertex group or float attribute on points of the surface by which {what} is multiplied; "
+        "empty: the same everywhere"
+    )
+    return _declare(Parameter("", "mask", "", label, description, "Hairloom", of=of))
 
 
 def _declare(parameter: Parameter) -> Any:

@@ -43,9 +43,10 @@ def struct_values(settings: Settings) -> np.ndarray:
 
 
 def _check_kinds(settings: type[Settings]) -> None:
-    """A curve has no place in a struct: whoever needs one evaluates it into a texture."""
-    curves = [p.name for p in settings.parameters() if p.kind == "curve"]
-    assert not curves, f"{settings.section}: {', '.join(curves)}"
+    """A curve has no place in a struct: whoever needs one evaluates it into a texture. Nor has the
+    name of a mask."""
+    others = [p.name for p in settings.parameters() if p.kind in ("curve", "mask")]
+    assert not others, f"{settings.section}: {', '.join(others)}"
 
 
 def _scalar(parameter: Parameter, value: float | bool | str) -> float | np.int32:

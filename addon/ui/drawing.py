@@ -12,6 +12,8 @@ from ..params import Parameter
 #: Draws one section of the panels of a groom.
 type Draw = Callable[[bpy.types.UILayout, bpy.types.Object], None]
 
+#: How much of its row a slider has that a mask stands beside.
+_BESIDE_MASK = 0.65
 #: positions of a curve's five values
 _PLACES = ("Root", "Quarter", "Middle", "Three Quarters", "Tip")
 
@@ -31,16 +33,22 @@ def draw_section(
         leave_out: parameters that are drawn elsewhere, such as in the header.
     """
     group, column = getattr(sections, section), layout.column()
+    masks = {each.of: each for each in group.settings.parameters() if each.kind == "mask"}
     for parameter in group.settings.parameters():
         is_shown = parameter.shown_when is None or parameter.shown_when(sections)
-        if parameter.panel != panel or parameter.name in leave_out or not is_shown:
+        is_elsewhere = parameter.name in leave_out or parameter.kind == "mask"
+        if parameter.panel != panel or is_elsewhere or not is_shown:
             continue
         own = column.column()
         own.active = parameter.active_when is None or parameter.active_when(sections)
         if parameter.kind == "curve":
             _draw_curve(own, group, parameter)
-        else:
-            own.prop(group, parameter.name, slider=parameter.kind in {"number", "integer"})
+            continue
+        if parameter.name in masks:
+            own = own.split(factor=_BESIDE_MASK, align=True)
+        own.prop(group, parameter.name, slider=parameter.kind in {"number", "integer"})
+        if parameter.name in masks:
+            own.prop(group, masks[parameter.name].name, text="", icon="GROUP_VERTEX")
 
 
 def _draw_curve(layout: bpy.types.UILayout, group: Any, parameter: Parameter) -> None:

@@ -14,6 +14,7 @@ import numpy as np
 from ...arrays import Floats, Ints
 from ...dynamics.settings import DynamicsSettings
 from ...groom.children_settings import ChildrenSettings
+from ...groom.masks import mask_names
 from ...groom.settings import GuideSettings
 from ...groom.width_settings import WidthSettings
 from ...pipeline import Pose
@@ -46,6 +47,10 @@ def groom_rig_hash(
         grown["children"] = (
             settings[ChildrenSettings],
             _weights_before_modifiers(head, settings.children_density),
+            *(
+                _weights_before_modifiers(head, name)
+                for name in mask_names(settings[ChildrenSettings]).values()
+            ),
         )
     lines = _parting_shapes(hair)
     if lines:

@@ -112,7 +112,8 @@ class _ReadStrands:
         source, strands = self.source, self.source.strands
         head = None if source.head is None else source.head.positions
         hair = strands.points, strands.offsets, strands.radius, strands.group
-        return *hair, head, source.density, source.partings, self.name, self.settings
+        painted = source.density, source.masks
+        return *hair, head, *painted, source.partings, self.name, self.settings
 
 
 def read_occluders(

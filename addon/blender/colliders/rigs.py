@@ -35,6 +35,7 @@ def rig_from(
         place=place,
         children=settings[ChildrenSettings],
         density=source.density,
+        masks=source.masks,
         widths=settings[WidthSettings].method,
         holders=source.holders,
         partings=source.partings,

@@ -14,6 +14,7 @@ from ... import pipeline
 from ...arrays import Floats
 from ...errors import HairloomError
 from ...groom.children_settings import ChildrenSettings
+from ...groom.masks import NO_MASKS, Masks, mask_names
 from ...groom.settings import GrowSettings, GuideSettings
 from ...groom.width_settings import WidthSettings
 from ...params import SettingsMap
@@ -24,6 +25,7 @@ from ..base.report import Report
 from ..colliders.fields import solid_of
 from ..pictures.studio import Studio
 from ..properties.groom_settings import GroomSettings
+from ..scene.source import masks_on
 from ..sessions.prepared_groom import prepared
 from .inputs import Inputs, Sources, head_of_sources, look_of_head, read_inputs
 
@@ -63,6 +65,7 @@ def read_rig(job: Job) -> tuple[Rig, Inputs]:
             place=inputs.groom_name,
             children=job.settings[ChildrenSettings],
             density=inputs.density,
+            masks=read_job_masks(job, inputs),
             partings=inputs.partings,
             widths=job.settings[WidthSettings].method,
             head_field=lambda: solid_of(inputs.head),
@@ -72,6 +75,28 @@ def read_rig(job: Job) -> tuple[Rig, Inputs]:
         print(f"{line}.", flush=True)
     tell_rig(report, rig, inputs.groom_name)
     return rig, inputs
+
+
+def read_job_masks(job: Job, inputs: Inputs) -> Masks:
+    """Those that the settings name on the head.
+
+    Raises:
+        HairloomError: one of them is not there, or cannot be used.
+    """
+    settings = job.settings[ChildrenSettings]
+    head = bpy.data.objects.get(inputs.head_object or "")
+    names = sorted(mask_names(settings).values())
+    if not names:
+        return NO_MASKS
+    if head is None:
+        raise HairloomError(
+            f"there is no mesh of the scene that could have the mask '{names[0]}'",
+            place=inputs.groom_name,
+            remedy="Name a head of the scene with --head, or set no mask",
+        )
+    masks, warnings = masks_on(head, settings, bpy.context.evaluated_depsgraph_get())
+    tell_notes(list(warnings), job.report)
+    return masks
 
 
 def tell_rig(report: Report, rig: Rig, name: str) -> None:

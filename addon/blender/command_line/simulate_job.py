@@ -14,6 +14,8 @@ import numpy as np
 
 from ...arrays import Floats
 from ...errors import HairloomError
+from ...groom.children_settings import ChildrenSettings
+from ...groom.masks import mask_names
 from ...strands import Surface
 from ..bakes.guide_motion import BakedGuides
 from ..base.attributes import set_attribute
@@ -24,7 +26,7 @@ from ..scene.partings import copy_partings
 from .bake_job import write_bake
 from .inputs import Inputs
 from .job_options import add_motion_options
-from .job_steps import Job, finish, read_hair
+from .job_steps import Job, finish, read_hair, read_job_masks
 from .object_settings import is_groom, put_map
 from .verb import Verb
 
@@ -100,6 +102,10 @@ def _scene_of(job: Job, inputs: Inputs) -> Iterator[bpy.types.Object]:
         if inputs.density is not None:
             set_attribute(head.data, _DENSITY, "POINT", inputs.density)
             hair.hairloom.children_density = _DENSITY
+        masks = read_job_masks(job, inputs)
+        names = mask_names(job.settings[ChildrenSettings])
+        for of, weights in masks.weights.items():
+            set_attribute(head.data, names[of], "POINT", weights)
         if named is not None and is_groom(named):
             copy_holders(named, hair, head, scene, depsgraph)
             copy_partings(named, hair, head, scene, depsgraph)

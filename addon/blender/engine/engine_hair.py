@@ -247,6 +247,7 @@ def _of_curves(
         source.strands.color,
         None if source.head is None else source.head.positions,
         source.density,
+        source.masks,
         settings.of_rig,
         settings[AmbientSettings],
     )

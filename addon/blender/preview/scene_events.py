@@ -14,6 +14,8 @@ from functools import partial
 
 import bpy
 
+from ...groom.children_settings import ChildrenSettings
+from ...groom.masks import mask_names
 from ..bakes import playback
 from ..base import latest_job
 from ..base.originals import refresh_views
@@ -252,7 +254,9 @@ def is_edited(session: Session, edited: set[int]) -> bool:
 
 def weights_changed(session: Session, edited: set[int]) -> bool:
     """Whether the head's own mesh changed, and with it maybe the weights that children grow by."""
-    if session.head is None or not session.settings.children_density:
+    settings = session.settings
+    is_painted = settings.children_density or mask_names(settings[ChildrenSettings])
+    if session.head is None or not is_painted:
         return False
     head = session.head.handle.find()
     return head is not None and head.data.session_uid in edited

@@ -9,13 +9,17 @@ from bpy.props import BoolProperty, EnumProperty, IntProperty, PointerProperty, 
 
 from ...parameters import ALL_SETTINGS, sections_of
 from ...params import Owner
-from ..base.objects import head_of
 from ..base.redraw import redraw_views
-from ..base.vertex_weights import weight_names
 from . import changed
 from .bake_group import HAIRLOOM_PG_bake
 from .card_group import HAIRLOOM_PG_card_images, HAIRLOOM_PG_card_object
-from .properties import OVERRIDABLE, property_annotations, property_group
+from .properties import (
+    OVERRIDABLE,
+    property_annotations,
+    property_group,
+    weights_meant,
+    weights_of_surface,
+)
 
 #: Shapes that the artist can choose from; "automatic" is what an object looks like.
 COLLIDER_SHAPES = (
@@ -74,25 +78,9 @@ def _is_mesh(_group: Any, obj: bpy.types.Object) -> bool:
     return obj.type == "MESH"
 
 
-def _weights(group: Any, _context: bpy.types.Context, typed: str) -> list[str]:
-    """The weights on the surface of this hair, by which it and its children may grow."""
-    owner, head = group.id_data, None
-    if isinstance(owner, bpy.types.Curves):
-        head = owner.surface
-    elif owner.type == "CURVES":
-        head = head_of(owner)
-    return _weights_of(head, typed)
-
-
 def _tip_groups(group: Any, _context: bpy.types.Context, typed: str) -> list[str]:
     """Where the mesh that holds tips may hold them."""
-    return _weights_of(group.tip_surface, typed)
-
-
-def _weights_of(obj: bpy.types.Object | None, typed: str) -> list[str]:
-    """The weights of a mesh that what was typed may mean."""
-    names = [] if obj is None or obj.type != "MESH" else weight_names(obj)
-    return [name for name in names if typed.lower() in name.lower()]
+    return weights_meant(group.tip_surface, typed)
 
 
 def _grow_changed(group: Any, _context: bpy.types.Context) -> None:
@@ -115,7 +103,7 @@ SECTION_GROUPS["grow"].__annotations__ |= {
         name="Density",
         description="Vertex group or float attribute on points of the surface that sets how "
         "densely hair grows. If empty, combed hair grows on the scalp, other hair everywhere",
-        search=_weights,
+        search=weights_of_surface,
         options=set(),
         update=_grow_changed,
     ),
@@ -123,7 +111,7 @@ SECTION_GROUPS["grow"].__annotations__ |= {
         name="Length Factor",
         description="Vertex group or float attribute on points of the surface that the length is "
         "multiplied by. If empty, all hair has the same length",
-        search=_weights,
+        search=weights_of_surface,
         options=set(),
         update=_grow_changed,
     ),
@@ -231,7 +219,7 @@ class HAIRLOOM_PG_character(bpy.types.PropertyGroup):
             name="Density",
             description="Vertex group or float attribute on points of the surface that says how "
             "densely children grow; empty: wherever guides are near",
-            search=_weights,
+            search=weights_of_surface,
             update=lambda self, _context: changed.settings(self.id_data),
             override=OVERRIDABLE,
         ),

@@ -7,10 +7,19 @@ from typing import Any
 
 import bpy
 import numpy as np
-from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProperty, IntProperty
+from bpy.props import (
+    BoolProperty,
+    EnumProperty,
+    FloatProperty,
+    FloatVectorProperty,
+    IntProperty,
+    StringProperty,
+)
 
 from ...params import Parameter, Settings
 from ...params.curve import PLACES
+from ..base.objects import head_of
+from ..base.vertex_weights import weight_names
 
 type Changed = Callable[[bpy.types.ID], None]
 
@@ -72,6 +81,22 @@ def settings_of[S: Settings](group: Any, settings: type[S]) -> S:
     )
 
 
+def weights_of_surface(group: Any, _context: bpy.types.Context, typed: str) -> list[str]:
+    """The weights on the surface of this hair, by which it and its children may grow."""
+    owner, head = group.id_data, None
+    if isinstance(owner, bpy.types.Curves):
+        head = owner.surface
+    elif owner.type == "CURVES":
+        head = head_of(owner)
+    return weights_meant(head, typed)
+
+
+def weights_meant(obj: bpy.types.Object | None, typed: str) -> list[str]:
+    """The weights of a mesh that what was typed may mean."""
+    names = [] if obj is None or obj.type != "MESH" else weight_names(obj)
+    return [name for name in names if typed.lower() in name.lower()]
+
+
 def _property(parameter: Parameter, changed: Changed | None, is_animated: bool) -> Any:
     common: dict[str, Any] = {
         "name": parameter.label,
@@ -85,6 +110,8 @@ def _property(parameter: Parameter, changed: Changed | None, is_animated: bool) 
         return BoolProperty(**common)
     if parameter.kind == "choice":
         return EnumProperty(items=parameter.choices, **common)
+    if parameter.kind == "mask":
+        return StringProperty(search=weights_of_surface, **common | {"options": set()})
     common |= _ranges(parameter)
     if parameter.kind == "integer":
         return IntProperty(**common)

@@ -9,12 +9,15 @@ import numpy as np
 
 from ...arrays import Floats, Ints
 from ...errors import HairloomError
+from ...groom.children_settings import ChildrenSettings
+from ...groom.masks import NO_MASKS, Masks, mask_names
 from ...groom.ties import NO_HOLDERS, Holders
 from ...strands import StrandSet, Surface
 from ...strands.clean import Cleaned
 from ...strands.colors import color_notes
 from ..base.objects import head_of
 from ..base.vertex_weights import read_weights
+from ..properties.properties import settings_of
 from .curves import read_curves
 from .partings import read_partings
 from .surfaces import read_surface
@@ -30,7 +33,8 @@ class Source:
     dropped: reason -> number of curves that cannot be used.
     kept: (strand_count,) indices of the curves that became strands.
     density: (vertex_count,) how densely children grow on the head, or None.
-    head_warning, density_warning: a warning with its remedy, or empty.
+    masks: what is painted on the head of the settings of children.
+    head_warning, density_warning: a warning with its remedy, or empty. mask_warnings: such.
     color_warnings: about strands without a colour.
     holders: what holds it beside its roots, at rest.
     partings: the straight pieces of its partings, (n, 2, 3) [m] world space; None: there are none.
@@ -42,8 +46,10 @@ class Source:
     kept: Ints
     head: Surface | None
     density: Floats | None = None
+    masks: Masks = NO_MASKS
     head_warning: str = ""
     density_warning: str = ""
+    mask_warnings: tuple[str, ...] = ()
     color_warnings: tuple[str, ...] = ()
     holders: Holders = NO_HOLDERS
     partings: Floats | None = None
@@ -54,6 +60,7 @@ class Source:
         found = (
             self.head_warning,
             self.density_warning,
+            *self.mask_warnings,
             *self.color_warnings,
             *self.parting_warnings,
         )
@@ -69,6 +76,7 @@ def read_source(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Sourc
     read = usable_curves(hair, depsgraph)
     head, head_warning = _read_head(hair, depsgraph)
     density, density_warning = read_density(hair, head, depsgraph)
+    masks, mask_warnings = read_masks(hair, head, depsgraph)
     partings, parting_warnings = read_partings(hair, depsgraph)
     return Source(
         read.strands,
@@ -76,8 +84,10 @@ def read_source(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Sourc
         read.kept,
         head,
         density,
+        masks,
         head_warning,
         density_warning,
+        mask_warnings,
         color_notes(hair.name, read.strands),
         partings=partings if len(partings) else None,
         parting_warnings=parting_warnings,
@@ -112,6 +122,40 @@ def wanted_density(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Fl
         place=head.name,
         remedy="Paint where children should grow, or clear their Density field",
     )
+
+
+def read_masks(
+    hair: bpy.types.Object, head: Surface | None, depsgraph: bpy.types.Depsgraph
+) -> tuple[Masks, tuple[str, ...]]:
+    """The masks of its children; one that cannot be used acts nowhere, with a warning."""
+    surface, settings = head_of(hair), settings_of(hair.data.hairloom.children, ChildrenSettings)
+    if head is None or surface is None:
+        return NO_MASKS, ()
+    return masks_on(surface, settings, depsgraph)
+
+
+def masks_on(
+    head: bpy.types.Object, settings: ChildrenSettings, depsgraph: bpy.types.Depsgraph
+) -> tuple[Masks, tuple[str, ...]]:
+    """The masks that settings name on a mesh; see `read_masks`."""
+    weights, warnings = {}, []
+    for of, name in mask_names(settings).items():
+        try:
+            weights[of] = _mask(head, depsgraph, name)
+        except HairloomError as error:
+            warnings.append(str(error))
+    return Masks(weights), tuple(warnings)
+
+
+def _mask(head: bpy.types.Object, depsgraph: bpy.types.Depsgraph, name: str) -> Floats:
+    weights = read_weights(head, depsgraph, name)
+    if not np.isfinite(weights).all():
+        raise HairloomError(
+            f"the mask '{name}' has values that are not finite numbers, so it is not used",
+            place=head.name,
+            remedy="Paint or compute it again, or clear its field",
+        )
+    return np.maximum(weights, 0.0)
 
 
 def own_dynamics(hair: bpy.types.Object) -> list[bpy.types.Modifier]:

@@ -25,7 +25,7 @@ from ..colliders.ties import Holding
 from ..properties.groom_settings import GroomSettings
 from ..scene.partings import is_same_state, parting_state, read_partings
 from ..scene.poses import check_finite, read_pose
-from ..scene.source import read_density, read_source, usable_curves
+from ..scene.source import read_density, read_masks, read_source, usable_curves
 from .prepared_groom import BuildRequest, rig_of
 
 #: Points that lie nearer than this to where they were have not moved, as a part of how far they are
@@ -37,7 +37,7 @@ class GroomSource:
     """One groom as it was read.
 
     source, settings: of the hair that is shown.
-    painted_density: as it was read last; None: children grow wherever guides are near.
+    painted: by which density children grow, and which masks shape them, as it was read last.
     request: what was read last, from which hair is being made unless it is shown already.
 
     Args:
@@ -52,7 +52,8 @@ class GroomSource:
         self.hair = Body.at_rest(hair, depsgraph)
         self._holding = Holding.of(hair, depsgraph)
         self.source = replace(read_source(hair, depsgraph), holders=self._holding.holders)
-        self._combed, self.painted_density = self.source.strands, self.source.density
+        self._combed = self.source.strands
+        self.painted = self.source.density, self.source.masks
         uses_head = self.source.head is not None and head is not None
         self.head = Body.at_rest(head, depsgraph) if uses_head else None
         self._head_uid = head and head.session_uid
@@ -142,6 +143,7 @@ class GroomSource:
         if _same(strands, before.strands, back):
             strands = before.strands
         density, warning = read_density(hair, before.head, depsgraph)
+        masks, mask_warnings = read_masks(hair, before.head, depsgraph)
         holding = Holding.of(hair, depsgraph, known.holding, back)
         partings, parting_warnings = before.partings, before.parting_warnings
         if self.has_other_partings():
@@ -156,6 +158,8 @@ class GroomSource:
             dropped=read.dropped,
             density=density,
             density_warning=warning,
+            masks=masks,
+            mask_warnings=mask_warnings,
             color_warnings=color_notes(hair.name, strands),
             partings=partings,
             parting_warnings=parting_warnings,
@@ -170,6 +174,7 @@ class GroomSource:
                 self.source,
                 dropped=read.dropped,
                 density_warning=warning,
+                mask_warnings=mask_warnings,
                 parting_warnings=parting_warnings,
             )
             return None
@@ -206,21 +211,26 @@ class GroomSource:
         self._combed = strands
         return strands.take(number), number
 
-    def has_other_density(self, depsgraph: bpy.types.Depsgraph) -> bool:
-        """Whether children are to grow by another density than when this was last asked for, or
-        since other hair was accepted.
+    def has_other_paint(self, depsgraph: bpy.types.Depsgraph) -> bool:
+        """Whether children are to grow by another density or by other masks than when this was last
+        asked for, or since other hair was accepted.
 
         Raises:
             HairloomError: the hair is gone.
         """
-        before = self.painted_density
-        self.painted_density, _ = read_density(self.hair.found(), self.source.head, depsgraph)
-        return not np.array_equal(before, self.painted_density)  # type: ignore[arg-type]
+        hair, head, (density, masks) = self.hair.found(), self.source.head, self.painted
+        self.painted = (
+            read_density(hair, head, depsgraph)[0],
+            read_masks(hair, head, depsgraph)[0],
+        )
+        is_same = np.array_equal(density, self.painted[0])  # type: ignore[arg-type]
+        return not (is_same and masks == self.painted[1])
 
     def accept(self, request: BuildRequest) -> None:
         """Its hair is shown from now on; what acts at once is as it is set now."""
         self.source, self._holding = request.source, request.holding
-        self._combed, self.painted_density = self.source.strands, self.source.density
+        self._combed = self.source.strands
+        self.painted = self.source.density, self.source.masks
         self.settings = GroomSettings.of(self.hair.found()).at_once(request.settings)
 
     def take_settings(self) -> bool:

@@ -64,6 +64,7 @@ class BuildRequest:
             and one.strands is two.strands
             and one.head is two.head
             and np.array_equal(one.density, two.density)  # type: ignore[arg-type]
+            and one.masks == two.masks
             and one.holders == two.holders
             and np.array_equal(one.partings, two.partings)  # type: ignore[arg-type]
         )

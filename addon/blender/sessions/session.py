@@ -295,17 +295,17 @@ class Session:
         self._show()
 
     def paint(self, depsgraph: bpy.types.Depsgraph) -> None:
-        """Have children at rest follow a density that a brush has painted, as far as that is done
-        at once; `read_again` is to come. Hair that is held, and that of bakes, waits for it.
+        """Have children at rest follow what a brush has painted, as far as that is done at once;
+        `read_again` is to come. Hair that is held, and that of bakes, waits for it.
 
         Raises:
             HairloomError: as `rest`.
         """
         if self.is_playing or self.rig.grown is None or self.rig.holds is not None:
             return
-        if not self._source.has_other_density(depsgraph):
+        if not self._source.has_other_paint(depsgraph):
             return
-        self.groom = replace(self.groom, rig=painted(self.rig, self._source.painted_density))
+        self.groom = replace(self.groom, rig=painted(self.rig, *self._source.painted))
         self.solver = NumpySolver.at_rest(self.rig, self._pose(depsgraph))
         self._show()
 
