@@ -13,6 +13,8 @@ from .children_settings import ChildrenSettings
 
 #: parameter that may be painted -> the one that names its mask
 MASKS = {each.of: each.name for each in ChildrenSettings.parameters() if each.kind == "mask"}
+#: parameter -> its label
+LABELS = {each.name: each.label for each in ChildrenSettings.parameters()}
 
 
 @dataclass(frozen=True, eq=False)

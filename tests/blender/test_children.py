@@ -10,9 +10,12 @@ from grids import baked_grid, grid_of
 
 from hairloom.addon import pipeline
 from hairloom.addon.blender.bakes import playback
+from hairloom.addon.blender.bakes.groom_hashes import groom_rig_hash
+from hairloom.addon.blender.bakes.simulated import differences
 from hairloom.addon.blender.command_line import command_line
 from hairloom.addon.blender.preview import previews, scene_events
 from hairloom.addon.blender.preview.bake import Bake
+from hairloom.addon.blender.properties.groom_settings import GroomSettings
 from hairloom.addon.blender.strands.strand_export import StrandExport
 from hairloom.addon.blender.viewport import overlay
 from hairloom.addon.errors import HairloomError
@@ -183,6 +186,96 @@ def test_weights_that_cannot_be_used_are_said(hair, sphere, evaluated):
     hair.hairloom.children_density = "Broken"
     catch_up(evaluated)
     assert "'Broken'" in session.warnings[0] and session.rig.strands.strand_count == 260
+
+
+def tips(session):
+    """Of the children, by their roots."""
+    rig = session.rig
+    each = np.split(rig.strands.points, rig.strands.offsets[1:-1])[rig.own_count :]
+    return {strand[0].tobytes(): strand for strand in each}
+
+
+@pytest.mark.parametrize("kind", ["group", "attribute"])
+def test_a_mask_shapes_the_children_where_it_is_painted(hair, sphere, evaluated, kind):
+    children = hair.data.hairloom.children
+    children.frizz = 0.05
+    session = previews.start(hair, evaluated())
+    before = tips(session)
+    if kind == "group":
+        upper_half(sphere, "Top")
+    else:
+        top = sphere.data.attributes.new("Top", "FLOAT", "POINT")
+        top.data.foreach_set("value", [float(v.co.z > 0.0) for v in sphere.data.vertices])
+    children.frizz_mask = "Top"
+    catch_up(evaluated)
+    after = tips(session)
+    assert session.warnings == () and after.keys() == before.keys()
+    children.frizz_mask, children.frizz = "", 0.0
+    catch_up(evaluated)
+    smooth = tips(session)
+    for root, strand in after.items():
+        if strand[0, 2] > 0.03:
+            np.testing.assert_array_equal(strand, before[root])
+        if strand[0, 2] < -0.03:
+            np.testing.assert_array_equal(strand, smooth[root])
+            assert not np.array_equal(strand, before[root])
+
+
+def test_a_brush_on_a_mask_is_followed_with_the_update(hair, sphere, evaluated):
+    children = hair.data.hairloom.children
+    children.length_variation = 0.0
+    group = upper_half(sphere, "Top")
+    children.length_mask = "Top"
+    session = previews.start(hair, evaluated())
+    own, lengths = session.rig.own_count, session.rig.strands.lengths()
+    group.add([v.index for v in sphere.data.vertices], 0.5, "REPLACE")
+    sphere.data.update_tag()
+    bpy.context.view_layer.update()
+    at_once = session.rig.strands.lengths()[own:]
+    assert session.is_stale and not np.allclose(at_once, lengths[own:])
+    catch_up(evaluated)
+    assert session.rig.strands.lengths()[own:] == pytest.approx(at_once, rel=1e-3)
+
+
+def test_masks_that_cannot_be_used_are_said_and_act_nowhere(hair, sphere, evaluated):
+    children = hair.data.hairloom.children
+    session = previews.start(hair, evaluated())
+    before = session.rig.strands.points
+    broken = sphere.data.attributes.new("Broken", "FLOAT", "POINT")
+    broken.data[0].value = float("nan")
+    sphere.data.attributes.new("Colour", "FLOAT_COLOR", "POINT")
+    sphere.vertex_groups.new(name="Nowhere")
+    for name, said in (
+        ("Gone", "neither a vertex group nor an attribute"),
+        ("Broken", "not finite"),
+        ("Colour", "FLOAT_COLOR on POINT"),
+    ):
+        children.frizz_mask = name
+        catch_up(evaluated)
+        (warning,) = session.warnings
+        assert warning.startswith("Head: ") and f"'{name}'" in warning and said in warning
+        np.testing.assert_array_equal(session.rig.strands.points, before)
+    children.frizz_mask = "Nowhere"
+    catch_up(evaluated)
+    (warning,) = session.warnings
+    assert "'Nowhere' is 0 everywhere, and so is Frizz" in warning
+    assert not np.array_equal(session.rig.strands.points, before)
+    children.frizz_mask = ""
+    catch_up(evaluated)
+    assert session.warnings == ()
+    np.testing.assert_array_equal(session.rig.strands.points, before)
+
+
+def test_a_bake_is_stale_once_a_mask_is_painted(hair, sphere):
+    group = upper_half(sphere, "Top")
+    settings = GroomSettings.of(hair)
+    hair.data.hairloom.children.clump_mask = "Top"
+    named = GroomSettings.of(hair)
+    hashes = [groom_rig_hash(hair, sphere, each, bpy.context.scene) for each in (settings, named)]
+    group.add([0, 1, 2], 0.3, "REPLACE")
+    hashes.append(groom_rig_hash(hair, sphere, named, bpy.context.scene))
+    assert len(set(hashes)) == 3
+    assert differences(hashes[1], hashes[2]) == ("children",)
 
 
 def test_an_unknown_density_is_said_and_a_bake_refuses_it(hair, sphere, evaluated):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import bpy
 import numpy as np
@@ -10,7 +10,7 @@ import numpy as np
 from ...arrays import Floats, Ints
 from ...errors import HairloomError
 from ...groom.children_settings import ChildrenSettings
-from ...groom.masks import NO_MASKS, Masks, mask_names
+from ...groom.masks import LABELS, NO_MASKS, Masks, mask_names
 from ...groom.ties import NO_HOLDERS, Holders
 from ...strands import StrandSet, Surface
 from ...strands.clean import Cleaned
@@ -46,7 +46,7 @@ class Source:
     kept: Ints
     head: Surface | None
     density: Floats | None = None
-    masks: Masks = NO_MASKS
+    masks: Masks = field(default_factory=Masks)
     head_warning: str = ""
     density_warning: str = ""
     mask_warnings: tuple[str, ...] = ()
@@ -144,6 +144,12 @@ def masks_on(
             weights[of] = _mask(head, depsgraph, name)
         except HairloomError as error:
             warnings.append(str(error))
+            continue
+        if not (weights[of] > 0.0).any():
+            warnings.append(
+                f"{head.name}: the mask '{name}' is 0 everywhere, and so is {LABELS[of]}. Paint it"
+                " (Weight Paint), or clear its field"
+            )
     return Masks(weights), tuple(warnings)
 
 
