@@ -3,7 +3,7 @@ for bit."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -14,6 +14,7 @@ from tiers import few_in_commits
 from hairloom.addon import pipeline
 from hairloom.addon.dynamics.colliders import DistanceField
 from hairloom.addon.groom.children_settings import ChildrenSettings
+from hairloom.addon.groom.masks import Masks
 from hairloom.addon.groom.settings import GuideSettings
 from hairloom.addon.strands import StrandSet, Surface
 from hairloom.addon.strands.kept import Kept
@@ -38,6 +39,10 @@ def same(one: Any, other: Any, where: str = "rig") -> None:
         np.testing.assert_array_equal(one, other, where)
     elif isinstance(one, Surface):
         assert one is other, where
+    elif isinstance(one, Mapping):
+        assert one.keys() == other.keys(), where
+        for name in one:
+            same(one[name], other[name], f"{where}.{name}")
     elif hasattr(one, "__dataclass_fields__"):
         for name in one.__dataclass_fields__:
             same(getattr(one, name), getattr(other, name), f"{where}.{name}")
@@ -82,6 +87,7 @@ def test_it_is_what_is_made_from_nothing(
             place="a wig",
             children=settings,
             density=density,
+            masks=Masks({"frizz": density, "length": density, "clump": density}),
             widths="found",
             head_field=lambda: field,
             **kept,
