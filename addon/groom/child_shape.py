@@ -162,7 +162,9 @@ def curl_points(longest: float, settings: ChildrenSettings, size: float) -> int:
     return _POINTS_PER_TURN * math.ceil(turns) + 1
 
 
-def curled(grid: Floats, lock: Ints, settings: ChildrenSettings, size: float, count: int) -> Floats:
+def curled(
+    grid: Floats, lock: Ints, settings: ChildrenSettings, size: float, count: int, painted: Floats
+) -> Floats:
     """Strands that wind around their paths as helices, of `count` points each; roots stay.
 
     The point at arc length s of the path goes aside by r (cos a e1 + sin a e2), a = 2 pi s / length
@@ -175,6 +177,7 @@ def curled(grid: Floats, lock: Ints, settings: ChildrenSettings, size: float, co
         lock: (child_count,) what is random about the curls of each depends on: those of one number
             wind alike.
         size: the median length of the guides [m], in which curls are given.
+        painted: (child_count,) by which the radius is multiplied.
     """
     result = np.empty((len(grid), count, 3), np.float32)
     radius = settings.curl * size * along(settings.curl_along, np.linspace(0.0, 1.0, count))
@@ -195,7 +198,7 @@ def curled(grid: Floats, lock: Ints, settings: ChildrenSettings, size: float, co
         turn = np.maximum(settings.curl_length * size, shortest)
         angle = _TURN * np.divide(reached, turn, out=np.zeros_like(reached), where=turn > 0.0)
         half = np.maximum(angle[:, -1:] / (2 * (count - 1)), 1.0e-9)
-        wide = radius * half / np.sin(half)
+        wide = painted[chunk, None] * radius * half / np.sin(half)
         aside = (wide * np.cos(angle))[..., None] * across
         aside += (wide * np.sin(angle))[..., None] * np.cross(tangent, across)
         result[chunk] = path + aside

@@ -86,7 +86,7 @@ class Growth:
         stray(grid, key, settings)
         if settings.curl:
             lock = self.key[self.clumps.outermost()[chosen]]
-            grid = curled(grid, lock, settings, self.size, self.cv_count)
+            grid = curled(grid, lock, settings, self.size, self.cv_count, factors["curl"])
         frizz(grid, key, settings, self.size, factors["frizz"])
         return grid
 

@@ -156,6 +156,7 @@ class ChildrenSettings(Settings):
         hard=(0.0, 1.0),
         shown_when=when("children.method", "multi", "single"),
     )
+    curl_mask: str = mask("curl", label="Curl Mask")
     curl_length: float = number(
         0.12,
         label="Curl Length",

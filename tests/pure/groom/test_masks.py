@@ -8,6 +8,7 @@ from small_wig import GUIDES, curves, sheet
 
 from hairloom.addon import pipeline
 from hairloom.addon.arrays import Floats
+from hairloom.addon.groom.children import make_children
 from hairloom.addon.groom.children_settings import ChildrenSettings
 from hairloom.addon.groom.masks import MASKS, NO_MASKS, Masks, mask_names
 from hairloom.addon.paint_flow import painted
@@ -25,6 +26,8 @@ BOLD = ChildrenSettings(
     length=0.6,
     length_variation=0.0,
 )
+#: those that shape what has no curls, and so keep their point counts
+STRAIGHT = [name for name in MASKS if name != "curl"]
 #: what each setting is without its effect
 WITHOUT = {"clump": 0.0, "frizz": 0.0}
 
@@ -42,7 +45,7 @@ def children(rig: pipeline.Rig) -> Floats:
 
 
 def test_all_that_may_be_painted_is_declared() -> None:
-    assert MASKS == {"length": "length_mask", "clump": "clump_mask", "frizz": "frizz_mask"}
+    assert {name: f"{name}_mask" for name in ("length", "clump", "curl", "frizz")} == MASKS
     named = ChildrenSettings(method="multi", clump_mask="Crown", frizz_mask="")
     assert mask_names(named) == {"clump": "Crown"}
     assert mask_names(ChildrenSettings(method="auto", clump_mask="Crown")) == {}
@@ -63,6 +66,31 @@ def test_a_mask_of_zero_is_the_setting_at_zero_bit_by_bit(name: str) -> None:
     assert not np.array_equal(children(masked), children(rig_of(BOLD)))
 
 
+def test_curls_are_multiplied() -> None:
+    """Around straight paths: the radius is how far points are from them."""
+    guides = rig_of(BOLD).grown.shapes
+    smooth = BOLD.from_dict(BOLD.as_dict() | {"frizz": 0.0, "curl": 0.02, "length": 1.0}, "test")
+
+    def aside(weights: Floats) -> Floats:
+        made = make_children(guides, HEAD, smooth, masks=Masks({"curl": weights}), place="test")
+        grid = made.strands.grid
+        again = made.growth.shapes(guides.grid, np.arange(len(grid)))
+        np.testing.assert_allclose(again, grid, atol=1e-6, err_msg="as a brush shapes them")
+        grid = grid.astype(np.float64) - grid[:, :1]
+        chord = grid[:, -1:] / np.linalg.norm(grid[:, -1:], axis=2, keepdims=True)
+        return np.linalg.norm(np.cross(grid, chord), axis=2).max(axis=1)
+
+    whole, half = aside(ONES), aside(HALF)
+    plain = make_children(guides, HEAD, smooth, place="test").strands
+    masked = make_children(guides, HEAD, smooth, masks=Masks({"curl": ONES}), place="test").strands
+    np.testing.assert_array_equal(masked.points, plain.points)
+    x = plain.roots[:, 0]
+    assert whole.min() > 0.001
+    assert aside(0.5 * ONES) == pytest.approx(0.5 * whole, rel=0.15)
+    assert half[x < -0.02].max() < 1e-5
+    np.testing.assert_array_equal(half[x > 0.02], whole[x > 0.02])
+
+
 def test_lengths_are_multiplied() -> None:
     """Against the lengths of children that are not cut: a fraction of their own curve."""
     whole = rig_of(BOLD.from_dict(BOLD.as_dict() | {"length": 1.0, "frizz": 0.0}, "test"))
@@ -74,7 +102,7 @@ def test_lengths_are_multiplied() -> None:
     assert 0.0 < bare.strands.lengths()[60:].max() < 0.0003, "of 11 cm"
 
 
-@pytest.mark.parametrize("name", MASKS)
+@pytest.mark.parametrize("name", STRAIGHT)
 def test_half_a_mask_shapes_its_half_alone(name: str) -> None:
     masked = rig_of(BOLD, Masks({name: HALF}))
     none, whole = rig_of(BOLD, Masks({name: 0.0 * ONES})), rig_of(BOLD)
@@ -93,7 +121,7 @@ def test_a_strong_mask_draws_no_child_beyond_its_clump() -> None:
     assert np.isfinite(tips).all() and np.abs(tips).max() < 0.05
 
 
-@pytest.mark.parametrize("name", MASKS)
+@pytest.mark.parametrize("name", STRAIGHT)
 def test_a_brush_gives_what_a_rebuild_makes_and_shapes_no_others(name: str) -> None:
     """More children than one level of clumps has, so that some are drawn by some that are drawn."""
     many = BOLD.from_dict(BOLD.as_dict() | {"strand_count": 6000}, "test")
