@@ -19,6 +19,7 @@ from dataclasses import dataclass
 import bpy
 
 from ...errors import HairloomError
+from .redraw import redraw_panels
 from .thread_work import ThreadWork
 
 #: What is on its way is looked for this often [s], or where it waits for this thread.
@@ -105,6 +106,7 @@ class LatestJob[Key, Result]:
         self._name, self._arrived, self._is_same = name, arrived, is_same
         self._wanted: tuple[Key, Callable[[], Work[Result]]] | None = None
         self._running: _Running[Key, Result] | None = None
+        self._shown_stage = ""
 
     def want(self, key: Key, begin: Callable[[], Work[Result]]) -> None:
         """Have this made.
@@ -175,6 +177,9 @@ class LatestJob[Key, Result]:
     def _step(self) -> float | None:
         if self._running is not None and self._running.work.run_main_thread_steps():
             self._arrived()
+        if self.stage != self._shown_stage:
+            self._shown_stage = self.stage
+            redraw_panels()
         if self._running is None:
             return None
         return SERVING_PAUSE if self._running.work.wants_main_thread else ARRIVAL_TIME
