@@ -133,6 +133,7 @@ def _steps() -> tuple[Step, ...]:
     """What is done and how it is undone, in order."""
     return (
         *(_class_step(each) for each in CLASSES),
+        (preferences.register, preferences.unregister),
         (groups.register, groups.unregister),
         (engine_panels.register, engine_panels.unregister),
         (previews.register, previews.unregister),

@@ -10,12 +10,13 @@
 #include "lib_hair_light.glsl"
 
 #if MARSCHNER
-// The level at which a highlight does not flicker. In a fragment pixels beside say how much theta_h
-// changes; elsewhere `bend` does, by how much the tangent turns in a pixel.
+// The level at which a highlight does not flicker. Where a strand is shaded as it is drawn, pixels beside
+// say how much theta_h changes. Where it is SHADED_LATER these may show others; then `bend` does, by how
+// much the tangent turns in a pixel.
 float strand_level(
     vec3 tangent, vec3 bend, vec3 normal, vec3 to_light, vec3 to_eye, float shift_noise)
 {
-#  ifdef GPU_FRAGMENT_SHADER
+#  ifndef SHADED_LATER
   return pixel_level(longitudinal, tangent, normal, to_light, to_eye, shift_noise, shading);
 #  else
   // the derivative of theta = asin(t . w), which has no end where a ray runs along the strand

@@ -4,19 +4,7 @@
 // each of its texels, where drawing all strands a second time would cost as much as the map itself.
 // Maps stand above one another in it, what the last hair leaves to 1 on the right of where the first
 // one is. Depths are whole numbers, since only of these the least can be kept.
-#include "lib_strand_texel.glsl"
-#include "lib_opacity.glsl"
-
-// Texels of `starts` along one side of a map.
-int starts_side()
-{
-  return opacity.resolution / {{start_texels}};
-}
-
-bool is_ahead(vec3 point)
-{
-  return dot(opacity.map_w[light_index], vec4(point, 1.0)) > 0.0;
-}
+#include "lib_opacity_starts.glsl"
 
 void keep_first_and_last(vec3 place)
 {
@@ -39,14 +27,8 @@ void main()
   }
   vec3 root_side = texelFetch(cv_points, span_texel(span, max(at.x - 1, 0)), 0).xyz;
   vec3 tip_side = texelFetch(cv_points, span_texel(span, at.x), 0).xyz;
-  if (!is_ahead(root_side) || !is_ahead(tip_side)) {
-    return;  // it reaches behind the light
-  }
-  vec3 from = map_place(opacity, light_index, root_side);
-  vec3 to = map_place(opacity, light_index, tip_side);
-  vec2 texels = abs(to.xy - from.xy) * float(starts_side());
-  int count = clamp(int(ceil(2.0 * max(texels.x, texels.y))), 1, 2 * starts_side());
-  for (int i = 1; i <= count; i++) {
-    keep_first_and_last(mix(from, to, float(i) / float(count)));
+  StartSegment segment = start_segment(root_side, tip_side);
+  for (int i = 1; i <= segment.count; i++) {
+    keep_first_and_last(mix(segment.from, segment.to, float(i) / float(segment.count)));
   }
 }

@@ -1,6 +1,5 @@
-// Strands, fragment stage, opaque: each pixel shaded as it is drawn. HASHED: pixels of a strand are
-// left out by chance, as many as it does not cover. With a DEBUG view colours that show numbers, just
-// enough shaded that strands stay apart.
+// Strands, fragment stage, opaque: each pixel shaded as it is drawn. With a DEBUG view colours that show
+// numbers, just enough shaded that strands stay apart.
 #include "lib_kajiya_kay.glsl"
 #include "lib_strand_noise.glsl"
 #include "lib_output.glsl"
@@ -10,9 +9,6 @@
 #  include "lib_strand_texel.glsl"
 #else
 #  include "lib_strand_light.glsl"
-#endif
-#if HASHED
-#  include "lib_coverage.glsl"
 #endif
 
 #if DEBUG
@@ -58,16 +54,6 @@ void main()
 #  endif
   vec3 radiance = strand_radiance(
       strand_point, tangent, vec3(0.0), strand_radius, place.x, place.y, between, own, seed);
-#endif
-#if HASHED
-  // at the end, because derivatives want all pixels until then
-  ivec2 pixel = ivec2(gl_FragCoord.xy);
-  uint place_number = uint(pixel.x) + uint(pixel.y) * {{strand_rows}}u;
-  // another part in each sample of a picture
-  float chance = hash_unit(seed, place_number + uint(view.viewport.z) * 0x9e3779b9u);
-  if (chance >= strands.opacity * ribbon_coverage(ribbon * gl_FragCoord.w)) {
-    discard;
-  }
 #endif
   color = vec4(output_encoded(radiance, output_encoding), 1.0);
 }

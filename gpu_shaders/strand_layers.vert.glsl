@@ -1,4 +1,4 @@
-// Strands as layers, third step: one triangle over the whole target.
+// One triangle over the whole target: what shows strands as layers, and hashed ones.
 
 void main()
 {

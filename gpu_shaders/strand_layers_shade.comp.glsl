@@ -1,61 +1,7 @@
 // Strands as layers, third step: the nodes that are seen, one an invocation. What tells a node's
 // colour gives way to the colour itself: yzw, as floats' bits, times its fraction of the pixel's light.
-#include "lib_strand_geometry.glsl"
-#include "lib_strand_light.glsl"
+#include "lib_layer_radiance.glsl"
 #include "lib_layer_packing.glsl"
-
-// How much the tangent turns in a pixel, at a place of a segment.
-vec3 tangent_bend(vec3 before, vec3 from, vec3 to, vec3 after, float u, vec3 tangent)
-{
-  vec4 clip = view.view_projection * vec4(catmull_rom_point(before, from, to, after, u), 1.0);
-  vec4 moved = view.view_projection * vec4(tangent, 0.0);
-  vec2 slope = (moved.xy * clip.w - clip.xy * moved.w) * 0.5 * view.viewport.xy;
-  float metres = clip.w * clip.w / max(length(slope), 1.0e-20);
-  float segments = min(metres / max(distance(from, to), 1.0e-20), 1.0e3);
-  float ahead = clamp(segments, 1.0e-3, 1.0);
-  vec3 turned = catmull_rom_tangent(before, from, to, after, u + ahead) - tangent;
-  return turned * segments / ahead;
-}
-
-// `place` is 0 at the root's point and 1 at the tip's, and grows by as much from point to point.
-vec3 layer_radiance(int strand, float place)
-{
-  StrandSpan span = strand_span(strand_spans, strand);
-  int last = span.count - 1;
-  int segment = min(int(place * float(last)), last - 1);
-  float u = place * float(last) - float(segment);
-  ivec2 root_side = span_texel(span, segment), tip_side = span_texel(span, segment + 1);
-  vec4 from_cv = texelFetch(cv_points, root_side, 0), to_cv = texelFetch(cv_points, tip_side, 0);
-  vec3 from = from_cv.xyz, to = to_cv.xyz;
-  vec3 before = texelFetch(cv_points, span_texel(span, max(segment - 1, 0)), 0).xyz;
-  vec3 after = texelFetch(cv_points, span_texel(span, min(segment + 2, last)), 0).xyz;
-  before = segment == 0 ? 2.0 * from - to : before;
-  after = segment == last - 1 ? 2.0 * to - from : after;
-  vec2 from_look = texelFetch(cv_looks, root_side, 0).xy;
-  vec2 to_look = texelFetch(cv_looks, tip_side, 0).xy;
-  vec3 point = catmull_rom_point(before, from, to, after, u);
-  vec3 tangent = catmull_rom_tangent(before, from, to, after, u);
-  vec3 bend = vec3(0.0);
-#if MARSCHNER
-  bend = tangent_bend(before, from, to, after, u, tangent);
-#endif
-  float occlusion = mix(from_look.x, to_look.x, u);
-  float along = place;
-#if UNEVEN
-  along = mix(from_look.y, to_look.y, u);
-#endif
-  float radius = mix(from_cv.w, to_cv.w, u) * strands.fullness *
-                 mix(1.0, strands.tip_width, along);
-  vec4 between = vec4(0.0), own = vec4(0.0);
-#ifdef OTHER_TAU
-  between = mix(texelFetch(cv_other_tau, root_side, 0), texelFetch(cv_other_tau, tip_side, 0), u);
-#endif
-#ifdef OWN_COLOR
-  own = mix(texelFetch(cv_colors, root_side, 0), texelFetch(cv_colors, tip_side, 0), u);
-#endif
-  uint seed = uint(texelFetch(strand_seeds, strand_texel(strand, 0, 1), 0).x);
-  return strand_radiance(point, tangent, bend, radius, along, occlusion, between, own, seed);
-}
 
 void main()
 {

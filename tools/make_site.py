@@ -52,6 +52,7 @@ MENU = {
         "docs/dev/architecture",
         "docs/dev/development",
         "docs/dev/extending",
+        "docs/dev/gpu",
         "docs/dev/shading",
         "docs/dev/dynamics",
         "docs/dev/refinement",

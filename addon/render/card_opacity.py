@@ -11,23 +11,20 @@ from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import gpu
 import numpy as np
 
 from ..cards.card_mesh import CardMesh
 from ..exchange.cards.sidecar import MIN_ALPHA
 from ..shading.lights import kept_lights
 from ..shading.volume.light_frame import Ball, ball_around
-from ..shading.volume.map_size import START_TEXELS
-from . import gpu_objects
 from .card_snapshot import CardSnapshot
 from .card_textures import tiles_of
 from .feature_programs import UniformBlocks, bound
 from .opacity_maps import OpacityDrawing, OpacityMaps
+from .opacity_starts import draw_starts
 from .shader_feature import ShaderFeature
-from .shader_program import ShaderRecipe, program
+from .shader_program import ShaderRecipe
 from .snapshot import Snapshot
-from .textures import drawing_into, drawing_state
 
 _INPUTS = (("VEC3", "position"), ("VEC2", "uv"), ("VEC3", "tangent"))
 _VARYINGS = (
@@ -55,14 +52,6 @@ _DEPTH_RECIPE = ShaderRecipe(
     numbers=(("FLOAT", "min_alpha"),),
     inputs=_INPUTS,
     varyings=_VARYINGS,
-)
-
-_STARTS_RECIPE = ShaderRecipe(
-    name="opacity_card_starts",
-    compute="opacity_card_starts.comp.glsl",
-    textures=(("DEPTH_2D", "first_cards"), ("DEPTH_2D", "last_cards")),
-    images=(("R32UI", "starts", "READ_WRITE"),),
-    integers=("map_index",),
 )
 
 
@@ -97,28 +86,14 @@ class _Cards:
         self.batch.draw(shader.shader)
 
     def draw_starts(self, maps: OpacityMaps, number: int, place: ShaderFeature) -> None:
-        """Depths of the first and the last card, then the outermost of each block of texels."""
-        side = maps.size.side
-        depths = {
-            "first_cards": self._depths(side, place, "LESS_EQUAL", 1.0),
-            "last_cards": self._depths(side, place, "GREATER_EQUAL", 0.0),
-        }
-        shader = program(_STARTS_RECIPE)
-        shader.bind(textures=depths, images={"starts": maps.starts}, integers={"map_index": number})
-        groups = -(-side // START_TEXELS // 8)
-        gpu.compute.dispatch(shader.shader, groups, groups, 1)
-        gpu.shader.unbind()
+        """Depths of the first and the last card."""
 
-    def _depths(self, side: int, place: ShaderFeature, depth_test: str, none: float) -> Any:
-        """A texture with the depth of the one card in each texel that wins; `none` without any."""
-        depths = gpu_objects.texture((side, side), format="DEPTH_COMPONENT32F")
-        target = gpu_objects.framebuffer(depth_slot=depths)
-        with drawing_into(target), drawing_state(depth_test=depth_test):
-            target.clear(depth=none)
+        def draw() -> None:
             features, numbers = [place, self.feature], {"min_alpha": MIN_ALPHA}
             shader = bound(_DEPTH_RECIPE, features, self.blocks, numbers=numbers)
             self.batch.draw(shader.shader)
-        return depths
+
+        draw_starts(maps, number, maps.size.side, draw)
 
 
 class CardOpacity:

@@ -18,10 +18,13 @@ from ..params.glsl import struct_values
 from ..shading.lights import Light
 from ..shading.settings import StrandSettings
 from ..shading.volume.light_frame import Ball
+from ..shading.volume.map_size import START_TEXELS
 from ..shading.volume.settings import VolumeSettings
+from .capabilities import capabilities
 from .detail_classes import DetailClass, detail_classes
 from .feature_programs import UniformBlocks, bound
 from .opacity_maps import OpacityDrawing, OpacityMaps
+from .opacity_starts import draw_starts
 from .ribbons import Ribbons
 from .shader_feature import ShaderFeature
 from .shader_program import ShaderRecipe
@@ -41,6 +44,15 @@ _LAYERS_RECIPE = ShaderRecipe(
     varyings=(("smooth", "FLOAT", "strand_depth"), ("flat", "FLOAT", "strand_weight")),
     defines=(("DEEP", 0), ("UNEVEN", 0)),
 )
+#: the depths of the first and the last strand
+_DEPTH_RECIPE = ShaderRecipe(
+    name="opacity_start",
+    vertex="opacity_start.vert.glsl",
+    fragment="opacity_start.frag.glsl",
+    structs=("struct_opacity.glsl",),
+    integers=("first_instance", "points_across"),
+)
+#: the same by atomics, without drawing all strands
 _STARTS_RECIPE = ShaderRecipe(
     name="opacity_starts",
     compute="opacity_starts.comp.glsl",
@@ -48,6 +60,8 @@ _STARTS_RECIPE = ShaderRecipe(
     images=(("R32UI", "starts", "READ_WRITE"),),
     integers=("drawn_count", "map_index", "first_instance"),
 )
+#: of a segment, where depth tests find the first and the last hair
+_FEWEST_POINTS = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,6 +109,27 @@ class _Strands:
     ribbons: Ribbons
 
     def draw_starts(self, maps: OpacityMaps, number: int, place: ShaderFeature) -> None:
+        if capabilities().image_atomics:
+            self._find_starts(maps, number, place)
+        else:
+            side = maps.size.side // START_TEXELS
+            draw_starts(maps, number, side, lambda: self._draw_points(side, place))
+
+    def _draw_points(self, side: int, place: ShaderFeature) -> None:
+        """What may be the first or the last hair of a texel: two points a texel, along strands as
+        long as the map is broad.
+        """
+        integers = {"first_instance": 0, "points_across": 0}
+        shader = bound(_DEPTH_RECIPE, [place, self.curves], self.blocks, integers=integers).shader
+        for drawn in self.casting.classes:
+            across = max(-(-2 * side // drawn.capacity), _FEWEST_POINTS)
+            shader.uniform_int("first_instance", drawn.first)
+            shader.uniform_int("points_across", across)
+            self.ribbons.points((drawn.capacity + 1) * across).draw_instanced(
+                shader, instance_start=0, instance_count=drawn.count
+            )
+
+    def _find_starts(self, maps: OpacityMaps, number: int, place: ShaderFeature) -> None:
         integers = {"map_index": number, "drawn_count": 0, "first_instance": 0}
         shader = bound(
             _STARTS_RECIPE,
@@ -174,6 +209,6 @@ class OpacityPass:
         look = ShaderFeature(
             blocks={"strands": ("StrandSettings", struct_values(strands.as_drawn))}
         )
-        state = serial, casting, strands
+        state = serial, casting, strands, capabilities().image_atomics
         hair = _Strands(state, curves, look, self._blocks, casting, self._ribbons)
         return self._drawing.maps(hair, ball, lights, settings, casters, spacing)

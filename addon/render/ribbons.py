@@ -10,16 +10,23 @@ from . import gpu_objects
 
 
 class Ribbons:
-    """Strips by how many pieces they have room for, made on first use."""
+    """Strips by how many pieces they have room for, and points, made on first use."""
 
     def __init__(self) -> None:
-        self._batches: dict[int, Any] = {}
+        self._batches: dict[tuple[str, int], Any] = {}
 
     def of(self, capacity: int) -> Any:
         """A strip of two vertices a station, and one station more than pieces."""
-        if capacity not in self._batches:
+        return self._batch("TRI_STRIP", 2 * (capacity + 1))
+
+    def points(self, count: int) -> Any:
+        """As many vertices, a point each."""
+        return self._batch("POINTS", count)
+
+    def _batch(self, kind: str, count: int) -> Any:
+        if (kind, count) not in self._batches:
             layout = gpu.types.GPUVertFormat()
             layout.attr_add(id="unused", comp_type="F32", len=1, fetch_mode="FLOAT")
-            vertices = gpu_objects.vertex_buffer(layout, 2 * (capacity + 1))
-            self._batches[capacity] = gpu_objects.batch(type="TRI_STRIP", buf=vertices)
-        return self._batches[capacity]
+            vertices = gpu_objects.vertex_buffer(layout, count)
+            self._batches[kind, count] = gpu_objects.batch(type=kind, buf=vertices)
+        return self._batches[kind, count]

@@ -28,7 +28,7 @@ from .shader_source import SHADER_FOLDER, ShaderError, ShaderText, compose
 #: what a compute shader may do with an image, and Blender's words for it
 ACCESSES = {"WRITE": {"WRITE"}, "READ": {"READ"}, "READ_WRITE": {"READ", "WRITE"}}
 #: Blender's word for the kind of an image, where it holds no floats
-_IMAGE_KINDS = {"R32UI": "UINT_2D_ATOMIC", "RGBA32UI": "UINT_2D"}
+_IMAGE_KINDS = {"R32UI": "UINT_2D", "RGBA32UI": "UINT_2D"}
 
 
 @dataclass(frozen=True)
@@ -180,10 +180,8 @@ def _create_info(recipe: ShaderRecipe, texts: Mapping[str, ShaderText]) -> Any:
     info = gpu.types.GPUShaderCreateInfo()
     for name, value in recipe.defines:
         info.define(name, str(value))
-    structs = [compose(file, recipe.folders).source for file in recipe.structs]
-    structs += [struct_source(settings, settings.__name__) for settings in recipe.settings]
-    if structs:
-        info.typedef_source("\n".join(structs))
+    if structs := struct_sources(recipe):
+        info.typedef_source(structs)
     for slot, (kind, name) in enumerate(recipe.blocks):
         info.uniform_buf(slot, kind, name)
     for slot, (kind, name) in enumerate(recipe.textures):
@@ -191,6 +189,8 @@ def _create_info(recipe: ShaderRecipe, texts: Mapping[str, ShaderText]) -> Any:
     for slot, (image_format, name, *access) in enumerate(recipe.images):
         qualifiers = ACCESSES[access[0] if access else "WRITE"]
         kind = _IMAGE_KINDS.get(image_format, "FLOAT_2D")
+        if image_format == "R32UI" and uses_image_atomics(texts):
+            kind = "UINT_2D_ATOMIC"
         info.image(slot, image_format, kind, name, qualifiers=qualifiers)
     for name in recipe.integers:
         info.push_constant("INT", name)
@@ -204,6 +204,18 @@ def _create_info(recipe: ShaderRecipe, texts: Mapping[str, ShaderText]) -> Any:
     return info
 
 
+def struct_sources(recipe: ShaderRecipe) -> str:
+    """The structs of its blocks, which come before everything else."""
+    structs = [compose(file, recipe.folders).source for file in recipe.structs]
+    structs += [struct_source(settings, settings.__name__) for settings in recipe.settings]
+    return "\n".join(structs)
+
+
+def uses_image_atomics(texts: Mapping[str, ShaderText]) -> bool:
+    """Whether a program needs what not every backend has, see capabilities.py."""
+    return any("imageAtomic" in text.source for text in texts.values())
+
+
 def _declare_drawing(info: Any, recipe: ShaderRecipe, texts: Mapping[str, ShaderText]) -> None:
     for slot, (kind, name) in enumerate(recipe.inputs):
         info.vertex_in(slot, kind, name)
@@ -214,6 +226,8 @@ def _declare_drawing(info: Any, recipe: ShaderRecipe, texts: Mapping[str, Shader
         info.vertex_out(interface)
     for slot, (kind, name) in enumerate(recipe.outputs):
         info.fragment_out(slot, kind, name)
+    if "gl_FragDepth" in texts["fragment"].source:
+        info.depth_write("ANY")  # without it Metal has no such variable
     info.vertex_source(texts["vertex"].source)
     info.fragment_source(texts["fragment"].source)
 

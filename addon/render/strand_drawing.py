@@ -1,4 +1,4 @@
-"""One draw of strands by its programs: shaded as they are drawn, or later, as layers."""
+"""One draw of strands by its programs: shaded as they are drawn, or later, as layers or hashed."""
 
 from __future__ import annotations
 
@@ -14,7 +14,9 @@ from .shader_feature import ShaderFeature
 from .shader_program import ShaderProgram, ShaderRecipe
 
 #: what covers pixels in part, see ribbon_coverage in lib_coverage.glsl
-_RIBBON = (("smooth", "VEC4", "ribbon"),)
+_RIBBON = ("smooth", "VEC4", "ribbon")
+#: what it takes to find a fragment's looks later
+_PLACED = (("smooth", "FLOAT", "strand_place"), ("flat", "INT", "strand_index"), _RIBBON)
 _STRUCTS = ("struct_view.glsl", "struct_lights.glsl", "struct_fibre.glsl", "struct_opacity.glsl")
 _SETTINGS = (StrandSettings, ShadingSettings)
 #: of shading, for programs without the features that turn these on
@@ -38,19 +40,31 @@ _OPAQUE_RECIPE = ShaderRecipe(
     integers=("output_encoding", "samples_across"),
     varyings=_VARYINGS,
     outputs=(("VEC4", "color"),),
-    defines=(*_PLAIN, *_WHOLE, ("HASHED", 0), ("COVERED", 0), ("GATHERED", 0)),
+    defines=(*_PLAIN, *_WHOLE, ("COVERED", 0), ("GATHERED", 0)),
 )
-#: leaves fragments out at random
+#: the nearest fragment that chance lets stay
 _HASHED_RECIPE = ShaderRecipe(
     name="strand_hashed",
     vertex="strand.vert.glsl",
-    fragment="strand.frag.glsl",
+    fragment="strand_hashed.frag.glsl",
+    structs=("struct_view.glsl",),
+    settings=(StrandSettings,),
+    integers=("turn",),
+    varyings=_PLACED,
+    outputs=(("VEC4", "hair"),),
+    defines=(*_WHOLE, ("COVERED", 1), ("GATHERED", 1)),
+)
+#: shades what two turns have found
+_HASHED_SHADE_RECIPE = ShaderRecipe(
+    name="strand_hashed_shade",
+    vertex="strand_layers.vert.glsl",
+    fragment="strand_hashed_shade.frag.glsl",
     structs=_STRUCTS,
     settings=_SETTINGS,
+    textures=(("FLOAT_2D", "first_hair"), ("FLOAT_2D", "second_hair")),
     integers=("output_encoding",),
-    varyings=(*_VARYINGS, *_RIBBON),
-    outputs=(("VEC4", "color"),),
-    defines=(*_PLAIN, *_WHOLE, ("HASHED", 1), ("COVERED", 1), ("GATHERED", 0)),
+    outputs=(("VEC4", "first_light"), ("VEC4", "second_light")),
+    defines=(*_PLAIN, ("UNEVEN", 0)),
 )
 #: puts each fragment into the list of its pixel
 _GATHER_RECIPE = ShaderRecipe(
@@ -66,7 +80,7 @@ _GATHER_RECIPE = ShaderRecipe(
         ("RGBA32UI", "layer_nodes"),
     ),
     integers=("capacity",),
-    varyings=(("smooth", "FLOAT", "strand_place"), ("flat", "INT", "strand_index"), *_RIBBON),
+    varyings=_PLACED,
     outputs=(("VEC4", "color"),),
     defines=(*_WHOLE, ("COVERED", 1), ("GATHERED", 1), ("COUNTED", 0), ("PARTS", 0)),
 )
@@ -123,14 +137,26 @@ class StrandDrawing:
     output_encoding: int
     samples_across: int
 
-    def draw(self, *, is_hashed: bool) -> None:
-        """All strands, each pixel shaded as it is drawn."""
-        integers = {"output_encoding": self.output_encoding}
-        if not is_hashed:
-            integers["samples_across"] = self.samples_across
+    def draw(self) -> None:
+        """All strands, opaque, each pixel shaded as it is drawn."""
+        integers = {"output_encoding": self.output_encoding, "samples_across": self.samples_across}
         features = [*self.points, self._detail, *self.shading, *self.shown]
-        recipe = _HASHED_RECIPE if is_hashed else _OPAQUE_RECIPE
-        self._draw(bound(recipe, features, self.blocks, integers=integers))
+        self._draw(bound(_OPAQUE_RECIPE, features, self.blocks, integers=integers))
+
+    def hash(self, turn: int) -> None:
+        """Who is seen where, of all strands, in one of two turns, see hashed_strands.py."""
+        features = [*self.points, self._detail]
+        self._draw(bound(_HASHED_RECIPE, features, self.blocks, integers={"turn": turn}))
+
+    def shade_hashed(self, found: Sequence[Any]) -> ShaderProgram:
+        """Bind what shades those that two turns have found."""
+        return bound(
+            _HASHED_SHADE_RECIPE,
+            [*self.points, *self.shading, *self.shown],
+            self.blocks,
+            textures=dict(zip(("first_hair", "second_hair"), found, strict=True)),
+            integers={"output_encoding": self.output_encoding},
+        )
 
     def gather(
         self, images: Mapping[str, Any], capacity: int, part: PixelPart | None = None

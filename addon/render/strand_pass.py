@@ -26,13 +26,16 @@ import numpy as np
 from ..params.glsl import struct_values
 from ..shading.drawn_strands import drawn_color, natural_strands, own_colors
 from ..shading.lights import kept_lights
+from ..shading.settings import StrandSettings
 from ..shading.strand_noise import SEED_LIMIT
 from ..shading.volume.light_frame import Ball
 from .camera import Camera
+from .capabilities import CALM_SAMPLES, capabilities
 from .detail_pass import DetailPass
 from .display import Display
 from .feature_programs import UniformBlocks
 from .hair_ball import HairBall
+from .hashed_strands import HASHED_STRANDS
 from .inter_groom_shadow import NOBODY, InterGroomShadow
 from .marschner_textures import marschner_feature, scattering_feature
 from .opacity_maps import OpacityMaps
@@ -153,14 +156,16 @@ class StrandPass:
             output_encoding=output_encoding,
             samples_across=samples,
         )
-        transparency = "none" if is_debug else snapshot.strand_settings.transparency
+        transparency = "none" if is_debug else drawn_transparency(snapshot.strand_settings)
         layers = LayersDrawn()
         if transparency == "layers":
             is_own_target = output == "scene_linear"
             layers = LAYERS_OF_PIXELS.draw(drawing, is_own_target=is_own_target, in_parts=in_parts)
+        elif transparency == "hashed":
+            HASHED_STRANDS.draw(drawing)
         else:
             with drawing_state():
-                drawing.draw(is_hashed=transparency == "hashed")
+                drawing.draw()
         self.statistics = Statistics(
             strands=sum(drawn.count for drawn in order.classes),
             pieces=order.pieces,
@@ -321,6 +326,20 @@ class StrandPass:
         """Let go of a texture that is not wanted any more."""
         self._textures.pop(name, None)
         self._uploaded.pop(name, None)
+
+
+def drawn_transparency(settings: StrandSettings) -> str:
+    """How strands are drawn here: layers are hashed where images have no atomics."""
+    wanted = settings.transparency
+    return "hashed" if wanted == "layers" and not capabilities().image_atomics else wanted
+
+
+def calm_draws(settings: StrandSettings, samples: int) -> int:
+    """How many draws with this many samples across a pixel make a still whose strands are calm that
+    are hashed because their lists cannot be made.
+    """
+    is_noisy = drawn_transparency(settings) != settings.transparency
+    return -(-CALM_SAMPLES // samples**2) if is_noisy else 1
 
 
 def _points_texture(snapshot: Snapshot) -> Any:

@@ -37,7 +37,7 @@ BROW_SOURCES = (
 
 TRANSPARENCIES = (
     ("layers", "Layers", "Blend strands by their coverage of each pixel, sorted by depth"),
-    ("hashed", "Hashed", "Stochastic coverage: needs no memory, but is noisy"),
+    ("hashed", "Hashed", "Stochastic coverage: needs little memory, but is noisy"),
     ("none", "None", "Opaque strands with hard edges, no thinner than the minimum width"),
 )
 _IS_MARSCHNER = when("shading.model", "marschner")

@@ -6,9 +6,11 @@ from types import SimpleNamespace
 from typing import Any
 
 import bpy
-from bpy.props import BoolProperty, StringProperty
+from bpy.props import BoolProperty, EnumProperty, StringProperty
 
+from ..blender.base import image_atomics
 from ..blender.base.gpu_context import gpu_in_use
+from ..blender.base.redraw import redraw_views
 from ..blender.properties.groups import operator_properties
 from ..blender.properties.presets import names
 from ..blender.sessions.solvers import compute_problem
@@ -54,12 +56,30 @@ NEW_GROOM: dict[str, Any] = {
 _DEVICE = operator_properties("dynamics")["device"]
 
 
+def _choose_atomics(page: Any, _context: Any) -> None:
+    image_atomics.choose(page.image_atomics)
+    redraw_views()
+
+
+#: of this machine; not what new grooms have
+_MACHINE: dict[str, Any] = {
+    "image_atomics": EnumProperty(
+        name="Image Atomics",
+        description="Whether the GPU sorts the strands of a pixel in lists. If it draws no hair or "
+        "broken hair, try Never, and tell us with Copy Report",
+        items=image_atomics.CHOICES,
+        update=_choose_atomics,
+    ),
+}
+
+
 class HAIRLOOM_AP_preferences(bpy.types.AddonPreferences):
     """Defaults of new grooms, and a test of this machine"""
 
     bl_idname = ROOT_PACKAGE
 
     __annotations__ = {
+        **_MACHINE,
         **NEW_GROOM,
         "device": _DEVICE,
         "follows": BoolProperty(
@@ -82,7 +102,8 @@ class HAIRLOOM_AP_preferences(bpy.types.AddonPreferences):
         header.label(text="New Grooms")
         if body:
             for name in self.__annotations__:
-                body.prop(self, name)
+                if name not in _MACHINE:
+                    body.prop(self, name)
         header, body = layout.panel("hairloom_shortcuts", default_closed=True)
         header.label(text="Shortcuts")
         if body:
@@ -90,6 +111,8 @@ class HAIRLOOM_AP_preferences(bpy.types.AddonPreferences):
         header, body = layout.panel("hairloom_this_machine")
         header.label(text="This Machine")
         if body:
+            for name in _MACHINE:
+                body.prop(self, name)
             draw_machine(body, context)
 
 
@@ -134,6 +157,18 @@ def chosen_presets(chosen: Any) -> tuple[str, ...]:
         chosen: preferences, or an operator with NEW_GROOM.
     """
     return tuple(name for name in (chosen.look, chosen.motion) if name)
+
+
+def register() -> None:
+    """Take over what an artist has chosen for this machine."""
+    entry = bpy.context.preferences.addons.get(ROOT_PACKAGE)
+    if entry is not None and entry.preferences is not None:
+        image_atomics.choose(entry.preferences.image_atomics)
+
+
+def unregister() -> None:
+    """What is chosen counts as long as there is a page to choose it on."""
+    image_atomics.choose("automatic")
 
 
 CLASSES: tuple[type[Any], ...] = (HAIRLOOM_AP_preferences,)

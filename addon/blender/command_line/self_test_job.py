@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
+
 from ...errors import HairloomError
+from ...render.capabilities import capabilities
 from ..setup import self_test as tests
 from .job_steps import Job
 from .verb import Verb
@@ -15,6 +18,7 @@ def self_test(job: Job) -> None:
     job.report.facts["checks"] = [
         {"name": check.name, "outcome": check.outcome, "text": check.text} for check in checks
     ]
+    job.report.facts["capabilities"] = asdict(capabilities())
     print(tests.report_text(), end="")
     failed = [check for check in checks if check.outcome == "failed"]
     if failed:

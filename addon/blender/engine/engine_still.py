@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import bpy
@@ -14,6 +14,7 @@ from ...arrays import Floats
 from ...render.accumulation import Accumulation, Target
 from ...render.camera import Camera
 from ...render.camera_window import Window, jittered
+from ...render.capabilities import CALM_SAMPLES, capabilities
 from ...render.lens import through
 from ...render.pixel_filter import jitters
 from ...render.scene_pass import FAR_AWAY, Rgba, ScenePass
@@ -74,7 +75,7 @@ class Still:
         ensure_gpu()
         self._engine, self._depsgraph = engine, depsgraph
         self._render = depsgraph.scene.render
-        self._settings = settings_of(depsgraph.scene.hairloom.picture, PictureSettings)
+        self._settings = _calm(settings_of(depsgraph.scene.hairloom.picture, PictureSettings))
         self._whole = engine.resolution_x, engine.resolution_y
         self._window: Window
         self._window, self._size = border_window(self._render, *self._whole)
@@ -182,6 +183,13 @@ def _leave_empty(result: Any) -> None:
     for each in _passes(result):
         value = 1.0 if each.name == SHADOW else FAR_AWAY if each.name == DEPTH else 0.0
         each.rect.foreach_set(np.full(len(each.rect) * each.channels, value, np.float32))
+
+
+def _calm(settings: PictureSettings) -> PictureSettings:
+    """With as many samples as it takes where strands are hashed because they cannot be layers."""
+    if capabilities().image_atomics:
+        return settings
+    return replace(settings, samples=max(settings.samples, CALM_SAMPLES))
 
 
 def sky_of(scene: SceneSnapshot, render: bpy.types.RenderSettings) -> Rgba:

@@ -19,7 +19,7 @@ from ...render.good_side import GoodSide, good_side
 from ...render.hair_ball import HairBall
 from ...render.mesh_pass import MeshPass
 from ...render.snapshot import MeshSnapshot, Snapshot
-from ...render.strand_pass import Statistics, StrandPass
+from ...render.strand_pass import Statistics, StrandPass, calm_draws
 from ...shading.lights import Light
 from ...shading.skin.notes import skin_notes
 from ...shading.stage import backdrop, over, stage_lights
@@ -115,15 +115,19 @@ class Studio:
     def _drawn(
         self, snapshot: Snapshot, camera: Camera, width: int, height: int, samples: int
     ) -> Floats:
-        picture = render_image(
-            snapshot,
-            camera,
-            width,
-            height,
-            samples,
-            passes=self._passes,
-            card_pass=self._card_pass,
-        )
+        pictures = [
+            render_image(
+                snapshot,
+                replace(camera, sample=number),
+                width,
+                height,
+                samples,
+                passes=self._passes,
+                card_pass=self._card_pass,
+            )
+            for number in range(calm_draws(snapshot.strand_settings, samples))
+        ]
+        picture = np.mean(pictures, axis=0)
         self._notes |= dict.fromkeys(self.statistics.notes)
         return picture
 

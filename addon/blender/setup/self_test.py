@@ -19,6 +19,7 @@ from ...groom.settings import GuideSettings
 from ...pipeline import Rig
 from ...refine.settings import DetailSettings
 from ...render.camera import frame_camera
+from ...render.capabilities import capabilities
 from ...render.frame import render_image
 from ...shading.ambient_settings import AmbientSettings
 from ...shading.lights import three_point_lights
@@ -81,6 +82,8 @@ def run() -> tuple[Check, ...]:
 
 def _checks() -> Iterator[Check]:
     yield _compute()
+    yield _checked("GPU", _limits)
+    yield _atomics()
     for name, settings in _looks().items():
         yield _checked(f"Drawing, {name}", partial(_drawn, *settings))
     yield _checked("Files", _files)
@@ -103,6 +106,29 @@ def _compute() -> Check:
     if problem:
         return Check(name, "absent", f"{problem}; the CPU simulates")
     return Check(name, "passed", "the same motion as by numpy")
+
+
+def _limits() -> str:
+    """What the GPU can do, as far as passes ask; a format that is missing is a failure."""
+    found = capabilities()
+    if found.missing_formats:
+        raise RuntimeError(f"there are no textures as {', '.join(found.missing_formats)}")
+    if found.dispatch_ms is None:
+        raise RuntimeError("a small compute shader does not write what it should")
+    groups = " x ".join(map(str, found.group_size))
+    return (
+        f"textures of {found.texture_size:,} texels and {found.texture_layers:,} layers, groups of "
+        f"{groups}, {found.dispatch_ms:.1f} ms for a small dispatch; {found.probe_ms:.0f} ms to "
+        "find out"
+    )
+
+
+def _atomics() -> Check:
+    """Whether strands can be lists of each pixel; without atomics of images they are hashed."""
+    name, problem = "Image atomics", capabilities().atomics_problem
+    if problem:
+        return Check(name, "absent", f"{problem}; strands are drawn as Hashed")
+    return Check(name, "passed", "as many as there should be")
 
 
 def _looks() -> dict[str, tuple[ShadingSettings, VolumeSettings]]:

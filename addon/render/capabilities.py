@@ -1,0 +1,193 @@
+"""What the GPU here can do, found once a start by trying it out, and what is drawn without it.
+
+Drivers may accept a program and do nothing, so what it wrote is read back. Each pass asks here
+before it makes a program that not every backend has:
+
+    image_atomics   strands as lists of each pixel (strand_layers.py), else hashed
+                    (hashed_strands.py); where deep layers start, else by depth tests
+                    (opacity_pass.py)
+
+The preferences, and HAIRLOOM_IMAGE_ATOMICS=never in the environment, have it drawn without them,
+to find out whether they are what is wrong. See docs/dev/gpu.md.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from dataclasses import dataclass, replace
+from typing import Any
+
+import gpu
+import numpy as np
+
+from . import gpu_objects
+from .shader_program import ShaderRecipe, program
+from .textures import drawing_into, drawing_state, texture_to_array
+
+#: how image atomics may be chosen
+ATOMICS_CHOICES = ("automatic", "never")
+#: in the environment; stronger than what is chosen in Blender
+ATOMICS_VARIABLE = "HAIRLOOM_IMAGE_ATOMICS"
+#: of all textures that passes make
+FORMATS = (
+    *("R16F", "R32F", "RG32F", "RGBA16F", "RGBA32F"),
+    *("R32UI", "RGBA32UI", "DEPTH_COMPONENT32F"),
+)
+#: why they are not even tried: a program with early_fragment_tests does not compile on Metal, and a
+#: script's textures lack the flag that its atomics need
+_METAL = "Blender gives scripts no textures for them on Metal"
+#: samples of a pixel that make a still of hashed strands, where they are drawn in place of layers
+CALM_SAMPLES = 16
+_SIDE = 16
+_DISPATCH_RECIPE = ShaderRecipe(
+    name="probe_dispatch", compute="probe_dispatch.comp.glsl", images=(("RGBA32F", "probed"),)
+)
+_ATOMICS_RECIPE = ShaderRecipe(
+    name="probe_atomics",
+    vertex="strand_layers.vert.glsl",
+    fragment="probe_atomics.frag.glsl",
+    images=(("R32UI", "probed", "READ_WRITE"),),
+    outputs=(("VEC4", "color"),),
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Capabilities:
+    """What was found.
+
+    backend: as Blender names it. image_atomics: whether they are used.
+    atomics_problem: why they are not; else empty.
+    missing_formats: of FORMATS. texture_size: of a side [texels]. texture_layers: of an array.
+    group_size, group_count: of compute shaders, in x, y and z.
+    dispatch_ms: how long a small one takes until it is read back; None where it fails.
+    probe_ms: how long it took to find all this out.
+    """
+
+    backend: str
+    image_atomics: bool
+    atomics_problem: str
+    missing_formats: tuple[str, ...]
+    texture_size: int
+    texture_layers: int
+    group_size: tuple[int, int, int]
+    group_count: tuple[int, int, int]
+    dispatch_ms: float | None
+    probe_ms: float
+
+
+_found: Capabilities | None = None
+_chosen = "automatic"
+
+
+def choose_image_atomics(choice: str) -> None:
+    """From the next draw on; one of ATOMICS_CHOICES."""
+    global _chosen
+    assert choice in ATOMICS_CHOICES, choice
+    _chosen = choice
+
+
+def capabilities() -> Capabilities:
+    """What the GPU here can do; the first call in a context that can draw finds out."""
+    global _found
+    if _found is None:
+        _found = _probed()
+    return _found if _forbidden() is None else _without_atomics(_found, _forbidden())
+
+
+def _forbidden() -> str | None:
+    """Who does not want image atomics."""
+    if os.environ.get(ATOMICS_VARIABLE, "").lower() == "never":
+        return f"turned off by {ATOMICS_VARIABLE}"
+    return "turned off in the preferences" if _chosen == "never" else None
+
+
+def _without_atomics(found: Capabilities, problem: str | None) -> Capabilities:
+    return replace(found, image_atomics=False, atomics_problem=problem or "")
+
+
+def _probed() -> Capabilities:
+    begin = time.perf_counter()
+    backend = str(gpu.platform.backend_type_get())
+    # a program that a driver refuses is never made where nobody wants it
+    problem = _forbidden() or (_METAL if backend == "METAL" else _atomics_problem())
+    dispatch_ms = _dispatch_ms()
+    missing = tuple(each for each in FORMATS if not _is_format_there(each))
+    size, count = (
+        gpu.capabilities.max_work_group_size_get,
+        gpu.capabilities.max_work_group_count_get,
+    )
+    found = Capabilities(
+        backend=backend,
+        image_atomics=not problem,
+        atomics_problem=problem,
+        missing_formats=missing,
+        texture_size=gpu.capabilities.max_texture_size_get(),
+        texture_layers=gpu.capabilities.max_texture_layers_get(),
+        group_size=(size(0), size(1), size(2)),
+        group_count=(count(0), count(1), count(2)),
+        dispatch_ms=dispatch_ms,
+        probe_ms=0.0,
+    )
+    return replace(found, probe_ms=1.0e3 * (time.perf_counter() - begin))
+
+
+def _atomics_problem() -> str:
+    """What is wrong with those of a small draw, compared with what must come out."""
+    try:
+        found = _counted_by_atomics()
+    except Exception as error:  # a driver may fail at any point, each with an error of its own
+        return f"{type(error).__name__}: {error}"
+    count = _SIDE * _SIDE
+    # the last exchange leaves one of the numbers, and the others come back
+    expected = [count, 0, count - 1, count * (count + 1) // 2]
+    read = [*found[:3], found[3] + found[4]]
+    return "" if read == expected else f"they give {read}, not {expected}"
+
+
+def _counted_by_atomics() -> list[int]:
+    """What fragments have left: how many they are, the least and the largest of their numbers, the
+    sum of what exchanges gave back, and what the last one left.
+    """
+    probed = gpu_objects.texture((5, 1), format="R32UI")
+    probed.clear(format="UINT", value=(0,))
+    color = gpu_objects.texture((_SIDE, _SIDE), format="RGBA32F")
+    target = gpu_objects.framebuffer(color_slots=(color,))
+    layout = gpu.types.GPUVertFormat()
+    layout.attr_add(id="unused", comp_type="F32", len=1, fetch_mode="FLOAT")
+    triangle = gpu_objects.batch(type="TRIS", buf=gpu_objects.vertex_buffer(layout, 3))
+    shader = program(_ATOMICS_RECIPE)
+    with drawing_into(target), drawing_state(depth_test="NONE", depth_write=False):
+        shader.bind(images={"probed": probed})
+        triangle.draw(shader.shader)
+    color.read()
+    return [int(each) for each in np.asarray(probed.read()).ravel()]
+
+
+def _dispatch_ms() -> float | None:
+    """How long a small dispatch takes; None where it does not do what it should."""
+    try:
+        times = [_timed_dispatch() for _ in range(2)]  # the first one may still compile
+    except Exception:  # as above; a self-test says which program it is that does not compile
+        return None
+    return times[-1]
+
+
+def _timed_dispatch() -> float | None:
+    begin = time.perf_counter()
+    probed = gpu_objects.texture((_SIDE, _SIDE), format="RGBA32F")
+    shader = program(_DISPATCH_RECIPE)
+    shader.bind(images={"probed": probed})
+    gpu.compute.dispatch(shader.shader, _SIDE // 8, _SIDE // 8, 1)
+    gpu.shader.unbind()
+    numbers = texture_to_array(probed)[..., 0].ravel()
+    took = 1.0e3 * (time.perf_counter() - begin)
+    return took if np.array_equal(numbers, np.arange(_SIDE * _SIDE)) else None
+
+
+def _is_format_there(name: str) -> bool:
+    try:
+        made: Any = gpu_objects.texture((4, 4), format=name)
+    except (RuntimeError, ValueError):
+        return False
+    return bool(made.width == 4)

@@ -1,0 +1,53 @@
+"""Where the deep layers of an opacity map start and end, by depth tests: no atomics of images.
+
+The depth of the first and of the last hair in two depth buffers, then the outermost of as many of
+their texels as fall onto one of `starts`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import gpu
+
+from . import gpu_objects
+from .opacity_maps import OpacityMaps
+from .shader_program import ShaderRecipe, program
+from .textures import drawing_into, drawing_state
+
+_STARTS_RECIPE = ShaderRecipe(
+    name="opacity_starts_of_depths",
+    compute="opacity_starts_of_depths.comp.glsl",
+    textures=(("DEPTH_2D", "first_depths"), ("DEPTH_2D", "last_depths")),
+    images=(("R32UI", "starts"),),
+    integers=("map_index",),
+)
+
+
+def draw_starts(maps: OpacityMaps, number: int, side: int, draw: Callable[[], None]) -> None:
+    """Write into `maps.starts` where the layers of one map start and end.
+
+    Args:
+        side: of the depth buffers [texels]; a multiple of that of `starts`.
+        draw: all hair into the bound depth buffer.
+    """
+    depths = {
+        "first_depths": _depths(side, "LESS_EQUAL", 1.0, draw),
+        "last_depths": _depths(side, "GREATER_EQUAL", 0.0, draw),
+    }
+    shader = program(_STARTS_RECIPE)
+    shader.bind(textures=depths, images={"starts": maps.starts}, integers={"map_index": number})
+    groups = -(-maps.starts.width // 2 // 8)
+    gpu.compute.dispatch(shader.shader, groups, groups, 1)
+    gpu.shader.unbind()
+
+
+def _depths(side: int, depth_test: str, none: float, draw: Callable[[], None]) -> Any:
+    """A texture with the depth of the one hair in each texel that wins; `none` without any."""
+    depths = gpu_objects.texture((side, side), format="DEPTH_COMPONENT32F")
+    target = gpu_objects.framebuffer(depth_slot=depths)
+    with drawing_into(target), drawing_state(depth_test=depth_test):
+        target.clear(depth=none)
+        draw()
+    return depths

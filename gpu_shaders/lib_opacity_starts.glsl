@@ -1,0 +1,33 @@
+// Points of strands at which opacity maps keep the depths of the first and the last hair: a few of each
+// segment, at least one in each texel of `starts` that it meets.
+//
+// Reads the block `opacity` and the integer `light_index`.
+#include "lib_strand_texel.glsl"
+#include "lib_opacity.glsl"
+
+// Texels of `starts` along one side of a map.
+int starts_side()
+{
+  return opacity.resolution / {{start_texels}};
+}
+
+bool is_ahead(vec3 point)
+{
+  return dot(opacity.map_w[light_index], vec4(point, 1.0)) > 0.0;
+}
+
+// Between the points before and after it, xyz the places of both in the map.
+struct StartSegment {
+  vec3 from;
+  vec3 to;
+  int count;  // of its points; none where it reaches behind the light
+};
+
+StartSegment start_segment(vec3 root_side, vec3 tip_side)
+{
+  vec3 from = map_place(opacity, light_index, root_side);
+  vec3 to = map_place(opacity, light_index, tip_side);
+  vec2 texels = abs(to.xy - from.xy) * float(starts_side());
+  int count = clamp(int(ceil(2.0 * max(texels.x, texels.y))), 1, 2 * starts_side());
+  return StartSegment(from, to, is_ahead(root_side) && is_ahead(tip_side) ? count : 0);
+}

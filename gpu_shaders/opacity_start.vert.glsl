@@ -1,0 +1,23 @@
+// Opacity maps, vertex stage of the depths of the first and the last strand: `points_across` of each
+// segment, for depth tests where opacity_starts.comp.glsl has atomics. They are the same points; of a
+// segment that has more of them as many, evenly.
+#include "lib_opacity_starts.glsl"
+
+const vec4 NOWHERE = vec4(2.0, 2.0, 2.0, 1.0);
+
+void main()
+{
+  StrandSpan span = strand_span(strand_spans, first_instance + gl_InstanceID);
+  int last = span.count - 1, point = gl_VertexID / points_across;
+  vec3 root_side = texelFetch(cv_points, span_texel(span, clamp(point - 1, 0, last)), 0).xyz;
+  vec3 tip_side = texelFetch(cv_points, span_texel(span, min(point, last)), 0).xyz;
+  StartSegment segment = start_segment(root_side, tip_side);
+  int most = min(segment.count, points_across), i = 1 + gl_VertexID % points_across;
+  vec3 place = mix(segment.from, segment.to, float(i) / float(max(most, 1)));
+  bool is_there = point <= last && i <= most;
+  // in the middle of its texel: drivers move points by a little, which might be into the next one
+  float side = float(starts_side());
+  vec3 middle = vec3((floor(place.xy * side) + 0.5) / side, clamp(place.z, 0.0, 1.0));
+  gl_PointSize = 1.0;
+  gl_Position = is_there ? vec4(2.0 * middle - 1.0, 1.0) : NOWHERE;
+}

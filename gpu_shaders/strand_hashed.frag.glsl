@@ -1,0 +1,18 @@
+// Hashed strands, first step: of each pixel the nearest fragment that chance lets stay, as often as it covers
+// the pixel. x the strand, y the place along it, z its depth. What they look like is found later, for those
+// that are seen.
+#include "lib_coverage.glsl"
+#include "lib_hashed.glsl"
+#include "lib_strand_noise.glsl"
+
+void main()
+{
+  float alpha = strands.opacity * ribbon_coverage(ribbon * gl_FragCoord.w);
+  uvec2 pixel = uvec2(gl_FragCoord.xy);
+  uint own = hash_integer(hash_integer(uint(strand_index)) + pixel.x + pixel.y * {{strand_rows}}u);
+  // another part in each sample of a picture
+  if (scrambled(2u * uint(view.viewport.z) + uint(turn), own, hash_integer(own)) >= alpha) {
+    discard;
+  }
+  hair = vec4(float(strand_index), strand_place, gl_FragCoord.z, 1.0);
+}

@@ -1,0 +1,15 @@
+// Hashed strands, third step: both turns into the target, each hidden by what lies before it there. First the
+// nearer one, half over what is there; then, where the farther one is not hidden either, both in place of
+// all.
+void main()
+{
+  ivec2 pixel = ivec2(gl_FragCoord.xy) - ivec2(left, bottom);
+  vec4 one = texelFetch(first_light, pixel, 0), other = texelFetch(second_light, pixel, 0);
+  vec4 near = one.w <= other.w ? one : other;
+  float depth = are_both != 0 ? max(one.w, other.w) : near.w;
+  if (depth > 1.0) {
+    discard;
+  }
+  color = are_both != 0 ? vec4(0.5 * (one.xyz + other.xyz), 1.0) : 0.5 * vec4(near.xyz, 1.0);
+  gl_FragDepth = depth;
+}
