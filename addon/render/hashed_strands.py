@@ -48,8 +48,6 @@ class HashedStrands:
         self._hair: tuple[Any, ...] = ()
         self._light: tuple[Any, ...] = ()
         self._depth: Any = None
-        self._turns: tuple[Any, ...] = ()
-        self._shaded: Any = None
         self._triangle: Any = None
 
     def draw(self, drawing: StrandDrawing) -> None:
@@ -62,14 +60,17 @@ class HashedStrands:
         """
         left, bottom, width, height = gpu.state.viewport_get()
         self._fit((width, height))
-        for turn, target in enumerate(self._turns):
+        # renders draw in a context of their own, which shares textures and no framebuffers
+        for turn, hair in enumerate(self._hair):
+            target = gpu_objects.framebuffer(depth_slot=self._depth, color_slots=(hair,))
             with drawing_into(target), drawing_state():
                 gpu.state.viewport_set(0, 0, width, height)
                 target.clear(color=_NOBODY, depth=1.0)
                 drawing.hash(turn)
-        with drawing_into(self._shaded), drawing_state(depth_test="NONE", depth_write=False):
+        shaded = gpu_objects.framebuffer(color_slots=self._light)
+        with drawing_into(shaded), drawing_state(depth_test="NONE", depth_write=False):
             gpu.state.viewport_set(0, 0, width, height)
-            self._shaded.clear(color=_DARK)
+            shaded.clear(color=_DARK)
             self._triangle.draw(drawing.shade_hashed(self._hair).shader)
         with drawing_state(depth_write=False, blend="ALPHA_PREMULT"):
             self._show(left, bottom, are_both=False)
@@ -94,11 +95,6 @@ class HashedStrands:
         textures = [gpu_objects.texture(size, format="RGBA32F") for _ in range(4)]
         self._hair, self._light = tuple(textures[:2]), tuple(textures[2:])
         self._depth = gpu_objects.texture(size, format="DEPTH_COMPONENT32F")
-        self._turns = tuple(
-            gpu_objects.framebuffer(depth_slot=self._depth, color_slots=(hair,))
-            for hair in self._hair
-        )
-        self._shaded = gpu_objects.framebuffer(color_slots=self._light)
         if self._triangle is None:
             layout = gpu.types.GPUVertFormat()
             layout.attr_add(id="unused", comp_type="F32", len=1, fetch_mode="FLOAT")

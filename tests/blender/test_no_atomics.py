@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -12,11 +13,20 @@ import pytest
 
 bpy = pytest.importorskip("bpy", reason="these tests need Blender or the bpy module")
 
-from engine_stage import picture  # noqa: E402
+from engine_stage import SIZE, picture  # noqa: E402
 
+from hairloom.addon.blender.preview import previews  # noqa: E402
 from hairloom.addon.blender.setup import self_test  # noqa: E402
+from hairloom.addon.blender.viewport import overlay  # noqa: E402
 from hairloom.addon.render import capabilities  # noqa: E402
+from hairloom.addon.render.accumulation import Target  # noqa: E402
+from hairloom.addon.render.camera import Camera, look_at, perspective  # noqa: E402
+from hairloom.addon.render.frame import render_image  # noqa: E402
+from hairloom.addon.render.hashed_strands import HASHED_STRANDS  # noqa: E402
+from hairloom.addon.render.snapshot import Snapshot  # noqa: E402
 from hairloom.addon.render.strand_pass import calm_draws  # noqa: E402
+from hairloom.addon.render.textures import texture_to_array  # noqa: E402
+from hairloom.addon.shading.lights import three_point_lights  # noqa: E402
 from hairloom.addon.shading.settings import StrandSettings  # noqa: E402
 from hairloom.addon.ui import preferences  # noqa: E402
 
@@ -48,6 +58,23 @@ def test_a_render_is_calm_without_atomics(
     assert pictures[1, "never"].mean() == pytest.approx(wanted.mean(), rel=0.01)
 
 
+def test_a_render_shares_what_was_drawn_elsewhere(
+    stage: Any, new_hair: Callable[..., Any], sphere: Any, tmp_path: Path
+) -> None:
+    """It has a GPU context of its own, in which framebuffers of another one cannot be bound."""
+    hair = new_hair(sphere)
+    hair.data.hairloom.strands.transparency = "hashed"
+    hair.data.hairloom.strands.fullness = 20.0
+    before = picture(tmp_path)
+    HASHED_STRANDS.release()
+    camera = Camera(look_at((0.4, -0.5, 0.3), (0.0, 0.0, 0.0)), perspective(0.4, 1.0, 0.05, 5.0))
+    points = np.linspace((0.0, 0.0, -0.1), (0.0, 0.0, 0.1), 4, dtype=np.float32)[None]
+    settings = StrandSettings(transparency="hashed")
+    one = Snapshot(points, np.full((1, 4), 0.01, np.float32), strand_settings=settings)
+    assert render_image(one, camera, SIZE, SIZE, 1)[..., 3].any()
+    np.testing.assert_array_equal(picture(tmp_path), before)
+
+
 def test_stills_take_several_draws_without_atomics() -> None:
     layers, hashed = StrandSettings(), StrandSettings(transparency="hashed")
     assert [calm_draws(layers, samples) for samples in (1, 3, 8)] == [1, 1, 1]
@@ -73,3 +100,25 @@ def test_the_preferences_forbid_them_and_the_self_test_says_so(monkeypatch: Any)
         "Image atomics"
     ] == "passed"
     assert "passed  Image atomics: " in self_test.report_text()
+
+
+def test_the_preview_is_drawn_without_atomics(
+    new_hair: Callable[..., Any], sphere: Any, evaluated: Callable[[], Any]
+) -> None:
+    """What a 3D view shows of a groom, with its shadow on the body: noisy, and as bright."""
+    hair = new_hair(sphere)
+    hair.data.hairloom.strands.fullness = 20.0
+    session = previews.start(hair, evaluated())
+    target, pictures = Target(), []
+    camera = Camera(look_at((0.4, -0.5, 0.3), (0.0, 0.0, 0.0)), perspective(0.4, 1.0, 0.05, 5.0))
+    for choice in ("automatic", "never"):
+        capabilities.choose_image_atomics(choice)
+        drawn = overlay.Drawn(overlay.Drawing(session.snapshot))
+        lit = replace(session.snapshot, lights=three_point_lights(camera.view))
+        target.sized(96, 96).clear((0.0, 0.0, 0.0, 0.0))
+        with target.drawing():
+            overlay._draw_groom(drawn, lit, camera, None, shades_body=True)
+        pictures.append(texture_to_array(target.color))
+    layers, hashed = pictures
+    assert (layers[..., 3] > 0.1).mean() > 0.05 and not np.array_equal(layers, hashed)
+    assert hashed.mean(axis=(0, 1)) == pytest.approx(layers.mean(axis=(0, 1)), rel=0.03)
