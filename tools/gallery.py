@@ -14,7 +14,7 @@ import os
 import shlex
 import sys
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -24,7 +24,7 @@ from small_pictures import write_small
 
 PAGE = REPOSITORY / "docs" / "gallery.md"
 PICTURES = REPOSITORY / "docs" / "images" / "gallery"
-PRESETS = REPOSITORY / "presets"
+PRESETS, STYLES = REPOSITORY / "presets", REPOSITORY / "hairstyles"
 HEADLESS, BEAR = "tools/headless.py", "tools/gallery.py --bear"
 SIZE = "--width 360 --height 360 --samples 2"
 COLUMNS = 3
@@ -78,6 +78,28 @@ def of_presets(folder: str, options: str) -> tuple[Picture, ...]:
     )
 
 
+def of_styles(names: Iterable[str]) -> tuple[Picture, ...]:
+    """A picture of each of these hairstyles on the built-in head."""
+    return tuple(
+        Picture(
+            f"style_{name}",
+            json.loads((STYLES / f"{name}.json").read_text(encoding="utf-8"))["title"],
+            f"--style {name}",
+        )
+        for name in names
+    )
+
+
+def hairstyles() -> list[str]:
+    """The names of all that grow on a head, in the order of Blender's menu."""
+    orders = {
+        path.stem: json.loads(path.read_text(encoding="utf-8"))["order"]
+        for path in STYLES.glob("*.json")
+        if path.with_suffix(".npz").is_file()  # fur has no guides of its own
+    }
+    return sorted(orders, key=orders.__getitem__)
+
+
 def grown(name: str, title: str, look: str, **settings: float) -> Picture:
     """Hair of the built-in head with these settings of the section `grow`."""
     sets = " ".join(f"--set grow.{setting}={value}" for setting, value in settings.items())
@@ -92,6 +114,11 @@ def fur(name: str, title: str, look: str, **settings: float) -> Picture:
 
 
 SECTIONS = (
+    Section(
+        "Hairstyles",
+        "The [hairstyles](hairstyles.md) that ship, on the built-in head.",
+        of_styles(hairstyles()),
+    ),
     Section(
         "Looks",
         "The [looks](shading.md) that ship, on the same hair in the same light.",

@@ -52,3 +52,8 @@ def test_every_preset_that_gives_a_look_is_shown() -> None:
         for folder in folders
     }
     assert shown == shipped
+
+
+def test_every_hairstyle_of_a_head_is_shown() -> None:
+    shown = {name for picture in ALL for name in re.findall(r"--style (\w+)", picture.options)}
+    assert shown == {path.stem for path in gallery.STYLES.glob("*.npz")}

@@ -25,6 +25,7 @@ from hairloom.addon.blender.cards.files import CardOutput, WrittenCards, write_c
 from hairloom.addon.cards.atlas_settings import AtlasSettings
 from hairloom.addon.cards.export_settings import CardExportSettings
 from hairloom.addon.cards.settings import CardSettings
+from hairloom.addon.exchange.cards.glb_file import GlbFile
 from hairloom.addon.exchange.textures.texture_files import read_texture
 from hairloom.addon.groom.settings import GuideSettings
 from hairloom.addon.params import SettingsMap
@@ -40,6 +41,8 @@ THREE = REPOSITORY / "tools" / "node" / "node_modules" / "three"
 SANDBOX = str(REPOSITORY / "tools" / "window_blender")
 #: the engines run where nothing but the repository is seen
 OUTPUT = REPOSITORY / "out" / "engines"
+#: what lies beside the files of an asset
+OF_ENGINES = shutil.ignore_patterns("godot*", "game", "web")
 
 SIZE, FIELD_OF_VIEW = 480, 30.0
 EYE, TARGET = (0.25, -0.45, 0.1), (0.0, 0.0, -0.01)
@@ -172,21 +175,88 @@ def read_encoded(linear: np.ndarray) -> np.ndarray:
     return np.where(color <= 0.0031308, 12.92 * color, 1.055 * color ** (1 / 2.4) - 0.055)
 
 
-def test_godot_draws_cards_as_we_do(asset: Asset, sandbox: str) -> None:
-    project = asset.folder / "godot"
+def godot_project(asset: Asset, name: str) -> Path:
+    project = asset.folder / name
     shutil.copytree(HERE / "godot", project)
-    shutil.copytree(ENGINES, project / "hairloom")
-    shutil.copytree(asset.folder, project / "asset", ignore=shutil.ignore_patterns("godot", "web"))
-    command = [sandbox, "run", str(REPOSITORY / "tools" / "with_xvfb"), "godot"]
-    command += ["--path", str(project), "--rendering-driver", "vulkan"]
-    command += ["--resolution", f"{SIZE}x{SIZE}", "--quit-after", "1000"]
-    result = subprocess.run(command, capture_output=True, text=True, timeout=300)
-    drawn = project / "asset" / "godot.png"
-    assert drawn.is_file(), result.stdout + result.stderr
-    assert "SCRIPT ERROR" not in result.stderr and "SHADER ERROR" not in result.stderr
-    check(asset, drawn)
-    shown = json.loads((project / "asset" / "levels.json").read_text(encoding="utf-8"))
+    shutil.copytree(ENGINES, project / "addons" / "hairloom")
+    shutil.copytree(asset.folder, project / "asset", ignore=OF_ENGINES)
+    return project
+
+
+def run_godot(sandbox: str, *options: str, window: bool = True) -> str:
+    """What it says; no script and no shader may fail."""
+    command = [sandbox, "run"]
+    if window:
+        command += [str(REPOSITORY / "tools" / "with_xvfb"), "godot", "--quit-after", "1000"]
+        command += ["--rendering-driver", "vulkan", "--resolution", f"{SIZE}x{SIZE}"]
+    else:
+        command += ["godot", "--headless"]
+    result = subprocess.run([*command, *options], capture_output=True, text=True, timeout=300)
+    said = result.stdout + result.stderr
+    assert result.returncode == 0, said
+    assert "SCRIPT ERROR" not in said and "SHADER ERROR" not in said, said
+    return said
+
+
+def indices_of(glb: Path, node: str) -> np.ndarray:
+    """Of the triangles of a node's mesh, (triangle_count, 3)."""
+    file = GlbFile.of(glb.read_bytes(), str(glb))
+    mesh = file.content["meshes"][file.content["nodes"][file.node(node)]["mesh"]]
+    indices = file.values(mesh["primitives"][0]["indices"])
+    return np.asarray(indices).reshape(-1, 3)
+
+
+def check_order(asset: Asset, written: Path) -> None:
+    """Each triangle is at its place; Godot turns all of them over."""
+    theirs = np.array(json.loads(written.read_text(encoding="utf-8"))).reshape(-1, 3)
+    ours = indices_of(asset.folder / "cards.glb", "cards_LOD0")
+    np.testing.assert_array_equal(np.sort(theirs, axis=1), np.sort(ours, axis=1))
+
+
+def ranges_of(asset: Asset) -> Any:
+    """From where to where each level is shown [m]: each begins where the last one ends, and that is
+    where the hair takes up the fraction of a screen that the file says; the last has no end."""
+    path = asset.folder / "cards.glb"
+    file = GlbFile.of(path.read_bytes(), str(path))
+    extras = file.content["nodes"][file.node("cards_LOD0")]["extras"]
+    sidecar = json.loads((asset.folder / "cards.hairloom.json").read_text(encoding="utf-8"))
+    bounds = sidecar["levels"][0]["bounds"]
+    height = float(np.subtract(bounds["maximum"], bounds["minimum"]).max())
+    tops = [
+        height / (2.0 * math.tan(math.radians(75.0 / 2.0)) * math.sqrt(each))
+        for each in extras["MSFT_screencoverage"][:-1]
+    ]
+    assert 0.0 < tops[0] < tops[1]
+    return [pytest.approx(each, rel=1e-5) for each in zip([0.0, *tops], [*tops, 0.0], strict=True)]
+
+
+def test_godot_draws_cards_as_we_do(asset: Asset, sandbox: str) -> None:
+    """Files that no editor has imported."""
+    project = godot_project(asset, "godot")
+    run_godot(sandbox, "--path", str(project), "--", str(project))
+    check(asset, project / "godot.png")
+    check_order(asset, project / "order.json")
+    shown = json.loads((project / "shown.json").read_text(encoding="utf-8"))
+    assert shown.pop("ranges") == ranges_of(asset)
     assert shown == {"plain": ["cards_LOD0"], "second": ["cards_LOD1"]}
+
+
+def test_a_game_that_godot_exported_draws_cards_as_we_do(asset: Asset, sandbox: str) -> None:
+    """Imported by the add-on, packed without the files themselves, played from elsewhere."""
+    project, game = godot_project(asset, "godot_editor"), asset.folder / "game"
+    game.mkdir()
+    said = run_godot(sandbox, "--path", str(project), "--import", window=False)
+    assert "WARNING" not in said and "ERROR" not in said, said
+    pack = game / "game.pck"
+    run_godot(sandbox, "--path", str(project), "--export-pack", "Pack", str(pack), window=False)
+    shutil.rmtree(project)
+    said = run_godot(sandbox, "--main-pack", str(pack), "--", str(game))
+    assert "WARNING" not in said and "ERROR" not in said, said
+    check(asset, game / "godot.png")
+    check_order(asset, game / "order.json")
+    shown = json.loads((game / "shown.json").read_text(encoding="utf-8"))
+    assert shown.pop("ranges") == ranges_of(asset)
+    assert shown == {"second": ["cards_LOD1"]}
 
 
 def test_three_js_draws_cards_as_we_do(asset: Asset, sandbox: str) -> None:
@@ -196,7 +266,7 @@ def test_three_js_draws_cards_as_we_do(asset: Asset, sandbox: str) -> None:
     shutil.copytree(HERE / "three", site)
     shutil.copytree(ENGINES, site / "hairloom")
     shutil.copytree(THREE, site / "three")
-    shutil.copytree(asset.folder, site / "asset", ignore=shutil.ignore_patterns("godot", "web"))
+    shutil.copytree(asset.folder, site / "asset", ignore=OF_ENGINES)
     shutil.copy2(REPOSITORY / "tools" / "draw_page.py", site)
     command = [sandbox, "run", "python3", str(site / "draw_page.py")]
     result = subprocess.run(command, capture_output=True, text=True, timeout=300)

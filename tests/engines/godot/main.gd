@@ -1,12 +1,15 @@
 extends Node3D
-## Draws asset/cards.glb as asset/view.json asks and saves it as godot.png; levels.json says which
-## meshes are shown by Godot alone, and as the loader's second level.
+## Draws asset/cards.glb as asset/view.json asks. Writes into the folder that the command line names
+## godot.png; shown.json: which meshes are shown as the loader's second level, and by Godot alone
+## where it finds the file, and from where to where each; order.json: the indices of the finest level.
+
+const Cards := preload("res://addons/hairloom/godot/hairloom_cards.gd")
+const GLB := "res://asset/cards.glb"
 
 
 func _ready() -> void:
 	var view: Dictionary = JSON.parse_string(FileAccess.get_file_as_string("res://asset/view.json"))
-	var hair: Node3D = load("res://hairloom/godot/hairloom_cards.gd").load_cards(
-			"res://asset/cards.glb")
+	var hair := Cards.load_cards(GLB, 0)
 	add_child(hair)
 	var camera := Camera3D.new()
 	add_child(camera)
@@ -24,18 +27,26 @@ func _ready() -> void:
 	surroundings.environment.background_mode = Environment.BG_COLOR
 	surroundings.environment.background_color = Color.BLACK
 	add_child(surroundings)
+	var output := OS.get_cmdline_user_args()[0]
+	var shown := {"second": _shown(Cards.load_cards(GLB, 1)), "ranges": _ranges(Cards.load_cards(GLB))}
+	if FileAccess.file_exists(GLB):
+		var document := GLTFDocument.new()
+		var state := GLTFState.new()
+		document.append_from_file(GLB, state)
+		shown["plain"] = _shown(document.generate_scene(state))
+	_write(output.path_join("shown.json"), shown)
+	var finest: MeshInstance3D = hair.find_child("cards_LOD0", true, false)
+	_write(output.path_join("order.json"), Array(finest.mesh.surface_get_arrays(0)[Mesh.ARRAY_INDEX]))
 	await RenderingServer.frame_post_draw
 	await RenderingServer.frame_post_draw
-	get_viewport().get_texture().get_image().save_png("res://asset/godot.png")
-	var document := GLTFDocument.new()
-	var state := GLTFState.new()
-	document.append_from_file("res://asset/cards.glb", state)
-	var shown := {"plain": _shown(document.generate_scene(state)), "second": _shown(
-			load("res://hairloom/godot/hairloom_cards.gd").load_cards("res://asset/cards.glb", 1))}
-	var file := FileAccess.open("res://asset/levels.json", FileAccess.WRITE)
-	file.store_string(JSON.stringify(shown))
-	file.close()
+	get_viewport().get_texture().get_image().save_png(output.path_join("godot.png"))
 	get_tree().quit()
+
+
+func _write(path: String, content: Variant) -> void:
+	var file := FileAccess.open(path, FileAccess.WRITE)
+	file.store_string(JSON.stringify(content))
+	file.close()
 
 
 func _shown(scene: Node) -> Array:
@@ -44,6 +55,15 @@ func _shown(scene: Node) -> Array:
 	var names := visible.map(func(mesh): return String(mesh.name))
 	scene.free()
 	return names
+
+
+## Of each mesh, in order: where it begins and ends to be shown [m].
+func _ranges(scene: Node) -> Array:
+	var meshes := scene.find_children("*", "MeshInstance3D", true, false)
+	var ranges := meshes.map(
+			func(mesh): return [mesh.visibility_range_begin, mesh.visibility_range_end])
+	scene.free()
+	return ranges
 
 
 func _vector(values: Array) -> Vector3:
