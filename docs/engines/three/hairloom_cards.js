@@ -15,25 +15,49 @@ const TEXTURES = { base: 255, alpha: 255, shift: 128, noise: 255, tangent: 128, 
 const TABLES = ['longitudinal', 'azimuthal', 'paths'];
 const REPEATED = ['shift', 'noise'];
 
-// Options: level (0 the finest), shading (address of hair_shading.gdshaderinc).
-export async function loadHairloomCards(url, { level = 0, shading = SHADING } = {}) {
+// of a distance: nothing flickers where a level takes over
+const HYSTERESIS = 0.05;
+
+// Options: level (0 the finest; without it a THREE.LOD shows each from the distance at which it takes
+// over), fieldOfView (of the camera for which these distances are, in degrees), shading (address of
+// hair_shading.gdshaderinc).
+export async function loadHairloomCards(url, { level, fieldOfView = 50, shading = SHADING } = {}) {
   const address = new URL(url, document.baseURI);
   const [sidecar, formulas, gltf] = await Promise.all([
     fetch(address.href.replace(/\.glb$/, '.hairloom.json')).then((file) => file.json()),
     fetch(shading).then((file) => file.text()),
     new GLTFLoader().loadAsync(address.href),
   ]);
-  const [uniforms, backIndex] = await Promise.all([
-    uniformsOf(sidecar, address),
-    backIndexOf(sidecar, sidecar.levels[level], address),
-  ]);
-  // Coarser levels are no part of the scene (MSFT_lod), so the node is asked for by its number.
-  const { nodes } = gltf.parser.json;
-  const number = nodes.findIndex(({ name }) => name === sidecar.levels[level].node);
-  const node = await gltf.parser.getDependency('node', number);
-  const hair = new THREE.Group();
-  hair.add(...passesOf(node, sidecar, backIndex, formulas, uniforms));
+  const uniforms = await uniformsOf(sidecar, address);
+  const groupOf = async (each) => {
+    // Coarser levels are no part of the scene (MSFT_lod), so the node is asked for by its number.
+    const node = await gltf.parser.getDependency('node', numberOf(gltf, each));
+    const backIndex = await backIndexOf(sidecar, each, address);
+    const group = new THREE.Group();
+    group.add(...passesOf(node, sidecar, backIndex, formulas, uniforms));
+    return group;
+  };
+  if (level !== undefined) return groupOf(sidecar.levels[level]);
+  const groups = await Promise.all(sidecar.levels.map(groupOf));
+  const begins = beginsOf(gltf, sidecar, fieldOfView);
+  const hair = new THREE.LOD();
+  groups.forEach((group, number) => hair.addLevel(group, begins[number], HYSTERESIS));
   return hair;
+}
+
+function numberOf(gltf, { node }) {
+  return gltf.parser.json.nodes.findIndex(({ name }) => name === node);
+}
+
+// From what distance each level is shown: where the hair takes up the fraction of the screen that the
+// file has for the level before.
+function beginsOf(gltf, { levels }, fieldOfView) {
+  const { minimum, maximum } = levels[0].bounds;
+  const size = Math.max(...maximum.map((high, axis) => high - minimum[axis]));
+  const slope = 2 * Math.tan(THREE.MathUtils.degToRad(fieldOfView) / 2);
+  const { extras } = gltf.parser.json.nodes[numberOf(gltf, levels[0])];
+  const coverage = extras?.MSFT_screencoverage ?? [];
+  return levels.map((_, number) => (number ? size / (slope * Math.sqrt(coverage[number - 1])) : 0));
 }
 
 // The same triangles once for each pass of the sidecar, in its order. Each pass has its own states, and
