@@ -53,18 +53,20 @@ from .refine.lead_out import (
 from .refine.lead_out_at_rest import led_out_at_rest
 from .refine.ride import Riders, ride
 from .refine.thinning import even_ranks
-from .shading.ambient import ambient_occlusion, skin_occlusion
+from .shading.ambient import ambient_occlusion, openness, skin_occlusion
 from .shading.ambient_settings import AmbientSettings
 from .shading.strand_noise import SEED_LIMIT
 from .strands import StrandSet, Surface
 from .strands.arc_length import typical
 from .strands.center_lines import center_lines, curl_room
 from .strands.face import is_face_hair
+from .strands.frames import strand_tangents, volume_normals
 from .strands.join import joined
 from .strands.kept import NOTHING_KEPT, Kept
 from .strands.needed_points import LOST, MAX_POINTS, with_needed_points
 from .strands.resample import resample
 from .strands.root_motions import RootMotions
+from .strands.vectors import dot
 
 NO_WIND = np.zeros(3)
 #: Of children that cannot be led out of the head, the part from which on a note says so.
@@ -702,6 +704,24 @@ def rest_occlusion(rig: Rig, settings: AmbientSettings, points: Floats | None = 
     return ambient_occlusion(
         strands, strands.points if points is None else points, rig.head, settings
     )
+
+
+def rest_openness(rig: Rig, settings: AmbientSettings) -> Floats:
+    """How open every point is by direction at rest, (point_count, 4), see `ambient.openness`: the
+    mean, and a vector along the strand, along its normal of the hair's volume, and across both.
+
+    It turns with the strand, so it holds while hair moves as far as occlusion does.
+    """
+    strands, extinction = rig.strands, rig.widths.extinction
+    found = openness(strands, strands.points, rig.head, extinction, settings.cell_count)
+    if not strands.strand_count:
+        return found
+    tangent = strand_tangents(strands.points, strands.offsets)
+    center = strands.roots.mean(axis=0, dtype=np.float64).astype(np.float32)
+    normal = volume_normals(strands.points, tangent, center)
+    axes = tangent, normal, np.cross(tangent, normal)
+    found[:, 1:] = np.stack([dot(found[:, 1:], axis) for axis in axes], axis=-1)
+    return found
 
 
 def head_occlusion(rig: Rig, settings: AmbientSettings) -> Floats | None:

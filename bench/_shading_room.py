@@ -124,6 +124,24 @@ class CyclesRoom:
         self._sun.data.energy = strength
         self._sun.rotation_euler = Vector(towards).to_track_quat("Z", "Y").to_euler()
 
+    @property
+    def blender_world(self) -> Any:
+        return self._scene.world
+
+    def world(self, radiance: np.ndarray) -> None:
+        """Light from all around, as an Environment Texture: (rows, columns, 3), row 0 below."""
+        tree, (rows, columns) = self._scene.world.node_tree, radiance.shape[:2]
+        image = bpy.data.images.new("Panorama", columns, rows, float_buffer=True)
+        image.colorspace_settings.name = "Linear Rec.709"
+        pixels = np.concatenate([radiance, np.ones_like(radiance[..., :1])], axis=-1)
+        image.pixels.foreach_set(pixels.astype(np.float32).ravel())
+        image.update()
+        background = tree.nodes["Background"]
+        background.inputs["Strength"].default_value = 1.0
+        node = tree.nodes.get("Panorama") or tree.nodes.new("ShaderNodeTexEnvironment")
+        node.name, node.image = "Panorama", image
+        tree.links.new(node.outputs["Color"], background.inputs["Color"])
+
     def hair(self, absorption: tuple[float, float, float], **inputs: float) -> None:
         """Principled Hair's inputs by their names, with _ for a space; angles in radians."""
         self._node.inputs["Absorption Coefficient"].default_value = absorption

@@ -142,9 +142,7 @@ def cycles_figures() -> dict[str, float]:
     room.sun(SUN, STRENGTH)
     pairs = {}
     for name, absorption in COLORS.items():
-        node = PrincipledHair(parametrization="ABSORPTION", absorption_coefficient=absorption)
-        plain = replace(ShadingSettings(), **dict.fromkeys(_UNKNOWN, 0.0))
-        shading, _ = settings_from(node, plain)
+        node, shading = plain_look(absorption)
         dark = replace(StageSettings(), **dict.fromkeys(_UNLIT, (0.0, 0.0, 0.0)))
         settings = GroomSettings().with_settings(shading, dark)
         sun = (Light.sun(-SUN, (1.0, 1.0, 1.0), STRENGTH),)
@@ -169,6 +167,13 @@ def cycles_figures() -> dict[str, float]:
             f"cycles_light_{name}_{channel}": float(light[n]) for n, channel in enumerate("rgb")
         }
     return {"cycles_flip_hair": max(found[f"cycles_flip_{name}"] for name in COLORS), **found}
+
+
+def plain_look(absorption: tuple[float, float, float]) -> tuple[PrincipledHair, ShadingSettings]:
+    """Principled Hair as it comes, and a look without what it does not know."""
+    node = PrincipledHair(parametrization="ABSORPTION", absorption_coefficient=absorption)
+    plain = replace(ShadingSettings(), **dict.fromkeys(_UNKNOWN, 0.0))
+    return node, settings_from(node, plain)[0]
 
 
 def _picture(

@@ -5,10 +5,12 @@ shadow is, the picture has to be the engine's own; where our raster of a mesh an
 disagree, hair is cut off wrongly. Depth of field and motion blur are compared by what the same
 strands, with the same widths, cover of each pixel.
 
+What part environment compares is said in _picture_environment.
+
 Exit code 1: a limit is missed.
 
 make bench NAME=picture
-tools/bench.py picture eevee blur      some parts
+tools/bench.py picture eevee environment      some parts
 """
 
 from __future__ import annotations
@@ -25,6 +27,7 @@ import bpy
 import flip_evaluator
 import numpy as np
 import OpenImageIO as oiio
+from _picture_environment import environment
 from _report import start, tell
 
 import hairloom
@@ -46,6 +49,8 @@ MOST = {
     "over_eevee_seconds_ratio": 1.0,
     "dof_flip": 0.05,
     "motion_flip": 0.05,
+    "environment_flip_hair": 0.15,
+    "environment_light_percent": 10.0,
 }
 
 type Passes = dict[str, np.ndarray]
@@ -174,12 +179,14 @@ def _cover_flip(scene: Any) -> float:
 
 def main() -> int:
     start()
-    parts = sys.argv[1:] or [*ENGINES, "blur"]
+    parts = sys.argv[1:] or [*ENGINES, "blur", "environment"]
     found: dict[str, Any] = {}
     for name in ENGINES:
         found |= over(name) if name in parts else {}
     if "blur" in parts:
         found |= blur()
+    if "environment" in parts:
+        found |= environment()
     missed = {name: most for name, most in MOST.items() if found.get(name, 0.0) > most}
     tell({**found, "limits_missed": sorted(missed)}, REFERENCE)
     return 1 if missed else 0

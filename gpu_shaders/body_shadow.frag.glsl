@@ -3,6 +3,7 @@
 //
 // What a colour of the picture becomes depends on its view transform; a middle grey stands for all.
 #include "lib_lights.glsl"
+#include "lib_environment.glsl"
 #include "lib_shadows.glsl"
 #include "lib_output.glsl"
 
@@ -20,7 +21,7 @@ void main()
   vec3 to_eye = view.eye.xyz - view.eye.w * mesh_point;
   vec3 normal = normalize(mesh_normal);
   normal = dot(normal, to_eye) < 0.0 ? -normal : normal;
-  vec3 all_light = lights.ambient_and_count.xyz;
+  vec3 all_light = matt_light(lights, normal);
   vec3 left = all_light;
   for (int index = 0; index < int(lights.ambient_and_count.w); index++) {
     vec3 to_light, irradiance;

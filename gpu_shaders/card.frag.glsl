@@ -16,6 +16,7 @@ void main()
 }
 #else
 #  include "lib_lights.glsl"
+#  include "lib_environment.glsl"
 #  include "lib_card.glsl"
 #  include "lib_hair_light.glsl"
 #  include "lib_card_shadows.glsl"
@@ -59,7 +60,14 @@ void main()
   vec3 hair = card_base(along, shading) * base;
 #  endif
 
-  vec3 radiance = hair * shading.ambient * lights.ambient_and_count.xyz * card_occlusion;
+#  if HARMONICS
+  vec4 openness = 0.5 * card_occlusion * vec4(1.0, normal);
+  vec3 radiance = hair_ambient(
+      openness, tangent, normal, to_eye, shift_noise, sparkle_noise, hair, absorption);
+#  else
+  vec3 radiance = hair * lights.ambient_and_count.xyz * card_occlusion;
+#  endif
+  radiance *= shading.ambient;
   for (int index = 0; index < int(lights.ambient_and_count.w); index++) {
     vec3 to_light, irradiance;
     light_at(lights, index, card_point, to_light, irradiance);

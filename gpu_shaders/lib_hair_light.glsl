@@ -2,6 +2,7 @@
 // model that the program holds, and with SCATTERING from strand to strand.
 //
 // Reads the blocks `shading` and `fibre`, and the textures that their features declare.
+#include "lib_environment.glsl"
 #include "lib_kajiya_kay.glsl"
 #if MARSCHNER
 #  include "lib_marschner.glsl"
@@ -63,3 +64,35 @@ vec3 hair_light(vec3 tangent,
          kajiya_kay(tangent, normal, to_light, to_eye, shift_noise, sparkle_noise, shading);
 #endif
 }
+
+#if HARMONICS
+// What hair sends to the eye of the world's light. openness: see open_path.
+vec3 hair_ambient(vec4 openness,
+                  vec3 tangent,
+                  vec3 normal,
+                  vec3 to_eye,
+                  float shift_noise,
+                  float sparkle_noise,
+                  vec3 hair,
+                  vec3 absorption)
+{
+  // an eighth of all directions blurs every highlight
+  float level = 8.0;
+  vec3 radiance = vec3(0.0);
+  for (int corner = 0; corner < 8; corner++) {
+    vec3 towards = corner_direction(corner);
+    vec3 path = vec3(open_path(openness, towards), 1.0);
+    radiance += corner_light(lights, corner) * hair_light(tangent,
+                                                          normal,
+                                                          towards,
+                                                          to_eye,
+                                                          shift_noise,
+                                                          sparkle_noise,
+                                                          hair,
+                                                          absorption,
+                                                          level,
+                                                          path);
+  }
+  return radiance;
+}
+#endif

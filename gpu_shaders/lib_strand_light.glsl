@@ -6,6 +6,7 @@
 //
 // Reads the blocks `view`, `lights`, `strands`, `shading`, `fibre`, and the textures of their features.
 #include "lib_lights.glsl"
+#include "lib_environment.glsl"
 #include "lib_strand_noise.glsl"
 #include "lib_hair_light.glsl"
 
@@ -34,6 +35,7 @@ vec3 strand_radiance(vec3 point,
                      float radius,
                      float along,
                      float occlusion,
+                     vec4 openness,
                      vec4 between,
                      vec4 own,
                      uint seed)
@@ -66,7 +68,20 @@ vec3 strand_radiance(vec3 point,
   vec3 hair = strand_base(tinted, color_noise, grey_noise, shading, root);
 #endif
 
-  vec3 radiance = hair * shading.ambient * lights.ambient_and_count.xyz * occlusion;
+  vec3 radiance = vec3(0.0);
+#if HARMONICS
+#  ifdef OPENNESS
+  vec3 bent = tangent * openness.y + normal * openness.z + cross(tangent, normal) * openness.w;
+  openness = vec4(openness.x, bent);
+#  else
+  openness = 0.5 * occlusion * vec4(1.0, unit_or(point - volume_center, normal));
+#  endif
+  radiance = hair_ambient(
+      openness, tangent, normal, to_eye, shift_noise, sparkle_noise, hair, absorption);
+#else
+  radiance = hair * lights.ambient_and_count.xyz * occlusion;
+#endif
+  radiance *= shading.ambient;
   for (int index = 0; index < int(lights.ambient_and_count.w); index++) {
     vec3 to_light, irradiance;
     light_at(lights, index, point, to_light, irradiance);

@@ -4,6 +4,7 @@
 // shadow is looked up where it has been spread. PICTURES of the material take the place of its colour,
 // and bend its normals. HASHED and BLENDED: it does not cover all.
 #include "lib_lights.glsl"
+#include "lib_environment.glsl"
 #include "lib_microfacet.glsl"
 #include "lib_shadows.glsl"
 #include "lib_output.glsl"
@@ -74,7 +75,8 @@ void main()
 #endif
   float reflected = reflected_fraction(dot(normal, to_eye), mesh_specular, mesh_roughness);
   vec3 matt = base * (1.0 - reflected);
-  vec3 radiance = (matt + reflected) * lights.ambient_and_count.xyz * mesh_occlusion;
+  vec3 mirrored = light_from(lights, reflect(-to_eye, normal), vec2(1.0));
+  vec3 radiance = (matt * matt_light(lights, normal) + reflected * mirrored) * mesh_occlusion;
 #ifdef OTHER_TAU
   vec4 between = texelFetch(inter_groom_shadow, ivec2(gl_FragCoord.xy), 0);
 #endif

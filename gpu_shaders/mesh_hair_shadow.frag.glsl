@@ -2,6 +2,7 @@
 // surface still gets, 1 where hair takes nothing. What other meshes keep out counts neither way.
 // OTHER_TAU, SKIN, HASHED and BLENDED as in mesh.frag.glsl; of PICTURES only alpha counts.
 #include "lib_lights.glsl"
+#include "lib_environment.glsl"
 #include "lib_shadows.glsl"
 #ifdef SKIN
 #  include "lib_skin.glsl"
@@ -45,7 +46,7 @@ void main()
 #ifdef OTHER_TAU
   vec4 between = texelFetch(inter_groom_shadow, ivec2(gl_FragCoord.xy), 0);
 #endif
-  vec3 all_light = lights.ambient_and_count.xyz * mesh_occlusion;
+  vec3 all_light = matt_light(lights, normal) * mesh_occlusion;
   vec3 left = all_light;
   for (int index = 0; index < int(lights.ambient_and_count.w); index++) {
     vec3 to_light, irradiance;

@@ -45,15 +45,26 @@ void main()
   vec3 radiance = debug_radiance(tangent, seed);
 #else
   vec2 place = strand_along_and_occlusion;
-  vec4 between = vec4(0.0), own = vec4(0.0);
+  vec4 between = vec4(0.0), own = vec4(0.0), openness = vec4(0.0);
 #  ifdef OTHER_TAU
   between = strand_other_tau;
 #  endif
 #  ifdef OWN_COLOR
   own = strand_own_color;
 #  endif
-  vec3 radiance = strand_radiance(
-      strand_point, tangent, vec3(0.0), strand_radius, place.x, place.y, between, own, seed);
+#  ifdef OPENNESS
+  openness = strand_openness;
+#  endif
+  vec3 radiance = strand_radiance(strand_point,
+                                  tangent,
+                                  vec3(0.0),
+                                  strand_radius,
+                                  place.x,
+                                  place.y,
+                                  openness,
+                                  between,
+                                  own,
+                                  seed);
 #endif
   color = vec4(output_encoded(radiance, output_encoding), 1.0);
 }

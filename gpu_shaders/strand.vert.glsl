@@ -77,6 +77,10 @@ void main()
   strand_other_tau =
       mix(texelFetch(cv_other_tau, root_side, 0), texelFetch(cv_other_tau, tip_side, 0), u);
 #  endif
+#  ifdef OPENNESS
+  strand_openness =
+      mix(texelFetch(cv_openness, root_side, 0), texelFetch(cv_openness, tip_side, 0), u);
+#  endif
 #  ifdef OWN_COLOR
   strand_own_color =
       mix(texelFetch(cv_colors, root_side, 0), texelFetch(cv_colors, tip_side, 0), u);

@@ -12,4 +12,5 @@ struct Lights {
   vec4 across[{{light_capacity}}];           // least squared distance, or half width
   vec4 upward[{{light_capacity}}];           // middle of a cone's rim in 1 - cos, or half height
   vec4 along[{{light_capacity}}];            // half width of that rim, or tangent of half a spread
+  vec4 harmonics[{{harmonic_count}}];        // xyz how the radiance of the world differs by direction
 };

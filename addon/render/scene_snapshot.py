@@ -38,7 +38,7 @@ class SceneSnapshot:
 
     casters: meshes that throw shadows, seen or not, world space.
     mesh_shadows: of meshes on meshes.
-    ambient: the world's colour [W/(m^2 sr)].
+    ambient, harmonics: the world's, see Snapshot.
     """
 
     meshes: tuple[MeshSnapshot, ...] = ()
@@ -46,6 +46,7 @@ class SceneSnapshot:
     grooms: tuple[DrawnGroom, ...] = ()
     lights: tuple[Light, ...] = ()
     ambient: Color = (0.0, 0.0, 0.0)
+    harmonics: Floats | None = None
     mesh_shadows: MeshShadowSettings = field(default_factory=MeshShadowSettings)
     _lit: dict[Hashable, Snapshot] = field(default_factory=dict, init=False, repr=False)
 
@@ -62,13 +63,20 @@ class SceneSnapshot:
                 casters=others,
                 lights=self.lights,
                 ambient=self.ambient,
+                harmonics=self.harmonics,
             )
         return self._lit[groom.key]
 
     def unlit_by_hair(self) -> Snapshot:
         """Nothing but light, for meshes that no hair shades."""
         none = np.zeros((0, 3), np.float32)
-        return Snapshot(none, none[:, 0], lights=self.lights, ambient=self.ambient)
+        return Snapshot(
+            none,
+            none[:, 0],
+            lights=self.lights,
+            ambient=self.ambient,
+            harmonics=self.harmonics,
+        )
 
 
 def shaded_by(meshes: tuple[MeshSnapshot, ...], centers: Floats) -> list[int]:

@@ -35,7 +35,7 @@ from ..refine.hold import NEAR, SWEEPS
 from ..refine.settings import DetailSettings
 from ..shading.card_look import DARKEST, MEAN_FACING
 from ..shading.card_texture import LEVELS, SLACK
-from ..shading.lights import LIGHT_CAPACITY
+from ..shading.lights import HARMONIC_COUNT, LIGHT_CAPACITY
 from ..shading.microfacet import MIN_ROUGHNESS
 from ..shading.skin.diffusion import KERNEL_REACH, KERNEL_TAPS, SKIN_LIGHTS
 from ..shading.skin.layout import CLOSING
@@ -97,6 +97,7 @@ DETAIL_CHOICES = {
 CONSTANTS: Mapping[str, str] = MappingProxyType(
     {
         "light_capacity": str(LIGHT_CAPACITY),
+        "harmonic_count": str(HARMONIC_COUNT),
         "min_roughness": repr(MIN_ROUGHNESS),
         "strand_rows": str(STRAND_ROWS),
         "pinned": str(PINNED),

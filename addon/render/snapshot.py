@@ -30,7 +30,14 @@ type Color = tuple[float, float, float]
 #: how meshes that do not cover all are drawn
 TRANSPARENCIES = ("opaque", "hashed", "blended")
 #: what a snapshot has of each point, and its channels
-_OF_POINTS = {"points": (3,), "radius": (), "along": (), "occlusion": (), "color": (3,)}
+_OF_POINTS = {
+    "points": (3,),
+    "radius": (),
+    "along": (),
+    "occlusion": (),
+    "openness": (4,),
+    "color": (3,),
+}
 SKIN: Color = (0.55, 0.38, 0.31)
 #: an index of refraction of 1.4 gives ((1.4 - 1) / (1.4 + 1))^2
 SKIN_SPECULAR, SKIN_ROUGHNESS = 0.028, 0.45
@@ -162,11 +169,14 @@ class Snapshot:
     extinction, spacing: factor on the light that a strand blocks, and how far apart [m] the strands
         are whose hairs fill the space between them, see `groom.widths.Widths`.
     occlusion: (point_count,) ambient light that arrives, 0 to 1; None is 1 everywhere.
+    openness: (point_count, 4), how much of the world's light comes straight to each point, by
+        direction, see pipeline.rest_openness; None is what occlusion and the hair's volume say.
     color: (point_count, 3) scene-linear, the strands' own; None is the look's, and so is NaN, all
         along a strand. Counts where the look wants it, see drawn_strands.drawn_color.
     seed: (strand_count,) whole numbers below 2^24, which the noise of a strand depends on; None is
         each strand's index.
-    ambient: the world's colour [W/(m^2 sr)].
+    ambient, harmonics: the world's mean radiance [W/(m^2 sr)], and how it differs by direction,
+        (8, 3), see shading/environment.py; None is not at all.
     volume_center: (3,) [m], what strands look away from; None is the middle of all roots.
     device_points: the same strands where the GPU has moved them; they are drawn in place of
         `points` and `radius`, which then only say how large the hair is.
@@ -190,10 +200,12 @@ class Snapshot:
     points: Floats
     radius: Floats
     occlusion: Floats | None = None
+    openness: Floats | None = None
     seed: Ints | None = None
     meshes: tuple[MeshSnapshot, ...] = ()
     lights: tuple[Light, ...] = ()
     ambient: Color = (0.05, 0.05, 0.05)
+    harmonics: Floats | None = None
     shading: ShadingSettings = field(default_factory=ShadingSettings)
     strand_settings: StrandSettings = field(default_factory=StrandSettings)
     detail: DetailSettings = field(default_factory=DetailSettings)
@@ -224,6 +236,7 @@ class Snapshot:
             "radius": points,
             "along": points,
             "occlusion": points,
+            "openness": (*points, 4),
             "color": (*points, 3),
             "seed": strands,
             "guide": strands,

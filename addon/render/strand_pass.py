@@ -241,6 +241,8 @@ class StrandPass:
             return
         if "cv_colors" in self._textures:
             yield self._color_feature()
+        if "cv_openness" in self._textures:
+            yield self._openness_feature()
         is_marschner, maps = snapshot.shading.model == "marschner", self.opacity(snapshot)
         if is_marschner:
             yield marschner_feature(snapshot)
@@ -274,6 +276,15 @@ class StrandPass:
             defines={"OWN_COLOR": 1},
         )
 
+    def _openness_feature(self) -> ShaderFeature:
+        """What a program has that knows from where the world's light comes to strands."""
+        return ShaderFeature(
+            name="open",
+            textures={"cv_openness": ("FLOAT_2D", self._textures["cv_openness"])},
+            varyings=(("smooth", "VEC4", "strand_openness"),),
+            defines={"OPENNESS": 1},
+        )
+
     def _debug_feature(self, debug_view: str) -> ShaderFeature:
         """What a program has that shows a debug view."""
         numbers = {"debug_numbers": ("FLOAT_2D", self._textures.get("debug_numbers"))}
@@ -305,6 +316,12 @@ class StrandPass:
             chosen = (look.color_source, look.brow_source, look.brow_color)
             sources = (snapshot.color, snapshot.group, layout, chosen)
             self._take("cv_colors", sources, partial(_colors_texture, snapshot))
+        openness = snapshot.openness
+        if snapshot.harmonics is None or openness is None:
+            self._drop("cv_openness")
+        else:
+            pixels = partial(layout.pixels, openness)
+            self._take("cv_openness", (openness, layout), lambda: texture_from(pixels(), "RGBA16F"))
         if snapshot.debug_view in NUMBERED_VIEWS:
             numbers = getattr(snapshot, snapshot.debug_view)
             shown = (numbers, layout)

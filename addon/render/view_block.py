@@ -19,10 +19,12 @@ def view_feature(camera: Camera, width: int, height: int) -> ShaderFeature:
 def lights_feature(snapshot: Snapshot) -> ShaderFeature:
     """The block `Lights`, and what kinds of them a program has to know."""
     kinds = kinds_needed(kept_lights(snapshot.lights))
+    is_directional = snapshot.harmonics is not None
+    block = pack_lights(snapshot.lights, snapshot.ambient, snapshot.harmonics)
     return ShaderFeature(
-        name=str(kinds),
-        blocks={"lights": ("Lights", pack_lights(snapshot.lights, snapshot.ambient))},
-        defines={"LIGHT_KINDS": kinds},
+        name=f"{kinds}{is_directional:d}",
+        blocks={"lights": ("Lights", block)},
+        defines={"LIGHT_KINDS": kinds, "HARMONICS": int(is_directional)},
     )
 
 

@@ -1,5 +1,7 @@
 """Ambient occlusion of hair: how much of the sky's light reaches a point through hair and body.
 
+Also by direction, for light that is not the same from everywhere: see `openness`.
+
 The hair becomes a grid of extinction coefficients, light dies in it by Beer and Lambert's law,
 and the 26 directions to a cell's neighbours stand for all directions with the weights of
 Lebedev's quadrature of degree 7 (Lebedev 1976). The optical depth along each direction is one
@@ -44,14 +46,45 @@ def ambient_occlusion(
     if not strands.strand_count or not len(points):
         return np.ones(len(points), np.float32)
     grid = grid_around(strands, settings.cell_count)
-    depth = hair_depth(strands, grid) * np.float32(settings.extinction)
-    if body is not None:
-        whole = grid.in_blocks()
-        of_body = body.latest(_body_depth, whole.low, whole.cell, whole.shape)
-        depth = np.maximum(depth, grid.part(of_body, whole))
-    openness = sky_openness(depth, settings.upper_fraction)
-    seen = sample(openness, grid.coordinates(points)) / settings.ao_bias
+    depth = _depth(strands, body, grid, settings.extinction)
+    open_sky = sky_openness(depth, settings.upper_fraction)
+    seen = sample(open_sky, grid.coordinates(points)) / settings.ao_bias
     return (1.0 - settings.strength * (1.0 - np.minimum(seen, 1.0))).astype(np.float32)
+
+
+def openness(
+    strands: StrandSet, points: Floats, body: Surface | None, extinction: float, cell_count: int
+) -> Floats:
+    """The fraction of the light from each direction w that comes straight to each point, as
+    q0 + q . w, (n, 4) float32: the mean over all directions, and a vector in world space.
+
+    Points lie on the light's side of their cells, as what is seen of hair does.
+
+    Args: see ambient_occlusion.
+    """
+    if not strands.strand_count or not len(points):
+        return np.tile(np.array([1.0, 0.0, 0.0, 0.0], np.float32), (len(points), 1))
+    grid = grid_around(strands, cell_count)
+    depth = _depth(strands, body, grid, extinction)
+    moments = np.zeros((4, *depth.shape), np.float32)
+    for step, weight in sky_directions(0.0):
+        through = weight * np.exp(-depth_towards(depth, step, own=0.0))
+        moments[0] += through
+        direction = 3.0 * np.array(step) / np.linalg.norm(step)
+        for moment, part in zip(moments[1:], direction, strict=True):
+            moment += np.float32(part) * through
+    places = grid.coordinates(points)
+    return np.stack([sample(moment, places) for moment in moments], axis=-1)
+
+
+def _depth(strands: StrandSet, body: Surface | None, grid: Grid, extinction: float) -> Floats:
+    """Optical depth of hair and body across each cell."""
+    depth = hair_depth(strands, grid) * np.float32(extinction)
+    if body is None:
+        return depth
+    whole = grid.in_blocks()
+    of_body = body.latest(_body_depth, whole.low, whole.cell, whole.shape)
+    return np.maximum(depth, grid.part(of_body, whole))
 
 
 def _body_depth(body: Surface, low: Floats, cell: float, shape: tuple[int, int, int]) -> Floats:
@@ -80,10 +113,11 @@ def sky_directions(upper_fraction: float) -> Iterator[tuple[Step, float]]:
     return ((step, float(weight)) for step, weight in zip(steps, fraction, strict=True) if weight)
 
 
-def depth_towards(depth: Floats, step: Step) -> Floats:
-    """Optical depth from each cell's centre out of the grid along one of 26 directions.
+def depth_towards(depth: Floats, step: Step, own: float = 0.5) -> Floats:
+    """Optical depth from each cell out of the grid along one of 26 directions.
 
-    Half of the own cell, then every cell on the way, each crossed over the length of the step.
+    A part of the own cell, from its centre half, then every cell on the way, each crossed over the
+    length of the step.
     """
     axis = int(np.argmax(np.abs(step)))
     others = [step[other] for other in range(3) if other != axis]
@@ -93,7 +127,7 @@ def depth_towards(depth: Floats, step: Step) -> Floats:
     beyond = np.zeros(layers.shape, np.float32)
     for index in range(1, len(layers)):
         _add_shifted(beyond[index], beyond[index - 1] + layers[index - 1], others)
-    crossed = (beyond + 0.5 * layers) * np.float32(np.linalg.norm(step))
+    crossed = (beyond + np.float32(own) * layers) * np.float32(np.linalg.norm(step))
     return np.moveaxis(crossed[::-1] if step[axis] > 0 else crossed, 0, axis)
 
 

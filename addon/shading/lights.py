@@ -8,7 +8,8 @@ a sends out the radiance a E cos / pi, which is what a pixel shows.
   no longer grows; as Cycles has both.
 - A spot of power P is a point light of that power, of which only a cone is let through.
 - An area light of power P sends it out from one side of a panel, see area_lights.py.
-- The world is one colour [W/(m^2 sr)] from everywhere; a matt surface sends out a times it.
+- The world is radiance [W/(m^2 sr)] by direction, see environment.py; of one that is even a matt
+  surface sends out a times it.
 Colours are scene-linear Rec.709. Shadows are no matter of the lights.
 """
 
@@ -28,6 +29,8 @@ type Color = tuple[float, float, float]
 type Vector = tuple[float, float, float]
 
 LIGHT_CAPACITY = 8
+#: of orders 1 and 2, see environment.py
+HARMONIC_COUNT = 8
 #: closer to a point light than this its irradiance no longer grows [m]; far below any hair
 NEAREST_DISTANCE = 1.0e-6
 
@@ -70,6 +73,7 @@ class Light:
     panel: of an area light.
     casts_shadow: whether anything is in its way.
     name: by which the artist knows it.
+    of_world: it is a bright place of the world, and shines where the world does.
     """
 
     kind: Literal["sun", "point", "spot", "area"]
@@ -81,6 +85,7 @@ class Light:
     panel: Panel | None = None
     casts_shadow: bool = True
     name: str = field(default="", compare=False)
+    of_world: bool = False
 
     @classmethod
     def sun(
@@ -244,13 +249,18 @@ def kept_lights(lights: Sequence[Light]) -> list[Light]:
     return sorted(lights, key=lambda light: -sum(light.power) * _reach(light))[:LIGHT_CAPACITY]
 
 
-def pack_lights(lights: Sequence[Light], ambient: Sequence[float]) -> Floats:
-    """The block `Lights` of gpu_shaders/struct_lights.glsl in std140, (164,) float32."""
+def pack_lights(
+    lights: Sequence[Light], ambient: Sequence[float], harmonics: Floats | None = None
+) -> Floats:
+    """The block `Lights` of gpu_shaders/struct_lights.glsl in std140, (196,) float32."""
     kept = kept_lights(lights)
-    block = np.zeros((1 + 5 * LIGHT_CAPACITY, 4), np.float32)
+    block = np.zeros((1 + 5 * LIGHT_CAPACITY + HARMONIC_COUNT, 4), np.float32)
     block[0] = (*ambient, len(kept))
+    of_lights = block[1:-HARMONIC_COUNT]
     for index, light in enumerate(kept):
-        block[1 + index :: LIGHT_CAPACITY] = _lanes(light)
+        of_lights[index::LIGHT_CAPACITY] = _lanes(light)
+    if harmonics is not None:
+        block[-HARMONIC_COUNT:, :3] = harmonics
     return block.ravel()
 
 

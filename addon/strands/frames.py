@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..arrays import Floats
+from ..arrays import Floats, Ints
 from .vectors import unit_or
 
 _SMALLEST = 1.0e-6
@@ -25,6 +25,16 @@ def tangents(grid: Floats) -> Floats:
         flat = length[..., cv, 0] == 0.0
         unit[..., cv, :] = np.where(flat[..., None], unit[..., cv - 1, :], unit[..., cv, :])
     return unit
+
+
+def strand_tangents(points: Floats, offsets: Ints) -> Floats:
+    """Unit tangents from root to tip, (point_count, 3), of strands that lie one after the other."""
+    edge = np.zeros_like(points)
+    edge[:-1] = points[1:] - points[:-1]
+    edge[offsets[1:] - 1] = 0.0
+    both = edge.copy()
+    both[1:] += edge[:-1]
+    return unit_or(both, np.array([0.0, 0.0, 1.0]))
 
 
 def transported_normals(tangent: Floats, root_normal: Floats) -> Floats:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -11,9 +12,11 @@ import pytest
 
 from hairloom.addon.blender.preview import previews
 from hairloom.addon.blender.scene.lights import light_warnings, read_lights
+from hairloom.addon.blender.scene.world import studio_environment
 from hairloom.addon.blender.sessions.session import Session
 from hairloom.addon.blender.viewport.overlay import lit
 from hairloom.addon.render.snapshot import Snapshot
+from hairloom.addon.shading.environment import light_from
 from hairloom.addon.shading.lights import (
     LIGHT_CAPACITY,
     Light,
@@ -153,30 +156,70 @@ def test_a_scene_without_light_is_told_where_a_view_goes_by_it(
     assert not any("no light" in warning for warning in session.warnings)
 
 
-def test_hair_is_lit_as_blender_lights_the_rest_and_never_black() -> None:
-    """The studio's lights wherever the scene gives no light at all."""
-    studio, lamp, world = three_point_lights(np.eye(4)), Light.sun((0, 0, -1), (1, 1, 1), 1.0), 0.3
-    strands, radius = np.zeros((1, 2, 3), np.float32), np.ones((1, 2), np.float32)
+STUDIO_WORLDS = Path(bpy.utils.system_resource("DATAFILES")) / "studiolights" / "world"
 
-    def shown(kind: str, lights: bool, has_world: bool, lamps: Any, grey: float) -> Any:
-        names = ("type", "use_scene_lights", "use_scene_world")
-        names += ("use_scene_lights_render", "use_scene_world_render")
-        values = (kind, lights, has_world, lights, has_world)
-        shading = SimpleNamespace(**dict(zip(names, values, strict=True)))
-        ambient = (grey, grey, grey)
-        snapshot = lit(Snapshot(strands, radius, lights=lamps, ambient=ambient), shading, studio)
+
+def view(kind: str, lights: bool, has_world: bool, picture: str = "forest.exr") -> Any:
+    """The shading of a 3D view; without a picture of a world, as in Solid mode."""
+    names = ("type", "use_scene_lights", "use_scene_world")
+    names += ("use_scene_lights_render", "use_scene_world_render")
+    values = (kind, lights, has_world, lights, has_world)
+    light = SimpleNamespace(type="WORLD", path=str(STUDIO_WORLDS / picture)) if picture else None
+    return SimpleNamespace(
+        **dict(zip(names, values, strict=True)),
+        selected_studio_light=light,
+        studiolight_rotate_z=0.0,
+        studiolight_intensity=1.0,
+    )
+
+
+def bare(**values: Any) -> Snapshot:
+    """No hair in this light."""
+    return Snapshot(np.zeros((0, 2, 3), np.float32), np.ones((0, 2), np.float32), **values)
+
+
+def test_hair_is_lit_as_blender_lights_the_rest_and_never_black() -> None:
+    """By the view's own picture of a world where Blender lights by it, and by the studio's lights
+    wherever there is no light at all."""
+    studio, lamp, world = three_point_lights(np.eye(4)), Light.sun((0, 0, -1), (1, 1, 1), 1.0), 0.3
+    sun = Light("sun", (1.0, 0.0, 0.0), (2.0, 2.0, 2.0), of_world=True)
+
+    def shown(shading: Any, lamps: Any, grey: float) -> Any:
+        snapshot = lit(bare(lights=lamps, ambient=(grey, grey, grey)), shading, studio)
         return snapshot.lights, snapshot.ambient[0]
 
     plain = Snapshot.ambient[0]
-    assert shown("SOLID", True, True, (lamp,), world) == (studio, plain)
+    assert shown(view("SOLID", True, True), (lamp,), world) == (studio, plain)
     for kind in ("MATERIAL", "RENDERED"):
-        assert shown(kind, True, True, (lamp,), world) == ((lamp,), world)
-        assert shown(kind, True, False, (lamp,), world) == ((lamp,), plain)
-        assert shown(kind, False, True, (lamp,), world) == ((), world)
-        assert shown(kind, True, True, (), world) == ((), world)
-        assert shown(kind, False, False, (lamp,), world) == (studio, plain)
-        assert shown(kind, True, False, (), world) == (studio, plain)
-        assert shown(kind, True, True, (), 0.0) == (studio, plain)
+        picture = studio_environment(view(kind, False, False))
+        assert picture.ambient[0] > 0.0 and picture.harmonics is not None
+        assert shown(view(kind, True, True), (lamp, sun), world) == ((lamp, sun), world)
+        assert shown(view(kind, False, True), (lamp, sun), world) == ((sun,), world)
+        assert shown(view(kind, True, True), (), world) == ((), world)
+        of_picture = picture.ambient[0]
+        assert shown(view(kind, True, False), (lamp, sun), world) == (
+            (lamp, *picture.suns),
+            of_picture,
+        )
+        assert shown(view(kind, False, False), (lamp,), world) == (picture.suns, of_picture)
+        assert shown(view(kind, True, False, ""), (), world) == (studio, plain)
+        assert shown(view(kind, True, False, "none.exr"), (), world) == (studio, plain)
+        assert shown(view(kind, True, True), (), 0.0) == (studio, plain)
+
+
+def test_the_views_picture_turns_and_gets_brighter() -> None:
+    shading = view("MATERIAL", False, False, "sunset.exr")
+    still = studio_environment(shading)
+    assert studio_environment(shading) is still, "each is made once"
+    shading.studiolight_intensity = 2.0
+    assert studio_environment(shading).ambient == pytest.approx(2.0 * np.array(still.ambient))
+    shading.studiolight_intensity, shading.studiolight_rotate_z = 1.0, 0.5 * np.pi
+    turned = studio_environment(shading)
+    assert turned.ambient == pytest.approx(still.ambient)
+    # what a view looks up is turned by a quarter, so its light goes round the other way
+    x, y, z = np.eye(3)
+    assert light_from(turned, -y) == pytest.approx(light_from(still, x), rel=1e-3)
+    assert light_from(turned, z) == pytest.approx(light_from(still, z), rel=1e-3)
 
 
 def test_a_light_that_is_deleted_shines_no_longer(new_hair: Any, sphere: Any) -> None:

@@ -20,8 +20,9 @@ from ...shading.mesh_shadow_settings import MeshShadowSettings
 from ...shading.skin.notes import uv_notes
 from ..base.objects import head_of
 from ..properties.properties import settings_of
-from ..scene.lights import light_warnings, read_ambient, read_lights
+from ..scene.lights import light_warnings, read_lights
 from ..scene.mesh_materials import material_notes
+from ..scene.world import read_environment, world_notes
 from . import engine_hair, hair_scene
 from .engine_hair import HairNotMadeYetError
 from .engine_meshes import SOLID_TYPES, as_before, read_meshes
@@ -139,12 +140,15 @@ class SceneReader:
         if any(_has_soft_shadow(each.groom.snapshot) for each in grooms.values()):
             of_meshes += [note for each in read.values() for note in each.skin_notes]
         self.warnings = (*warnings, *dict.fromkeys(of_meshes), *light_warnings(depsgraph))
+        environment = read_environment(depsgraph.scene_eval, blocking=blocking)
+        self.warnings = (*self.warnings, *world_notes(depsgraph.scene_eval))
         return SceneSnapshot(
             meshes=tuple(drawn),
             casters=tuple(casters),
             grooms=found,
-            lights=read_lights(depsgraph, center),
-            ambient=read_ambient(depsgraph.scene_eval),
+            lights=read_lights(depsgraph, center, environment.suns),
+            ambient=environment.ambient,
+            harmonics=environment.harmonics,
             mesh_shadows=settings_of(depsgraph.scene.hairloom.mesh_shadows, MeshShadowSettings),
         )
 

@@ -154,11 +154,9 @@ class EngineView:
         shadows = settings_of(context.scene.hairloom.mesh_shadows, MeshShadowSettings)
         grooms = (*self._scene.grooms, *previewed)
         scene = replace(self._scene, grooms=grooms, mesh_shadows=shadows)
-        uses_lights, uses_world = uses_scene_light(space.shading)
-        if not uses_lights:
-            scene = replace(scene, lights=three_point_lights(camera.view))
-        if not uses_world:
-            scene = replace(scene, ambient=Snapshot.ambient)
+        used = uses_scene_light(space.shading)
+        if not all(used):
+            scene = overlay.lit(scene, space.shading, three_point_lights(camera.view))
         marks = (
             *(self._scene, shadows),
             *(drawing.snapshot for _, drawing in overlay.shown_in(context)),
@@ -166,7 +164,9 @@ class EngineView:
             *((groom.key, groom.is_holdout) for groom in previewed),
             camera.view.tobytes(),
             camera.projection.tobytes(),
-            (uses_lights, uses_world, render.film_transparent, render.filter_size, *size),
+            (*used, render.film_transparent, render.filter_size, *size),
+            (scene.lights, scene.ambient),
+            b"" if scene.harmonics is None else scene.harmonics.tobytes(),
         )
         return _Shown(scene, camera, marks)
 

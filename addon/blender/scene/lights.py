@@ -16,7 +16,9 @@ from ...shading.lights import LIGHT_CAPACITY, Cone, Light, light_irradiance
 type Color = tuple[float, float, float]
 
 
-def read_lights(depsgraph: bpy.types.Depsgraph, center: Floats) -> tuple[Light, ...]:
+def read_lights(
+    depsgraph: bpy.types.Depsgraph, center: Floats, suns: Sequence[Light] = ()
+) -> tuple[Light, ...]:
     """The up to eight visible lights that are brightest at a point, brightest first.
 
     Read as Cycles does, except for shadows, light linking, instanced lights, nodes other than a
@@ -24,8 +26,9 @@ def read_lights(depsgraph: bpy.types.Depsgraph, center: Floats) -> tuple[Light, 
 
     Args:
         center: (3,) [m], world space.
+        suns: those of the world.
     """
-    lights = list(_lights(depsgraph))
+    lights = [*_lights(depsgraph), *suns]
     return tuple(sorted(lights, key=lambda light: -_strength(light, center))[:LIGHT_CAPACITY])
 
 
@@ -79,18 +82,6 @@ def _open_shadings() -> Iterator[bpy.types.View3DShading]:
         for area in window.screen.areas:
             if area.type == "VIEW_3D":
                 yield area.spaces.active.shading
-
-
-def read_ambient(scene: bpy.types.Scene) -> Color:
-    """The world's plain colour [W/(m^2 sr)]; for an image or a sky, the Background's own colour."""
-    world = scene.world
-    if world is None:
-        return (0.0, 0.0, 0.0)
-    background = _node(world.node_tree, "BACKGROUND")
-    if background is None:
-        return _triple(world.color)
-    strength = background.inputs["Strength"].default_value
-    return _triple(channel * strength for channel in background.inputs["Color"].default_value)
 
 
 def _lights(depsgraph: bpy.types.Depsgraph) -> Iterator[Light]:

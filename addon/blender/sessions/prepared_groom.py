@@ -79,6 +79,7 @@ class PreparedGroom:
     rank: (strand_count,), see `pipeline.strand_ranks`; None where it was left out.
     occluders: spheres in the head that hide hair; None where it has none, or they were left out.
     is_placeholder: whether these are a few of its strands only, which are not seen.
+    openness: (point_count, 4), see `pipeline.rest_openness`; None where it was left out.
     """
 
     rig: Rig
@@ -87,6 +88,7 @@ class PreparedGroom:
     rank: Floats | None = None
     occluders: OccluderSpheres | None = None
     is_placeholder: bool = False
+    openness: Floats | None = None
 
     @cached_property
     def used(self) -> Ints:
@@ -187,9 +189,10 @@ def _drawn(
     if known is not None and not _same_hair(known.rig, rig):
         known = None
     if known is not None and known.occlusion is not None and known.ambient == ambient:
-        occlusion = known.occlusion
+        occlusion, openness = known.occlusion, known.openness
     else:
         occlusion = pipeline.rest_occlusion(rig, ambient)
+        openness = pipeline.rest_openness(rig, ambient)
     report("what the head hides")
     occluders = None if known is None else known.occluders
     if occluders is None and rig.head is not None and with_occluders:
@@ -197,7 +200,7 @@ def _drawn(
         corners = np.stack([roots.min(axis=0), roots.max(axis=0)])
         occluders = rig.head.latest(OccluderSpheres, corners)
     rank = pipeline.strand_ranks(rig)
-    return PreparedGroom(rig, ambient, occlusion, rank, occluders)
+    return PreparedGroom(rig, ambient, occlusion, rank, occluders, openness=openness)
 
 
 def placeholder(request: BuildRequest) -> PreparedGroom:

@@ -27,10 +27,10 @@ from ..properties.groom_settings import GroomSettings
 from ..scene.lights import (
     light_warnings,
     no_light_warnings,
-    read_ambient,
     read_lights,
     scene_lights_are_shown,
 )
+from ..scene.world import read_environment, world_notes
 from .prepared_groom import PreparedGroom
 from .solvers import Solver
 
@@ -44,6 +44,7 @@ def snapshot_of(groom: PreparedGroom) -> Snapshot:
         layout=StrandLayout(strands.offsets),
         along=uneven_along(strands.points, strands.offsets),
         occlusion=groom.occlusion,
+        openness=groom.openness,
         guide=np.ascontiguousarray(groom.rig.weights.guide[:, 0]),
         group=strands.group,
         rank=groom.rank,
@@ -153,12 +154,14 @@ class GroomPicture:
 
     def light(self, depsgraph: bpy.types.Depsgraph) -> None:
         """Take over the scene's lights and world."""
+        environment = read_environment(depsgraph.scene, blocking=bpy.app.background)
         self.snapshot = replace(
             self.snapshot,
-            lights=read_lights(depsgraph, self.snapshot.center),
-            ambient=read_ambient(depsgraph.scene),
+            lights=read_lights(depsgraph, self.snapshot.center, environment.suns),
+            ambient=environment.ambient,
+            harmonics=environment.harmonics,
         )
-        self._light_warnings = light_warnings(depsgraph)
+        self._light_warnings = (*light_warnings(depsgraph), *world_notes(depsgraph.scene))
 
     def show(self, rig: Rig, solver: Solver, settings: GroomSettings) -> None:
         """The hair where the solver has it."""

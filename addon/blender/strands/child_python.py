@@ -15,10 +15,9 @@ from functools import cache
 from pathlib import Path
 from subprocess import TimeoutExpired
 
-import bpy
-
 from ...exchange.files.child_process import python_program, run_child
 from ...exchange.strand_formats import ALEMBIC, USD, strand_format
+from ..base.blender_program import blender_command
 
 #: Packages whose files another process reads, and what of them must load there.
 _PACKAGES = {"numpy": "numpy", "alembic3d": "alembic3d", "pxr": "pxr.Usd"}
@@ -65,14 +64,6 @@ def python_for(path: Path) -> tuple[str, ...] | None:
         HairloomError: the file's suffix is of no format.
     """
     return python_command() if strand_format(path) in (ALEMBIC, USD) else None
-
-
-def blender_command() -> tuple[str, ...] | None:
-    """Blender itself as a Python; None where it is a module."""
-    if not bpy.app.binary_path:
-        return None
-    quietly = ("--background", "--factory-startup", "--python-exit-code", "1")
-    return (bpy.app.binary_path, *quietly, "--python-use-system-env", "--python")
 
 
 def _programs() -> Iterator[str]:

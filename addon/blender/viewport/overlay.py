@@ -20,13 +20,16 @@ from ...render.camera import Camera
 from ...render.card_pass import CardPass
 from ...render.display import Display
 from ...render.scene_pass import ONE_AT_A_TIME
+from ...render.scene_snapshot import SceneSnapshot
 from ...render.snapshot import Snapshot
 from ...render.strand_pass import Statistics, StrandPass
+from ...shading.environment import Environment, world_suns
 from ...shading.lights import Light, three_point_lights
 from ..base.objects import LayerKey, is_solid, layer_key, layers_with, spaces_without
 from ..base.redraw import redraw_panels, redraw_views
 from ..cards.show import as_shown, without_strands
 from ..scene.lights import uses_scene_light
+from ..scene.world import studio_environment
 from ..sessions.measures import FrameTimes
 from ..sessions.session import Session
 from ..sessions.snapshots import with_all_strands
@@ -321,16 +324,22 @@ def _shades_body(snapshot: Snapshot, space: Any) -> bool:
     return snapshot.volume.on_body and uses_lights and bool(snapshot.lights) and is_shown
 
 
-def lit(snapshot: Snapshot, shading: Any, studio: tuple[Light, ...]) -> Snapshot:
-    """By the scene's lights and world where Blender itself uses them; elsewhere, as there, by a
-    studio's. A scene that has no light and a black world has the studio's too, not black hair.
+def lit[Shown: (Snapshot, SceneSnapshot)](
+    shown: Shown, shading: Any, studio: tuple[Light, ...]
+) -> Shown:
+    """By the scene's lights and world where Blender itself uses them; instead of the world by the
+    view's own picture of one, where Blender shows that, and elsewhere, as there, by a studio's
+    lights. A scene that has no light and a black world has these too, not black hair.
     """
-    uses_lights, uses_world = uses_scene_light(shading)
-    lights = snapshot.lights if uses_lights else ()
-    ambient = snapshot.ambient if uses_world else Snapshot.ambient
-    if not lights and not (uses_world and any(ambient)):
-        return replace(snapshot, lights=studio, ambient=Snapshot.ambient)
-    return replace(snapshot, lights=lights, ambient=ambient)
+    used: tuple[bool, bool] = uses_scene_light(shading)
+    scene: Snapshot | SceneSnapshot = shown
+    own = Environment(scene.ambient, scene.harmonics, world_suns(scene.lights))
+    world: Environment = own if used[1] else studio_environment(shading)
+    lamps: tuple[Light, ...] = tuple(light for light in scene.lights if not light.of_world)
+    lights = (*(lamps if used[0] else ()), *world.suns)
+    if not lights and world.is_black:
+        return replace(shown, lights=studio, ambient=Snapshot.ambient, harmonics=None)
+    return replace(shown, lights=lights, ambient=world.ambient, harmonics=world.harmonics)
 
 
 def _fail(error: Exception) -> None:

@@ -8,6 +8,7 @@ import pytest
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.shading.area_lights import Panel
 from hairloom.addon.shading.lights import (
+    HARMONIC_COUNT,
     LIGHT_CAPACITY,
     Cone,
     Light,
@@ -142,9 +143,12 @@ def test_packed_lanes() -> None:
         Light.area((4.0, 5.0, 6.0), WHITE, 7.0, Panel(X, Y, DOWN, 0.5, 0.25)),
     )
     block = pack_lights(lights, (0.1, 0.2, 0.3)).reshape(-1, 4)
-    assert block.shape == (1 + 5 * LIGHT_CAPACITY, 4) and block.dtype == np.float32
+    assert block.shape == (1 + 5 * LIGHT_CAPACITY + HARMONIC_COUNT, 4)
+    assert block.dtype == np.float32 and not block[-HARMONIC_COUNT:].any()
     assert block[0] == pytest.approx([0.1, 0.2, 0.3, 4.0])
-    vector, power, across, upward, along = block[1:].reshape(5, LIGHT_CAPACITY, 4)[:, :4]
+    vector, power, across, upward, along = block[1:-HARMONIC_COUNT].reshape(5, LIGHT_CAPACITY, 4)[
+        :, :4
+    ]
     assert vector.tolist() == [[1, 0, 0, 0], [5, 6, 7, 1], [1, 2, 3, 2], [4, 5, 6, 3]]
     assert power[:2].tolist() == [[4.0, 2.0, 1.0, 0.0], [9.0, 9.0, 9.0, 0.25]]
     assert across[2:] == pytest.approx(np.array([[1, 0, 0, 1e-12], [1, 0, 0, 0.5]]), abs=1e-13)

@@ -1,0 +1,350 @@
+"""The light of a scene's world, by direction: an Environment of its nodes.
+
+A plain colour is one; an Environment Texture, turned by a Mapping, is read from its image; whatever
+else there is, such as a Sky Texture, another Blender renders as a small panorama, once for each
+state of the nodes. In the window that is done beside it, and the world is its plain colour until
+then.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import tempfile
+import zlib
+from collections.abc import Callable, Hashable
+from dataclasses import dataclass
+from functools import lru_cache, partial
+from pathlib import Path
+from subprocess import TimeoutExpired
+from typing import Any
+
+import bpy
+import numpy as np
+from mathutils import Euler, Vector
+
+from ...arrays import Floats
+from ...errors import HairloomError
+from ...exchange.files.child_process import python_program, run_child
+from ...exchange.textures.texture_files import read_texture
+from ...shading.environment import Environment, environment_of, reduced
+from ..base.blender_program import blender_command
+from ..base.images import read_image
+from ..base.latest_job import LatestJob
+
+_SCRIPT = Path(__file__).with_name("render_panorama.py")
+#: states of worlds that are kept, so that an animated one does not fill the memory
+_KEPT = 16
+#: seconds for another Blender to start and render a panorama, on a busy machine too
+_PATIENCE = 120.0
+#: settings of nodes that change no light, and how deep groups are looked into
+_UNSEEN = {each.identifier for each in bpy.types.Node.bl_rna.properties} - {"mute"}
+_DEPTH = 16
+
+
+@dataclass(frozen=True, eq=False)
+class _Read:
+    """note: what could not be read, with its remedy; empty if all is well."""
+
+    environment: Environment
+    note: str = ""
+
+
+_known: dict[Hashable, _Read] = {}
+
+
+def read_environment(scene: bpy.types.Scene, *, blocking: bool = True) -> Environment:
+    """The world's light; the same object while nothing of it changes.
+
+    Args:
+        blocking: False: what takes a while is done beside the window; until then a plain colour.
+    """
+    return _read(scene.world, blocking=blocking).environment
+
+
+def world_notes(scene: bpy.types.Scene) -> tuple[str, ...]:
+    """What of the world could not be read, with its remedy; usually nothing."""
+    note = _read(scene.world, blocking=False).note
+    return (note,) if note else ()
+
+
+def studio_environment(shading: bpy.types.View3DShading) -> Environment:
+    """The picture of a world that a 3D view lights by in place of the scene's; black where it has
+    none, as in Solid mode.
+
+    Only the view's own settings are read, and each file once.
+    """
+    light = shading.selected_studio_light if shading.type in ("MATERIAL", "RENDERED") else None
+    if light is None or light.type != "WORLD":
+        return Environment()
+    return _studio(light.path, shading.studiolight_rotate_z, shading.studiolight_intensity)
+
+
+@lru_cache(maxsize=8)
+def _studio(path: str, rotation: float, intensity: float) -> Environment:
+    panorama = _studio_panorama(path)
+    if panorama is None:
+        return Environment()
+    # Blender turns the direction in which it looks the picture up
+    turn = np.array(Euler((0.0, 0.0, -rotation)).to_matrix())
+    return environment_of(intensity * panorama, turn)
+
+
+@lru_cache(maxsize=4)
+def _studio_panorama(path: str) -> Floats | None:
+    """None: it cannot be read, and Blender's own view is black."""
+    try:
+        return reduced(_rgb(read_texture(Path(path), is_color=True)))
+    except HairloomError as error:
+        print(f"Studio light: {error}")
+        return None
+
+
+def _read(world: bpy.types.World | None, *, blocking: bool) -> _Read:
+    if world is None:
+        return _once(None, lambda: _Read(Environment()))
+    surface = _surface(world)
+    if surface is None:
+        return _plain(world)
+    picture = _picture(surface)
+    if picture is not None:
+        return picture
+    if _is_plain(surface):
+        return _plain(world)
+    key = ("nodes", world.name_full, _state(world.node_tree))
+    if key in _known:
+        return _known[key]
+    folder = tempfile.TemporaryDirectory(prefix="hairloom")
+    if blocking:
+        with folder:
+            _write(world, Path(folder.name))
+            return _once(key, partial(_rendered, Path(folder.name), world.name, _colors(world)))
+    if not _job.wants(key):
+        _write(world, Path(folder.name))
+        work = partial(_rendered_beside, folder, world.name, _colors(world), key)
+        _job.want(key, lambda: lambda _: work())
+    return _plain(world)
+
+
+def _once(key: Hashable, make: Callable[[], _Read]) -> _Read:
+    if key not in _known:
+        if len(_known) >= _KEPT:
+            del _known[next(iter(_known))]
+        _known[key] = make()
+    return _known[key]
+
+
+def _plain(world: bpy.types.World) -> _Read:
+    """The Background's own colour, whatever is linked to it, or that of a world without nodes."""
+    color = _colors(world)
+    return _once(("plain", color), lambda: _Read(Environment(color)))
+
+
+def _colors(world: bpy.types.World) -> tuple[float, float, float]:
+    nodes = () if world.node_tree is None else world.node_tree.nodes
+    node = next((each for each in nodes if each.type == "BACKGROUND" and not each.mute), None)
+    if node is None:
+        red, green, blue = world.color
+        return (red, green, blue)
+    color, giver = node.inputs["Color"].default_value, _giver(node.inputs["Color"])
+    if giver is not None and giver.type == "RGB":
+        color = giver.outputs[0].default_value
+    strength = node.inputs["Strength"].default_value
+    red, green, blue, *_ = (max(0.0, float(channel * strength)) for channel in color)
+    return (red, green, blue)
+
+
+def _surface(world: bpy.types.World) -> bpy.types.Node | None:
+    """What the world shows; None without nodes, or where nothing is shown."""
+    if world.node_tree is None:
+        return None
+    output = world.node_tree.get_output_node("CYCLES") or world.node_tree.get_output_node("EEVEE")
+    return None if output is None else _giver(output.inputs["Surface"])
+
+
+def _is_plain(surface: bpy.types.Node) -> bool:
+    if surface.type != "BACKGROUND" or surface.mute or surface.inputs["Strength"].is_linked:
+        return False
+    color = surface.inputs["Color"]
+    giver = _giver(color)
+    return not color.is_linked or (giver is not None and giver.type == "RGB" and not giver.mute)
+
+
+def _picture(surface: bpy.types.Node) -> _Read | None:
+    """The world of an Environment Texture that is only turned and scaled in strength."""
+    if surface.type != "BACKGROUND" or surface.mute or surface.inputs["Strength"].is_linked:
+        return None
+    node = _giver(surface.inputs["Color"])
+    if node is None or node.type != "TEX_ENVIRONMENT" or node.mute or node.image is None:
+        return None
+    turn = _turn(node.inputs["Vector"])
+    is_file = node.image.source in ("FILE", "GENERATED")
+    if turn is None or node.projection != "EQUIRECTANGULAR" or not is_file:
+        return None
+    image, strength = node.image, float(surface.inputs["Strength"].default_value)
+    try:
+        state = _image_state(image)
+        key = ("picture", state, strength, turn.tobytes())
+        return _once(key, lambda: _Read(environment_of(strength * _panorama(image, state), turn)))
+    except HairloomError as error:
+        note = f"World: {error} Until then it is black."
+        return _once(("missing", note), lambda: _Read(Environment(), note))
+
+
+def _turn(socket: bpy.types.NodeSocket) -> Floats | None:
+    """From a panorama's directions to those of the world, (3, 3); None if it is no rotation."""
+    if not socket.is_linked:
+        return np.eye(3)
+    node, output = socket.links[0].from_node, socket.links[0].from_socket
+    if node.type == "TEX_COORD" and output.name == "Generated" and not node.mute:
+        return np.eye(3)
+    if node.type != "MAPPING" or node.mute or any(each.is_linked for each in node.inputs[1:]):
+        return None
+    values = {each.name: each.default_value for each in node.inputs[1:]}
+    moves = node.vector_type in ("POINT", "TEXTURE") and Vector(values["Location"]).length > 0.0
+    is_scaled = any(abs(each - 1.0) > 1e-6 for each in values["Scale"])
+    before = _turn(node.inputs["Vector"])
+    if moves or is_scaled or before is None or node.vector_type == "NORMAL":
+        return None
+    own = np.array(Euler(values["Rotation"], "XYZ").to_matrix())
+    return before @ (own if node.vector_type == "TEXTURE" else own.T)
+
+
+def _giver(socket: bpy.types.NodeSocket) -> bpy.types.Node | None:
+    """The node that is linked to an input, past reroutes."""
+    while socket.is_linked:
+        node = socket.links[0].from_node
+        if node.type != "REROUTE":
+            return node
+        socket = node.inputs[0]
+    return None
+
+
+def _image_state(image: bpy.types.Image) -> Hashable:
+    """Equal while its pixels are."""
+    path = bpy.path.abspath(image.filepath, library=image.library)
+    written = os.path.getmtime(path) if os.path.isfile(path) else 0.0
+    state = (image.name_full, *image.size, path, written, image.colorspace_settings.name)
+    if not image.is_dirty:
+        return state
+    pixels = np.empty(len(image.pixels), np.float32)
+    image.pixels.foreach_get(pixels)
+    return (*state, zlib.crc32(pixels.tobytes()))
+
+
+#: the last image that was read, so that turning it does not read it again
+_last_panorama: list[tuple[Hashable, Floats]] = []
+
+
+def _panorama(image: bpy.types.Image, state: Hashable) -> Floats:
+    """Its pixels in scene-linear colour, few enough, (rows, columns, 3).
+
+    Raises:
+        HairloomError: its file is missing or broken.
+    """
+    if not _last_panorama or _last_panorama[0][0] != state:
+        pixels = read_image(image, is_color=True, place=f"Image '{image.name}'")
+        _last_panorama[:] = [(state, reduced(pixels[..., :3] * pixels[..., 3:]))]
+    return _last_panorama[0][1]
+
+
+def _rgb(picture: Floats) -> Floats:
+    """A file's colours, grey ones too."""
+    colors = picture[..., :3] if picture.shape[-1] >= 3 else picture[..., :1]
+    return np.broadcast_to(colors, (*colors.shape[:2], 3))
+
+
+def _state(tree: bpy.types.NodeTree, depth: int = 0) -> Hashable:
+    """Equal while the nodes give the same light."""
+    nodes = tuple((node.name, *_node_state(node, depth)) for node in tree.nodes)
+    links = tuple(
+        (link.from_node.name, link.from_socket.identifier)
+        + (link.to_node.name, link.to_socket.identifier)
+        for link in tree.links
+    )
+    return nodes, links
+
+
+def _node_state(node: bpy.types.Node, depth: int) -> tuple[Hashable, ...]:
+    own = (each.identifier for each in node.bl_rna.properties if each.identifier not in _UNSEEN)
+    values = tuple((name, _value(getattr(node, name), depth)) for name in own)
+    inputs = tuple(_value(getattr(each, "default_value", None), depth) for each in node.inputs)
+    outputs = tuple(_value(getattr(each, "default_value", None), depth) for each in node.outputs)
+    return node.bl_idname, values, inputs, outputs
+
+
+def _value(value: Any, depth: int) -> Hashable:
+    if isinstance(value, bpy.types.Image):
+        return _image_state(value)
+    if isinstance(value, bpy.types.NodeTree):
+        return _state(value, depth + 1) if depth < _DEPTH else value.name_full
+    if isinstance(value, bpy.types.ID):
+        return value.name_full
+    if isinstance(value, bpy.types.ColorRamp):
+        stops = tuple((each.position, *each.color) for each in value.elements)
+        return (value.interpolation, value.color_mode, value.hue_interpolation, *stops)
+    if isinstance(value, bpy.types.CurveMapping):
+        curves = [[(*each.location, each.handle_type) for each in c.points] for c in value.curves]
+        return repr(curves)
+    if isinstance(value, bpy.types.bpy_struct):
+        return type(value).__name__
+    return value if isinstance(value, (bool, int, float, str)) else repr(_plain_values(value))
+
+
+def _plain_values(value: Any) -> Any:
+    return tuple(value) if hasattr(value, "__iter__") else value
+
+
+def _write(world: bpy.types.World, folder: Path) -> None:
+    original = world.original
+    bpy.data.libraries.write(
+        str(folder / "world.blend"), {original}, path_remap="ABSOLUTE", fake_user=True
+    )
+
+
+def _rendered(folder: Path, name: str, plain: tuple[float, float, float]) -> _Read:
+    """What another Blender renders of the world that was written there."""
+    panorama = folder / "panorama.exr"
+    program, settings = blender_command(), None
+    if program is None:
+        # among the modules of this one are those of Blender itself, which need it around them
+        program, settings = python_program(sys.executable), {"PYTHONPATH": ""}
+    files = str(folder / "world.blend"), str(panorama)
+    try:
+        command = [*program, str(_SCRIPT), "--", *files]
+        done = run_child(command, seconds=_PATIENCE, settings=settings)
+        if done.returncode == 0:
+            return _Read(environment_of(_rgb(read_texture(panorama, is_color=True))))
+        lines = done.stderr.decode(errors="replace").strip().splitlines()
+        why = lines[-1] if lines else f"it ended with {done.returncode}"
+    except (OSError, TimeoutExpired, HairloomError) as error:
+        why = str(error)
+    note = (
+        f"World '{name}': another Blender could not render its nodes ({why}), so its plain colour "
+        "lights hair. Use an Environment Texture, a Mapping and a Background alone."
+    )
+    return _Read(Environment(plain), note)
+
+
+def _rendered_beside(
+    folder: tempfile.TemporaryDirectory[str],
+    name: str,
+    plain: tuple[float, float, float],
+    key: Hashable,
+) -> tuple[Hashable, _Read]:
+    with folder:
+        return key, _rendered(Path(folder.name), name, plain)
+
+
+def _take() -> None:
+    """What was rendered beside the window has arrived: worlds are read again."""
+    found = _job.take()
+    if found is not None:
+        key, read = found
+        _once(key, lambda: read)
+    for scene in bpy.data.scenes:
+        if scene.world is not None:
+            scene.world.update_tag()
+
+
+_job: LatestJob[Hashable, tuple[Hashable, _Read]] = LatestJob("hairloom world", _take)

@@ -1,0 +1,213 @@
+"""Light from all around, as hair and meshes see it: a world's panorama in a few numbers.
+
+A panorama is radiance [W/(m^2 sr)] over latitudes and longitudes, (rows, columns, 3), row 0 at the
+bottom, its middle towards +X and its left half towards +Y, as Blender's Environment Texture. It
+becomes
+- suns: lobes that are small and much brighter than the rest, each a light of its own, with
+  highlight and shadow;
+- ambient and harmonics: what remains, as spherical harmonics up to order 2, a quadratic polynomial
+  of the direction (Ramamoorthi and Hanrahan 2001, "An Efficient Representation for Irradiance
+  Environment Maps"). Light that falls on a matt surface is that with each order damped.
+
+Hair is lit by a cube's eight corners, each of which stands for the light from an eighth of all
+directions, as by eight more lights; only that what is in their way comes from a grid
+(ambient.openness) and not from maps. Twin of gpu_shaders/lib_environment.glsl.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..arrays import Floats, Ints
+from .lights import Color, Light
+
+#: pixels of the panorama from which suns and harmonics are found
+ROWS, COLUMNS = 128, 256
+#: what Lambert's cosine leaves of orders 1 and 2, over what it leaves of order 0
+MATT = (2.0 / 3.0, 1.0 / 4.0)
+#: what the mean over an eighth of all directions leaves of orders 1 and 2 at its middle
+EIGHTH = (0.5 * np.sqrt(3.0), 2.0 / np.pi)
+#: less of a direction's light than this does not count: that is seven strands
+CLOSED = 1.0e-3
+#: a lobe is brighter than this many times the mean around it; its radius; the fraction of all light
+#: that it has at least
+_BRIGHTER, _LOBE, _LOBE_LIGHT = 3.0, np.radians(25.0), 0.03
+_MAX_SUNS = 2
+#: the brightest pixels, each of which may be a lobe's middle, and how far around it light counts
+_CANDIDATES, _SMOOTH = 1024, np.radians(12.0)
+#: harmonics below this fraction of the light are none
+_EVEN = 1e-3
+#: mean squares of the eight harmonics over all directions
+_SQUARES = np.array([1 / 3, 1 / 3, 1 / 3, 1 / 15, 1 / 15, 4 / 5, 1 / 15, 4 / 15])
+_LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+
+
+@dataclass(frozen=True, eq=False)
+class Environment:
+    """ambient: mean radiance of what is no sun.
+
+    harmonics: (8, 3), how it differs by direction, see `harmonics_at`; None is not at all.
+    suns: directional lights in place of the brightest lobes.
+    """
+
+    ambient: Color = (0.0, 0.0, 0.0)
+    harmonics: Floats | None = None
+    suns: tuple[Light, ...] = ()
+
+    @property
+    def is_black(self) -> bool:
+        return not any(self.ambient) and not self.suns
+
+
+def world_suns(lights: tuple[Light, ...]) -> tuple[Light, ...]:
+    """Those among lights that are bright places of the world."""
+    return tuple(light for light in lights if light.of_world)
+
+
+def environment_of(panorama: Floats, turn: Floats | None = None) -> Environment:
+    """The environment of a panorama, of any size.
+
+    Args:
+        turn: (3, 3) from the panorama's directions to those of the world; None is as it is.
+    """
+    radiance = reduced(panorama)
+    directions, weights = panorama_directions(*radiance.shape[:2])
+    if turn is not None:
+        directions = directions @ np.asarray(turn).T
+    directions, weights = directions.reshape(-1, 3), weights.ravel()
+    rest, suns = _without_suns(radiance.reshape(-1, 3), directions, weights)
+    ambient = weights @ rest / (4.0 * np.pi)
+    projected = (harmonics_at(directions) * weights[:, None]).T @ rest
+    harmonics = projected / (4.0 * np.pi * _SQUARES[:, None])
+    is_even = bool((np.abs(harmonics) <= _EVEN * max(float(ambient.max()), 1e-30)).all())
+    red, green, blue = ambient.tolist()
+    return Environment(
+        (red, green, blue), None if is_even else harmonics.astype(np.float32), tuple(suns)
+    )
+
+
+def panorama_directions(rows: int, columns: int) -> tuple[Floats, Floats]:
+    """The middle of each pixel of a panorama, (rows, columns, 3), and its solid angle."""
+    edges = np.linspace(-0.5 * np.pi, 0.5 * np.pi, rows + 1)
+    height = (0.5 * (edges[1:] + edges[:-1]))[:, None]
+    turn = (0.5 - (np.arange(columns)[None, :] + 0.5) / columns) * 2.0 * np.pi
+    flat = np.cos(height)
+    directions = np.stack(
+        [flat * np.cos(turn), flat * np.sin(turn), np.sin(height) + 0.0 * turn], axis=-1
+    )
+    band = np.diff(np.sin(edges))[:, None] * (2.0 * np.pi / columns)
+    return directions, np.broadcast_to(band, (rows, columns))
+
+
+def reduced(panorama: Floats) -> Floats:
+    """A panorama of about ROWS x COLUMNS pixels at most, with the same light: no pixel is left out,
+    and large ones are cut up.
+
+    A pixel that is not finite is black, as in Cycles, and one that is negative, too.
+    """
+    for axis, count in enumerate((ROWS, COLUMNS)):
+        panorama = np.repeat(panorama, max(count // panorama.shape[axis], 1), axis=axis)
+    edges = np.linspace(-0.5 * np.pi, 0.5 * np.pi, len(panorama) + 1)
+    by_rows = _averaged(panorama, ROWS, np.diff(np.sin(edges)))
+    by_columns = np.moveaxis(by_rows, 1, 0)
+    return np.moveaxis(_averaged(by_columns, COLUMNS, np.ones(len(by_columns))), 0, 1)
+
+
+def _averaged(picture: Floats, most: int, weights: Floats) -> Floats:
+    """Weighted means of equal parts of the first axis, of which there are at most this many."""
+    count = len(picture)
+    edges = np.linspace(0.0, count, min(count, most) + 1)
+    found = []
+    for low, high in itertools.pairwise(edges):
+        inside = np.arange(int(low), min(int(np.ceil(high - 1e-9)), count))
+        # of a pixel that lies in two parts each takes what is in it
+        cover = np.minimum(inside + 1.0, high) - np.maximum(inside, low)
+        cover = cover * weights[inside]
+        found.append(np.tensordot(cover / cover.sum(), _lit(picture[inside]), 1))
+    return np.array(found)
+
+
+def _lit(pixels: Floats) -> Floats:
+    """Pixels as Cycles takes them: black where a channel is not finite."""
+    is_finite = np.isfinite(pixels).all(axis=-1, keepdims=True)
+    return np.where(is_finite, np.maximum(pixels, 0.0), 0.0).astype(np.float64)
+
+
+def _without_suns(
+    radiance: Floats, directions: Floats, weights: Floats
+) -> tuple[Floats, list[Light]]:
+    """What remains of the radiance, and the brightest lobes as suns, brightest first."""
+    whole = float(weights @ radiance @ _LUMINANCE)
+    suns: list[Light] = []
+    while len(suns) < _MAX_SUNS and whole > 0.0:
+        bright = radiance @ _LUMINANCE
+        # what is left of a lobe is no other sun
+        for sun in suns:
+            bright[directions @ np.array(sun.vector) > np.cos(2.0 * _LOBE)] = 0.0
+        is_near = directions @ _brightest(bright * weights, directions) > np.cos(_LOBE)
+        around = float(weights[~is_near] @ bright[~is_near] / weights[~is_near].sum())
+        excess = np.maximum(bright - _BRIGHTER * around, 0.0) / np.maximum(bright, 1e-30)
+        taken = radiance * np.where(is_near, excess, 0.0)[:, None]
+        flux = taken @ _LUMINANCE * weights
+        if flux.sum() < _LOBE_LIGHT * whole:
+            break
+        light = Light.sun(-(flux @ directions), weights @ taken, 1.0)
+        suns.append(replace(light, of_world=True, name="World"))
+        radiance = radiance - taken
+    return radiance, suns
+
+
+def _brightest(flux: Floats, directions: Floats) -> Floats:
+    """The direction around which most of the flux is."""
+    strongest = np.argsort(flux)[-_CANDIDATES:]
+    around = directions[strongest] @ directions[strongest].T > np.cos(_SMOOTH)
+    middle: Floats = directions[strongest[(around @ flux[strongest]).argmax()]]
+    return middle
+
+
+def harmonics_at(directions: Floats) -> Floats:
+    """The eight harmonics of orders 1 and 2 at unit vectors (..., 3), (..., 8)."""
+    x, y, z = np.moveaxis(np.asarray(directions), -1, 0)
+    return np.stack([x, y, z, x * y, y * z, 3.0 * z * z - 1.0, x * z, x * x - y * y], axis=-1)
+
+
+def light_from(
+    environment: Environment, directions: Floats, kept: tuple[float, float] = (1.0, 1.0)
+) -> Floats:
+    """Radiance from directions (..., 3) without the suns', of which orders 1 and 2 are damped."""
+    ambient = np.broadcast_to(environment.ambient, np.shape(directions))
+    if environment.harmonics is None:
+        return ambient
+    damped = np.repeat(kept, (3, 5))[:, None] * environment.harmonics
+    return np.maximum(ambient + harmonics_at(directions) @ damped, 0.0)
+
+
+def matt_light(environment: Environment, normals: Floats) -> Floats:
+    """Irradiance over pi, on surfaces that face (..., 3), without the suns'."""
+    return light_from(environment, normals, MATT)
+
+
+def corner_direction(corner: Ints) -> Floats:
+    """What stands for the light from an eighth of all directions, 0 to 7, (..., 3)."""
+    sides = np.stack([corner & 1, (corner >> 1) & 1, corner >> 2], axis=-1)
+    found: Floats = (2.0 * sides - 1.0) / np.sqrt(3.0)
+    return found
+
+
+def corner_light(environment: Environment, corner: Ints) -> Floats:
+    """Its irradiance on what faces it, (..., 3)."""
+    return 0.5 * np.pi * light_from(environment, corner_direction(corner), EIGHTH)
+
+
+def open_path(openness: Floats, towards: Floats) -> Floats:
+    """How many strands are between a place of hair and a direction, and beyond it, (..., 2).
+
+    Args:
+        openness: (..., 4), see ambient.openness. towards: (..., 3).
+    """
+    mean, bent = openness[..., 0], np.sum(openness[..., 1:] * towards, axis=-1)
+    both: Floats = np.stack([mean + bent, mean - bent], axis=-1)
+    return -np.log(np.clip(both, CLOSED, 1.0))

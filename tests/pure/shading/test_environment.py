@@ -1,0 +1,164 @@
+"""Panoramas as suns and harmonics, against integrals that are known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hairloom.addon.shading.environment import (
+    COLUMNS,
+    ROWS,
+    Environment,
+    corner_direction,
+    corner_light,
+    environment_of,
+    light_from,
+    matt_light,
+    open_path,
+    panorama_directions,
+    reduced,
+)
+
+DIRECTIONS, ANGLES = panorama_directions(ROWS, COLUMNS)
+UP = DIRECTIONS[..., 2:]
+WHITE = np.ones(3)
+QUARTER = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+
+
+def whole(environment: Environment) -> np.ndarray:
+    """All of its light, over all directions [W/m^2]."""
+    return 4.0 * np.pi * np.array(environment.ambient) + sum(
+        (np.array(sun.power) for sun in environment.suns), np.zeros(3)
+    )
+
+
+def test_directions_are_blenders() -> None:
+    """The middle of a panorama is +X, its left half +Y, its top +Z."""
+    assert DIRECTIONS[ROWS // 2, COLUMNS // 2] == pytest.approx([1.0, 0.0, 0.0], abs=0.02)
+    assert DIRECTIONS[ROWS // 2, COLUMNS // 4] == pytest.approx([0.0, 1.0, 0.0], abs=0.02)
+    assert DIRECTIONS[-1, 0, 2] > 0.99
+    assert ANGLES.sum() == pytest.approx(4.0 * np.pi)
+
+
+def test_an_even_world_is_its_color_alone() -> None:
+    color = np.array([0.2, 0.5, 3.0])
+    found = environment_of(np.ones((9, 20, 3)) * color)
+    assert found.ambient == pytest.approx(color, rel=1e-9)
+    assert found.harmonics is None and not found.suns
+
+
+@pytest.mark.parametrize(
+    ("radiance", "irradiance"),
+    [
+        # of a sky that is bright above, and of one that is bright at the zenith and the nadir
+        (1.0 + 0.5 * UP, lambda z: 1.0 + 0.5 * 2.0 / 3.0 * z),
+        (1.0 + 0.25 * (3.0 * UP**2 - 1.0), lambda z: 1.0 + 0.25 * 0.25 * (3.0 * z**2 - 1.0)),
+    ],
+)
+def test_irradiance_of_an_analytic_sky(radiance: np.ndarray, irradiance: object) -> None:
+    found = environment_of(radiance * WHITE)
+    normals = DIRECTIONS[::8, ::8]
+    expected = irradiance(normals[..., 2])  # type: ignore[operator]
+    assert matt_light(found, normals)[..., 0] == pytest.approx(expected, abs=1e-3)
+    assert light_from(found, DIRECTIONS) == pytest.approx(radiance * WHITE, abs=2e-3)
+
+
+def test_irradiance_of_half_a_sky() -> None:
+    """(1 + cos) / 2 of it on a slanted surface; order 2 has it within 4 %."""
+    found = environment_of(np.where(UP > 0.0, 1.0, 0.0) * WHITE)
+    normals = DIRECTIONS[::8, ::8]
+    assert not found.suns
+    expected = 0.5 * (1.0 + normals[..., 2])
+    assert matt_light(found, normals)[..., 1] == pytest.approx(expected, abs=0.04)
+    assert whole(found) == pytest.approx(2.0 * np.pi * WHITE)
+
+
+@pytest.mark.parametrize("degrees", [1.0, 5.0])
+def test_a_bright_disk_is_a_sun(degrees: float) -> None:
+    towards = np.array([0.5, -0.6, 0.4])
+    towards /= np.linalg.norm(towards)
+    color = np.array([900.0, 700.0, 300.0])
+    is_sun = (DIRECTIONS @ towards > np.cos(np.radians(degrees)))[..., None]
+    found = environment_of(np.where(is_sun, color, 0.2))
+    (sun,) = found.suns
+    # a disk of few pixels has its middle off by a part of one
+    assert np.degrees(np.arccos(min(towards @ sun.vector, 1.0))) < 0.7
+    angle = float((ANGLES * is_sun[..., 0]).sum())
+    assert sun.power == pytest.approx(color * angle, rel=0.02)
+    assert found.ambient == pytest.approx(0.2 * WHITE, rel=0.05)
+    assert sun.of_world and sun.casts_shadow
+
+
+def test_no_light_is_lost_between_suns_and_the_rest() -> None:
+    random = np.random.default_rng(7)
+    radiance = random.gamma(0.3, 1.0, (ROWS, COLUMNS, 3)) ** 3
+    radiance[80:90, 100:110] += 50.0
+    radiance[60:64, 200:220] += 30.0
+    expected = np.einsum("rc,rcn->n", ANGLES, radiance)
+    found = environment_of(radiance)
+    assert len(found.suns) == 2
+    assert whole(found) == pytest.approx(expected)
+
+
+@pytest.mark.parametrize("size", [(1, 1), (7, 13), (130, 259), (300, 701), (512, 1024)])
+def test_reduced_pictures_have_the_same_light(size: tuple[int, int]) -> None:
+    picture = np.random.default_rng(3).random((*size, 3))
+    _, angles = panorama_directions(*size)
+    expected = np.einsum("rc,rcn->n", angles, picture)
+    assert whole(environment_of(picture)) == pytest.approx(expected)
+    assert reduced(picture).shape[0] <= ROWS and reduced(picture).shape[1] <= COLUMNS
+
+
+def test_pixels_that_are_no_light_are_black() -> None:
+    """One channel that is not finite makes its pixel black, as in Cycles; negative ones count 0."""
+    picture = np.full((64, 128, 3), 0.5)
+    black = picture.copy()
+    black[10, 20] = black[30, 40] = black[50, 60] = 0.0
+    picture[10, 20, 0], picture[30, 40, 1], picture[50, 60] = np.nan, np.inf, -1e30
+    assert reduced(picture) == pytest.approx(reduced(black))
+
+
+def test_a_pixel_of_a_million_is_a_sun() -> None:
+    picture = np.full((64, 128, 3), 0.5)
+    picture[40, 20] = 1.0e6
+    directions, angles = panorama_directions(64, 128)
+    (sun,) = environment_of(picture).suns
+    assert sun.vector == pytest.approx(directions[40, 20], abs=1e-3)
+    assert sun.power == pytest.approx(WHITE * 1.0e6 * angles[40, 20], rel=1e-3)
+    assert environment_of(picture).ambient == pytest.approx(0.5 * WHITE, rel=0.01)
+
+
+def test_a_quarter_turn_is_a_shift_of_columns() -> None:
+    random = np.random.default_rng(5)
+    picture = random.random((32, 64, 3))
+    picture[20:22, 5:7] = 80.0
+    turned, shifted = (
+        environment_of(picture, QUARTER),
+        environment_of(np.roll(picture, -16, axis=1)),
+    )
+    assert turned.ambient == pytest.approx(shifted.ambient)
+    assert turned.harmonics == pytest.approx(shifted.harmonics, abs=1e-5)
+    assert turned.suns[0].vector == pytest.approx(shifted.suns[0].vector)
+    still = environment_of(picture)
+    assert QUARTER @ still.suns[0].vector == pytest.approx(turned.suns[0].vector)
+    assert light_from(turned, DIRECTIONS @ QUARTER.T) == pytest.approx(
+        light_from(still, DIRECTIONS), abs=1e-5
+    )
+
+
+def test_eight_corners_have_all_light() -> None:
+    """And as much from above as there is: half a sky of 1 + z gives 3 pi of the 4 pi."""
+    found = environment_of((1.0 + UP) * WHITE)
+    lights = corner_light(found, np.arange(8))
+    assert lights.sum(axis=0) == pytest.approx(4.0 * np.pi * WHITE, rel=1e-4)
+    from_above = lights[corner_direction(np.arange(8))[:, 2] > 0.0].sum(axis=0)
+    assert from_above == pytest.approx(3.0 * np.pi * WHITE, rel=1e-3)
+
+
+def test_paths_of_openness() -> None:
+    """Half a sky, as above a head: nothing in the way above, all that counts below."""
+    openness = np.array([0.5, 0.0, 0.0, 0.75])
+    up, down = np.array([0.0, 0.0, 1.0]), np.array([0.0, 0.0, -1.0])
+    assert open_path(openness, up) == pytest.approx([0.0, np.log(1000.0)])
+    assert open_path(openness, down) == pytest.approx([np.log(1000.0), 0.0])
+    assert open_path(openness, np.array([1.0, 0.0, 0.0])) == pytest.approx([np.log(2.0)] * 2)
