@@ -10,6 +10,7 @@ from hairloom.addon.shading.ambient import (
     AmbientSettings,
     ambient_occlusion,
     depth_towards,
+    openness,
     skin_occlusion,
     sky_directions,
     sky_openness,
@@ -193,6 +194,30 @@ def test_the_body_shuts_out_the_light_from_behind_and_only_that() -> None:
     assert inside[0] < 1e-3
     free = ambient_occlusion(strands, strands.roots, None, settings)
     assert free == pytest.approx(1.0)
+
+
+def test_openness_knows_from_where_light_comes() -> None:
+    """Over a ball and without hair's shade light comes from all around but a cone: its mean and
+    its vector outward are integrals of that, and nothing points along the ball."""
+    strands = hair_on_ball()
+    outward = strands.roots / np.linalg.norm(strands.roots, axis=1, keepdims=True)
+    found = openness(strands, strands.roots * 1.01, ball(0.08), 0.0, 96)
+    shell = 0.08 - 1.5 * grid_around(strands, 96).cell
+    squared = (shell / 0.0808) ** 2
+    assert found[:, 0].mean() == pytest.approx(0.5 * (1.0 + np.sqrt(1.0 - squared)), abs=0.05)
+    along = np.sum(found[:, 1:] * outward, axis=1)
+    assert along.mean() == pytest.approx(0.75 * squared, abs=0.07)
+    aside = found[:, 1:] - along[:, None] * outward
+    assert np.abs(aside.mean(axis=0)).max() < 0.02
+    assert openness(strands, strands.roots, None, 0.0, 40) == pytest.approx(
+        np.tile([1.0, 0.0, 0.0, 0.0], (4000, 1)), abs=1e-5
+    )
+
+
+def test_openness_is_less_in_the_hair_than_at_its_tips() -> None:
+    strands = hair_on_ball()
+    found = openness(strands, strands.points, ball(0.08), 2.0, 56)[:, 0].reshape(4000, 8)
+    assert (np.diff(found.mean(axis=0)) > 0.0).all() and found.mean(axis=0)[-1] > 0.4
 
 
 def test_a_thin_sheet_shades_neither_of_its_sides() -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hairloom.addon.arrays import Floats
-from hairloom.addon.strands.frames import tangents, transported_normals
+from hairloom.addon.strands.frames import strand_tangents, tangents, transported_normals
 
 pytestmark = pytest.mark.portable
 
@@ -71,3 +71,10 @@ def test_reversal_and_parallel_root_normal_stay_finite() -> None:
     normals = transported_normals(tangent, np.array([0.0, 0.0, 1.0]))
     assert np.isfinite(normals).all()
     assert np.linalg.norm(normals, axis=-1) == pytest.approx(np.ones(3))
+
+
+def test_tangents_of_strands_one_after_the_other() -> None:
+    """As those of each strand by itself."""
+    grid = np.random.default_rng(4).normal(size=(20, 5, 3))
+    found = strand_tangents(grid.reshape(-1, 3), np.arange(21) * 5)
+    assert found.reshape(20, 5, 3) == pytest.approx(tangents(grid))
