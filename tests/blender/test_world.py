@@ -106,6 +106,15 @@ def test_an_image_lights_as_in_cycles(scene: Any) -> None:
     assert_alike(found, by_cycles(scene))
 
 
+def test_another_image_of_the_same_name_is_another_world(scene: Any) -> None:
+    node = picture(scene, uneven())
+    found = read_environment(scene)
+    bpy.data.images.remove(node.image)
+    scene.world.node_tree.nodes.remove(node)
+    assert picture(scene, 2.0 * uneven()).image.name == "Panorama"
+    assert read_environment(scene).ambient == pytest.approx(2.0 * np.array(found.ambient))
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["POINT", "TEXTURE", "VECTOR"])
 def test_a_mapping_turns_it_as_in_cycles(scene: Any, kind: str) -> None:

@@ -112,6 +112,13 @@ def test_an_even_panorama_is_a_plain_world(frame: Any) -> None:
     assert seen(frame, nought, np.eye(3)) == pytest.approx(seen(frame, bare, np.eye(3)), abs=1e-6)
 
 
+def test_hashed_strands_have_the_same_light(frame: Any) -> None:
+    layers = lit(sky(), np.eye(3))
+    hashed = replace(layers, strand_settings=replace(layers.strand_settings, transparency="hashed"))
+    one, other = (seen(frame, each, np.eye(3))[..., :3].mean() for each in (layers, hashed))
+    assert other == pytest.approx(one, rel=0.03)
+
+
 def test_closed_hair_gets_no_light_of_the_world(frame: Any) -> None:
     environment = replace(sky(), suns=())
     open_hair = lit(environment, np.eye(3))

@@ -224,7 +224,9 @@ def _image_state(image: bpy.types.Image) -> Hashable:
     """Equal while its pixels are."""
     path = bpy.path.abspath(image.filepath, library=image.library)
     written = os.path.getmtime(path) if os.path.isfile(path) else 0.0
-    state = (image.name_full, *image.size, path, written, image.colorspace_settings.name)
+    packed = 0 if image.packed_file is None else image.packed_file.size
+    file = image.original.session_uid, path, written, packed
+    state = (*file, *image.size, image.colorspace_settings.name)
     if not image.is_dirty:
         return state
     pixels = np.empty(len(image.pixels), np.float32)
