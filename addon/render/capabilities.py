@@ -95,6 +95,12 @@ def capabilities() -> Capabilities:
     return _found if _forbidden() is None else _without_atomics(_found, _forbidden())
 
 
+def pair_format() -> str:
+    """Of two numbers a texel, which one program both reads and writes: Metal has only one and four
+    of them (Apple's feature set tables, "Texture Buffer Pixel Formats")."""
+    return "RGBA32F" if gpu.platform.backend_type_get() == "METAL" else "RG32F"
+
+
 def _forbidden() -> str | None:
     """Who does not want image atomics."""
     if os.environ.get(ATOMICS_VARIABLE, "").lower() == "never":

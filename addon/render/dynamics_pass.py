@@ -4,8 +4,8 @@ The guides stay on the GPU from frame to frame, in textures in the layout of
 strand_layout.strand_rows:
 
     positions      RGBA32F: xyz world [m], w the z of a substep earlier
-    previous_positions   RG32F: x and y of a substep earlier; software drivers take time for each
-                   number that is written
+    previous_positions   RG32F, on Metal RGBA32F: x and y of a substep earlier; software drivers
+                   take time for each number that is written
     bridged        RGBA32F: xyz world [m], at the frame's very end (step.grid_at_frame_end)
     styles_earlier, styles_before, styles_now   RGBA32F: xyz world [m], see frame.Drive
     rest_shapes    RGBA32F: of CV i xyz curvature [m] and w hold (style.LocalShape); of CV 0 x its
@@ -41,6 +41,7 @@ from ..dynamics.schedule import due_substeps
 from ..dynamics.settings import DynamicsSettings
 from ..dynamics.state import DynamicsState, Rest, as_rows
 from ..dynamics.step import displacement_beside_root
+from .capabilities import pair_format
 from .collider_textures import NOT_FOLLOWED, UploadedColliders
 from .dynamics_block import block_of, moments_of, spans_of
 from .shader_program import ShaderRecipe, program, released_with_shaders
@@ -84,8 +85,13 @@ def dynamics_recipe(
     followed: bool = False,
     sharp: bool = False,
     clearance: bool = False,
+    pairs: str = "RG32F",
 ) -> ShaderRecipe:
-    """The program for guides of this many CVs, without what the scene does not need."""
+    """The program for guides of this many CVs, without what the scene does not need.
+
+    Args:
+        pairs: see capabilities.pair_format.
+    """
     flags = {
         "RELAXATION": relaxation,
         "HAS_HELD": held,
@@ -108,7 +114,7 @@ def dynamics_recipe(
         textures=tuple(("FLOAT_2D", name) for name in textures),
         images=(
             ("RGBA32F", "positions", "READ_WRITE"),
-            ("RG32F", "previous_positions", "READ_WRITE"),
+            (pairs, "previous_positions", "READ_WRITE"),
         ),
         group_size=(GROUP_SIZE,),
         defines=(
@@ -168,7 +174,7 @@ class DynamicsPass:
         """The state as it is now, read back; step.advance and another pass can go on from it."""
         if "positions" in self._textures:
             here, beside = (self._grid(name) for name in ("positions", "previous_positions"))
-            previous = np.concatenate([beside, here[..., 3:]], axis=-1)
+            previous = np.concatenate([beside[..., :2], here[..., 3:]], axis=-1)
             self._state = replace(
                 self._state, position=as_rows(here[..., :3]), previous=as_rows(previous)
             )
@@ -189,7 +195,7 @@ class DynamicsPass:
         if "positions" not in textures:
             here, previous = (rows.transpose(2, 1, 0) for rows in (state.position, state.previous))
             textures["positions"] = points_texture(here, previous[..., 2])
-            textures["previous_positions"] = texture_from(strand_rows(previous[..., :2]), "RG32F")
+            textures["previous_positions"] = _pairs_texture(previous[..., :2])
             textures["bridged"] = points_texture(here)
             textures["rest_shapes"] = texture_from(strand_rows(rest_shapes(state.rest)), "RGBA32F")
             lengths = of_segments(state.rest.length)
@@ -246,6 +252,7 @@ class DynamicsPass:
             followed=is_followed,
             sharp=is_sharp,
             clearance=bool(posed) and frame.drive.clearance is not None,
+            pairs=pair_format(),
         )
         block = block_of(frame, state.guide_count, state.cv_count, count, speed_ratio)
         shader = program(recipe)
@@ -292,6 +299,13 @@ def points_texture(grid: Floats, lane: Floats | float = 0.0) -> Any:
         points[..., axis] = grid[..., axis]
     points[..., 3] = lane
     return texture_from(strand_rows(points), "RGBA32F")
+
+
+def _pairs_texture(pairs: Floats) -> Any:
+    """Pairs (guide_count, cv_count, 2) as a texture in the layout of strand_rows."""
+    kept = pair_format()
+    unused = {"RG32F": 0, "RGBA32F": 2}[kept]
+    return texture_from(strand_rows(np.pad(pairs, ((0, 0), (0, 0), (0, unused)))), kept)
 
 
 def rest_shapes(rest: Rest) -> Floats:

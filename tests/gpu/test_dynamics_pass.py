@@ -481,3 +481,24 @@ def test_release_with_all_shaders(make_pass: Any) -> None:
     dynamics.advance(scene.drives(0.1)[0], scene.settings, 1.0 / 60.0)
     shader_program.release()
     assert dynamics.guides is None
+
+
+@pytest.mark.parametrize("pairs", ["RG32F", "RGBA32F"])
+def test_the_format_for_metal_keeps_the_same_motion(
+    gpu_context: Any, monkeypatch: pytest.MonkeyPatch, pairs: str
+) -> None:
+    """Through a read-back, after which another pass goes on."""
+    from hairloom.addon.render import dynamics_pass
+
+    scene, positions = Scene(guide_count=8), []
+    for kept in ("RG32F", pairs):
+        monkeypatch.setattr(dynamics_pass, "pair_format", lambda kept=kept: kept)
+        state = scene.start()
+        for drives in (scene.drives(0.1)[:3], scene.drives(0.1)[3:]):
+            moving = dynamics_pass.DynamicsPass(state)
+            for drive in drives:
+                moving.advance(drive, scene.settings, 1.0 / scene.fps)
+            state = moving.read()
+        positions.append(state.position)
+    assert np.abs(positions[0] - scene.start().position).max() > 1e-3
+    np.testing.assert_array_equal(*positions)

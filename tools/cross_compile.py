@@ -1,0 +1,194 @@
+"""Programs as other compilers see them: Vulkan's GLSL, SPIR-V, Metal's language and HLSL.
+
+Blender gives a program's text to the driver of the backend that runs. This writes the same text
+with the same declarations for glslang, and what spirv-val and SPIRV-Cross say of it. It shows what
+our text does wrong, not what Blender's own wrapper for Metal does with it. The compilers are
+Debian's glslang-tools, spirv-tools and spirv-cross: those of this machine, or of the Debian that
+tools/window_blender has installed.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+COMPILERS = ("glslangValidator", "spirv-val", "spirv-cross")
+#: Blender's words for types, and GLSL's
+_TYPES = {
+    **{"FLOAT": "float", "INT": "int", "UINT": "uint", "MAT4": "mat4", "MAT3": "mat3"},
+    **{f"{kind}VEC{n}": f"{kind.lower()}vec{n}" for kind in ("", "I", "U") for n in (2, 3, 4)},
+}
+_SAMPLERS = {
+    **{
+        f"{kind}_{shape}": f"sampler{shape}"
+        for kind in ("FLOAT", "DEPTH")
+        for shape in ("2D", "3D")
+    },
+    **{f"{kind}_2D_ARRAY": "sampler2DArray" for kind in ("FLOAT", "DEPTH")},
+    "UINT_2D": "usampler2D",
+    "FLOAT_1D": "sampler1D",
+}
+_COMPONENTS = {"float": 1, "int": 1, "uint": 1, "mat3": 9, "mat4": 16}
+_QUALIFIERS = {"READ": "readonly ", "WRITE": "writeonly ", "READ_WRITE": ""}
+_SUFFIXES = {"vertex": "vert", "fragment": "frag", "compute": "comp"}
+_BUILTINS = """#define gl_VertexID gl_VertexIndex
+#define gl_InstanceID gl_InstanceIndex
+"""
+#: what programs for Metal must not need, from Blender's sources (see docs/dev/gpu.md): the most of
+#: each thing, and the formats of images that a program may both read and write
+METAL_LIMITS = {
+    "samplers": 64,
+    "images": 8,
+    "buffers": 31 - 2 - 7,
+    "push_bytes": 4096,
+    "inputs": 31,
+    "varying_floats": 60,
+    "outputs": 8,
+    "group_size": 512,
+    "image_atomics": 0,
+    "early_tests": 0,
+    "shared_memory": 0,
+    "unreadable_images": 0,
+}
+_READ_WRITE = {"R32F", "R32UI", "R32I", "RGBA32F", "RGBA32UI", "RGBA32I", "RGBA16F"}
+
+
+#: what each compiler says of each stage in a folder; a file is left only where it complains
+_SCRIPT = """
+for file in *.vert *.frag *.comp; do
+    [ -e "$file" ] || continue
+    kept() { "$@" >"$file.said" 2>&1 && rm "$file.said"; }
+    { kept glslangValidator -V --quiet "$file" -o "$file.spv" &&
+        kept spirv-val --target-env vulkan1.0 "$file.spv"; } ||
+        { mv "$file.said" "$file.spirv_failed"; continue; }
+    kept spirv-cross "$file.spv" --msl --msl-version 20200 || mv "$file.said" "$file.metal_failed"
+    kept spirv-cross "$file.spv" --hlsl --shader-model 50 || mv "$file.said" "$file.hlsl_failed"
+done
+"""
+_WINDOW_BLENDER = Path(__file__).resolve().parent / "window_blender"
+
+
+def is_possible() -> bool:
+    """Whether the compilers are on this machine or in the Debian of tools/window_blender."""
+    return all(map(shutil.which, COMPILERS)) or all(
+        (_debian() / "usr" / "bin" / name).exists() for name in COMPILERS
+    )
+
+
+def _debian() -> Path:
+    cache = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+    return Path(cache) / "hairloom" / "sid"
+
+
+def compile_all(folder: Path) -> dict[str, dict[str, str]]:
+    """What compilers complain of, by kind ("spirv", "metal", "hlsl") and file; nothing where they
+    do not.
+
+    Args:
+        folder: below the repository: only that is there in the other Debian.
+    """
+    script = ["sh", "-ec", f"cd '{folder}'{_SCRIPT}"]
+    if not all(map(shutil.which, COMPILERS)):
+        script = [str(_WINDOW_BLENDER), "run", *script]
+    subprocess.run(script, check=True, timeout=600)
+    return {
+        kind: {
+            said.stem: said.read_text(encoding="utf-8").strip()[:400]
+            for said in folder.glob(f"*.{kind}_failed")
+        }
+        for kind in ("spirv", "metal", "hlsl")
+    }
+
+
+def texts(recipe: Any, structs: str) -> dict[str, str]:
+    """Each stage of a recipe as a whole file of Vulkan's GLSL, by its suffix."""
+    return {
+        _SUFFIXES[stage]: "\n".join([*_declarations(recipe, structs, stage), text.source])
+        for stage, text in recipe.texts.items()
+    }
+
+
+def _declarations(recipe: Any, structs: str, stage: str) -> list[str]:
+    lines = ["#version 450", f"#define GPU_{stage.upper()}_SHADER", _BUILTINS]
+    lines += [f"#define {name} {value}" for name, value in recipe.defines]
+    lines.append(structs)
+    binding = 0
+    for kind, name in recipe.blocks:
+        lines.append(
+            f"layout(std140, set=0, binding={binding}) uniform {name}_block {{ {kind} {name}; }};"
+        )
+        binding += 1
+    for kind, name in recipe.textures:
+        lines.append(f"layout(set=0, binding={binding}) uniform {_SAMPLERS[kind]} {name};")
+        binding += 1
+    for image_format, name, *access in recipe.images:
+        kind = "uimage2D" if image_format.endswith("UI") else "image2D"
+        lines.append(
+            f"layout(set=0, binding={binding}, {image_format.lower()}) uniform "
+            f"{_QUALIFIERS[access[0] if access else 'WRITE']}{kind} {name};"
+        )
+        binding += 1
+    pushed = [("int", name) for name in recipe.integers]
+    pushed += [(_TYPES[kind], name) for kind, name in recipe.numbers]
+    if pushed:
+        members = " ".join(f"{kind} {name};" for kind, name in pushed)
+        lines.append(f"layout(push_constant) uniform pushed_constants {{ {members} }};")
+    if stage == "compute":
+        x, y = (*recipe.group_size, 1)[:2]
+        return [*lines, f"layout(local_size_x={x}, local_size_y={y}) in;"]
+    if stage == "vertex":
+        lines += _located("in", ((kind, name) for kind, name in recipe.inputs))
+    else:
+        lines += _located("out", ((kind, name) for kind, name in recipe.outputs))
+    way = "out" if stage == "vertex" else "in"
+    for place, (interpolation, kind, name) in enumerate(recipe.varyings):
+        lines.append(f"layout(location={place}) {interpolation} {way} {_TYPES[kind]} {name};")
+    return lines
+
+
+def _located(way: str, members: Any) -> list[str]:
+    return [
+        f"layout(location={place}) {way} {_TYPES[kind]} {name};"
+        for place, (kind, name) in enumerate(members)
+    ]
+
+
+def demands(recipe: Any) -> dict[str, int]:
+    """What a program needs, by the names of METAL_LIMITS."""
+    source = "\n".join(text.source for text in recipe.texts.values())
+    pushed = ["int"] * len(recipe.integers) + [_TYPES[kind] for kind, _ in recipe.numbers]
+    both = [image[0] for image in recipe.images if image[2:] == ("READ_WRITE",)]
+    group = 1
+    for side in recipe.group_size if recipe.compute else ():
+        group *= side
+    return {
+        "samplers": len(recipe.textures),
+        "images": len(recipe.images),
+        "buffers": len(recipe.blocks) + len(recipe.inputs),
+        # a vec3 takes as much as a vec4
+        "push_bytes": sum(
+            16 if _components(kind) == 3 else 4 * _components(kind) for kind in pushed
+        ),
+        "inputs": len(recipe.inputs),
+        "varying_floats": sum(_components(_TYPES[kind]) for _, kind, _ in recipe.varyings),
+        "outputs": len(recipe.outputs),
+        "group_size": group,
+        "image_atomics": len(re.findall(r"imageAtomic\w+", source)),
+        "early_tests": source.count("early_fragment_tests"),
+        "shared_memory": len(re.findall(r"^\s*shared\s", source, re.MULTILINE)),
+        "unreadable_images": sum(image_format not in _READ_WRITE for image_format in both),
+    }
+
+
+def _components(kind: str) -> int:
+    return _COMPONENTS.get(kind) or int(kind[-1])
+
+
+def beyond_metal(found: Mapping[str, int]) -> list[str]:
+    """What of its demands Metal has not."""
+    return [f"{name} {found[name]}" for name, most in METAL_LIMITS.items() if found[name] > most]
