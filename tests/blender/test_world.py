@@ -7,6 +7,7 @@ from typing import Any
 import bpy
 import numpy as np
 import pytest
+from waiting import take_steps_until
 
 from hairloom.addon.blender.scene import world as world_module
 from hairloom.addon.blender.scene.world import read_environment, world_notes
@@ -168,6 +169,27 @@ def test_a_sky_is_rendered_once(scene: Any, monkeypatch: pytest.MonkeyPatch) -> 
     assert world_module._state(tree) != world_module._state(bpy.data.worlds.new("W").node_tree)
     monkeypatch.setattr(world_module, "run_child", lambda *_, **__: runs.append(0) or fail())
     assert read_environment(scene) is not found and len(runs) == 2
+
+
+def test_in_the_window_it_is_rendered_beside(scene: Any) -> None:
+    """A plain colour until it is there, and what was there before until another one is."""
+    tree = scene.world.node_tree
+    gradient = tree.nodes.new("ShaderNodeTexGradient")
+    tree.links.new(gradient.outputs["Color"], background(scene).inputs["Color"])
+
+    def arrived() -> Environment:
+        take_steps_until(lambda: not world_module._job.is_pending)
+        return read_environment(scene, blocking=False)
+
+    plain = read_environment(scene, blocking=False)
+    assert plain.harmonics is None
+    first = arrived()
+    assert first.harmonics is not None and not world_notes(scene)
+    background(scene).inputs["Strength"].default_value = 3.0
+    assert read_environment(scene, blocking=False) is first
+    assert arrived().ambient == pytest.approx(3.0 * np.array(first.ambient), rel=0.02)
+    world_module._known.clear()
+    assert arrived().ambient == pytest.approx(3.0 * np.array(first.ambient), rel=0.02)
 
 
 def fail() -> Any:

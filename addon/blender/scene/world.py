@@ -51,6 +51,8 @@ class _Read:
 
 
 _known: dict[Hashable, _Read] = {}
+#: what each world was rendered as last, by its session number
+_last: dict[int, _Read] = {}
 
 
 def read_environment(scene: bpy.types.Scene, *, blocking: bool = True) -> Environment:
@@ -111,19 +113,39 @@ def _read(world: bpy.types.World | None, *, blocking: bool) -> _Read:
         return picture
     if _is_plain(surface):
         return _plain(world)
-    key = ("nodes", world.name_full, _state(world.node_tree))
-    if key in _known:
-        return _known[key]
-    folder = tempfile.TemporaryDirectory(prefix="hairloom")
-    if blocking:
-        with folder:
-            _write(world, Path(folder.name))
-            return _once(key, partial(_rendered, Path(folder.name), world.name, _colors(world)))
-    if not _job.wants(key):
+    uid, key = world.original.session_uid, _key(world)
+    if key not in _known and not blocking:
+        # a sky that is being turned stays as it was until the new one is there
+        _want(uid, key, _colors(world))
+        return _last.get(uid) or _plain(world)
+    if key not in _known:
+        with tempfile.TemporaryDirectory(prefix="hairloom") as folder:
+            _write(world, Path(folder))
+            _once(key, partial(_rendered, Path(folder), world.name, _colors(world)))
+    _last[uid] = _known[key]
+    return _known[key]
+
+
+def _key(world: bpy.types.World) -> Hashable:
+    return "nodes", world.original.session_uid, _state(world.node_tree)
+
+
+def _want(uid: int, key: Hashable, plain: tuple[float, float, float]) -> None:
+    """Have the world of this number rendered beside the window."""
+
+    def begin() -> Callable[[object], tuple[Hashable, _Read]]:
+        found = (each for each in bpy.data.worlds if each.session_uid == uid)
+        world = next(found, None)
+        if world is None or world.node_tree is None:  # gone since, and nobody asks for it
+            return lambda _: (key, _Read(Environment(plain)))
+        folder = tempfile.TemporaryDirectory(prefix="hairloom")
         _write(world, Path(folder.name))
-        work = partial(_rendered_beside, folder, world.name, _colors(world), key)
-        _job.want(key, lambda: lambda _: work())
-    return _plain(world)
+        work = partial(_rendered_beside, folder, world.name, plain, _key(world))
+        return lambda _: work()
+
+    if _job.wants(key) and not _job.is_pending:
+        _job.cancel()  # what it gave is forgotten
+    _job.want(key, begin)
 
 
 def _once(key: Hashable, make: Callable[[], _Read]) -> _Read:
