@@ -50,6 +50,7 @@ def without_strands(snapshot: Snapshot) -> Snapshot:
         volume_center=snapshot.center,
         device_points=None,
         occlusion=None,
+        openness=None,
         seed=None,
         guide=None,
         group=None,

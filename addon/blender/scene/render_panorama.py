@@ -33,4 +33,5 @@ def main(blend: str, panorama: str) -> None:
     bpy.ops.render.render(write_still=True, scene=scene.name)
 
 
-main(*sys.argv[sys.argv.index("--") + 1 :])
+if __name__ == "__main__":
+    main(*sys.argv[sys.argv.index("--") + 1 :])
