@@ -101,6 +101,13 @@ def pair_format() -> str:
     return "RGBA32F" if gpu.platform.backend_type_get() == "METAL" else "RG32F"
 
 
+def shades_hashed_by_direction() -> bool:
+    """Whether hashed strands take the world's light by direction: Mesa's Vulkan on the processor
+    crashes in that program, and has the world's mean there."""
+    is_vulkan = gpu.platform.backend_type_get() == "VULKAN"
+    return not (is_vulkan and "llvmpipe" in gpu.platform.renderer_get())
+
+
 def _forbidden() -> str | None:
     """Who does not want image atomics."""
     if os.environ.get(ATOMICS_VARIABLE, "").lower() == "never":

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from ..shading.settings import ShadingSettings, StrandSettings
+from .capabilities import shades_hashed_by_direction
 from .detail_pass import DetailOrder
 from .feature_programs import UniformBlocks, bound
 from .pixel_parts import PixelPart
@@ -66,6 +67,7 @@ _HASHED_SHADE_RECIPE = ShaderRecipe(
     outputs=(("VEC4", "first_light"), ("VEC4", "second_light")),
     defines=(*_PLAIN, ("UNEVEN", 0)),
 )
+_EVEN_WORLD = ShaderFeature(name="even", defines={"HARMONICS": 0})
 #: puts each fragment into the list of its pixel
 _GATHER_RECIPE = ShaderRecipe(
     name="strand_gather",
@@ -150,9 +152,10 @@ class StrandDrawing:
 
     def shade_hashed(self, found: Sequence[Any]) -> ShaderProgram:
         """Bind what shades those that two turns have found."""
+        world = () if shades_hashed_by_direction() else (_EVEN_WORLD,)
         return bound(
             _HASHED_SHADE_RECIPE,
-            [*self.points, *self.shading, *self.shown],
+            [*self.points, *self.shading, *self.shown, *world],
             self.blocks,
             textures=dict(zip(("first_hair", "second_hair"), found, strict=True)),
             integers={"output_encoding": self.output_encoding},
