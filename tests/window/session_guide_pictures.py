@@ -222,7 +222,7 @@ def of_hair():
     yield
     column()[0].spaces.active.context = "DATA"
     yield
-    for name in ("data", "look", "shadows", "strands", "dynamics", "cards", "show"):
+    for name in ("data", "look", "grow", "shadows", "strands", "dynamics", "cards", "show"):
         if name == "dynamics":
             tied_and_baked()
         yield from picture(name, column)
