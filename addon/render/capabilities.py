@@ -166,9 +166,7 @@ def _counted_by_atomics() -> list[int]:
     probed.clear(format="UINT", value=(0,))
     color = gpu_objects.texture((_SIDE, _SIDE), format="RGBA32F")
     target = gpu_objects.framebuffer(color_slots=(color,))
-    layout = gpu.types.GPUVertFormat()
-    layout.attr_add(id="unused", comp_type="F32", len=1, fetch_mode="FLOAT")
-    triangle = gpu_objects.batch(type="TRIS", buf=gpu_objects.vertex_buffer(layout, 3))
+    triangle = gpu_objects.triangle()
     shader = program(_ATOMICS_RECIPE)
     with drawing_into(target), drawing_state(depth_test="NONE", depth_write=False):
         shader.bind(images={"probed": probed})
@@ -181,7 +179,8 @@ def _dispatch_ms() -> float | None:
     """How long a small dispatch takes; None where it does not do what it should."""
     try:
         times = [_timed_dispatch() for _ in range(2)]  # the first one may still compile
-    except Exception:  # as above; a self-test says which program it is that does not compile
+    except Exception as error:  # as above; the self-test fails, and this is why
+        print(f"Hairloom: a small dispatch on the GPU fails: {type(error).__name__}: {error}")
         return None
     return times[-1]
 

@@ -67,3 +67,10 @@ vertex_buffer = _owned("GPUVertBuf")
 index_buffer = _owned("GPUIndexBuf")
 uniform_buffer = _owned("GPUUniformBuf")
 batch = _owned("GPUBatch")
+
+
+def triangle() -> Any:
+    """Three vertices with nothing in them, by which strand_layers.vert.glsl covers a target."""
+    layout = gpu.types.GPUVertFormat()
+    layout.attr_add(id="unused", comp_type="F32", len=1, fetch_mode="FLOAT")
+    return batch(type="TRIS", buf=vertex_buffer(layout, 3))

@@ -96,10 +96,7 @@ class HashedStrands:
         self._hair, self._light = tuple(textures[:2]), tuple(textures[2:])
         self._depth = gpu_objects.texture(size, format="DEPTH_COMPONENT32F")
         if self._triangle is None:
-            layout = gpu.types.GPUVertFormat()
-            layout.attr_add(id="unused", comp_type="F32", len=1, fetch_mode="FLOAT")
-            corners = gpu_objects.vertex_buffer(layout, 3)
-            self._triangle = gpu_objects.batch(type="TRIS", buf=corners)
+            self._triangle = gpu_objects.triangle()
 
 
 #: of all grooms and views

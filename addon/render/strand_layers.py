@@ -247,10 +247,7 @@ class StrandLayers:
         self._make_nodes(min(FIRST_ROWS, self._max_rows))
         self._fronts = gpu_objects.texture(size, format="RG32F")
         if self._triangle is None:
-            layout = gpu.types.GPUVertFormat()
-            layout.attr_add(id="unused", comp_type="F32", len=1, fetch_mode="FLOAT")
-            corners = gpu_objects.vertex_buffer(layout, 3)
-            self._triangle = gpu_objects.batch(type="TRIS", buf=corners)
+            self._triangle = gpu_objects.triangle()
 
 
 def is_software() -> bool:
