@@ -60,14 +60,19 @@ void main()
   vec3 hair = card_base(along, shading) * base;
 #  endif
 
-#  if HARMONICS
-  vec4 openness = 0.5 * card_occlusion * vec4(1.0, normal);
-  vec3 radiance = hair_ambient(
-      openness, tangent, normal, to_eye, shift_noise, sparkle_noise, hair, absorption);
-#  else
-  vec3 radiance = hair * lights.ambient_and_count.xyz * card_occlusion;
+  vec3 radiance = vec3(0.0);
+#  if WORLD
+  vec4 openness = openness_by_occlusion(card_occlusion, normal);
+  radiance = shading.ambient * hair_ambient(card_occlusion,
+                                            openness,
+                                            tangent,
+                                            normal,
+                                            to_eye,
+                                            shift_noise,
+                                            sparkle_noise,
+                                            hair,
+                                            absorption);
 #  endif
-  radiance *= shading.ambient;
   for (int index = 0; index < int(lights.ambient_and_count.w); index++) {
     vec3 to_light, irradiance;
     light_at(lights, index, card_point, to_light, irradiance);

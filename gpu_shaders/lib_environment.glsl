@@ -1,22 +1,16 @@
 // Light from all around. Twin of addon/shading/environment.py: same names; what the terms mean is
 // written there. Needs struct_lights.glsl. Holds no resources.
-//
-// HARMONICS, where a recipe says it: 0 the world is the same in all directions.
-#ifndef HARMONICS
-#  define HARMONICS 1
-#endif
 
 // MATT of addon/shading/environment.py
 const vec2 MATT = vec2(2.0 / 3.0, 1.0 / 4.0);
-// EIGHTH and CLOSED of addon/shading/environment.py
+// EIGHTH, CLOSED and CORNER_BLUR of addon/shading/environment.py
 const vec2 EIGHTH = vec2(0.8660254037844386, 0.6366197723675814);
-const float CLOSED = 1.0e-3, ENVIRONMENT_PI = 3.14159265358979;
+const float CLOSED = 1.0e-3, CORNER_BLUR = 0.39269908169872, ENVIRONMENT_PI = 3.14159265358979;
 
 // Radiance from a direction, of which orders 1 and 2 are damped.
 vec3 light_from(Lights lights, vec3 towards, vec2 kept)
 {
   vec3 radiance = lights.ambient_and_count.xyz;
-#if HARMONICS
   vec3 square = towards * towards, mixed = towards.xyz * towards.yzx;
   radiance += kept.x * (lights.harmonics[0].xyz * towards.x + lights.harmonics[1].xyz * towards.y +
                         lights.harmonics[2].xyz * towards.z);
@@ -24,9 +18,7 @@ vec3 light_from(Lights lights, vec3 towards, vec2 kept)
                         lights.harmonics[5].xyz * (3.0 * square.z - 1.0) +
                         lights.harmonics[6].xyz * mixed.z +
                         lights.harmonics[7].xyz * (square.x - square.y));
-  radiance = max(radiance, vec3(0.0));
-#endif
-  return radiance;
+  return max(radiance, vec3(0.0));
 }
 
 // Irradiance over pi, on a surface that faces this way.
@@ -46,6 +38,12 @@ vec3 corner_direction(int corner)
 vec3 corner_light(Lights lights, int corner)
 {
   return 0.5 * ENVIRONMENT_PI * light_from(lights, corner_direction(corner), EIGHTH);
+}
+
+// Openness where only occlusion is known: to where hair looks away.
+vec4 openness_by_occlusion(float occlusion, vec3 away)
+{
+  return 0.5 * occlusion * vec4(1.0, away);
 }
 
 // How many strands are between a place of hair and a direction, and beyond it, by its openness.

@@ -65,9 +65,13 @@ vec3 hair_light(vec3 tangent,
 #endif
 }
 
-#if HARMONICS
-// What hair sends to the eye of the world's light. openness: see open_path.
-vec3 hair_ambient(vec4 openness,
+#if WORLD
+// What hair sends to the eye of the world's light. Marschner's model takes it as eight lights;
+// Kajiya-Kay's as a matt surface, with ambient occlusion alone in the way.
+//
+// openness: see open_path.
+vec3 hair_ambient(float occlusion,
+                  vec4 openness,
                   vec3 tangent,
                   vec3 normal,
                   vec3 to_eye,
@@ -76,8 +80,10 @@ vec3 hair_ambient(vec4 openness,
                   vec3 hair,
                   vec3 absorption)
 {
-  // an eighth of all directions blurs every highlight
-  float level = 8.0;
+#  if !MARSCHNER
+  return occlusion * hair * matt_light(lights, normal);
+#  else
+  float level = table_level(CORNER_BLUR, longitudinal);
   vec3 radiance = vec3(0.0);
   for (int corner = 0; corner < 8; corner++) {
     vec3 towards = corner_direction(corner);
@@ -94,5 +100,6 @@ vec3 hair_ambient(vec4 openness,
                                                           path);
   }
   return radiance;
+#  endif
 }
 #endif

@@ -69,19 +69,23 @@ vec3 strand_radiance(vec3 point,
 #endif
 
   vec3 radiance = vec3(0.0);
-#if HARMONICS
+#if WORLD
 #  ifdef OPENNESS
   vec3 bent = tangent * openness.y + normal * openness.z + cross(tangent, normal) * openness.w;
   openness = vec4(openness.x, bent);
 #  else
-  openness = 0.5 * occlusion * vec4(1.0, unit_or(point - volume_center, normal));
+  openness = openness_by_occlusion(occlusion, unit_or(point - volume_center, normal));
 #  endif
-  radiance = hair_ambient(
-      openness, tangent, normal, to_eye, shift_noise, sparkle_noise, hair, absorption);
-#else
-  radiance = hair * lights.ambient_and_count.xyz * occlusion;
+  radiance = shading.ambient * hair_ambient(occlusion,
+                                            openness,
+                                            tangent,
+                                            normal,
+                                            to_eye,
+                                            shift_noise,
+                                            sparkle_noise,
+                                            hair,
+                                            absorption);
 #endif
-  radiance *= shading.ambient;
   for (int index = 0; index < int(lights.ambient_and_count.w); index++) {
     vec3 to_light, irradiance;
     light_at(lights, index, point, to_light, irradiance);

@@ -1,24 +1,37 @@
 // Hashed strands, second step: the colours of what both turns have found, where they have, and its depth.
+//
+// SHADES_ALL: pixels without hair are shaded as well and left out afterwards, for a driver that fails in
+// a branch that no pixel takes.
 #include "lib_layer_radiance.glsl"
 #include "lib_output.glsl"
+
+bool is_bare(vec4 hair)
+{
+  return hair.w == 0.0;
+}
 
 // w the depth; beyond all depths where there is no hair.
 vec4 shaded(vec4 hair)
 {
-  if (hair.w == 0.0) {
-    return vec4(0.0, 0.0, 0.0, 2.0);
+  const vec4 nothing = vec4(0.0, 0.0, 0.0, 2.0);
+#if !SHADES_ALL
+  if (is_bare(hair)) {
+    return nothing;
   }
+#endif
   vec3 light = layer_radiance(int(hair.x), hair.y);
-  return vec4(output_encoded(light, output_encoding), hair.z);
+  return is_bare(hair) ? nothing : vec4(output_encoded(light, output_encoding), hair.z);
 }
 
 void main()
 {
   ivec2 pixel = ivec2(gl_FragCoord.xy);
   vec4 one = texelFetch(first_hair, pixel, 0), other = texelFetch(second_hair, pixel, 0);
-  if (one.w == 0.0 && other.w == 0.0) {
+#if !SHADES_ALL
+  if (is_bare(one) && is_bare(other)) {
     discard;
   }
+#endif
   first_light = shaded(one);
   second_light = shaded(other);
 }

@@ -279,6 +279,11 @@ class Snapshot:
         return self.layout.strand_count
 
     @property
+    def has_world(self) -> bool:
+        """Whether light comes from all around."""
+        return any(self.ambient)
+
+    @property
     def center(self) -> Floats:
         """What strands look away from, (3,) [m]."""
         if self.volume_center is not None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from ..shading.settings import ShadingSettings, StrandSettings
-from .capabilities import shades_hashed_by_direction
+from .capabilities import fails_in_idle_branches
 from .detail_pass import DetailOrder
 from .feature_programs import UniformBlocks, bound
 from .pixel_parts import PixelPart
@@ -67,7 +67,6 @@ _HASHED_SHADE_RECIPE = ShaderRecipe(
     outputs=(("VEC4", "first_light"), ("VEC4", "second_light")),
     defines=(*_PLAIN, ("UNEVEN", 0)),
 )
-_EVEN_WORLD = ShaderFeature(name="even", defines={"HARMONICS": 0})
 #: puts each fragment into the list of its pixel
 _GATHER_RECIPE = ShaderRecipe(
     name="strand_gather",
@@ -152,10 +151,10 @@ class StrandDrawing:
 
     def shade_hashed(self, found: Sequence[Any]) -> ShaderProgram:
         """Bind what shades those that two turns have found."""
-        world = () if shades_hashed_by_direction() else (_EVEN_WORLD,)
+        driver = ShaderFeature(defines={"SHADES_ALL": int(fails_in_idle_branches())})
         return bound(
             _HASHED_SHADE_RECIPE,
-            [*self.points, *self.shading, *self.shown, *world],
+            [*self.points, *self.shading, *self.shown, driver],
             self.blocks,
             textures=dict(zip(("first_hair", "second_hair"), found, strict=True)),
             integers={"output_encoding": self.output_encoding},

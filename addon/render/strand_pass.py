@@ -241,11 +241,11 @@ class StrandPass:
             return
         if "cv_colors" in self._textures:
             yield self._color_feature()
-        if "cv_openness" in self._textures:
-            yield self._openness_feature()
         is_marschner, maps = snapshot.shading.model == "marschner", self.opacity(snapshot)
         if is_marschner:
             yield marschner_feature(snapshot)
+        if is_marschner and "cv_openness" in self._textures:
+            yield self._openness_feature()
         if maps is None:
             return
         yield maps.feature
@@ -317,7 +317,7 @@ class StrandPass:
             sources = (snapshot.color, snapshot.group, layout, chosen)
             self._take("cv_colors", sources, partial(_colors_texture, snapshot))
         openness = snapshot.openness
-        if snapshot.harmonics is None or openness is None:
+        if not snapshot.has_world or openness is None:
             self._drop("cv_openness")
         else:
             pixels = partial(layout.pixels, openness)

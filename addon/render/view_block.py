@@ -17,14 +17,13 @@ def view_feature(camera: Camera, width: int, height: int) -> ShaderFeature:
 
 
 def lights_feature(snapshot: Snapshot) -> ShaderFeature:
-    """The block `Lights`, and what kinds of them a program has to know."""
-    kinds = kinds_needed(kept_lights(snapshot.lights))
-    is_directional = snapshot.harmonics is not None
+    """The block `Lights`, and which of them a program has to know: WORLD, light from all around."""
+    kinds, has_world = kinds_needed(kept_lights(snapshot.lights)), snapshot.has_world
     block = pack_lights(snapshot.lights, snapshot.ambient, snapshot.harmonics)
     return ShaderFeature(
-        name=f"{kinds}{is_directional:d}",
+        name=f"{kinds}{has_world:d}",
         blocks={"lights": ("Lights", block)},
-        defines={"LIGHT_KINDS": kinds, "HARMONICS": int(is_directional)},
+        defines={"LIGHT_KINDS": kinds, "WORLD": int(has_world)},
     )
 
 

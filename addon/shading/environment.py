@@ -9,14 +9,16 @@ becomes
   of the direction (Ramamoorthi and Hanrahan 2001, "An Efficient Representation for Irradiance
   Environment Maps"). Light that falls on a matt surface is that with each order damped.
 
-Hair is lit by a cube's eight corners, each of which stands for the light from an eighth of all
-directions, as by eight more lights; only that what is in their way comes from a grid
-(ambient.openness) and not from maps. Twin of gpu_shaders/lib_environment.glsl.
+Marschner's hair is lit by a cube's eight corners, each of which stands for the light from an eighth
+of all directions, as by eight more lights; only that what is in their way comes from a grid
+(ambient.openness) and not from maps. Kajiya-Kay's is lit as a matt surface. Twin of
+gpu_shaders/lib_environment.glsl, and of `hair_ambient` in lib_hair_light.glsl.
 """
 
 from __future__ import annotations
 
 import itertools
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -32,6 +34,8 @@ MATT = (2.0 / 3.0, 1.0 / 4.0)
 EIGHTH = (0.5 * np.sqrt(3.0), 2.0 / np.pi)
 #: less of a direction's light than this does not count: that is seven strands
 CLOSED = 1.0e-3
+#: over which angle [rad] light from an eighth of all directions blurs a highlight along the strand
+CORNER_BLUR = np.pi / 8.0
 #: a lobe is brighter than this many times the mean around it; its radius; the fraction of all light
 #: that it has at least
 _BRIGHTER, _LOBE, _LOBE_LIGHT = 3.0, np.radians(25.0), 0.03
@@ -211,3 +215,30 @@ def open_path(openness: Floats, towards: Floats) -> Floats:
     mean, bent = openness[..., 0], np.sum(openness[..., 1:] * towards, axis=-1)
     both: Floats = np.stack([mean + bent, mean - bent], axis=-1)
     return -np.log(np.clip(both, CLOSED, 1.0))
+
+
+def hair_ambient(
+    environment: Environment, openness: Floats, hair_light: Callable[[Floats, Floats], Floats]
+) -> Floats:
+    """What Marschner's hair sends to the eye of the world's light without the suns', (..., 3).
+
+    Args:
+        openness: (..., 4), see ambient.openness.
+        hair_light: what hair sends of one light, (..., 3), times irradiance it is radiance; of the
+            direction towards the light (..., 3) and of `open_path` there (..., 2).
+    """
+    found = np.zeros((*openness.shape[:-1], 3))
+    corners = np.arange(8)
+    for power, toward in zip(
+        corner_light(environment, corners), corner_direction(corners), strict=True
+    ):
+        towards = np.broadcast_to(toward, found.shape)
+        found += power * hair_light(towards, open_path(openness, towards))
+    return found
+
+
+def openness_by_occlusion(occlusion: Floats, away: Floats) -> Floats:
+    """Openness (..., 4) where only occlusion (...) is known: to where hair looks away, (..., 3)."""
+    ahead = np.concatenate([np.ones((*away.shape[:-1], 1)), away], axis=-1)
+    found: Floats = 0.5 * occlusion[..., None] * ahead
+    return found

@@ -67,7 +67,7 @@ class StageSettings(Settings):
     fill: float = _strength(1.2, "Fill", "Light into the shadows of the main light")
     fill_side: float = _side(-60.0, "Fill Side", "fill light")
     fill_height: float = _height(5.0, "Fill Height", "fill light")
-    rim: float = _strength(1.9, "Rim", "Light from behind, which shines through the hair")
+    rim: float = _strength(1.4, "Rim", "Light from behind, which shines through the hair")
     rim_side: float = _side(-148.0, "Rim Side", "light from behind")
     rim_height: float = _height(35.0, "Rim Height", "light from behind")
     distance: float = number(
@@ -86,7 +86,7 @@ class StageSettings(Settings):
         hard=(-1.0, 1.0),
     )
     ambient: tuple[float, float, float] = color(
-        (0.45, 0.475, 0.52),
+        (0.3, 0.32, 0.35),
         label="Ambient",
         description="Light from all sides",
         maximum=100.0,

@@ -116,13 +116,19 @@ def test_a_pixel_has_the_colour_of_the_reference(
 def test_marschner_shades_cards_as_strands(frame: Any, front: Any, color_noise: float) -> None:
     """A card has the colours of the reference of a strand in its place; its base texture says how
     that strand's colour differs from the mean."""
+    from hairloom.addon.shading.environment import (
+        CORNER_BLUR,
+        Environment,
+        hair_ambient,
+        openness_by_occlusion,
+    )
     from hairloom.addon.shading.marschner.look import (
         fibre_of,
         marschner_light,
         strand_absorption,
         strand_color,
     )
-    from hairloom.addon.shading.marschner.tables import marschner_tables, shape_of
+    from hairloom.addon.shading.marschner.tables import marschner_tables, shape_of, table_level
 
     look = dataclasses.replace(
         LOOK, model="marschner", grey_fraction=0.0, tip_tint=0.0, color_variation=0.6
@@ -142,6 +148,7 @@ def test_marschner_shades_cards_as_strands(frame: Any, front: Any, color_noise: 
     )
     picture = frame.render_image(snapshot, front, SIZE, SIZE, 1)
     tables = marschner_tables(shape_of(fibre_of(look)), snapshot.table_size)
+    level = table_level(CORNER_BLUR, snapshot.table_size)
     for row, column in ((20, 30), (48, 50), (90, 7)):
         u, z = (column + 0.5) / SIZE, (row + 0.5) / SIZE
         point = np.array([u, 0.0, z])
@@ -149,20 +156,26 @@ def test_marschner_shades_cards_as_strands(frame: Any, front: Any, color_noise: 
         tangent = np.array([0.0, -np.sin(tilt), -np.cos(tilt)])
         along = np.array(1.0 - z)
         absorption = strand_absorption(look, along, np.array(color_noise), half + 1.0)
-        radiance = np.array(AMBIENT) * strand_color(absorption)
+        occlusion = np.array(0.4 + 0.2 * u + 0.4 * (1.0 - z))
+        lit = partial(
+            marschner_light,
+            tables,
+            tangent,
+            normal,
+            to_eye=np.array([0.0, -1.0, 0.0]),
+            shift_noise=np.array(0.7),
+            sparkle_noise=np.array(0.3),
+            absorption=absorption,
+            shading=look,
+        )
+        expected = hair_ambient(
+            Environment(AMBIENT),
+            openness_by_occlusion(occlusion, normal),
+            lambda towards, path, lit=lit: lit(to_light=towards, level=level, tau=path[..., 0]),
+        )
         for lamp in LIGHTS:
-            radiance = radiance + light_irradiance(lamp, point) * marschner_light(
-                tables,
-                tangent,
-                normal,
-                light_at(lamp, point)[0],
-                np.array([0.0, -1.0, 0.0]),
-                np.array(0.7),
-                np.array(0.3),
-                absorption,
-                look,
-            )
-        expected = radiance * (0.4 + 0.2 * u + 0.4 * (1.0 - z))
+            irradiance = light_irradiance(lamp, point)
+            expected += occlusion * irradiance * lit(to_light=light_at(lamp, point)[0])
         assert picture[row, column, :3] == pytest.approx(expected, rel=0.01)
 
 

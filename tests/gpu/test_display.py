@@ -90,7 +90,9 @@ def drawn(
         np.array([[[0.0, 0.0, -1.0], [0.0, 0.0, 1.0]]], np.float32),
         np.full((1, 2), 9.0, np.float32),
         ambient=radiance,
-        shading=ShadingSettings(base_color=(1.0, 1.0, 1.0), color_variation=0.0),
+        shading=ShadingSettings(
+            model="kajiya_kay", base_color=(1.0, 1.0, 1.0), color_variation=0.0
+        ),
         strand_settings=StrandSettings(tip_width=1.0),
     )
     camera = Camera(look_at((0, -1, 0), (0, 0, 0)), orthographic(1.0, 1.0, 0.0, 3.0))

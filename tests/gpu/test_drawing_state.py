@@ -28,7 +28,9 @@ def white(gpu_context: Any) -> Any:
         strands,
         np.full((1, 2), 9.0, np.float32),
         ambient=(0.5, 0.5, 0.5),
-        shading=ShadingSettings(base_color=(1.0, 1.0, 1.0), color_variation=0.0),
+        shading=ShadingSettings(
+            model="kajiya_kay", base_color=(1.0, 1.0, 1.0), color_variation=0.0
+        ),
         strand_settings=StrandSettings(tip_width=1.0),
     )
     return snapshot, Camera(look_at((0, -1, 0), (0, 0, 0)), orthographic(1.0, 1.0, 0.0, 3.0))

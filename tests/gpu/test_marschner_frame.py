@@ -9,6 +9,12 @@ import numpy as np
 import pytest
 
 from hairloom.addon.refine.settings import DetailSettings
+from hairloom.addon.shading.environment import (
+    CORNER_BLUR,
+    Environment,
+    hair_ambient,
+    openness_by_occlusion,
+)
 from hairloom.addon.shading.kajiya_kay import strand_normal
 from hairloom.addon.shading.lights import Light, light_at
 from hairloom.addon.shading.marschner import tables as tables_module
@@ -16,9 +22,13 @@ from hairloom.addon.shading.marschner.look import (
     fibre_of,
     marschner_light,
     strand_absorption,
-    strand_color,
 )
-from hairloom.addon.shading.marschner.tables import PREVIEW_SIZE, MarschnerTables, marschner_tables
+from hairloom.addon.shading.marschner.tables import (
+    PREVIEW_SIZE,
+    MarschnerTables,
+    marschner_tables,
+    table_level,
+)
 from hairloom.addon.shading.settings import ShadingSettings, StrandSettings
 from hairloom.addon.shading.strand_noise import strand_noise
 from hairloom.addon.shading.volume.settings import VolumeSettings
@@ -87,13 +97,32 @@ def test_a_pixel_has_the_colour_of_the_reference(
     shift, sparkle = (strand_noise(seeds[:, None], channel, cells) for channel in (0, 1))
     own = [strand_noise(seeds[:, None], channel, np.zeros((7, 9))) for channel in (2, 3)]
     absorption = strand_absorption(shading, along, *own)
-    expected = np.array(ambient) * strand_color(absorption)
+    occlusion = 0.4 + 0.4 * along
+    expected = np.zeros((7, 9, 3))
     for lamp in lights:
         to_light, irradiance = light_at(lamp, point)
-        expected = expected + irradiance * marschner_light(
+        expected += irradiance * marschner_light(
             tables, tangent, normal, to_light, to_eye, shift, sparkle, absorption, shading
         )
-    expected *= (0.4 + 0.4 * along)[..., None]
+    expected *= occlusion[..., None]
+    away = (point - center) / np.linalg.norm(point - center, axis=-1, keepdims=True)
+    expected += hair_ambient(
+        Environment(ambient),
+        openness_by_occlusion(occlusion, away),
+        lambda towards, path: marschner_light(
+            tables,
+            tangent,
+            normal,
+            towards,
+            to_eye,
+            shift,
+            sparkle,
+            absorption,
+            shading,
+            level=table_level(CORNER_BLUR, size),
+            tau=path[..., 0],
+        ),
+    )
     found = picture[row, column]
     assert (found[..., 3] == 1.0).all()
     assert np.abs(found[..., :3] / expected - 1.0).max() < 2e-3

@@ -141,6 +141,11 @@ def look_up(
     return np.sum(factors[..., None] * kept, axis=-2) / squared
 
 
+def table_level(angle: float, size: int) -> float:
+    """The level at which a longitudinal table of this size is blurred over an angle of theta_h."""
+    return float(np.log2(max(angle * (size - 1) / np.pi, 1.0)))
+
+
 def kept_light(paths: Floats, absorption: Floats) -> Floats:
     """What absorption leaves of R, TT, TRT and the rest, (..., 4, 3).
 

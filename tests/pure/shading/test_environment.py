@@ -7,17 +7,27 @@ import pytest
 
 from hairloom.addon.shading.environment import (
     COLUMNS,
+    CORNER_BLUR,
     ROWS,
     Environment,
     corner_direction,
     corner_light,
     environment_of,
+    hair_ambient,
     light_from,
     matt_light,
     open_path,
     panorama_directions,
     reduced,
 )
+from hairloom.addon.shading.marschner.look import fibre_of, marschner_light
+from hairloom.addon.shading.marschner.tables import (
+    DEFAULT_SIZE,
+    PREVIEW_SIZE,
+    marschner_tables,
+    table_level,
+)
+from hairloom.addon.shading.settings import ShadingSettings
 
 DIRECTIONS, ANGLES = panorama_directions(ROWS, COLUMNS)
 UP = DIRECTIONS[..., 2:]
@@ -153,6 +163,37 @@ def test_eight_corners_have_all_light() -> None:
     assert lights.sum(axis=0) == pytest.approx(4.0 * np.pi * WHITE, rel=1e-4)
     from_above = lights[corner_direction(np.arange(8))[:, 2] > 0.0].sum(axis=0)
     assert from_above == pytest.approx(3.0 * np.pi * WHITE, rel=1e-3)
+
+
+@pytest.mark.parametrize("size", [PREVIEW_SIZE, DEFAULT_SIZE])
+def test_white_hair_in_a_white_world_is_white(size: int) -> None:
+    """The furnace: hair that keeps all light, in the open, sends as much as comes, on average."""
+    look = ShadingSettings(fake_scattering=0.0, volume_shadow=0.0, sparkle=0.0, shift_noise=0.0)
+    tables = marschner_tables(fibre_of(look), size)
+    random, count = np.random.default_rng(3), 4000
+    tangent, to_eye, other = random.normal(size=(3, count, 3))
+    normal = np.cross(tangent, other)
+    for vectors in (tangent, to_eye, normal):
+        vectors /= np.linalg.norm(vectors, axis=1, keepdims=True)
+    half, white = np.full(count, 0.5), np.zeros((count, 3))
+    found = hair_ambient(
+        Environment((1.0, 1.0, 1.0)),
+        np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)),
+        lambda towards, path: marschner_light(
+            tables,
+            tangent,
+            normal,
+            towards,
+            to_eye,
+            half,
+            half,
+            white,
+            look,
+            level=table_level(CORNER_BLUR, size),
+            tau=path[..., 0],
+        ),
+    )
+    assert found.mean() == pytest.approx(1.0, abs=0.1)
 
 
 def test_paths_of_openness() -> None:
