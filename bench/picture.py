@@ -5,7 +5,7 @@ shadow is, the picture has to be the engine's own; where our raster of a mesh an
 disagree, hair is cut off wrongly. Depth of field and motion blur are compared by what the same
 strands, with the same widths, cover of each pixel.
 
-What part environment compares is said in _picture_environment.
+What the parts environment and soft_shadows compare is said in their modules.
 
 Exit code 1: a limit is missed.
 
@@ -28,6 +28,7 @@ import flip_evaluator
 import numpy as np
 import OpenImageIO as oiio
 from _picture_environment import environment
+from _picture_soft_shadows import soft_shadows
 from _report import start, tell
 
 import hairloom
@@ -51,15 +52,20 @@ MOST = {
     "motion_flip": 0.05,
     "environment_flip_hair": 0.15,
     "environment_light_percent": 10.0,
+    "soft_shadow_rms": 0.02,
 }
 
 type Passes = dict[str, np.ndarray]
 
 
-def scene_with_hair() -> tuple[Any, Any]:
+def empty_file() -> None:
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     if not hasattr(bpy.types.Scene, "hairloom"):
         hairloom.register()
+
+
+def scene_with_hair() -> tuple[Any, Any]:
+    empty_file()
     scene, hair = add_sample_scene(())
     bpy.context.window.scene = scene
     scene.render.resolution_x, scene.render.resolution_y = WIDTH, HEIGHT
@@ -179,7 +185,7 @@ def _cover_flip(scene: Any) -> float:
 
 def main() -> int:
     start()
-    parts = sys.argv[1:] or [*ENGINES, "blur", "environment"]
+    parts = sys.argv[1:] or [*ENGINES, "blur", "environment", "soft_shadows"]
     found: dict[str, Any] = {}
     for name in ENGINES:
         found |= over(name) if name in parts else {}
@@ -187,6 +193,9 @@ def main() -> int:
         found |= blur()
     if "environment" in parts:
         found |= environment()
+    if "soft_shadows" in parts:
+        empty_file()
+        found |= soft_shadows(rendered)
     missed = {name: most for name, most in MOST.items() if found.get(name, 0.0) > most}
     tell({**found, "limits_missed": sorted(missed)}, REFERENCE)
     return 1 if missed else 0

@@ -13,6 +13,7 @@ import numpy as np
 from ..arrays import Floats
 from ..shading.lights import Light
 from ..shading.mesh_shadow_settings import MeshShadowSettings
+from .light_samples import lights_at
 from .snapshot import Color, MeshSnapshot, Snapshot
 
 
@@ -66,6 +67,13 @@ class SceneSnapshot:
                 harmonics=self.harmonics,
             )
         return self._lit[groom.key]
+
+    def at_sample(self, sample: int) -> SceneSnapshot:
+        """The same moment with one point of each light, see light_samples.py."""
+        centers = [self.lit(groom).center for groom in self.grooms]
+        center = np.mean(centers, axis=0) if centers else np.zeros(3)
+        lights = lights_at(self.lights, sample, center)
+        return self if lights == self.lights else replace(self, lights=lights)
 
     def unlit_by_hair(self) -> Snapshot:
         """Nothing but light, for meshes that no hair shades."""

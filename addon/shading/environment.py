@@ -158,7 +158,11 @@ def _without_suns(
         flux = taken @ _LUMINANCE * weights
         if flux.sum() < _LOBE_LIGHT * whole:
             break
-        light = Light.sun(-(flux @ directions), weights @ taken, 1.0)
+        middle = flux @ directions
+        # of a disk, whose rays lie on average half as deep as its rim
+        depth = 1.0 - float(np.linalg.norm(middle)) / float(flux.sum())
+        angle = 2.0 * float(np.arccos(np.clip(1.0 - 2.0 * depth, 0.0, 1.0)))
+        light = Light.sun(-middle, weights @ taken, 1.0, angle)
         suns.append(replace(light, of_world=True, name="World"))
         radiance = radiance - taken
     return radiance, suns

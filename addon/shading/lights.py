@@ -67,6 +67,7 @@ class Light:
     kind: "sun", "point", "spot" or "area".
     vector: for a sun the unit direction towards it, for others their position [m].
     power: rgb; for a sun irradiance [W/m^2], for others radiant flux [W].
+    angle: that a sun fills [rad], 0 to pi; only its shadows and highlights are wider by it.
     radius: of a point or spot [m].
     is_ball: a radius makes it a ball, not a disk that faces whoever looks.
     cone: of a spot.
@@ -86,6 +87,7 @@ class Light:
     casts_shadow: bool = True
     name: str = field(default="", compare=False)
     of_world: bool = False
+    angle: float = 0.0
 
     @classmethod
     def sun(
@@ -93,8 +95,9 @@ class Light:
         shines_along: Sequence[float] | Floats,
         color: Sequence[float] | Floats,
         strength: float,
+        angle: float = 0.0,
     ) -> Light:
-        """A sun that shines along a direction, of Blender's strength [W/m^2].
+        """A sun that shines along a direction, of Blender's strength [W/m^2] and angle [rad].
 
         Raises:
             HairloomError: the direction has no length.
@@ -105,7 +108,8 @@ class Light:
             raise HairloomError(
                 "its direction has no length", place="sun light", remedy="Turn it to the hair"
             )
-        return cls("sun", _triple(-along / length), _triple(np.multiply(color, strength)))
+        power = _triple(np.multiply(color, strength))
+        return cls("sun", _triple(-along / length), power, angle=angle)
 
     @classmethod
     def point(

@@ -147,6 +147,7 @@ class Still:
 
     def _add_sample(self, scene: SceneSnapshot, camera: Camera, place: Floats) -> None:
         moved = jittered(camera, place, *self._size, sample=self._picture.count)
+        scene = scene.at_sample(self._picture.count)
         self._pass.draw(scene, moved, self._target, self._size, sky_of(scene, self._render))
         self.warnings = tuple(dict.fromkeys((*self.warnings, *self._pass.notes)))
         self._picture.add(self._target.color)

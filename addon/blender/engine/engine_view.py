@@ -99,7 +99,8 @@ class EngineView:
         size, number = self._picture.size, self._picture.count
         place = jitters(number + 1, render.filter_size)[-1]
         camera = jittered(shown.camera, place, *size, number)
-        self._pass.draw(shown.scene, camera, self._target, size, sky_of(shown.scene, render))
+        scene = shown.scene.at_sample(number)
+        self._pass.draw(scene, camera, self._target, size, sky_of(scene, render))
         self._picture.add(self._target.color)
 
     @property

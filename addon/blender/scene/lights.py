@@ -103,7 +103,8 @@ def _light(instance: bpy.types.Object) -> Light | None:
     if data.type in ("SUN", "AREA") and not along.any():
         return None
     if data.type == "SUN":
-        return Light.sun(along, color, 1.0 if data.normalize else _sun_disk(data.angle))
+        strength = 1.0 if data.normalize else _sun_disk(data.angle)
+        return Light.sun(along, color, strength, data.angle)
     if data.type == "AREA":
         if _is_portal(data):
             return None

@@ -1,0 +1,99 @@
+"""The penumbra of a sun that fills an angle, against the part of its disk that an edge leaves."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from hairloom.addon.render.camera import Camera, look_at, orthographic
+from hairloom.addon.render.scene_snapshot import DrawnGroom, SceneSnapshot
+from hairloom.addon.render.snapshot import MeshSnapshot, Snapshot
+from hairloom.addon.shading.lights import Light
+from hairloom.addon.shading.mesh_shadow_settings import MeshShadowSettings
+from hairloom.addon.shading.volume.settings import VolumeSettings
+from hairloom.addon.strands import Surface
+
+SIZE, SAMPLES = 128, 96
+HEIGHT, ANGLE = 0.5, np.radians(20.0)
+WHITE = (1.0, 1.0, 1.0)
+
+
+def square(low: tuple[float, float], high: tuple[float, float], height: float) -> Surface:
+    x, y = zip(low, high, strict=True)
+    corners = [(x[0], y[0]), (x[1], y[0]), (x[1], y[1]), (x[0], y[1])]
+    positions = np.insert(np.array(corners), 2, height, axis=1).astype(np.float32)
+    return Surface(positions, np.array([[0, 1, 2], [0, 2, 3]], np.int32))
+
+
+def matt(surface: Surface) -> MeshSnapshot:
+    normals = np.tile(np.float32([0.0, 0.0, 1.0]), (4, 1))
+    return MeshSnapshot(surface, normals, WHITE, specular=0.0)
+
+
+def mean_row(scene: SceneSnapshot) -> np.ndarray:
+    """The middle row of the picture, from above and below what shades, of all samples."""
+    from hairloom.addon.render.accumulation import Target
+    from hairloom.addon.render.scene_pass import ScenePass
+    from hairloom.addon.render.textures import texture_to_array
+
+    camera = Camera(
+        look_at((0.0, 0.0, 4.0), (0.0, 0.0, 0.0), up=(0.0, 1.0, 0.0)),
+        orthographic(0.6, 1.0, 3.7, 5.0),
+    )
+    drawing, target = ScenePass(), Target()
+    total = np.zeros((SIZE, 3))
+    for sample in range(SAMPLES):
+        drawing.draw(scene.at_sample(sample), camera, target, (SIZE, SIZE), (0.0, 0.0, 0.0, 1.0))
+        total += texture_to_array(target.color)[SIZE // 2, :, :3]
+    return total / SAMPLES
+
+
+def segment_left(place: np.ndarray) -> np.ndarray:
+    """The part of a unit disk that lies to the right of a line at -place."""
+    x = np.clip(place, -1.0, 1.0)
+    return 0.5 + (np.arcsin(x) + x * np.sqrt(1.0 - x * x)) / np.pi
+
+
+def test_an_edge_has_the_penumbra_of_the_disk(gpu_context: Any) -> None:
+    """A sheet covers all to the left of x = 0, above what the camera sees."""
+    ground = matt(square((-4.0, -4.0), (4.0, 4.0), 0.0))
+    sheet = matt(square((-3.0, -3.0), (0.0, 3.0), HEIGHT))
+    sun = Light.sun((0.0, 0.0, -1.0), WHITE, np.pi, ANGLE)
+    scene = SceneSnapshot(
+        meshes=(ground,),
+        casters=(ground, sheet),
+        lights=(sun,),
+        mesh_shadows=MeshShadowSettings(mesh_resolution=2048),
+    )
+    found = mean_row(scene)[:, 0]
+    place = (np.arange(SIZE) + 0.5) / SIZE * 0.6 - 0.3
+    expected = segment_left(place / (HEIGHT * np.tan(0.5 * ANGLE)))
+    assert np.abs(found - expected).max() < 0.05
+    assert np.sqrt(np.mean((found - expected) ** 2)) < 0.02
+
+
+def test_hair_shades_a_mesh_softly(gpu_context: Any) -> None:
+    """A curtain of hair, whose edge is at x = 0: as far as its opacity goes."""
+    ground = matt(square((-4.0, -4.0), (4.0, 4.0), 0.0))
+    x = np.linspace(-0.5, 0.0, 400)
+    ends = np.array([[[0.0, -0.5, HEIGHT], [0.0, 0.5, HEIGHT]]])
+    strands = (ends + x[:, None, None] * [1.0, 0.0, 0.0]).astype(np.float32)
+    hair = Snapshot(
+        strands,
+        np.full(strands.shape[:2], 0.003, np.float32),
+        volume=VolumeSettings(shadows="deep"),
+    )
+    scene = SceneSnapshot(
+        meshes=(ground,),
+        casters=(ground,),
+        grooms=(DrawnGroom("hair", hair),),
+        lights=(Light.sun((0.0, 0.0, -1.0), WHITE, np.pi, ANGLE),),
+    )
+    found = mean_row(scene)[:, 1]
+    open_, closed = found[-8:].mean(), found[:8].mean()
+    place = (np.arange(SIZE) + 0.5) / SIZE * 0.6 - 0.3
+    expected = segment_left(place / (HEIGHT * np.tan(0.5 * ANGLE)))
+    assert open_ == pytest.approx(1.0, abs=0.02) and closed < 0.4
+    assert (found - closed) / (open_ - closed) == pytest.approx(expected, abs=0.08)

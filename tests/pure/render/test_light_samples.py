@@ -1,0 +1,75 @@
+"""Points of lights: their mean is the whole light, and they fill it evenly."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hairloom.addon.render.light_samples import disk_place, lights_at
+from hairloom.addon.shading.area_lights import Panel
+from hairloom.addon.shading.lights import Light, light_at
+
+WHITE = (1.0, 1.0, 1.0)
+AXES = (1.0, 0.0, 0.0), (0.0, 0.6, 0.8), (0.0, 0.8, -0.6)
+LIGHTS = {
+    "sun": Light.sun((0.3, 0.2, -1.0), WHITE, 3.0, np.radians(20.0)),
+    "lamp": Light.point((0.4, -0.9, 1.2), WHITE, 40.0, 0.3),
+    "ball": Light.point((0.4, -0.9, 1.2), WHITE, 40.0, 0.1, is_ball=True),
+    "panel": Light.area((0.0, -1.0, 1.0), WHITE, 40.0, Panel(*AXES, 0.5, 0.25)),
+    "ellipse": Light.area((0.0, -1.0, 1.0), WHITE, 40.0, Panel(*AXES, 0.5, 0.25, True)),
+    "narrow": Light.area(
+        (0.0, -1.0, 1.0), WHITE, 40.0, Panel(*AXES, 0.3, 0.3, spread=np.radians(120.0))
+    ),
+}
+POINTS = np.array([[0.0, 0.0, 0.0], [0.3, -0.2, 0.1], [-0.2, 0.1, -0.4]])
+
+
+def arriving(light: Light) -> np.ndarray:
+    """The vector irradiance at the points: what a matt surface sees of a light."""
+    towards, irradiance = light_at(light, POINTS)
+    return towards * irradiance[:, :1]
+
+
+@pytest.mark.parametrize("name", LIGHTS)
+def test_the_mean_of_all_points_is_the_whole_light(name: str) -> None:
+    light = LIGHTS[name]
+    parts = [lights_at((light,), sample, np.zeros(3))[0] for sample in range(1024)]
+    found = np.mean([arriving(part) for part in parts], axis=0)
+    assert np.linalg.norm(found - arriving(light), axis=1) == pytest.approx(
+        0.0, abs=0.02 * np.linalg.norm(arriving(light), axis=1).max()
+    )
+    assert len({part.vector for part in parts}) == len(parts)
+
+
+def test_the_first_sample_is_the_middle() -> None:
+    for name, light in LIGHTS.items():
+        (first,) = lights_at((light,), 0, np.zeros(3))
+        assert first.vector == pytest.approx(light.vector), name
+
+
+def test_a_sun_fills_its_angle() -> None:
+    """Even over the disk, half of it is within 0.707 of its radius."""
+    light = LIGHTS["sun"]
+    found = np.array([lights_at((light,), sample, np.zeros(3))[0].vector for sample in range(512)])
+    angles = np.arccos(np.clip(found @ np.array(light.vector), -1.0, 1.0))
+    assert np.degrees(angles.max()) == pytest.approx(10.0, abs=0.3)
+    assert np.degrees(np.median(angles)) == pytest.approx(10.0 * np.sqrt(0.5), abs=0.3)
+
+
+def test_lights_without_a_size_are_left_alone() -> None:
+    lights = (Light.sun((0.0, 0.0, -1.0), WHITE, 1.0), Light.point((1.0, 0.0, 0.0), WHITE, 1.0))
+    assert lights_at(lights, 7, np.zeros(3)) == lights
+
+
+def test_hair_inside_a_lamp_sees_no_side_of_it() -> None:
+    light = Light.point((0.0, 0.0, 0.1), WHITE, 1.0, 0.3)
+    assert lights_at((light,), 5, np.zeros(3)) == (light,)
+
+
+def test_the_disk_keeps_areas() -> None:
+    side = (np.arange(200) + 0.5) / 200
+    places = np.array([disk_place(np.array([x, y])) for x in side for y in side])
+    radius = np.linalg.norm(places, axis=1)
+    assert radius.max() <= 1.0
+    assert (radius < 0.5).mean() == pytest.approx(0.25, abs=0.01)
+    assert ((places[:, 0] > 0.0) & (places[:, 1] > 0.0)).mean() == pytest.approx(0.25, abs=0.01)
