@@ -28,6 +28,7 @@ import numpy as np
 
 import hairloom
 from hairloom.addon.blender.base import latest_job
+from hairloom.addon.blender.base.parts import at_once
 from hairloom.addon.blender.colliders import fields
 from hairloom.addon.blender.preview import previews, scene_events
 from hairloom.addon.blender.preview.phases import Phase
@@ -77,7 +78,7 @@ def main() -> None:
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     hairloom.register()
     latest_job.is_blocking = lambda: False  # as in a window
-    scene, hair = add_sample_scene(())
+    scene, hair = at_once(add_sample_scene(()))
     hair.hairloom.dynamics.device = given.form
     depsgraph = scene.view_layers[0].depsgraph
     stops = Stops()

@@ -8,10 +8,13 @@ the same scene after *Make Real*: Blender's own curves, drawn again. FLIP is And
 `comb_all_ms` until the rest has come, `comb_undo_ms` the stroke taken back; see `_combing`.
 `grow_edit_ms` is a setting of growth given to 4,095 strands until these and their children follow;
 see `_growing`.
+`silent_seconds_max` is the longest that a job keeps the window from saying how far it is, and from
+hearing Esc; see `_jobs`.
 
 make bench NAME=seat                some five minutes
 tools/bench.py seat comb            combing alone
 tools/bench.py seat grow            growing alone
+tools/bench.py seat jobs            long jobs alone
 """
 
 from __future__ import annotations
@@ -26,9 +29,11 @@ import flip_evaluator
 import numpy as np
 from _combing import combed, styled
 from _growing import edited
+from _jobs import silent
 from _report import start, tell
 
 import hairloom
+from hairloom.addon.blender.base.parts import at_once
 from hairloom.addon.blender.setup.sample_scene import add_sample_scene
 from hairloom.addon.blender.strands.make_real import make_real
 
@@ -39,6 +44,7 @@ MOST = {
     "comb_undo_ms": 100.0,
     "comb_all_ms": 1000.0,
     "grow_edit_ms": 500.0,
+    "silent_seconds_max": 0.5,
 }
 SIZE = 480
 #: what else is compared, without a limit: a look with all that a colour for each strand has to hold
@@ -54,6 +60,8 @@ def main(parts: list[str]) -> int:
         found |= combed(styled("long_straight"))
     if "grow" in parts or not parts:
         found |= edited()
+    if "jobs" in parts or not parts:
+        found |= silent()
     if not parts:
         found |= _figures({})
         found |= {f"{name}_tinted": value for name, value in _figures(TINTED).items()}
@@ -63,14 +71,14 @@ def main(parts: list[str]) -> int:
 
 
 def _figures(look: dict[str, float]) -> dict[str, float]:
-    scene, hair = add_sample_scene(("looks/brown",), "light")
+    scene, hair = at_once(add_sample_scene(("looks/brown",), "light"))
     for name, value in look.items():
         setattr(hair.data.hairloom.shading, name, value)
     scene.render.resolution_x = scene.render.resolution_y = SIZE
     before = _picture(scene)
     began = time.process_time()
     with bpy.context.temp_override(scene=scene, view_layer=scene.view_layers[0]):
-        real, _ = make_real(hair, scene.view_layers[0].depsgraph)
+        ((real, _),) = at_once(make_real([hair], scene.view_layers[0].depsgraph))
     seconds = time.process_time() - began
     after = _picture(scene)
     real.hide_render = True

@@ -107,7 +107,8 @@ def passes_of(scene: Any, path: Path) -> dict[str, Any]:
 def by_each_engine(work: Path) -> list[Path]:
     """The sample scene as EEVEE and Cycles show it with our hair, and as our engine does."""
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    scene, _ = of_addon("blender.setup.sample_scene").add_sample_scene(("looks/brown",))
+    bpy.ops.hairloom.sample_scene(look="looks/brown", plays=False)
+    scene = bpy.context.scene
     scene.render.resolution_x = scene.render.resolution_y = OVER_SIZE
     scene.hairloom.picture.samples = SAMPLES
     scene.eevee.taa_render_samples = scene.cycles.samples = OVER_SAMPLES

@@ -59,10 +59,12 @@ def rig_of(name: str, most: int = 1_000_000) -> tuple[Any, bpy.types.Object]:
     setup = of_addon("blender.setup.hairstyles")
     collection = bpy.context.collection
     style = setup.named_hairstyle(name)
-    head = animal() if setup.grows_anywhere(style) else setup.add_head(collection, "light")
+    at_once = of_addon("blender.base.parts").at_once
+    is_fur = setup.grows_anywhere(style)
+    head = animal() if is_fur else at_once(setup.add_head(collection, "light"))
     bpy.context.view_layer.update()
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    hair = setup.add_hairstyle(style, head, depsgraph, collection).hair
+    hair = at_once(setup.add_hairstyle(style, head, depsgraph, collection)).hair
     children = hair.data.hairloom.children
     children.strand_count = min(children.strand_count, most)
     inputs = of_addon("blender.command_line.inputs")

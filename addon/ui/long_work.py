@@ -9,12 +9,14 @@ from __future__ import annotations
 import time
 from collections.abc import Generator
 from contextlib import closing
+from functools import partial
 from typing import Any, NamedTuple
 
 import bpy
 from bpy.app.handlers import persistent
 
 from ..blender.base.outcome import report
+from ..blender.base.parts import Part, Parts
 from ..blender.base.redraw import redraw_panels
 from ..blender.base.thread_work import ThreadWork
 from .reports import reporting, waiting
@@ -193,10 +195,12 @@ def draw_progress(layout: bpy.types.UILayout, operator: type[LongWork]) -> bool:
     if _running is None or _running.operator is not operator:
         return False
     text, fraction, *_ = _running.progress
+    row = layout.row(align=True)
     if fraction is None:
-        layout.label(text=text, icon="SORTTIME")
+        row.label(text=text, icon="SORTTIME")
     else:
-        layout.progress(factor=fraction, text=text)
+        row.progress(factor=fraction, text=text)
+    row.label(text="", icon="EVENT_ESC")
     return True
 
 
@@ -228,6 +232,32 @@ def threaded[Result](work: ThreadWork[Result]) -> Steps[Result]:
         return work.result()
     finally:
         work.give_up()
+
+
+def in_parts[Result](parts: Parts[Result]) -> Steps[Result]:
+    """Work whose parts threads do; closing the generator closes it, and abandons the part."""
+    with closing(parts):
+        step = partial(next, parts)
+        while True:
+            try:
+                part = step()
+            except StopIteration as end:
+                result: Result = end.value
+                return result
+            try:
+                made = yield from threaded(_beside(part))
+            except Exception as error:  # it belongs where the work waits for the part
+                step = partial(parts.throw, error)
+            else:
+                step = partial(parts.send, made)
+
+
+def _beside(part: Part) -> ThreadWork[Any]:
+    def work(thread: ThreadWork[Any]) -> Any:
+        thread.report(part.title)
+        return part.work()
+
+    return ThreadWork(work, "Hairloom part")
 
 
 def stop() -> None:

@@ -7,16 +7,16 @@ import bpy
 from ..blender.strands.growing import grow_again, grow_on, has_grown, is_behind, losses
 from .drawing import draw_section
 from .grow_options import GROW_PROPERTIES, draw_where_settings_are
+from .long_work import LongWork, Steps, draw_progress, in_parts
 from .messages import draw_message
 from .operators_start import in_object_mode
-from .reports import reporting, waiting
 from .selection import chosen_hair, ground_mesh, make_active, needs_hair
 
 #: More names than these are only counted.
 _NAMED = 2
 
 
-class HAIRLOOM_OT_grow(bpy.types.Operator):
+class HAIRLOOM_OT_grow(LongWork, bpy.types.Operator):
     """Grow hair curves on the active mesh"""
 
     bl_idname = "hairloom.grow"
@@ -27,33 +27,32 @@ class HAIRLOOM_OT_grow(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
+        if not cls.is_free():
+            return False
         if ground_mesh(context) is not None:
             return True
         cls.poll_message_set("Select the mesh to grow hair on")
         return False
 
-    @reporting
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def steps(self, context: bpy.types.Context) -> Steps[None]:
         head, depsgraph = ground_mesh(context), context.evaluated_depsgraph_get()
-        with waiting(context):
-            hair = grow_on(
-                head,
-                depsgraph,
-                context.collection,
-                self,
-                density_group=self.density_group,
-                length_group=self.length_group,
-            )
-        make_active(context, [hair])
-        return {"FINISHED"}
+        growing = grow_on(
+            head,
+            depsgraph,
+            context.collection,
+            self,
+            density_group=self.density_group,
+            length_group=self.length_group,
+        )
+        make_active(context, [(yield from in_parts(growing))])
 
     def draw(self, _context: bpy.types.Context) -> None:
         draw_where_settings_are(self.layout)
 
 
-class HAIRLOOM_OT_grow_again(bpy.types.Operator):
+class HAIRLOOM_OT_grow_again(LongWork, bpy.types.Operator):
     """Give the selected hair the curves that its settings make now. What was combed, cut, settled
-    or painted on its curves since it grew is lost"""
+    or painted on its curves since it grew is lost. Esc cancels"""
 
     bl_idname = "hairloom.grow_again"
     bl_label = "Grow Again"
@@ -61,14 +60,10 @@ class HAIRLOOM_OT_grow_again(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return in_object_mode(cls, context) and needs_hair(cls, context)
+        return cls.is_free() and in_object_mode(cls, context) and needs_hair(cls, context)
 
-    @reporting
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        with waiting(context):
-            for hair in chosen_hair(context):
-                grow_again(hair, context.evaluated_depsgraph_get())
-        return {"FINISHED"}
+    def steps(self, context: bpy.types.Context) -> Steps[None]:
+        yield from in_parts(grow_again(chosen_hair(context), context.evaluated_depsgraph_get()))
 
 
 def draw_grow(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
@@ -78,9 +73,10 @@ def draw_grow(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
     lines = layout.column(align=True)
     lines.label(text=_state(curves, lost), icon="UNLOCKED" if not lost else "LOCKED")
     lines.label(text=f"Growing again loses: {_listed(lost)}", icon="BLANK1")
-    button = lines.row()
-    button.active = bool(lost)
-    button.operator("hairloom.grow_again", icon="FILE_REFRESH")
+    if not draw_progress(lines, HAIRLOOM_OT_grow_again):
+        button = lines.row()
+        button.active = bool(lost)
+        button.operator("hairloom.grow_again", icon="FILE_REFRESH")
     groom = curves.hairloom
     if groom.grow.problem:
         draw_message(layout, bpy.context, groom.grow.problem, "ERROR")

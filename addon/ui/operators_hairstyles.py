@@ -9,6 +9,7 @@ from bpy.props import BoolProperty, EnumProperty, StringProperty
 
 from ..blender.base.objects import objects_in
 from ..blender.base.outcome import report
+from ..blender.base.parts import taken_back
 from ..blender.scene.bust_skin import TONES
 from ..blender.setup.foreign_heads import add_landmarks, may_be_head
 from ..blender.setup.hairstyles import (
@@ -23,6 +24,7 @@ from ..blender.setup.hairstyles import (
     shipped,
 )
 from .grow_options import names_of_weights
+from .long_work import LongWork, Steps, in_parts
 from .operators_start import begin, in_object_mode
 from .preferences import preferences
 from .reports import reporting, waiting
@@ -32,9 +34,10 @@ from .selection import chosen_hair, ground_mesh
 _ACROSS, _PICTURE_SCALE, _WIDTH = 4, 5.0, 440
 
 
-class HAIRLOOM_OT_add_hairstyle(bpy.types.Operator):
+class HAIRLOOM_OT_add_hairstyle(LongWork, bpy.types.Operator):
     """Add this hairstyle as hair curves to the selected head, or to the built-in one in the scene.
-    Fur grows on the selected mesh. Without one, a head with brows and lashes is added too"""
+    Fur grows on the selected mesh. Without one, a head with brows and lashes is added too. Esc
+    cancels"""
 
     bl_idname = "hairloom.add_hairstyle"
     bl_label = "Hairloom Hairstyle"
@@ -63,34 +66,37 @@ class HAIRLOOM_OT_add_hairstyle(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return in_object_mode(cls, context)
+        return cls.is_free() and in_object_mode(cls, context)
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
         if not self.properties.is_property_set("plays"):
             self.plays = preferences(context).plays
         return self.execute(context)
 
-    @reporting
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def steps(self, context: bpy.types.Context) -> Steps[None]:
         style, collection = named_hairstyle(self.style), context.collection
-        with waiting(context):
-            head = ground_mesh(context) if grows_anywhere(style) else self._head(context)
-            is_new = head is None
+        head = ground_mesh(context) if grows_anywhere(style) else self._head(context)
+        is_new = head is None
+        with taken_back() as note:
             if head is None:
-                head = add_head(collection, self.skin)
+                head = yield from in_parts(add_head(collection, self.skin))
+                note()
             depsgraph = context.evaluated_depsgraph_get()
-            added = add_hairstyle(style, head, depsgraph, collection, hairline=self.hairline)
-            hair = added.hair
-            for kind, lines in (("WARNING", added.warnings), ("INFO", added.done)):
-                for line in lines:
-                    report(self, kind, line)
-            grooms = [hair]
+            added = yield from in_parts(
+                add_hairstyle(style, head, depsgraph, collection, hairline=self.hairline)
+            )
+            note()
+            grooms = [added.hair]
             if is_new and not is_of_face(style):
-                grooms.insert(0, add_face_hair(head, depsgraph, collection, hair))
-            if is_new:
-                report(self, "INFO", f"Added a head, {head.name}, for the hair to grow on")
-            begin(self, context, grooms, plays=self.plays)
-        return {"FINISHED"}
+                depsgraph = context.evaluated_depsgraph_get()
+                of_face = add_face_hair(head, depsgraph, collection, added.hair)
+                grooms.insert(0, (yield from in_parts(of_face)))
+        for kind, lines in (("WARNING", added.warnings), ("INFO", added.done)):
+            for line in lines:
+                report(self, kind, line)
+        if is_new:
+            report(self, "INFO", f"Added a head, {head.name}, for the hair to grow on")
+        begin(self, context, grooms, plays=self.plays)
 
     def _head(self, context: bpy.types.Context) -> bpy.types.Object | None:
         """The head that is meant: the active one, or that of the active hair, else the first
@@ -136,9 +142,9 @@ class HAIRLOOM_OT_place_landmarks(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class HAIRLOOM_OT_fit_again(bpy.types.Operator):
+class HAIRLOOM_OT_fit_again(LongWork, bpy.types.Operator):
     """Give the selected hair the curves of its hairstyle again, by the landmarks and the shape that
-    its head has now. Modifiers and settings stay, combing is lost"""
+    its head has now. Modifiers and settings stay, combing is lost. Esc cancels"""
 
     bl_idname = "hairloom.fit_again"
     bl_label = "Fit Again"
@@ -146,22 +152,18 @@ class HAIRLOOM_OT_fit_again(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if not in_object_mode(cls, context):
+        if not (cls.is_free() and in_object_mode(cls, context)):
             return False
         if any(hair.hairloom.hairstyle for hair in chosen_hair(context)):
             return True
         cls.poll_message_set("Select hair that was added as a hairstyle")
         return False
 
-    @reporting
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        with waiting(context):
-            depsgraph = context.evaluated_depsgraph_get()
-            for hair in chosen_hair(context):
-                if hair.hairloom.hairstyle:
-                    for warning in fit_again(hair, depsgraph):
-                        report(self, "WARNING", warning)
-        return {"FINISHED"}
+    def steps(self, context: bpy.types.Context) -> Steps[None]:
+        grooms = [hair for hair in chosen_hair(context) if hair.hairloom.hairstyle]
+        fitting = fit_again(grooms, context.evaluated_depsgraph_get())
+        for warning in (yield from in_parts(fitting)):
+            report(self, "WARNING", warning)
 
 
 class HAIRLOOM_OT_choose_hairstyle(bpy.types.Operator):

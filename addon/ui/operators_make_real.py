@@ -5,14 +5,15 @@ from __future__ import annotations
 import bpy
 
 from ..blender.strands.make_real import make_real
-from .reports import reporting, tell, waiting
+from .long_work import LongWork, Steps, in_parts
+from .reports import tell
 from .selection import chosen_hair, make_active, needs_hair
 
 
-class HAIRLOOM_OT_make_real(bpy.types.Operator):
+class HAIRLOOM_OT_make_real(LongWork, bpy.types.Operator):
     """Make ordinary hair curves of all strands as they are combed, with children, curls, widths,
     colours and a material like the look, for Cycles, EEVEE and other tools. The hair that they are
-    made from is kept, and hidden"""
+    made from is kept, and hidden. Esc cancels"""
 
     bl_idname = "hairloom.make_real"
     bl_label = "Make Real"
@@ -20,21 +21,19 @@ class HAIRLOOM_OT_make_real(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
+        if not cls.is_free():
+            return False
         if context.mode != "OBJECT":
             cls.poll_message_set("Return to Object Mode first")
             return False
         return needs_hair(cls, context)
 
-    @reporting
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        made = []
-        with waiting(context):
-            for hair in chosen_hair(context):
-                real, outcome = make_real(hair, context.evaluated_depsgraph_get())
-                made.append(real)
-                tell(self, outcome)
-        make_active(context, made)
-        return {"FINISHED"}
+    def steps(self, context: bpy.types.Context) -> Steps[None]:
+        parts = make_real(chosen_hair(context), context.evaluated_depsgraph_get())
+        made = yield from in_parts(parts)
+        for each in made:
+            tell(self, each.outcome)
+        make_active(context, [each.hair for each in made])
 
 
 CLASSES = (HAIRLOOM_OT_make_real,)

@@ -18,6 +18,7 @@ from ..blender.setup.sample_scene import add_sample_scene
 from ..blender.setup.starting import new_groom, take_over
 from ..errors import HairloomError
 from .grow_options import GROW_PROPERTIES, draw_where_settings_are
+from .long_work import LongWork, Steps, in_parts
 from .operators_preview import start_preview
 from .preferences import NEW_GROOM, chosen_presets, preferences
 from .reports import reporting, waiting
@@ -26,8 +27,8 @@ from .selection import active_mesh, chosen_hair, ground_mesh, make_active, needs
 _NO_MESH = "Select the mesh to grow hair on, or add a sample: Add > Curve > Hairloom Sample Scene"
 
 
-class HAIRLOOM_OT_add_groom(bpy.types.Operator):
-    """Grow a groom with a look on the active mesh, and simulate it"""
+class HAIRLOOM_OT_add_groom(LongWork, bpy.types.Operator):
+    """Grow a groom with a look on the active mesh, and simulate it. Esc cancels"""
 
     bl_idname = "hairloom.add_groom"
     bl_label = "Hairloom Groom"
@@ -46,28 +47,24 @@ class HAIRLOOM_OT_add_groom(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return in_object_mode(cls, context) and _has_ground(cls, context)
+        return cls.is_free() and in_object_mode(cls, context) and _has_ground(cls, context)
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
         _take_preferences(self, context)
         return self.execute(context)
 
-    @reporting
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        depsgraph = context.evaluated_depsgraph_get()
-        with waiting(context):
-            hair = new_groom(
-                ground_mesh(context),
-                depsgraph,
-                context.collection,
-                self,
-                presets=chosen_presets(self),
-                fits=self.fits,
-                density_group=self.density_group,
-                length_group=self.length_group,
-            )
-            begin(self, context, [hair], plays=self.plays)
-        return {"FINISHED"}
+    def steps(self, context: bpy.types.Context) -> Steps[None]:
+        growing = new_groom(
+            ground_mesh(context),
+            context.evaluated_depsgraph_get(),
+            context.collection,
+            self,
+            presets=chosen_presets(self),
+            fits=self.fits,
+            density_group=self.density_group,
+            length_group=self.length_group,
+        )
+        begin(self, context, [(yield from in_parts(growing))], plays=self.plays)
 
     def draw(self, _context: bpy.types.Context) -> None:
         self.layout.use_property_split = True
@@ -76,9 +73,9 @@ class HAIRLOOM_OT_add_groom(bpy.types.Operator):
         draw_where_settings_are(self.layout)
 
 
-class HAIRLOOM_OT_sample_scene(bpy.types.Operator):
+class HAIRLOOM_OT_sample_scene(LongWork, bpy.types.Operator):
     """Add and play a scene with a turning head, long hair, lights and a camera. Your own scenes are
-    not changed"""
+    not changed. Esc cancels"""
 
     bl_idname = "hairloom.sample_scene"
     bl_label = "Hairloom Sample Scene"
@@ -96,26 +93,24 @@ class HAIRLOOM_OT_sample_scene(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return in_object_mode(cls, context)
+        return cls.is_free() and in_object_mode(cls, context)
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
         _take_preferences(self, context)
         return self.execute(context)
 
-    @reporting
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        with waiting(context):
-            scene, hair = add_sample_scene(chosen_presets(self), self.skin)
-            if context.window is not None:
-                context.window.scene = scene
-            with context.temp_override(scene=scene, view_layer=scene.view_layers[0]):
-                begin(self, context, [hair], plays=False)
-                hair.select_set(False)  # active, but without an outline
+    def steps(self, context: bpy.types.Context) -> Steps[None]:
+        adding = add_sample_scene(chosen_presets(self), self.skin)
+        scene, hair = yield from in_parts(adding)
+        if context.window is not None:
+            context.window.scene = scene
+        with context.temp_override(scene=scene, view_layer=scene.view_layers[0]):
+            begin(self, context, [hair], plays=False)
+            hair.select_set(False)  # active, but without an outline
         if not bpy.app.background:
             _look_through_the_camera(context)
             if self.plays and not context.screen.is_animation_playing:
                 bpy.ops.screen.animation_play()
-        return {"FINISHED"}
 
 
 class HAIRLOOM_OT_use_groom(bpy.types.Operator):

@@ -11,7 +11,10 @@ from ..blender.preview import previews
 from ..blender.scene.particle_hair import hair_systems
 from ..blender.setup.foreign_heads import may_be_head
 from .drawing import Draw
+from .long_work import draw_progress
 from .operators_adopted import draw_sort
+from .operators_hairstyles import HAIRLOOM_OT_add_hairstyle, HAIRLOOM_OT_fit_again
+from .operators_start import HAIRLOOM_OT_add_groom, HAIRLOOM_OT_sample_scene
 from .sections import SECTIONS, SESSION_SECTIONS, SUB_SECTIONS, SWITCHES
 from .selection import active_mesh, chosen_hair
 from .state import NAMES, draw_notice, draw_problems_row, draw_state
@@ -50,7 +53,8 @@ def draw_preview(layout: bpy.types.UILayout, context: bpy.types.Context) -> None
     if hair.hairloom.hairstyle:
         row = layout.row(align=True)
         row.operator("hairloom.place_landmarks", text="Landmarks", icon="EMPTY_AXIS")
-        row.operator("hairloom.fit_again", icon="FILE_REFRESH")
+        if not draw_progress(row, HAIRLOOM_OT_fit_again):
+            row.operator("hairloom.fit_again", icon="FILE_REFRESH")
     parts = layout.split(factor=NAMES)
     parts.label(text="Colour By")
     row = parts.row(align=True)
@@ -64,14 +68,17 @@ def draw_start(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """How to get some hair."""
     column = layout.column(align=True)
     column.scale_y = 1.3
-    column.operator("hairloom.add_groom", text="Add Hair", icon="OUTLINER_OB_CURVES")
-    column.operator("hairloom.choose_hairstyle", icon="USER")
+    if not draw_progress(column, HAIRLOOM_OT_add_groom):
+        column.operator("hairloom.add_groom", text="Add Hair", icon="OUTLINER_OB_CURVES")
+    if not draw_progress(column, HAIRLOOM_OT_add_hairstyle):
+        column.operator("hairloom.choose_hairstyle", icon="USER")
     mesh = active_mesh(context)
     if mesh is not None and may_be_head(mesh):
         column.operator("hairloom.place_landmarks", icon="EMPTY_AXIS")
     if mesh is not None and hair_systems(mesh):
         column.operator("hairloom.convert_particles", icon="PARTICLES")
-    column.operator("hairloom.sample_scene", text="Sample Scene", icon="SCENE_DATA")
+    if not draw_progress(column, HAIRLOOM_OT_sample_scene):
+        column.operator("hairloom.sample_scene", text="Sample Scene", icon="SCENE_DATA")
     column.menu("HAIRLOOM_MT_import", text="Import", icon="IMPORT")
 
 

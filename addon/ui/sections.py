@@ -12,11 +12,14 @@ from ..parameters import ALL_SETTINGS
 from ..params import Owner
 from .card_sections import CARD_SECTIONS, draw_cards
 from .drawing import Draw, draw_section
+from .long_work import draw_progress
 from .messages import draw_lines
 from .operators_bake import draw_bake
+from .operators_card_export import HAIRLOOM_OT_export_cards
 from .operators_colliders import draw_colliders
 from .operators_flow import draw_flow
 from .operators_grow import draw_grow
+from .operators_make_real import HAIRLOOM_OT_make_real
 from .operators_measure import draw_measure
 from .operators_mirror import draw_mirror
 from .operators_partings import draw_partings
@@ -149,10 +152,12 @@ def draw_collisions(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
 
 
 def draw_export(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
-    layout.operator("hairloom.export_cards", icon="EXPORT")
+    if not draw_progress(layout, HAIRLOOM_OT_export_cards):
+        layout.operator("hairloom.export_cards", icon="EXPORT")
     layout.menu("HAIRLOOM_MT_export_strands", icon="EXPORT")
     layout.operator("hairloom.check_export", icon="CHECKMARK")
-    layout.operator("hairloom.make_real", icon="OUTLINER_OB_CURVES")
+    if not draw_progress(layout, HAIRLOOM_OT_make_real):
+        layout.operator("hairloom.make_real", icon="OUTLINER_OB_CURVES")
     layout.operator("hairloom.show_reports", icon="TEXT")
 
 

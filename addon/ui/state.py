@@ -16,6 +16,7 @@ from ..blender.sessions.measures import PARTS, array_bytes
 from ..blender.sessions.session import Session
 from ..blender.viewport import view_transform
 from ..blender.viewport.overlay import statistics_of
+from .long_work import running
 from .messages import draw_lines, draw_message
 
 _MEGABYTE = 1 << 20
@@ -42,6 +43,10 @@ def draw_state(layout: bpy.types.UILayout, session: Session | None) -> None:
         parts = lines.split(factor=NAMES)
         parts.label(text=name)
         row = parts.row(align=True)
+        if name == "State" and running():
+            row.label(text=running())
+            row.label(text="", icon="EVENT_ESC")
+            continue
         row.label(text=text)
         if name == "State" and session is not None and not session.is_made:
             row.operator("hairloom.cancel_build", text="", icon="X")

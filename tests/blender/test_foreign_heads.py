@@ -10,6 +10,7 @@ from mathutils import Vector
 from mathutils.bvhtree import BVHTree
 from tiers import few_in_commits
 
+from hairloom.addon.blender.base.parts import at_once
 from hairloom.addon.blender.command_line.command_line import run
 from hairloom.addon.blender.preview import previews
 from hairloom.addon.blender.scene.bust_data import load_bust
@@ -42,7 +43,7 @@ PLACE, LARGER, TURNED = np.array([3.0, -1.0, 1.5]), 1.3, 0.4
 
 def added(name: str, head: bpy.types.Object, **options: str) -> AddedHair:
     style = named_hairstyle(name)
-    return add_hairstyle(style, head, depsgraph(), bpy.context.collection, **options)
+    return at_once(add_hairstyle(style, head, depsgraph(), bpy.context.collection, **options))
 
 
 def depsgraph() -> bpy.types.Depsgraph:
@@ -268,11 +269,11 @@ def test_a_dragged_landmark_moves_the_hair_when_it_is_fitted_again() -> None:
     hair = added("buzz_cut", head).hair
     hair.data.hairloom.children.strand_count = 1234
     before = roots_of(hair)
-    fit_again(hair, depsgraph())
+    at_once(fit_again([hair], depsgraph()))
     assert np.abs(roots_of(hair) - before).max() < 1e-4, "the same landmarks give the same hair"
     hairline = landmarks_of(head)["hairline"]
     hairline.location.z += 0.025
-    fit_again(hair, depsgraph())
+    at_once(fit_again([hair], depsgraph()))
     after = roots_of(hair)
     near = np.linalg.norm(before - stood(shaped([LANDMARKS["hairline"][1]]))[0], axis=1) < 0.045
     assert near.sum() > 10, "roots are there"

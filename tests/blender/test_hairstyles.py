@@ -13,6 +13,7 @@ import pytest
 from mathutils import Vector
 from tiers import few_in_commits
 
+from hairloom.addon.blender.base.parts import at_once
 from hairloom.addon.blender.command_line.command_line import run
 from hairloom.addon.blender.preview import previews
 from hairloom.addon.blender.properties.presets import named_preset
@@ -55,7 +56,7 @@ def few(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def head() -> bpy.types.Object:
-    made = add_head(bpy.context.collection, "light")
+    made = at_once(add_head(bpy.context.collection, "light"))
     bpy.context.view_layer.update()
     return made
 
@@ -65,7 +66,7 @@ def depsgraph() -> bpy.types.Depsgraph:
 
 
 def added(style: Hairstyle, head: bpy.types.Object) -> bpy.types.Object:
-    hair = add_hairstyle(style, head, depsgraph(), bpy.context.collection).hair
+    hair = at_once(add_hairstyle(style, head, depsgraph(), bpy.context.collection)).hair
     bpy.context.view_layer.update()
     return hair
 

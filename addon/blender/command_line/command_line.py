@@ -18,6 +18,7 @@ from ...params import SettingsMap
 from ..base.gpu_context import gpu_refusals
 from ..base.interruption import Interrupted, interruptible
 from ..base.objects import objects_in
+from ..base.parts import at_once
 from ..base.report import Report
 from ..setup.hairstyles import add_hairstyle, add_head, named_hairstyle
 from .bake_job import BAKE
@@ -210,10 +211,10 @@ def _styled(options: argparse.Namespace, report: Report) -> str:
     if options.head:
         (head,) = named_objects([options.head], lambda obj: bool(obj.type == "MESH"), "a mesh")
     else:
-        head = add_head(collection, options.skin)
+        head = at_once(add_head(collection, options.skin))
     style, depsgraph = named_hairstyle(options.style), bpy.context.evaluated_depsgraph_get()
-    added = add_hairstyle(
-        style, head, depsgraph, collection, hairline=options.children_density or ""
+    added = at_once(
+        add_hairstyle(style, head, depsgraph, collection, hairline=options.children_density or "")
     )
     tell_notes([*added.warnings, *added.done], report)
     bpy.context.view_layer.update()

@@ -7,6 +7,7 @@ import argparse
 import bpy
 
 from ...groom.settings import GrowSettings
+from ..base.parts import at_once
 from ..setup.starting import new_groom
 from .job_steps import Job
 from .object_settings import named_objects, put_settings
@@ -18,15 +19,17 @@ def grow(job: Job) -> None:
     options, report = job.options, job.report
     (head,) = named_objects([options.head], lambda obj: bool(obj.type == "MESH"), "a mesh")
     with report.stage("grow"):
-        hair = new_groom(
-            head,
-            bpy.context.evaluated_depsgraph_get(),
-            bpy.context.collection,
-            job.settings[GrowSettings],
-            presets=(),
-            fits=options.fit,
-            density_group=options.density_group,
-            length_group=options.length_group,
+        hair = at_once(
+            new_groom(
+                head,
+                bpy.context.evaluated_depsgraph_get(),
+                bpy.context.collection,
+                job.settings[GrowSettings],
+                presets=(),
+                fits=options.fit,
+                density_group=options.density_group,
+                length_group=options.length_group,
+            )
         )
     hair.name = options.name or hair.name
     # by what is set of growth it has grown, and been fitted, already

@@ -19,6 +19,7 @@ from ...strands import StrandSet, Surface
 from ...strands.colors import color_notes
 from ...strands.join import joined
 from ..base.objects import head_of
+from ..base.parts import at_once
 from ..base.vertex_weights import read_weights
 from ..scene.built_in_head import HeadLook, built_in_head
 from ..scene.curves import read_curves
@@ -96,7 +97,7 @@ def read_inputs(sources: Sources, grow_settings: GrowSettings) -> Inputs:
         head = _read_head(head_name, sources)
         mesh = bpy.data.objects.get(head_name or "")
         if sources.with_face and head is not None and mesh is not None and is_bust(mesh):
-            face = face_hair(mesh, head, bpy.context.evaluated_depsgraph_get())
+            face = at_once(face_hair(mesh, head, bpy.context.evaluated_depsgraph_get()))
             strands = joined(strands, face)
     else:
         head, dropped, groom, notes = _read_head(head_name, sources), {}, None, ()

@@ -107,15 +107,20 @@ def write_curves(
     strands: StrandSet,
     surface: bpy.types.Object | None,
     collection: bpy.types.Collection,
+    *,
+    are_found: bool = False,
 ) -> bpy.types.Object:
     """A new hair curves object that holds these strands, attached to a surface if there is one.
 
     Args:
         strands: world space, which is also object space: the object is at the origin. If nobody
             knows their widths, the curves have those that are found.
+        are_found: they were found already; see `groom.widths.with_widths`.
     """
     curves = bpy.data.hair_curves.new(name)
     fill_curves(curves, strands)
+    if are_found:
+        curves.hairloom.widths.method = "found"
     obj = bpy.data.objects.new(name, curves)
     collection.objects.link(obj)
     if surface is not None:

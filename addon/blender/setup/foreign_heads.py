@@ -55,13 +55,15 @@ _SHOWN = 0.006
 class ForeignHead:
     """A mesh with the built-in head fitted to it, in world space.
 
-    skin: the built-in head's skin as it lies on the mesh, with its own UVs.
+    built_in: the built-in head.
+    skin: its skin as it lies on the mesh, with its own UVs.
     away: how far from the mesh that is, on average [m on the built-in head].
     landmarks: guessed or placed; none where the topology says where everything is.
     """
 
     name: str
     surface: Surface
+    built_in: Surface
     skin: Surface
     warp: Warp
     landmarks: dict[str, Floats]
@@ -80,7 +82,7 @@ class ForeignHead:
             HairloomError: too many of them.
         """
         outside = OuterSearch(self.surface, self.skin, self.scale)
-        made, roots = guides.on(built_in_head().surface), guides.on(self.skin).roots
+        made, roots = guides.on(self.built_in), guides.on(self.skin).roots
         fitted = fitted_hair(made, roots, self.warp, outside, self.scale)
         missing, loose = (fitted.away > limit * self.scale for limit in (_MISSING, _LOOSE_ROOT))
         if missing.mean() > _MAX_MISSING:
@@ -110,30 +112,60 @@ class ForeignHead:
         return warped_weights(own, self.skin, positions, _GROUP_REACH * self.scale)
 
 
-def read_foreign_head(head: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> ForeignHead:
-    """A mesh that hair of the built-in head is to grow on; the scene is not changed.
+@dataclass(frozen=True, eq=False)
+class ReadHead:
+    """What is read of a mesh that hair of the built-in head is to grow on.
+
+    own: where its vertices are, see `own_positions`, if it is MakeHuman's; else None.
+    placed: landmarks that an artist has.
+    """
+
+    name: str
+    surface: Surface
+    built_in: Surface
+    own: Floats | None
+    placed: Mapping[str, Floats]
+
+
+def read_foreign_head(head: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> ReadHead:
+    """The scene is not changed.
 
     Raises:
-        HairloomError: it has no faces, or is too unlike a head; landmarks that are mistaken.
+        HairloomError: it has no faces, or too few vertices to be a head.
     """
     surface = read_surface(head, depsgraph, need_uv=False, place=head.name)
+    built_in = built_in_head().surface
     if has_makehuman_topology(head.data):
-        warp, positions = _by_topology(own_positions(head, depsgraph))
-        return ForeignHead(head.name, surface, _skin(positions), warp, {}, 0.0)
+        return ReadHead(head.name, surface, built_in, own_positions(head, depsgraph), {})
     if not may_be_head(head):
         raise HairloomError(
             f"a mesh of {len(head.data.vertices)} vertices is no head",
             place=head.name,
             remedy="Select a head, or nothing to add one; fur and Add Hair take any mesh",
         )
-    placed = placed_landmarks(head, depsgraph)
+    return ReadHead(head.name, surface, built_in, None, placed_landmarks(head, depsgraph))
+
+
+def fitted_to(read: ReadHead) -> ForeignHead:
+    """The built-in head fitted to a mesh, from arrays alone.
+
+    Raises:
+        HairloomError: it is too unlike a head; landmarks that are mistaken.
+    """
+    if read.own is not None:
+        warp, positions = _by_topology(read.own)
+        skin = _skin(positions)
+        return ForeignHead(read.name, read.surface, read.built_in, skin, warp, {}, 0.0)
     points = None
-    if placed:
-        is_whole = len(placed) == len(LANDMARKS)
-        points = {**({} if is_whole else guess_landmarks(fit_model(), surface)[0]), **placed}
-    fit = fit_head(fit_model(), surface, points, head.name)
-    positions = fit.warp(load_bust().positions)
-    return ForeignHead(head.name, surface, _skin(positions), fit.warp, fit.landmarks, fit.away)
+    if read.placed:
+        is_whole = len(read.placed) == len(LANDMARKS)
+        guess = {} if is_whole else guess_landmarks(fit_model(), read.surface)[0]
+        points = {**guess, **read.placed}
+    fit = fit_head(fit_model(), read.surface, points, read.name)
+    skin = _skin(fit.warp(load_bust().positions))
+    return ForeignHead(
+        read.name, read.surface, read.built_in, skin, fit.warp, fit.landmarks, fit.away
+    )
 
 
 def may_be_head(mesh: bpy.types.Object) -> bool:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 
 import bpy
@@ -17,6 +17,7 @@ from ...exchange.hairstyles import GROWN, Hairstyle, read_hairstyle, read_title
 from ...groom.face_hair import grow_face_hair
 from ...groom.grow import grow
 from ...groom.settings import GrowSettings
+from ...groom.widths import with_widths
 from ...parameters import ALL_SETTINGS
 from ...refine.lead_out_at_rest import are_inside, led_out_at_rest
 from ...shading.settings import ShadingSettings
@@ -25,6 +26,7 @@ from ...strands.affine import mean_scale, moved
 from ...strands.face import is_face_hair
 from ...strands.rooted_shapes import RootedShapes
 from ..base.objects import head_of
+from ..base.parts import Part, Parts, taken_back
 from ..base.vertex_weights import read_weights, set_group, weight_names
 from ..colliders.fields import solid_of
 from ..properties import previews
@@ -32,11 +34,12 @@ from ..properties.presets import apply, named_preset
 from ..properties.properties import settings_of
 from ..scene.bust import bust_object
 from ..scene.bust_data import load_bust
+from ..scene.bust_skin import painted
 from ..scene.curves import fill_curves, read_curves, write_curves
 from ..scene.hair_material import put_look_material
 from ..scene.hair_nodes import add_hair_nodes
 from ..scene.surfaces import read_surface
-from .foreign_heads import own_positions, put_landmarks, read_foreign_head
+from .foreign_heads import fitted_to, own_positions, put_landmarks, read_foreign_head
 from .starting import REAL, fit_motion, fitted, fitting_factor
 
 HAIRSTYLE_FOLDER = Path(__file__).resolve().parents[3] / "hairstyles"
@@ -104,12 +107,13 @@ def is_bust(mesh: bpy.types.Object) -> bool:
     )
 
 
-def add_head(collection: bpy.types.Collection, skin: str) -> bpy.types.Object:
+def add_head(collection: bpy.types.Collection, skin: str) -> Parts[bpy.types.Object]:
     """The built-in head.
 
     Args:
         skin: one of bust_skin.TONES.
     """
+    yield Part("Painting the skin", partial(painted, skin))  # which keeps it
     head = bust_object(_HEAD, skin)
     collection.objects.link(head)
     return head
@@ -151,7 +155,7 @@ def add_hairstyle(
     collection: bpy.types.Collection,
     *,
     hairline: str = "",
-) -> AddedHair:
+) -> Parts[AddedHair]:
     """Hair curves in this style on a head, or fur on any mesh, with its modifiers and settings.
 
     A head that is neither the built-in one nor MakeHuman's gets landmarks. One without the vertex
@@ -162,13 +166,16 @@ def add_hairstyle(
 
     Raises:
         HairloomError: a mesh that it does not grow on, a mask that it has not or that is empty, a
-            preset or node group that is not there. Nothing is added then.
+            preset or node group that is not there. Nothing is added then, nor if it is cancelled.
     """
     masks = {**style.masks, **({"children": hairline} if hairline and style.masks else {})}
     _check_masks(style, head, depsgraph, masks.values(), needed=hairline)
-    growth = _growth(style, head, depsgraph, masks)
-    hair = write_curves(f"{head.name} {style.title}", growth.strands, head, collection)
-    try:
+    growth = yield from _growth(style, head, depsgraph, masks)
+    with taken_back() as note:
+        hair = write_curves(
+            f"{head.name} {style.title}", growth.strands, head, collection, are_found=True
+        )
+        note()
         for one in style.modifiers:
             add_hair_nodes(hair, one.nodes, one.inputs, growth.size)
         for name in style.presets:
@@ -178,11 +185,6 @@ def add_hairstyle(
         fit_motion(hair, growth.factor)
         if growth.solid is not None and hair.modifiers:
             _leave_out_inside(hair, growth.solid, _DEEP * growth.size)
-    except HairloomError:
-        curves = hair.data
-        bpy.data.objects.remove(hair)
-        bpy.data.hair_curves.remove(curves)
-        raise
     hair.hairloom.children_density = masks.get("children", "")
     hair.hairloom.hairstyle = style.name
     put_look_material(hair.data, settings_of(hair.data.hairloom.shading, ShadingSettings))
@@ -206,14 +208,25 @@ def _put(
     return tuple(done)
 
 
-def fit_again(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> tuple[str, ...]:
+def fit_again(
+    grooms: Sequence[bpy.types.Object], depsgraph: bpy.types.Depsgraph
+) -> Parts[tuple[str, ...]]:
     """Give hair the curves of its hairstyle again, by the landmarks and the shape that its head has
     now; modifiers and settings stay. Returns warnings.
 
     Raises:
-        HairloomError: it was not added as a hairstyle, has no head, or does not fit on it. It is
-            as it was then.
+        HairloomError: some was not added as a hairstyle, has no head, or does not fit on it. All
+            is as it was then, and if it is cancelled.
     """
+    grown = []
+    for hair in grooms:
+        grown.append((yield from _grown_again(hair, depsgraph)))
+    for hair, growth in zip(grooms, grown, strict=True):
+        _replace_curves(hair, growth)
+    return tuple(warning for growth in grown for warning in growth.warnings)
+
+
+def _grown_again(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Parts[_Growth]:
     head = head_of(hair)
     if not hair.hairloom.hairstyle or head is None:
         raise HairloomError(
@@ -225,7 +238,10 @@ def fit_again(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> tuple[s
     mask = hair.hairloom.children_density
     masks = {**style.masks, **({"children": mask} if mask else {})}
     _check_masks(style, head, depsgraph, masks.values(), needed="")
-    growth = _growth(style, head, depsgraph, masks)
+    return (yield from _growth(style, head, depsgraph, masks))
+
+
+def _replace_curves(hair: bpy.types.Object, growth: _Growth) -> None:
     curves = hair.data
     curves.remove_curves()
     # as they are written where their object stands now
@@ -234,7 +250,6 @@ def fit_again(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> tuple[s
     hair.update_tag()
     if growth.solid is not None and hair.modifiers:
         _leave_out_inside(hair, growth.solid, _DEEP * growth.size)
-    return growth.warnings
 
 
 def _check_masks(
@@ -263,17 +278,38 @@ def _growth(
     head: bpy.types.Object,
     depsgraph: bpy.types.Depsgraph,
     masks: Mapping[str, str],
-) -> _Growth:
+) -> Parts[_Growth]:
+    """Reads the mesh; the rest is made from arrays alone."""
     if style.guides is None:
-        factor = fitting_factor(head, depsgraph)
-        settings = fitted(GrowSettings.from_dict(style.settings[GROWN], style.title), factor)
-        surface = read_surface(head, depsgraph, need_uv=False, place=head.name)
-        return _Growth(_outside(grow(surface, settings), solid_of(surface)), factor, factor)
-    if not is_bust(head):
-        return _on_foreign(style.guides, head, depsgraph, masks)
+        title, work = f"Growing {style.title}", _fur(style, head, depsgraph)
+    elif is_bust(head):
+        title, work = f"Placing {style.title}", _on_bust(style.guides, head, depsgraph)
+    else:
+        title = f"Fitting {style.title}"
+        work = _on_foreign(style.guides, head, depsgraph, masks)
+
+    def with_found_widths() -> _Growth:
+        growth = work()
+        return replace(growth, strands=with_widths(growth.strands, "found")[0])
+
+    return (yield Part(title, with_found_widths))
+
+
+def _fur(
+    style: Hairstyle, head: bpy.types.Object, depsgraph: bpy.types.Depsgraph
+) -> Callable[[], _Growth]:
+    factor = fitting_factor(head, depsgraph)
+    settings = fitted(GrowSettings.from_dict(style.settings[GROWN], style.title), factor)
+    surface = read_surface(head, depsgraph, need_uv=False, place=head.name)
+    return lambda: _Growth(_outside(grow(surface, settings), solid_of(surface)), factor, factor)
+
+
+def _on_bust(
+    guides: RootedShapes, head: bpy.types.Object, depsgraph: bpy.types.Depsgraph
+) -> Callable[[], _Growth]:
     surface = read_surface(head, depsgraph, need_uv=True, place=head.name)
     size = _size_of(head)
-    return _Growth(style.guides.on(surface, size), size, 1.0)
+    return lambda: _Growth(guides.on(surface, size), size, 1.0)
 
 
 def _on_foreign(
@@ -281,30 +317,39 @@ def _on_foreign(
     head: bpy.types.Object,
     depsgraph: bpy.types.Depsgraph,
     masks: Mapping[str, str],
-) -> _Growth:
+) -> Callable[[], _Growth]:
     """Guides on a head that is not built in."""
-    foreign = read_foreign_head(head, depsgraph)
-    strands, warnings = foreign.hair(guides)
-    mask, groups = masks.get("children", ""), {}
-    if mask in weight_names(head):
-        strands = _within(strands, read_weights(head, depsgraph, mask), foreign.surface, head, mask)
-    elif mask:
-        groups[mask] = foreign.weights(mask, own_positions(head, depsgraph))
-    solid = solid_of(foreign.surface)
-    strands = _outside(strands, solid)
-    lost = len(guides.group) - strands.strand_count
-    if lost > _NOTED_LOSS * len(guides.group):
-        warnings.append(
-            f"{head.name}: {lost:,} of {len(guides.group):,} guides were left out, since the mesh "
-            "or its vertex group has no place for them"
-        )
-    size = foreign.scale
-    factor = size if not 1.0 / REAL <= size <= REAL else 1.0
-    return _Growth(strands, size, factor, tuple(warnings), groups, foreign.landmarks, solid)
+    read, name = read_foreign_head(head, depsgraph), head.name
+    mask = masks.get("children", "")
+    weights = read_weights(head, depsgraph, mask) if mask in weight_names(head) else None
+    positions = own_positions(head, depsgraph) if mask and weights is None else None
+
+    def work() -> _Growth:
+        foreign = fitted_to(read)
+        strands, warnings = foreign.hair(guides)
+        groups = {}
+        if weights is not None:
+            strands = _within(strands, weights, foreign.surface, name, mask)
+        if positions is not None:
+            groups[mask] = foreign.weights(mask, positions)
+        solid = solid_of(foreign.surface)
+        strands = _outside(strands, solid)
+        lost = len(guides.group) - strands.strand_count
+        if lost > _NOTED_LOSS * len(guides.group):
+            warnings.append(
+                f"{name}: {lost:,} of {len(guides.group):,} guides were left out, since the mesh "
+                "or its vertex group has no place for them"
+            )
+        size = foreign.scale
+        factor = size if not 1.0 / REAL <= size <= REAL else 1.0
+        landmarks = foreign.landmarks
+        return _Growth(strands, size, factor, tuple(warnings), groups, landmarks, solid)
+
+    return work
 
 
 def _within(
-    strands: StrandSet, weights: Floats, surface: Surface, head: bpy.types.Object, mask: str
+    strands: StrandSet, weights: Floats, surface: Surface, place: str, mask: str
 ) -> StrandSet:
     """The strands whose roots have a weight above 0.
 
@@ -318,7 +363,7 @@ def _within(
     if not len(kept):
         raise HairloomError(
             f"the weights '{mask}' are zero wherever this hair grows",
-            place=head.name,
+            place=place,
             remedy="Paint them where hair is to grow, or choose another group as the hairline",
         )
     return strands.take(kept)
@@ -359,15 +404,16 @@ def add_face_hair(
     depsgraph: bpy.types.Depsgraph,
     collection: bpy.types.Collection,
     like: bpy.types.Object,
-) -> bpy.types.Object:
+) -> Parts[bpy.types.Object]:
     """Brows and lashes on the built-in head, in the look of its hair.
 
     Raises:
         HairloomError: its groups for them are empty or gone.
     """
     surface = read_surface(head, depsgraph, need_uv=True, place=head.name)
-    strands = face_hair(head, surface, depsgraph)
-    hair = write_curves(f"{head.name} Brows and Lashes", strands, head, collection)
+    strands = yield from face_hair(head, surface, depsgraph)
+    name = f"{head.name} Brows and Lashes"
+    hair = write_curves(name, strands, head, collection, are_found=True)
     group = like.data.hairloom.shading
     apply(settings_of(group, group.settings), hair)
     hair.data.hairloom.children.method = "none"
@@ -376,14 +422,18 @@ def add_face_hair(
 
 def face_hair(
     head: bpy.types.Object, surface: Surface, depsgraph: bpy.types.Depsgraph
-) -> StrandSet:
+) -> Parts[StrandSet]:
     """Brows and lashes of the built-in head, where its own vertex groups say.
 
     Raises:
         HairloomError: these are empty or gone.
     """
     brows, lashes = (read_weights(head, depsgraph, name) for name in ("brows", "lashes"))
-    return grow_face_hair(surface, brows, lashes)
+
+    def work() -> StrandSet:
+        return with_widths(grow_face_hair(surface, brows, lashes), "found")[0]
+
+    return (yield Part("Growing brows and lashes", work))
 
 
 def _size_of(head: bpy.types.Object) -> float:

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import bpy
 import numpy as np
 from mathutils import Vector
 
 from ...groom.face_hair import grow_with_face
 from ...groom.settings import GrowSettings
+from ...groom.widths import with_widths
+from ..base.parts import Part, Parts, taken_back
 from ..base.vertex_weights import read_weights
 from ..scene.bust import bust_object
 from ..scene.bust_data import HAIR_GROUPS
+from ..scene.bust_skin import painted
 from ..scene.curves import write_curves
 from ..scene.surfaces import read_surface
 from ..viewport.overlay import ENGINE
@@ -36,13 +41,26 @@ _HAIR = GrowSettings(strand_count=6000, length=0.26)
 
 def add_sample_scene(
     presets: tuple[str, ...], skin: str = "light"
-) -> tuple[bpy.types.Scene, bpy.types.Object]:
+) -> Parts[tuple[bpy.types.Scene, bpy.types.Object]]:
     """A new scene, rendered by Hairloom, with its groom; existing scenes are not changed.
 
     Args:
         presets: of the groom, by name.
         skin: of the head, one of bust_skin.TONES.
     """
+    yield Part("Painting the skin", partial(painted, skin))  # which keeps it
+    with taken_back() as note:
+        scene, head = _scene_with_head(skin)
+        note()
+        layer = scene.view_layers[0]
+        layer.update()
+        hair = yield from _grown(head, layer.depsgraph, scene.collection)
+    dress(hair, presets)
+    hair.hairloom.bake.follows = True
+    return scene, hair
+
+
+def _scene_with_head(skin: str) -> tuple[bpy.types.Scene, bpy.types.Object]:
     scene = bpy.data.scenes.new(NAME)
     scene.frame_start, scene.frame_end, scene.frame_current = 1, _FRAMES, 1
     scene.render.engine = ENGINE
@@ -57,22 +75,20 @@ def add_sample_scene(
         collection.objects.link(_light(name, place, power, side, color))
     scene.camera = _camera()
     collection.objects.link(scene.camera)
-    layer = scene.view_layers[0]
-    layer.update()
-    hair = _grown(head, layer.depsgraph, collection)
-    dress(hair, presets)
-    hair.hairloom.bake.follows = True
-    return scene, hair
+    return scene, head
 
 
 def _grown(
     head: bpy.types.Object, depsgraph: bpy.types.Depsgraph, collection: bpy.types.Collection
-) -> bpy.types.Object:
+) -> Parts[bpy.types.Object]:
     """Hair by the vertex groups of the head."""
     surface = read_surface(head, depsgraph, need_uv=True, place=head.name)
     weights = {name: read_weights(head, depsgraph, name) for name in HAIR_GROUPS}
-    strands = grow_with_face(surface, _HAIR, weights)
-    return write_curves(f"{head.name} Hair", strands, head, collection)
+    strands = yield Part(
+        f"Growing {_HAIR.strand_count:,} strands",
+        lambda: with_widths(grow_with_face(surface, _HAIR, weights), "found")[0],
+    )
+    return write_curves(f"{head.name} Hair", strands, head, collection, are_found=True)
 
 
 def _animate(head: bpy.types.Object) -> None:

@@ -12,6 +12,7 @@ from ...errors import HairloomError
 from ...groom.settings import GrowSettings
 from ...shading.settings import ShadingSettings
 from ..base.objects import head_of
+from ..base.parts import Parts, at_once
 from ..properties.presets import apply, named_preset
 from ..properties.properties import settings_of
 from ..scene.curves import read_curves
@@ -79,7 +80,7 @@ def new_groom(
     fits: bool,
     density_group: str = "",
     length_group: str = "",
-) -> bpy.types.Object:
+) -> Parts[bpy.types.Object]:
     """Hair grown on a mesh, with these presets.
 
     Args:
@@ -93,7 +94,7 @@ def new_groom(
     settings = settings_of(values, GrowSettings)
     factor = fitting_factor(head, depsgraph) if fits else 1.0
     settings = fitted(settings, factor)
-    hair = grow_on(
+    hair = yield from grow_on(
         head,
         depsgraph,
         collection,
@@ -177,7 +178,7 @@ def _grown_in_place(
     factor = fitting_factor(head, depsgraph)
     settings = fitted(GrowSettings(), factor)
     name, collections = hair.name, list(hair.users_collection)
-    grown = grow_on(head, depsgraph, collections[0], settings)
+    grown = at_once(grow_on(head, depsgraph, collections[0], settings))
     for collection in collections[1:]:
         collection.objects.link(grown)
     curves = hair.data

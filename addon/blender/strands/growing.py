@@ -7,13 +7,14 @@ if they are still as they grew.
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
 import bpy
 import numpy as np
 
-from ...arrays import Floats
+from ...arrays import Floats, Ints
 from ...errors import HairloomError
 from ...groom.grow import grow, scalp_density
 from ...groom.settings import GrowSettings
@@ -21,6 +22,7 @@ from ...groom.widths import with_widths
 from ...strands import StrandSet, Surface
 from ..base.attributes import read_attribute
 from ..base.objects import head_of
+from ..base.parts import Part, Parts, at_once
 from ..base.vertex_weights import read_weights
 from ..properties import changed
 from ..properties.properties import settings_of
@@ -41,7 +43,7 @@ def grow_on(
     *,
     density_group: str = "",
     length_group: str = "",
-) -> bpy.types.Object:
+) -> Parts[bpy.types.Object]:
     """Hair curves grown on a mesh, with the settings that they grow by.
 
     Args:
@@ -54,8 +56,8 @@ def grow_on(
         HairloomError: it has no faces to grow on, there is no group of this name, or all is 0.
     """
     settings = settings_of(values, GrowSettings)
-    strands = _grown(head, depsgraph, settings, density_group, length_group)
-    hair = write_curves(f"{head.name} Hair", strands, head, collection)
+    strands = yield from _grown(head, depsgraph, settings, density_group, length_group)
+    hair = write_curves(f"{head.name} Hair", strands, head, collection, are_found=True)
     own = hair.data.hairloom.grow
     for name, value in settings.as_dict().items():
         setattr(own, name, value)
@@ -64,31 +66,50 @@ def grow_on(
     return hair
 
 
-def grow_again(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> None:
+def grow_again(grooms: Sequence[bpy.types.Object], depsgraph: bpy.types.Depsgraph) -> Parts[None]:
     """Give hair the curves that its settings make now, whatever was done to those that it has.
 
     Raises:
-        HairloomError: it has no mesh to grow on, or as `grow_on`. It is as it was then.
+        HairloomError: some has no mesh to grow on, or as `grow_on`. All is as it was then.
     """
-    head, curves = head_of(hair), hair.data
+    made = []
+    for hair in grooms:
+        made.append((yield from _grown_again(hair, depsgraph)))
+    for hair, strands in zip(grooms, made, strict=True):
+        _replace_curves(hair, strands, depsgraph)
+
+
+def _grown_again(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Parts[StrandSet]:
+    head, own = head_of(hair), hair.data.hairloom.grow
     if head is None:
         raise HairloomError(
             "it has no surface to grow on",
             place=hair.name,
             remedy="Set Surface in its Data properties",
         )
-    own = curves.hairloom.grow
-    strands = _grown(
-        head, depsgraph, settings_of(own, GrowSettings), own.density_group, own.length_group
+    return (
+        yield from _grown(
+            head,
+            depsgraph,
+            settings_of(own, GrowSettings),
+            own.density_group,
+            own.length_group,
+            before=hair.data,
+        )
     )
-    strands = _with_widths(strands, curves)
+
+
+def _replace_curves(
+    hair: bpy.types.Object, strands: StrandSet, depsgraph: bpy.types.Depsgraph
+) -> None:
+    curves = hair.data
     back = np.linalg.inv(np.array(hair.evaluated_get(depsgraph).matrix_world, np.float64))
     curves.remove_curves()
     for name in _other_attributes(curves):
         curves.attributes.remove(curves.attributes[name])
     fill_curves(curves, strands.transformed(back))
     curves.update_tag()
-    own.problem = ""
+    curves.hairloom.grow.problem = ""
     _seal(curves)
 
 
@@ -102,7 +123,7 @@ def follow_settings(curves: bpy.types.ID) -> None:
     hair = next((obj for obj in users if head_of(obj) is not None), None)
     try:
         if hair is not None:
-            grow_again(hair, bpy.context.evaluated_depsgraph_get())
+            at_once(grow_again([hair], bpy.context.evaluated_depsgraph_get()))
     except HairloomError as error:  # the panel shows it; the settings may be on their way
         own.problem = str(error)
 
@@ -133,21 +154,31 @@ def _grown(
     settings: GrowSettings,
     density_group: str,
     length_group: str,
-) -> StrandSet:
-    """In world space, on the head as it is posed now."""
+    before: bpy.types.Curves | None = None,
+) -> Parts[StrandSet]:
+    """In world space, on the head as it is posed now.
+
+    Args:
+        before: the curves that these replace, whose widths they keep.
+    """
     surface = _known(read_surface(head, depsgraph, need_uv=False, place=head.name))
     density = read_weights(head, depsgraph, density_group) if density_group else None
     length = read_weights(head, depsgraph, length_group) if length_group else None
-    if density is None and settings.method == "combed":
-        density = surface.once(scalp_density)
-    return grow(surface, settings, density, length)
+    radius: Floats | None = None if before is None else read_attribute(before, "radius", "POINT")
+    offsets = np.zeros(1, np.int32) if before is None else curve_offsets(before)
+
+    def work() -> StrandSet:
+        by_default = density is None and settings.method == "combed"
+        dense = surface.once(scalp_density) if by_default else density
+        return _with_widths(grow(surface, settings, dense, length), radius, offsets)
+
+    return (yield Part(f"Growing {settings.strand_count:,} strands", work))
 
 
-def _with_widths(strands: StrandSet, before: bpy.types.Curves) -> StrandSet:
-    """Strands as wide as the curves that they replace, or, where there are more or fewer, with
+def _with_widths(strands: StrandSet, radius: Floats | None, offsets: Ints) -> StrandSet:
+    """Strands as wide as those that they replace, or, where there are none, or more or fewer, with
     widths that are found for them."""
-    radius: Floats | None = read_attribute(before, "radius", "POINT")
-    if radius is not None and np.array_equal(curve_offsets(before), strands.offsets):
+    if radius is not None and np.array_equal(offsets, strands.offsets):
         return replace(strands, radius=radius, has_widths=True)
     return with_widths(strands, "found")[0]
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import bpy
 import numpy as np
@@ -11,19 +13,21 @@ from ...cards.drawing_settings import CardDrawingSettings
 from ...groom.children_settings import ChildrenSettings
 from ...groom.width_settings import WidthSettings
 from ...parameters import ALL_SETTINGS, sections_of
-from ...pipeline import strand_seeds
+from ...pipeline import Rig, strand_seeds
 from ...shading.drawn_strands import drawn_radius, strand_colors
 from ...shading.settings import ShadingSettings, StrandSettings
+from ...strands import StrandSet
 from ...strands.arc_length import along
 from ..base.objects import head_of
 from ..base.outcome import Outcome, notes_of
-from ..colliders.rigs import rig_of
+from ..base.parts import Part, Parts
+from ..colliders.rigs import rig_from
 from ..properties.groom_settings import GroomSettings
 from ..properties.presets import apply
 from ..scene.curves import write_curves
 from ..scene.groom_attributes import group_names, store_group_names
 from ..scene.hair_material import put_look_material
-from ..scene.source import read_source
+from ..scene.source import Source, read_source
 
 #: what of the scene moves hair, as properties of an object's group
 _POINTERS = (
@@ -37,9 +41,25 @@ _POINTERS = (
 )
 
 
+class MadeReal(NamedTuple):
+    """New hair curves, and what is said of them."""
+
+    hair: bpy.types.Object
+    outcome: Outcome
+
+
+class _Drawn(NamedTuple):
+    """What is drawn of hair, as arrays alone."""
+
+    source: Source
+    settings: GroomSettings
+    rig: Rig
+    strands: StrandSet
+
+
 def make_real(
-    hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph
-) -> tuple[bpy.types.Object, Outcome]:
+    grooms: Sequence[bpy.types.Object], depsgraph: bpy.types.Depsgraph
+) -> Parts[tuple[MadeReal, ...]]:
     """New hair curves beside these: every strand that is drawn, as it is combed, with its children,
     curls, widths and colours, and a material equal to the look.
 
@@ -47,34 +67,55 @@ def make_real(
     The hair that they are made from is hidden.
 
     Raises:
-        HairloomError: no hair that can be used, or one of another scale than its head.
+        HairloomError: no hair that can be used, or one of another scale than its head. All is as
+            it was then.
     """
+    drawn = []
+    for hair in grooms:
+        drawn.append((yield from _drawn(hair, depsgraph)))
+    return tuple(_written(hair, each) for hair, each in zip(grooms, drawn, strict=True))
+
+
+def _drawn(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Parts[_Drawn]:
+    name, settings = hair.name, GroomSettings.of(hair)
     source = read_source(hair, depsgraph)
-    rig, settings = rig_of(hair, source), GroomSettings.of(hair)
-    shading, strands = settings[ShadingSettings], rig.strands
-    place = along(strands.points, strands.offsets)
-    counts = strands.point_counts
+    rig = yield Part(
+        "Making strands",
+        lambda: rig_from(source, settings.sections, place=name),
+    )
+    strands = yield Part("Colouring strands", lambda: _coloured(rig, settings))
+    return _Drawn(source, settings, rig, strands)
+
+
+def _coloured(rig: Rig, settings: GroomSettings) -> StrandSet:
+    """With the widths and colours that they are drawn with."""
+    strands = rig.strands
+    place, counts = along(strands.points, strands.offsets), strands.point_counts
     color = strand_colors(
         np.repeat(strand_seeds(rig), counts),
         place,
-        shading,
+        settings[ShadingSettings],
         strands.color,
         np.repeat(strands.group, counts),
     )
-    drawn = replace(
+    return replace(
         strands,
         radius=drawn_radius(strands.radius, settings[StrandSettings], place),
         color=np.clip(color, 0.0, 1.0),
         has_widths=True,
     )
-    real = write_curves(f"{hair.name} Real", drawn, head_of(hair), hair.users_collection[0])
+
+
+def _written(hair: bpy.types.Object, drawn: _Drawn) -> MadeReal:
+    source, settings, rig, strands = drawn
+    real = write_curves(f"{hair.name} Real", strands, head_of(hair), hair.users_collection[0])
     store_group_names(real.data, group_names(hair))
     _keep_settings(real, hair, settings)
-    _, notes = put_look_material(real.data, real_look(shading), are_final=True)
+    _, notes = put_look_material(real.data, real_look(settings[ShadingSettings]), are_final=True)
     _hide(hair)
-    result = f"Made {drawn.strand_count:,} strands real: {real.name}. {hair.name} is hidden"
+    result = f"Made {strands.strand_count:,} strands real: {real.name}. {hair.name} is hidden"
     warnings = (*source.warnings, *notes_of(hair, rig), *(f"{real.name}: {each}" for each in notes))
-    return real, Outcome(result, dict(source.dropped), warnings)
+    return MadeReal(real, Outcome(result, dict(source.dropped), warnings))
 
 
 def real_look(shading: ShadingSettings) -> ShadingSettings:

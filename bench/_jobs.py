@@ -1,0 +1,86 @@
+"""Long jobs as the window works through them: how long nothing is said, and no key is heard.
+
+What is measured is the longest time that a job keeps Blender's main thread between two looks at the
+keyboard: until the first word of progress, and from one to the next. Drawing is left out.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import bpy
+
+from hairloom.addon.blender.base import latest_job
+from hairloom.addon.blender.preview import previews
+from hairloom.addon.ui import long_work
+
+#: strands of the groom that grows again
+STRANDS = 20_000
+_LOOK = 0.01
+
+
+def silent() -> dict[str, float]:
+    """The longest silence of each job [s], and that of all."""
+    found = {}
+    for name, job in JOBS.items():
+        longest: list[float] = []
+        # as in a window, where nobody waits for what a thread makes
+        latest_job.is_blocking = lambda: False
+        long_work._at_once = lambda steps, to=longest: to.append(_longest(steps))
+        job()
+        found[f"silent_{name}_seconds"] = max(longest)
+        while any(not session.is_made for session in previews.sessions()):
+            latest_job.take_steps()
+            time.sleep(_LOOK)
+    return {"silent_seconds_max": max(found.values()), **found}
+
+
+def _longest(steps: Iterator[Any]) -> float:
+    """Of the steps of a job, in seconds."""
+    longest = 0.0
+    while True:
+        began = time.perf_counter()
+        step = next(steps, None)
+        longest = max(longest, time.perf_counter() - began)
+        if step is None:
+            return longest
+        if step.is_idle:
+            time.sleep(_LOOK)
+
+
+def _grow_again() -> None:
+    previews.stop_all()
+    bpy.context.object.data.hairloom.grow.strand_count = STRANDS
+    bpy.ops.hairloom.grow_again()
+
+
+def _clear() -> None:
+    previews.stop_all()
+    bpy.ops.wm.read_homefile(use_empty=True)
+
+
+def _add_hairstyle() -> None:
+    _clear()
+    bpy.ops.hairloom.add_hairstyle(style="long_straight", skin="dark", plays=False)
+
+
+def _add_groom() -> None:
+    bpy.context.view_layer.objects.active = bpy.context.object.parent
+    bpy.context.object.select_set(True)
+    bpy.ops.hairloom.add_groom(plays=False)
+
+
+def _sample_scene() -> None:
+    _clear()
+    bpy.ops.hairloom.sample_scene(skin="light")
+
+
+JOBS: dict[str, Callable[[], Any]] = {
+    "add_hairstyle": _add_hairstyle,
+    "make_real": lambda: bpy.ops.hairloom.make_real(),
+    "add_groom": _add_groom,
+    "grow_again": _grow_again,
+    "sample_scene": _sample_scene,
+}
