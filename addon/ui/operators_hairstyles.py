@@ -24,8 +24,8 @@ from ..blender.setup.hairstyles import (
     shipped,
 )
 from .grow_options import names_of_weights
-from .long_work import LongWork, Steps, in_parts
-from .operators_start import begin, in_object_mode
+from .long_work import LongWork, Progress, Steps, in_parts
+from .operators_start import beginning, in_object_mode
 from .preferences import preferences
 from .reports import reporting, waiting
 from .selection import chosen_hair, ground_mesh
@@ -81,6 +81,7 @@ class HAIRLOOM_OT_add_hairstyle(LongWork, bpy.types.Operator):
             if head is None:
                 head = yield from in_parts(add_head(collection, self.skin))
                 note()
+                yield Progress(f"Placing {style.title}")
             depsgraph = context.evaluated_depsgraph_get()
             added = yield from in_parts(
                 add_hairstyle(style, head, depsgraph, collection, hairline=self.hairline)
@@ -96,7 +97,7 @@ class HAIRLOOM_OT_add_hairstyle(LongWork, bpy.types.Operator):
                 report(self, kind, line)
         if is_new:
             report(self, "INFO", f"Added a head, {head.name}, for the hair to grow on")
-        begin(self, context, grooms, plays=self.plays)
+        yield from beginning(self, context, grooms, plays=self.plays)
 
     def _head(self, context: bpy.types.Context) -> bpy.types.Object | None:
         """The head that is meant: the active one, or that of the active hair, else the first

@@ -18,7 +18,7 @@ from ..blender.setup.sample_scene import add_sample_scene
 from ..blender.setup.starting import new_groom, take_over
 from ..errors import HairloomError
 from .grow_options import GROW_PROPERTIES, draw_where_settings_are
-from .long_work import LongWork, Steps, in_parts
+from .long_work import LongWork, Progress, Steps, in_parts
 from .operators_preview import start_preview
 from .preferences import NEW_GROOM, chosen_presets, preferences
 from .reports import reporting, waiting
@@ -64,7 +64,8 @@ class HAIRLOOM_OT_add_groom(LongWork, bpy.types.Operator):
             density_group=self.density_group,
             length_group=self.length_group,
         )
-        begin(self, context, [(yield from in_parts(growing))], plays=self.plays)
+        hair = yield from in_parts(growing)
+        yield from beginning(self, context, [hair], plays=self.plays)
 
     def draw(self, _context: bpy.types.Context) -> None:
         self.layout.use_property_split = True
@@ -219,9 +220,22 @@ def begin(
     *,
     plays: bool,
 ) -> None:
+    """As `beginning`, all at once."""
+    for _ in beginning(operator, context, grooms, plays=plays):
+        pass
+
+
+def beginning(
+    operator: bpy.types.Operator,
+    context: bpy.types.Context,
+    grooms: list[bpy.types.Object],
+    *,
+    plays: bool,
+) -> Steps[None]:
     """Select, preview and, in a window, play.
 
-    The grooms are there by now and are to be undone in one step, so that an error is reported here.
+    The grooms are there by now and are to be undone in one step, so that an error is reported here,
+    and it is too late to cancel.
     """
     chosen = preferences(context)
     for hair in grooms:
@@ -230,11 +244,13 @@ def begin(
         if chosen.device != "automatic":
             hair.hairloom.dynamics.device = chosen.device
     make_active(context, grooms)
-    try:
-        start_preview(operator, context, grooms)
-    except HairloomError as error:
-        report(operator, "ERROR", error)
-        return
+    for hair in grooms:
+        yield Progress("Starting the preview", is_committed=True)
+        try:
+            start_preview(operator, context, [hair])
+        except HairloomError as error:
+            report(operator, "ERROR", error)
+            return
     if not plays or bpy.app.background:
         return
     if previews.is_playing():

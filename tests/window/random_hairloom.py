@@ -6,7 +6,7 @@ import addon_utils
 import bpy
 import driver
 from dice import action, call, clicked, objects, press, select, step
-from driver import of_hairloom
+from driver import of_hairloom, until
 
 SECTIONS = {
     bpy.types.Curves: ["shading", "strands", "volume", "detail", "guides", "children", "skin"]
@@ -14,6 +14,11 @@ SECTIONS = {
     bpy.types.Object: ["dynamics", "dynamics", "fin"],
 }
 MOST_GROOMS = 3
+
+
+def no_long_work():
+    """A script could take away what the work stands on; a mouse cannot."""
+    yield from until(lambda: not of_hairloom("long_work").running(), "the work does not end")
 
 
 @action(6)
@@ -35,6 +40,7 @@ def add_groom(dice):
     select(dice.object("MESH"))
     how = {"strand_count": dice.chance.randint(2, 150), "method": dice.pick(["combed", "normals"])}
     clicked(dice, dice.pick(["hairloom.add_groom", "hairloom.grow"]), **how)
+    yield from no_long_work()
 
 
 @action(12)

@@ -76,6 +76,7 @@ def the_sample_scene_plays():
     """One click: hair that moves and shines, in a scene of its own."""
     own = bpy.context.window.scene
     invoke("sample_scene")
+    yield from until(lambda: not of_hairloom("long_work").running(), "the scene does not come")
     scene = bpy.context.window.scene
     assert scene != own and len(live().sessions()) == 1
     yield from until(lambda: bpy.context.screen.is_animation_playing, "nothing plays")

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import bpy
 import numpy as np
 
+from ...arrays import Floats
 from ...exchange.textures.srgb import srgb_encoded
 from ..base.vertex_weights import set_group
 from .bust_data import HAIR_GROUPS, Bust, load_bust
@@ -57,11 +60,17 @@ def _mesh(name: str, bust: Bust) -> bpy.types.Mesh:
     return mesh
 
 
-def _picture(tone: str) -> bpy.types.Image:
-    image = bpy.data.images.new(f"Hairloom Skin {tone}", RESOLUTION, RESOLUTION)
+@lru_cache(maxsize=1)
+def encoded_skin(tone: str) -> Floats:
+    """The picture of the skin as an image has it; from arrays alone, which takes some seconds."""
     picture = painted(tone).copy()
     picture[..., :3] = srgb_encoded(picture[..., :3])
-    image.pixels.foreach_set(picture.ravel())
+    return picture
+
+
+def _picture(tone: str) -> bpy.types.Image:
+    image = bpy.data.images.new(f"Hairloom Skin {tone}", RESOLUTION, RESOLUTION)
+    image.pixels.foreach_set(encoded_skin(tone).ravel())
     image.pack()
     return image
 

@@ -32,9 +32,8 @@ from ..colliders.fields import solid_of
 from ..properties import previews
 from ..properties.presets import apply, named_preset
 from ..properties.properties import settings_of
-from ..scene.bust import bust_object
+from ..scene.bust import bust_object, encoded_skin
 from ..scene.bust_data import load_bust
-from ..scene.bust_skin import painted
 from ..scene.curves import fill_curves, read_curves, write_curves
 from ..scene.hair_material import put_look_material
 from ..scene.hair_nodes import add_hair_nodes
@@ -113,7 +112,7 @@ def add_head(collection: bpy.types.Collection, skin: str) -> Parts[bpy.types.Obj
     Args:
         skin: one of bust_skin.TONES.
     """
-    yield Part("Painting the skin", partial(painted, skin))  # which keeps it
+    yield Part("Painting the skin", partial(encoded_skin, skin))  # which keeps it
     head = bust_object(_HEAD, skin)
     collection.objects.link(head)
     return head
@@ -433,7 +432,7 @@ def face_hair(
     def work() -> StrandSet:
         return with_widths(grow_face_hair(surface, brows, lashes), "found")[0]
 
-    return (yield Part("Growing brows and lashes", work))
+    return (yield Part("Growing brows", work))
 
 
 def _size_of(head: bpy.types.Object) -> float:

@@ -13,9 +13,8 @@ from ...groom.settings import GrowSettings
 from ...groom.widths import with_widths
 from ..base.parts import Part, Parts, taken_back
 from ..base.vertex_weights import read_weights
-from ..scene.bust import bust_object
+from ..scene.bust import bust_object, encoded_skin
 from ..scene.bust_data import HAIR_GROUPS
-from ..scene.bust_skin import painted
 from ..scene.curves import write_curves
 from ..scene.surfaces import read_surface
 from ..viewport.overlay import ENGINE
@@ -48,7 +47,7 @@ def add_sample_scene(
         presets: of the groom, by name.
         skin: of the head, one of bust_skin.TONES.
     """
-    yield Part("Painting the skin", partial(painted, skin))  # which keeps it
+    yield Part("Painting the skin", partial(encoded_skin, skin))  # which keeps it
     with taken_back() as note:
         scene, head = _scene_with_head(skin)
         note()

@@ -1,0 +1,152 @@
+"""Work of which threads do parts: here and now, in the window, cancelled, and failed."""
+
+from __future__ import annotations
+
+import threading
+from typing import Any
+
+import bpy
+import numpy as np
+import pytest
+
+from hairloom.addon.blender.base.parts import Part, Parts, at_once, taken_back
+from hairloom.addon.blender.scene.curves import curve_points, put_points
+from hairloom.addon.cards.steps import result_of
+from hairloom.addon.errors import HairloomError
+from hairloom.addon.ui.long_work import in_parts
+from hairloom.addon.ui.operators_grow import HAIRLOOM_OT_grow_again
+from hairloom.addon.ui.operators_hairstyles import HAIRLOOM_OT_add_hairstyle
+from hairloom.addon.ui.operators_make_real import HAIRLOOM_OT_make_real
+
+threads: list[str] = []
+may_go_on = threading.Event()
+
+
+@pytest.fixture(autouse=True)
+def at_start() -> None:
+    threads.clear()
+    may_go_on.set()
+
+
+def doubled(value: int) -> int:
+    threads.append(threading.current_thread().name)
+    assert may_go_on.wait(30.0)
+    if value > 10:
+        raise HairloomError("too much", place="test", remedy="Take less")
+    return 2 * value
+
+
+def quadrupled(value: int) -> Parts[int]:
+    twice = yield Part("Doubling", lambda: doubled(value))
+    try:
+        four: int = yield Part("Again", lambda: doubled(twice))
+    except HairloomError:
+        return -1
+    return four
+
+
+@pytest.mark.parametrize(("value", "wanted"), [(3, 12), (9, -1)])
+def test_both_ways_have_the_same_result(value: int, wanted: int) -> None:
+    """An error is raised where the work waits for the part, which may go on without it."""
+    assert at_once(quadrupled(value)) == wanted
+    assert result_of(in_parts(quadrupled(value))) == wanted
+
+
+@pytest.mark.parametrize("way", [at_once, lambda parts: result_of(in_parts(parts))])
+def test_an_error_that_nobody_takes_comes_out(way: Any) -> None:
+    with pytest.raises(HairloomError, match="too much"):
+        way(quadrupled(11))
+
+
+def test_in_the_window_parts_are_beside_it_and_say_what_they_are() -> None:
+    may_go_on.clear()
+    told = in_parts(quadrupled(2))
+    while next(told).text != "Doubling":
+        pass
+    assert next(told).is_idle and threads != [threading.main_thread().name]
+    may_go_on.set()
+    assert result_of(told) == 8 and len(threads) == 2
+    at_once(quadrupled(2))
+    assert threads[2:] == 2 * [threading.main_thread().name]
+
+
+def everything() -> dict[str, list[str]]:
+    """Names of all that is in the file, and what of it is hidden."""
+    kinds = [kind for kind in bpy.data.bl_rna.properties if kind.type == "COLLECTION"]
+    found = {k.identifier: [each.name for each in getattr(bpy.data, k.identifier)] for k in kinds}
+    return {**found, "hidden": [obj.name for obj in bpy.data.objects if obj.hide_viewport]}
+
+
+def cancelled(operator: type[Any], stage: str, **values: Any) -> None:
+    """Take an operator's own steps until it is at this stage, and cancel it there."""
+    members = {"bl_label": operator.bl_label, "report": lambda *_: None, **values}
+    if hasattr(operator, "_head"):
+        members["_head"] = operator._head
+    steps = operator.steps(type("Asked", (), members)(), bpy.context)
+    next(progress for progress in steps if progress.text == stage)
+    steps.close()
+
+
+@pytest.mark.usefixtures("extension")
+@pytest.mark.parametrize("stage", ["Painting the skin", "Placing Buzz Cut", "Growing brows"])
+def test_a_hairstyle_that_is_cancelled_leaves_nothing(stage: str) -> None:
+    before = everything()
+    values = {"style": "buzz_cut", "skin": "light", "hairline": "", "plays": False}
+    cancelled(HAIRLOOM_OT_add_hairstyle, stage, **values)
+    assert everything() == before
+
+
+@pytest.mark.usefixtures("extension")
+@pytest.mark.parametrize("stage", ["Making strands", "Colouring strands"])
+def test_hair_that_is_not_made_real_after_all_is_shown(stage: str, sphere: Any) -> None:
+    bpy.ops.hairloom.grow(strand_count=60, length=0.1)
+    before = everything()
+    cancelled(HAIRLOOM_OT_make_real, stage)
+    assert everything() == before
+
+
+@pytest.mark.usefixtures("extension")
+def test_hair_that_does_not_grow_again_after_all_is_as_it_was_combed(sphere: Any) -> None:
+    """Of two grooms neither has grown when the second is cancelled."""
+    grooms, combed = [], []
+    for count in (60, 70):
+        bpy.ops.hairloom.grow(strand_count=count, length=0.1)
+        grooms.append(bpy.context.object)
+    grooms[0].select_set(True)  # beside the active one, which grows first
+    for hair in grooms:
+        put_points(hair.data, curve_points(hair.data) * np.float32(1.1))
+        combed.append(curve_points(hair.data))
+    cancelled(HAIRLOOM_OT_grow_again, "Growing 60 strands")
+    for hair, points in zip(grooms, combed, strict=True):
+        assert np.array_equal(curve_points(hair.data), points)
+
+
+def test_what_was_added_goes_where_work_fails_and_stays_where_it_ends() -> None:
+    before = everything()
+    with pytest.raises(HairloomError), taken_back() as note:
+        bpy.data.meshes.new("Gone")
+        note()
+        doubled(11)
+    assert everything() == before
+    with taken_back() as note:
+        bpy.data.meshes.new("Kept")
+        note()
+    assert "Kept" in bpy.data.meshes
+
+
+def test_what_was_there_stays_though_another_file_was_loaded() -> None:
+    """The work is ended when the other file is there already."""
+
+    def work() -> Parts[None]:
+        with taken_back() as note:
+            bpy.data.meshes.new("Gone")
+            note()
+            yield Part("Waiting", lambda: None)
+
+    parts = work()
+    next(parts)
+    bpy.ops.wm.read_homefile(use_empty=True)
+    bpy.data.meshes.new("Other")
+    before = everything()
+    parts.close()
+    assert everything() == before
