@@ -138,4 +138,4 @@ def grown_again():
     yield
 
 
-driver.run(steps)
+driver.play(steps())
