@@ -13,7 +13,7 @@ from bpy_extras.io_utils import ExportHelper
 from ..blender.bakes import playback
 from ..blender.bakes.bake_settings import frame_range
 from ..blender.bakes.stale_bakes import stale_notes
-from ..blender.base.file_names import file_stem, files_of
+from ..blender.base.file_names import file_stem, files_of, in_own_folder
 from ..blender.base.outcome import Outcome
 from ..blender.cards.files import CardExport, CardOutput, FileSteps
 from ..blender.properties.groups import operator_properties
@@ -49,6 +49,12 @@ class HAIRLOOM_OT_export_cards(LongWork, ExportHelper, bpy.types.Operator):
         options={"HIDDEN"},
     )
     format: EnumProperty(name="Format", description="Format of the file", items=_FORMATS)
+    own_folder: BoolProperty(
+        name="Own Folder",
+        description="Write all files into a folder that is named after the mesh. What names a path "
+        "itself, as a script or a collection's exporter does, gets that path unless this is on",
+        default=False,
+    )
     own_levels: BoolProperty(
         name="Other Levels of Detail",
         description="Write another number of levels than the groom's settings say",
@@ -86,12 +92,16 @@ class HAIRLOOM_OT_export_cards(LongWork, ExportHelper, bpy.types.Operator):
         if hair and not self.filepath:
             folder = Path(bpy.data.filepath).parent if bpy.data.filepath else Path()
             self.properties.filepath = str(folder / (file_stem(hair[0].name) + self.filename_ext))
+        if not self.properties.is_property_set("own_folder"):
+            self.own_folder = True
         self.stale = _stale(hair[:1], context.evaluated_depsgraph_get())
         return super().invoke(context, event)
 
     def steps(self, context: bpy.types.Context) -> Steps[None]:
         hair = self._hair(context)
         files = files_of(Path(bpy.path.abspath(self.filepath)), [each.name for each in hair])
+        if self.own_folder:
+            files = [in_own_folder(path) for path in files]
         plans = [self._plan(context, *each) for each in zip(hair, files, strict=True)]
         outcomes = []
         for plan in plans:
@@ -134,6 +144,7 @@ class HAIRLOOM_OT_export_cards(LongWork, ExportHelper, bpy.types.Operator):
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
         layout.use_property_split = True
+        self._draw_place(layout)
         layout.prop(self, "format")
         levels = layout.row(heading="Levels")
         levels.prop(self, "own_levels", text="")
@@ -144,6 +155,15 @@ class HAIRLOOM_OT_export_cards(LongWork, ExportHelper, bpy.types.Operator):
             layout.prop(self, name)
         if self.motion != "none":
             self._draw_motion(layout, context)
+
+    def _draw_place(self, layout: bpy.types.UILayout) -> None:
+        """Whether the files have a folder of their own. The file browser asks before it replaces a
+        file of the name that it shows; of one in that folder it knows nothing."""
+        layout.prop(self, "own_folder")
+        if self.own_folder:
+            path = in_own_folder(Path(bpy.path.abspath(self.filepath)))
+            icon, does = ("ERROR", "Replaces") if path.exists() else ("FILE_FOLDER", "Makes")
+            layout.label(text=f"{does} {path.parent.name}/{path.name}", icon=icon)
 
     def _draw_motion(self, layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
         frames = layout.row(heading="Frames")

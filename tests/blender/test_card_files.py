@@ -17,6 +17,7 @@ import pytest
 from glb_files import Glb, validated
 from tiers import few_in_commits
 
+from hairloom.addon.errors import HairloomError
 from hairloom.addon.exchange.cards.card_formats import FORMATS
 from hairloom.addon.exchange.textures.card_textures import FORMATS as TEXTURE_FORMATS
 from hairloom.addon.exchange.textures.texture_packing import PRESETS
@@ -375,6 +376,37 @@ def test_a_button_writes_under_the_hairs_name(sphere: Any, tmp_path: Path) -> No
     assert [line[2:] for line in out.read_text("utf-8").splitlines() if line[:2] == "o "] == nodes
 
 
+def test_an_export_with_a_folder_is_that_folder_and_nothing_else(
+    sphere: Any, tmp_path: Path
+) -> None:
+    """A second time, too, from where the folder lies and from within it."""
+    grown(sphere, "Hair")
+    loose, out = tmp_path / "loose" / "Hair.glb", tmp_path / "Hair.glb"
+    options = {"own_levels": True, "levels": 1}
+    bpy.ops.hairloom.export_cards(filepath=str(loose), **options)
+    names = sorted(path.name for path in loose.parent.iterdir())
+    assert len(names) > 5, "a path that was named is not taken"
+    folder = tmp_path / "Hair"
+    for path in (out, out, folder / "Hair.glb"):
+        bpy.ops.hairloom.export_cards(filepath=str(path), own_folder=True, **options)
+        assert sorted(path.name for path in folder.iterdir()) == names
+        assert sorted(tmp_path.iterdir()) == [folder, loose.parent]
+    assert (folder / "Hair.glb").read_bytes() == loose.read_bytes()
+
+
+def test_no_folder_stays_of_an_export_that_fails(
+    sphere: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: Any, **__: Any) -> None:
+        raise HairloomError("it broke", place="mesh", remedy="Wait")
+
+    grown(sphere, "Hair")
+    monkeypatch.setattr(files, "write_card_mesh", fail)
+    with pytest.raises(RuntimeError, match="it broke"):
+        bpy.ops.hairloom.export_cards(filepath=str(tmp_path / "Hair.glb"), own_folder=True)
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_all_that_there_is_can_be_chosen() -> None:
     properties = bpy.ops.hairloom.export_cards.get_rna_type().properties
     offered = {
@@ -414,6 +446,11 @@ def test_a_collections_exporter_writes_all_its_hair(sphere: Any, tmp_path: Path)
     for name in ("Front", "Haar_Ä_001"):
         (level, *_) = sidecar_of(tmp_path / f"hair_{name}.glb")["levels"]
         assert level["node"].startswith(name)
+    exporter.export_properties.filepath = str(tmp_path / "folders" / "hair.glb")
+    exporter.export_properties.own_folder = True
+    assert bpy.ops.collection.export_all() == {"FINISHED"}
+    found = sorted(path.name for path in (tmp_path / "folders").iterdir())
+    assert found == ["hair_Front", "hair_Haar_Ä_001"]
 
 
 def test_a_collection_without_hair_is_told(sphere: Any, tmp_path: Path) -> None:

@@ -191,12 +191,12 @@ def cards_in_motion():
     scene.frame_set(1)
     choose(hair)
     assert bpy.ops.hairloom.bake() == {"FINISHED"}
-    cards = FOLDER / "cards"
+    cards = FOLDER / "Hair"
     cards.mkdir()
     (cards / "Hair.glb").write_bytes(b"the cards of before")
     with bpy.context.temp_override(area=viewport(), region=region("WINDOW")):
         bpy.ops.hairloom.export_cards("INVOKE_DEFAULT", motion="joints")
-    yield from confirm_file(cards)
+    yield from confirm_file(FOLDER)
     yield from until(lambda: running() == "Export Hair Cards", "the browser starts no export")
     yield from until(lambda: told() == "Fitting joints", "no joints are fitted")
     driver.screenshot("fitting")

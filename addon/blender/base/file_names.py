@@ -13,6 +13,12 @@ def file_stem(hair_name: str) -> str:
     return no_device(plain_name(hair_name))
 
 
+def in_own_folder(path: Path) -> Path:
+    """Where the files of an asset go if they are to have a folder of their own, named after it,
+    beside where `path` would be; one that is in such a folder stays."""
+    return path if path.parent.name == path.stem else path.parent / path.stem / path.name
+
+
 def files_of(path: Path, hair_names: Sequence[str]) -> list[Path]:
     """Where each hair goes; of several in a file each, it has its name behind the file's.
 

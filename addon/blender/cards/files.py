@@ -448,10 +448,10 @@ class CardExport:
 
     def outcome(self, written: WrittenCards) -> Outcome:
         """What is reported to the artist."""
-        first, *beside = (file.name for file in written.files)
+        first, *beside = written.files
         result = (
             f"Wrote {written.mesh.card_count:,} cards in {len(written.levels)} levels of detail "
-            f"to {first}, with {len(beside)} files beside it. "
+            f"to {first.parent.name}/{first.name}, with {len(beside)} files beside it. "
             f"{order_line(written.build.wrong_fraction)}"
         )
         return Outcome(

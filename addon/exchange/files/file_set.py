@@ -5,8 +5,8 @@ from __future__ import annotations
 import filecmp
 import os
 import shutil
-from collections.abc import Container, Iterator
-from contextlib import contextmanager
+from collections.abc import Container, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from ...errors import HairloomError
@@ -22,7 +22,8 @@ def written_together(path: Path) -> Iterator[Path]:
 
     They keep their names, so that they may name each other. Missing folders are made. When the
     block fails or is interrupted, or when one of the files cannot be put into its place, all that
-    was there before stays as it was. What a killed process left in the folder is removed.
+    was there before stays as it was, and folders that were made go again. What a killed process
+    left in the folder is removed.
 
     Raises:
         HairloomError: nothing can be written there, or the block wrote no file of `path`'s name.
@@ -30,11 +31,13 @@ def written_together(path: Path) -> Iterator[Path]:
     check_name(path)
     folder = path.parent
     staging = temporary_beside(path, suffix="")
+    missing = [each for each in (folder, *folder.parents) if not each.exists()]
     try:
         folder.mkdir(parents=True, exist_ok=True)
         remove_stale_files(folder)
         staging.mkdir()
     except OSError as error:
+        _remove_empty(missing)
         raise unwritable(path, error.strerror or str(error)) from error
     try:
         (staging / path.name).touch(exist_ok=False)  # fails now for a name that cannot be
@@ -55,6 +58,14 @@ def written_together(path: Path) -> Iterator[Path]:
         raise HairloomError(error.problem, place=place, remedy=error.remedy) from error
     finally:
         shutil.rmtree(staging, ignore_errors=True)
+        _remove_empty(missing)
+
+
+def _remove_empty(folders: Sequence[Path]) -> None:
+    """The innermost first; one that holds something, as after a good end, stays."""
+    for folder in folders:
+        with suppress(OSError):
+            folder.rmdir()
 
 
 def kept_aside(staging: Path, path: Path, own: Container[str] = ()) -> tuple[str, ...]:

@@ -48,6 +48,18 @@ def test_a_failing_writer_leaves_what_was_there(
     assert contents(tmp_path) == dict.fromkeys(sorted(FILES), "old")
 
 
+@pytest.mark.parametrize("failure", [ValueError, KeyboardInterrupt])
+def test_folders_that_were_made_go_where_nothing_comes_into_them(
+    tmp_path: Path, failure: type[BaseException]
+) -> None:
+    (tmp_path / "mine").mkdir()
+    with pytest.raises(failure), written_together(tmp_path / "mine/a/b/hair.glb") as folder:
+        write(folder, "new", FILES[:2])
+        raise failure
+    assert list(tmp_path.iterdir()) == [tmp_path / "mine"]
+    assert list((tmp_path / "mine").iterdir()) == []
+
+
 def test_what_went_wrong_names_the_files_own_folder(tmp_path: Path) -> None:
     with (
         pytest.raises(HairloomError) as caught,
