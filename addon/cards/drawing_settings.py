@@ -59,7 +59,7 @@ class CardDrawingSettings(Settings):
     )
     skip_clear: bool = toggle(
         True,
-        label="Skip Transparent Pixels",
+        label="Skip Clear Pixels",
         description="Test alpha in the last pass, so that transparent pixels hide nothing; "
         "without it, the pass is as in the paper and faster on some GPUs",
         panel="Drawing",

@@ -48,7 +48,7 @@ class CardOcclusionSettings(Settings):
     )
     self_occlusion_distance: float = number(
         0.03,
-        label="Self-occlusion Distance",
+        label="Self Distance",
         description="Distance from which a card occludes itself, relative to the extent of the "
         "cards; a little more than its width, so that only curls do",
         soft=(0.0, 0.2),

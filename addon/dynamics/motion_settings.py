@@ -109,7 +109,7 @@ class MotionSettings(Settings):
     )
     depenetration_speed: float = number(
         2.0,
-        label="Depenetration Speed",
+        label="Exit Speed",
         description="Speed at which points that start inside a collider are moved out of it, in "
         "lengths of the hair per second; for cloth, in quarters of its extent",
         soft=(0.2, 20.0),
@@ -119,7 +119,7 @@ class MotionSettings(Settings):
     )
     collider_resolution: int = integer(
         56,
-        label="Collider Resolution",
+        label="Grid Resolution",
         description="Cells along the longest side of a mesh collider's distance field",
         soft=(24, 96),
         hard=(8, 192),

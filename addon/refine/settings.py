@@ -46,7 +46,7 @@ class DetailSettings(Settings):
     )
     piece_length: float = number(
         8.0,
-        label="Subdivision Length",
+        label="Piece Length",
         description="Length of a piece where hair bends by 45 degrees or more",
         soft=(2.0, 32.0),
         hard=(0.5, 1000.0),
@@ -64,7 +64,7 @@ class DetailSettings(Settings):
     )
     max_subdivisions: int = integer(
         64,
-        label="Max Subdivisions",
+        label="Max Pieces",
         description="Maximum number of pieces per segment",
         soft=(1, 64),
         hard=(1, 64),

@@ -33,7 +33,7 @@ class KajiyaKaySettings(Settings):
     )
     primary_exponent: float = number(
         90.0,
-        label="First Sharpness",
+        label="First Gloss",
         description="Exponent of the first highlight; higher is narrower",
         soft=(2.0, 300.0),
         hard=(1.0, 2000.0),
@@ -72,7 +72,7 @@ class KajiyaKaySettings(Settings):
     )
     secondary_exponent: float = number(
         22.0,
-        label="Second Sharpness",
+        label="Second Gloss",
         description="Exponent of the second highlight; higher is narrower",
         soft=(2.0, 300.0),
         hard=(1.0, 2000.0),

@@ -24,7 +24,7 @@ class PictureSettings(Settings):
     )
     viewport_samples: int = integer(
         32,
-        label="Viewport Samples",
+        label="View Samples",
         description="Samples per pixel that the viewport accumulates while nothing moves",
         soft=(1, 64),
         hard=(1, 65536),

@@ -144,7 +144,7 @@ class SharedSettings(Settings):
     brow_source: str = choice(
         "look",
         BROW_SOURCES,
-        label="Brows and Lashes",
+        label="Brow Source",
         description="Colour of brows and lashes, which are strands of the groups 9001 and 9002",
         panel="Tips & Brows",
     )

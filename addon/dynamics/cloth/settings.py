@@ -82,7 +82,7 @@ class FinSettings(MotionSettings):
     )
     edgewise: float = number(
         0.1,
-        label="Edgewise Fraction",
+        label="Edgewise Drag",
         description="Fraction of damping and drag that acts on motion along the face",
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),

@@ -179,7 +179,7 @@ class MarschnerSettings(Settings):
     )
     strength_higher: float = number(
         1.0,
-        label="Higher-order Lobes",
+        label="Higher Lobes",
         description="Factor on light reflected inside the hair twice or more; 1 is physical",
         soft=(0.0, 2.0),
         hard=(0.0, 100.0),

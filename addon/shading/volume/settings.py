@@ -128,7 +128,7 @@ class VolumeSettings(Settings):
     )
     density: float = number(
         0.88,
-        label="Scattering Density",
+        label="Scatter Density",
         description="Density of the surrounding hair: 0 is a single strand, 1 is full of hair",
         soft=(0.5, 1.0),
         hard=(0.0, 1.0),
