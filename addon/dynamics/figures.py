@@ -91,6 +91,15 @@ class Figures:
         )
 
 
+def blank_table() -> tuple[tuple[str, ...], ...]:
+    """The table of what nobody has measured yet, as large as that of any figures."""
+    rows = []
+    for name, *values in Figures().table:
+        is_header = values[0] == "Worst"
+        rows.append((name, *(each if is_header else each and "-" for each in values)))
+    return tuple(rows)
+
+
 def _percent(value: float) -> str:
     """Such as "0.03 %": two digits, but 0 only where it is nothing."""
     return "0 %" if not value else f"{value:.1f} %" if value >= 1.0 else f"{max(value, 0.01):.2f} %"

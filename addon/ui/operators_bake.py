@@ -86,44 +86,46 @@ def has_bake(obj: bpy.types.Object) -> bool:
 
 
 def draw_bake(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
-    """Draw the bake settings of hair or a fin, the buttons, and what is on disk."""
+    """Draw the bake settings of hair or a fin, the buttons, and what is on disk: as many lines in
+    any state."""
     bake = obj.hairloom.bake
     layout.prop(bake, "folder")
     layout.prop(bake, "use_own_range")
-    if bake.use_own_range:
-        column = layout.column(align=True)
-        column.prop(bake, "first")
-        column.prop(bake, "last")
+    column = layout.column(align=True)
+    column.active = bake.use_own_range
+    column.prop(bake, "first")
+    column.prop(bake, "last")
     if obj.type == "CURVES":
         layout.prop(bake, "in_renders")
-    if draw_progress(layout, HAIRLOOM_OT_bake):
-        return
-    row = layout.row(align=True)
-    row.operator("hairloom.bake", icon="REC")
-    row.operator("hairloom.bake_free", text="", icon="TRASH")
+    if not draw_progress(layout, HAIRLOOM_OT_bake):
+        row = layout.row(align=True)
+        row.operator("hairloom.bake", icon="REC")
+        row.operator("hairloom.bake_free", text="", icon="TRASH")
     _draw_state(layout, obj)
 
 
 def _draw_state(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
     try:
-        cache = playback.cache_of(obj)
+        cache, problem = playback.cache_of(obj), ""
     except HairloomError as error:
-        layout.label(text=error.problem, icon="ERROR")
-        return
-    if cache is None:
-        layout.label(text="Not baked", icon="BLANK1")
-        return
-    layout.prop(obj.hairloom.bake, "is_shown")
-    facts, known = cache.facts, previews.bake_of(obj)
-    computed = {"numpy": "CPU", "compute": "GPU"}.get(facts.form, facts.form)
-    layout.label(
-        text=f"Frames {facts.first} to {facts.last} at {facts.frame_rate:g} fps, {computed}",
-        icon="CHECKMARK",
-    )
-    if facts.figures is not None:
-        draw_figures(layout.column(align=True), facts.figures.table)
-    if known is not None and known.changed:
-        layout.label(text="Out of date: " + ", ".join(known.changed), icon="ERROR")
+        cache, problem = None, error.problem
+    shown = layout.column()
+    shown.active = cache is not None
+    shown.prop(obj.hairloom.bake, "is_shown")
+    facts = None if cache is None else cache.facts
+    if facts is None:
+        layout.label(text=problem or "Not baked", icon="ERROR" if problem else "BLANK1")
+    else:
+        computed = {"numpy": "CPU", "compute": "GPU"}.get(facts.form, facts.form)
+        layout.label(
+            text=f"Frames {facts.first} to {facts.last} at {facts.frame_rate:g} fps, {computed}",
+            icon="CHECKMARK",
+        )
+    draw_figures(layout.column(align=True), None if facts is None else facts.figures)
+    known = previews.bake_of(obj)
+    changed = () if facts is None or known is None else known.changed
+    text = "Out of date: " + ", ".join(changed) if changed else ""
+    layout.label(text=text, icon="ERROR" if changed else "BLANK1")
 
 
 class _FinBake:

@@ -2,14 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import bpy
 
 from ..blender.base.outcome import Outcome
 from ..blender.cards.build import order_line
 from ..blender.cards.object import CardObjectJob, card_objects
+from ..cards.settings import CardSettings
 from .long_work import LongWork, Progress, Steps, draw_progress, threaded
 from .reports import tell
 from .selection import chosen_hair, needs_hair
+
+#: levels of detail that a panel has room for: as many as there may be
+_MAX_LEVELS = next(
+    int(each.hard_range[1])
+    for each in CardSettings.parameters()
+    if each.name == "levels" and each.hard_range
+)
 
 
 class HAIRLOOM_OT_make_cards(LongWork, bpy.types.Operator):
@@ -39,23 +49,37 @@ class HAIRLOOM_OT_make_cards(LongWork, bpy.types.Operator):
 
 
 def draw_made_cards(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
-    """The button, and what there is: a line a level of detail, and the texture."""
-    if draw_progress(layout, HAIRLOOM_OT_make_cards):
-        return
+    """The button, and what there is: as many lines before as after."""
     objects = card_objects(hair)
-    text = "Make Cards Again" if objects else "Make Cards"
-    layout.operator("hairloom.make_cards", text=text, icon="MESH_GRID")
+    if not draw_progress(layout, HAIRLOOM_OT_make_cards):
+        text = "Make Cards Again" if objects else "Make Cards"
+        layout.operator("hairloom.make_cards", text=text, icon="MESH_GRID")
+    finest = objects[0] if objects else None
+    made = finest and finest.hairloom.card_object
     column = layout.column(align=True)
-    for obj in objects:
-        row = column.row(align=True)
-        row.label(text=f"{obj.name}: {_counts(obj)}")
-        row.prop(obj, "hide_viewport", text="", emboss=False)
-    if not objects:
-        return
-    column.label(text=order_line(objects[0].hairloom.card_object.wrong_fraction), icon="SORTSIZE")
-    image = objects[0].hairloom.card_object.image
-    if image is not None:
-        column.label(text=f"Texture {image.size[0]} x {image.size[1]}", icon="TEXTURE")
+    column.label(text=_counts(finest) if finest else "No cards yet", icon="OUTLINER_OB_MESH")
+    _draw_levels(column, objects)
+    column.label(text=order_line(made.wrong_fraction) if made else "", icon="SORTSIZE")
+    image = made and made.image
+    size = f"{image.size[0]} x {image.size[1]}" if image else "-"
+    column.label(text=f"Texture {size}", icon="TEXTURE")
+
+
+def _draw_levels(column: bpy.types.UILayout, objects: Sequence[bpy.types.Object]) -> None:
+    """A switch for each level of detail that there may be: how many triangles it has, and whether
+    it is seen."""
+    row = column.row(align=True)
+    for number in range(_MAX_LEVELS):
+        if number < len(objects):
+            text = _short(len(objects[number].data.polygons))
+            row.prop(objects[number], "hide_viewport", text=text, toggle=1, invert_checkbox=True)
+        else:
+            row.label(text="-")
+
+
+def _short(count: int) -> str:
+    """A number that is four letters wide at most, such as "37k"."""
+    return f"{count:,}" if count < 1000 else f"{count / 1000.0:.0f}k"
 
 
 def _counts(obj: bpy.types.Object) -> str:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 
 import bpy
 
 from ..blender.base.redraw import redraw_panels
 from ..blender.preview import previews
 from ..blender.sessions.session import Session
+from ..dynamics.figures import Figures, blank_table
 from .reports import reporting
 from .selection import chosen_hair, needs_hair
 
@@ -49,15 +50,14 @@ def draw_measure(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
     """Draw the button, and what was measured last; greyed out once the hair has moved on."""
     layout.operator("hairloom.measure", icon="DRIVER_DISTANCE")
     session = previews.session_of(hair)
-    if session is not None and session.figures is not None:
-        lines = layout.column(align=True)
-        lines.active = session.are_figures_current
-        draw_figures(lines, session.figures.table)
+    lines = layout.column(align=True)
+    lines.active = session is not None and session.are_figures_current
+    draw_figures(lines, None if session is None else session.figures)
 
 
-def draw_figures(column: bpy.types.UILayout, table: Iterable[Sequence[str]]) -> None:
-    """Draw what was measured, see `Figures.table`."""
-    for name, *values in table:
+def draw_figures(column: bpy.types.UILayout, figures: Figures | None) -> None:
+    """Draw what was measured, see `Figures.table`; as many lines where nothing was."""
+    for name, *values in blank_table() if figures is None else figures.table:
         row = column.split(factor=_NAMES)
         row.label(text=name)
         columns = row.row()

@@ -178,9 +178,8 @@ def _shown(operator: bpy.types.Operator, context: bpy.types.Context) -> ShownGro
 
 
 def draw_show(layout: bpy.types.UILayout, _hair: bpy.types.Object) -> None:
-    if draw_progress(layout, HAIRLOOM_OT_turntable):
-        return
-    layout.operator("hairloom.turntable", icon="RENDER_ANIMATION")
+    if not draw_progress(layout, HAIRLOOM_OT_turntable):
+        layout.operator("hairloom.turntable", icon="RENDER_ANIMATION")
     layout.operator("hairloom.contact_sheet", icon="IMAGE_DATA")
 
 

@@ -62,5 +62,8 @@ class Layout:
     def template_ID(self, *_: Any, text: str = "", **__: Any) -> None:
         self._element(text)
 
+    def template_icon_view(self, *_: Any, scale: float = 1.0, **__: Any) -> None:
+        self.parts.append(scale)
+
     def separator(self, **_: Any) -> None:
         self.parts.append(0.5)

@@ -248,16 +248,18 @@ def test_the_panel_draws_what_there_is(hair):
         def operator(self, _name, text="", icon="NONE"):
             said.append(text)
 
-        def prop(self, *_arguments, **_named):
-            pass
+        def prop(self, *_arguments, text="", **_named):
+            said.append(text)
 
     draw_made_cards(Layout(), hair)
-    assert said == ["Make Cards"]
+    assert said == ["Make Cards", "No cards yet", *5 * ["-"], "", "Texture -"]
+    before = len(said)
     press()
     said.clear()
     draw_made_cards(Layout(), hair)
+    assert len(said) == before, "what is below moves"
     assert said[0] == "Make Cards Again"
-    assert said[1].startswith("Hair Cards: 12 cards, 384 triangles")
+    assert said[1:3] == ["12 cards, 384 triangles", "384"] and said[5:7] == ["-", "-"]
     assert said[-2].endswith(" % of pixels blend in the wrong order")
     assert said[-1] == "Texture 128 x 32"
 

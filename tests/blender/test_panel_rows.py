@@ -10,7 +10,21 @@ from panel_layout import Layout
 
 from hairloom.addon.blender.preview import previews, scene_events
 from hairloom.addon.parameters import ALL_SETTINGS
-from hairloom.addon.ui import panels, sections, state
+from hairloom.addon.ui import (
+    card_sections,
+    long_work,
+    operators_bake,
+    operators_card_export,
+    operators_cards,
+    operators_grow,
+    operators_hairstyles,
+    operators_make_real,
+    operators_settle,
+    operators_show,
+    panels,
+    sections,
+    state,
+)
 
 pytestmark = pytest.mark.usefixtures("extension")
 #: [pixels] of the sidebar and of Properties, as Blender opens them
@@ -18,6 +32,28 @@ WIDTHS = (280, 340)
 #: of texts, and how wide labels of fields in the sidebar may be [pixels], at UI scale 1; a window
 #: shows "Length Variation", of 88, and cuts "Sag Correction", of 101
 FONT_SIZE, LABEL_WIDTH = 11, 92
+#: how wide one beside a checkbox may be [pixels]: it has the other part of its row
+TOGGLE_WIDTH = 118
+#: sections that are drawn without a look at how wide they are
+OTHERS = (
+    operators_bake.draw_bake,
+    sections.draw_dynamics,
+    sections.draw_export,
+    card_sections.draw_cards,
+    operators_show.draw_show,
+    operators_grow.draw_grow,
+)
+#: operators that show their progress instead of their button
+JOBS = (
+    operators_bake.HAIRLOOM_OT_bake,
+    operators_cards.HAIRLOOM_OT_make_cards,
+    operators_card_export.HAIRLOOM_OT_export_cards,
+    operators_grow.HAIRLOOM_OT_grow_again,
+    operators_hairstyles.HAIRLOOM_OT_fit_again,
+    operators_make_real.HAIRLOOM_OT_make_real,
+    operators_settle.HAIRLOOM_OT_settle,
+    operators_show.HAIRLOOM_OT_turntable,
+)
 
 
 @pytest.fixture
@@ -46,7 +82,7 @@ def context_of(width):
     )
 
 
-def states(hair):
+def states(hair, folder):
     """Brings hair into one state after another; gives their names."""
     yield "not previewed"
     bpy.ops.hairloom.preview()
@@ -72,11 +108,34 @@ def states(hair):
     hair.data.hairloom.card_drawing.shown_as = "cards"
     bpy.context.view_layer.update()
     yield "as cards"
+    hair.data.hairloom.card_drawing.shown_as = "strands"
+    groom = hair.data.hairloom
+    groom.cards.source, groom.cards.card_count, groom.atlas.source = "clusters", 12, "made"
+    groom.card_occlusion.rays = 4
+    bpy.ops.hairloom.make_cards()
+    previews.play(bpy.context.evaluated_depsgraph_get())
+    bpy.ops.hairloom.measure()
+    yield "measured, with cards beside it"
+    bake = hair.hairloom.bake
+    bake.folder, bake.use_own_range, bake.last = str(folder), True, 3
+    bpy.ops.hairloom.bake()
+    yield "baked"
+    hair.data.hairloom.guides.guide_count += 1
+    bpy.context.view_layer.update()
+    yield "with a bake that is out of date"
+    for operator in JOBS:
+        progress = long_work.Progress("Growing 4,000 strands", 0.5)
+        long_work._running = SimpleNamespace(
+            operator=operator, label=operator.bl_label, progress=progress
+        )
+        yield operator.bl_label
+    long_work._running = None
 
 
-def test_nothing_below_moves_whatever_happens_to_the_hair(hair, monkeypatch):
+def test_nothing_below_moves_whatever_happens_to_the_hair(hair, monkeypatch, tmp_path):
     heights = {}
-    for name in states(hair):
+    monkeypatch.setattr(long_work, "_running", None)
+    for name in states(hair, tmp_path):
         for width in WIDTHS:
             context = context_of(width)
             monkeypatch.setattr(sections, "bpy", SimpleNamespace(context=context))
@@ -84,25 +143,26 @@ def test_nothing_below_moves_whatever_happens_to_the_hair(hair, monkeypatch):
                 height(panels.draw_preview, context),
                 height(sections.draw_strands, hair),
                 height(sections.draw_children, hair),
+                *(height(draw, hair) for draw in OTHERS),
             )
     for width in WIDTHS:
         wanted = heights["not previewed", width]
         found = {key: each for key, each in heights.items() if key[1] == width and each != wanted}
         assert found == {}, f"not {wanted}"
-    assert len(heights) == 8 * len(WIDTHS)
+    assert len(heights) == (11 + len(JOBS)) * len(WIDTHS)
 
 
-def test_no_label_of_the_sidebar_is_cut(extension):
-    """Measured by Blender's own font, in the part of a panel that labels of fields have."""
+def test_no_label_is_cut(extension):
+    """Of all panels: measured by Blender's own font, in the part of a row that labels have."""
     blf.size(0, FONT_SIZE)
-    cut = [
-        f"{parameter.label}: {blf.dimensions(0, parameter.label)[0]:.0f}"
-        for section in ("shading", "grow", "dynamics")
-        for parameter in ALL_SETTINGS[section].parameters()
-        if not parameter.panel and parameter.kind not in {"toggle", "curve"}
-        if blf.dimensions(0, parameter.label)[0] > LABEL_WIDTH
-    ]
-    assert cut == []
+    cut, count = [], 0
+    for section, settings in ALL_SETTINGS.items():
+        for parameter in settings.parameters():
+            width = blf.dimensions(0, parameter.label)[0]
+            count += 1
+            if width > (TOGGLE_WIDTH if parameter.kind == "toggle" else LABEL_WIDTH):
+                cut.append(f"{section}, {parameter.label}: {width:.0f}")
+    assert cut == [] and count > 200
 
 
 def test_all_problems_are_counted_and_the_worst_has_its_button(hair):

@@ -122,6 +122,7 @@ def grown_again():
     choose("Head")
     assert bpy.ops.hairloom.grow(strand_count=60) == {"FINISHED"}
     hair = bpy.context.object
+    name = hair.name
     assert head == hair.parent
     put, points = of_hairloom("curves").put_points, of_hairloom("curves").curve_points
     put(hair.data, points(hair.data) * np.float32(1.05))
@@ -135,7 +136,7 @@ def grown_again():
     yield from done()
     assert len(hair.data.curves) == STRANDS
     bpy.ops.ed.undo()
-    assert np.array_equal(points(bpy.data.objects[hair.name].data), combed)
+    assert np.array_equal(points(bpy.data.objects[name].data), combed)
     yield
 
 
