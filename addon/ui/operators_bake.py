@@ -11,6 +11,7 @@ from ..blender.base.outcome import report
 from ..blender.preview import previews
 from ..blender.preview.bake import Bake, bakeable, free, show_in_renders
 from ..blender.scene.fin_modifier import fin_modifier
+from ..blender.sessions.measures import table_of
 from ..errors import HairloomError
 from . import long_work
 from .long_work import LongWork, Steps, counted, draw_progress
@@ -121,7 +122,7 @@ def _draw_state(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
             text=f"Frames {facts.first} to {facts.last} at {facts.frame_rate:g} fps, {computed}",
             icon="CHECKMARK",
         )
-    draw_figures(layout.column(align=True), None if facts is None else facts.figures)
+    draw_figures(layout.column(align=True), table_of(None if facts is None else facts.figures))
     known = previews.bake_of(obj)
     changed = () if facts is None or known is None else known.changed
     text = "Out of date: " + ", ".join(changed) if changed else ""

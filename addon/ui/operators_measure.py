@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import bpy
 
 from ..blender.base.redraw import redraw_panels
 from ..blender.preview import previews
+from ..blender.sessions.measures import table_of
 from ..blender.sessions.session import Session
-from ..dynamics.figures import Figures, blank_table
 from .reports import reporting
 from .selection import chosen_hair, needs_hair
 
@@ -52,12 +52,12 @@ def draw_measure(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
     session = previews.session_of(hair)
     lines = layout.column(align=True)
     lines.active = session is not None and session.are_figures_current
-    draw_figures(lines, None if session is None else session.figures)
+    draw_figures(lines, table_of(None if session is None else session.figures))
 
 
-def draw_figures(column: bpy.types.UILayout, figures: Figures | None) -> None:
-    """Draw what was measured, see `Figures.table`; as many lines where nothing was."""
-    for name, *values in blank_table() if figures is None else figures.table:
+def draw_figures(column: bpy.types.UILayout, table: Iterable[Sequence[str]]) -> None:
+    """Draw what was measured, see `table_of`."""
+    for name, *values in table:
         row = column.split(factor=_NAMES)
         row.label(text=name)
         columns = row.row()

@@ -12,6 +12,8 @@ from typing import Any
 
 import numpy as np
 
+from ...dynamics.figures import Figures, blank_table
+
 #: The median of this many frames is reported, and only of those not older than this [s].
 _KEPT, _LATEST = 15, 10.0
 
@@ -68,3 +70,8 @@ def _collect(thing: Any, seen: dict[int, int]) -> None:
             _collect(each, seen)
     elif is_dataclass(thing) and not isinstance(thing, type):
         _collect(tuple(getattr(thing, field.name) for field in fields(thing)), seen)
+
+
+def table_of(figures: Figures | None) -> tuple[tuple[str, ...], ...]:
+    """For a panel, as large where nothing was measured."""
+    return blank_table() if figures is None else figures.table
