@@ -73,5 +73,5 @@ lock: ## write requirements.lock again from requirements.in (needs uv)
 	    --no-emit-index-url --custom-compile-command "make lock" requirements.in -o requirements.lock
 
 clean: ## remove what was made here, except .venv and the window Blender
-	rm -rf out dist .pytest_cache .mypy_cache .ruff_cache
+	rm -rf out dist help .pytest_cache .mypy_cache .ruff_cache
 	find . -name __pycache__ -not -path './.venv/*' -prune -exec rm -rf {} +

@@ -17,6 +17,7 @@ from .blender.properties import groups, previews
 from .blender.strands import growing
 from .ui import (
     engine_panels,
+    help,
     long_work,
     menus,
     operators_adopted,
@@ -84,6 +85,7 @@ CLASSES: tuple[type[Any], ...] = (
     *preset_chooser.CLASSES,
     *operators_fix.CLASSES,
     *operators_reports.CLASSES,
+    *help.CLASSES,
     *operators_self_test.CLASSES,
     *preferences.CLASSES,
     *operators_start.CLASSES,
@@ -140,6 +142,7 @@ def _steps() -> tuple[Step, ...]:
         (operators_preview.register, operators_preview.unregister),
         (preset_chooser.register, preset_chooser.unregister),
         (menus.register, menus.unregister),
+        (help.register, help.unregister),
         (translations.register, translations.unregister),
         (operators_adopted.register, operators_adopted.unregister),
         (handlers.register, handlers.unregister),

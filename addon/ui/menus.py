@@ -8,10 +8,11 @@ from typing import Any
 import bpy
 import rna_keymap_ui
 
+from ..blender.preview import previews
 from ..blender.properties.presets import shipped
 from .operators_strand_export import draw_strand_exports
 from .operators_strand_import import draw_imports
-from .selection import active_mesh
+from .selection import active_mesh, chosen_hair
 
 _PIE = "HAIRLOOM_MT_pie"
 #: operator, its settings: offered in the keymap of the 3D view, without keys
@@ -115,12 +116,28 @@ def _draw_object(self: Any, context: bpy.types.Context) -> None:
         self.layout.menu("HAIRLOOM_MT_object", icon="OUTLINER_OB_CURVES")
 
 
+def _draw_overlays(self: Any, context: bpy.types.Context) -> None:
+    """What lies over the view: of the selected hair, below Blender's own of objects."""
+    hair = chosen_hair(context)
+    if not hair:
+        return
+    column = self.layout.column()
+    column.separator()
+    is_shown = previews.session_of(hair[0]) is not None
+    column.operator("hairloom.preview", text="Hairloom", icon="HIDE_OFF", depress=is_shown)
+    shown = column.row(align=True)
+    shown.prop(hair[0].hairloom, "shown_overlays")
+    shown.prop(hair[0].hairloom, "show_counts", text="", icon="INFO")
+    column.prop(hair[0].hairloom, "hide_original")
+
+
 MENUS: tuple[tuple[str, Callable[[Any, bpy.types.Context], None]], ...] = (
     ("TOPBAR_MT_file_import", _draw_import),
     ("TOPBAR_MT_file_export", _draw_exports),
     ("VIEW3D_MT_curve_add", _draw_add),
     ("VIEW3D_MT_object", _draw_object),
     ("VIEW3D_MT_object_context_menu", _draw_object),
+    ("VIEW3D_PT_overlay_object", _draw_overlays),
 )
 
 

@@ -11,6 +11,7 @@ from ..blender.preview import previews
 from ..blender.scene.particle_hair import hair_systems
 from ..blender.setup.foreign_heads import may_be_head
 from .drawing import Draw
+from .help import draw_help
 from .long_work import draw_progress
 from .operators_adopted import draw_sort
 from .operators_hairstyles import HAIRLOOM_OT_add_hairstyle, HAIRLOOM_OT_fit_again
@@ -90,6 +91,9 @@ class HAIRLOOM_PT_sidebar(bpy.types.Panel):
     bl_region_type = "UI"
     bl_category = "Hairloom"
 
+    def draw_header_preset(self, _context: bpy.types.Context) -> None:
+        draw_help(self.layout, "")
+
     def draw(self, context: bpy.types.Context) -> None:
         draw_preview(self.layout, context)
         if _hair(context) is not None:
@@ -107,6 +111,9 @@ class HAIRLOOM_PT_data(bpy.types.Panel):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         return context.object is not None and context.object.type == "CURVES"
+
+    def draw_header_preset(self, _context: bpy.types.Context) -> None:
+        draw_help(self.layout, "")
 
     def draw(self, context: bpy.types.Context) -> None:
         draw_preview(self.layout, context)
@@ -140,6 +147,9 @@ def _sub_panel(
         self.layout.use_property_decorate = is_in_properties
         draw_section(self.layout, _hair(context))
 
+    def draw_header_preset(self: Any, _context: bpy.types.Context) -> None:
+        draw_help(self.layout, name)
+
     def draw_header(self: Any, context: bpy.types.Context) -> None:
         owner, switch = SWITCHES[name]
         self.layout.prop(owner(_hair(context)), switch, text="")
@@ -153,6 +163,7 @@ def _sub_panel(
         "bl_options": {"DEFAULT_CLOSED"},
         "poll": classmethod(poll),
         "draw": draw,
+        "draw_header_preset": draw_header_preset,
     }
     if name in SWITCHES:
         namespace["draw_header"] = draw_header
@@ -176,6 +187,9 @@ class HAIRLOOM_PT_sidebar_mesh_cards(bpy.types.Panel):
     def poll(cls, context: bpy.types.Context) -> bool:
         mesh = active_mesh(context)
         return mesh is not None and mesh.hairloom.card_object.groom is None
+
+    def draw_header_preset(self, _context: bpy.types.Context) -> None:
+        draw_help(self.layout, "mesh_cards")
 
     def draw(self, context: bpy.types.Context) -> None:
         draw_sort(self, context)

@@ -1,0 +1,165 @@
+"""Help: the page of the documentation about a panel, a setting or a button.
+
+The pages come with the extension. Blender asks the manual map for F1, and for *Online Manual* in
+the menu of a right click, with a name such as `bpy.types.HAIRLOOM_PG_dynamics.gravity`, in small
+letters.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import bpy
+from bpy.props import StringProperty
+
+from ..errors import HairloomError
+from .reports import reporting
+
+_ROOT = Path(__file__).resolve().parents[2]
+#: made for the zip; a clone has the sources
+HELP, _SOURCES = _ROOT / "help", _ROOT / "docs"
+
+#: section of the panels, or of the settings -> page of docs, and the heading on it
+PAGES = {
+    "": "user_guide#the-sidebar",
+    "look": "shading#look-settings",
+    "shading": "shading#look-settings",
+    "shadows": "shading#shadows",
+    "volume": "shading#shadows",
+    "ambient": "shading#shadows",
+    "skin": "skin#soft-shadow-on-skin",
+    "shafts": "light_shafts",
+    "grow": "styling#grow",
+    "strands": "user_guide#strands-and-children",
+    "widths": "user_guide#strands-and-children",
+    "guides": "user_guide#strands-and-children",
+    "children": "refinement#children",
+    "partings": "styling#partings",
+    "parting": "styling#partings",
+    "flow": "styling#flow",
+    "trim": "styling#trim",
+    "mirror": "styling#mirror",
+    "detail": "refinement#detail",
+    "dynamics": "dynamics",
+    "style": "dynamics#style-and-lengths",
+    "medium": "dynamics#forces",
+    "lengths": "dynamics#style-and-lengths",
+    "collisions": "dynamics#collisions",
+    "sphere_fit": "dynamics#collisions",
+    "ties": "dynamics#ties-and-held-tips",
+    "settle": "styling#settle",
+    "bake": "dynamics#bakes",
+    "fin": "dynamics#cloth",
+    "show": "user_guide#show-and-export",
+    "cards": "cards",
+    "card_strips": "cards#from-strands-to-cards",
+    "card_texture": "card_textures",
+    "atlas": "card_textures",
+    "card_images": "card_textures",
+    "card_occlusion": "cards#cards-in-the-scene",
+    "card_drawing": "cards#the-draw-order",
+    "card_object": "cards#cards-in-the-scene",
+    "mesh_cards": "cards#the-draw-order",
+    "cards_export": "cards_export",
+    "strands_export": "strands_export",
+    "export": "user_guide#export-and-import",
+    "picture": "engine#samples",
+    "mesh_shadows": "engine#shadows-of-meshes-on-meshes",
+    "stage": "user_guide#show-and-export",
+}
+#: part of an operator's name -> a section, or a page; the first that fits counts
+_OPERATORS = (
+    ("export_cards", "cards_export"),
+    ("export_", "strands_export"),
+    ("import_", "strands_import"),
+    ("hairstyle", "hairstyles"),
+    ("landmarks", "hairstyles#on-your-own-head"),
+    ("fit_again", "hairstyles#on-your-own-head"),
+    ("grow", "styling#grow"),
+    ("settle", "styling#settle"),
+    ("back_to_combed", "styling#settle"),
+    ("parting", "styling#partings"),
+    ("stroke", "styling#flow"),
+    ("flow", "styling#flow"),
+    ("trim", "styling#trim"),
+    ("mirror", "styling#mirror"),
+    ("make_cards", "cards#cards-in-the-scene"),
+    ("sort_cards", "cards#the-draw-order"),
+    ("bake", "dynamics#bakes"),
+    ("measure", "dynamics#measuring"),
+    ("tie", "dynamics#ties-and-held-tips"),
+    ("spheres", "dynamics#collisions"),
+    ("fin_", "dynamics#cloth"),
+    ("look_", "shading#from-blender-s-principled-hair"),
+    ("preset", "shading#looks"),
+    ("", "user_guide#the-sidebar"),
+)
+_FALLBACK = "user_guide"
+
+
+def address(page: str) -> str:
+    """Where a page lies, such as "cards#limits"; in a clone that is its source."""
+    name, _, heading = page.partition("#")
+    if not HELP.is_dir():
+        return (_SOURCES / f"{name}.md").as_uri()
+    place = (HELP / "docs" / f"{name}.html").as_uri()
+    return f"{place}#{heading}" if heading else place
+
+
+def page_of(section: str) -> str:
+    """The page about a section of the panels; that of its first word where it has none itself."""
+    return PAGES.get(section) or PAGES.get(section.partition("_")[0], _FALLBACK)
+
+
+def manual_map() -> tuple[str, tuple[tuple[str, str], ...]]:
+    """For `bpy.utils.register_manual_map`."""
+    groups = (
+        (f"bpy.types.hairloom_pg_{section}.*", address(page))
+        for section, page in PAGES.items()
+        if section
+    )
+    operators = ((f"bpy.ops.hairloom.*{part}*", address(page)) for part, page in _OPERATORS)
+    return "", (*groups, *operators, ("bpy.types.hairloom_*", address(_FALLBACK)))
+
+
+class HAIRLOOM_OT_help(bpy.types.Operator):
+    """Show the page of the documentation about this panel, in the web browser. It needs no network.
+    F1 over a setting or a button shows its own"""
+
+    bl_idname = "hairloom.help"
+    bl_label = "Help"
+
+    page: StringProperty(
+        name="Page",
+        description="Page and heading, such as cards#limits",
+        default=_FALLBACK,
+        options={"SKIP_SAVE"},
+    )
+
+    @reporting
+    def execute(self, _context: bpy.types.Context) -> set[str]:
+        known = {*PAGES.values(), *(page for _, page in _OPERATORS), _FALLBACK}
+        if self.page not in known:
+            raise HairloomError(
+                "there is no such page", place=self.page, remedy=f"Use {_FALLBACK}, for example"
+            )
+        bpy.ops.wm.url_open(url=address(self.page))
+        return {"FINISHED"}
+
+
+def draw_help(layout: bpy.types.UILayout, section: str) -> None:
+    """A question mark, for the header of a panel."""
+    button: Any = layout.operator("hairloom.help", text="", icon="QUESTION", emboss=False)
+    button.page = page_of(section)
+
+
+CLASSES = (HAIRLOOM_OT_help,)
+
+
+def register() -> None:
+    bpy.utils.register_manual_map(manual_map)
+
+
+def unregister() -> None:
+    bpy.utils.unregister_manual_map(manual_map)

@@ -1,0 +1,111 @@
+"""Help: panels, settings and buttons open pages of the documentation that are there."""
+
+from __future__ import annotations
+
+import re
+import webbrowser
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote, urlparse
+
+import bpy
+import make_help
+import pytest
+from bl_operators.wm import WM_OT_doc_view_manual
+
+from hairloom.addon import registration
+from hairloom.addon.ui import help as ours
+from hairloom.addon.ui import panels
+
+pytestmark = pytest.mark.usefixtures("extension")
+
+
+@pytest.fixture(scope="module")
+def pages(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The pages as they are in the zip."""
+    return make_help.write_help(tmp_path_factory.mktemp("help") / "help")
+
+
+def is_there(address: str) -> bool:
+    """Whether a page has this heading."""
+    parts = urlparse(address)
+    page = Path(unquote(parts.path))
+    return page.is_file() and (not parts.fragment or f'id="{parts.fragment}"' in page.read_text())
+
+
+def found(name: str) -> str | None:
+    """What Blender opens at F1."""
+    address: str | None = WM_OT_doc_view_manual._lookup_rna_url(name, verbose=False)
+    return address
+
+
+def test_every_page_and_heading_is_in_the_zip(pages: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(ours, "HELP", pages)
+    _, entries = ours.manual_map()
+    missing = [pattern for pattern, address in entries if not is_there(address)]
+    assert missing == [] and len(entries) > 50
+    assert not is_there(ours.address("dynamics#nowhere")), "the check finds everything"
+
+
+def test_the_pages_need_nothing_that_was_left_out(pages: Path) -> None:
+    for page in pages.rglob("*.html"):
+        text = page.read_text("utf-8")
+        assert "<img" not in text and "_images/" not in text, page
+        for source in re.findall(r'<(?:script|link)[^>]+(?:src|href)="([^"?#]+)', text):
+            is_of_site = source.endswith("versions.js")  # the site's menu of other versions
+            assert is_of_site or (page.parent / source).exists(), f"{page.name} loads {source}"
+
+
+def test_f1_finds_a_page_for_all_that_we_have() -> None:
+    for each in registration.CLASSES:
+        if issubclass(each, bpy.types.PropertyGroup):
+            for prop in each.bl_rna.properties:
+                name = f"bpy.types.{each.__name__}.{prop.identifier}"
+                assert (found(name) or "").startswith("file:"), name
+    for name in dir(bpy.ops.hairloom):
+        assert (found(f"bpy.ops.hairloom.{name}") or "").startswith("file:"), name
+    blenders = found("bpy.types.Object.location")
+    assert blenders is not None and "docs.blender.org" in blenders, "Blender's own are taken"
+
+
+@pytest.mark.parametrize(
+    ("what", "page"),
+    [
+        ("HAIRLOOM_PG_dynamics.gravity", "dynamics"),
+        ("HAIRLOOM_PG_grow.length", "styling"),
+        ("HAIRLOOM_PG_shading.base_color", "shading"),
+        ("hairloom.make_cards", "cards"),
+        ("hairloom.add_hairstyle", "hairstyles"),
+    ],
+)
+def test_f1_opens_it(what: str, page: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    opened: list[str] = []
+    monkeypatch.setattr(webbrowser, "open", opened.append)
+    assert bpy.ops.wm.doc_view_manual(doc_id=what) == {"FINISHED"}
+    assert [Path(urlparse(each).path).stem for each in opened] == [page]
+
+
+def test_each_panel_of_hair_has_a_question_mark_for_its_own_page(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    opened: list[str] = []
+    monkeypatch.setattr(webbrowser, "open", opened.append)
+    asked: list[Any] = []
+
+    class Layout:
+        def operator(self, name: str, **_: Any) -> Any:
+            asked.append(type("Properties", (), {"operator": name}))
+            return asked[-1]
+
+    for panel in panels.CLASSES:
+        panel.draw_header_preset(type("Panel", (), {"layout": Layout()})(), bpy.context)
+        section = panel.__name__.partition("_PT_")[2].partition("_")[2]
+        assert asked[-1].page in ours.PAGES.values(), section
+        bpy.ops.hairloom.help(page=asked[-1].page)
+    assert len(opened) == len(asked) == len(panels.CLASSES) > 30
+    assert len(set(opened)) > 10, "many panels have the same page"
+
+
+def test_a_page_that_nobody_wrote_is_refused() -> None:
+    with pytest.raises(RuntimeError, match="no such page"):
+        bpy.ops.hairloom.help(page="../../etc/passwd")
