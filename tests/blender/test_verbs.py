@@ -21,6 +21,7 @@ DOCS = Path(__file__).parents[2] / "docs"
 #: buttons that act on a view or a session alone, and leave nothing behind
 WINDOW_ONLY = {
     "show_problems",
+    "help",
     "show_reports",
     "copy_reports",
     "preview",
