@@ -1,5 +1,5 @@
 """Makes what comes from the code: tables of parameters and verbs, the figure of the flows, the
-texts to translate, the page of the gallery, the pictures.
+texts to translate, the page of the gallery, the index of the decisions, the pictures.
 
 python tools/make_docs.py [--check | --pictures]
 
@@ -17,6 +17,7 @@ import sys
 import tempfile
 from pathlib import Path
 
+import decisions_index
 import flow_figure
 import gallery
 from extension_loader import PACKAGE, REPOSITORY, load_package
@@ -101,6 +102,8 @@ def main() -> int:
     VERBS.write_text(verb_tables(), encoding="utf-8")
     TEXTS.write_text(texts_to_translate(), encoding="utf-8")
     gallery.PAGE.write_text(gallery.page(), encoding="utf-8")
+    decisions = decisions_index.PAGE.read_text(encoding="utf-8")
+    decisions_index.PAGE.write_text(decisions_index.with_index(decisions), encoding="utf-8")
     if chosen.pictures:
         make_pictures()
     return 0

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+import decisions_index
 import make_docs
 import pytest
 
@@ -149,10 +150,10 @@ def test_a_file_is_named_by_its_whole_path() -> None:
     assert [is_there(name, page) for name in named] == [False, True, False, True]
 
 
-def test_decisions_have_a_number_a_day_and_a_status() -> None:
-    text = (REPOSITORY / "docs" / "dev" / "decisions.md").read_text(encoding="utf-8")
+def test_decisions_have_a_number_a_day_a_status_and_a_topic() -> None:
+    text = decisions_index.PAGE.read_text(encoding="utf-8")
     entries = re.split(r"^## ", text, flags=re.M)[1:]
-    status = r"\n\n\d{4}-\d\d-\d\d · (accepted|superseded by ((?:\d+(?: and )?)+))\n\n\*\*"
+    status = r"\n\n\d{4}-\d\d-\d\d · (accepted|superseded by ((?:\d+(?: and )?)+)) · (\w+)\n\n\*\*"
 
     numbers = [int(entry.partition(".")[0]) for entry in entries]
     # work that goes on side by side takes numbers ahead of each other
@@ -163,6 +164,8 @@ def test_decisions_have_a_number_a_day_and_a_status() -> None:
         assert found, title
         later = [int(other) for other in re.findall(r"\d+", found.group(2) or "")]
         assert all(number < other and other in numbers for other in later), title
+        assert found.group(3) in decisions_index.TOPICS, title
         assert "**Decision.** " in entry, title
 
     assert len(entries) > 50
+    assert decisions_index.with_index(text) == text, "run make docs"
