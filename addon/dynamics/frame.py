@@ -9,8 +9,10 @@ import numpy as np
 
 from ..arrays import Floats
 from ..errors import HairloomError
+from .among import Among, Strength
 from .clearance import GuideClearance
 from .colliders import PosedCollider
+from .constraints import PINNED
 from .contacts import BETWEEN, BETWEEN_RADIUS, radius_of_all
 from .forces import carried_fraction, combed_gravity, felt_gravity
 from .held import Held
@@ -135,6 +137,7 @@ class Frame:
     matrix: StyleBand
     air: Air | None
     size: float  # of the hair [m], see `state.Rest`
+    among: Among | None  # None where hair does not feel other hair
 
     @classmethod
     def of(
@@ -146,13 +149,19 @@ class Frame:
         dt: float,
     ) -> Frame:
         turn: Floats = np.eye(3)
+        among = None
         if state.guide_count:
             before, now = (sample(grid) for grid in (drive.target_before, drive.target_now))
             turn = rotation_from(state.rest.sample, (before + now) / 2.0)
+            among = _among(state, drive, settings, turn, dt)
         matrix = style_band(settings, state.cv_count, dt)
         air = air_of(settings, drive.scene_wind)
         time, left, size = state.time, state.time_left, state.rest.size
-        return cls(drive, settings, dt, duration, time, left, turn, matrix, air, size)
+        return cls(drive, settings, dt, duration, time, left, turn, matrix, air, size, among)
+
+    def pieces(self, count: int) -> list[range]:
+        """The substeps that guides may go through one guide after the other."""
+        return [range(count)] if self.among is None else self.among.pieces(count)
 
     @property
     def carried_fraction(self) -> float:
@@ -171,6 +180,19 @@ class Frame:
         return self.air.at(roots, self.time + number * self.dt) * np.float32(self.dt)
 
 
+def _among(
+    state: DynamicsState, drive: Drive, settings: DynamicsSettings, turn: Floats, dt: float
+) -> Among | None:
+    """The grid goes with the roots, halfway through the frame, and turns with the groom."""
+    strength = Strength.of(settings, dt)
+    if strength is None or state.cv_count <= PINNED:
+        return None
+    grid = state.rest.hair_grid
+    ends = [target[:, 0].mean(axis=0, dtype=np.float64) for target in drive.targets[:2]]
+    place = grid.place(turn, (ends[0] + ends[1]) / 2.0)
+    return Among(grid, place, strength, round(state.time / dt))
+
+
 @dataclass(frozen=True)
 class Block:
     """Some guides made ready for a frame, rows (3, cv_count, n) world [m].
@@ -184,8 +206,6 @@ class Block:
     springs: of the guides that are curled; None where none of these gives.
     """
 
-    position: Floats
-    previous: Floats
     rest: Rest
     style_before: Floats
     style_displacement: Floats
@@ -211,9 +231,6 @@ class Block:
         middle = before + displacement * np.float32(0.5)
         impulse = displacement * np.float32(frame.carried_fraction)
         impulse += felt_gravity(drive.gravity, settings, frame.turn, middle) * np.float32(dt * dt)
-        position, previous = state.position[:, :, guides].copy(), state.previous[:, :, guides]
-        if state.substep and state.substep != dt:
-            previous = position - (position - previous) * np.float32(dt / state.substep)
         radius = radius_of_all(settings, state.cv_count, before.shape[2], state.rest.size)
         between = np.tile(radius * BETWEEN_RADIUS, (len(BETWEEN), 1))
         if drive.clearance is not None:
@@ -230,8 +247,6 @@ class Block:
         combed = combed_gravity(drive.gravity, settings, frame.turn)
         springs = Springs.of(rest.room, rest.length, middle, combed, held, settings, dt)
         return cls(
-            position,
-            previous.copy(),
             rest,
             before,
             displacement,

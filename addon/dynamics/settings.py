@@ -140,6 +140,17 @@ class DynamicsSettings(MotionSettings):
         source="Springs with a compliance, Macklin, Mueller and Chentanez 2016",
         panel="Style",
     )
+    volume: float = number(
+        0.0,
+        label="Volume",
+        description="How much hair feels other hair: it keeps its volume and its locks, and "
+        "neighbours move together. At rest it changes nothing; 0 is hair that passes through hair",
+        soft=(0.0, 1.0),
+        hard=(0.0, 1.0),
+        unit="factor",
+        source="Grid of density and velocity, Petrovic, Henne and Anderson 2005",
+        panel="Style",
+    )
     length_solver: str = choice(
         "direct",
         (

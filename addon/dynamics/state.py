@@ -14,6 +14,7 @@ import numpy as np
 
 from ..arrays import Floats
 from ..errors import HairloomError
+from .among import HairGrid
 from .constraints import PINNED
 from .style import LocalShape, local_shape
 from .turn import rest_sample
@@ -29,6 +30,7 @@ class Rest:
     size: the median length of all guides [m], in which distances are given in the settings.
     room: (cv_count - 1, guide_count) float32, by which fraction of its length each segment could be
         drawn out until its curls are straight; None where no guide is curled.
+    strands: (guide_count,) how many strands each guide stands for; None: equally many.
     """
 
     position: Floats
@@ -36,6 +38,12 @@ class Rest:
     shape: LocalShape
     size: float = 0.0
     room: Floats | None = None
+    strands: Floats | None = None
+
+    @cached_property
+    def hair_grid(self) -> HairGrid:
+        """For hair that feels other hair."""
+        return HairGrid.at_rest(self.position, self.size, self.strands)
 
     @cached_property
     def sample(self) -> Floats:
@@ -52,6 +60,7 @@ class Rest:
             self.shape.part(guides),
             self.size,
             None if self.room is None else self.room[:, guides],
+            None if self.strands is None else self.strands[guides],
         )
 
 
@@ -102,13 +111,16 @@ class DynamicsState:
         return np.ascontiguousarray(self.position.transpose(2, 1, 0))
 
 
-def start(guide_grid: Floats, room: Floats | None = None) -> DynamicsState:
+def start(
+    guide_grid: Floats, room: Floats | None = None, strands: Floats | None = None
+) -> DynamicsState:
     """Guides at rest in their style.
 
     Args:
         guide_grid: (guide_count, cv_count, 3) world [m], cv_count at least 2.
         room: (guide_count, cv_count - 1), see `strands.center_lines.curl_room`; None: none is
             curled.
+        strands: (guide_count,) how many strands each guide stands for; None: equally many.
 
     Raises:
         HairloomError: another shape, or a CV that is not finite.
@@ -126,6 +138,7 @@ def start(guide_grid: Floats, room: Floats | None = None) -> DynamicsState:
         shape=local_shape(position),
         size=float(np.median(length.sum(axis=0))) if length.size else 0.0,
         room=None if room is None else np.ascontiguousarray(room.T, np.float32),
+        strands=strands,
     )
     for array in (rest.length, rest.shape.curvature, rest.shape.hold, rest.shape.twist_cv):
         array.flags.writeable = False

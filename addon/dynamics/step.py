@@ -1,6 +1,7 @@
 """One frame of motion, in fixed substeps.
 
     repeat substep_rate times a second:
+        among        now and then: hair feels other hair
         brake        drag by the square of the speed through the air
         predict      Verlet: inertia, damping, gravity, wind
         pin          the head carries the first two CVs, ties carry what they hold
@@ -14,8 +15,9 @@ References: Jakobsen 2001, "Advanced Character Physics"; Nguyen and Donnelly 200
 and Rendering in the Nalu Demo", GPU Gems 2, chapter 23; Han and Harada 2012. `reference/` holds
 the same, one CV after the other.
 
-Guides do not feel each other, so they are advanced in blocks that fit into the cache; a guide's
-motion is the same to the last bit in any block.
+Between two kicks of hair by hair (`among`), or for the whole frame where there are none, guides do
+not feel each other. So they are advanced in blocks that fit into the cache; a guide's motion is the
+same to the last bit in any block.
 
 Time that is shorter than a substep waits in the state for the next frame, so the result does not
 depend on the frame rate; `grid_at_frame_end` bridges it for drawing.
@@ -78,12 +80,29 @@ def advance(
     frame = Frame.of(state, drive, settings, duration, dt)
     spans = [frame.span(number) for number in range(count)]
     poses = poses_through(drive.colliders, spans)
-    position, previous = np.empty_like(state.position), np.empty_like(state.position)
-    for guides in _blocks(state.guide_count):
-        block = Block.of(state, frame, styles, guides)
-        position[:, :, guides], previous[:, :, guides] = _advance_block(block, frame, spans, poses)
+    position, previous = state.position.copy(), _previous(state, dt)
+    slices, pieces = _blocks(state.guide_count), frame.pieces(count)
+    made = (Block.of(state, frame, styles, guides) for guides in slices)
+    blocks = made if len(pieces) == 1 else list(made)
+    for numbers in pieces:
+        if frame.among is not None and frame.among.is_due(numbers[0]):
+            previous -= frame.among.kick(position, previous)
+        for guides, block in zip(slices, blocks, strict=True):
+            own = (rows[:, :, guides].copy() for rows in (position, previous))
+            position[:, :, guides], previous[:, :, guides] = _advance_block(
+                block, *own, frame, spans, poses, numbers
+            )
     time = state.time + count * dt
     return DynamicsState(position, previous, state.rest, dt, left, time, styles)
+
+
+def _previous(state: DynamicsState, dt: float) -> Floats:
+    """Where the CVs were a substep of `dt` [s] earlier."""
+    if not state.substep or state.substep == dt:
+        return state.previous.copy()
+    motion = state.position - state.previous
+    motion *= np.float32(dt / state.substep)
+    return state.position - motion
 
 
 def _blocks(guide_count: int) -> list[slice]:
@@ -94,14 +113,21 @@ def _blocks(guide_count: int) -> list[slice]:
 
 
 def _advance_block(
-    block: Block, frame: Frame, spans: list[tuple[float, float]], poses: list[list[Pose]]
+    block: Block,
+    position: Floats,
+    previous: Floats,
+    frame: Frame,
+    spans: list[tuple[float, float]],
+    poses: list[list[Pose]],
+    numbers: range,
 ) -> tuple[Floats, Floats]:
-    """Position and previous position after the frame's substeps; takes the block's own arrays."""
+    """Position and previous position after these substeps; takes the arrays."""
     settings, dt, rest = frame.settings, frame.dt, block.rest
-    position, previous, spare = block.position, block.previous, np.empty_like(block.position)
+    spare = np.empty_like(position)
     kept, blown = speed_kept(settings, dt), air_fraction(settings, dt)
     chain = _Chain(rest.length, block.held, rest.size, settings)
-    for number, span in enumerate(spans):
+    for number in numbers:
+        span = spans[number]
         style = block.style_at(span[1])
         impulse = block.impulse_at(span)
         air_displacement = frame.air_displacement(position[:, 0], number)
