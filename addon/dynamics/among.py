@@ -2,7 +2,7 @@
 
     every KICKS_PER_SECOND, before a substep:
         deposit    each CV into the cell where it is: the strands that it stands for, and their motion
-        look up    at each CV, of all others: density, its gradient, mean motion
+        look up    at each CV, of all others, smoothed: density, its gradient, mean motion
         kick       pressure    from where it is denser than it was at rest, to where it is less dense
                    cohesion    back to the others, where it is less dense than it was at rest
                    friction    towards the mean motion
@@ -23,7 +23,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from itertools import pairwise, product
+from itertools import pairwise
 
 import numpy as np
 
@@ -31,21 +31,24 @@ from ..arrays import Floats, Ints
 from .settings import DynamicsSettings
 
 #: How often hair feels other hair, nearly: a whole number of substeps apart [1/s].
-KICKS_PER_SECOND = 90.0
+KICKS_PER_SECOND = 45.0
 #: The whole numbers of a cell: what a CV of a mean guide weighs, at most; a cell of motion in a
 #: substep, and how many cells count.
 MASS, HEAVIEST, MOTION, FASTEST = 16, 127, 1024, 4
-#: A cell is as wide as it takes for a CV to have this many others in its own at rest, between these
-#: fractions of the hair's length. The grid has at most so many cells to a side.
-CROWD, FINEST, COARSEST, SIDE = 6, 1.0 / 40.0, 1.0 / 8.0, 64
+#: A cell is as wide as it takes for a CV to have this many others in its own at rest, and for the
+#: grid to have at most so many cells for each CV, between these fractions of the hair's length. The
+#: grid has at most SIDE cells to a side.
+CROWD, ROOM, FINEST, COARSEST, SIDE = 16, 2, 1.0 / 25.0, 1.0 / 8.0, 64
 #: Where a grid begins, in cells: nothing that is symmetric lies on the border of cells.
 BEGIN = np.array([0.37, 0.41, 0.43])
 #: Densities that differ by less than this part count as equal: CVs go from cell to cell one by one.
-SLACK = 0.15
+SLACK = 0.05
+#: Where the median density at rest is more than a CV's own, it is crowded from this part of it on.
+THIN = 0.5
 #: At full volume: how far pressure and cohesion move a CV in the time between two kicks, where the
 #: density is twice what it was or nothing, in squared cells times the gradient of its logarithm;
 #: how far at most [cells]; and the rate at which friction takes differences of speed [1/s].
-PUSH, PULL, FARTHEST, RUBBING = 0.3, 0.06, 0.25, 8.0
+PUSH, PULL, FARTHEST, RUBBING = 1.0, 0.05, 0.3, 8.0
 #: What divides nothing [cells' worth of hair].
 TINY = 1.0e-6
 
@@ -57,7 +60,7 @@ class HairGrid:
     cell: how wide [m]. counts: (3,) of cells. middle: (3,) float64 world [m], of the roots.
     mass: (guide_count,) whole float32, MASS for a guide that stands for as many strands as the mean.
     density: (cv_count, guide_count) float32 of the others at each CV.
-    typical: the median of these.
+    full: the same, the density above which each CV is crowded, to which others compare.
     """
 
     cell: float
@@ -65,7 +68,7 @@ class HairGrid:
     middle: Floats
     mass: Floats
     density: Floats
-    typical: float
+    full: Floats
 
     @classmethod
     def at_rest(cls, position: Floats, size: float, strands: Floats | None) -> HairGrid:
@@ -76,15 +79,16 @@ class HairGrid:
         """
         middle = position[:, 0].mean(axis=1, dtype=np.float64)
         mass = _masses(strands, position.shape[2])
-        extent = float(np.ptp(position.reshape(3, -1), axis=1).max())
-        cell = _cell_of(position.reshape(3, -1), size, extent)
-        counts = [
-            min(math.ceil(one / cell) + 2, SIDE) for one in np.ptp(position.reshape(3, -1), axis=1)
-        ]
-        grid = cls(cell, (counts[0], counts[1], counts[2]), middle, mass, position[0], 0.0)
-        still = Felt.of(grid, grid.place(np.eye(3), middle), position, np.zeros_like(position))
-        typical = float(np.median(still.density))
-        return cls(grid.cell, grid.counts, middle, mass, still.density, max(typical, TINY))
+        points = position.reshape(3, -1)
+        extent = np.ptp(points, axis=1)
+        cell = _cell_of(points, extent, size)
+        x, y, z = np.minimum(np.ceil(extent / cell) + 2, SIDE).astype(int).tolist()
+        bare = cls(cell, (x, y, z), middle, mass, position[0], position[0])
+        density = Felt.of(
+            bare, bare.place(np.eye(3), middle), position, np.zeros_like(position)
+        ).density
+        full = np.maximum(density, np.float32(max(THIN * float(np.median(density)), TINY)))
+        return cls(cell, bare.counts, middle, mass, density, full)
 
     def place(self, turn: Floats, middle: Floats) -> Place:
         """Where the grid stands as the groom has turned, and its roots' middle has gone."""
@@ -92,11 +96,6 @@ class HairGrid:
             np.asarray(middle, np.float32),
             (np.asarray(turn, np.float64).T / self.cell).astype(np.float32),
         )
-
-    @property
-    def full(self) -> Floats:
-        """The density (cv_count, guide_count) above which a CV is crowded; to it others compare."""
-        return np.maximum(self.density, np.float32(self.typical))
 
 
 @dataclass(frozen=True)
@@ -112,9 +111,9 @@ class Place:
             BEGIN.astype(np.float32), points
         )
 
-    def out(self, ways: Floats, cell: float) -> Floats:
-        """Ways (3, ...) in cells, in the world [m]."""
-        return _turned(self.into.T * np.float32(cell * cell), ways)
+    def out(self, ways: Floats, scale: float) -> Floats:
+        """Ways (3, ...) in cells, in the world [m], times the scale over the square of a cell."""
+        return _turned(self.into.T * np.float32(scale), ways)
 
 
 @dataclass(frozen=True)
@@ -129,6 +128,10 @@ class Strength:
     push: float
     pull: float
     friction: float
+
+    def scale(self, cell: float) -> float:
+        """From a way in cells until the next kick to one in a substep, see `Place.out`."""
+        return cell * cell / self.substeps
 
     @classmethod
     def of(cls, settings: DynamicsSettings, dt: float) -> Strength | None:
@@ -169,15 +172,15 @@ def kick(
     """What is to be taken from `previous`, in its shape (3, cv_count, guide_count) [m]."""
     motion = position - previous
     felt = Felt.of(grid, place, position, motion)
-    full = grid.full
-    over = np.clip(felt.density / full - np.float32(1.0 + SLACK), 0.0, 1.0)
-    under = np.clip((grid.density - felt.density) / full - np.float32(SLACK), 0.0, 1.0)
+    ratio = felt.density / grid.full
+    over = np.clip(ratio - np.float32(1.0 + SLACK), 0.0, 1.0)
+    under = np.clip(grid.density / grid.full - ratio - np.float32(SLACK), 0.0, 1.0)
     amount = over * np.float32(-strength.push) + under * np.float32(strength.pull)
     way = felt.gradient * (amount / np.maximum(felt.density, np.float32(TINY)))
     far = np.sqrt((way * way).sum(axis=0))
     way *= np.float32(FARTHEST) / np.maximum(far, np.float32(FARTHEST))
-    kicked = place.out(way, grid.cell / strength.substeps)
-    rubbed = np.minimum(felt.density / full, np.float32(1.0)) * np.float32(strength.friction)
+    kicked = place.out(way, strength.scale(grid.cell))
+    rubbed = np.minimum(ratio, np.float32(1.0)) * np.float32(strength.friction)
     kicked += (felt.motion - motion) * rubbed
     return kicked
 
@@ -195,17 +198,37 @@ class Felt:
 
     @classmethod
     def of(cls, grid: HairGrid, place: Place, position: Floats, motion: Floats) -> Felt:
-        points = place.cells(position.reshape(3, -1))
         mass = np.broadcast_to(grid.mass, position.shape[1:]).reshape(-1)
-        whole = whole_motion(motion.reshape(3, -1), grid.cell) * mass
-        own = np.stack([mass, *whole], axis=-1)
-        corner = np.floor(points)
-        sums = _sums(corner, own, grid.counts)
-        found = _looked_up(sums, corner, points - corner, own, grid.counts)
-        density, across, gradient = found[:, 0], found[:, 1:4].T, found[:, 4:].T
-        mean = across / np.maximum(density, np.float32(TINY)) * np.float32(grid.cell / MOTION)
-        shape = position.shape[1:]
-        return cls(density.reshape(shape), gradient.reshape(3, *shape), mean.reshape(3, *shape))
+        across = whole_motion(motion.reshape(3, -1), grid.cell) * mass
+        part = place.cells(position.reshape(3, -1))
+        corner = np.floor(part)
+        part -= corner
+        low = _wrapped(corner, grid.counts)
+        sums = _sums(low, part, (mass, *across), grid.counts)
+        found = _between(_fields(sums), low, part)
+        own, steep = own_part(part)
+        density = found[:, 0] - own * mass
+        gradient = found[:, 4:].T - steep * mass
+        moving = found[:, 1:4].T - across * own
+        moving *= np.float32(grid.cell / MOTION) / np.maximum(density, np.float32(TINY))
+        ways = (rows.reshape(position.shape) for rows in (gradient, moving))
+        return cls(density.reshape(position.shape[1:]), *ways)
+
+
+def own_part(part: Floats) -> tuple[Floats, Floats]:
+    """What a CV finds of itself, (n,), and of itself in the gradient, (3, n), for a mass of 1.
+
+    Its own cell is the nearer one of the two along each axis. Smoothing leaves a half of it there
+    and a quarter in each neighbour, and no slope there.
+
+    Args:
+        part: see `_between`.
+    """
+    far = np.minimum(part, np.float32(1.0) - part)
+    x, y, z = np.float32(0.5) - np.float32(0.25) * far
+    slope = np.float32(0.5) * np.where(part < np.float32(0.5), -far, far)
+    xy = x * y
+    return xy * z, slope * np.stack([y * z, x * z, xy])
 
 
 def whole_motion(motion: Floats, cell: float) -> Floats:
@@ -214,58 +237,96 @@ def whole_motion(motion: Floats, cell: float) -> Floats:
     return np.rint(np.clip(motion * np.float32(MOTION / cell), -limit, limit))
 
 
-def spline(fraction: Floats) -> tuple[Floats, Floats]:
-    """The quadratic B-spline over three cells, and its slope, (3, ...): of the cell before, of the
-    one that holds the point at this fraction, and of the next."""
-    beside = fraction - np.float32(0.5)
-    low, high = np.float32(0.5) - beside, np.float32(0.5) + beside
-    half = np.float32(0.5)
-    weight = np.stack([half * low * low, np.float32(0.75) - beside * beside, half * high * high])
-    return weight, np.stack([-low, np.float32(-2.0) * beside, high])
+def _wrapped(corner: Floats, counts: tuple[int, int, int]) -> Ints:
+    """Which cell of a grid that wraps around it is, along each axis (3, n), for whole numbers."""
+    return corner.astype(np.int32) % np.array(counts, np.int32)[:, None]
 
 
-def _looked_up(
-    sums: Floats, corner: Floats, fraction: Floats, own: Floats, counts: tuple[int, int, int]
+def _sums(
+    low: Ints, part: Floats, lanes: tuple[Floats, ...], counts: tuple[int, int, int]
 ) -> Floats:
-    """(point_count, 7): mass and motion of the others, and the gradient of their mass."""
-    weight, slope = spline(fraction)  # (3 cells, 3 axes, n)
-    steps = range(3)
-    index = np.stack([_index_along(corner, axis, counts) for axis in steps])  # (axis, cell, n)
-    found = np.zeros((len(own), 7), np.float32)
-    for z, y in product(steps, steps):
-        row = index[2, z] + index[1, y]
-        along, steep = np.zeros((len(own), 4), np.float32), np.zeros(len(own), np.float32)
-        for x in steps:
-            here = sums.take(row + index[0, x], axis=0)
-            if x == y == z == 1:
-                here -= own
-            steep += here[:, 0] * slope[x, 0]
-            here *= weight[x, 0][:, None]
-            along += here
-        both = weight[y, 1] * weight[z, 2]
-        found[:, 4] += steep * both
-        found[:, 5] += along[:, 0] * (slope[y, 1] * weight[z, 2])
-        found[:, 6] += along[:, 0] * (weight[y, 1] * slope[z, 2])
-        along *= both[:, None]
-        found[:, :4] += along
+    """What all CVs leave in the cells, (4, *counts) float32 of whole numbers."""
+    x, y, z = low + (part >= np.float32(0.5))
+    after = tuple(count + 1 for count in counts)
+    index = (x * after[1] + y) * after[2] + z
+    padded = np.stack([np.bincount(index, lane, math.prod(after)) for lane in lanes])
+    return _folded(padded.astype(np.float32).reshape(4, *after))
+
+
+def _folded(padded: Floats) -> Floats:
+    """One cell more along each axis, which is the first one again, added to that."""
+    for axis in (1, 2, 3):
+        cells = np.moveaxis(padded, axis, 0)
+        cells[0] += cells[-1]
+        padded = np.moveaxis(cells[:-1], 0, axis)
+    return padded
+
+
+def _fields(sums: Floats) -> Floats:
+    """Of each cell from the 27 around: density, motion and the gradient of density, (x, y, z, 7).
+
+    Each axis ends with its first cell once more.
+    """
+    x, y, z = 1, 2, 3
+    over_x = _smooth(sums, x)
+    over_xy = _smooth(over_x, y)
+    lanes = [
+        *_smooth(over_xy, z),
+        *_smooth(_smooth(_steep(sums[:1], x), y), z),
+        *_smooth(_steep(over_x[:1], y), z),
+        *_steep(over_xy[:1], z),
+    ]
+    return np.stack(lanes, axis=-1)
+
+
+def _smooth(sums: Floats, axis: int) -> Floats:
+    """A quarter, a half and a quarter of three cells."""
+    before, here, after = _three(sums, axis)
+    smooth: Floats = before + after
+    smooth *= np.float32(0.5)
+    smooth += here
+    smooth *= np.float32(0.5)
+    return smooth
+
+
+def _steep(sums: Floats, axis: int) -> Floats:
+    """Half of what the next cell has more than the one before."""
+    before, _, after = _three(sums, axis)
+    steep: Floats = after - before
+    steep *= np.float32(0.5)
+    return steep
+
+
+def _three(sums: Floats, axis: int) -> tuple[Floats, Floats, Floats]:
+    """Of each cell along an axis, and of the first once more: that before, itself, the next."""
+    count = sums.shape[axis]
+    around = sums.take(np.arange(-1, count + 2), axis=axis, mode="wrap")
+    before, here, after = (
+        around[(slice(None),) * axis + (slice(first, first + count + 1),)] for first in range(3)
+    )
+    return before, here, after
+
+
+def _between(fields: Floats, low: Ints, part: Floats) -> Floats:
+    """The fields (n, 7) between the middles of cells.
+
+    Args:
+        low: (3, n) the lowest of the eight cells whose middles are around a point.
+        part: (3, n) how far the point is from that middle to the next.
+    """
+    _, count_y, count_z, _ = fields.shape
+    rows = fields.reshape(-1, fields.shape[-1])
+    x, y, z = part
+    first = (low[0] * count_y + low[1]) * count_z + low[2]
+    found = np.zeros((len(first), rows.shape[1]), np.float32)
+    for beyond_x, weight_x in ((0, np.float32(1.0) - x), (count_y * count_z, x)):
+        for beyond_y, weight_xy in ((0, weight_x - weight_x * y), (count_z, weight_x * y)):
+            weight = weight_xy * z
+            for beyond_z, each in ((0, weight_xy - weight), (1, weight)):
+                here = rows.take(first + (beyond_x + beyond_y + beyond_z), axis=0)
+                here *= each[:, None]
+                found += here
     return found
-
-
-def _sums(corner: Floats, own: Floats, counts: tuple[int, int, int]) -> Floats:
-    """What all CVs leave in the cells, (cell_count, 4) float32 of whole numbers."""
-    index = sum(_index_along(corner, axis, counts)[1] for axis in range(3))
-    total = math.prod(counts)
-    return np.stack(
-        [np.bincount(index, own[:, column], total) for column in range(4)], axis=-1
-    ).astype(np.float32)
-
-
-def _index_along(corner: Floats, axis: int, counts: tuple[int, int, int]) -> Ints:
-    """What the cell before, the cell itself and the next add to an index, (3, n): x counts first."""
-    stride = math.prod(counts[:axis])
-    cell = np.mod(corner[axis], np.float32(counts[axis])).astype(np.int64)
-    around = cell + np.array([[-1], [0], [1]])
-    return (around % counts[axis]) * stride
 
 
 def _masses(strands: Floats | None, guide_count: int) -> Floats:
@@ -275,12 +336,15 @@ def _masses(strands: Floats | None, guide_count: int) -> Floats:
     return np.clip(mass, 1, HEAVIEST).astype(np.float32)
 
 
-def _cell_of(points: Floats, size: float, extent: float) -> float:
+def _cell_of(points: Floats, extent: Floats, size: float) -> float:
     """How wide the cells are, for points (3, n) [m]."""
     finest, coarsest = FINEST * size, COARSEST * size
-    cell = max(min(max(finest, extent / (SIDE - 2)), coarsest), TINY)
-    while cell < coarsest and _crowd_of(points, cell) < CROWD:
-        cell = min(cell * 1.2, coarsest)
+    cell = max(min(max(finest, float(extent.max()) / (SIDE - 2)), coarsest), TINY)
+    while cell < coarsest and (
+        _crowd_of(points, cell) < CROWD
+        or float(np.prod(extent / cell + 2.0)) > ROOM * points.shape[1]
+    ):
+        cell = min(cell * 1.1, coarsest)
     return cell
 
 

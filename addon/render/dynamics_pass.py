@@ -41,6 +41,7 @@ from ..dynamics.schedule import due_substeps
 from ..dynamics.settings import DynamicsSettings
 from ..dynamics.state import DynamicsState, Rest, as_rows
 from ..dynamics.step import displacement_beside_root
+from .among_pass import AmongPass
 from .capabilities import pair_format
 from .collider_textures import NOT_FOLLOWED, UploadedColliders
 from .dynamics_block import block_of, moments_of, spans_of
@@ -184,7 +185,7 @@ class DynamicsPass:
         """Let go of all that lies on the GPU; goes on from the state that was read last."""
         self._textures: dict[str, Any] = {}
         self._is_bridged = False
-        self._block = UniformBlock()
+        self._block, self._among = UniformBlock(), AmongPass()
         self._colliders.release()
         self._styles: list[tuple[Floats, Any]] = []  # those of the last frame, and their textures
         self._held: Held | None = None
@@ -223,9 +224,16 @@ class DynamicsPass:
 
     def _advance(self, frame: Frame, count: int, speed_ratio: float) -> None:
         """All substeps of a frame; the first is `speed_ratio` as long as the one before it."""
-        for first in range(0, count, SUBSTEPS_AT_ONCE):
-            part = min(count - first, SUBSTEPS_AT_ONCE)
-            self._dispatch(frame, first, part, 1.0 if first else speed_ratio)
+        textures = self._textures
+        for numbers in frame.pieces(count):
+            first, end = numbers[0], numbers[-1] + 1
+            if frame.among is not None and frame.among.is_due(first):
+                positions, previous = textures["positions"], textures["previous_positions"]
+                ratio = 1.0 if first else speed_ratio
+                self._among.kick(frame.among, positions, previous, ratio)
+            for begin in range(first, end, SUBSTEPS_AT_ONCE):
+                part = min(end - begin, SUBSTEPS_AT_ONCE)
+                self._dispatch(frame, begin, part, 1.0 if begin else speed_ratio)
 
     def _dispatch(self, frame: Frame, first: int, count: int, speed_ratio: float) -> None:
         settings, state, posed = frame.settings, self._state, frame.drive.colliders

@@ -16,7 +16,7 @@ from pathlib import Path
 from types import MappingProxyType
 
 from ..cards.bake import SAMPLES, SPARSE_RANGE, SPARSE_STEPS
-from ..dynamics import springs
+from ..dynamics import among, springs
 from ..dynamics.colliders.signed_distance import FLATTEST
 from ..dynamics.constraints import CONTACT_WEIGHT, HELD, HELD_SWEEPS, PINNED
 from ..dynamics.contacts import (
@@ -104,6 +104,10 @@ CONSTANTS: Mapping[str, str] = MappingProxyType(
         "contact_weight": repr(float(CONTACT_WEIGHT)),
         "held_weight": repr(float(HELD)),
         "steepest_spring": repr(float(springs.STEEPEST)),
+        "among_limit": repr(float(among.FASTEST * among.MOTION)),
+        "among_slack": repr(among.SLACK),
+        "among_farthest": repr(among.FARTHEST),
+        "among_tiny": repr(among.TINY),
         "held_sweeps": str(HELD_SWEEPS),
         "hold_sweeps": str(SWEEPS),
         "hold_near": repr(NEAR),

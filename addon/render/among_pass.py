@@ -1,0 +1,132 @@
+"""Hair among hair on the GPU: `dynamics.among.kick`, of guides that lie in textures.
+
+    hair_at_rest   RGBA32F in the layout of strand_layout.strand_rows: of each CV x its density at
+                   rest, y that above which it is crowded, z its mass
+    cell_sums      RGBA32F: of each cell x mass, yzw motion times mass, whole numbers
+
+CVs are drawn as points that blending adds up, which needs no atomics. Sums are exact as long as
+they fit into the 24 bits of a float.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any
+
+import gpu
+import numpy as np
+
+from ..arrays import Floats
+from ..dynamics.among import BEGIN, MOTION, Among, HairGrid
+from . import gpu_objects
+from .capabilities import pair_format
+from .ribbons import Ribbons
+from .shader_program import ShaderRecipe, program
+from .strand_layout import strand_rows
+from .textures import UniformBlock, drawing_into, drawing_state, texture_from
+
+_GROUP = (16, 4)
+
+
+@lru_cache(maxsize=32)
+def deposit_recipe(cv_count: int) -> ShaderRecipe:
+    names = ("positions", "previous_positions", "hair_at_rest")
+    return ShaderRecipe(
+        name="among_deposit",
+        vertex="among_deposit.vert.glsl",
+        fragment="among_deposit.frag.glsl",
+        structs=("struct_among.glsl",),
+        blocks=(("Among", "among"),),
+        textures=tuple(("FLOAT_2D", name) for name in names),
+        varyings=(("flat", "VEC4", "lanes"),),
+        outputs=(("VEC4", "cell_sums"),),
+        defines=(("CV_COUNT", cv_count),),
+    )
+
+
+@lru_cache(maxsize=32)
+def kick_recipe(cv_count: int, pairs: str) -> ShaderRecipe:
+    """Args:
+    pairs: see capabilities.pair_format.
+    """
+    return ShaderRecipe(
+        name="among_kick",
+        compute="among_kick.comp.glsl",
+        structs=("struct_among.glsl",),
+        blocks=(("Among", "among"),),
+        textures=(("FLOAT_2D", "cell_sums"), ("FLOAT_2D", "hair_at_rest")),
+        images=(
+            ("RGBA32F", "positions", "READ_WRITE"),
+            (pairs, "previous_positions", "READ_WRITE"),
+        ),
+        group_size=_GROUP,
+        defines=(("CV_COUNT", cv_count),),
+    )
+
+
+class AmongPass:
+    """Keeps the grid of one groom's guides; making one touches no GPU."""
+
+    def __init__(self) -> None:
+        self._block, self._points = UniformBlock(), Ribbons()
+        self._grid: HairGrid | None = None
+        self._at_rest: Any = None
+        self._sums: Any = None
+
+    def kick(self, among: Among, positions: Any, previous: Any, speed_ratio: float) -> None:
+        """Change the motion of guides in textures, see dynamics_pass.
+
+        Args:
+            speed_ratio: of the substep that comes to the one before it.
+        """
+        grid = among.grid
+        if grid is not self._grid:
+            self._make(grid)
+        cv_count, guide_count = grid.density.shape
+        block = self._block.holding(_block_of(among, speed_ratio))
+        target = gpu_objects.framebuffer(color_slots=(self._sums,))
+        shader = program(deposit_recipe(cv_count))
+        with (
+            drawing_into(target),
+            drawing_state(depth_test="NONE", depth_write=False, blend="ADDITIVE_PREMULT"),
+        ):
+            target.clear(color=(0.0, 0.0, 0.0, 0.0))
+            shader.bind(
+                blocks={"among": block},
+                textures={
+                    "positions": positions,
+                    "previous_positions": previous,
+                    "hair_at_rest": self._at_rest,
+                },
+            )
+            self._points.points(guide_count * cv_count).draw(shader.shader)
+        shader = program(kick_recipe(cv_count, pair_format()))
+        shader.bind(
+            blocks={"among": block},
+            textures={"cell_sums": self._sums, "hair_at_rest": self._at_rest},
+            images={"positions": positions, "previous_positions": previous},
+        )
+        across, down = _GROUP
+        gpu.compute.dispatch(shader.shader, -(-cv_count // across), -(-guide_count // down), 1)
+        gpu.shader.unbind()
+
+    def _make(self, grid: HairGrid) -> None:
+        mass = np.broadcast_to(grid.mass, grid.density.shape)
+        numbers = np.stack([grid.density.T, grid.full.T, mass.T, np.zeros_like(mass.T)], axis=-1)
+        self._at_rest = texture_from(strand_rows(numbers), "RGBA32F")
+        x, y, z = grid.counts
+        self._sums = gpu_objects.texture((x * z, y), format="RGBA32F")
+        self._grid = grid
+
+
+def _block_of(among: Among, speed_ratio: float) -> Floats:
+    """`Among` of gpu_shaders/struct_among.glsl in std140, float32."""
+    grid, place, strength = among.grid, among.place, among.strength
+    values = np.zeros((7, 4), np.float32)
+    values[0].view(np.int32)[:] = (*grid.counts, grid.density.shape[1])
+    values[1] = (*place.middle, grid.cell)
+    values[2:5, :3], values[2:5, 3] = place.into, BEGIN
+    scale = strength.scale(grid.cell)
+    values[5] = strength.push, strength.pull, strength.friction, scale
+    values[6, :2] = speed_ratio, MOTION / grid.cell
+    return values.ravel()

@@ -1,0 +1,21 @@
+// Hair among hair, vertex stage of what CVs leave in the cells: a point a CV, in the middle of the
+// texel of its cell. Blending adds whole numbers, so the sums depend on no order.
+//
+// Twin of _sums in addon/dynamics/among.py.
+#include "lib_strand_texel.glsl"
+#include "lib_among.glsl"
+
+void main()
+{
+  int guide = gl_VertexID / CV_COUNT;
+  ivec2 texel = strand_texel(guide, gl_VertexID % CV_COUNT, CV_COUNT);
+  vec4 here = texelFetch(positions, texel, 0);
+  vec3 before = vec3(texelFetch(previous_positions, texel, 0).xy, here.w);
+  AmongCv cv = among_cv(among, here.xyz, before);
+  lanes = among_lanes(among, cv.motion, texelFetch(hair_at_rest, texel, 0).z);
+  ivec3 counts = among.counts.xyz;
+  ivec2 cell = among_texel(counts, cv.low + ivec3(greaterThanEqual(cv.part, vec3(0.5))));
+  vec2 place = (vec2(cell) + 0.5) / vec2(counts.x * counts.z, counts.y);
+  gl_PointSize = 1.0;
+  gl_Position = vec4(2.0 * place - 1.0, 0.0, 1.0);
+}

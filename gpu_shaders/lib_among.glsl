@@ -1,0 +1,39 @@
+// The grid around hair that feels other hair: where a CV is in it, and where a cell is in its texture.
+//
+// Twin of addon/dynamics/among.py. Holds no resources.
+
+// A CV in the grid.
+struct AmongCv {
+  vec3 motion;  // world [m] in a substep
+  ivec3 low;    // lowest of the eight cells whose middles are around it
+  vec3 part;    // how far it is from that middle to the next
+};
+
+// Sums over products in the order of numpy.
+float along_row(vec4 row, vec3 beside)
+{
+  return row.x * beside.x + row.y * beside.y + row.z * beside.z;
+}
+
+AmongCv among_cv(Among among, vec3 here, vec3 before)
+{
+  vec3 beside = here - among.middle.xyz;
+  vec3 cells = vec3(along_row(among.into_x, beside), along_row(among.into_y, beside), along_row(among.into_z, beside));
+  cells += vec3(among.into_x.w, among.into_y.w, among.into_z.w);
+  vec3 corner = floor(cells);
+  return AmongCv((here - before) * among.speed_ratio, ivec3(corner), cells - corner);
+}
+
+// Mass, and motion in whole parts of a cell times mass.
+vec4 among_lanes(Among among, vec3 motion, float mass)
+{
+  vec3 whole = clamp(motion * among.whole, vec3(-{{among_limit}}), vec3({{among_limit}}));
+  return vec4(mass, roundEven(whole) * mass);
+}
+
+// Texel of a cell of a grid that wraps around.
+ivec2 among_texel(ivec3 counts, ivec3 cell)
+{
+  ivec3 at = cell - counts * ivec3(floor((vec3(cell) + 0.5) / vec3(counts)));
+  return ivec2(at.x * counts.z + at.z, at.y);
+}
