@@ -4,17 +4,6 @@
 #include "lib_strand_texel.glsl"
 #include "lib_among.glsl"
 
-// Smoothing, then the line between two middles: what each of four cells counts along an axis.
-vec4 smooth_weights(float part)
-{
-  return 0.25 * vec4(1.0 - part, 2.0 - part, 1.0 + part, part);
-}
-
-vec4 steep_weights(float part)
-{
-  return 0.5 * vec4(part - 1.0, -part, 1.0 - part, part);
-}
-
 // Twin of own_part: the part in density, and its gradient.
 vec4 own_part(vec3 part)
 {
@@ -36,23 +25,19 @@ void main()
   vec4 rest = texelFetch(hair_at_rest, texel, 0);
   AmongCv cv = among_cv(among, here.xyz, before);
   ivec3 counts = among.counts.xyz;
-  vec4 wx = smooth_weights(cv.part.x), wy = smooth_weights(cv.part.y), wz = smooth_weights(cv.part.z);
-  vec4 sx = steep_weights(cv.part.x), sy = steep_weights(cv.part.y), sz = steep_weights(cv.part.z);
+  ivec3 low = among_wrapped(cv.low, counts);
+  ivec2 across = ivec2(low.x, among_after(low.x, counts.x)) * counts.z;
+  ivec2 up = ivec2(low.y, among_after(low.y, counts.y));
+  ivec2 deep = ivec2(low.z, among_after(low.z, counts.z));
   vec4 found = vec4(0.0);
   vec3 gradient = vec3(0.0);
-  for (int x = 0; x < 4; x++) {
-    for (int y = 0; y < 4; y++) {
-      vec4 row = vec4(0.0);
-      float steep = 0.0;
-      for (int z = 0; z < 4; z++) {
-        vec4 cell = texelFetch(cell_sums, among_texel(counts, cv.low + ivec3(x, y, z) - 1), 0);
-        row += cell * wz[z];
-        steep += cell.x * sz[z];
-      }
-      found += row * (wx[x] * wy[y]);
-      gradient += vec3(sx[x] * wy[y], wx[x] * sy[y], 0.0) * row.x;
-      gradient.z += steep * wx[x] * wy[y];
-    }
+  for (int i = 0; i < 8; i++) {
+    ivec3 corner = ivec3(i >> 2, (i >> 1) & 1, i & 1);
+    ivec2 cell = ivec2(across[corner.x] + deep[corner.z], up[corner.y]);
+    vec3 weights = mix(1.0 - cv.part, cv.part, vec3(corner));
+    float weight = weights.x * weights.y * weights.z;
+    found += texelFetch(densities, cell, 0) * weight;
+    gradient += texelFetch(gradients, cell, 0).xyz * weight;
   }
   vec4 own = own_part(cv.part);
   found -= among_lanes(among, cv.motion, rest.z) * own.x;
@@ -65,7 +50,8 @@ void main()
   way *= {{among_farthest}} / max(length(way), {{among_farthest}});
   vec3 kicked = (among.into_x.xyz * way.x + among.into_y.xyz * way.y + among.into_z.xyz * way.z) * among.strength.w;
   vec3 mean = found.yzw / (among.whole * density);
-  kicked += (mean - cv.motion) * (min(ratio, 1.0) * among.strength.z);
+  float rubbed = 1.0 - exp(-among.strength.z * (min(ratio, 1.0) + over * {{among_pressed}}));
+  kicked += (mean - cv.motion) * rubbed;
   before -= kicked / among.speed_ratio;
   imageStore(positions, texel, vec4(here.xyz, before.z));
   imageStore(previous_positions, texel, vec4(before.xy, 0.0, 0.0));

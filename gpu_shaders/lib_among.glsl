@@ -17,11 +17,12 @@ float along_row(vec4 row, vec3 beside)
 
 AmongCv among_cv(Among among, vec3 here, vec3 before)
 {
-  vec3 beside = here - among.middle.xyz;
+  vec3 motion = (here - before) * among.speed_ratio;
+  vec3 beside = here + motion * among.ahead - among.middle.xyz;
   vec3 cells = vec3(along_row(among.into_x, beside), along_row(among.into_y, beside), along_row(among.into_z, beside));
   cells += vec3(among.into_x.w, among.into_y.w, among.into_z.w);
   vec3 corner = floor(cells);
-  return AmongCv((here - before) * among.speed_ratio, ivec3(corner), cells - corner);
+  return AmongCv(motion, ivec3(corner), cells - corner);
 }
 
 // Mass, and motion in whole parts of a cell times mass.
@@ -31,9 +32,18 @@ vec4 among_lanes(Among among, vec3 motion, float mass)
   return vec4(mass, roundEven(whole) * mass);
 }
 
-// Texel of a cell of a grid that wraps around.
-ivec2 among_texel(ivec3 counts, ivec3 cell)
+// Cells of a grid that wraps around, along one axis.
+ivec3 among_wrapped(ivec3 cell, ivec3 counts)
 {
-  ivec3 at = cell - counts * ivec3(floor((vec3(cell) + 0.5) / vec3(counts)));
-  return ivec2(at.x * counts.z + at.z, at.y);
+  return cell - counts * ivec3(floor((vec3(cell) + 0.5) / vec3(counts)));
+}
+
+int among_before(int cell, int count)
+{
+  return cell == 0 ? count - 1 : cell - 1;
+}
+
+int among_after(int cell, int count)
+{
+  return cell == count - 1 ? 0 : cell + 1;
 }

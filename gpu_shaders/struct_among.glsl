@@ -8,6 +8,6 @@ struct Among {
   vec4 strength;    // x push, y pull, z friction, w [m^2] from a gradient in cells to a way in the world
   float speed_ratio;  // of this substep to the one before
   float whole;        // whole parts of a metre of motion
-  float unused_0;
-  float unused_1;
+  float ahead;        // substeps of its motion ahead that a CV counts
+  float unused;
 };

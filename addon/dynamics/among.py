@@ -31,7 +31,7 @@ from ..arrays import Floats, Ints
 from .settings import DynamicsSettings
 
 #: How often hair feels other hair, nearly: a whole number of substeps apart [1/s].
-KICKS_PER_SECOND = 45.0
+KICKS_PER_SECOND = 30.0
 #: The whole numbers of a cell: what a CV of a mean guide weighs, at most; a cell of motion in a
 #: substep, and how many cells count.
 MASS, HEAVIEST, MOTION, FASTEST = 16, 127, 1024, 4
@@ -48,7 +48,12 @@ THIN = 0.5
 #: At full volume: how far pressure and cohesion move a CV in the time between two kicks, where the
 #: density is twice what it was or nothing, in squared cells times the gradient of its logarithm;
 #: how far at most [cells]; and the rate at which friction takes differences of speed [1/s].
-PUSH, PULL, FARTHEST, RUBBING = 1.0, 0.05, 0.3, 8.0
+PUSH, PULL, FARTHEST, RUBBING = 1.5, 0.1, 0.4, 8.0
+#: CVs count where they are at this part of the time until the next kick: locks meet before they have
+#: gone through each other.
+AHEAD = 0.5
+#: How many times more friction there is where the density is twice what it was: locks that meet stop.
+PRESSED = 15.0
 #: What divides nothing [cells' worth of hair].
 TINY = 1.0e-6
 
@@ -129,6 +134,11 @@ class Strength:
     pull: float
     friction: float
 
+    @property
+    def ahead(self) -> float:
+        """How many substeps of its motion ahead a CV counts."""
+        return AHEAD * self.substeps
+
     def scale(self, cell: float) -> float:
         """From a way in cells until the next kick to one in a substep, see `Place.out`."""
         return cell * cell / self.substeps
@@ -139,7 +149,7 @@ class Strength:
         if not settings.volume:
             return None
         substeps = max(round(1.0 / (KICKS_PER_SECOND * dt)), 1)
-        friction = 1.0 - math.exp(-RUBBING * settings.volume * substeps * dt)
+        friction = RUBBING * settings.volume * substeps * dt
         return cls(substeps, PUSH * settings.volume, PULL * settings.volume, friction)
 
 
@@ -171,7 +181,7 @@ def kick(
 ) -> Floats:
     """What is to be taken from `previous`, in its shape (3, cv_count, guide_count) [m]."""
     motion = position - previous
-    felt = Felt.of(grid, place, position, motion)
+    felt = Felt.of(grid, place, position + motion * np.float32(strength.ahead), motion)
     ratio = felt.density / grid.full
     over = np.clip(ratio - np.float32(1.0 + SLACK), 0.0, 1.0)
     under = np.clip(grid.density / grid.full - ratio - np.float32(SLACK), 0.0, 1.0)
@@ -180,7 +190,8 @@ def kick(
     far = np.sqrt((way * way).sum(axis=0))
     way *= np.float32(FARTHEST) / np.maximum(far, np.float32(FARTHEST))
     kicked = place.out(way, strength.scale(grid.cell))
-    rubbed = np.minimum(ratio, np.float32(1.0)) * np.float32(strength.friction)
+    rubbed = np.minimum(ratio, np.float32(1.0)) + over * np.float32(PRESSED)
+    rubbed = np.float32(1.0) - np.exp(rubbed * np.float32(-strength.friction))
     kicked += (felt.motion - motion) * rubbed
     return kicked
 

@@ -3,6 +3,7 @@
     hair_at_rest   RGBA32F in the layout of strand_layout.strand_rows: of each CV x its density at
                    rest, y that above which it is crowded, z its mass
     cell_sums      RGBA32F: of each cell x mass, yzw motion times mass, whole numbers
+    densities, gradients   RGBA32F: the same smoothed; xyz how the smoothed mass grows along each axis
 
 CVs are drawn as points that blending adds up, which needs no atomics. Sums are exact as long as
 they fit into the 24 bits of a float.
@@ -44,6 +45,16 @@ def deposit_recipe(cv_count: int) -> ShaderRecipe:
     )
 
 
+FIELDS_RECIPE = ShaderRecipe(
+    name="among_fields",
+    compute="among_fields.comp.glsl",
+    structs=("struct_among.glsl",),
+    blocks=(("Among", "among"),),
+    textures=(("FLOAT_2D", "cell_sums"),),
+    images=(("RGBA32F", "densities"), ("RGBA32F", "gradients")),
+)
+
+
 @lru_cache(maxsize=32)
 def kick_recipe(cv_count: int, pairs: str) -> ShaderRecipe:
     """Args:
@@ -54,7 +65,9 @@ def kick_recipe(cv_count: int, pairs: str) -> ShaderRecipe:
         compute="among_kick.comp.glsl",
         structs=("struct_among.glsl",),
         blocks=(("Among", "among"),),
-        textures=(("FLOAT_2D", "cell_sums"), ("FLOAT_2D", "hair_at_rest")),
+        textures=tuple(
+            ("FLOAT_2D", name) for name in ("densities", "gradients", "hair_at_rest")
+        ),
         images=(
             ("RGBA32F", "positions", "READ_WRITE"),
             (pairs, "previous_positions", "READ_WRITE"),
@@ -70,8 +83,8 @@ class AmongPass:
     def __init__(self) -> None:
         self._block, self._points = UniformBlock(), Ribbons()
         self._grid: HairGrid | None = None
-        self._at_rest: Any = None
-        self._sums: Any = None
+        self._textures: dict[str, Any] = {}
+        self._target: Any = None
 
     def kick(self, among: Among, positions: Any, previous: Any, speed_ratio: float) -> None:
         """Change the motion of guides in textures, see dynamics_pass.
@@ -79,44 +92,47 @@ class AmongPass:
         Args:
             speed_ratio: of the substep that comes to the one before it.
         """
-        grid = among.grid
-        if grid is not self._grid:
-            self._make(grid)
-        cv_count, guide_count = grid.density.shape
+        if among.grid is not self._grid:
+            self._make(among.grid)
+        cv_count, guide_count = among.grid.density.shape
+        x, y, z = among.grid.counts
         block = self._block.holding(_block_of(among, speed_ratio))
-        target = gpu_objects.framebuffer(color_slots=(self._sums,))
-        shader = program(deposit_recipe(cv_count))
+        textures = {**self._textures, "positions": positions, "previous_positions": previous}
         with (
-            drawing_into(target),
+            drawing_into(self._target),
             drawing_state(depth_test="NONE", depth_write=False, blend="ADDITIVE_PREMULT"),
         ):
-            target.clear(color=(0.0, 0.0, 0.0, 0.0))
-            shader.bind(
-                blocks={"among": block},
-                textures={
-                    "positions": positions,
-                    "previous_positions": previous,
-                    "hair_at_rest": self._at_rest,
-                },
-            )
-            self._points.points(guide_count * cv_count).draw(shader.shader)
-        shader = program(kick_recipe(cv_count, pair_format()))
-        shader.bind(
-            blocks={"among": block},
-            textures={"cell_sums": self._sums, "hair_at_rest": self._at_rest},
-            images={"positions": positions, "previous_positions": previous},
-        )
-        across, down = _GROUP
-        gpu.compute.dispatch(shader.shader, -(-cv_count // across), -(-guide_count // down), 1)
+            self._target.clear(color=(0.0, 0.0, 0.0, 0.0))
+            shader = _bound(deposit_recipe(cv_count), block, textures)
+            self._points.points(guide_count * cv_count).draw(shader)
+        for recipe, size in (
+            (FIELDS_RECIPE, (x * z, y)),
+            (kick_recipe(cv_count, pair_format()), (cv_count, guide_count)),
+        ):
+            shader = _bound(recipe, block, textures)
+            groups = [-(-side // group) for side, group in zip(size, recipe.group_size, strict=True)]
+            gpu.compute.dispatch(shader, *groups, 1)
         gpu.shader.unbind()
 
     def _make(self, grid: HairGrid) -> None:
         mass = np.broadcast_to(grid.mass, grid.density.shape)
         numbers = np.stack([grid.density.T, grid.full.T, mass.T, np.zeros_like(mass.T)], axis=-1)
-        self._at_rest = texture_from(strand_rows(numbers), "RGBA32F")
         x, y, z = grid.counts
-        self._sums = gpu_objects.texture((x * z, y), format="RGBA32F")
+        self._textures = {"hair_at_rest": texture_from(strand_rows(numbers), "RGBA32F")}
+        for name in ("cell_sums", "densities", "gradients"):
+            self._textures[name] = gpu_objects.texture((x * z, y), format="RGBA32F")
+        self._target = gpu_objects.framebuffer(color_slots=(self._textures["cell_sums"],))
         self._grid = grid
+
+
+def _bound(recipe: ShaderRecipe, block: Any, textures: dict[str, Any]) -> Any:
+    shader = program(recipe)
+    shader.bind(
+        blocks={"among": block},
+        textures={name: textures[name] for _, name in recipe.textures},
+        images={name: textures[name] for _, name, *_ in recipe.images},
+    )
+    return shader.shader
 
 
 def _block_of(among: Among, speed_ratio: float) -> Floats:
@@ -128,5 +144,5 @@ def _block_of(among: Among, speed_ratio: float) -> Floats:
     values[2:5, :3], values[2:5, 3] = place.into, BEGIN
     scale = strength.scale(grid.cell)
     values[5] = strength.push, strength.pull, strength.friction, scale
-    values[6, :2] = speed_ratio, MOTION / grid.cell
+    values[6, :3] = speed_ratio, MOTION / grid.cell, strength.ahead
     return values.ravel()

@@ -107,6 +107,7 @@ CONSTANTS: Mapping[str, str] = MappingProxyType(
         "among_limit": repr(float(among.FASTEST * among.MOTION)),
         "among_slack": repr(among.SLACK),
         "among_farthest": repr(among.FARTHEST),
+        "among_pressed": repr(among.PRESSED),
         "among_tiny": repr(among.TINY),
         "held_sweeps": str(HELD_SWEEPS),
         "hold_sweeps": str(SWEEPS),
