@@ -1,7 +1,7 @@
 // One frame of dynamics: one invocation a guide, which goes through all substeps.
 //
 // Twin of advance in addon/dynamics/step.py. Defines: CV_COUNT; RELAXATION;
-// HAS_HELD; HAS_SPRINGS; HAS_AIR; CONTACT_SLOTS, 0 where there are no colliders; HAS_ROUNDS and HAS_FIELDS, the
+// HAS_HELD; HAS_SPRINGS; HAS_PUSHES, where hair feels other hair; HAS_AIR; CONTACT_SLOTS, 0 where there are no colliders; HAS_ROUNDS and HAS_FIELDS, the
 // kinds of colliders; HAS_SHARP, HAS_FOLLOWED and HAS_CLEARANCE, see lib_contacts.glsl.
 //
 // Loops of an unknown number of turns ask at their end: drivers on CPUs go once more through the
@@ -32,7 +32,7 @@ vec3 twist_curvature;
 #ifdef HAS_SPRINGS
 bool is_curled = false;
 #endif
-vec3 fall[FREE_SIZE];  // [m] that gravity adds to each free CV in a substep
+vec3 fall[FREE_SIZE];  // [m] that gravity and other hair add to each free CV in a substep
 
 // How the path of a point is bent, times r (r + 1); twin of curvature in addon/dynamics/trajectory.py.
 vec3 curvature_of(vec3 earlier, vec3 before, vec3 displacement)
@@ -82,7 +82,7 @@ void load_guide(int guide)
   twist_curvature = curvature_of(texelFetch(styles_earlier, texel, 0).xyz, twist_before, twist_displacement);
 }
 
-void find_fall()
+void find_fall(int guide)
 {
   vec3 middle[FREE_SIZE];
   for (int i = 0; i < FREE; i++) {
@@ -92,6 +92,9 @@ void find_fall()
   weight_on_style(frame.combed.xyz, root, middle, fall);
   for (int i = 0; i < FREE; i++) {
     fall[i] = frame.fall.xyz - fall[i];
+#ifdef HAS_PUSHES
+    fall[i] += texelFetch(pushes, strand_texel(guide, i + 2, CV_COUNT), 0).xyz;
+#endif
 #ifdef HAS_SPRINGS
     load[i] *= frame.springs.y;
 #endif
@@ -250,7 +253,7 @@ void main()
     return;
   }
   load_guide(guide);
-  find_fall();
+  find_fall(guide);
   int number = 0;
   do {
     do_substep(number);

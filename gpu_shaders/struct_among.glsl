@@ -1,11 +1,11 @@
-// Uniform block of a kick of hair by hair, filled by addon/render/among_pass.py.
+// Uniform block of hair that feels other hair, filled by addon/render/among_pass.py.
 struct Among {
   ivec4 counts;     // xyz cells of the grid, w guides
   vec4 middle;      // xyz world [m], w width of a cell [m]
   vec4 into_x;      // xyz from the world to cells, w where the grid begins; so the next two
   vec4 into_y;
   vec4 into_z;
-  vec4 strength;    // x push, y pull, z friction, w [m^2] from a gradient in cells to a way in the world
+  vec4 strength;    // x push, y pull, z friction, w from a way in cells to what a substep adds
   float speed_ratio;  // of this substep to the one before
   float whole;        // whole parts of a metre of motion
   float ahead;        // substeps of its motion ahead that a CV counts

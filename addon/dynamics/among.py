@@ -1,9 +1,9 @@
 """Hair among hair: a grid of density and velocity around all guides of a groom.
 
-    every KICKS_PER_SECOND, before a substep:
+    FELT_PER_SECOND times a second, before a substep:
         deposit    each CV into the cell where it is: the strands that it stands for, and their motion
         look up    at each CV, of all others, smoothed: density, its gradient, mean motion
-        kick       pressure    from where it is denser than it was at rest, to where it is less dense
+        feel       pressure    from where it is denser than it was at rest, to where it is less dense
                    cohesion    back to the others, where it is less dense than it was at rest
                    friction    towards the mean motion
 
@@ -31,7 +31,7 @@ from ..arrays import Floats, Ints
 from .settings import DynamicsSettings
 
 #: How often hair feels other hair, nearly: a whole number of substeps apart [1/s].
-KICKS_PER_SECOND = 30.0
+FELT_PER_SECOND = 36.0
 #: The whole numbers of a cell: what a CV of a mean guide weighs, at most; a cell of motion in a
 #: substep, and how many cells count.
 MASS, HEAVIEST, MOTION, FASTEST = 16, 127, 1024, 4
@@ -45,11 +45,11 @@ BEGIN = np.array([0.37, 0.41, 0.43])
 SLACK = 0.05
 #: Where the median density at rest is more than a CV's own, it is crowded from this part of it on.
 THIN = 0.5
-#: At full volume: how far pressure and cohesion move a CV in the time between two kicks, where the
+#: At full volume: how far pressure and cohesion move a CV until hair feels again, where the
 #: density is twice what it was or nothing, in squared cells times the gradient of its logarithm;
 #: how far at most [cells]; and the rate at which friction takes differences of speed [1/s].
-PUSH, PULL, FARTHEST, RUBBING = 1.5, 0.1, 0.4, 8.0
-#: CVs count where they are at this part of the time until the next kick: locks meet before they have
+PUSH, PULL, FARTHEST, RUBBING = 1.2, 0.1, 0.4, 8.0
+#: CVs count where they are at this part of the time until hair feels again: locks meet before they have
 #: gone through each other.
 AHEAD = 0.5
 #: How many times more friction there is where the density is twice what it was: locks that meet stop.
@@ -123,10 +123,9 @@ class Place:
 
 @dataclass(frozen=True)
 class Strength:
-    """What the setting makes of the numbers above, in one kick.
+    """What the setting makes of the numbers above.
 
-    substeps: from one kick to the next. push, pull: see PUSH. friction: part of a difference of
-    speed that goes.
+    substeps: until hair feels again. push, pull: see PUSH. friction: rate times that time.
     """
 
     substeps: int
@@ -140,15 +139,15 @@ class Strength:
         return AHEAD * self.substeps
 
     def scale(self, cell: float) -> float:
-        """From a way in cells until the next kick to one in a substep, see `Place.out`."""
-        return cell * cell / self.substeps
+        """From a way in cells until hair feels again to what each substep adds, see `Place.out`."""
+        return cell * cell / self.substeps**2
 
     @classmethod
     def of(cls, settings: DynamicsSettings, dt: float) -> Strength | None:
         """None where hair does not feel other hair."""
         if not settings.volume:
             return None
-        substeps = max(round(1.0 / (KICKS_PER_SECOND * dt)), 1)
+        substeps = max(round(1.0 / (FELT_PER_SECOND * dt)), 1)
         friction = RUBBING * settings.volume * substeps * dt
         return cls(substeps, PUSH * settings.volume, PULL * settings.volume, friction)
 
@@ -163,23 +162,27 @@ class Among:
     first: int
 
     def is_due(self, number: int) -> bool:
-        """Whether there is a kick before this substep of the frame."""
+        """Whether hair feels before this substep of the frame."""
         return (self.first + number) % self.strength.substeps == 0
 
     def pieces(self, count: int) -> list[range]:
-        """The frame's substeps, cut where kicks are due."""
+        """The frame's substeps, cut where hair feels."""
         cuts = [0, *(number for number in range(1, count) if self.is_due(number)), count]
         return [range(*ends) for ends in pairwise(cuts)]
 
-    def kick(self, position: Floats, previous: Floats) -> Floats:
-        """See `kick`."""
-        return kick(self.grid, self.place, self.strength, position, previous)
+    def feel(self, position: Floats, previous: Floats) -> tuple[Floats, Floats]:
+        """See `feel`."""
+        return feel(self.grid, self.place, self.strength, position, previous)
 
 
-def kick(
+def feel(
     grid: HairGrid, place: Place, strength: Strength, position: Floats, previous: Floats
-) -> Floats:
-    """What is to be taken from `previous`, in its shape (3, cv_count, guide_count) [m]."""
+) -> tuple[Floats, Floats]:
+    """What friction takes from the motion of each CV at once, and what pressure and cohesion add in
+    each substep until hair feels again; both (3, cv_count, guide_count) [m].
+
+    Pressure that bears weight acts evenly: at once, it would throw the hair up and let it fall.
+    """
     motion = position - previous
     felt = Felt.of(grid, place, position + motion * np.float32(strength.ahead), motion)
     ratio = felt.density / grid.full
@@ -189,11 +192,10 @@ def kick(
     way = felt.gradient * (amount / np.maximum(felt.density, np.float32(TINY)))
     far = np.sqrt((way * way).sum(axis=0))
     way *= np.float32(FARTHEST) / np.maximum(far, np.float32(FARTHEST))
-    kicked = place.out(way, strength.scale(grid.cell))
     rubbed = np.minimum(ratio, np.float32(1.0)) + over * np.float32(PRESSED)
     rubbed = np.float32(1.0) - np.exp(rubbed * np.float32(-strength.friction))
-    kicked += (felt.motion - motion) * rubbed
-    return kicked
+    taken = (motion - felt.motion) * rubbed
+    return taken, place.out(way, strength.scale(grid.cell))
 
 
 @dataclass(frozen=True)

@@ -15,8 +15,8 @@ References: Jakobsen 2001, "Advanced Character Physics"; Nguyen and Donnelly 200
 and Rendering in the Nalu Demo", GPU Gems 2, chapter 23; Han and Harada 2012. `reference/` holds
 the same, one CV after the other.
 
-Between two kicks of hair by hair (`among`), or for the whole frame where there are none, guides do
-not feel each other. So they are advanced in blocks that fit into the cache; a guide's motion is the
+Between two moments at which hair feels hair (`among`), and where it does not for the whole frame,
+guides are on their own. So they are advanced in blocks that fit into the cache; a guide's motion is the
 same to the last bit in any block.
 
 Time that is shorter than a substep waits in the state for the next frame, so the result does not
@@ -84,16 +84,19 @@ def advance(
     slices, pieces = _blocks(state.guide_count), frame.pieces(count)
     made = (Block.of(state, frame, styles, guides) for guides in slices)
     blocks = made if len(pieces) == 1 else list(made)
+    push = None if frame.among is None else state.push
     for numbers in pieces:
-        if frame.among is not None and frame.among.is_due(numbers[0]):
-            previous -= frame.among.kick(position, previous)
+        if frame.among is not None and (push is None or frame.among.is_due(numbers[0])):
+            taken, push = frame.among.feel(position, previous)
+            previous += taken
         for guides, block in zip(slices, blocks, strict=True):
             own = (rows[:, :, guides].copy() for rows in (position, previous))
+            pushed = None if push is None else push[:, :, guides]
             position[:, :, guides], previous[:, :, guides] = _advance_block(
-                block, *own, frame, spans, poses, numbers
+                block, *own, pushed, frame, spans, poses, numbers
             )
     time = state.time + count * dt
-    return DynamicsState(position, previous, state.rest, dt, left, time, styles)
+    return DynamicsState(position, previous, state.rest, dt, left, time, styles, push)
 
 
 def _previous(state: DynamicsState, dt: float) -> Floats:
@@ -116,6 +119,7 @@ def _advance_block(
     block: Block,
     position: Floats,
     previous: Floats,
+    push: Floats | None,
     frame: Frame,
     spans: list[tuple[float, float]],
     poses: list[list[Pose]],
@@ -130,6 +134,8 @@ def _advance_block(
         span = spans[number]
         style = block.style_at(span[1])
         impulse = block.impulse_at(span)
+        if push is not None:
+            impulse = impulse + push
         air_displacement = frame.air_displacement(position[:, 0], number)
         if settings.drag:
             brake(position, previous, settings.drag, air_displacement)

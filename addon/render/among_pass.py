@@ -1,4 +1,4 @@
-"""Hair among hair on the GPU: `dynamics.among.kick`, of guides that lie in textures.
+"""Hair among hair on the GPU: `dynamics.among.feel`, of guides that lie in textures.
 
     hair_at_rest   RGBA32F in the layout of strand_layout.strand_rows: of each CV x its density at
                    rest, y that above which it is crowded, z its mass
@@ -56,13 +56,13 @@ FIELDS_RECIPE = ShaderRecipe(
 
 
 @lru_cache(maxsize=32)
-def kick_recipe(cv_count: int, pairs: str) -> ShaderRecipe:
+def feel_recipe(cv_count: int, pairs: str) -> ShaderRecipe:
     """Args:
     pairs: see capabilities.pair_format.
     """
     return ShaderRecipe(
-        name="among_kick",
-        compute="among_kick.comp.glsl",
+        name="among_feel",
+        compute="among_feel.comp.glsl",
         structs=("struct_among.glsl",),
         blocks=(("Among", "among"),),
         textures=tuple(
@@ -71,6 +71,7 @@ def kick_recipe(cv_count: int, pairs: str) -> ShaderRecipe:
         images=(
             ("RGBA32F", "positions", "READ_WRITE"),
             (pairs, "previous_positions", "READ_WRITE"),
+            ("RGBA32F", "pushes"),
         ),
         group_size=_GROUP,
         defines=(("CV_COUNT", cv_count),),
@@ -86,10 +87,11 @@ class AmongPass:
         self._textures: dict[str, Any] = {}
         self._target: Any = None
 
-    def kick(self, among: Among, positions: Any, previous: Any, speed_ratio: float) -> None:
-        """Change the motion of guides in textures, see dynamics_pass.
+    def feel(self, among: Among, guides: dict[str, Any], speed_ratio: float) -> None:
+        """Change the motion of guides, and what pushes them.
 
         Args:
+            guides: the textures positions, previous_positions and pushes of dynamics_pass.
             speed_ratio: of the substep that comes to the one before it.
         """
         if among.grid is not self._grid:
@@ -97,7 +99,7 @@ class AmongPass:
         cv_count, guide_count = among.grid.density.shape
         x, y, z = among.grid.counts
         block = self._block.holding(_block_of(among, speed_ratio))
-        textures = {**self._textures, "positions": positions, "previous_positions": previous}
+        textures = {**guides, **self._textures}
         with (
             drawing_into(self._target),
             drawing_state(depth_test="NONE", depth_write=False, blend="ADDITIVE_PREMULT"),
@@ -107,7 +109,7 @@ class AmongPass:
             self._points.points(guide_count * cv_count).draw(shader)
         for recipe, size in (
             (FIELDS_RECIPE, (x * z, y)),
-            (kick_recipe(cv_count, pair_format()), (cv_count, guide_count)),
+            (feel_recipe(cv_count, pair_format()), (cv_count, guide_count)),
         ):
             shader = _bound(recipe, block, textures)
             groups = [-(-side // group) for side, group in zip(size, recipe.group_size, strict=True)]

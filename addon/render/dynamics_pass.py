@@ -6,6 +6,7 @@ strand_layout.strand_rows:
     positions      RGBA32F: xyz world [m], w the z of a substep earlier
     previous_positions   RG32F, on Metal RGBA32F: x and y of a substep earlier; software drivers
                    take time for each number that is written
+    pushes         RGBA32F: xyz [m] what other hair adds in a substep, see state.DynamicsState
     bridged        RGBA32F: xyz world [m], at the frame's very end (step.grid_at_frame_end)
     styles_earlier, styles_before, styles_now   RGBA32F: xyz world [m], see frame.Drive
     rest_shapes    RGBA32F: of CV i xyz curvature [m] and w hold (style.LocalShape); of CV 0 x its
@@ -79,6 +80,7 @@ def dynamics_recipe(
     relaxation: bool = False,
     held: bool = False,
     springs: bool = False,
+    pushed: bool = False,
     air: bool = False,
     collider_count: int = 0,
     rounds: bool = False,
@@ -97,6 +99,7 @@ def dynamics_recipe(
         "RELAXATION": relaxation,
         "HAS_HELD": held,
         "HAS_SPRINGS": springs,
+        "HAS_PUSHES": pushed,
         "HAS_AIR": air,
         "HAS_ROUNDS": rounds,
         "HAS_FIELDS": fields,
@@ -106,6 +109,7 @@ def dynamics_recipe(
     }
     textures = ["styles_earlier", "styles_before", "styles_now", "rest_shapes", "rest_lengths"]
     textures += ["moments"] + ["held_cvs"] * held + ["curl_rooms"] * springs
+    textures += ["pushes"] * pushed
     textures += ["rounds"] * rounds + ["fields"] * fields + ["clearances"] * clearance
     return ShaderRecipe(
         name="dynamics",
@@ -176,15 +180,19 @@ class DynamicsPass:
         if "positions" in self._textures:
             here, beside = (self._grid(name) for name in ("positions", "previous_positions"))
             previous = np.concatenate([beside[..., :2], here[..., 3:]], axis=-1)
+            push = as_rows(self._grid("pushes")[..., :3]) if self._is_pushed else None
             self._state = replace(
-                self._state, position=as_rows(here[..., :3]), previous=as_rows(previous)
+                self._state,
+                position=as_rows(here[..., :3]),
+                previous=as_rows(previous),
+                push=push,
             )
         return self._state
 
     def release(self) -> None:
         """Let go of all that lies on the GPU; goes on from the state that was read last."""
         self._textures: dict[str, Any] = {}
-        self._is_bridged = False
+        self._is_bridged = self._is_pushed = False
         self._block, self._among = UniformBlock(), AmongPass()
         self._colliders.release()
         self._styles: list[tuple[Floats, Any]] = []  # those of the last frame, and their textures
@@ -198,6 +206,9 @@ class DynamicsPass:
             textures["positions"] = points_texture(here, previous[..., 2])
             textures["previous_positions"] = _pairs_texture(previous[..., :2])
             textures["bridged"] = points_texture(here)
+            push = np.zeros_like(here) if state.push is None else state.push.transpose(2, 1, 0)
+            textures["pushes"] = points_texture(push)
+            self._is_pushed = state.push is not None
             textures["rest_shapes"] = texture_from(strand_rows(rest_shapes(state.rest)), "RGBA32F")
             lengths = of_segments(state.rest.length)
             textures["rest_lengths"] = texture_from(strand_rows(lengths), "R32F")
@@ -224,13 +235,12 @@ class DynamicsPass:
 
     def _advance(self, frame: Frame, count: int, speed_ratio: float) -> None:
         """All substeps of a frame; the first is `speed_ratio` as long as the one before it."""
-        textures = self._textures
+        self._is_pushed &= frame.among is not None
         for numbers in frame.pieces(count):
             first, end = numbers[0], numbers[-1] + 1
-            if frame.among is not None and frame.among.is_due(first):
-                positions, previous = textures["positions"], textures["previous_positions"]
-                ratio = 1.0 if first else speed_ratio
-                self._among.kick(frame.among, positions, previous, ratio)
+            if frame.among is not None and (frame.among.is_due(first) or not self._is_pushed):
+                self._among.feel(frame.among, self._textures, 1.0 if first else speed_ratio)
+                self._is_pushed = True
             for begin in range(first, end, SUBSTEPS_AT_ONCE):
                 part = min(end - begin, SUBSTEPS_AT_ONCE)
                 self._dispatch(frame, begin, part, 1.0 if begin else speed_ratio)
@@ -253,6 +263,7 @@ class DynamicsPass:
             relaxation=settings.length_solver == "relaxation",
             held=frame.drive.held is not None,
             springs=state.rest.room is not None and settings.curl_stretch > 0.0,
+            pushed=frame.among is not None,
             air=frame.air is not None,
             collider_count=len(posed),
             rounds=colliders.rounds is not None,

@@ -1,6 +1,7 @@
-// Hair among hair: pressure, cohesion and friction change the motion of each CV. One invocation a CV.
+// Hair among hair: friction changes the motion of each CV, pressure and cohesion are written down for
+// the substeps. One invocation a CV.
 //
-// Twin of kick in addon/dynamics/among.py.
+// Twin of feel in addon/dynamics/among.py.
 #include "lib_strand_texel.glsl"
 #include "lib_among.glsl"
 
@@ -48,11 +49,11 @@ void main()
   float under = clamp(rest.x / rest.y - ratio - {{among_slack}}, 0.0, 1.0);
   vec3 way = gradient * ((under * among.strength.y - over * among.strength.x) / density);
   way *= {{among_farthest}} / max(length(way), {{among_farthest}});
-  vec3 kicked = (among.into_x.xyz * way.x + among.into_y.xyz * way.y + among.into_z.xyz * way.z) * among.strength.w;
-  vec3 mean = found.yzw / (among.whole * density);
+  vec3 push = among.into_x.xyz * way.x + among.into_y.xyz * way.y + among.into_z.xyz * way.z;
   float rubbed = 1.0 - exp(-among.strength.z * (min(ratio, 1.0) + over * {{among_pressed}}));
-  kicked += (mean - cv.motion) * rubbed;
-  before -= kicked / among.speed_ratio;
+  vec3 mean = found.yzw / (among.whole * density);
+  before += (cv.motion - mean) * (rubbed / among.speed_ratio);
+  imageStore(pushes, texel, vec4(push * among.strength.w, 0.0));
   imageStore(positions, texel, vec4(here.xyz, before.z));
   imageStore(previous_positions, texel, vec4(before.xy, 0.0, 0.0));
 }
