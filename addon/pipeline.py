@@ -166,6 +166,12 @@ class Rig:
         """How much the curls of guides have to give, see `center_lines.curl_room`."""
         return curl_room(self.strands.take(self.guides).lengths(), self.guide_grid)
 
+    @cached_property
+    def strands_of_guides(self) -> Floats:
+        """How many strands each guide stands for, (guide_count,): their parts that ride on it."""
+        guide, weight = self.weights.guide.ravel(), self.weights.weight.ravel()
+        return np.bincount(guide, weight, len(self.guides))
+
     @property
     def child_count(self) -> int:
         own = self.own_count
@@ -572,7 +578,8 @@ def held_cvs(rig: Rig, pose: Pose) -> Held | None:
 def begin(rig: Rig, pose: Pose) -> Motion:
     """Hair at rest in this pose."""
     guides = style_of_guides(rig, pose)
-    return Motion(start(guides, rig.curl_room), guides, guides, pose)
+    state = start(guides, rig.curl_room, rig.strands_of_guides)
+    return Motion(state, guides, guides, pose)
 
 
 def advance(

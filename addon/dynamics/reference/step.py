@@ -1,8 +1,9 @@
 """The same step, one guide and one CV after the other in float64: slow, to be read and compared.
 
-Nothing is shared with the fast form but settings and their curves, state, drive, colliders, the air
-and the groom's mean rotation. Frames are rotation matrices here, and each linear system is written
-out and solved densely, so the banded solves are checked as well.
+Nothing is shared with the fast form but settings and their curves, state, drive, colliders, the
+air, the groom's mean rotation and the cells of hair that feels hair. Frames are rotation matrices
+here, and each linear system is written out and solved densely, so the banded solves are checked as
+well.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import numpy as np
 
 from ...arrays import Floats
 from ...params.curve import along as curve_along
+from ..among import FELT_PER_SECOND
 from ..constraints import CONTACT_WEIGHT, HELD, HELD_SWEEPS, PINNED, ROUNDING
 from ..contacts import BETWEEN, MORE_ROUNDS
 from ..settings import DynamicsSettings
@@ -22,6 +24,7 @@ from ..state import DynamicsState
 from ..step import Drive
 from ..turn import best_rotation
 from ..wind import air_of
+from .among import Hair, feel_slowly
 from .contacts import Moment, Plane, is_deep, planes_of, push_out
 from .shape import frames, hold, jacobian_of
 
@@ -35,12 +38,15 @@ def advance_slowly(
     time = state.time_left + duration
     count = math.floor(time / dt + 1.0e-6) if duration else 0
     guides = [_Guide(state, drive, g, settings) for g in range(state.guide_count)]
+    if state.substep and count:
+        for guide in guides:
+            guide.previous = guide.x - (guide.x - guide.previous) * (dt / state.substep)
+    push = _Push(state, drive, settings, dt)
     for number in range(count):
+        push.before(number, guides)
         begin = (number * dt - state.time_left) / duration
         moment = Moment(begin, begin + dt / duration, state.time + number * dt, dt)
         for guide in guides:
-            if state.substep and number == 0:
-                guide.previous = guide.x - (guide.x - guide.previous) * (dt / state.substep)
             guide.substep(drive, settings, moment)
     if not guides:
         return state
@@ -48,7 +54,47 @@ def advance_slowly(
     position, previous = (grid.transpose(2, 1, 0).astype(np.float32) for grid in rows)
     left = max(time - count * dt, 0.0)
     substep = dt if count else state.substep
-    return DynamicsState(position, previous, state.rest, substep, left, state.time + count * dt)
+    time = state.time + count * dt
+    return DynamicsState(position, previous, state.rest, substep, left, time, (), push.rows)
+
+
+class _Push:
+    """How guides feel other guides, now and then."""
+
+    def __init__(
+        self, state: DynamicsState, drive: Drive, settings: DynamicsSettings, dt: float
+    ) -> None:
+        self.state, self.settings, self.dt = state, settings, dt
+        self.is_felt = settings.volume > 0.0 and state.cv_count > PINNED
+        self.substeps = max(round(1.0 / (FELT_PER_SECOND * dt)), 1)
+        self.first = round(state.time / dt)
+        self.rows = state.push if self.is_felt else None
+        self.middles = (drive.target_before + drive.target_now).transpose(2, 1, 0) / 2.0
+
+    def before(self, number: int, guides: list[_Guide]) -> None:
+        """Before a substep of the frame."""
+        if not self.is_felt or not guides:
+            return
+        if self.rows is None or (self.first + number) % self.substeps == 0:
+            self._feel(guides)
+        assert self.rows is not None
+        for guide, push in zip(guides, self.rows.transpose(2, 1, 0), strict=True):
+            guide.push = push.astype(np.float64)
+
+    def _feel(self, guides: list[_Guide]) -> None:
+        rest = self.state.rest
+        here = np.concatenate([guide.x for guide in guides])
+        before = np.concatenate([guide.previous for guide in guides])
+        turn = best_rotation(rest.position, self.middles)
+        middle = self.middles[:, 0].mean(axis=1, dtype=np.float64)
+        at_rest = np.concatenate([guide.rest for guide in guides])
+        hair = Hair(here, here - before, turn, middle)
+        taken, push = feel_slowly(
+            rest.hair_grid, at_rest, hair, self.settings, self.dt, self.substeps
+        )
+        for guide, own in zip(guides, np.split(taken, len(guides)), strict=True):
+            guide.previous = guide.previous + own
+        self.rows = push.reshape(len(guides), -1, 3).transpose(2, 1, 0).astype(np.float32)
 
 
 class _Guide:
@@ -64,6 +110,7 @@ class _Guide:
         self.rest = points(state.rest.position)
         self.twist_cv = int(state.rest.shape.twist_cv[guide])
         self.rest_length = [float(np.linalg.norm(b - a)) for a, b in pairwise(self.rest)]
+        self.push = np.zeros_like(self.x)  # by other guides, in each substep
         self.length = self.rest_length  # those that this substep keeps
         room = state.rest.room
         self.room = np.zeros(len(self.length)) if room is None else room[:, guide].astype(float)
@@ -154,7 +201,7 @@ class _Guide:
             moved = (self.x[cv] - self.previous[cv]) * kept
             moved = moved + style_displacement[cv] * lost * settings.style_damping
             moved = moved + air * moment.dt * lost * settings.damping
-            moved = moved + self.gravity[cv] * moment.dt**2
+            moved = moved + self.gravity[cv] * moment.dt**2 + self.push[cv]
             self.previous[cv], self.x[cv] = self.x[cv].copy(), self.x[cv] + moved
 
     def _pin(self, style: Floats) -> None:

@@ -1,0 +1,106 @@
+"""Hair among hair without a grid: each CV adds up what each other one does to it, in float64.
+
+Shared with the fast form: where its cells are, and the numbers that say how strong all is.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...arrays import Floats
+from ..among import (
+    AHEAD,
+    BEGIN,
+    FARTHEST,
+    FASTEST,
+    MOTION,
+    PRESSED,
+    PULL,
+    PUSH,
+    RUBBING,
+    SLACK,
+    THIN,
+    HairGrid,
+)
+from ..settings import DynamicsSettings
+
+
+@dataclass(frozen=True)
+class Hair:
+    """All CVs at one moment, (n, 3) float64 world [m]. turn: (3, 3) of the groom since rest.
+
+    middle: (3,) of its roots.
+    """
+
+    here: Floats
+    motion: Floats
+    turn: Floats
+    middle: Floats
+
+
+def feel_slowly(
+    grid: HairGrid, rest: Floats, hair: Hair, settings: DynamicsSettings, dt: float, substeps: int
+) -> tuple[Floats, Floats]:
+    """What `among.feel` does, as (n, 3) [m].
+
+    Args:
+        rest: (n, 3) where all CVs were at rest.
+    """
+    mass = np.tile(grid.mass.astype(np.float64)[:, None], (1, len(rest) // len(grid.mass))).ravel()
+    still = Hair(rest, np.zeros_like(rest), np.eye(3), grid.middle)
+    at_rest = [_others(grid, still, mass, cv, 0.0)[0] for cv in range(len(rest))]
+    crowded = np.maximum(at_rest, THIN * np.median(at_rest))
+    taken, push = np.zeros_like(rest), np.zeros_like(rest)
+    for cv in range(len(rest)):
+        density, gradient, mean = _others(grid, hair, mass, cv, AHEAD * substeps)
+        if density == 0.0:
+            continue
+        ratio = density / crowded[cv]
+        over = min(max(ratio - 1.0 - SLACK, 0.0), 1.0)
+        under = min(max(at_rest[cv] / crowded[cv] - ratio - SLACK, 0.0), 1.0)
+        way = gradient / density * (PULL * under - PUSH * over) * settings.volume
+        way *= min(FARTHEST / max(float(np.linalg.norm(way)), 1e-30), 1.0)
+        push[cv] = hair.turn @ way * grid.cell / substeps**2
+        rate = RUBBING * settings.volume * (min(ratio, 1.0) + PRESSED * over)
+        taken[cv] = (hair.motion[cv] - mean) * (1.0 - math.exp(-rate * substeps * dt))
+    return taken, push
+
+
+def _others(
+    grid: HairGrid, hair: Hair, mass: Floats, cv: int, ahead: float
+) -> tuple[float, Floats, Floats]:
+    """Density, its gradient [1 / cell] and mean motion [m] of all others at a CV."""
+    places = (hair.here + hair.motion * ahead - hair.middle) @ hair.turn / grid.cell + BEGIN
+    steps = hair.motion * MOTION / grid.cell
+    whole = np.rint(np.clip(steps, -FASTEST * MOTION, FASTEST * MOTION)) * grid.cell / MOTION
+    density, gradient, moving = 0.0, np.zeros(3), np.zeros(3)
+    for other in range(len(places)):
+        if other == cv:
+            continue
+        nearest_middle = np.floor(places[other] + 0.5)
+        near = [
+            _along(float(apart), count)
+            for apart, count in zip(places[cv] - nearest_middle, grid.counts, strict=True)
+        ]
+        (x, slope_x), (y, slope_y), (z, slope_z) = near
+        density += mass[other] * x * y * z
+        gradient += mass[other] * np.array([slope_x * y * z, x * slope_y * z, x * y * slope_z])
+        moving += mass[other] * x * y * z * whole[other]
+    return density, gradient, moving / density if density else moving
+
+
+def _along(apart: float, count: int) -> tuple[float, float]:
+    """What a cell whose middle is so far away counts, and the slope of that, along one axis of a
+    grid that begins again after `count` cells."""
+    apart = math.remainder(apart, count)
+    images = [apart - count, apart, apart + count]
+    weight = sum(_tent(d + 1.0) / 4.0 + _tent(d) / 2.0 + _tent(d - 1.0) / 4.0 for d in images)
+    slope = sum((_tent(d + 1.0) - _tent(d - 1.0)) / 2.0 for d in images)
+    return weight, slope
+
+
+def _tent(apart: float) -> float:
+    return max(1.0 - abs(apart), 0.0)

@@ -1,0 +1,249 @@
+"""Hair that feels other hair: against a form without a grid, and what it is for."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hairloom.addon.dynamics import among
+from hairloom.addon.dynamics.among import AHEAD, HairGrid, Strength, feel
+from hairloom.addon.dynamics.reference.among import Hair, feel_slowly
+from hairloom.addon.dynamics.reference.step import advance_slowly
+from hairloom.addon.dynamics.settings import DynamicsSettings
+from hairloom.addon.dynamics.state import start
+from hairloom.addon.dynamics.step import Drive, advance
+
+EARTH, DT = np.array([0.0, 0.0, -9.81]), 1.0 / 180.0
+#: A style that bears next to nothing, and none of the weight.
+SOFT = {"style_root": 0.5, "style_tip": 0.1, "bend": 0.3, "sag_compensation": 0.0}
+
+
+def tail(count, cv_count=12, narrow=0.012, wide=0.04, length=0.3, seed=1):
+    """A ponytail below its tie: out to `wide`, then straight down."""
+    random = np.random.default_rng(seed)
+    angle, away = random.uniform(0.0, 2.0 * np.pi, count), random.random(count) ** 0.5
+    along = np.linspace(0.0, 1.0, cv_count)
+    radius = narrow + (wide - narrow) * np.sin(np.minimum(1.6 * along, 1.0) * np.pi / 2.0)
+    grid = np.zeros((count, cv_count, 3))
+    grid[..., 0] = (np.cos(angle) * away)[:, None] * radius
+    grid[..., 1] = (np.sin(angle) * away)[:, None] * radius
+    grid[..., 2] = -length * along
+    return grid.astype(np.float32)
+
+
+def locks(count, cv_count=12, seed=2):
+    """Two locks of hair that hang side by side, 3 cm apart, and on which side each strand is."""
+    lock = tail(2 * count, cv_count, 0.012, 0.012, 0.25, seed)
+    side = np.repeat([-1.0, 1.0], count)
+    lock[..., 0] += (0.015 * side)[:, None].astype(np.float32)
+    return lock, side
+
+
+def played(grid, settings, seconds=2.0, fps=24.0, state=None):
+    state = start(grid) if state is None else state
+    for _ in range(round(seconds * fps)):
+        state = advance(state, Drive(grid, grid, (), EARTH), settings, 1.0 / fps)
+    return state
+
+
+def cells_of(grid, width=0.006):
+    """How many cells of this width strands run through."""
+    steps = np.arange(4)[:, None, None, None] / 4.0
+    points = grid[:, :-1] * (1.0 - steps) + grid[:, 1:] * steps
+    return len(np.unique(np.floor(points.reshape(-1, 3) / width).astype(int), axis=0))
+
+
+def turned(angle, axis=(0.3, -0.5, 0.8)):
+    x, y, z = np.asarray(axis) / np.linalg.norm(axis)
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross
+
+
+def squeezed(count=30, cv_count=8):
+    """A tail that has been moved, turned, squeezed and set in motion: rest, position, previous,
+    turn, middle."""
+    random = np.random.default_rng(5)
+    rest = tail(count, cv_count)
+    turn, move = turned(0.7), np.array([0.4, -2.0, 1.5])
+    here = rest * [0.55, 0.8, 1.0] @ turn.T + move
+    before = here - random.normal(0.0, 0.002, here.shape)
+    rows = [np.ascontiguousarray(one.transpose(2, 1, 0), np.float32) for one in (here, before)]
+    middle = (rest[:, 0] @ turn.T + move).mean(axis=0)
+    return start(rest, strands=random.uniform(0.0, 3.0, count)).rest, *rows, turn, middle
+
+
+@pytest.mark.parametrize("volume", [0.4, 1.0])
+def test_as_without_a_grid(volume):
+    rest, position, previous, turn, middle = squeezed()
+    grid, settings = rest.hair_grid, DynamicsSettings(volume=volume)
+    strength = Strength.of(settings, DT)
+    found = feel(grid, grid.place(turn, middle), strength, position, previous)
+    flat = [rows.transpose(2, 1, 0).reshape(-1, 3).astype(float) for rows in (position, previous)]
+    hair = Hair(flat[0], flat[0] - flat[1], turn, middle.astype(float))
+    at_rest = rest.position.transpose(2, 1, 0).reshape(-1, 3).astype(float)
+    expected = feel_slowly(grid, at_rest, hair, settings, DT, strength.substeps)
+    for one, other in zip(found, expected, strict=True):
+        one = one.transpose(2, 1, 0).reshape(-1, 3)
+        assert (np.abs(other).max(axis=1) > 1e-6).mean() > 0.3  # it acts on many of them
+        np.testing.assert_allclose(one, other, atol=2e-5 * np.abs(other).max())
+
+
+def test_a_frame_as_without_a_grid():
+    grid = tail(24, 8)
+    settings = DynamicsSettings(volume=1.0, length_tolerance=0.0001, **SOFT)
+    fast = slow = start(grid)
+    for frame in range(8):
+        target = grid + np.float32([0.01 * frame, 0.0, 0.0])
+        drive = Drive(target - np.float32([0.01, 0.0, 0.0]), target, (), EARTH)
+        fast = advance(fast, drive, settings, 1.0 / 24.0)
+        slow = advance_slowly(slow, drive, settings, 1.0 / 24.0)
+        np.testing.assert_allclose(fast.position, slow.position, atol=2e-5)
+    alone = played(grid, replace(settings, volume=0.0), 8 / 24.0)
+    assert np.abs(fast.push).max() > 1e-7
+    assert np.abs(fast.position - alone.position).max() > 1e-3
+
+
+def test_the_order_of_guides_changes_no_bit():
+    rest, position, previous, turn, middle = squeezed(60)
+    order = np.random.default_rng(6).permutation(60)
+    other = replace(rest, position=rest.position[:, :, order], strands=rest.strands[order])
+    strength = Strength.of(DynamicsSettings(volume=1.0), DT)
+    place = rest.hair_grid.place(turn, middle)
+    found = feel(rest.hair_grid, place, strength, position, previous)
+    again = feel(
+        replace(other.hair_grid, middle=rest.hair_grid.middle),
+        place,
+        strength,
+        position[:, :, order],
+        previous[:, :, order],
+    )
+    for one, two in zip(found, again, strict=True):
+        assert np.array_equal(one[:, :, order], two)
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.4, 2.0])
+def test_at_rest_it_does_nothing_wherever_the_head_is(angle):
+    grid, turn, move = tail(300), turned(angle), np.array([3.0, -1.0, 0.5])
+    rest = start(grid).rest
+    here = (grid @ turn.T + move).astype(np.float32)
+    rows = np.ascontiguousarray(here.transpose(2, 1, 0))
+    place = rest.hair_grid.place(turn, grid[:, 0].mean(axis=0) @ turn.T + move)
+    strength = Strength.of(DynamicsSettings(volume=1.0), DT)
+    taken, push = feel(rest.hair_grid, place, strength, rows, rows)
+    assert not taken.any() and not push.any()
+
+
+def test_hair_at_rest_stays_at_rest():
+    """With weight borne by the style, as by default: it comes to the same rest, at no speed."""
+    grid = tail(200)
+    alone, among_others = (
+        played(grid, DynamicsSettings(volume=volume), 4.0) for volume in (0.0, 1.0)
+    )
+    assert not among_others.push.any()
+    assert np.abs(among_others.position - alone.position).max() < 5e-6
+    assert np.abs(among_others.position - among_others.previous).max() / DT < 1e-4
+
+
+def test_a_ponytail_keeps_its_volume():
+    grid = tail(600)
+    kept = {
+        volume: cells_of(played(grid, DynamicsSettings(volume=volume, **SOFT)).grid)
+        / cells_of(grid)
+        for volume in (0.0, 1.0)
+    }
+    assert kept[0.0] < 0.5
+    assert kept[1.0] > 0.8
+
+
+def test_it_comes_to_rest_under_its_weight():
+    settings = DynamicsSettings(volume=1.0, **SOFT)
+    state = played(tail(300), settings, 4.0)
+    assert state.push.any()  # which bears it
+    assert np.abs(state.position - state.previous).max() / DT < 0.01
+
+
+def test_locks_do_not_swing_through_each_other():
+    grid, side = locks(100)
+    along = np.linspace(0.0, 1.0, grid.shape[1])
+    wrong = {}
+    for volume in (0.0, 1.0):
+        state = start(grid)
+        previous = state.position.copy()
+        previous[0] += along[:, None] * side * 0.8 * DT  # 0.8 m/s towards the other, at the tips
+        state = replace(state, previous=previous, substep=DT)
+        worst = 0.0
+        for _ in range(24):
+            state = played(grid, DynamicsSettings(volume=volume), 1 / 24.0, 24.0, state)
+            x = state.grid[:, grid.shape[1] // 2 :, 0].mean(axis=1)
+            worst = max(worst, float((x * side < -0.002).mean()))
+        wrong[volume] = worst
+    assert wrong[0.0] > 0.9
+    assert wrong[1.0] <= 0.05
+
+
+def test_neighbours_move_together():
+    """One strand that moves among many that stand is braked; its lengths and theirs are kept."""
+    grid = tail(200)
+    rest = start(grid).rest
+    previous = rest.position.copy()
+    previous[0, :, 7] -= 0.001
+    place = rest.hair_grid.place(np.eye(3), rest.hair_grid.middle)
+    strength = Strength.of(DynamicsSettings(volume=1.0), DT)
+    taken, _ = feel(rest.hair_grid, place, strength, rest.position, previous)
+    assert 0.0 < taken[0, 2:, 7].min() and taken[0, 2:, 7].max() < 0.001
+    others = np.delete(taken[0], 7, axis=1)
+    assert others.max() <= 0.0 and others.min() < 0.0  # and they are taken along
+
+
+def test_lengths_are_kept():
+    state = played(tail(200), DynamicsSettings(volume=1.0, **SOFT), 1.0)
+    lengths = np.linalg.norm(np.diff(state.grid, axis=1), axis=2)
+    np.testing.assert_allclose(lengths, state.rest.length.T, rtol=0.003)
+
+
+def test_the_frame_rate_does_not_matter():
+    grid, settings = tail(150), DynamicsSettings(volume=1.0, **SOFT)
+    one, other = (played(grid, settings, 1.0, fps) for fps in (20.0, 60.0))
+    assert np.abs(one.position - other.position).max() < 1e-4
+
+
+def test_a_guide_counts_for_its_strands():
+    grid = tail(100)
+    even, uneven = (start(grid, strands=strands).rest for strands in (None, np.ones(100)))
+    assert np.array_equal(even.hair_grid.density, uneven.hair_grid.density)
+    strands = np.ones(100)
+    strands[50:] = 3.0
+    heavy = start(grid, strands=strands).rest.hair_grid
+    assert (heavy.mass[50:] == 3.0 * heavy.mass[:50]).all()
+
+
+def test_hair_that_is_a_kilometre_apart():
+    grid = np.concatenate([tail(50), tail(50) + np.float32([1000.0, 0.0, 0.0])])
+    state = played(grid, DynamicsSettings(volume=1.0, **SOFT), 0.5)
+    assert np.isfinite(state.position).all()
+    hair_grid = state.rest.hair_grid
+    assert max(hair_grid.counts) <= among.SIDE
+    assert hair_grid.cell <= among.COARSEST * state.rest.size * 1.001
+
+
+@pytest.mark.parametrize("grid", [tail(1), tail(3, 2), np.zeros((5, 6, 3), np.float32)])
+def test_few_guides_and_guides_without_length(grid):
+    state = played(grid, DynamicsSettings(volume=1.0), 0.25)
+    assert np.isfinite(state.position).all()
+
+
+def test_turned_on_in_mid_play():
+    grid = tail(100)
+    state = played(grid, DynamicsSettings(**SOFT), 0.1)
+    assert state.push is None
+    on = played(grid, DynamicsSettings(volume=1.0, **SOFT), 0.1, state=state)
+    assert on.push is not None
+    assert played(grid, DynamicsSettings(**SOFT), 0.1, state=on).push is None
+
+
+def test_how_far_ahead():
+    strength = Strength.of(DynamicsSettings(volume=0.5), DT)
+    assert strength.substeps == 5
+    assert strength.ahead == AHEAD * 5
+    assert Strength.of(DynamicsSettings(), DT) is None
+    assert isinstance(start(tail(4)).rest.hair_grid, HairGrid)
