@@ -20,7 +20,6 @@ import numpy as np
 from ..arrays import Floats
 from ..dynamics.among import BEGIN, MOTION, Among, HairGrid
 from . import gpu_objects
-from .capabilities import pair_format
 from .ribbons import Ribbons
 from .shader_program import ShaderRecipe, program
 from .strand_layout import strand_rows
@@ -31,6 +30,7 @@ _GROUP = (16, 4)
 
 @lru_cache(maxsize=32)
 def deposit_recipe(cv_count: int) -> ShaderRecipe:
+    """What the CVs leave in the cells."""
     names = ("positions", "previous_positions", "hair_at_rest")
     return ShaderRecipe(
         name="among_deposit",
@@ -57,8 +57,10 @@ FIELDS_RECIPE = ShaderRecipe(
 
 @lru_cache(maxsize=32)
 def feel_recipe(cv_count: int, pairs: str) -> ShaderRecipe:
-    """Args:
-    pairs: see capabilities.pair_format.
+    """Friction at once, and what pushes the guides until it is felt again.
+
+    Args:
+        pairs: see capabilities.pair_format.
     """
     return ShaderRecipe(
         name="among_feel",
@@ -87,12 +89,15 @@ class AmongPass:
         self._textures: dict[str, Any] = {}
         self._target: Any = None
 
-    def feel(self, among: Among, guides: dict[str, Any], speed_ratio: float) -> None:
+    def feel(
+        self, among: Among, guides: dict[str, Any], speed_ratio: float, pairs: str
+    ) -> None:
         """Change the motion of guides, and what pushes them.
 
         Args:
             guides: the textures positions, previous_positions and pushes of dynamics_pass.
             speed_ratio: of the substep that comes to the one before it.
+            pairs: the format of previous_positions.
         """
         if among.grid is not self._grid:
             self._make(among.grid)
@@ -109,7 +114,7 @@ class AmongPass:
             self._points.points(guide_count * cv_count).draw(shader)
         for recipe, size in (
             (FIELDS_RECIPE, (x * z, y)),
-            (feel_recipe(cv_count, pair_format()), (cv_count, guide_count)),
+            (feel_recipe(cv_count, pairs), (cv_count, guide_count)),
         ):
             shader = _bound(recipe, block, textures)
             groups = [-(-side // group) for side, group in zip(size, recipe.group_size, strict=True)]

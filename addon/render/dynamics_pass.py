@@ -239,7 +239,8 @@ class DynamicsPass:
         for numbers in frame.pieces(count):
             first, end = numbers[0], numbers[-1] + 1
             if frame.among is not None and (frame.among.is_due(first) or not self._is_pushed):
-                self._among.feel(frame.among, self._textures, 1.0 if first else speed_ratio)
+                ratio = 1.0 if first else speed_ratio
+                self._among.feel(frame.among, self._textures, ratio, pair_format())
                 self._is_pushed = True
             for begin in range(first, end, SUBSTEPS_AT_ONCE):
                 part = min(end - begin, SUBSTEPS_AT_ONCE)

@@ -209,6 +209,10 @@ IN_AIR = {
     ),
     "held": Scene(is_held=True),
     "held at 24 frames a second": Scene({"substep_rate": 100.0}, fps=24.0, is_held=True),
+    "volume": Scene({"volume": 1.0, "style_tip": 0.3}, guide_count=150),
+    "volume at 24 frames a second": Scene(
+        {"volume": 0.5, "substep_rate": 100.0, "style_tip": 0.3}, fps=24.0, guide_count=150
+    ),
     "curls": Scene({"curl_stretch": 0.6, "sag_compensation": 0.6, **LOOSE}, is_curled=True),
     "held curls": Scene({"curl_bounce": 5.0, **LOOSE}, is_held=True, is_curled=True),
     "curls with relaxation": Scene({"length_solver": "relaxation"}, is_curled=True),
@@ -314,6 +318,68 @@ def played(scene: Scene) -> DynamicsState:
 def test_more_guides_than_a_texture_has_rows(make_pass: Any) -> None:
     scene = Scene(guide_count=20000, cv_count=4, on_head=(BALL,))
     assert_equal(scene, make_pass, TOUCHING, seconds=0.1)
+
+
+@dataclass(eq=False)
+class Bundle(Scene):
+    """Guides side by side that hang through each other, as many as lie in three columns."""
+
+    guide_count: int = 300
+
+    def carried(self, frame: float) -> np.ndarray:
+        random = np.random.default_rng(7)
+        grid = np.zeros((self.guide_count, self.cv_count, 3))
+        along = np.linspace(0.0, 1.0, self.cv_count)
+        across = random.uniform(-0.012, 0.012, (self.guide_count, 2))
+        grid[..., :2] = across[:, None] * (1.0 + 2.0 * np.minimum(2.0 * along, 1.0))[:, None]
+        grid[..., 2] = -0.3 * along
+        matrix = shaking(frame / self.fps)
+        return (grid @ matrix[:3, :3].T + matrix[:3, 3]).astype(np.float32)
+
+
+FALLING = {
+    "volume": 1.0,
+    "sag_compensation": 0.0,
+    "style_root": 0.5,
+    "style_tip": 0.1,
+    "bend": 0.3,
+}
+
+
+def test_hair_among_hair_equals_numpy(make_pass: Any) -> None:
+    scene = Bundle(FALLING, on_head=(BALL,), fps=24.0)
+    assert_equal(scene, make_pass, TOUCHING, seconds=0.75)
+    alone = Bundle(FALLING | {"volume": 0.0}, on_head=(BALL,), fps=24.0)
+    assert np.abs(played(scene).position - played(alone).position).max() > 0.005
+
+
+def test_hair_among_hair_is_the_same_to_the_last_bit_every_time(make_pass: Any) -> None:
+    scene = Bundle(FALLING, fps=24.0, guide_count=2000)
+    found = []
+    for _ in range(3):
+        dynamics = make_pass(scene.start())
+        for drive in scene.drives(0.25):
+            dynamics.advance(drive, scene.settings, 1.0 / scene.fps)
+        found.append(dynamics.read())
+    for other in found[1:]:
+        assert np.array_equal(found[0].position, other.position)
+        assert np.array_equal(found[0].push, other.push)
+
+
+def test_what_hair_feels_goes_on_where_the_form_is_switched(make_pass: Any) -> None:
+    """Frames of 7 and 8 substeps, of which hair feels each fifth."""
+    scene = Bundle(FALLING, fps=24.0)
+    state = mixed = scene.start()
+    for frame, drive in enumerate(scene.drives(0.5)):
+        state = advance(state, drive, scene.settings, 1.0 / scene.fps)
+        if frame % 2:
+            mixed = advance(mixed, drive, scene.settings, 1.0 / scene.fps)
+        else:
+            dynamics = make_pass(mixed)
+            dynamics.advance(drive, scene.settings, 1.0 / scene.fps)
+            mixed = dynamics.read()
+        assert np.abs(mixed.push - state.push).max() < 1e-6
+        assert np.abs(mixed.position - state.position).max() < FREE
 
 
 def test_one_may_switch_the_form_in_mid_motion(make_pass: Any) -> None:

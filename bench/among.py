@@ -1,0 +1,228 @@
+"""Hair among hair: whether it keeps its volume and its locks, does nothing at rest, and what it costs.
+
+volume_kept          a ponytail in a style that bears nothing, 2 s below its tie: cells as wide as two
+                     strands are apart that it runs through, over those at rest; without: the same
+                     with Volume 0
+volume_kept_bent     the same over a shoulder, a capsule that comes under it in the first second
+rest_motion_mm       how much farther from its style hair at rest is after 10 s than with Volume 0
+crossing_percent     of two locks side by side that swing against each other, 1 m/s at the tips: how
+                     many strands are on the other's side, in the worst frame
+cost_ratio_*         a frame at 24 a second with Volume over one without, on a head that sways, with
+                     its mesh as collider; each frame by the least of several rounds in turn
+
+The last line is one JSON object; the exit status is 1 if a limit is missed.
+
+make bench NAME="among --pictures out"
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import bpy  # noqa: F401  it must come before gpu, which lives inside it
+import gpu
+import numpy as np
+from _forms import ComputeForm, Form, NumpyForm, has_compute, play
+from _shaken_head import Shake, guides_on, new_head, surface_of
+
+from hairloom.addon.dynamics.colliders import CapsuleCollider, DistanceField, PosedCollider
+from hairloom.addon.dynamics.settings import DynamicsSettings
+from hairloom.addon.dynamics.state import DynamicsState, start
+from hairloom.addon.dynamics.step import Drive, advance
+
+GRAVITY = np.array([0.0, 0.0, -9.81])
+FPS, GUIDES, CVS, SECONDS = 24.0, 762, 16, 2.0
+#: A style that bears next to nothing, and none of the weight.
+SOFT = {"style_root": 0.5, "style_tip": 0.1, "bend": 0.3, "sag_compensation": 0.0}
+#: Volume in what is measured, but for cost, where it does not matter how much.
+VOLUME = 1.0
+#: [m/s] of each lock, at the tips.
+SWING = 1.0
+SIZES, ROUNDS = {"762": 762, "10k": 10_000}, {"762": 7, "10k": 3}
+LIMITS: dict[str, Callable[[float], bool]] = {
+    "volume_kept": lambda kept: kept >= 0.8,
+    "volume_kept_bent": lambda kept: kept >= 0.8,
+    "rest_motion_mm": lambda motion: motion < 0.01,
+    "crossing_percent": lambda percent: percent <= 5.0,
+    "cost_ratio": lambda ratio: ratio <= 1.6,
+}
+
+
+def main() -> int:
+    options = argparse.ArgumentParser()
+    options.add_argument("--pictures", type=Path, help="folder of pictures of a ponytail")
+    options.add_argument("--skip-cost", action="store_true", help="all but the slow part")
+    asked = options.parse_args()
+    gpu.init()
+    found: dict[str, object] = {"guides": GUIDES, "renderer": gpu.platform.renderer_get()}
+    found |= volumes() | {"rest_motion_mm": rest_motion()} | crossings()
+    if not asked.skip_cost:
+        for name, count in SIZES.items():
+            found |= costs(name, count)
+    if asked.pictures is not None:
+        draw(asked.pictures)
+    missed = [key for key, value in found.items() if is_missed(key, value)]
+    print(json.dumps(found | {"missed": missed}))
+    return int(bool(missed))
+
+
+def is_missed(key: str, value: object) -> bool:
+    limit = LIMITS.get("cost_ratio" if key.startswith("cost_ratio") else key)
+    return limit is not None and not limit(float(str(value)))
+
+
+def tail(count: int, narrow: float = 0.012, wide: float = 0.04, length: float = 0.3) -> np.ndarray:
+    """A ponytail below its tie: out to `wide`, then straight down."""
+    random = np.random.default_rng(1)
+    angle, away = random.uniform(0.0, 2.0 * np.pi, count), random.random(count) ** 0.5
+    along = np.linspace(0.0, 1.0, CVS)
+    radius = narrow + (wide - narrow) * np.sin(np.minimum(1.6 * along, 1.0) * np.pi / 2.0)
+    grid = np.zeros((count, CVS, 3))
+    grid[..., 0] = (np.cos(angle) * away)[:, None] * radius
+    grid[..., 1] = (np.sin(angle) * away)[:, None] * radius
+    grid[..., 2] = -length * along
+    return grid.astype(np.float32)
+
+
+def volumes() -> dict[str, object]:
+    grid = tail(GUIDES)
+    apart = 2.0 * 0.04 * np.sqrt(np.pi / GUIDES)
+    found = {}
+    for name, moving in (("volume_kept", nothing), ("volume_kept_bent", shoulder)):
+        for end, volume in (("", VOLUME), ("_without", 0.0)):
+            state = start(grid)
+            for frame in range(round(SECONDS * FPS)):
+                drive = Drive(grid, grid, moving(frame), GRAVITY)
+                settings = DynamicsSettings(volume=volume, **SOFT)
+                state = advance(state, drive, settings, 1.0 / FPS)
+            kept = cells_of(state.grid, apart) / cells_of(grid, apart)
+            found[name + end] = round(kept, 3)
+    return found
+
+
+def nothing(_frame: int) -> tuple[PosedCollider, ...]:
+    return ()
+
+
+def shoulder(frame: int) -> tuple[PosedCollider, ...]:
+    """5 cm thick, from beside the tail to below its tie."""
+    capsule = CapsuleCollider(np.array([0.0, -0.3, -0.15]), np.array([0.0, 0.3, -0.15]), 0.05)
+    matrices = []
+    for moment in (frame, frame + 1):
+        part = min(moment / FPS, 1.0)
+        matrix = np.eye(4)
+        matrix[0, 3] = -0.12 + 0.1 * part * part * (3.0 - 2.0 * part)
+        matrices.append(matrix)
+    return (PosedCollider(capsule, *matrices),)
+
+
+def cells_of(grid: np.ndarray, width: float) -> int:
+    """How many cells of this width strands run through."""
+    steps = np.linspace(0.0, 1.0, 5)[:-1, None, None, None]
+    points = grid[:, :-1] * (1.0 - steps) + grid[:, 1:] * steps
+    return len(np.unique(np.floor(points.reshape(-1, 3) / width).astype(int), axis=0))
+
+
+def rest_motion() -> float:
+    grid, farthest = tail(GUIDES), []
+    for volume in (0.0, VOLUME):
+        state = start(grid)
+        for _ in range(round(10.0 * FPS)):
+            state = advance(
+                state, Drive(grid, grid, (), GRAVITY), DynamicsSettings(volume=volume), 1.0 / FPS
+            )
+        farthest.append(np.linalg.norm(state.grid - grid, axis=2).max())
+    return round(max(float(farthest[1] - farthest[0]), 0.0) * 1e3, 4)
+
+
+def crossings() -> dict[str, object]:
+    found = {}
+    for end, volume in (("", VOLUME), ("_without", 0.0)):
+        grid, side = tail(240, 0.012, 0.012, 0.25), np.repeat([-1.0, 1.0], 120)
+        grid[..., 0] += (0.015 * side)[:, None].astype(np.float32)
+        state = start(grid)
+        previous, dt = state.position.copy(), 1.0 / DynamicsSettings().substep_rate
+        previous[0] += np.linspace(0.0, 1.0, CVS)[:, None] * side * SWING * dt
+        state = replace(state, previous=previous, substep=dt)
+        worst = 0.0
+        for _ in range(round(SECONDS * FPS)):
+            state = advance(
+                state, Drive(grid, grid, (), GRAVITY), DynamicsSettings(volume=volume), 1.0 / FPS
+            )
+            beyond = state.grid[:, CVS // 2 :, 0].mean(axis=1) * side
+            worst = max(worst, float((beyond < -0.002).mean()))
+        found[f"crossing_percent{end}"] = round(100.0 * worst, 1)
+    return found
+
+
+def costs(name: str, count: int) -> dict[str, object]:
+    """Milliseconds a frame, and their ratio, of all that can run here."""
+    surface = surface_of(new_head())
+    field = DistanceField.from_surface(surface, DynamicsSettings(), place="head")
+    guides = guides_on(surface, count)
+    drives = list(Shake(guides.grid, (field,)).drives(FPS, 0.5))
+    forms: dict[str, Callable[[DynamicsState], Form]] = {"numpy": NumpyForm}
+    if has_compute():
+        forms["compute"] = ComputeForm
+    times: dict[tuple[str, float], list[list[float]]] = {}
+    for _ in range(ROUNDS[name]):
+        for form, make in forms.items():
+            for volume in (0.0, 0.5):
+                one = make(start(guides.grid))
+                took = play(one, drives, DynamicsSettings(volume=volume), FPS)
+                one.release()
+                times.setdefault((form, volume), []).append(took)
+    found: dict[str, object] = {}
+    for form in forms:
+        # the first frames compile, and find the grid
+        without, with_it = (
+            float(np.min(times[form, volume], axis=0)[2:].mean()) for volume in (0.0, 0.5)
+        )
+        found[f"{form}_{name}_ms"], found[f"{form}_{name}_without_ms"] = (
+            round(with_it, 2),
+            round(without, 2),
+        )
+        found[f"cost_ratio_{form}_{name}"] = round(with_it / without, 2)
+    return found
+
+
+def draw(folder: Path) -> None:
+    """A ponytail on the built-in head in soft hair: its style, and 2 s later without and with."""
+    from _ponytail import ponytail
+
+    from hairloom.addon.blender.base import images
+    from hairloom.addon.blender.colliders.fields import field_of
+    from hairloom.addon.blender.pictures.studio import FIELD_OF_VIEW, Studio
+    from hairloom.addon.blender.properties.groom_settings import GroomSettings
+    from hairloom.addon.blender.sessions.numpy_solver import NumpySolver
+    from hairloom.addon.blender.sessions.prepared_groom import prepared
+    from hairloom.addon.refine.settings import DetailSettings
+    from hairloom.addon.render.frame import frame_camera
+    from hairloom.addon.shading.ambient_settings import AmbientSettings
+
+    hair = ponytail(8000)
+    settings = GroomSettings().with_settings(DetailSettings(lod_height=0.0))
+    studio = Studio(prepared(hair.rig, AmbientSettings()), settings, look=hair.bust.look("light"))
+    points = hair.rig.strands.points
+    box = points.min(axis=0) - 0.03, points.max(axis=0) + 0.03
+    camera = frame_camera(box, (-0.9, 0.9, 0.25), FIELD_OF_VIEW, 480 / 600)
+    collider = field_of(hair.bust.surface, DynamicsSettings(), place="head")
+    still = np.eye(4)
+    pictures = [studio.picture(hair.pose(still), points, 480, 600, 2, camera)]
+    for volume in (0.0, VOLUME):
+        solver = NumpySolver(hair.rig)
+        for _ in range(round(SECONDS * FPS)):
+            posed = (PosedCollider(collider, still, still),)
+            soft = DynamicsSettings(volume=volume, **SOFT)
+            solver.advance(hair.pose(still), posed, soft, GRAVITY, 1.0 / FPS)
+        pictures.append(studio.picture(hair.pose(still), solver.strands(), 480, 600, 2, camera))
+    images.write_png(folder / "among.png", images.contact_sheet(pictures, 3))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
