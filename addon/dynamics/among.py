@@ -31,7 +31,7 @@ from ..arrays import Floats, Ints
 from .settings import DynamicsSettings
 
 #: How often hair feels other hair, nearly: a whole number of substeps apart [1/s].
-FELT_PER_SECOND = 36.0
+FELT_PER_SECOND = 60.0
 #: The whole numbers of a cell: what a CV of a mean guide weighs, at most; a cell of motion in a
 #: substep, and how many cells count.
 MASS, HEAVIEST, MOTION, FASTEST = 16, 127, 1024, 4
@@ -42,16 +42,16 @@ CROWD, ROOM, FINEST, COARSEST, SIDE = 16, 2, 1.0 / 25.0, 1.0 / 8.0, 64
 #: Where a grid begins, in cells: nothing that is symmetric lies on the border of cells.
 BEGIN = np.array([0.37, 0.41, 0.43])
 #: Densities that differ by less than this part count as equal: CVs go from cell to cell one by one.
-SLACK = 0.05
+SLACK = 0.04
 #: Where the median density at rest is more than a CV's own, it is crowded from this part of it on.
-THIN = 0.5
+THIN = 0.25
 #: At full volume: how far pressure and cohesion move a CV until hair feels again, where the
 #: density is twice what it was or nothing, in squared cells times the gradient of its logarithm;
 #: how far at most [cells]; and the rate at which friction takes differences of speed [1/s].
-PUSH, PULL, FARTHEST, RUBBING = 1.2, 0.1, 0.4, 8.0
+PUSH, PULL, FARTHEST, RUBBING = 1.4, 0.1, 0.4, 12.0
 #: CVs count where they are at this part of the time until hair feels again: locks meet before they have
 #: gone through each other.
-AHEAD = 0.5
+AHEAD = 0.75
 #: How many times more friction there is where the density is twice what it was: locks that meet stop.
 PRESSED = 15.0
 #: What divides nothing [cells' worth of hair].

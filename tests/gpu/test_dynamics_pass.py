@@ -367,7 +367,7 @@ def test_hair_among_hair_is_the_same_to_the_last_bit_every_time(make_pass: Any) 
 
 
 def test_what_hair_feels_goes_on_where_the_form_is_switched(make_pass: Any) -> None:
-    """Frames of 7 and 8 substeps, of which hair feels each fifth."""
+    """Frames of 7 and 8 substeps, of which hair feels each third."""
     scene = Bundle(FALLING, fps=24.0)
     state = mixed = scene.start()
     for frame, drive in enumerate(scene.drives(0.5)):

@@ -159,7 +159,9 @@ def test_it_comes_to_rest_under_its_weight():
     settings = DynamicsSettings(volume=1.0, **SOFT)
     state = played(tail(300), settings, 4.0)
     assert state.push.any()  # which bears it
-    assert np.abs(state.position - state.previous).max() / DT < 0.01
+    speed = np.linalg.norm(state.position - state.previous, axis=0) / DT
+    assert np.quantile(speed, 0.99) < 0.01
+    assert speed.max() < 0.05
 
 
 def test_locks_do_not_swing_through_each_other():
@@ -243,7 +245,7 @@ def test_turned_on_in_mid_play():
 
 def test_how_far_ahead():
     strength = Strength.of(DynamicsSettings(volume=0.5), DT)
-    assert strength.substeps == 5
-    assert strength.ahead == AHEAD * 5
+    assert strength.substeps == 3
+    assert strength.ahead == AHEAD * 3
     assert Strength.of(DynamicsSettings(), DT) is None
     assert isinstance(start(tail(4)).rest.hair_grid, HairGrid)
