@@ -1,8 +1,8 @@
-"""Hair among hair: whether it keeps its volume and its locks, does nothing at rest, and what it costs.
+"""Hair among hair: whether it keeps volume and locks, does nothing at rest, and what it costs.
 
-volume_kept          a ponytail in a style that bears nothing, 2 s below its tie: cells as wide as two
-                     strands are apart that it runs through, over those at rest; without: the same
-                     with Volume 0
+volume_kept          a ponytail in a style that bears nothing, 2 s below its tie: cells as wide as
+                     two strands are apart that it runs through, over those at rest; without: the
+                     same with Volume 0
 volume_kept_bent     the same over a shoulder, a capsule that comes under it in the first second
 rest_motion_mm       how much farther from its style hair at rest is after 10 s than with Volume 0
 crossing_percent     of two locks side by side that swing against each other, 1 m/s at the tips: how

@@ -47,9 +47,9 @@ void main()
   float ratio = found.x / rest.y;
   float over = clamp(ratio - (1.0 + {{among_slack}}), 0.0, 1.0);
   float under = clamp(rest.x / rest.y - ratio - {{among_slack}}, 0.0, 1.0);
-  vec3 way = gradient * ((under * among.strength.y - over * among.strength.x) / density);
-  way *= {{among_farthest}} / max(length(way), {{among_farthest}});
-  vec3 push = among.into_x.xyz * way.x + among.into_y.xyz * way.y + among.into_z.xyz * way.z;
+  vec3 shift = gradient * ((under * among.strength.y - over * among.strength.x) / density);
+  shift *= {{among_farthest}} / max(length(shift), {{among_farthest}});
+  vec3 push = among.into_x.xyz * shift.x + among.into_y.xyz * shift.y + among.into_z.xyz * shift.z;
   float rubbed = 1.0 - exp(-among.strength.z * (min(ratio, 1.0) + over * {{among_pressed}}));
   vec3 mean = found.yzw / (among.whole * density);
   before += (cv.motion - mean) * (rubbed / among.speed_ratio);

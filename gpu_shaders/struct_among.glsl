@@ -5,7 +5,7 @@ struct Among {
   vec4 into_x;      // xyz from the world to cells, w where the grid begins; so the next two
   vec4 into_y;
   vec4 into_z;
-  vec4 strength;    // x push, y pull, z friction, w from a way in cells to what a substep adds
+  vec4 strength;    // x push, y pull, z friction, w from a shift in cells to what a substep adds
   float speed_ratio;  // of this substep to the one before
   float whole;        // whole parts of a metre of motion
   float ahead;        // substeps of its motion ahead that a CV counts

@@ -1,9 +1,9 @@
 """Hair among hair: a grid of density and velocity around all guides of a groom.
 
     FELT_PER_SECOND times a second, before a substep:
-        deposit    each CV into the cell where it is: the strands that it stands for, and their motion
+        deposit    each CV into the cell where it is: what strands it stands for, and their motion
         look up    at each CV, of all others, smoothed: density, its gradient, mean motion
-        feel       pressure    from where it is denser than it was at rest, to where it is less dense
+        feel       pressure    out of where hair is denser than it was at rest
                    cohesion    back to the others, where it is less dense than it was at rest
                    friction    towards the mean motion
 
@@ -36,8 +36,8 @@ FELT_PER_SECOND = 60.0
 #: substep, and how many cells count.
 MASS, HEAVIEST, MOTION, FASTEST = 16, 127, 1024, 4
 #: A cell is as wide as it takes for a CV to have this many others in its own at rest, and for the
-#: grid to have at most so many cells for each CV, between these fractions of the hair's length. The
-#: grid has at most SIDE cells to a side.
+#: grid to have at most this many cells for each CV, between these fractions of the hair's length.
+#: The grid has at most SIDE cells to a side.
 CROWD, ROOM, FINEST, COARSEST, SIDE = 16, 2, 1.0 / 25.0, 1.0 / 8.0, 64
 #: Where a grid begins, in cells: nothing that is symmetric lies on the border of cells.
 BEGIN = np.array([0.37, 0.41, 0.43])
@@ -49,10 +49,11 @@ THIN = 0.25
 #: density is twice what it was or nothing, in squared cells times the gradient of its logarithm;
 #: how far at most [cells]; and the rate at which friction takes differences of speed [1/s].
 PUSH, PULL, FARTHEST, RUBBING = 1.4, 0.1, 0.4, 12.0
-#: CVs count where they are at this part of the time until hair feels again: locks meet before they have
-#: gone through each other.
+#: CVs count where they will be after this part of the time until hair feels again: locks meet
+#: before they have gone through each other.
 AHEAD = 0.75
-#: How many times more friction there is where the density is twice what it was: locks that meet stop.
+#: How many times more friction there is where the density is twice what it was: locks that meet
+#: stop.
 PRESSED = 15.0
 #: What divides nothing [cells' worth of hair].
 TINY = 1.0e-6
@@ -63,9 +64,9 @@ class HairGrid:
     """Where the hair of a groom was at rest.
 
     cell: how wide [m]. counts: (3,) of cells. middle: (3,) float64 world [m], of the roots.
-    mass: (guide_count,) whole float32, MASS for a guide that stands for as many strands as the mean.
+    mass: (guide_count,) whole float32, MASS for a guide that stands for as many strands as most.
     density: (cv_count, guide_count) float32 of the others at each CV.
-    full: the same, the density above which each CV is crowded, to which others compare.
+    full: the same, the density above which a CV is crowded; others are compared with it.
     """
 
     cell: float
@@ -116,9 +117,9 @@ class Place:
             BEGIN.astype(np.float32), points
         )
 
-    def out(self, ways: Floats, scale: float) -> Floats:
-        """Ways (3, ...) in cells, in the world [m], times the scale over the square of a cell."""
-        return _turned(self.into.T * np.float32(scale), ways)
+    def out(self, shifts: Floats, scale: float) -> Floats:
+        """Shifts (3, ...) in cells, in the world [m], times the scale over the square of a cell."""
+        return _turned(self.into.T * np.float32(scale), shifts)
 
 
 @dataclass(frozen=True)
@@ -139,7 +140,7 @@ class Strength:
         return AHEAD * self.substeps
 
     def scale(self, cell: float) -> float:
-        """From a way in cells until hair feels again to what each substep adds, see `Place.out`."""
+        """From a shift in cells until hair feels again to what a substep adds, see `Place.out`."""
         return cell * cell / self.substeps**2
 
     @classmethod
@@ -189,13 +190,13 @@ def feel(
     over = np.clip(ratio - np.float32(1.0 + SLACK), 0.0, 1.0)
     under = np.clip(grid.density / grid.full - ratio - np.float32(SLACK), 0.0, 1.0)
     amount = over * np.float32(-strength.push) + under * np.float32(strength.pull)
-    way = felt.gradient * (amount / np.maximum(felt.density, np.float32(TINY)))
-    far = np.sqrt((way * way).sum(axis=0))
-    way *= np.float32(FARTHEST) / np.maximum(far, np.float32(FARTHEST))
+    shift = felt.gradient * (amount / np.maximum(felt.density, np.float32(TINY)))
+    far = np.sqrt((shift * shift).sum(axis=0))
+    shift *= np.float32(FARTHEST) / np.maximum(far, np.float32(FARTHEST))
     rubbed = np.minimum(ratio, np.float32(1.0)) + over * np.float32(PRESSED)
     rubbed = np.float32(1.0) - np.exp(rubbed * np.float32(-strength.friction))
     taken = (motion - felt.motion) * rubbed
-    return taken, place.out(way, strength.scale(grid.cell))
+    return taken, place.out(shift, strength.scale(grid.cell))
 
 
 @dataclass(frozen=True)
@@ -224,8 +225,8 @@ class Felt:
         gradient = found[:, 4:].T - steep * mass
         moving = found[:, 1:4].T - across * own
         moving *= np.float32(grid.cell / MOTION) / np.maximum(density, np.float32(TINY))
-        ways = (rows.reshape(position.shape) for rows in (gradient, moving))
-        return cls(density.reshape(position.shape[1:]), *ways)
+        vectors = (rows.reshape(position.shape) for rows in (gradient, moving))
+        return cls(density.reshape(position.shape[1:]), *vectors)
 
 
 def own_part(part: Floats) -> tuple[Floats, Floats]:

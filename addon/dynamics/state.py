@@ -83,8 +83,8 @@ class DynamicsState:
     time_left: time [s] that has passed but is shorter than a substep, so not yet simulated.
     time: [s] simulated since the start; gusts depend on it.
     styles: what the last frame went by, so that the next need not turn and check it again.
-    push: (3, cv_count, guide_count) [m], what other hair adds to each CV in a substep until it is felt
-        again; None where it is to be felt at once.
+    push: (3, cv_count, guide_count) [m], what other hair adds to each CV in a substep until it is
+        felt again; None where it is to be felt at once.
     """
 
     position: Floats

@@ -16,8 +16,8 @@ and Rendering in the Nalu Demo", GPU Gems 2, chapter 23; Han and Harada 2012. `r
 the same, one CV after the other.
 
 Between two moments at which hair feels hair (`among`), and where it does not for the whole frame,
-guides are on their own. So they are advanced in blocks that fit into the cache; a guide's motion is the
-same to the last bit in any block.
+guides are on their own. So they are advanced in blocks that fit into the cache; a guide's motion is
+the same to the last bit in any block.
 
 Time that is shorter than a substep waits in the state for the next frame, so the result does not
 depend on the frame rate; `grid_at_frame_end` bridges it for drawing.
@@ -90,10 +90,10 @@ def advance(
             taken, push = frame.among.feel(position, previous)
             previous += taken
         for guides, block in zip(slices, blocks, strict=True):
-            own = (rows[:, :, guides].copy() for rows in (position, previous))
+            here, before = position[:, :, guides].copy(), previous[:, :, guides].copy()
             pushed = None if push is None else push[:, :, guides]
             position[:, :, guides], previous[:, :, guides] = _advance_block(
-                block, *own, pushed, frame, spans, poses, numbers
+                block, here, before, pushed, frame, spans, poses, numbers
             )
     time = state.time + count * dt
     return DynamicsState(position, previous, state.rest, dt, left, time, styles, push)

@@ -3,7 +3,8 @@
     hair_at_rest   RGBA32F in the layout of strand_layout.strand_rows: of each CV x its density at
                    rest, y that above which it is crowded, z its mass
     cell_sums      RGBA32F: of each cell x mass, yzw motion times mass, whole numbers
-    densities, gradients   RGBA32F: the same smoothed; xyz how the smoothed mass grows along each axis
+    densities      RGBA32F: the same smoothed
+    gradients      RGBA32F: xyz how the smoothed mass grows along each axis
 
 CVs are drawn as points that blending adds up, which needs no atomics. Sums are exact as long as
 they fit into the 24 bits of a float.
@@ -67,9 +68,7 @@ def feel_recipe(cv_count: int, pairs: str) -> ShaderRecipe:
         compute="among_feel.comp.glsl",
         structs=("struct_among.glsl",),
         blocks=(("Among", "among"),),
-        textures=tuple(
-            ("FLOAT_2D", name) for name in ("densities", "gradients", "hair_at_rest")
-        ),
+        textures=tuple(("FLOAT_2D", name) for name in ("densities", "gradients", "hair_at_rest")),
         images=(
             ("RGBA32F", "positions", "READ_WRITE"),
             (pairs, "previous_positions", "READ_WRITE"),
@@ -89,9 +88,7 @@ class AmongPass:
         self._textures: dict[str, Any] = {}
         self._target: Any = None
 
-    def feel(
-        self, among: Among, guides: dict[str, Any], speed_ratio: float, pairs: str
-    ) -> None:
+    def feel(self, among: Among, guides: dict[str, Any], speed_ratio: float, pairs: str) -> None:
         """Change the motion of guides, and what pushes them.
 
         Args:
@@ -117,7 +114,9 @@ class AmongPass:
             (feel_recipe(cv_count, pairs), (cv_count, guide_count)),
         ):
             shader = _bound(recipe, block, textures)
-            groups = [-(-side // group) for side, group in zip(size, recipe.group_size, strict=True)]
+            groups = [
+                -(-side // group) for side, group in zip(size, recipe.group_size, strict=True)
+            ]
             gpu.compute.dispatch(shader, *groups, 1)
         gpu.shader.unbind()
 

@@ -61,9 +61,9 @@ def feel_slowly(
         ratio = density / crowded[cv]
         over = min(max(ratio - 1.0 - SLACK, 0.0), 1.0)
         under = min(max(at_rest[cv] / crowded[cv] - ratio - SLACK, 0.0), 1.0)
-        way = gradient / density * (PULL * under - PUSH * over) * settings.volume
-        way *= min(FARTHEST / max(float(np.linalg.norm(way)), 1e-30), 1.0)
-        push[cv] = hair.turn @ way * grid.cell / substeps**2
+        shift = gradient / density * (PULL * under - PUSH * over) * settings.volume
+        shift *= min(FARTHEST / max(float(np.linalg.norm(shift)), 1e-30), 1.0)
+        push[cv] = hair.turn @ shift * grid.cell / substeps**2
         rate = RUBBING * settings.volume * (min(ratio, 1.0) + PRESSED * over)
         taken[cv] = (hair.motion[cv] - mean) * (1.0 - math.exp(-rate * substeps * dt))
     return taken, push
