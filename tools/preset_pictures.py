@@ -7,7 +7,6 @@ FOLDER gets looks.png, where each look is shown twice: in a studio's light, and 
 
 import importlib
 import sys
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,11 +18,10 @@ from extension_loader import PACKAGE, REPOSITORY, load_package
 LOOKS = REPOSITORY / "presets" / "looks"
 #: [pixels]; thumbnails are square
 THUMBNAIL, WIDTH, HEIGHT, SAMPLES = 192, 210, 250, 2
-STRANDS = 9000
-#: from behind the ear, where there is the most hair
-DIRECTION = (-0.9, 0.75, 0.35)
-NO_BACKDROP = (0.0, 0.0, 0.0, 0.0)
-BACKDROP = (0.045, 0.05, 0.058, 1.0)
+STRANDS = 20000
+#: of the hair, from the side of which there is more to see
+DIRECTION, MARGIN = (-0.75, -1.0, 0.25), 0.78
+BACKDROP = (0.045, 0.05, 0.058)
 #: of each channel of a thumbnail; few, so that a picture of hair stays a small file
 SHADES = 64
 
@@ -32,24 +30,26 @@ def of_addon(module: str) -> Any:
     return importlib.import_module(f"{PACKAGE}.addon.{module}")
 
 
-def wig() -> Any:
-    """A snapshot of shoulder-long hair on the built-in head."""
+def wig(strand_count: int = STRANDS) -> Any:
+    """Shoulder-long hair on the built-in head with its brows and lashes, made ready to move."""
     settings, pipeline = of_addon("parameters").ALL_SETTINGS, of_addon("pipeline")
-    grown = settings["grow"](strand_count=STRANDS, wave=0.006, wave_length=0.09, clump=0.25)
+    grown = settings["grow"](strand_count=strand_count)
     bust = of_addon("blender.scene.built_in_head").built_in_head()
-    head = bust.surface
-    grow = of_addon("groom.grow")
-    strands = grow.grow(head, grown, bust.weights["scalp"])
-    rig = pipeline.prepare(
-        strands, head, settings["guides"](), place="the built-in groom", widths="auto"
+    strands = of_addon("groom.face_hair").grow_with_face(bust.surface, grown, bust.weights)
+    return pipeline.prepare(
+        strands, bust.surface, settings["guides"](), place="the built-in groom", widths="auto"
     )
-    ambient = settings["ambient"]()
-    groom = of_addon("blender.sessions.prepared_groom").prepared(rig, ambient, with_occluders=False)
-    snapshot = of_addon("blender.sessions.snapshots").snapshot_of(groom)
-    return replace(
-        snapshot,
-        meshes=(of_addon("render.snapshot").MeshSnapshot.of(head, occlusion=groom.head_occlusion),),
-        detail=settings["detail"](lod_height=0.0),
+
+
+def studio_of(rig: Any, *settings: Any) -> Any:
+    """A studio for this hair, whose head has light skin."""
+    all_settings = of_addon("parameters").ALL_SETTINGS
+    return of_addon("blender.pictures.studio").Studio(
+        of_addon("blender.sessions.prepared_groom").prepared(rig, all_settings["ambient"]()),
+        of_addon("blender.properties.groom_settings").GroomSettings(
+            of_addon("params").SettingsMap(*settings, all_settings["detail"](lod_height=0.0))
+        ),
+        look=of_addon("blender.scene.built_in_head").built_in_head().look("light"),
     )
 
 
@@ -74,29 +74,34 @@ def main(folder: Path) -> None:
     gpu.init()
     load_package().register()
     frame, images = of_addon("render.frame"), of_addon("blender.base.images")
-    studio, lights = of_addon("blender.pictures.studio"), of_addon("shading.lights")
-    presets = of_addon("blender.properties.presets")
-    hair = wig()
-    points = hair.points
+    view = of_addon("blender.pictures.studio").FIELD_OF_VIEW
+    presets, rig = of_addon("blender.properties.presets"), wig()
+    studio, points = studio_of(rig), rig.strands.points
     box = points.min(axis=0), points.max(axis=0)
 
-    def picture(
-        look: Any, light: Any, size: tuple[int, int], room: float, backdrop: tuple[float, ...]
-    ) -> Any:
-        camera = frame.frame_camera(
-            box, DIRECTION, studio.FIELD_OF_VIEW, size[0] / size[1], margin=room
+    def picture(width: int, height: int, lights: Any = None) -> Any:
+        camera = frame.frame_camera(box, DIRECTION, view, width / height, margin=MARGIN)
+        return studio.picture(
+            *(rig.rest_pose, points, width, height, SAMPLES),
+            camera=camera,
+            lights=None if lights is None else lights(camera.view),
+            is_transparent=True,
         )
-        lit = replace(hair, shading=look, lights=light(camera.view))
-        return frame.render_image(lit, camera, *size, SAMPLES, background=backdrop)
 
-    sheet = []
+    studio_stage, dark = (
+        presets.named_preset(f"stage/{n}").settings for n in ("studio", "dramatic")
+    )
+    sheet, stages = [], ((studio_stage, None), (dark, against))
     for path in sorted(LOOKS.glob("*.json")):
         look = presets.named_preset(f"looks/{path.stem}").settings
-        square = (THUMBNAIL, THUMBNAIL)
-        thumbnail = picture(look, lights.three_point_lights, square, 0.75, NO_BACKDROP)
-        images.write_png(path.with_suffix(".png"), coarse(thumbnail))
-        for light in (lights.three_point_lights, against):
-            sheet.append(picture(look, light, (WIDTH, HEIGHT), 0.75, BACKDROP))
+        for stage, lights in stages:
+            studio.settings = studio.settings.with_settings(look, stage)
+            if lights is None:
+                images.write_png(path.with_suffix(".png"), coarse(picture(THUMBNAIL, THUMBNAIL)))
+            shown = picture(WIDTH, HEIGHT, lights)
+            shown[..., :3] += BACKDROP * (1.0 - shown[..., 3:])
+            shown[..., 3] = 1.0
+            sheet.append(shown)
         print(f"Drew {path.stem}", flush=True)
     images.write_png(folder / "looks.png", images.contact_sheet(sheet, 6))
 

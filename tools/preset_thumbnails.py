@@ -14,7 +14,7 @@ import bpy  # noqa: F401  it must come before gpu, which lives inside it
 import gpu
 import numpy as np
 from extension_loader import REPOSITORY, load_package
-from preset_pictures import THUMBNAIL, coarse, of_addon
+from preset_pictures import THUMBNAIL, coarse, of_addon, studio_of, wig
 
 PRESETS, SAMPLES = REPOSITORY / "presets", 2
 #: all hair is blond here: it shows shadows best
@@ -24,18 +24,6 @@ TURN, TURNING, FRAMES, DURATION = np.radians(70.0), 8, 13, 1.0 / 24.0
 #: enough for a picture of this size
 ATLAS = "1024"
 GRAVITY = np.array([0.0, 0.0, -9.81])
-
-
-def wig() -> Any:
-    """Shoulder-long hair on the built-in head, made ready to move."""
-    settings, pipeline = of_addon("parameters").ALL_SETTINGS, of_addon("pipeline")
-    grown = settings["grow"](strand_count=STRANDS)
-    bust = of_addon("blender.scene.built_in_head").built_in_head()
-    head = bust.surface
-    strands = of_addon("groom.face_hair").grow_with_face(head, grown, bust.weights)
-    return pipeline.prepare(
-        strands, head, settings["guides"](), place="the built-in groom", widths="auto"
-    )
 
 
 def turned(rig: Any, angle: float) -> Any:
@@ -62,21 +50,10 @@ def main(folder: Path) -> None:
     gpu.init()
     load_package().register()
     presets = of_addon("blender.properties.presets")
-    settings, studio_of = of_addon("parameters").ALL_SETTINGS, of_addon("blender.pictures.studio")
+    settings, rig = of_addon("parameters").ALL_SETTINGS, wig(STRANDS)
     images = of_addon("blender.base.images")
-    rig, ambient = wig(), settings["ambient"]()
-    shading = presets.named_preset(LOOK).settings
-    plain = of_addon("blender.properties.groom_settings").GroomSettings(
-        of_addon("params").SettingsMap(
-            shading,
-            settings["detail"](lod_height=0.0),
-        )
-    )
-    studio = studio_of.Studio(
-        of_addon("blender.sessions.prepared_groom").prepared(rig, ambient),
-        plain,
-        look=of_addon("blender.scene.built_in_head").built_in_head().look("light"),
-    )
+    studio = studio_of(rig, presets.named_preset(LOOK).settings)
+    plain = studio.settings
 
     def look_and_motion(preset: Any) -> tuple[Any, tuple[Any, Any]]:
         at_rest = rig.rest_pose, rig.strands.points
