@@ -244,7 +244,7 @@ class StrandPass:
         is_marschner, maps = snapshot.shading.model == "marschner", self.opacity(snapshot)
         if is_marschner:
             yield marschner_feature(snapshot)
-        if is_marschner and "cv_openness" in self._textures:
+        if "cv_openness" in self._textures:
             yield self._openness_feature()
         if maps is None:
             return
@@ -317,7 +317,8 @@ class StrandPass:
             sources = (snapshot.color, snapshot.group, layout, chosen)
             self._take("cv_colors", sources, partial(_colors_texture, snapshot))
         openness = snapshot.openness
-        if not snapshot.has_world or openness is None:
+        # Kajiya-Kay's model takes the world by ambient occlusion alone
+        if not snapshot.has_world or look.model != "marschner" or openness is None:
             self._drop("cv_openness")
         else:
             pixels = partial(layout.pixels, openness)

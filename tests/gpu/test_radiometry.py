@@ -106,10 +106,11 @@ def test_sun(cycles: Any) -> None:
     import bpy
 
     sun = bpy.data.lights.new("Sun", "SUN")
-    sun.energy, sun.color, sun.angle = 2.5, (1.0, 0.6, 0.3), 0.0
+    sun.energy, sun.color, sun.angle = 2.5, (1.0, 0.6, 0.3), 0.02
     tilt = np.radians(35.0)
     theirs, read = cycles(sun, (0.0, 0.0, 5.0), (0.0, tilt, 0.0))
     light = Light.sun((-np.sin(tilt), 0.0, -np.cos(tilt)), (1.0, 0.6, 0.3), 2.5)
+    assert read.angle == pytest.approx(0.02)
     assert ours(light)[INNER] == pytest.approx(theirs[INNER], rel=0.005)
     assert ours(read)[INNER] == pytest.approx(theirs[INNER], rel=0.005)
 

@@ -7,7 +7,7 @@ import pytest
 
 from hairloom.addon.render.light_samples import disk_place, lights_at
 from hairloom.addon.shading.area_lights import Panel
-from hairloom.addon.shading.lights import Light, light_at
+from hairloom.addon.shading.lights import Light, light_at, light_irradiance
 
 WHITE = (1.0, 1.0, 1.0)
 AXES = (1.0, 0.0, 0.0), (0.0, 0.6, 0.8), (0.0, 0.8, -0.6)
@@ -45,6 +45,13 @@ def test_the_first_sample_is_the_middle() -> None:
     for name, light in LIGHTS.items():
         (first,) = lights_at((light,), 0, np.zeros(3))
         assert first.vector == pytest.approx(light.vector), name
+
+
+def test_every_point_of_a_lamp_gives_the_hair_as_much() -> None:
+    light, hair = LIGHTS["lamp"], np.zeros((1, 3))
+    for sample in range(8):
+        (part,) = lights_at((light,), sample, hair[0])
+        assert light_irradiance(part, hair) == pytest.approx(light_irradiance(light, hair))
 
 
 def test_a_sun_fills_its_angle() -> None:

@@ -97,6 +97,9 @@ def test_a_bright_disk_is_a_sun(degrees: float) -> None:
     assert sun.power == pytest.approx(color * angle, rel=0.02)
     assert found.ambient == pytest.approx(0.2 * WHITE, rel=0.05)
     assert sun.of_world and sun.casts_shadow
+    # as wide as the pixels that it covers; a single one is a point
+    width = 2.0 * np.arccos(1.0 - angle / (2.0 * np.pi))
+    assert sun.angle == pytest.approx(width if is_sun.sum() > 1 else 0.0, rel=0.15)
 
 
 def test_no_light_is_lost_between_suns_and_the_rest() -> None:
