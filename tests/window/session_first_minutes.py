@@ -169,10 +169,8 @@ def a_menu_under_the_mouse():
 
 def a_key_of_ones_own():
     """The shortcut that is suggested for Preview gets a key, and the key presses the button."""
-    keymap = bpy.context.window_manager.keyconfigs.user.keymaps["3D View"]
-    (item,) = (each for each in keymap.keymap_items if each.idname == "hairloom.preview")
-    assert item.type == "NONE", "Hairloom takes a key that nobody gave it"
-    item.type = "F19"
+    assert preview_key().type == "NONE", "Hairloom takes a key that nobody gave it"
+    preview_key().type = "F19"
     count = len(live().sessions())
     view = region("WINDOW")
     x, y = view.x + view.width // 2, view.y + view.height // 2
@@ -183,7 +181,14 @@ def a_key_of_ones_own():
     yield from press("F19", x, y)
     yield from until(lambda: len(live().sessions()) == count, "the key works once")
     yield from hair_is_made()
-    item.type = "NONE"
+    preview_key().type = "NONE"
+
+
+def preview_key():
+    """The item of the keymap, looked up anew: Blender makes other items when it merges keymaps."""
+    keymap = bpy.context.window_manager.keyconfigs.user.keymaps["3D View"]
+    (item,) = (each for each in keymap.keymap_items if each.idname == "hairloom.preview")
+    return item
 
 
 def a_warning_mends():
