@@ -108,9 +108,14 @@ def _moved(
     of_root = order[np.searchsorted(number[order], come)]
     triangle, barycentric = roots.triangle[of_root], roots.barycentric[of_root]
     frames = root_frames(head.positions, head.triangles, triangle, barycentric)
+    assert rig.grown is not None
+    before = rig.grown.growth.fineness[rig.grown.kept[strand - own]]
+    finer = np.ones(strands.strand_count, np.float32)
+    finer[strand] = grown.growth.fineness[come] / before
     moved = replace(
         strands,
         points=points,
+        radius=strands.radius * np.repeat(finer, strands.point_counts),
         root_triangle=_with(strands.root_triangle, strand, triangle),
         root_barycentric=_with(strands.root_barycentric, strand, barycentric),
     )

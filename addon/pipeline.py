@@ -294,7 +294,9 @@ def prepare(
     else:
         if children is not None and children.method != "none":
             rig = _with_children(rig, children, ground, place)
-        strands, found = with_widths(rig.strands, widths, number=_numbers(rig), kept=kept)
+        strands, found = with_widths(
+            rig.strands, widths, number=_numbers(rig), fineness=_fineness(rig), kept=kept
+        )
         rig = replace(rig, strands=strands, widths=found)
     if holds is None:
         return rig
@@ -320,6 +322,13 @@ def _numbers(rig: Rig) -> Ints | None:
     if rig.grown is None or rig.own_count is None:
         return None
     return np.concatenate([np.arange(rig.own_count), rig.own_count + rig.grown.kept])
+
+
+def _fineness(rig: Rig) -> Floats | None:
+    """How wide each strand is in terms of the hair around it, (strand_count,); None: as that."""
+    if rig.grown is None or rig.own_count is None:
+        return None
+    return np.append(np.ones(rig.own_count), rig.grown.growth.fineness[rig.grown.kept])
 
 
 def _lost_length(strands: StrandSet, own: StrandSet) -> tuple[str, ...]:

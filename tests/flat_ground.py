@@ -12,7 +12,13 @@ from hairloom.addon.groom.roots import bind_roots
 from hairloom.addon.strands import StrandSet, Surface
 
 #: mixed, and nothing else
-PLAIN: dict[str, Any] = {"method": "multi", "length_variation": 0.0, "clump": 0.0, "frizz": 0.0}
+PLAIN: dict[str, Any] = {
+    "method": "multi",
+    "length_variation": 0.0,
+    "clump": 0.0,
+    "frizz": 0.0,
+    "baby_hair": 0.0,
+}
 
 
 def settings(**values: Any) -> ChildrenSettings:

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from ..arrays import Floats, Ints
+from ..arrays import Bools, Floats, Ints
 from ..params.curve import along
 from ..strands.arc_length import first_as_far
 from ..strands.catmull_rom import even_places, evenly_on_curve, on_curve
@@ -26,7 +26,9 @@ _SHORTEST = 0.001
 #: Random numbers of a child's own, beside that of its place (`children`).
 _LENGTH, _WAVES = 2, 3
 #: Those up to 4 have part in where children grow, too: fly-aways would be in patches by these.
-_STRAYS, _STRAY_WAVES, _CURLS = 5, 6, 7
+_STRAYS, _STRAY_WAVES, _CURLS, _BABIES, _BABY_LENGTHS = 5, 6, 7, 8, 9
+#: Parts of the length of others that baby hair has.
+_SHORTEST_BABY, _LONGEST_BABY = 0.04, 0.3
 #: How far fly-aways turn from their path at their tips, as a tangent: of the calmest and the
 #: wildest; and waves along one of them, which is as low as stray hair's are.
 _CALM, _WILD, _STRAY_TURNS = 0.2, 0.55, 0.8
@@ -55,19 +57,33 @@ def mixed(root: Floats, guide_grid: Floats, weights: GuideWeights) -> Floats:
     return grid.reshape(len(grid), cv_count, 3)
 
 
-def shorten(grid: Floats, key: Ints, settings: ChildrenSettings, painted: Floats) -> None:
+def babies(key: Ints, settings: ChildrenSettings, border: Floats) -> Bools:
+    """Which children are baby hair, (child_count,): more of them than before are those and others.
+
+    Args:
+        key: (child_count,) what is random about each depends on.
+        border: (child_count,) how near each is to where the hair ends, 0 to 1.
+    """
+    return np.asarray(uniform(key, _BABIES) < settings.baby_hair * border**2)
+
+
+def shorten(
+    grid: Floats, key: Ints, settings: ChildrenSettings, painted: Floats, is_baby: Bools
+) -> None:
     """Cut each strand to its length along its curve, in place, and space its CVs as before.
 
     Args:
         grid: (child_count, cv_count, 3) float32 [m].
         key: (child_count,) what is random about each depends on.
         painted: (child_count,) by which lengths are multiplied.
+        is_baby: (child_count,) see `babies`.
     """
     whole = settings.length * painted
-    if not settings.length_variation and (whole >= 1.0).all():
+    if not settings.length_variation and (whole >= 1.0).all() and not is_baby.any():
         return
     kept = whole * (1.0 - settings.length_variation * uniform(key, _LENGTH))
-    kept = np.clip(kept, _SHORTEST, 1.0)
+    of_babies = _LONGEST_BABY * (_SHORTEST_BABY / _LONGEST_BABY) ** uniform(key, _BABY_LENGTHS)
+    kept = np.clip(np.where(is_baby, of_babies * kept, kept), _SHORTEST, 1.0)
     for start in range(0, len(grid), _CHUNK):
         chunk = slice(start, start + _CHUNK)
         grid[chunk] = _cut(grid[chunk], kept[chunk])
@@ -121,8 +137,9 @@ def frizz(
                 grid[chunk, :, axis] += swing * part[:, None]
 
 
-def stray(grid: Floats, key: Ints, settings: ChildrenSettings) -> None:
-    """Let some strands wander off their path, in place; roots and lengths stay.
+def stray(grid: Floats, key: Ints, settings: ChildrenSettings, is_baby: Bools) -> None:
+    """Let some strands wander off their path, in place, and all baby hair as the calmest of them;
+    roots and lengths stay.
 
     Each segment turns from its direction towards a vector across it that wanders slowly along the
     strand and grows to its tip. More fly-aways are those of fewer and others.
@@ -130,10 +147,11 @@ def stray(grid: Floats, key: Ints, settings: ChildrenSettings) -> None:
     Args:
         grid: (child_count, cv_count, 3) float32 [m].
         key: (child_count,) what is random about each depends on.
+        is_baby: (child_count,) see `babies`.
     """
-    if not settings.fly_aways:
+    if not settings.fly_aways and not is_baby.any():
         return
-    strayed = np.flatnonzero(uniform(key, _STRAYS) < settings.fly_aways)
+    strayed = np.flatnonzero((uniform(key, _STRAYS) < settings.fly_aways) | is_baby)
     along = np.linspace(0.0, 1.0, grid.shape[1])[1:, None]
     for start in range(0, len(strayed), _CHUNK):
         chunk = strayed[start : start + _CHUNK]
@@ -143,7 +161,8 @@ def stray(grid: Floats, key: Ints, settings: ChildrenSettings) -> None:
         swing = np.sin(_TURN * (_STRAY_TURNS * along + own[:, None, 5:6]))
         aside = _on_sphere(own[:, 0], own[:, 1])[:, None]
         aside = aside + swing * _on_sphere(own[:, 2], own[:, 3])[:, None]
-        wildness = _CALM + (_WILD - _CALM) * own[:, None, 4:5]
+        wild = np.where(is_baby[chunk], 0.0, own[:, 4])[:, None, None]
+        wildness = _CALM + (_WILD - _CALM) * wild
         direction = unit(step)
         aside = aside - direction * dot(aside, direction)[..., None]
         turned = size * unit(direction + wildness * along * aside)

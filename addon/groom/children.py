@@ -24,9 +24,10 @@ from ..strands.nearest import nearest_points
 from ..strands.needed_points import MAX_POINTS
 from .child_clumps import Clumps, clump, clump_again
 from .child_roots import ChildRoots, child_roots
-from .child_shape import curl_points, curled, frizz, mixed, shorten, stray
+from .child_shape import babies, curl_points, curled, frizz, mixed, shorten, stray
 from .children_settings import ChildrenSettings
 from .counter_random import named, normal
+from .hairline import nearness_to_border
 from .masks import NO_MASKS, Factors, Masks
 from .partings import Partings
 from .weights import GUIDES_PER_STRAND, GuideWeights, child_weights, nearest_before
@@ -37,6 +38,8 @@ CHILD_POINTS, FEWEST_CHILD_POINTS = 12_000_000, 16
 _NEIGHBOUR = 3
 #: Random numbers of where a child takes its shape from; those of its shape are in `child_shape`.
 _PLACE = 0
+#: How wide baby hair is, in terms of the hair around it.
+_BABY_WIDTH = 0.5
 
 
 @dataclass(frozen=True)
@@ -62,6 +65,7 @@ class Growth:
     partings: which they grew beside; None: none.
     cv_count: of the children, more than their guides' where they curl.
     masks, factors: what was painted, and what that is at each child.
+    guide_border, border: (guide_count,) and (child_count,), how near each is to where guides end.
     """
 
     root: Floats
@@ -74,6 +78,8 @@ class Growth:
     cv_count: int
     masks: Masks
     factors: Factors
+    guide_border: Floats
+    border: Floats
 
     def varied(self, grid: Floats, chosen: Ints) -> Floats:
         """With what is each child's own, (n, cv_count, 3) float32 [m].
@@ -82,13 +88,20 @@ class Growth:
             grid: (n, guides' cv_count, 3) float32 [m], clumped, which is changed. chosen: (n,).
         """
         key, settings, factors = self.key[chosen], self.settings, self.factors.take(chosen)
-        shorten(grid, key, settings, factors["length"])
-        stray(grid, key, settings)
+        is_baby = babies(key, settings, self.border[chosen])
+        shorten(grid, key, settings, factors["length"], is_baby)
+        stray(grid, key, settings, is_baby)
         if settings.curl:
             lock = self.key[self.clumps.outermost()[chosen]]
             grid = curled(grid, lock, settings, self.size, self.cv_count, factors["curl"])
         frizz(grid, key, settings, self.size, factors["frizz"])
         return grid
+
+    @property
+    def fineness(self) -> Floats:
+        """How wide each is in terms of the hair around it, (child_count,)."""
+        is_baby = babies(self.key, self.settings, self.border)
+        return np.where(is_baby, np.float32(_BABY_WIDTH), np.float32(1.0))
 
     def touched(self, guides: Bools) -> Bools:
         """Children (child_count,) whose shapes these guides (guide_count,) have a part in."""
@@ -140,6 +153,7 @@ class Growth:
             factors=self.factors.and_also(
                 self.masks.at(surface, roots.triangle, roots.barycentric)
             ),
+            border=np.concatenate([self.border, _border(self.guide_border, weights)]),
         )
 
 
@@ -182,6 +196,7 @@ def make_children(
     size = typical(guides.lengths())
     needed = max(curl_points(float(guides.lengths().max()), settings, size), grid.shape[1])
     cv_count = max(min(needed, _room(settings)), grid.shape[1])
+    guide_border = nearness_to_border(guides.roots, guides.roots, kept, "border")
     growth = Growth(
         roots.point,
         roots.key,
@@ -193,6 +208,8 @@ def make_children(
         cv_count,
         masks,
         factors,
+        guide_border,
+        _border(guide_border, weights),
     )
 
     def varied(some: Ints) -> tuple[Floats]:
@@ -200,11 +217,13 @@ def make_children(
 
     fixed = replace(settings, strand_count=ChildrenSettings().strand_count), size, cv_count
     lock = roots.key[clumps.outermost()] if settings.curl else roots.key
-    (shaped,) = kept.rows("varied", fixed, (grid, roots.key, lock, *factors.rows), varied)
+    (shaped,) = kept.rows(
+        "varied", fixed, (grid, roots.key, lock, growth.border, *factors.rows), varied
+    )
     strands = StrandSet(
         points=shaped.reshape(-1, 3),
         offsets=np.arange(len(shaped) + 1) * cv_count,
-        radius=_by_points(_radius(guides, weights, settings), cv_count).ravel(),
+        radius=_by_points(_radius(guides, growth), cv_count).ravel(),
         group=group,
         root_uv=_root_uv(roots, surface),
         root_triangle=roots.triangle,
@@ -266,13 +285,20 @@ def _scattered(roots: ChildRoots, guide_root: Floats, settings: ChildrenSettings
     return roots.point + np.float32(reach) * normal(named(roots.key[:, None], np.arange(3)), _PLACE)
 
 
-def _radius(guides: StrandSet, weights: GuideWeights, settings: ChildrenSettings) -> Floats:
-    """Mixed as the points are, (child_count, guides' cv_count) [m]."""
+def _border(guide_border: Floats, weights: GuideWeights) -> Floats:
+    """How near children are to where their guides end, as these are, (child_count,) float32."""
+    border: Floats = (guide_border[weights.guide] * weights.weight).sum(axis=1, dtype=np.float32)
+    return border
+
+
+def _radius(guides: StrandSet, growth: Growth) -> Floats:
+    """Mixed as the points are, (child_count, guides' cv_count) [m]; baby hair is finer."""
+    settings, weights = growth.settings, growth.weights
     own = guides.radius.reshape(guides.strand_count, -1) * np.float32(settings.width)
     total = np.zeros((len(weights.guide), own.shape[1]), np.float32)
     for guide, weight in zip(weights.guide.T, weights.weight.T, strict=True):
         total += own[guide] * weight[:, None]
-    return total
+    return total * growth.fineness[:, None]
 
 
 def _color(guides: StrandSet, weights: GuideWeights, cv_count: int) -> Floats | None:

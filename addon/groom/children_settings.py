@@ -147,6 +147,16 @@ class ChildrenSettings(Settings):
         hard=(0.0, 1.0),
         shown_when=when("children.method", "multi", "single"),
     )
+    baby_hair: float = number(
+        0.8,
+        label="Baby Hair",
+        description="Fraction of the children that are short and fine at the very border of the "
+        "hair; further inside there are ever fewer",
+        unit="factor",
+        soft=(0.0, 1.0),
+        hard=(0.0, 1.0),
+        shown_when=when("children.method", "multi", "single", "auto"),
+    )
     curl: float = number(
         0.0,
         label="Curl",

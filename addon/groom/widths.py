@@ -21,6 +21,7 @@ from ..strands import StrandSet
 from ..strands.face import is_face_hair
 from ..strands.kept import NOTHING_KEPT, Kept
 from ..strands.nearest import nearest_points
+from .hairline import nearness_to_border
 
 #: of a head: how many hairs, and the width of one in terms of the root of the area they grow on.
 _HAIRS, _HAIR = 120_000, 0.08 / 245.0
@@ -51,6 +52,8 @@ _ALONE = 1.0 / 500.0
 _TOO_THIN, _TOO_WIDE, _TOO_NEAR = 0.25, 2.0, 0.5
 #: Strands whose neighbours are looked at, and how many neighbours.
 _SAMPLES, _NEIGHBOURS = 1500, 8
+#: Where hair ends it is finer by this part.
+_FINER = 0.4
 #: Narrowest and widest of a groom's strands in terms of the median.
 _LEAST, _MOST = 0.5, 2.0
 
@@ -109,6 +112,7 @@ def with_widths(
     parts: float = 1.0,
     *,
     number: Ints | None = None,
+    fineness: Floats | None = None,
     kept: Kept = NOTHING_KEPT,
 ) -> tuple[StrandSet, Widths]:
     """The strands as wide as `METHODS` says, all in one space.
@@ -117,6 +121,7 @@ def with_widths(
         parts: how many strands are drawn for each of these, itself included.
         number: (strand_count,) ascending, which they are of all that there might be: which of them
             are measured hardly changes where one is left out. None: all.
+        fineness: (strand_count,) by which widths that are found are multiplied; None: by 1.
         kept: of the strands that were measured last.
     """
     if not strands.strand_count:
@@ -132,7 +137,8 @@ def with_widths(
         return strands, Widths(False, median)
     if not found.spacing:
         reason = "from their lengths alone, since there is no space between them"
-    radius = np.repeat(0.5 * found.width, strands.point_counts)
+    width = found.width if fineness is None else found.width * fineness
+    radius = np.repeat(0.5 * width, strands.point_counts)
     median = float(np.median(found.width))
     widths = Widths(True, median, found.hairs, found.extinction, reason, found.spacing)
     return replace(strands, radius=radius, has_widths=True), widths
@@ -190,6 +196,7 @@ class _Hair:
     """What decides about widths; all (strand_count,) [m].
 
     apart: how far strands are from their neighbours, at their roots or further out.
+    border: how near they are to where the hair ends, 0 to 1.
     typical: lengths without extremes. of_head, of_layers: the width that gives the cover of a
     head, and some layers of hair. widest: as wide as a strand may be.
     middle: the median of `apart`; 0 if all strands are in one place, and the rest does not count.
@@ -199,6 +206,7 @@ class _Hair:
     typical: Floats
     apart: Floats
     at_roots: Floats
+    border: Floats
     middle: float
 
     @classmethod
@@ -220,6 +228,10 @@ class _Hair:
         def spacing(at: Ints, where: str) -> Floats:
             return _spacing(strands.points[at], chosen, kept, f"{name}, {where}")
 
+        roots = strands.roots
+        border = nearness_to_border(roots[chosen], roots, kept, f"{name}, border")
+        border = _spread(border, roots, chosen, kept, f"{name}, border of all")
+
         length = strands.lengths()
         first, last = strands.offsets[:-1], strands.offsets[1:] - 1
         at_roots = spacing(first, "roots")
@@ -228,8 +240,11 @@ class _Hair:
         apart = np.maximum(at_roots, beyond)
         typical = np.clip(length, *np.percentile(length, (25, 95)))
         # where most roots coincide, as in tufts, they do not tell how the hair is spread
-        roots = _evened(at_roots if np.median(at_roots) else apart)
-        return cls(length, typical, _evened(apart), roots, float(np.median(apart)))
+        at_roots = _evened(at_roots if np.median(at_roots) else apart)
+        # neighbours are on one side alone, and half of the square that they suggest is bare
+        at_roots *= np.sqrt(1.0 - 0.5 * border)
+        middle = float(np.median(apart))
+        return cls(length, typical, _evened(apart), at_roots, border, middle)
 
     @property
     def is_long(self) -> bool:
@@ -295,7 +310,7 @@ def _found_of(hair: _Hair, parts: float = 1.0) -> _Found:
         np.minimum(of_head, _OF_SPACING * hair.at_roots / closer),
         np.minimum(of_layers, _OF_SPACING * hair.apart),
     )
-    width = np.minimum(width, _OF_LENGTH * hair.typical)
+    width = np.minimum(width, _OF_LENGTH * hair.typical) * (1.0 - _FINER * hair.border)
     wanted = np.maximum(np.maximum(of_head, of_layers), width)
     length = hair.length
     extinction = min(float((wanted * length).sum() / (width * length).sum()), _MAX_EXTINCTION)
@@ -326,11 +341,17 @@ def _spacing(places: Floats, chosen: Ints, kept: Kept, name: str) -> Floats:
     reach = kept.nearest(f"{name}, reach", measured, places, neighbours + 1)[1][:, -1]
     count = min(_NEIGHBOURS, len(chosen))
     around, _ = kept.nearest(f"{name}, around", measured, measured, count)
-    spacing: Floats = np.median((np.sqrt(np.pi / neighbours) * reach)[around], axis=1)
+    spacing = np.median((np.sqrt(np.pi / neighbours) * reach)[around], axis=1)
+    return _spread(spacing, places, chosen, kept, f"{name}, all")
+
+
+def _spread(values: Floats, places: Floats, chosen: Ints, kept: Kept, name: str) -> Floats:
+    """Values of the chosen places, at all places those of the nearest of these."""
     if len(chosen) == len(places):
-        return spacing
-    near, _ = kept.nearest(f"{name}, all", places, measured, 1)
-    return spacing[near[:, 0]]
+        return values
+    near, _ = kept.nearest(name, places, places[chosen], 1)
+    spread: Floats = values[near[:, 0]]
+    return spread
 
 
 def _is_row(roots: Floats) -> bool:

@@ -155,13 +155,13 @@ def test_no_unit_of_length_is_assumed(factor: float) -> None:
 
 
 def test_children_are_as_straight_as_their_curves() -> None:
-    """Short hair does not get the frizz of a head of hair."""
+    """Short hair does not get the frizz of a head of hair, and baby hair bends but a little."""
     rig = rig_of(fur(32, 0.05), sheet())
     assert rig.child_count > 0
     grid = rig.strands.grid.astype(np.float64)
     chord = np.linalg.norm(grid[:, -1] - grid[:, 0], axis=1)
     length = np.linalg.norm(np.diff(grid, axis=1), axis=2).sum(axis=1)
-    assert (chord / length).min() > 0.98 and length.max() < 1.02 * 0.05
+    assert (chord / length).min() > 0.96 and length.max() < 1.02 * 0.05
 
 
 def test_a_row_of_lashes_is_left_alone() -> None:

@@ -48,6 +48,7 @@ def test_more_children_move_none(
     """Bit for bit, over the count at which clumps get clumps of their own."""
     density = np.maximum(egg.positions[:, 2], 0.0) if is_painted else None
     values = {"clump": 0.8, "clump_size": 5, "frizz": 0.002, "length_variation": 0.3}
+    values |= {"baby_hair": 0.7}
 
     def children(count: int) -> Children:
         chosen = settings(method=way, strand_count=count, **values)

@@ -25,6 +25,7 @@ BOLD = ChildrenSettings(
     frizz=0.05,
     length=0.6,
     length_variation=0.0,
+    baby_hair=0.0,
 )
 #: those that shape what has no curls, and so keep their point counts
 STRAIGHT = [name for name in MASKS if name != "curl"]
