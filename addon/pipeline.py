@@ -15,6 +15,7 @@ import numpy as np
 from .arrays import Bools, Floats, Ints
 from .dynamics.clearance import GuideClearance, farthest_kept, guide_clearance
 from .dynamics.colliders import DistanceField, PosedCollider
+from .dynamics.force_fields import NO_FIELDS, ForceFields
 from .dynamics.held import Held
 from .dynamics.settings import DynamicsSettings
 from .dynamics.state import DynamicsState, start
@@ -68,7 +69,6 @@ from .strands.resample import resample
 from .strands.root_motions import RootMotions
 from .strands.vectors import dot
 
-NO_WIND = np.zeros(3)
 #: Of children that cannot be led out of the head, the part from which on a note says so.
 MANY_INSIDE = 0.01
 
@@ -222,7 +222,7 @@ class Motion:
         colliders: tuple[PosedCollider, ...],
         gravity: Floats,
         duration: float,
-        scene_wind: Floats,
+        force_fields: ForceFields,
         held: Held | None = None,
     ) -> Drive:
         """What acts in a frame of `duration` [s] that carries the guides to `target`."""
@@ -230,7 +230,7 @@ class Motion:
         ratio = self.duration / duration if duration else 1.0
         before, clearance = self.carried_guides, self.guide_clearance
         return Drive(
-            before, target, colliders, gravity, earlier, scene_wind, ratio, held, clearance
+            before, target, colliders, gravity, earlier, force_fields, ratio, held, clearance
         )
 
 
@@ -599,7 +599,7 @@ def advance(
     settings: DynamicsSettings,
     gravity: Floats,
     duration: float,
-    scene_wind: Floats = NO_WIND,
+    force_fields: ForceFields = NO_FIELDS,
     led: LedOut = NOT_LED,
 ) -> Motion:
     """One frame of motion: the roots go with the head, the dynamics moves the rest.
@@ -607,13 +607,13 @@ def advance(
     Args:
         gravity: (3,) [m/s^2], world space.
         duration: time since the motion's pose [s].
-        scene_wind: (3,) [m/s], world space.
+        force_fields: of the scene.
         led: the strands that were led out at this moment of the motion: from how they were bent
             the next frame's are led.
     """
     target = style_of_guides(rig, pose)
     motion = with_clearance(rig, motion, colliders, settings)
-    drive = motion.drive(target, colliders, gravity, duration, scene_wind, held_cvs(rig, pose))
+    drive = motion.drive(target, colliders, gravity, duration, force_fields, held_cvs(rig, pose))
     state = advance_dynamics(motion.dynamics, drive, settings, duration)
     guides, before = grid_at_frame_end(state, drive, duration), motion.carried_guides
     return Motion(

@@ -22,6 +22,14 @@ from hairloom.addon.dynamics.colliders import (
     SphereCollider,
     SphereSetCollider,
 )
+from hairloom.addon.dynamics.force_fields import (
+    FALLOFFS,
+    KINDS,
+    NO_FIELDS,
+    Falloff,
+    ForceField,
+    ForceFields,
+)
 from hairloom.addon.dynamics.held import Held
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.dynamics.springs import give
@@ -79,7 +87,7 @@ class RandomRun:
     head: Way
     colliders: tuple[tuple[Collider, Way], ...]
     gravity: np.ndarray
-    scene_wind: np.ndarray
+    force_fields: ForceFields
     fps: float
     is_bent: bool
     held: Held | None
@@ -99,7 +107,7 @@ class RandomRun:
             colliders = tuple(self._posed(one, way, moments) for one, way in self.colliders)
             before, now = targets[-2:]
             yield Drive(
-                before, now, colliders, self.gravity, earlier, self.scene_wind, held=self.held
+                before, now, colliders, self.gravity, earlier, self.force_fields, held=self.held
             )
 
     def _posed(self, collider: Collider, way: Way, moments: list[float]) -> PosedCollider:
@@ -174,12 +182,38 @@ def random_run(seed: int, guide_count: int = 12) -> RandomRun:
         head=_way(random, is_head=True),
         colliders=solids,
         gravity=random.normal(size=3) * random.choice([0.0, 9.81, 100.0]),
-        scene_wind=random.normal(size=3) * random.choice([0.0, 0.0, 3.0, 100.0]),
+        force_fields=_fields(random),
         fps=float(random.choice(FRAME_RATES)),
         is_bent=bool(random.random() < 0.7),
         held=held,
         room=room,
     )
+
+
+def _fields(random: np.random.Generator) -> ForceFields:
+    """None, or some of all kinds, of which a few are much too strong."""
+    fields = []
+    for _ in range(random.choice([0, 0, 1, 4])):
+        axis = random.normal(size=3)
+        fields.append(
+            ForceField(
+                str(random.choice(KINDS)),
+                center=tuple(random.normal(0.0, 0.3, 3).tolist()),
+                axis=tuple((axis / np.linalg.norm(axis)).tolist()),
+                strength=float(random.normal() * random.choice([3.0, 100.0, 1.0e6])),
+                shape=str(random.choice(("point", "line", "plane"))),
+                damping=float(random.choice([0.0, 1.0, 1.0e6])),
+                size=float(random.choice([0.0, 0.1])),
+                flow=float(random.choice([0.0, 1.0, -10.0])),
+                across=float(random.choice([0.0, 1.0])),
+                falloff=str(random.choice(FALLOFFS)),
+                side=int(random.integers(-1, 2)),
+                distance=Falloff(float(random.choice([0.0, 2.0, 10.0])), 0.0),
+                radial=Falloff(float(random.choice([0.0, 0.3])), 0.1, 90.0),
+                is_inverse_square=bool(random.random() < 0.5),
+            )
+        )
+    return ForceFields(tuple(fields), random.permutation(256))
 
 
 def shaken(guide_count: int) -> RandomRun:
@@ -204,7 +238,7 @@ def shaken(guide_count: int) -> RandomRun:
         head=head,
         colliders=((SphereCollider(still, 0.1), head),),
         gravity=np.array([0.0, 0.0, -9.81]),
-        scene_wind=still,
+        force_fields=NO_FIELDS,
         fps=60.0,
         is_bent=True,
         held=None,

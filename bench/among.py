@@ -1,4 +1,5 @@
-"""Hair among hair: whether it keeps volume and locks, does nothing at rest, and what it costs.
+"""Hair among hair, whether it keeps volume and locks, does nothing at rest, and what it costs; and
+the scene's force fields.
 
 volume_kept          a ponytail in a style that bears nothing, 2 s below its tie: cells as wide as
                      two strands are apart that it runs through, over those at rest; without: the
@@ -9,6 +10,9 @@ crossing_percent     of two locks side by side that swing against each other, 1 
                      many strands are on the other's side, in the worst frame
 cost_ratio_*         a frame at 24 a second with Volume over one without, on a head that sways, with
                      its mesh as collider; each frame by the least of several rounds in turn
+field_error          force fields of every kind, shape and falloff beside Blender's particles: the
+                     largest difference of accelerations at 200 places, over the largest one
+field_cost_ratio_*   a frame as above with four force fields over one without
 
 The last line is one JSON object; the exit status is 1 if a limit is missed.
 
@@ -24,13 +28,16 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
-import bpy  # noqa: F401  it must come before gpu, which lives inside it
+import bpy  # it must come before gpu, which lives inside it
 import gpu
 import numpy as np
+from _field_particles import field_error
 from _forms import ComputeForm, Form, NumpyForm, has_compute, play
 from _shaken_head import Shake, guides_on, new_head, surface_of
 
+from hairloom.addon import register, unregister
 from hairloom.addon.dynamics.colliders import CapsuleCollider, DistanceField, PosedCollider
+from hairloom.addon.dynamics.force_fields import Falloff, ForceField, ForceFields
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.dynamics.state import DynamicsState, start
 from hairloom.addon.dynamics.step import Drive, advance
@@ -44,11 +51,19 @@ VOLUME = 1.0
 #: [m/s] of each lock, at the tips.
 SWING = 1.0
 SIZES, ROUNDS = {"762": 762, "10k": 10_000}, {"762": 7, "10k": 3}
+#: Four kinds that scenes have, around the head.
+FIELDS = (
+    ForceField("wind", axis=(1.0, 0.0, 0.0), strength=5.0, shape="plane", flow=1.0, across=1.0),
+    ForceField("force", center=(0.3, 0.3, 0.2), strength=-2.0, distance=Falloff(2.0)),
+    ForceField("vortex", strength=2.0, shape="plane", distance=Falloff(1.0)),
+    ForceField("turbulence", strength=4.0, size=0.2),
+)
 LIMITS: dict[str, Callable[[float], bool]] = {
     "volume_kept": lambda kept: kept >= 0.8,
     "volume_kept_bent": lambda kept: kept >= 0.8,
     "rest_motion_mm": lambda motion: motion < 0.01,
     "crossing_percent": lambda percent: percent <= 5.0,
+    "field_error": lambda error: error <= 0.01,
     "cost_ratio": lambda ratio: ratio <= 1.6,
 }
 
@@ -60,6 +75,7 @@ def main() -> int:
     asked = options.parse_args()
     gpu.init()
     found: dict[str, object] = {"guides": GUIDES, "renderer": gpu.platform.renderer_get()}
+    found |= field_errors()
     found |= volumes() | {"rest_motion_mm": rest_motion()} | crossings()
     if not asked.skip_cost:
         for name, count in SIZES.items():
@@ -140,6 +156,19 @@ def rest_motion() -> float:
     return round(max(float(farthest[1] - farthest[0]), 0.0) * 1e3, 4)
 
 
+def field_errors() -> dict[str, object]:
+    """The largest, and of which case it is; of Blender's particles in an empty scene."""
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    register()
+    try:
+        points = np.random.default_rng(3).uniform(-1.0, 1.0, (200, 3))
+        errors = field_error(points)
+    finally:
+        unregister()
+    worst = max(errors, key=errors.__getitem__)
+    return {"field_error": errors[worst], "field_worst": worst, "field_cases": len(errors)}
+
+
 def crossings() -> dict[str, object]:
     found = {}
     for end, volume in (("", VOLUME), ("_without", 0.0)):
@@ -166,28 +195,32 @@ def costs(name: str, count: int) -> dict[str, object]:
     field = DistanceField.from_surface(surface, DynamicsSettings(), place="head")
     guides = guides_on(surface, count)
     drives = list(Shake(guides.grid, (field,)).drives(FPS, 0.5))
+    fields = ForceFields(FIELDS, np.random.default_rng(1).permutation(256))
+    blown = [replace(drive, force_fields=fields) for drive in drives]
     forms: dict[str, Callable[[DynamicsState], Form]] = {"numpy": NumpyForm}
     if has_compute():
         forms["compute"] = ComputeForm
-    times: dict[tuple[str, float], list[list[float]]] = {}
+    kinds = {"": (0.0, drives), "among": (0.5, drives), "fields": (0.0, blown)}
+    times: dict[tuple[str, str], list[list[float]]] = {}
     for _ in range(ROUNDS[name]):
         for form, make in forms.items():
-            for volume in (0.0, 0.5):
+            for kind, (volume, driven) in kinds.items():
                 one = make(start(guides.grid))
-                took = play(one, drives, DynamicsSettings(volume=volume), FPS)
+                took = play(one, driven, DynamicsSettings(volume=volume), FPS)
                 one.release()
-                times.setdefault((form, volume), []).append(took)
+                times.setdefault((form, kind), []).append(took)
     found: dict[str, object] = {}
     for form in forms:
         # the first frames compile, and find the grid
-        without, with_it = (
-            float(np.min(times[form, volume], axis=0)[2:].mean()) for volume in (0.0, 0.5)
+        without, with_it, with_fields = (
+            float(np.min(times[form, kind], axis=0)[2:].mean()) for kind in kinds
         )
         found[f"{form}_{name}_ms"], found[f"{form}_{name}_without_ms"] = (
             round(with_it, 2),
             round(without, 2),
         )
         found[f"cost_ratio_{form}_{name}"] = round(with_it / without, 2)
+        found[f"field_cost_ratio_{form}_{name}"] = round(with_fields / without, 2)
     return found
 
 

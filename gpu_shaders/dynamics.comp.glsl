@@ -1,7 +1,7 @@
 // One frame of dynamics: one invocation a guide, which goes through all substeps.
 //
 // Twin of advance in addon/dynamics/step.py. Defines: CV_COUNT; RELAXATION;
-// HAS_HELD; HAS_SPRINGS; HAS_PUSHES, where hair feels other hair; HAS_AIR; CONTACT_SLOTS, 0 where there are no colliders; HAS_ROUNDS and HAS_FIELDS, the
+// HAS_HELD; HAS_SPRINGS; HAS_PUSHES, where hair feels other hair; HAS_AIR; HAS_FORCE_FIELDS; CONTACT_SLOTS, 0 where there are no colliders; HAS_ROUNDS and HAS_FIELDS, the
 // kinds of colliders; HAS_SHARP, HAS_FOLLOWED and HAS_CLEARANCE, see lib_contacts.glsl.
 //
 // Loops of an unknown number of turns ask at their end: drivers on CPUs go once more through the
@@ -11,6 +11,9 @@
 #include "lib_forces.glsl"
 #ifdef HAS_AIR
 #include "lib_wind.glsl"
+#endif
+#ifdef HAS_FORCE_FIELDS
+#include "lib_force_fields.glsl"
 #endif
 #include "lib_style.glsl"
 #include "lib_lengths.glsl"
@@ -109,6 +112,11 @@ void predict(vec4 moment, vec3 air_displacement)
     if (frame.drag > 0.0) {
       before = braked(here, before, frame.drag, air_displacement);
     }
+#ifdef HAS_FORCE_FIELDS
+    vec3 root_side = i == 0 ? position[1] : previous[i + 1];  // where it was, as of all others
+    vec3 tip_side = position[min(i + 3, CV_COUNT - 1)];
+    before -= blown_by_fields(here, before, field_direction(tip_side - root_side));
+#endif
     vec3 impulse = style_displacement[i + 2] * moment.z + style_curvature[i + 2] * moment.w;
     impulse += fall[i] + air_displacement * frame.air_fraction;
     position[i + 2] = (here - before) * frame.kept + here + impulse;

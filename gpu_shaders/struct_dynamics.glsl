@@ -20,9 +20,9 @@ struct Dynamics {
   vec4 fall;          // xyz [m] that gravity adds in a substep; w duration of the frame before, over
                       // that of this one
   vec4 combed;        // xyz the same of the gravity in which the style was combed, where it is held
-  vec4 wind;          // xyz mean [m/s]
+  vec4 wind;          // xyz mean [m/s]; w factor of force fields
   vec4 springs;       // x fraction of their room that curls give, y 1 / (kappa dt^2), see lib_springs.glsl;
-                      // z [m] that lengths cannot be kept better than
+                      // z [m] that lengths cannot be kept better than; w [m] that force fields move a CV at most
   vec4 swing[{{wind_modes}}];  // xyz [m/s]
   vec4 wave[{{wind_modes}}];   // xyz [1/m]
   vec4 band[CV_COUNT];  // of each CV: near and far factor, inverse pivot, pull

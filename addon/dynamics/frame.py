@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -14,6 +14,7 @@ from .clearance import GuideClearance
 from .colliders import PosedCollider
 from .constraints import PINNED
 from .contacts import BETWEEN, BETWEEN_RADIUS, radius_of_all
+from .force_fields import NO_FIELDS, ForceFields
 from .forces import carried_fraction, combed_gravity, felt_gravity
 from .held import Held
 from .settings import DynamicsSettings
@@ -35,7 +36,7 @@ class Drive:
     gravity: (3,) world [m/s^2].
     target_earlier: where that style was one frame earlier, so that its path is bent, see
         `trajectory.curvature`; None: straight.
-    scene_wind: (3,) world [m/s], in addition to that of the settings.
+    force_fields: of the scene.
     earlier_ratio: duration of that frame, over that of this one.
     held: the CVs that go with these targets whatever the rest of the guide does; None: none.
     clearance: how far guides stay from colliders at most; None: as far as their radius says.
@@ -49,7 +50,7 @@ class Drive:
     colliders: tuple[PosedCollider, ...]
     gravity: Floats
     target_earlier: Floats | None = None
-    scene_wind: Floats = field(default_factory=lambda: np.zeros(3))
+    force_fields: ForceFields = NO_FIELDS
     earlier_ratio: float = 1.0
     held: Held | None = None
     clearance: GuideClearance | None = None
@@ -106,13 +107,18 @@ def check_drive(state: DynamicsState, drive: Drive, known: tuple[Floats, ...] = 
             place="dynamics",
             remedy="Start the simulation again",
         )
-    for name, vector in (("gravity", drive.gravity), ("wind", drive.scene_wind)):
-        if np.shape(vector) != (3,) or not np.isfinite(vector).all():
-            raise HairloomError(
-                f"{name} is not three finite numbers",
-                place="dynamics",
-                remedy=f"Check the scene's {name}",
-            )
+    if np.shape(drive.gravity) != (3,) or not np.isfinite(drive.gravity).all():
+        raise HairloomError(
+            "gravity is not three finite numbers",
+            place="dynamics",
+            remedy="Check the scene's gravity",
+        )
+    if not np.isfinite(drive.force_fields.table).all():
+        raise HairloomError(
+            "a force field has numbers that are not finite",
+            place="dynamics",
+            remedy="Check the scene's force fields",
+        )
 
 
 def style_rows(state: DynamicsState, drive: Drive) -> tuple[StyleRows, ...]:
@@ -136,6 +142,7 @@ class Frame:
     turn: Floats
     matrix: StyleBand
     air: Air | None
+    force_fields: ForceFields | None  # None where none acts
     size: float  # of the hair [m], see `state.Rest`
     among: Among | None  # None where hair does not feel other hair
 
@@ -155,9 +162,11 @@ class Frame:
             turn = rotation_from(state.rest.sample, (before + now) / 2.0)
             among = _among(state, drive, settings, turn, dt)
         matrix = style_band(settings, state.cv_count, dt)
-        air = air_of(settings, drive.scene_wind)
+        air, fields = air_of(settings), drive.force_fields.by(settings.force_fields)
         time, left, size = state.time, state.time_left, state.rest.size
-        return cls(drive, settings, dt, duration, time, left, turn, matrix, air, size, among)
+        return cls(
+            drive, settings, dt, duration, time, left, turn, matrix, air, fields, size, among
+        )
 
     def pieces(self, count: int) -> list[range]:
         """The substeps that guides may go through one guide after the other."""

@@ -47,8 +47,7 @@ class MotionSettings(Settings):
     wind_speed: float = number(
         0.0,
         label="Wind Speed",
-        description="Speed of the air, or of the current under water. Wind force fields of the "
-        "scene are added",
+        description="Speed of the air, or of the current under water, wherever the hair is",
         soft=(0.0, 20.0),
         hard=(0.0, 200.0),
         unit="speed",
@@ -96,6 +95,15 @@ class MotionSettings(Settings):
         description="Random seed of the gusts",
         soft=(0, 100),
         hard=(0, 2**31 - 1),
+        panel="Medium & Wind",
+    )
+    force_fields: float = number(
+        1.0,
+        label="Force Fields",
+        description="How strongly the scene's force fields act, each where it stands; 0 is not at "
+        "all",
+        soft=(0.0, 1.0),
+        hard=(0.0, 10.0),
         panel="Medium & Wind",
     )
     friction: float = number(

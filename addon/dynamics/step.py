@@ -3,6 +3,7 @@
     repeat substep_rate times a second:
         among        now and then: hair feels other hair
         brake        drag by the square of the speed through the air
+        blow         the scene's force fields push, slow down and turn
         predict      Verlet: inertia, damping, gravity, wind
         pin          the head carries the first two CVs, ties carry what they hold
         springs      curls give along themselves; the lengths that they leave are kept from there on
@@ -33,6 +34,7 @@ import numpy as np
 from ..arrays import Floats, Ints
 from .colliders import Pose, poses_through
 from .constraints import (
+    PINNED,
     Touched,
     finish_lengths,
     hold_within_reach,
@@ -48,6 +50,7 @@ from .contacts import (
     spacing_of,
     touched_by,
 )
+from .force_fields import along_strands, blow
 from .forces import air_fraction, brake, predict, speed_kept
 from .frame import Block, Drive, Frame, check_drive, style_rows
 from .schedule import due_substeps
@@ -139,6 +142,8 @@ def _advance_block(
         air_displacement = frame.air_displacement(position[:, 0], number)
         if settings.drag:
             brake(position, previous, settings.drag, air_displacement)
+        if frame.force_fields is not None:
+            _blow(position, previous, frame)
         if air_displacement is not None:
             impulse = impulse + air_displacement[:, None] * np.float32(blown)
         predict(position, previous, impulse, kept, out=spare)
@@ -151,6 +156,17 @@ def _advance_block(
         chain.keep_lengths(position, None)
         _keep_outside(position, previous, block, chain, frame, poses[number])
     return position, previous
+
+
+def _blow(position: Floats, previous: Floats, frame: Frame) -> None:
+    """The force fields at each free CV; changes `previous`, which holds the speed."""
+    fields = frame.force_fields
+    assert fields is not None, "it is asked where there are any"
+    here, before = (np.ascontiguousarray(rows[:, PINNED:]) for rows in (position, previous))
+    along = along_strands(position)[:, PINNED:].reshape(3, -1) if fields.is_across else None
+    flat = before.reshape(3, -1)
+    blow(here.reshape(3, -1), flat, fields, frame.dt, frame.size, along)
+    previous[:, PINNED:] = before
 
 
 def grid_at_frame_end(state: DynamicsState, drive: Drive, duration: float) -> Floats:

@@ -53,15 +53,11 @@ class Air:
         return result
 
 
-def air_of(settings: MotionSettings, scene_wind: Floats) -> Air | None:
-    """The air of these settings; None when it stands still.
-
-    Args:
-        scene_wind: (3,) [m/s], world, from the scene's wind force fields.
-    """
+def air_of(settings: MotionSettings) -> Air | None:
+    """The air of these settings; None when it stands still."""
     rise, turn = settings.wind_elevation, settings.wind_direction
     own = np.array([np.cos(rise) * np.cos(turn), np.cos(rise) * np.sin(turn), np.sin(rise)])
-    velocity = own * settings.wind_speed + np.asarray(scene_wind, np.float64)
+    velocity = own * settings.wind_speed
     speed = float(np.linalg.norm(velocity))
     if speed == 0.0:
         return None

@@ -18,6 +18,7 @@ import numpy as np
 from ..arrays import Floats
 from ..dynamics.constraints import PINNED, ROUNDING
 from ..dynamics.contacts import REACH, cv_radius
+from ..dynamics.force_fields import FARTHEST
 from ..dynamics.forces import air_fraction, carried_fraction, speed_kept
 from ..dynamics.frame import Frame
 from ..dynamics.settings import DynamicsSettings
@@ -87,7 +88,7 @@ def block_of(
     vectors = values[_NUMBERS:].reshape(-1, 4)
     _fill_forces(vectors, frame)
     bounce = 1.0 / (stiffness(settings, cv_count) * dt * dt)
-    vectors[3, :3] = give(settings), bounce, ROUNDING * frame.size
+    vectors[3] = give(settings), bounce, ROUNDING * frame.size, FARTHEST * frame.size
     values[_NUMBERS + 4 * _VECTORS :] = _cv_values(settings, cv_count, dt, frame.size)
     return values
 
@@ -100,6 +101,8 @@ def _fill_forces(vectors: Floats, frame: Frame) -> None:
     vectors[0, 3] = clamped_ratio(frame.drive.earlier_ratio)
     combed = (frame.turn @ pull.astype(np.float64)).astype(np.float32)
     vectors[1, :3] = combed * (np.float32(settings.sag_compensation) * square)
+    if frame.force_fields is not None:
+        vectors[2, 3] = frame.force_fields.factor
     if air is not None:
         vectors[2, :3] = air.velocity
         vectors[4 : 4 + len(air.swing), :3] = air.swing

@@ -14,6 +14,7 @@ strand_layout.strand_rows:
     rest_lengths   R32F: [m] to the next CV
     curl_rooms     R32F: of the segment to the next CV, see Rest.room; only where curls give
     held_cvs       R32F: 1 where a CV is held (held.Held), else 0
+    force_fields   RGBA32F: see force_fields.ForceFields.table; only where any act
     clearances     RGBA32F: of each CV, see clearance.GuideClearance; only where there are colliders
     beside_root    RGBA32F: xyz [m], see step.displacement_beside_root; both only where CVs are held
 
@@ -82,6 +83,7 @@ def dynamics_recipe(
     springs: bool = False,
     pushed: bool = False,
     air: bool = False,
+    force_fields: bool = False,
     collider_count: int = 0,
     rounds: bool = False,
     fields: bool = False,
@@ -101,6 +103,7 @@ def dynamics_recipe(
         "HAS_SPRINGS": springs,
         "HAS_PUSHES": pushed,
         "HAS_AIR": air,
+        "HAS_FORCE_FIELDS": force_fields and cv_count > PINNED,
         "HAS_ROUNDS": rounds,
         "HAS_FIELDS": fields,
         "HAS_FOLLOWED": followed and cv_count > PINNED,
@@ -109,7 +112,7 @@ def dynamics_recipe(
     }
     textures = ["styles_earlier", "styles_before", "styles_now", "rest_shapes", "rest_lengths"]
     textures += ["moments"] + ["held_cvs"] * held + ["curl_rooms"] * springs
-    textures += ["pushes"] * pushed
+    textures += ["pushes"] * pushed + ["force_fields"] * (force_fields and cv_count > PINNED)
     textures += ["rounds"] * rounds + ["fields"] * fields + ["clearances"] * clearance
     return ShaderRecipe(
         name="dynamics",
@@ -259,6 +262,8 @@ class DynamicsPass:
             table = np.concatenate([table, poses], axis=1)
         textures = {**self._textures, "moments": texture_from(table, "RGBA32F")}
         textures |= {"rounds": colliders.rounds, "fields": colliders.fields}
+        if frame.force_fields is not None:
+            textures["force_fields"] = texture_from(frame.force_fields.table, "RGBA32F")
         recipe = dynamics_recipe(
             state.cv_count,
             relaxation=settings.length_solver == "relaxation",
@@ -266,6 +271,7 @@ class DynamicsPass:
             springs=state.rest.room is not None and settings.curl_stretch > 0.0,
             pushed=frame.among is not None,
             air=frame.air is not None,
+            force_fields=frame.force_fields is not None,
             collider_count=len(posed),
             rounds=colliders.rounds is not None,
             fields=colliders.fields is not None,

@@ -29,6 +29,7 @@ from ..dynamics.contacts import (
     SKIN,
     TRACE_STEPS,
 )
+from ..dynamics.force_fields import KINDS, SHAPES
 from ..dynamics.wind import MODES
 from ..refine import curls, detail, lead_out, ride
 from ..refine.hold import NEAR, SWEEPS
@@ -136,6 +137,8 @@ CONSTANTS: Mapping[str, str] = MappingProxyType(
         "more_rounds": str(MORE_ROUNDS),
         "max_weight": repr(float(MAX_WEIGHT)),
         "wind_modes": str(MODES),
+        **{f"field_{name}": str(number) for number, name in enumerate(KINDS)},
+        **{f"shape_{name}": str(number) for number, name in enumerate(SHAPES)},
         "moment_texels": str(MOMENT_TEXELS),
         "collider_texels": str(COLLIDER_TEXELS),
         "rounds_across": str(ROUNDS_ACROSS),

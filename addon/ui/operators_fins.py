@@ -146,6 +146,8 @@ def draw_fin(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
         if label == "Collisions":
             body.prop(obj.hairloom, "collider")
             body.prop(obj.hairloom, "collider_collection")
+        if label == "Medium & Wind":
+            body.prop(obj.hairloom, "field_collection")
         draw_section(body, obj.hairloom, "fin", label)
 
 

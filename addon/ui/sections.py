@@ -122,6 +122,13 @@ def draw_skin(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
     column.operator("hairloom.show_skin_shadow")
 
 
+def draw_medium(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
+    """Air, water and wind, and which force fields act."""
+    _panel("dynamics", "Medium & Wind")(layout, hair)
+    column = layout.column()
+    column.prop(hair.hairloom, "field_collection")
+
+
 def draw_children(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
     """What the preview has; where there are none, only how to get some."""
     groom = hair.data.hairloom
@@ -209,7 +216,7 @@ SUB_SECTIONS: dict[str, tuple[Section, ...]] = {
     ),
     "dynamics": (
         ("style", "Style", _panel("dynamics", "Style")),
-        ("medium", "Medium & Wind", _panel("dynamics", "Medium & Wind")),
+        ("medium", "Medium & Wind", draw_medium),
         ("lengths", "Lengths", _panel("dynamics", "Lengths")),
         ("collisions", "Collisions", draw_collisions),
         ("ties", "Ties", draw_ties),

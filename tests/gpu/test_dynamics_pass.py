@@ -21,6 +21,13 @@ from hairloom.addon.dynamics.colliders import (
     SphereCollider,
     SphereSetCollider,
 )
+from hairloom.addon.dynamics.force_fields import (
+    KINDS,
+    NO_FIELDS,
+    Falloff,
+    ForceField,
+    ForceFields,
+)
 from hairloom.addon.dynamics.held import Held
 from hairloom.addon.dynamics.measure import deepest_penetration, max_stretch
 from hairloom.addon.dynamics.settings import DynamicsSettings
@@ -95,7 +102,7 @@ class Scene:
     cv_count: int = 16
     on_head: tuple[Collider, ...] = ()
     standing: tuple[Collider, ...] = ()
-    wind: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    force_fields: ForceFields = NO_FIELDS
     is_held: bool = False
     is_curled: bool = False
     fps: float = 60.0
@@ -150,7 +157,7 @@ class Scene:
 
     def drives(self, seconds: float) -> list[Drive]:
         grids = [self.carried(frame) for frame in range(round(seconds * self.fps) + 1)]
-        gravity, wind = np.array([0.0, 0.0, -9.81]), np.array(self.wind)
+        gravity = np.array([0.0, 0.0, -9.81])
         drives = []
         for frame, (before, now) in enumerate(pairwise(grids)):
             earlier = grids[frame - 1] if self.is_bent and frame else None
@@ -162,7 +169,7 @@ class Scene:
                     colliders,
                     gravity,
                     earlier,
-                    wind,
+                    self.force_fields,
                     held=self.held,
                     clearance=self.clearance,
                 )
@@ -192,6 +199,28 @@ CLUSTER = SphereSetCollider(
 #: numpy lets rounding of the world's coordinates pass as well, which adds up where curls give.
 LOOSE = {"length_tolerance": 0.02}
 
+PERMUTATION = np.random.default_rng(3).permutation(256)
+_ABOVE = {"center": (0.05, -0.1, 0.35), "axis": (0.48, 0.6, 0.64)}
+#: Every kind, shape and falloff, each strong enough to be seen.
+FIELDS = (
+    ForceField("wind", **_ABOVE, strength=12.0, shape="plane", flow=1.0, across=1.0),
+    ForceField("wind", strength=-6.0, falloff="tube", radial=Falloff(0.5, 0.02, 0.3)),
+    ForceField("force", **_ABOVE, strength=8.0, distance=Falloff(1.7, 0.1, 0.5), side=-1),
+    ForceField("force", **_ABOVE, strength=-0.3, is_inverse_square=True, across=0.5),
+    ForceField(
+        "force", strength=6.0, shape="points", place=(0.1, 0.1, 0.1), normal=(0.0, 0.6, 0.8)
+    ),
+    ForceField("force", strength=5.0, falloff="cone", radial=Falloff(0.4, 10.0, 60.0)),
+    ForceField("vortex", **_ABOVE, strength=9.0, shape="plane"),
+    ForceField("vortex", **_ABOVE, strength=40.0, flow=0.4),
+    ForceField("magnet", **_ABOVE, strength=30.0, shape="line"),
+    ForceField("magnet", **_ABOVE, strength=30.0, shape="plane"),
+    ForceField("harmonic", **_ABOVE, strength=60.0, damping=0.2, size=0.1),
+    ForceField("turbulence", **_ABOVE, strength=9.0, size=0.2),
+    ForceField("turbulence", strength=9.0, size=0.0, is_global=True),
+    ForceField("drag", **_ABOVE, strength=2.0, damping=1.5, distance=Falloff(1.0)),
+)
+
 IN_AIR = {
     "default": Scene(),
     "straight way": Scene(is_bent=False),
@@ -199,7 +228,16 @@ IN_AIR = {
     "no bend": Scene({"bend": 0.0, "damping": 6.0, "style_tip": 3.0}),
     "stiff": Scene({"style_root": 15.0, "style_tip": 8.0, "bend": 4.0}),
     "wind with gusts": Scene({"wind_speed": 6.0, "gusts": 1.0, "wind_direction": 0.7}),
-    "steady wind of the scene": Scene({"gusts": 0.0}, wind=(0.0, 4.0, 1.0)),
+    "steady wind": Scene({"gusts": 0.0, "wind_speed": 4.0}),
+    "force fields": Scene(force_fields=ForceFields(FIELDS, PERMUTATION)),
+    "half the force fields in wind": Scene(
+        {"force_fields": 0.5, "wind_speed": 3.0}, force_fields=ForceFields(FIELDS, PERMUTATION)
+    ),
+    **{
+        f"{kind} field": Scene(force_fields=ForceFields(fields, PERMUTATION))
+        for kind in KINDS
+        if (fields := tuple(one for one in FIELDS if one.kind == kind))
+    },
     "drag in a current": Scene({"drag": 4.0, "wind_speed": 1.0}),
     "drag in still water": Scene({"drag": 6.0, "damping": 2.0}),
     "buoyancy": Scene({"buoyancy": 0.8}),

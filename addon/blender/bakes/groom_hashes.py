@@ -26,9 +26,9 @@ from ..colliders.obstacles import shape_of, sources_of
 from ..colliders.ties import holders_of
 from ..properties.groom_settings import GroomSettings
 from ..scene.curves import COLOR_ATTRIBUTE, GROUP_ATTRIBUTES
+from ..scene.forces import force_fields_of, gravity_of
 from ..scene.partings import parting_state, partings_of
 from ..scene.surfaces import read_positions
-from ..scene.wind import gravity_of, scene_wind
 from .simulated import SOLVER_VERSION, Hashed, hashes
 
 #: The parts of a rig hash that determine the rig; the others only matter to a bake.
@@ -87,7 +87,7 @@ def groom_frame_hash(
         settings=_dynamics(hair),
         colliders=collider_places(hair, head, depsgraph),
         **({"ties": ties} if ties else {}),
-        forces=(gravity_of(depsgraph.scene), scene_wind(depsgraph)),
+        forces=(gravity_of(depsgraph.scene), force_fields_of(hair, depsgraph)[0].table),
     )
 
 

@@ -46,7 +46,12 @@ COLLIDER_SHAPES = (
 #: What acts on the hair and can be shown as lines in the viewport.
 OVERLAYS = (
     ("colliders", "Colliders", "Spheres, capsules, and the boxes of distance fields"),
-    ("wind", "Wind", "Where the mean wind blows to: as long as the hair is wide at 10 m/s"),
+    (
+        "wind",
+        "Wind",
+        "Where the mean wind blows to: as long as the hair is wide at 10 m/s. Force fields: where "
+        "they push points of the hair, the same at 10 m/s²",
+    ),
     ("lights", "Lights", "From the hair towards each light that shines on it"),
 )
 _DEBUG_VIEWS = (
@@ -268,6 +273,13 @@ class HAIRLOOM_PG_character(bpy.types.PropertyGroup):
             type=bpy.types.Collection,
             name="Colliders",
             description="Collection of more objects that hair stays out of; read as Play begins",
+            override=OVERRIDABLE,
+        ),
+        "field_collection": PointerProperty(
+            type=bpy.types.Collection,
+            name="Fields",
+            description="Collection of the force fields that act on this hair or cloth; empty: all "
+            "of the scene",
             override=OVERRIDABLE,
         ),
         "tie_collection": PointerProperty(

@@ -10,6 +10,7 @@ import numpy as np
 from ... import pipeline
 from ...arrays import Floats
 from ...dynamics.colliders import PosedCollider
+from ...dynamics.force_fields import NO_FIELDS, ForceFields
 from ...dynamics.settings import DynamicsSettings
 from ...pipeline import Motion, Pose, Rig
 from ...refine.lead_out import NOT_LED, LedOut
@@ -78,7 +79,7 @@ class ComputeSolver:
         settings: DynamicsSettings,
         gravity: Floats,
         duration: float,
-        scene_wind: Floats = pipeline.NO_WIND,
+        force_fields: ForceFields = NO_FIELDS,
     ) -> None:
         if self._is_baked:
             self._take(self.motion)
@@ -93,7 +94,7 @@ class ComputeSolver:
             self._dynamics = DynamicsPass(motion.dynamics, self._colliders)
         rig = self._rig
         target, held = pipeline.style_of_guides(rig, pose), pipeline.held_cvs(rig, pose)
-        drive = motion.drive(target, colliders, gravity, duration, scene_wind, held)
+        drive = motion.drive(target, colliders, gravity, duration, force_fields, held)
         self._dynamics.advance(drive, settings, duration)
         self._motion = replace(
             motion,

@@ -24,7 +24,7 @@ from ..colliders.obstacles import Obstacles
 from ..properties.properties import settings_of
 from ..scene.fin_mesh import check_usable, corners_of, loose_edges_of, triangles_of
 from ..scene.fin_modifier import clear, fin_modifier, has_fins, read_carried, show
-from ..scene.wind import gravity_of, scene_wind
+from ..scene.forces import force_fields_of, gravity_of
 
 
 class FinSession:
@@ -63,6 +63,7 @@ class FinSession:
         self._shown, self._matrix = self._read(obj, depsgraph)
         self._carried, self._earlier = self._world(), None
         self._duration = 0.0
+        _, self._field_notes = force_fields_of(obj, depsgraph)
         self.is_stale = False
         clear(obj.data)
         if self.state is not None:
@@ -107,13 +108,14 @@ class FinSession:
         earlier, before = self._earlier, self._carried
         self._shown, self._matrix = self._read(obj, depsgraph)
         now = self._world()
+        fields, self._field_notes = force_fields_of(obj, depsgraph)
         drive = Drive(
             before,
             now,
             self.obstacles.move(depsgraph, duration),
             gravity_of(depsgraph.scene),
             earlier if duration else None,
-            scene_wind(depsgraph),
+            fields,
             self._duration / duration if duration else 1.0,
         )
         self.state = self._named(lambda: advance_cloth(state, drive, self.settings, duration))
@@ -124,6 +126,7 @@ class FinSession:
     def warnings(self) -> tuple[str, ...]:
         """What the artist should know of its colliders and pins."""
         known = () if self.obstacles is None else self.obstacles.warnings
+        known += self._field_notes
         if self.state is None or self.state.fabric.pin.any():
             return known
         text = f"{self.name}: no vertex is pinned, so it falls. Choose a Pin Group with weights."
@@ -177,7 +180,7 @@ class FinSession:
             pose=(carried, matrix),
             settings=self.settings,
             colliders=collider_places(obj, None, depsgraph),
-            forces=(gravity_of(depsgraph.scene), scene_wind(depsgraph)),
+            forces=(gravity_of(depsgraph.scene), force_fields_of(obj, depsgraph)[0].table),
         )
 
     def _found(self) -> bpy.types.Object:

@@ -10,6 +10,7 @@ import numpy as np
 from ... import pipeline
 from ...arrays import Floats
 from ...dynamics.colliders import PosedCollider
+from ...dynamics.force_fields import NO_FIELDS, ForceFields
 from ...dynamics.settings import DynamicsSettings
 from ...dynamics.state import rows_of
 from ...errors import HairloomError
@@ -56,7 +57,7 @@ class NumpySolver:
         settings: DynamicsSettings,
         gravity: Floats,
         duration: float,
-        scene_wind: Floats = pipeline.NO_WIND,
+        force_fields: ForceFields = NO_FIELDS,
     ) -> None:
         # what was not shown counts too: motion does not depend on who looks
         led = NOT_LED if self._motion.clearance is None else self.led()
@@ -69,7 +70,7 @@ class NumpySolver:
                 settings,
                 gravity,
                 duration,
-                scene_wind,
+                force_fields,
                 led,
             )
         )

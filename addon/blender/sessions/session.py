@@ -29,8 +29,8 @@ from ..base.thread_work import ThreadWork
 from ..colliders.fields import NotMadeYetError
 from ..colliders.obstacles import Obstacles
 from ..properties.groom_settings import GroomSettings
+from ..scene.forces import force_fields_of, gravity_of
 from ..scene.source import Source, dynamics_warnings, refuse_own_dynamics
-from ..scene.wind import gravity_of, scene_wind
 from .groom_source import GroomSource
 from .measures import FrameTimes
 from .numpy_solver import NumpySolver
@@ -86,6 +86,7 @@ class Session:
         self.is_stale = False
         self._begun: tuple[Pose, tuple[PosedCollider, ...]] | None = None
         self._posed: tuple[PosedCollider, ...] = ()
+        self._field_notes: tuple[str, ...] = ()
         self.figures: Figures | None = None
         self.are_figures_current = False
         self.picture = GroomPicture(
@@ -193,6 +194,7 @@ class Session:
         found = () if self.obstacles is None else self.obstacles.warnings
         notes = (f"{self.name}: {note}" for note in self.rig.notes)
         cards = (f"{self.name}: {note}" for note in self.cards.warnings)
+        found += self._field_notes
         return (*self._source.warnings, *notes, *cards, *doubled, *found, *self.picture.warnings)
 
     @property
@@ -360,6 +362,7 @@ class Session:
         """
         self.solver.rest(self._pose(depsgraph))
         self._begun, self.figures = None, None
+        _, self._field_notes = force_fields_of(self.hair.found(), depsgraph)
         if self.is_playing and self.obstacles is not None:
             self._posed = self.obstacles.rest(depsgraph)
             self._begun = self.solver.pose, self._posed
@@ -433,13 +436,14 @@ class Session:
         with self.times.measured("simulation"):
             pose = self._pose(depsgraph)
             self._posed = () if self.obstacles is None else self.obstacles.move(depsgraph, duration)
+            fields, self._field_notes = force_fields_of(self.hair.found(), depsgraph)
             self.solver.advance(
                 pose,
                 self._posed,
                 self.settings[DynamicsSettings],
                 gravity_of(depsgraph.scene),
                 duration,
-                scene_wind(depsgraph),
+                fields,
             )
             self._show()
 

@@ -25,8 +25,8 @@ from ..base.outcome import Outcome
 from ..colliders.fields import solid_of
 from ..colliders.obstacles import Obstacles
 from ..scene.curves import read_own_curves, write_own_curves
+from ..scene.forces import gravity_of
 from ..scene.kept_shape import KeptShape
-from ..scene.wind import gravity_of
 from .combing import check_own
 from .groom_source import GroomSource
 from .prepared_groom import PreparedGroom

@@ -15,6 +15,7 @@ import numpy as np
 from ... import pipeline
 from ...arrays import Floats
 from ...dynamics.colliders import PosedCollider
+from ...dynamics.force_fields import NO_FIELDS, ForceFields
 from ...dynamics.settings import DynamicsSettings
 from ...errors import HairloomError
 from ...groom.settings import GuideSettings
@@ -58,7 +59,7 @@ class Solver(Protocol):
         settings: DynamicsSettings,
         gravity: Floats,
         duration: float,
-        scene_wind: Floats = pipeline.NO_WIND,
+        force_fields: ForceFields = NO_FIELDS,
     ) -> None:
         """One frame of motion, as pipeline.advance."""
 

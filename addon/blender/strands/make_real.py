@@ -33,6 +33,7 @@ from ..scene.source import Source, read_source
 _POINTERS = (
     "collider",
     "collider_collection",
+    "field_collection",
     "collider_shape",
     "tie_collection",
     "tip_surface",

@@ -18,6 +18,7 @@ from ...dynamics.colliders import (
     SphereCollider,
     SphereSetCollider,
 )
+from ...dynamics.force_fields import ForceFields, felt
 from ...dynamics.settings import DynamicsSettings
 from ...dynamics.wind import Air, air_of
 from ...errors import HairloomError
@@ -26,7 +27,7 @@ from ...render import gpu_objects
 from ...shading.lights import Light
 from ...strands.affine import moved
 from ..properties.groups import OVERLAYS
-from ..scene.wind import scene_wind
+from ..scene.forces import force_fields_of
 from ..sessions.session import Session
 
 #: Linear colours with alpha.
@@ -43,6 +44,8 @@ _CORNERS = 32
 _MAX_SPHERES = 200
 #: A wind of this speed [m/s] has an arrow as long as the hair is wide; its head is this fraction.
 _BRISK, _HEAD = 10.0, 0.2
+#: Guides whose points show what force fields do, about.
+_FIELD_GUIDES = 40
 #: A light farther away than this many radii of the hair has its line cut there.
 _AWAY = 1.6
 
@@ -87,8 +90,11 @@ def debug_lines_of(
     points = session.snapshot.root_center, _radius(session)
     made = {
         "colliders": lambda: collider_lines(session, depsgraph),
-        "wind": lambda: wind_lines(
-            air_of(session.settings[DynamicsSettings], scene_wind(depsgraph)), *points
+        "wind": lambda: np.concatenate(
+            [
+                wind_lines(air_of(session.settings[DynamicsSettings]), *points),
+                field_lines(session, force_fields_of(hair, depsgraph)[0], points[1]),
+            ]
         ),
         "lights": lambda: light_lines(session.snapshot.lights, *points),
     }
@@ -163,6 +169,20 @@ def wind_lines(air: Air | None, center: Floats, radius: float) -> Floats:
         for sign in (1.0, -1.0):
             lines += [tip, tip + _HEAD * length * (0.5 * sign * side - along)]
     return np.array(lines)
+
+
+def field_lines(session: Session, fields: ForceFields, radius: float) -> Floats:
+    """From some of the guides' points where force fields push them, (2n, 3)."""
+    acting = fields.by(session.settings[DynamicsSettings].force_fields)
+    if acting is None:
+        return np.zeros((0, 3))
+    grid = carried_guides(session.rig, session.solver.pose)
+    every = max(len(grid) // _FIELD_GUIDES, 1)
+    points = grid[::every, :: max(grid.shape[1] // 3, 1)].reshape(-1, 3).astype(np.float32)
+    push = felt(acting, np.ascontiguousarray(points.T), np.zeros_like(points.T)).push.T
+    strength = np.linalg.norm(push, axis=1, keepdims=True)
+    scale = 2.0 * radius / np.maximum(strength, _BRISK)  # stronger ones are no longer
+    return np.stack([points, points + push * scale], axis=1).reshape(-1, 3)
 
 
 def light_lines(lights: tuple[Light, ...], center: Floats, radius: float) -> Floats:

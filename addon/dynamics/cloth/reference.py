@@ -12,6 +12,8 @@ import numpy as np
 
 from ...arrays import Floats, Ints
 from ..contacts import REACH
+from ..force_fields import ForceFields
+from ..reference.force_fields import blown_slowly
 from ..step import Drive
 from ..wind import air_of
 from .coloring import greedy_colors, opposite_pairs
@@ -69,12 +71,15 @@ class _Cloth:
         self.edges, self.folds = _in_order(fabric.pairs), _in_order(folds)
         weight = settings.gravity * (1.0 - settings.buoyancy)
         self.gravity = np.asarray(drive.gravity, np.float64) * weight
-        self.air = air_of(settings, drive.scene_wind)
+        self.air = air_of(settings)
 
     def substep(self, begin: float, end: float, time: float) -> None:
         settings = self.settings
         if settings.damping or settings.drag:
             self._feel_air(time)
+        fields = self.drive.force_fields.by(settings.force_fields)
+        if fields is not None:
+            self._feel_force_fields(fields)
         if settings.bend:
             self._hold_folds()
         before = [x.copy() for x in self.x]
@@ -112,6 +117,13 @@ class _Cloth:
             for v in corners:
                 total[v] = total[v] + np.cross(b - a, c - a)
         return [n / np.linalg.norm(n) if n.any() else n for n in total]
+
+    def _feel_force_fields(self, fields: ForceFields) -> None:
+        ratio, x = self.dt / self.small, np.array(self.x)
+        before = x - (x - np.array(self.previous)) * ratio
+        blown = blown_slowly(x, before, fields, self.dt, self.fabric.size, is_strand=False)
+        change = (blown - before) / ratio
+        self.previous = [p + one for p, one in zip(self.previous, change, strict=True)]
 
     def _hold_folds(self) -> None:
         rest = self.fabric.position.T.astype(np.float64)

@@ -2,6 +2,7 @@
 
     repeat substep_rate times a second:
         air          takes the speed against it, broadside more than edgewise
+        fields       the scene's force fields push, slow down and turn
         folds        one implicit step, as a change of speed
         contacts     found where the substep would lead
         repeat small_steps times:
@@ -34,6 +35,7 @@ from ...errors import HairloomError
 from ...strands.vectors import dot_rows
 from ..colliders import PosedCollider, poses_through
 from ..contacts import find_contacts
+from ..force_fields import ForceFields, blow
 from ..schedule import due_substeps
 from ..step import Drive
 from ..trajectory import at
@@ -58,6 +60,7 @@ class _Frame:
     colliders: tuple[PosedCollider, ...]
     gravity: Floats  # (3, 1) [m/s^2]
     air: Air | None
+    force_fields: ForceFields | None  # None where none acts
     dt: float
     small: float  # [s] of a small step
     pull: Floats  # (n,) of the spring to where a vertex is carried, times small^2; 0 for the pinned
@@ -96,6 +99,7 @@ def advance_cloth(
         begin = (number * dt - state.time_left) / duration
         span = (begin, begin + dt / duration)
         _feel_air(position, previous, state.fabric, frame, settings, state.time + number * dt)
+        _feel_force_fields(position, previous, frame, state.fabric.size)
         _hold_folds(position, previous, state.fabric, frame, settings)
         position, previous = _substep(position, previous, state.fabric, frame, settings, span)
     return ClothState(
@@ -158,6 +162,20 @@ def _feel_air(
     if frame.air is not None:
         displacement += air_displacement
     np.subtract(position, displacement, out=previous)
+
+
+def _feel_force_fields(position: Floats, previous: Floats, frame: _Frame, size: float) -> None:
+    """What the scene's force fields do in a substep; changes `previous`."""
+    if frame.force_fields is None:
+        return
+    ratio, origin = np.float32(frame.dt / frame.small), frame.origin.astype(np.float32)
+    here = position + origin
+    before = here - (position - previous) * ratio
+    felt = before.copy()
+    blow(here, felt, frame.force_fields, frame.dt, size)
+    felt -= before
+    felt /= ratio
+    previous += felt
 
 
 def _hold_folds(
@@ -250,7 +268,8 @@ def _prepare(state: ClothState, drive: Drive, settings: FinSettings, dt: float) 
         curvature=curvature,
         colliders=tuple(seen_from(origin, posed) for posed in drive.colliders),
         gravity=(gravity * np.float32(settings.gravity * (1.0 - settings.buoyancy)))[:, None],
-        air=air_of(settings, drive.scene_wind),
+        air=air_of(settings),
+        force_fields=drive.force_fields.by(settings.force_fields),
         dt=dt,
         small=small,
         pull=pull,

@@ -26,6 +26,7 @@ from ..turn import best_rotation
 from ..wind import air_of
 from .among import Hair, feel_slowly
 from .contacts import Moment, Plane, is_deep, planes_of, push_out
+from .force_fields import blown_slowly
 from .shape import frames, hold, jacobian_of
 
 
@@ -137,8 +138,11 @@ class _Guide:
         )
 
     def substep(self, drive: Drive, settings: DynamicsSettings, moment: Moment) -> None:
-        air = self._air(drive, settings, moment)
+        air = self._air(settings, moment)
         self._brake(settings.drag, air, moment.dt)
+        fields = drive.force_fields.by(settings.force_fields)
+        if fields is not None:
+            self.previous = blown_slowly(self.x, self.previous, fields, moment.dt, self.size)
         self._predict(settings, air, moment)
         style = self._style_at(moment.end)
         self._pin(style)
@@ -179,9 +183,9 @@ class _Guide:
             + self.curvature * fraction * (fraction - 1.0)
         )
 
-    def _air(self, drive: Drive, settings: DynamicsSettings, moment: Moment) -> Floats:
+    def _air(self, settings: DynamicsSettings, moment: Moment) -> Floats:
         """Velocity of the air at the root, (3,)."""
-        air = air_of(settings, drive.scene_wind)
+        air = air_of(settings)
         if air is None:
             return np.zeros(3)
         return air.at(self.x[0][:, None].astype(np.float32), moment.time)[:, 0].astype(np.float64)

@@ -11,6 +11,7 @@ import pytest
 
 from hairloom.addon.dynamics.clearance import GuideClearance, farthest_kept, guide_clearance
 from hairloom.addon.dynamics.colliders import Collider, PosedCollider
+from hairloom.addon.dynamics.force_fields import NO_FIELDS, ForceFields
 from hairloom.addon.dynamics.held import Held
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.dynamics.state import DynamicsState, start
@@ -167,7 +168,7 @@ class Scene:
     advance: Callable[..., DynamicsState] = advance
     held: Any = None
     bowed: bool = False
-    wind: Any = (0.0, 0.0, 0.0)
+    force_fields: ForceFields = NO_FIELDS
     room: Any = None
     is_combed: bool = False
 
@@ -187,10 +188,14 @@ class Scene:
         earlier = targets[0] if self.bowed else None
         colliders = self.colliders(before, now)
         held = None if self.held is None else Held(np.asarray(self.held, bool))
-        wind = np.asarray(self.wind)
-        clearance = self.clearance if self.is_combed else None
         return Drive(
-            *targets[1:], colliders, self.gravity, earlier, wind, held=held, clearance=clearance
+            *targets[1:],
+            colliders,
+            self.gravity,
+            earlier,
+            self.force_fields,
+            held=held,
+            clearance=self.clearance if self.is_combed else None,
         )
 
     @property

@@ -74,7 +74,6 @@ def test_each_feature(kit, shake, values, bowed):
         DynamicsSettings(**TIGHT | values),
         shake,
         bowed=bowed,
-        wind=(0.0, 2.0, 0.0) if "drag" in values else (0.0, 0.0, 0.0),
     )
     fast, slow = both(kit, scene, 0.2)
     plain = kit.Scene(**scene.__dict__ | {"settings": DynamicsSettings(**TIGHT)}).play(0.2, 50.0)

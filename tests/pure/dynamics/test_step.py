@@ -7,6 +7,7 @@ from tiers import few_in_commits
 from hairloom.addon.dynamics import step
 from hairloom.addon.dynamics.colliders import PosedCollider, SphereCollider
 from hairloom.addon.dynamics.constraints import PINNED, TINY, directions
+from hairloom.addon.dynamics.force_fields import ForceField, ForceFields
 from hairloom.addon.dynamics.forces import weight_on_style
 from hairloom.addon.dynamics.held import Held
 from hairloom.addon.dynamics.measure import max_stretch
@@ -332,7 +333,7 @@ def bad_drive(kit, **changes):
         ({"target_now": np.zeros((4, 24), np.float32)}, "shape"),
         ({"gravity": np.array([0.0, np.inf, 0.0])}, "gravity"),
         ({"gravity": np.zeros(2)}, "gravity"),
-        ({"scene_wind": np.array([0.0, np.nan, 0.0])}, "wind"),
+        ({"force_fields": ForceFields((ForceField("wind", strength=np.nan),))}, "force field"),
         ({"target_earlier": np.full((4, 8, 3), np.inf, np.float32)}, "not a finite number"),
         ({"target_earlier": np.zeros((4, 7, 3), np.float32)}, "Start the simulation again"),
         ({"held": Held(np.ones((4, 7), bool))}, "Start the simulation again"),
