@@ -6,6 +6,7 @@ artist's buttons and from the command line alike.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
@@ -15,12 +16,14 @@ import numpy as np
 from .arrays import Bools, Floats, Ints
 from .dynamics.clearance import GuideClearance, farthest_kept, guide_clearance
 from .dynamics.colliders import DistanceField, PosedCollider
+from .dynamics.constraints import PINNED
 from .dynamics.force_fields import NO_FIELDS, ForceFields
 from .dynamics.held import Held
 from .dynamics.settings import DynamicsSettings
-from .dynamics.state import DynamicsState, start
+from .dynamics.state import DynamicsState, rows_of, start
 from .dynamics.step import Drive, grid_at_frame_end
 from .dynamics.step import advance as advance_dynamics
+from .dynamics.turn import rotation_from
 from .errors import HairloomError
 from .groom.automatic_children import are_few, automatic
 from .groom.children import (
@@ -69,6 +72,8 @@ from .strands.resample import resample
 from .strands.root_motions import RootMotions
 from .strands.vectors import dot
 
+#: Guides, about, that tell whether their head has jumped.
+JUMP_GUIDES = 64
 #: Of children that cannot be led out of the head, the part from which on a note says so.
 MANY_INSIDE = 0.01
 
@@ -627,6 +632,74 @@ def advance(
         motion.clearance,
         motion.guide_clearance,
         led.leans,
+    )
+
+
+def has_jumped(
+    rig: Rig, motion: Motion, pose: Pose, settings: DynamicsSettings, duration: float
+) -> bool:
+    """Whether the head is elsewhere all of a sudden, as at a cut: since the motion's pose
+    it has gone much farther than in the frame before, or has turned far.
+
+    In the frame after a jump nobody can tell, as the speed is not known.
+    """
+    is_first = not motion.duration
+    if (motion.carried_earlier is None and not is_first) or not len(rig.guides):
+        return False
+    chosen = np.arange(0, len(rig.guides), max(len(rig.guides) // JUMP_GUIDES, 1))
+    roots = rig.guide_grid[chosen, :PINNED]
+    offsets = np.arange(len(chosen) + 1) * roots.shape[1]
+    motions = motions_of(rig, pose, rig.guides[chosen])
+    now = follow(roots.reshape(-1, 3), offsets, motions).reshape(-1, 3).astype(np.float64)
+    before = motion.carried_guides[chosen, :PINNED].reshape(-1, 3).astype(np.float64)
+    here = before.mean(axis=0)
+    displacement = now.mean(axis=0) - here
+    if motion.carried_earlier is not None:
+        earlier = motion.carried_earlier[chosen, :PINNED].reshape(-1, 3).mean(axis=0)
+        displacement = displacement - (here - earlier) * (duration / motion.duration)
+    extent = float(np.linalg.norm(np.ptp(rig.guide_grid.reshape(-1, 3), axis=0)))
+    if 0.0 < settings.jump_distance * extent < float(np.linalg.norm(displacement)):
+        return True
+    turn = rotation_from((before - here).T, np.ascontiguousarray(now.T))
+    angle = math.acos(min(max((float(np.trace(turn)) - 1.0) / 2.0, -1.0), 1.0))
+    return 0.0 < settings.jump_turn < angle
+
+
+def go_along(
+    rig: Rig,
+    motion: Motion,
+    pose: Pose,
+    colliders: tuple[PosedCollider, ...],
+    duration: float,
+) -> Motion:
+    """A frame in which hair goes along with its roots as it is, each guide rigidly.
+
+    Args:
+        duration: [s] of a jump, after which hair has no speed; 0: hair is frozen, and goes on with
+            the speed that it had.
+    """
+    target, state = style_of_guides(rig, pose), motion.dynamics
+    turn = root_turns(rig, pose) @ np.linalg.pinv(root_turns(rig, motion.pose))
+    root = state.grid[:, :1]
+
+    def taken_along(rows: Floats) -> Floats:
+        grid = rows.transpose(2, 1, 0)
+        moved = np.einsum("nij,nkj->nki", turn, grid - root) + target[:, :1]
+        return rows_of(moved.astype(np.float32), "dynamics")
+
+    position = taken_along(state.position)
+    previous = position if duration else taken_along(state.previous)
+    state = replace(state, position=position, previous=previous, styles=(), push=None)
+    return Motion(
+        state,
+        state.grid,
+        target,
+        pose,
+        None,
+        duration or motion.duration,
+        colliders,
+        motion.clearance,
+        motion.guide_clearance,
     )
 
 

@@ -1,4 +1,4 @@
-"""Force fields as Blender's own particles feel them: mass 1, no gravity, a frame by Euler's rule."""
+"""Force fields as Blender's particles feel them: mass 1, no gravity, one frame by Euler's rule."""
 
 from __future__ import annotations
 

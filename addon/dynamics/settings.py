@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from ..params import choice, curve, integer, number, toggle
@@ -19,7 +20,7 @@ class DynamicsSettings(MotionSettings):
     section = "dynamics"
     title = "Dynamics"
     owner = "character"
-    panels = ("Style", "Medium & Wind", "Lengths", "Collisions")
+    panels = ("Style", "Medium & Wind", "Lengths", "Collisions", "Shot")
 
     device: str = choice(
         "automatic",
@@ -228,4 +229,39 @@ class DynamicsSettings(MotionSettings):
         hard=(0.0, 1.0),
         source='"Pearl" configuration, Nguyen and Donnelly 2005',
         panel="Collisions",
+    )
+    jump_distance: float = number(
+        3.0,
+        label="Jump Distance",
+        description="At a cut hair goes along as it is, at no speed: where its roots go so much "
+        "farther in a frame than in the one before, in extents of the hair; 0 is never",
+        soft=(0.0, 10.0),
+        hard=(0.0, 1.0e6),
+        panel="Shot",
+    )
+    jump_turn: float = number(
+        math.radians(120.0),
+        label="Jump Turn",
+        description="The same where its roots turn so far in a frame; 0 is never",
+        soft=(0.0, math.pi),
+        hard=(0.0, math.pi),
+        unit="angle",
+        panel="Shot",
+    )
+    pre_roll: int = integer(
+        0,
+        label="Pre-Roll",
+        description="Frames that are simulated before the first one, with the head where it is "
+        "then, so that hair hangs and blows from the start",
+        soft=(0, 100),
+        hard=(0, 1000),
+        panel="Shot",
+    )
+    time_scale: float = number(
+        1.0,
+        label="Time Scale",
+        description="Speed of the hair's time; at 0 hair is frozen and goes along with its roots",
+        soft=(0.0, 1.0),
+        hard=(0.0, 4.0),
+        panel="Shot",
     )

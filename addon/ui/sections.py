@@ -218,6 +218,7 @@ SUB_SECTIONS: dict[str, tuple[Section, ...]] = {
         ("style", "Style", _panel("dynamics", "Style")),
         ("medium", "Medium & Wind", draw_medium),
         ("lengths", "Lengths", _panel("dynamics", "Lengths")),
+        ("shot", "Shot", _panel("dynamics", "Shot")),
         ("collisions", "Collisions", draw_collisions),
         ("ties", "Ties", draw_ties),
         ("bake", "Bake", draw_bake),

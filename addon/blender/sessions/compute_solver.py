@@ -106,6 +106,12 @@ class ComputeSolver:
         )
         self._is_resting = self._is_drawn = False
 
+    def has_jumped(self, pose: Pose, settings: DynamicsSettings, duration: float) -> bool:
+        return pipeline.has_jumped(self._rig, self._motion, pose, settings, duration)
+
+    def go_along(self, pose: Pose, colliders: tuple[PosedCollider, ...], duration: float) -> None:
+        self._take(pipeline.go_along(self._rig, self.motion, pose, colliders, duration))
+
     def carry(self, pose: Pose, guides: Floats, led: LedOut = NOT_LED) -> None:
         self._take(carried_motion(self._rig, self._motion, pose, guides))
         self._led, self._is_baked = led, True

@@ -23,6 +23,7 @@ from ...pipeline import Pose, Rig
 from ...render.snapshot import Snapshot
 from ...strands.arc_length import lengths
 from ..bakes.baked_rig import BakedRig, frame_arrays, led_in, rig_arrays
+from ..bakes.groom_hashes import frame_rate
 from ..bakes.simulated import Arrays
 from ..base.latest_job import LatestJob
 from ..base.thread_work import ThreadWork
@@ -366,6 +367,9 @@ class Session:
         if self.is_playing and self.obstacles is not None:
             self._posed = self.obstacles.rest(depsgraph)
             self._begun = self.solver.pose, self._posed
+            rate = frame_rate(depsgraph.scene)
+            for _ in range(self.settings[DynamicsSettings].pre_roll):
+                self._simulate(depsgraph, 1.0 / rate)
         self._show()
 
     def has_moved(self, depsgraph: bpy.types.Depsgraph) -> bool:
@@ -434,18 +438,29 @@ class Session:
             HairloomError: as `rest`.
         """
         with self.times.measured("simulation"):
-            pose = self._pose(depsgraph)
-            self._posed = () if self.obstacles is None else self.obstacles.move(depsgraph, duration)
-            fields, self._field_notes = force_fields_of(self.hair.found(), depsgraph)
-            self.solver.advance(
-                pose,
-                self._posed,
-                self.settings[DynamicsSettings],
-                gravity_of(depsgraph.scene),
-                duration,
-                fields,
-            )
+            scale = self.settings[DynamicsSettings].time_scale
+            if scale:
+                self._simulate(depsgraph, duration * scale)
+            else:
+                self._go_along(depsgraph, self._pose(depsgraph), 0.0)
             self._show()
+
+    def _simulate(self, depsgraph: bpy.types.Depsgraph, duration: float) -> None:
+        """A frame of this duration of the hair's time [s]."""
+        pose, settings = self._pose(depsgraph), self.settings[DynamicsSettings]
+        if self.solver.has_jumped(pose, settings, duration):
+            self._go_along(depsgraph, pose, duration)
+            return
+        self._posed = () if self.obstacles is None else self.obstacles.move(depsgraph, duration)
+        fields, self._field_notes = force_fields_of(self.hair.found(), depsgraph)
+        self.solver.advance(
+            pose, self._posed, settings, gravity_of(depsgraph.scene), duration, fields
+        )
+
+    def _go_along(self, depsgraph: bpy.types.Depsgraph, pose: Pose, duration: float) -> None:
+        """A frame in which hair goes with its head as it is; see `pipeline.go_along`."""
+        self._posed = () if self.obstacles is None else self.obstacles.rest(depsgraph)
+        self.solver.go_along(pose, self._posed, duration)
 
     def measure(self) -> None:
         """Find the figures of this moment, while it is simulated."""

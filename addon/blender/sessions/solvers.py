@@ -63,6 +63,12 @@ class Solver(Protocol):
     ) -> None:
         """One frame of motion, as pipeline.advance."""
 
+    def has_jumped(self, pose: Pose, settings: DynamicsSettings, duration: float) -> bool:
+        """Whether the head is elsewhere all of a sudden, see `pipeline.has_jumped`."""
+
+    def go_along(self, pose: Pose, colliders: tuple[PosedCollider, ...], duration: float) -> None:
+        """A frame in which hair goes along with its roots, see `pipeline.go_along`."""
+
     def carry(self, pose: Pose, guides: Floats, led: LedOut = NOT_LED) -> None:
         """Show guides (guide_count, cv_count, 3) [m, world], and strands that were led out of
         colliders, which come from a bake.

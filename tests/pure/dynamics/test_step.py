@@ -285,7 +285,7 @@ def test_guides_without_length_stay_finite(kit, shake):
 @pytest.mark.parametrize("held", [None, True])
 @pytest.mark.parametrize("seed", few_in_commits(range(12), 3))
 def test_any_settings_stay_finite_and_short(kit, seed, held):
-    """Hard ranges at random, with a violent head, colliders, wind and held tips."""
+    """Hard ranges at random, with a violent head, colliders, force fields and held tips."""
     random = np.random.default_rng(seed)
     fixed = {} if seed % 4 == 3 else {"length_solver": "direct"}
     settings = kit.random_settings(random, **fixed)
@@ -304,7 +304,12 @@ def test_any_settings_stay_finite_and_short(kit, seed, held):
         standing=(SphereCollider((0.3, 0, 0.0), 0.2),),
         held=held and kit.tied(np.arange(20) % 3 == 0, 16, 3, 9) | kit.tips(even, 16),
         bowed=seed % 2 == 0,
-        wind=10.0 * way[3],
+        force_fields=ForceFields(
+            (
+                ForceField("wind", axis=tuple(way[3] / np.linalg.norm(way[3])), strength=30.0),
+                ForceField("vortex", strength=200.0, shape="plane", across=1.0),
+            )
+        ),
     )
     for state in scene.play(0.5)[1:]:
         assert np.isfinite(state.position).all()

@@ -1,0 +1,166 @@
+"""What a shot needs of moving hair: cuts without a whip, hair that already moves, slow motion."""
+
+import bpy
+import numpy as np
+import pytest
+from mathutils import Matrix
+
+from hairloom.addon.blender.bakes.cache import Cache
+from hairloom.addon.blender.command_line import command_line
+from hairloom.addon.blender.preview import previews
+
+pytestmark = pytest.mark.draws
+SOFT = {"style_root": 1.0, "style_tip": 0.2, "sag_compensation": 0.0}
+
+
+@pytest.fixture(params=["numpy", "compute"])
+def playing(request, gpu_context, new_hair, sphere, evaluated):
+    """Soft hair on a head, which plays: its settings, the head, the session."""
+    hair = new_hair(sphere)
+    settings = hair.hairloom.dynamics
+    for name, value in SOFT.items():
+        setattr(settings, name, value)
+    settings.device = request.param
+    session = previews.start(hair, evaluated())
+    assert previews.play(evaluated()) == []
+    assert session.solver.form == request.param
+    return settings, sphere, session
+
+
+def advance(evaluated, frames=1, each=lambda frame: None):
+    for frame in range(frames):
+        each(frame)
+        bpy.context.view_layer.update()
+        previews.advance(evaluated(), 1.0 / 24.0)
+
+
+def on_head(session, head):
+    """Guides as the head sees them."""
+    inverse = np.array(head.matrix_world.inverted())
+    return session.solver.guides() @ inverse[:3, :3].T + inverse[:3, 3]
+
+
+def speed(session):
+    dynamics = session.solver.motion.dynamics
+    return float(np.abs(dynamics.position - dynamics.previous).max()) / dynamics.substep
+
+
+def cut(head):
+    head.matrix_world = Matrix.Translation((4.0, -3.0, 1.0)) @ Matrix.Rotation(2.5, 4, "Y")
+
+
+def test_hair_goes_along_at_a_cut_and_has_no_speed_after_it(playing, evaluated):
+    _, head, session = playing
+    advance(evaluated, 6, lambda frame: setattr(head.location, "x", 0.02 * frame))
+    assert speed(session) > 0.05
+    before = on_head(session, head)
+    cut(head)
+    advance(evaluated)
+    np.testing.assert_allclose(on_head(session, head), before, atol=2e-6)
+    assert speed(session) == 0.0
+    advance(evaluated, 3)
+    assert 0.0 < speed(session) < 2.0, "it falls on, and does not whip"
+
+
+def test_without_it_hair_whips(playing, evaluated):
+    settings, head, session = playing
+    settings.jump_distance = settings.jump_turn = 0.0
+    advance(evaluated, 2)
+    cut(head)
+    advance(evaluated)
+    assert speed(session) > 10.0
+
+
+@pytest.mark.parametrize("limit", ["jump_distance", "jump_turn"])
+def test_either_limit_finds_its_jump(playing, evaluated, limit):
+    settings, head, session = playing
+    setattr(settings, {"jump_distance": "jump_turn", "jump_turn": "jump_distance"}[limit], 0.0)
+    advance(evaluated, 2)
+    if limit == "jump_distance":
+        head.location.y = 5.0
+    else:
+        head.rotation_euler.z = 2.5
+    before = on_head(session, head)
+    advance(evaluated)
+    assert speed(session) == 0.0
+    np.testing.assert_allclose(on_head(session, head)[:, 0], before[:, 0], atol=5e-6)
+
+
+def test_a_fast_car_is_no_jump(playing, evaluated):
+    """Five metres a frame, evenly: only its first frame could be one."""
+    _, head, session = playing
+    advance(evaluated, 2, lambda frame: setattr(head.location, "x", 5.0 * (frame + 1)))
+    advance(evaluated, 1, lambda frame: setattr(head.location, "x", 15.0))
+    assert speed(session) > 50.0
+
+
+def test_frozen_hair_goes_along_and_then_goes_on(playing, evaluated):
+    settings, head, session = playing
+    advance(evaluated, 6, lambda frame: setattr(head.location, "x", 0.02 * frame))
+    before, fast = on_head(session, head), speed(session)
+    settings.time_scale = 0.0
+    session.take_settings()
+
+    def turn(frame):
+        head.rotation_euler.y = 0.2 * frame
+
+    advance(evaluated, 4, turn)
+    np.testing.assert_allclose(on_head(session, head), before, atol=5e-6)
+    assert speed(session) == pytest.approx(fast, rel=0.2)
+    settings.time_scale = 1.0
+    session.take_settings()
+    advance(evaluated)
+    assert np.abs(on_head(session, head) - before).max() > 1e-3
+
+
+def test_at_half_the_speed_two_frames_are_one(playing, evaluated):
+    settings, head, session = playing
+    advance(evaluated, 4)
+    once = on_head(session, head)
+    previews.rest(evaluated(), keep_playing=True)
+    settings.time_scale = 0.5
+    session.take_settings()
+    advance(evaluated, 4)
+    assert np.abs(on_head(session, head) - once).max() > 1e-3
+    advance(evaluated, 4)
+    np.testing.assert_allclose(on_head(session, head), once, atol=2e-5)
+
+
+def test_pre_roll_is_what_frames_at_the_start_would_be(playing, evaluated):
+    settings, head, session = playing
+    advance(evaluated, 5)
+    expected = on_head(session, head)
+    settings.pre_roll = 5
+    session.take_settings()
+    previews.rest(evaluated(), keep_playing=True)
+    np.testing.assert_allclose(on_head(session, head), expected, atol=1e-6)
+    previews.rest(evaluated(), keep_playing=False)
+    assert np.abs(on_head(session, head) - expected).max() > 1e-3, "at rest there is none"
+
+
+def test_a_bake_has_all_of_them(new_hair, sphere, tmp_path):
+    """Pre-roll, a cut in frame 4, and hair frozen by a keyframe from frame 6 on."""
+    hair = new_hair(sphere)
+    scene, settings = bpy.context.scene, hair.hairloom.dynamics
+    scene.frame_start, scene.frame_end = 1, 8
+    for name, value in SOFT.items():
+        setattr(settings, name, value)
+    settings.device, settings.pre_roll = "numpy", 6
+    for frame, place in ((3, 0.0), (4, 6.0)):
+        sphere.location.x = place
+        sphere.keyframe_insert("location", index=0, frame=frame)
+    for frame, scale in ((5, 1.0), (6, 0.0)):
+        settings.time_scale = scale
+        hair.keyframe_insert("hairloom.dynamics.time_scale", frame=frame)
+    assert command_line.run(["bake", "--output", str(tmp_path / "bake")]) == 0
+    bake = Cache(tmp_path / "bake")
+    frames = [bake.frame(frame)["guides"] for frame in range(1, 9)]
+    fallen = (frames[0][:, -1] - frames[0][:, 0])[:, 2].mean()
+    settings.pre_roll = 0
+    assert command_line.run(["bake", "--output", str(tmp_path / "without")]) == 0
+    combed = Cache(tmp_path / "without").frame(1)["guides"]
+    assert fallen < (combed[:, -1] - combed[:, 0])[:, 2].mean() - 1e-3, "it falls before the start"
+    assert np.abs(frames[3] - frames[2] - [6.0, 0.0, 0.0]).max() < 1e-5
+    assert np.abs(frames[4] - frames[3]).max() > 1e-5
+    for later in frames[6:]:
+        np.testing.assert_allclose(later, frames[5], atol=1e-6)
