@@ -170,6 +170,8 @@ def test_every_block_fits_the_sources(tmp_path: Path) -> None:
 
 def test_the_places_of_a_force_are_complete() -> None:
     others = {"addon/dynamics/constraints.py", "addon/dynamics/settings.py"}
+    others |= {"addon/dynamics/force_fields.py", "addon/blender/scene/forces.py"}  # Blender's
+    others.add("gpu_shaders/lib_force_fields.glsl")
     assert listed_files("A force or constraint") - others == files_with("drag") - others
 
 

@@ -19,7 +19,7 @@ PICTURES: dict[str, tuple[tuple[str, ...], ...]] = {
     ),
     "dynamics": (
         ("data_dynamics", "data_dynamics_style"),
-        ("data_dynamics_medium", "data_dynamics_lengths"),
+        ("data_dynamics_medium", "data_dynamics_lengths", "data_dynamics_shot"),
         ("data_dynamics_collisions", "data_dynamics_ties", "data_dynamics_bake"),
     ),
     "cards": (
