@@ -45,6 +45,7 @@ PAGES = {
     "style": "dynamics#style-and-lengths",
     "medium": "dynamics#forces",
     "lengths": "dynamics#style-and-lengths",
+    "shot": "dynamics#shots",
     "collisions": "dynamics#collisions",
     "sphere_fit": "dynamics#collisions",
     "ties": "dynamics#ties-and-held-tips",
