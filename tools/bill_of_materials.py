@@ -26,7 +26,10 @@ from fetch_wheels import FOLDER, REPOSITORY, wanted
 from packageurl import PackageURL
 
 #: What the zip holds beside wheels that is not ours: name, license, description.
-DATA = (("MakeHuman base mesh", "CC0-1.0", "addon/blender/scene/bust.npz is made from it"),)
+DATA = (
+    ("MakeHuman base mesh", "CC0-1.0", "addon/blender/scene/bust.npz is made from it"),
+    ("three.js 0.187.0", "MIT", "addon/exchange/cards/page/viewer.min.js has parts of it"),
+)
 #: Licenses that a wheel names in words -> their identifiers.
 _IDENTIFIERS = {"MIT License": "MIT"}
 _NAMESPACE = UUID("6ba7b811-9dad-11d1-80b4-00c04fd430c8")

@@ -52,6 +52,23 @@ class CardExportSettings(Settings):
         description="Also write the sorted indices as a separate file, NAME.indices.bin, for "
         "engines that keep their own vertices",
     )
+    page: bool = toggle(
+        False,
+        label="Web Page",
+        description="GLB: also write NAME.html, one file that shows the hair in any browser, "
+        "without a network",
+    )
+    page_texture: str = choice(
+        "1024",
+        tuple((size, size, f"Up to {size} texels a side") for size in ("512", "1024", "2048")),
+        label="Page Textures",
+        description="Size of the textures in the web page, which are scaled down",
+    )
+    page_head: bool = toggle(
+        True,
+        label="Page Head",
+        description="Put the mesh that hair grows on into the web page, too",
+    )
     motion: str = choice(
         "none",
         (

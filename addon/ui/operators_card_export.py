@@ -20,7 +20,7 @@ from ..blender.properties.groups import operator_properties
 from ..blender.properties.properties import settings_of
 from ..cards.export_settings import CardExportSettings
 from ..errors import HairloomError
-from ..exchange.cards.card_formats import FORMATS, SUFFIXES
+from ..exchange.cards.card_formats import FORMATS, GLB, SUFFIXES
 from .long_work import LongWork, Progress, Steps, threaded
 from .messages import draw_lines
 from .reports import tell
@@ -151,8 +151,10 @@ class HAIRLOOM_OT_export_cards(LongWork, ExportHelper, bpy.types.Operator):
         count = levels.row()
         count.active = self.own_levels
         count.prop(self, "levels", text="")
-        for name in ("packing", "textures", "attributes", "index_buffer", "motion"):
+        for name in ("packing", "textures", "attributes", "index_buffer"):
             layout.prop(self, name)
+        self._draw_page(layout)
+        layout.prop(self, "motion")
         if self.motion != "none":
             self._draw_motion(layout, context)
 
@@ -164,6 +166,13 @@ class HAIRLOOM_OT_export_cards(LongWork, ExportHelper, bpy.types.Operator):
             path = in_own_folder(Path(bpy.path.abspath(self.filepath)))
             icon, does = ("ERROR", "Replaces") if path.exists() else ("FILE_FOLDER", "Makes")
             layout.label(text=f"{does} {path.parent.name}/{path.name}", icon=icon)
+
+    def _draw_page(self, layout: bpy.types.UILayout) -> None:
+        page = layout.column()
+        page.active = self.format == GLB.name
+        page.prop(self, "page")
+        for name in ("page_texture", "page_head") if self.page else ():
+            page.prop(self, name)
 
     def _draw_motion(self, layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
         frames = layout.row(heading="Frames")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import shutil
 import tempfile
@@ -28,59 +27,15 @@ from hairloom.addon.shading.marschner.tables import marschner_tables, shape_of
 from hairloom.addon.shading.settings import ShadingSettings
 
 bpy = pytest.importorskip("bpy", reason="exporters need Blender or the bpy module")
-jsonschema = pytest.importorskip("jsonschema", reason="it is missing: `make setup` installs it")
+pytest.importorskip("jsonschema", reason="it is missing: `make setup` installs it")
+
+from card_exports import BAKED, cards, grown, sidecar_of  # noqa: E402
 
 from hairloom.addon.blender.cards import files  # noqa: E402
 from hairloom.addon.blender.cards.textures import TABLE_SIZE  # noqa: E402
-from hairloom.addon.blender.command_line import command_line  # noqa: E402
 from hairloom.addon.ui.operators_card_export import HAIRLOOM_OT_export_cards  # noqa: E402
 
 pytestmark = pytest.mark.usefixtures("extension")
-
-SCHEMA = json.loads(
-    (Path(__file__).parents[2] / "docs" / "sidecar.schema.json").read_text(encoding="utf-8")
-)
-SMALL = (
-    *(
-        "--set",
-        "children.method=none",
-        "--set",
-        "grow.strand_count=100",
-        "--set",
-        "guides.guide_count=10",
-    ),
-    *("--set", "card_occlusion.rays=16", "--set", "cards.source=guides"),
-    *("--set", "cards.order_by=distance"),
-    *("--set", "atlas.source=made"),
-)
-BAKED = (
-    *(
-        "--set",
-        "cards.source=clusters",
-        "--set",
-        "cards.card_count=8",
-        "--set",
-        "atlas.source=baked",
-    ),
-    *("--set", "atlas.size=512", "--set", "atlas.columns=4", "--set", "atlas.rows=2"),
-)
-
-
-def cards(output: Path, *more: str) -> int:
-    return command_line.run(["cards", *SMALL, *more, "--output", str(output)])
-
-
-def sidecar_of(path: Path) -> dict[str, Any]:
-    """The sidecar, which follows the schema and names files that are there."""
-    content = json.loads(path.with_suffix(".hairloom.json").read_text(encoding="utf-8"))
-    jsonschema.Draft202012Validator(SCHEMA).validate(content)
-    textures = content["textures"].values()
-    roles = [value for value in textures if isinstance(value, dict) and "file" in value]
-    tables = content["material"]["tables"].values()
-    beside = [each["file"] for each in (*roles, *tables, content.get("index_buffer", roles[0]))]
-    for file in (content["file"], *beside, *content["texture_files"]):
-        assert (path.parent / file).is_file(), file
-    return content
 
 
 def oiio_pixels(path: Path) -> np.ndarray:
@@ -351,19 +306,6 @@ def test_the_format_may_be_named_and_others_are_refused(
     assert "Use .glb" in capfd.readouterr().err
     assert cards(tmp_path / "hair.glb", "--levels", "9") == 1
     assert "levels" in capfd.readouterr().err
-
-
-def grown(sphere: Any, name: str) -> Any:
-    bpy.ops.object.select_all(action="DESELECT")
-    sphere.select_set(True)
-    bpy.context.view_layer.objects.active = sphere
-    bpy.ops.hairloom.grow(strand_count=200, length=0.05)
-    hair = bpy.context.object
-    hair.name = name
-    hair.data.hairloom.guides.guide_count = 10
-    hair.data.hairloom.card_occlusion.rays = 16
-    hair.data.hairloom.cards.source, hair.data.hairloom.atlas.source = "guides", "made"
-    return hair
 
 
 def test_a_button_writes_under_the_hairs_name(sphere: Any, tmp_path: Path) -> None:

@@ -21,6 +21,7 @@ from ...cards.steps import map_progress, result_of
 from ...cards.vertex_animation import motion_layout
 from ...errors import HairloomError
 from ...exchange.cards.card_formats import GLB, USD, CardFormat, format_of
+from ...exchange.cards.card_page import PAGE_SUFFIX
 from ...exchange.cards.glb_file import GlbFile
 from ...exchange.cards.glb_plain import screen_coverage, with_levels, with_material
 from ...exchange.cards.index_buffer import index_buffer
@@ -37,8 +38,8 @@ from ...shading.kajiya_kay_settings import KajiyaKaySettings
 from ...shading.marschner.look import fibre_of, pack_fibre
 from ...shading.marschner.settings import MarschnerSettings
 from ...shading.settings import ShadingSettings, SharedSettings
+from ...strands import Surface
 from ..bakes.guide_motion import BakedGuides, GuideMotion
-from ..base.images import write_texture
 from ..base.outcome import Outcome
 from ..base.report import hairloom_version
 from ..base.thread_work import ThreadWork
@@ -61,7 +62,15 @@ from .motion import (
     joint_motion_steps,
     moved_cards,
 )
-from .textures import picture_files, texture_channels, texture_roles, write_tables, write_textures
+from .page import PAGE_AT_REST, check_page, write_page
+from .textures import (
+    picture_files,
+    png_of,
+    texture_channels,
+    texture_roles,
+    write_tables,
+    write_textures,
+)
 
 _UNITS = {
     "length": "m",
@@ -147,7 +156,8 @@ def write_cards(
     check_output(path, output, motion)
     with stage("build cards"):
         made = result_of(build_steps(inputs, stage=stage))
-    return result_of(file_steps(path, made, inputs.settings, output, stage, motion))
+    head = inputs.rig.head
+    return result_of(file_steps(path, made, inputs.settings, output, stage, motion, head))
 
 
 def check_output(path: Path, output: CardOutput, motion: GuideMotion | None) -> None:
@@ -159,6 +169,7 @@ def check_output(path: Path, output: CardOutput, motion: GuideMotion | None) -> 
     path, file_format = format_of(path, output.format)
     check_place(path)
     check_exporter(file_format, str(path))
+    check_page(output.settings, file_format, str(path))
     if motion is not None:
         check_motion(output.settings, motion, file_format)
 
@@ -186,8 +197,12 @@ def file_steps(
     output: CardOutput,
     stage: Stage = untimed,
     motion: GuideMotion | None = None,
+    head: Surface | None = None,
 ) -> FileSteps[WrittenCards]:
     """Write cards that are made; closing it leaves old files as they were.
+
+    Args:
+        head: what hair grows on, for a web page.
 
     Raises:
         HairloomError: as `write_cards`.
@@ -195,7 +210,7 @@ def file_steps(
     path, file_format = format_of(path, output.format)
     check_cards(made.build.levels, str(path))
     with written_together(path) as folder:
-        writer = _Writer(folder / path.name, made, settings, output, file_format, stage)
+        writer = _Writer(folder / path.name, made, settings, output, file_format, stage, head)
         said = yield from writer.steps(motion)
         said += kept_aside(folder, path, files_of_earlier(path))
         names = {file.name for file in folder.iterdir() if file.is_file()}
@@ -216,6 +231,7 @@ class _Writer:
     output: CardOutput
     file_format: CardFormat
     stage: Stage
+    head: Surface | None = None
     motion: Mapping[str, Any] = field(default_factory=dict)
 
     def steps(self, motion: GuideMotion | None) -> FileSteps[tuple[str, ...]]:
@@ -318,8 +334,15 @@ class _Writer:
             material=material_of(shading, tables),
             indices=indices,
             motion=self.motion,
+            page=path.stem + PAGE_SUFFIX if settings.page else "",
             generator=hairloom_version(),
         )
+        if settings.page:
+            with self.stage("write page"):
+                head = self.head if settings.page_head else None
+                write_page(path, self._name, sidecar, self.made, shading, backs, head, settings)
+            if self.motion.get("kind") == "texture":
+                notes += (PAGE_AT_REST,)
         path.with_name(path.stem + SUFFIX).write_text(sidecar_text(sidecar), encoding="utf-8")
         return notes
 
@@ -335,7 +358,7 @@ class _Writer:
             with_levels(file, nodes, screen_coverage(levels, self.made.build.errors))
             ramp = np.linspace(0.0, 1.0, _RAMP_SIZE, dtype=np.float32)[None, :, None]
             maps = _direction_pictures(self.path, self.made.maps)
-            with_material(file, maps, _png(self.path, ramp))
+            with_material(file, maps, png_of(self.path, ramp))
             self.path.write_bytes(file.data())
         return ()
 
@@ -347,16 +370,9 @@ def _direction_pictures(path: Path, maps: CardMaps) -> dict[str, bytes]:
         return {}
     made = packed(of_one_size(directions), "gltf")
     by_name = {each.suffix.removeprefix("_"): each.pixels for each in made}
-    return {name: _png(path, by_name[name]) for name in ("normal", "anisotropy") if name in by_name}
-
-
-def _png(path: Path, pixels: Floats) -> bytes:
-    """(height, width, channels) as a PNG of 8 bits; `path` lies in the folder it may use."""
-    picture = path.with_name(".picture.png")
-    write_texture(picture, pixels, is_color=False, depth="uint8", is_packed=True)
-    data = picture.read_bytes()
-    picture.unlink()
-    return data
+    return {
+        name: png_of(path, by_name[name]) for name in ("normal", "anisotropy") if name in by_name
+    }
 
 
 def _look(
@@ -443,7 +459,15 @@ class CardExport:
 
     def writing(self, made: MappedCards) -> FileSteps[Outcome]:
         """Write the cards that were made; closing it leaves old files as they were."""
-        steps = file_steps(self.path, made, self.inputs.settings, self.output, motion=self.motion)
+        inputs = self.inputs
+        steps = file_steps(
+            self.path,
+            made,
+            inputs.settings,
+            self.output,
+            motion=self.motion,
+            head=inputs.rig.head,
+        )
         return self.outcome((yield from steps))
 
     def outcome(self, written: WrittenCards) -> Outcome:

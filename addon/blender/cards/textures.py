@@ -137,6 +137,15 @@ def _together(
     return [maps]
 
 
+def png_of(path: Path, pixels: Floats, *, is_color: bool = False) -> bytes:
+    """(height, width, channels) as a PNG of 8 bits; `path` lies in the folder it may use."""
+    picture = path.with_name(".picture.png")
+    write_texture(picture, pixels, is_color=is_color, depth="uint8", is_packed=True)
+    data = picture.read_bytes()
+    picture.unlink()
+    return data
+
+
 def write_tables(folder: Path, stem: str, shading: ShadingSettings) -> dict[str, str]:
     """Marschner's tables as EXR files of 32 bits, name -> file; nothing for the other model, or
     without OpenImageIO.
@@ -144,15 +153,22 @@ def write_tables(folder: Path, stem: str, shading: ShadingSettings) -> dict[str,
     Raises:
         HairloomError: nothing can be written there.
     """
-    if shading.model != "marschner" or not has_openimageio():
+    if not has_openimageio():
         return {}
-    tables = marschner_tables(shape_of(fibre_of(shading)), TABLE_SIZE)
-    pixels = {
-        "longitudinal": tables.longitudinal[0],
-        "azimuthal": tables.azimuthal,
-        "paths": tables.paths,
-    }
+    pixels = look_tables(shading)
     files = {name: f"{stem}_{name}.exr" for name in pixels}
     for name, file in files.items():
         write_texture(folder / file, pixels[name], is_color=False, depth="float", is_packed=True)
     return files
+
+
+def look_tables(shading: ShadingSettings) -> dict[str, Floats]:
+    """Marschner's tables, (side, side, 4), row 0 the lowest; none for the other model."""
+    if shading.model != "marschner":
+        return {}
+    tables = marschner_tables(shape_of(fibre_of(shading)), TABLE_SIZE)
+    return {
+        "longitudinal": tables.longitudinal[0],
+        "azimuthal": tables.azimuthal,
+        "paths": tables.paths,
+    }

@@ -15,7 +15,7 @@ from typing import Any
 from ...cards.card_mesh import CardMesh
 from .glb_file import GlbFile
 
-_LOD, _ANISOTROPY = "MSFT_lod", "KHR_materials_anisotropy"
+LOD, _ANISOTROPY = "MSFT_lod", "KHR_materials_anisotropy"
 _SPECULAR = "KHR_materials_specular"
 #: Of the light that a smooth surface reflects, what hair does: measured with bench engines.
 SPECULAR = 0.9
@@ -43,9 +43,9 @@ def with_levels(file: GlbFile, nodes: Sequence[str], coverage: Sequence[float]) 
             if key in node:
                 node[key] = [each for each in node[key] if each not in others]
     node = file.content["nodes"][finest]
-    node.setdefault("extensions", {})[_LOD] = {"ids": others}
+    node.setdefault("extensions", {})[LOD] = {"ids": others}
     node.setdefault("extras", {})["MSFT_screencoverage"] = list(coverage)
-    _use(file, _LOD)
+    _use(file, LOD)
 
 
 def screen_coverage(levels: Sequence[CardMesh], errors: Sequence[float]) -> list[float]:

@@ -32,6 +32,13 @@ class IndexBuffer:
     first: tuple[int, ...]
     back_first: tuple[int, ...]
 
+    def backs_alone(self) -> IndexBuffer:
+        """Without the first orders, which the mesh has: `first` names the second ones, too."""
+        begin = self.back_first[0]
+        size = 2 if self.type == "uint16" else 4
+        back = tuple(each - begin for each in self.back_first)
+        return IndexBuffer(self.content[begin * size :], self.type, back, back)
+
 
 def index_buffer(levels: Sequence[CardMesh], back: Sequence[Ints] = ()) -> IndexBuffer:
     """The indices of all levels.

@@ -99,6 +99,7 @@ class CardFile:
     material: model, values, units, fibre and tables, see blender/cards/files.py.
     indices: the index buffer and its file, or None.
     motion: what moves, see exchange/cards/sidecar_motion.py; empty: nothing.
+    page: the web page beside it; empty: none.
     generator: version of Hairloom.
     """
 
@@ -116,6 +117,7 @@ class CardFile:
     material: Mapping[str, Any] = field(default_factory=dict)
     indices: tuple[str, IndexBuffer] | None = None
     motion: Mapping[str, Any] = field(default_factory=dict)
+    page: str = ""
     generator: str = ""
 
 
@@ -181,6 +183,8 @@ def description(cards: CardFile) -> dict[str, Any]:
         "shading": texts.SHADING,
         "engines": texts.ENGINES,
     }
+    if cards.page:
+        content["page"] = cards.page
     if cards.motion:
         content["motion"] = dict(cards.motion)
     if cards.indices is not None:

@@ -5,6 +5,7 @@
 //
 // Reads NAME.glb, NAME.hairloom.json and the textures next to them. Uses the lights of the scene:
 // ambient light, suns (DirectionalLight) and lamps (PointLight). Shadows are left to you.
+// Joints that were exported move the hair: new AnimationMixer(hair).clipAction(hair.animations[0]).
 import * as THREE from 'three';
 import { EXRLoader } from 'three/addons/loaders/EXRLoader.js';
 import { GLTFLoader } from 'three/addons/loaders/GLTFLoader.js';
@@ -20,29 +21,42 @@ const HYSTERESIS = 0.05;
 
 // Options: level (0 the finest; without it a THREE.LOD shows each from the distance at which it takes
 // over), fieldOfView (of the camera for which these distances are, in degrees), shading (address of
-// hair_shading.gdshaderinc).
-export async function loadHairloomCards(url, { level, fieldOfView = 50, shading = SHADING } = {}) {
-  const address = new URL(url, document.baseURI);
+// hair_shading.gdshaderinc), addressOf (file name -> address, for files that lie elsewhere).
+export async function loadHairloomCards(
+  url,
+  { level, fieldOfView = 50, shading = SHADING, addressOf = addressesBeside(url) } = {},
+) {
+  const name = url.toString().split('/').pop();
   const [sidecar, formulas, gltf] = await Promise.all([
-    fetch(address.href.replace(/\.glb$/, '.hairloom.json')).then((file) => file.json()),
+    fetch(addressOf(name.replace(/\.glb$/, '.hairloom.json'))).then((file) => file.json()),
     fetch(shading).then((file) => file.text()),
-    new GLTFLoader().loadAsync(address.href),
+    new GLTFLoader().loadAsync(addressOf(name)),
   ]);
-  const uniforms = await uniformsOf(sidecar, address);
+  const uniforms = await uniformsOf(sidecar, addressOf);
   const groupOf = async (each) => {
     // Coarser levels are no part of the scene (MSFT_lod), so the node is asked for by its number.
     const node = await gltf.parser.getDependency('node', numberOf(gltf, each));
-    const backIndex = await backIndexOf(sidecar, each, address);
+    const backIndex = await backIndexOf(sidecar, each, addressOf);
     const group = new THREE.Group();
     group.add(...passesOf(node, sidecar, backIndex, formulas, uniforms));
     return group;
   };
-  if (level !== undefined) return groupOf(sidecar.levels[level]);
-  const groups = await Promise.all(sidecar.levels.map(groupOf));
-  const begins = beginsOf(gltf, sidecar, fieldOfView);
-  const hair = new THREE.LOD();
-  groups.forEach((group, number) => hair.addLevel(group, begins[number], HYSTERESIS));
+  const hair = level === undefined ? new THREE.LOD() : await groupOf(sidecar.levels[level]);
+  if (level === undefined) {
+    const groups = await Promise.all(sidecar.levels.map(groupOf));
+    const begins = beginsOf(gltf, sidecar, fieldOfView);
+    groups.forEach((group, number) => hair.addLevel(group, begins[number], HYSTERESIS));
+  }
+  if (sidecar.motion?.kind === 'joints') {
+    hair.add(gltf.scene.getObjectByName('hair_root')); // all levels are bound to its joints
+    hair.animations = gltf.animations;
+  }
   return hair;
+}
+
+function addressesBeside(url) {
+  const address = new URL(url, document.baseURI);
+  return (name) => new URL(name, address).href;
 }
 
 function numberOf(gltf, { node }) {
@@ -66,15 +80,22 @@ function passesOf(node, sidecar, backIndex, formulas, uniforms) {
   return sidecar.passes.map((pass, number) => {
     const isBack = backIndex && pass.cull === 'front';
     const geometry = isBack ? node.geometry.clone().setIndex(backIndex) : node.geometry;
-    const mesh = new THREE.Mesh(geometry, materialOf(pass, sidecar, formulas, uniforms));
+    const material = materialOf(pass, sidecar, formulas, uniforms);
+    const mesh = node.isSkinnedMesh
+      ? new THREE.SkinnedMesh(geometry, material)
+      : new THREE.Mesh(geometry, material);
+    if (node.isSkinnedMesh) {
+      mesh.bind(node.skeleton, node.bindMatrix);
+      mesh.frustumCulled = false; // it moves out of its bounds
+    }
     mesh.renderOrder = 1 + number; // after all opaque meshes, including the head
     return mesh;
   });
 }
 
-async function backIndexOf({ index_buffer: buffer }, level, address) {
+async function backIndexOf({ index_buffer: buffer }, level, addressOf) {
   if (!buffer || level.buffer_back_first === undefined) return null;
-  const bytes = await (await fetch(new URL(buffer.file, address))).arrayBuffer();
+  const bytes = await (await fetch(addressOf(buffer.file))).arrayBuffer();
   const isShort = buffer.type === 'uint16';
   const all = isShort ? new Uint16Array(bytes) : new Uint32Array(bytes);
   const indices = all.slice(level.buffer_back_first, level.buffer_back_first + level.indices);
@@ -119,7 +140,7 @@ function leastAlpha(pass, sidecar) {
   return pass.pixels.includes('min_alpha') ? sidecar.min_alpha : 0.0;
 }
 
-async function uniformsOf(sidecar, address) {
+async function uniformsOf(sidecar, addressOf) {
   const { model, values, fibre, tables } = sidecar.material;
   const facing = sidecar.textures.view_compensated_alpha;
   const uniforms = {
@@ -138,12 +159,12 @@ async function uniformsOf(sidecar, address) {
     ...Object.entries(TEXTURES).map(async ([name, empty]) => {
       const entry = sidecar.textures[name];
       uniforms[`${name}_texture`] = {
-        value: entry ? await textureOf(new URL(entry.file, address).href, name) : plain(empty),
+        value: entry ? await textureOf(addressOf(entry.file), name) : plain(empty),
       };
       uniforms[`${name}_mask`] = { value: maskOf(entry) };
     }),
     ...TABLES.filter((name) => tables && tables[name]).map(async (name) => {
-      uniforms[name] = { value: await tableOf(new URL(tables[name].file, address).href) };
+      uniforms[name] = { value: await tableOf(addressOf(tables[name].file)) };
     }),
   ]);
   return uniforms;
@@ -179,6 +200,7 @@ async function tableOf(file) {
 }
 
 const VERTEX = /* glsl */ `
+#include <skinning_pars_vertex>
 in vec2 uv1;
 in vec4 tangent;
 out vec2 card_uv;
@@ -191,10 +213,22 @@ invariant gl_Position; // so that the second pass gets exactly the depths of the
 void main() {
   card_uv = uv;
   occlusion_and_along = uv1;
-  vec4 place = modelViewMatrix * vec4(position, 1.0);
+  vec3 transformed = position;
+  vec3 objectNormal = normal;
+  vec3 objectTangent = cross(normal, tangent.xyz); // from root to tip
+#ifdef USE_SKINNING
+#include <skinbase_vertex>
+  mat3 turned = mat3(bindMatrixInverse * (skinWeight.x * boneMatX + skinWeight.y * boneMatY +
+                                          skinWeight.z * boneMatZ + skinWeight.w * boneMatW) *
+                     bindMatrix);
+  objectNormal = turned * objectNormal;
+  objectTangent = turned * objectTangent;
+#include <skinning_vertex>
+#endif
+  vec4 place = modelViewMatrix * vec4(transformed, 1.0);
   card_point = place.xyz;
-  card_normal = normalMatrix * normal;
-  card_tangent = mat3(modelViewMatrix) * cross(normal, tangent.xyz); // from root to tip
+  card_normal = normalMatrix * objectNormal;
+  card_tangent = mat3(modelViewMatrix) * objectTangent;
   gl_Position = projectionMatrix * place;
 }`;
 

@@ -1,0 +1,147 @@
+"""An asset made smaller for a page: vertices on a grid, no textures in the GLB, small maps."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from ...arrays import Bools, Floats
+from ...cards.atlas_grid import AtlasGrid
+from ..textures.mip_maps import mip_levels
+from ..textures.srgb import srgb_decoded, srgb_encoded
+from .glb_file import GlbFile
+from .glb_plain import LOD
+
+#: Steps of a rounded number: of the largest extent for positions, else of 1. None can be seen: they
+#: are a fifth of a degree, and a sixteenth of a texel of 1,024.
+_STEPS = {"POSITION": 2.0**-14, "NORMAL": 2.0**-8, "TANGENT": 2.0**-8}
+_UV_STEP = 2.0**-14
+#: Steps of what is stored in 8 bits. Fewer compress better: those of single strands are lost among
+#: many. 128, which is no direction, is one of them, and so is 255.
+_STORED = {"base": 4, "alpha": 4, "tangent": 4, "normal": 8, "shift": 4, "noise": 16}
+
+
+def small_glb(data: bytes, place: str) -> bytes:
+    """The same meshes, joints and motion without material; vertices are rounded, so that they can
+    be compressed."""
+    file = GlbFile.of(data, place)
+    attributes = [
+        (name, number)
+        for mesh in file.content["meshes"]
+        for primitive in mesh["primitives"]
+        for name, number in primitive["attributes"].items()
+    ]
+    rounded = {
+        number: _rounded(name, np.asarray(file.values(number), np.float32))
+        for name, number in attributes
+        if name in _STEPS or name.startswith("TEXCOORD")
+    }
+    for mesh in file.content["meshes"]:
+        for primitive in mesh["primitives"]:
+            primitive.pop("material", None)
+    for kind in ("materials", "textures", "images", "samplers"):
+        file.content.pop(kind, None)
+    used = file.content.pop("extensionsUsed", [])
+    if LOD in used:
+        file.content["extensionsUsed"] = [LOD]
+    return _with_values(file, rounded).data()
+
+
+def _rounded(name: str, values: Floats) -> Floats:
+    step = _STEPS.get(name, _UV_STEP)
+    if name == "POSITION":
+        extent = float(np.ptp(values, axis=0).max())
+        step *= 2.0 ** np.ceil(np.log2(extent)) if extent > 0.0 else 1.0
+    return (np.round(values / step) * step).astype(np.float32)
+
+
+def _with_values(file: GlbFile, values: Mapping[int, Floats]) -> GlbFile:
+    """Only the bytes that accessors point to, some of them with other values."""
+    old_binary, old_views = bytes(file.binary), file.content["bufferViews"]
+    file.binary, file.content["bufferViews"] = bytearray(), []
+    moved: dict[int, int] = {}
+    for number, accessor in enumerate(file.content["accessors"]):
+        old = accessor["bufferView"]
+        if number in values:
+            accessor["bufferView"] = file.add_bytes(values[number].tobytes())
+            accessor.pop("byteOffset", None)
+            if "min" in accessor:
+                accessor["min"] = values[number].min(axis=0).tolist()
+                accessor["max"] = values[number].max(axis=0).tolist()
+            continue
+        if old not in moved:
+            begin = old_views[old].get("byteOffset", 0)
+            moved[old] = file.add_bytes(old_binary[begin : begin + old_views[old]["byteLength"]])
+        accessor["bufferView"] = moved[old]
+    return file
+
+
+def small_maps(maps: Mapping[str, Floats], grid: AtlasGrid, size: int) -> dict[str, Floats]:
+    """Maps of at most `size` texels a side, in as few values as they need.
+
+    Those of one size with alpha get its mean where there is no hair.
+    """
+    alpha = maps["alpha"]
+    together = {name: each for name, each in maps.items() if each.shape[:2] == alpha.shape}
+    small = _with_size(together, grid, size)
+    hair = small["alpha"] > 0.0
+    for name, values in small.items():
+        # normals change most across the edge of a strand, where filters look beyond it
+        kept = _grown(hair) if name == "normal" else hair
+        if name != "alpha" and kept.any():
+            small[name] = np.where(
+                kept.reshape(*kept.shape, *(1,) * (values.ndim - 2)),
+                values,
+                values[hair].mean(axis=0),
+            )
+    for name in maps.keys() - together.keys():
+        small |= _with_size({name: maps[name]}, AtlasGrid(), size)
+    return {name: _in_steps(name, small[name]) for name in maps}
+
+
+def _with_size(maps: Mapping[str, Floats], grid: AtlasGrid, size: int) -> dict[str, Floats]:
+    levels = mip_levels(maps, grid=grid, threshold=None)
+    return next(level for level in levels if max(next(iter(level.values())).shape[:2]) <= size)
+
+
+def _grown(mask: Bools) -> Bools:
+    """With the four neighbours of each texel."""
+    wide = np.pad(mask, 1)
+    grown: Bools = mask | wide[2:, 1:-1] | wide[:-2, 1:-1] | wide[1:-1, 2:] | wide[1:-1, :-2]
+    return grown
+
+
+def _in_steps(name: str, values: Floats) -> Floats:
+    """Colours in steps of what is stored, which is by the sRGB curve."""
+    step = _STORED[name] / 255.0
+    stored = np.clip(values, 0.0, 1.0)
+    if name == "base":
+        stored = srgb_encoded(stored)
+    stored = np.minimum(np.round(stored / step) * step, 1.0).astype(np.float32)
+    return srgb_decoded(stored) if name == "base" else stored
+
+
+def half_floats(table: Floats) -> bytes:
+    """A look-up table (side, side, 4), row 0 first, as little-endian halves."""
+    return np.ascontiguousarray(table, "<f2").tobytes()
+
+
+def sizes_of(glb: int, textures: Mapping[str, int], levels: list[dict[str, int]]) -> list[Any]:
+    """The rows of the page's table.
+
+    Args:
+        glb: bytes of the mesh's file. textures: file -> bytes.
+    """
+    rows = [(f"Triangles, level {n}", f"{each['triangles']:,}") for n, each in enumerate(levels)]
+    return [
+        *rows,
+        ("Cards", f"{levels[0]['cards']:,}"),
+        ("Mesh", _megabytes(glb)),
+        (f"{len(textures)} textures", _megabytes(sum(textures.values()))),
+    ]
+
+
+def _megabytes(count: int) -> str:
+    return f"{count / 1e6:.1f} MB"

@@ -1,0 +1,178 @@
+"""The web page of an export in Chromium: from its file, without a network."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from extension_loader import REPOSITORY
+
+pytest.importorskip("bpy", reason="writing cards needs Blender or the bpy module")
+
+from engine_assets import (
+    EYE,
+    FIELD_OF_VIEW,
+    IRRADIANCE,
+    NEAR,
+    SIZE,
+    TARGET,
+    TO_SUN,
+    Asset,
+    glb_axes,
+    read_encoded,
+    written_asset,
+)
+
+from hairloom.addon.cards.export_settings import CardExportSettings
+from hairloom.addon.exchange.textures.texture_files import read_texture
+
+TOOLS = REPOSITORY / "tools"
+NAME = '</script> "Zöpfe" 头发'
+#: A page smooths edges, which our picture here does not: half of the difference. The rest comes of
+#: fewer shades in its textures.
+MOST_MEAN, MOST_LIGHT = 2.0 / 255.0, 0.05
+#: the picture of an own view that an engine draws: one sun in front of black, without the panel
+OWN_VIEW = """(({ hair, scene, camera, redraw }, view) => {
+  scene.background = null;
+  scene.traverse((each) => { if (each.isLight) each.intensity = 0; });
+  const sun = scene.children.find((each) => each.isDirectionalLight);
+  [sun.intensity, hair.autoUpdate] = [view.irradiance, false];
+  sun.color.set('white');
+  sun.target.position.set(0, 0, 0);
+  sun.position.set(...view.to_sun);
+  hair.levels.forEach(({ object }, number) => { object.visible = number === 0; });
+  document.querySelectorAll('aside, header, #corner').forEach((each) => { each.hidden = true; });
+  document.querySelector('main').style.display = 'block';
+  document.querySelector('#stage').style.height = '100vh';
+  camera.fov = view.field_of_view;
+  camera.near = view.near;
+  camera.updateProjectionMatrix();
+  hairloom.controls.target.set(...view.target);
+  camera.position.set(...view.eye);
+  hairloom.controls.update();
+  redraw();
+})(hairloom, VIEW)"""
+
+
+@pytest.fixture(scope="module")
+def asset(gpu_context: Any) -> Asset:
+    settings = CardExportSettings(page=True, page_texture="2048")
+    return written_asset("page", "baked", settings, NAME)
+
+
+def driven(sandbox: str, asset: Asset, name: str, *steps: dict[str, Any]) -> dict[str, Any]:
+    """What the browser says; pictures lie in the folder `name` of the asset."""
+    folder = asset.folder / name
+    folder.mkdir()
+    page = folder / "a page äö.html"
+    shutil.copy2(asset.folder / "cards.html", page)  # alone: nothing lies beside it
+    (folder / "steps.json").write_text(json.dumps(steps), encoding="utf-8")
+    command = [sandbox, "run", "python3", str(TOOLS / "drive_page.py")]
+    command += [str(page), str(folder / "steps.json"), str(folder)]
+    result = subprocess.run(command, capture_output=True, text=True, timeout=500)
+    assert result.returncode == 0, result.stderr
+    report: dict[str, Any] = json.loads((folder / "report.json").read_text(encoding="utf-8"))
+    return report
+
+
+def picture(path: Path) -> np.ndarray:
+    return read_texture(path, is_color=False)[..., :3]
+
+
+STILL = {"media": {"prefers-reduced-motion": "reduce"}}
+
+
+def chosen(selector: str) -> dict[str, str]:
+    """A click, and then a redraw."""
+    return {"evaluate": f"document.querySelector({json.dumps(selector)}).click()"}
+
+
+def test_a_page_opens_from_its_file_and_its_controls_change_the_picture(
+    asset: Asset,
+    sandbox: str,
+) -> None:
+    controls = {
+        "lights": {
+            "evaluate": "{ const bar = document.querySelector('#lights'); bar.value = 120; "
+            "bar.dispatchEvent(new Event('input', { bubbles: true })); }"
+        },
+        "order": chosen("#order"),
+        "level": chosen("#levels input[value='2']"),
+        "surroundings": chosen("#surroundings input[value='Paper']"),
+        "wireframe": chosen("#wireframe"),
+    }
+    steps: list[dict[str, Any]] = [STILL, {"screen": [760, 480, 1]}, {"open": True}]
+    steps += [chosen("#levels input[value='0']"), {"picture": "first.png"}]
+    steps += [{"picture": "again.png"}]
+    for name, control in controls.items():
+        steps += [control, {"picture": f"{name}.png"}]
+    steps += [{"evaluate": "document.querySelector('#picture').focus()"}, {"key": "ArrowLeft"}]
+    steps += [{"picture": "key.png"}, {"evaluate": "document.querySelector('#status').textContent"}]
+    report = driven(sandbox, asset, "controls", *steps)
+    assert report["complaints"] == []
+    assert [each for each in report["requests"][1:] if not each.startswith("blob:")] == []
+    folder = asset.folder / "controls"
+    before = picture(folder / "first.png")
+    stage = before[:, :440]
+    assert stage.std() > 0.05, "there is something in it"
+    np.testing.assert_array_equal(picture(folder / "again.png"), before)
+    for name in (*controls, "key"):
+        after = picture(folder / f"{name}.png")
+        changed = (np.abs(after - before)[60:, :440].max(axis=-1) > 4.0 / 255.0).mean()
+        assert changed > 0.002, name
+        before = after
+    sidecar = json.loads((asset.folder / "cards.hairloom.json").read_text(encoding="utf-8"))
+    coarse = sidecar["levels"][2]
+    assert report["values"][-1] == (
+        f"{coarse['triangles']:,} triangles in {coarse['cards']:,} cards, level 2"
+    )
+
+
+def test_a_page_draws_cards_as_we_do(asset: Asset, sandbox: str) -> None:
+    """The same view as the engines'."""
+    view = {
+        "eye": glb_axes(EYE),
+        "target": glb_axes(TARGET),
+        "to_sun": glb_axes(TO_SUN),
+        "irradiance": IRRADIANCE,
+        "field_of_view": FIELD_OF_VIEW,
+        "near": NEAR,
+    }
+    steps = [STILL, {"screen": [SIZE, SIZE, 1]}, {"open": True}]
+    steps += [{"evaluate": OWN_VIEW.replace("VIEW)", f"{json.dumps(view)})")}]
+    steps += [{"picture": "view.png"}]
+    report = driven(sandbox, asset, "view", *steps)
+    assert report["complaints"] == []
+    theirs, ours = picture(asset.folder / "view" / "view.png"), read_encoded(asset.picture)
+    assert (ours.max(axis=-1) > 0.1).mean() > 0.1  # there is hair in it
+    assert np.abs(theirs - ours).mean() < MOST_MEAN
+    assert theirs.mean() / ours.mean() == pytest.approx(1.0, abs=MOST_LIGHT)
+
+
+def test_without_webgl_a_page_says_so(asset: Asset, sandbox: str) -> None:
+    steps = [{"block_webgl": True}, {"open": True}]
+    steps += [{"evaluate": "document.querySelector('#sentence').textContent"}]
+    steps += [{"evaluate": "document.querySelector('h1').textContent"}]
+    report = driven(sandbox, asset, "no_webgl", *steps)
+    sentence, title = report["values"][-2:]
+    assert "WebGL 2 is off" in sentence and title == NAME
+    assert report["complaints"] == []
+
+
+def test_motion_plays_unless_less_of_it_is_wanted(asset: Asset, sandbox: str) -> None:
+    """Without an animation the camera goes around."""
+    angle = "hairloom.controls.getAzimuthalAngle()"
+    pressed = {"evaluate": "document.querySelector('#play').getAttribute('aria-pressed')"}
+    steps = [{"screen": [300, 300, 1]}, {"open": True}, pressed]
+    goes = [{"evaluate": f"globalThis.begin = {angle}"}, {"wait": f"{angle} !== begin"}]
+    moving = driven(sandbox, asset, "moving", *steps, *goes)
+    frame = {"evaluate": "new Promise((done) => requestAnimationFrame(done)).then(() => 0)"}
+    begin, end = ({"evaluate": angle} for _ in range(2))
+    still = driven(sandbox, asset, "still", STILL, *steps, begin, *[frame] * 10, end)
+    assert moving["values"][2] == "true"
+    assert still["values"][3] == "false" and still["values"][4] == still["values"][-1]

@@ -1,0 +1,178 @@
+"""Opens a page from its file in a browser without a window or a network, and does what is asked.
+
+python3 drive_page.py PAGE.html STEPS.json OUTPUT
+
+STEPS.json is a list of steps: {"evaluate": JavaScript} for its value, {"picture": NAME} for a PNG
+in the folder OUTPUT, {"key": NAME} for a press, {"wait": JavaScript} until it is true,
+{"screen": [width, height, scale]}, {"media": {feature: value}}, {"block_webgl": true} and
+{"open": true}.
+OUTPUT/report.json then has the values, what the console said, and what was asked of a network.
+The browser is driven through a pipe, so that nothing but its standard library is needed.
+"""
+
+from __future__ import annotations
+
+import base64
+import itertools
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+from draw_page import BROWSER
+
+LONGEST = 180.0
+NO_WEBGL = """HTMLCanvasElement.prototype.getContext = new Proxy(
+  HTMLCanvasElement.prototype.getContext,
+  { apply: (real, self, [kind, ...rest]) => kind.startsWith('webgl') ? null
+      : Reflect.apply(real, self, [kind, ...rest]) });"""
+
+
+class Browser:
+    """One page in Chromium. complaints: what its console said beside plain notes; requests: the
+    addresses that it asked for."""
+
+    def __init__(self, profile: str) -> None:
+        to_browser, self._out = os.pipe()
+        self._in, from_browser = os.pipe()
+        command = [*BROWSER, f"--user-data-dir={profile}", "--remote-debugging-pipe"]
+
+        def plugged() -> None:
+            """Chromium reads from 3 and writes to 4."""
+            ends = [os.dup(to_browser), os.dup(from_browser)]
+            for end, number in zip(ends, (3, 4), strict=True):
+                os.dup2(end, number)
+
+        self.process = subprocess.Popen(
+            [*command, "about:blank"],
+            preexec_fn=plugged,
+            close_fds=False,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+        os.close(to_browser)
+        os.close(from_browser)
+        self.complaints: list[str] = []
+        self.requests: list[str] = []
+        self._numbers, self._left = itertools.count(1), b""
+        targets = self.ask("Target.getTargets")["targetInfos"]
+        (page,) = (each["targetId"] for each in targets if each["type"] == "page")
+        self._session = self.ask("Target.attachToTarget", targetId=page, flatten=True)["sessionId"]
+        for domain in ("Page", "Runtime", "Log", "Network"):
+            self.ask(f"{domain}.enable")
+        self.ask("Network.emulateNetworkConditions", offline=True, latency=0,
+                 downloadThroughput=0, uploadThroughput=0)  # fmt: skip
+
+    _session: str | None = None
+
+    def ask(self, method: str, **parameters: Any) -> dict[str, Any]:
+        number = next(self._numbers)
+        message = {"id": number, "method": method, "params": parameters}
+        if self._session:
+            message["sessionId"] = self._session
+        os.write(self._out, json.dumps(message).encode() + b"\0")
+        while True:
+            answer = self._message()
+            if answer.get("id") == number:
+                if "error" in answer:
+                    raise RuntimeError(f"{method}: {answer['error']['message']}")
+                return answer["result"]
+            self._note(answer)
+
+    def value(self, script: str) -> Any:
+        answer = self.ask("Runtime.evaluate", expression=script, returnByValue=True,
+                          awaitPromise=True)  # fmt: skip
+        if "exceptionDetails" in answer:
+            raise RuntimeError(f"{script}: {answer['exceptionDetails']}")
+        return answer["result"].get("value")
+
+    def wait(self, script: str) -> None:
+        end = time.monotonic() + LONGEST
+        while not self.value(script):
+            if time.monotonic() > end:
+                raise RuntimeError(f"never came: {script}; {self.complaints}")
+            time.sleep(0.1)
+
+    def picture(self, path: Path) -> None:
+        path.write_bytes(base64.b64decode(self.ask("Page.captureScreenshot")["data"]))
+
+    def _message(self) -> dict[str, Any]:
+        while b"\0" not in self._left:
+            part = os.read(self._in, 1 << 16)
+            if not part:
+                raise RuntimeError("the browser has ended")
+            self._left += part
+        message, _, self._left = self._left.partition(b"\0")
+        return json.loads(message)
+
+    def _note(self, event: dict[str, Any]) -> None:
+        method, what = event.get("method"), event.get("params", {})
+        if method == "Runtime.exceptionThrown":
+            self.complaints.append(str(what["exceptionDetails"]))
+        elif method == "Log.entryAdded":
+            self.complaints.append(what["entry"]["text"])
+        elif method == "Runtime.consoleAPICalled" and what["type"] in (
+            "error",
+            "warning",
+            "assert",
+        ):
+            self.complaints.append(str([each.get("value") for each in what["args"]]))
+        elif method == "Network.requestWillBeSent":
+            self.requests.append(what["request"]["url"][:200])
+
+
+def perform(browser: Browser, step: dict[str, Any], page: Path, output: Path) -> Any:
+    ((name, what),) = step.items()
+    if name == "open":
+        browser.ask("Page.navigate", url=page.resolve().as_uri())
+        browser.wait("['ready', 'failed'].includes(document.documentElement?.dataset.state)")
+    elif name == "evaluate":
+        return browser.value(what)
+    elif name == "wait":
+        browser.wait(what)
+    elif name == "picture":
+        browser.value(
+            "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
+        )
+        browser.picture(output / what)
+    elif name == "key":
+        for kind in ("keyDown", "keyUp"):
+            browser.ask("Input.dispatchKeyEvent", type=kind, key=what)
+    elif name == "screen":
+        width, height, scale = what
+        browser.ask("Emulation.setDeviceMetricsOverride", width=width, height=height,
+                    deviceScaleFactor=scale, mobile=width < 600)  # fmt: skip
+    elif name == "media":
+        features = [{"name": each, "value": value} for each, value in what.items()]
+        browser.ask("Emulation.setEmulatedMedia", features=features)
+    elif name == "block_webgl":
+        browser.ask("Page.addScriptToEvaluateOnNewDocument", source=NO_WEBGL)
+    else:
+        raise ValueError(f"no such step: {name}")
+    return None
+
+
+def main(page: Path, steps: Path, output: Path) -> int:
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile:
+        browser = Browser(profile)
+        try:
+            asked = json.loads(steps.read_text(encoding="utf-8"))
+            values = [perform(browser, step, page, output) for step in asked]
+        finally:
+            browser.process.kill()
+            browser.process.wait()
+    report = {
+        "values": values,
+        "complaints": browser.complaints,
+        "requests": browser.requests,
+    }
+    (output / "report.json").write_text(json.dumps(report), encoding="utf-8")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(*map(Path, sys.argv[1:])))
