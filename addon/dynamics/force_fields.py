@@ -38,9 +38,16 @@ _HALVES = 16
 #: Octaves of turbulence.
 _OCTAVES = 3
 _NOWHERE = (0.0, 0.0, 0.0)
-#: The two axes of the gradients of Perlin's noise, by the lowest four bits of a hash.
-_FIRST = np.array([0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1])
-_SECOND = np.array([1, 1, 1, 1, 2, 2, 2, 2, 2, 2, 2, 2, 0, 2, 0, 2])
+#: The gradients of Perlin's noise, by the lowest four bits of a hash.
+_GRADIENTS = np.array(
+    [
+        *((x, y, 0) for y in (1, -1) for x in (1, -1)),
+        *((x, 0, z) for z in (1, -1) for x in (1, -1)),
+        *((0, y, z) for z in (1, -1) for y in (1, -1)),
+        *((1, 1, 0), (0, -1, 1), (-1, 1, 0), (0, -1, -1)),
+    ],
+    np.float32,
+)
 #: An angle over its sine as a polynomial of its cosine, within 1e-7, the highest power first; twin
 #: of lib_angle.glsl.
 _ANGLE = (
@@ -334,15 +341,19 @@ def perlin(permutation: Ints, points: Floats) -> Floats:
     inside = points - whole
     fade = inside * inside * inside * (inside * (inside * 6.0 - 15.0) + 10.0)
     twice = np.tile(permutation, 2)
+    gradient = np.ascontiguousarray(_GRADIENTS[twice & 15].T)
+    seen = np.stack([inside, inside - np.float32(1.0)])
     values = []
     for x in (0, 1):
-        along_x = twice[cell[0] + x]
+        along_x = twice.take(cell[0] + x)
         for y in (0, 1):
-            along_y = twice[along_x + cell[1] + y]
+            along_y = twice.take(along_x + cell[1] + y)
             for z in (0, 1):
-                corner = twice[along_y + cell[2] + z] & 15
-                seen = inside - np.array([[x], [y], [z]], np.float32)
-                values.append(_gradient(corner, seen))
+                corner = along_y + cell[2] + z
+                value = gradient[0].take(corner) * seen[x, 0]
+                value += gradient[1].take(corner) * seen[y, 1]
+                value += gradient[2].take(corner) * seen[z, 2]
+                values.append(value)
     blended = values
     for axis in (2, 1, 0):  # the last axis runs fastest
         blended = [
@@ -350,12 +361,6 @@ def perlin(permutation: Ints, points: Floats) -> Floats:
             for low, high in zip(blended[::2], blended[1::2], strict=True)
         ]
     return blended[0]
-
-
-def _gradient(corner: Ints, seen: Floats) -> Floats:
-    one = np.take_along_axis(seen, _FIRST[corner][None], axis=0)[0]
-    other = np.take_along_axis(seen, _SECOND[corner][None], axis=0)[0]
-    return np.where(corner & 1, -one, one) + np.where(corner & 2, -other, other)
 
 
 def blow(
