@@ -121,3 +121,22 @@ def test_children_keep_their_noise_when_others_come_or_go() -> None:
     turned = pipeline.strand_seeds(replace(rig, strands=shuffled))
     assert (turned[own:] == seeds[own:][::-1]).all()
     assert (pipeline.strand_seeds(other) == seeds[: own + 300]).all()
+
+
+def test_baby_hair_is_fine_where_widths_are_found() -> None:
+    """Found widths know how far strands are apart, not that some of them are baby hair."""
+    settings = ChildrenSettings(method="multi", strand_count=2000, length_variation=0.0)
+
+    def widths(baby_hair: float) -> tuple[np.ndarray, np.ndarray]:
+        children = replace(settings, baby_hair=baby_hair)
+        rig = pipeline.prepare(
+            curves(), sheet(), GUIDES, place="a wig", children=children, widths="found"
+        )
+        assert rig.widths.is_found
+        first = rig.strands.offsets[:-1]
+        return rig.strands.lengths()[60:], rig.strands.radius[first][60:]
+
+    (plain, _), (cut, radius) = widths(0.0), widths(0.8)
+    is_baby = cut < 0.5 * plain
+    assert 50 < is_baby.sum() < 1500
+    assert np.median(radius[is_baby]) < 0.65 * np.median(radius[~is_baby])
