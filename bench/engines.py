@@ -1,38 +1,57 @@
-"""Exported cards in programs that know nothing of Hairloom, what a user sees there, and the page.
+"""Exported cards in programs that know nothing of Hairloom, what a user sees there, the page, and
+the atlases that are exported.
 
-See `_engines_plain` and `_engines_page` for what is compared with what.
+See `_engines_plain`, `_engines_page` and `_engines_atlas` for what is compared with what.
 
 Exit code 1: a limit is missed.
 
-make bench NAME=engines         both parts; `python tools/bench.py engines page` is one of them
+make bench NAME=engines                     all parts
+tools/bench.py engines page                 one part: plain, page or atlas
+tools/bench.py engines atlas sintel few     some grooms
 """
 
 from __future__ import annotations
 
 import sys
+from typing import Any
 
+from _engines_atlas import atlas_figures
 from _engines_page import page_figures
 from _engines_plain import plain_figures
 from _report import start, tell
 
 REFERENCE = "our own picture of the strands, drawn as they come, under the same suns"
 PARTS = {"plain": plain_figures, "page": page_figures}
-#: figure -> the most that it may be
+#: end of a figure's name -> the most, and the least, that it may be
 MOST = {
     "plain_levels_visible": 1,
     "plain_color_percent": 10.0,
     "page_bytes": 6e6,
     "page_errors": 0,
+    "fur_triangles": 8.0,
+    "fur_coverage_percent": 10.0,
+    "fur_color_percent": 10.0,
+    "few_side_texels": 512,
 }
+LEAST = {"opaque_percent": 25.0, "strand_texels": 1.5}
 
 
-def main(names: list[str]) -> int:
+def main(arguments: list[str]) -> int:
     start()
-    found = {}
-    for name in names or PARTS:
-        found |= PARTS[name]()
+    part, *names = arguments or [""]
+    found: dict[str, Any] = {}
+    for name, figures in PARTS.items():
+        if part in ("", name):
+            found |= figures()
+    if part in ("", "atlas"):
+        found |= atlas_figures(names)
     tell(found, REFERENCE)
-    missed = [name for name, value in found.items() if not value <= MOST.get(name, value)]
+    missed = [
+        name
+        for name, value in found.items()
+        if any(name.endswith(end) and not value <= most for end, most in MOST.items())
+        or any(name.endswith(end) and not value >= least for end, least in LEAST.items())
+    ]
     print(f"missed: {', '.join(missed) or 'none'}")
     return int(bool(missed))
 

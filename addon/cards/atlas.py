@@ -36,6 +36,9 @@ _SKEW = 0.5
 _HUE = 0.15
 #: Beyond all colours, where a strand has none of its own.
 _NO_COLOR = 4.0
+#: What an automatic atlas gives a tile: texels to the width of the median strand; how much longer
+#: than wide texels are, since hair runs along them; the fewest texels, across and along.
+_STRAND_TEXELS, _TEXEL_LENGTH, _MIN_TEXELS = 1.5, 2.0, (8.0, 48.0)
 _ROUNDS = 12
 _TINY = 1e-12
 
@@ -93,13 +96,14 @@ def plan_atlas(
     Raises:
         HairloomError: the atlas is too small for its tiles, or no strand has a width.
     """
-    atlas = settings.grid
     if not (radius > 0.0).any():
         raise HairloomError(
             "no strand has a width, so that the atlas would be empty",
             place="strands",
             remedy="Give the strands a radius, or raise Fullness",
         )
+    settings = settings.fitted(len(strips), *_wanted_texels(strips, radius, cluster, settings))
+    atlas = settings.grid
     shapes = _card_shapes(strips, grid, radius, cluster)
     kind = _kinds(cluster, group, shapes.strand_count, atlas.tile_count)
     is_face = _is_face(cluster, group)
@@ -126,6 +130,18 @@ def plan_atlas(
         thickness=crowding * np.where(is_face[medoid], 1.0, settings.strand_width),
         notes=notes,
     )
+
+
+def _wanted_texels(
+    strips: Strips, radius: Floats, cluster: Ints, settings: AtlasSettings
+) -> tuple[float, float]:
+    """What a tile needs so that the usual strand is wide enough, across and along [texels]."""
+    width = np.maximum(strips.width.mean(axis=1), _TINY)
+    strand = settings.strand_width * 2.0 * radius.mean(axis=1) / width[cluster]
+    across = max(_STRAND_TEXELS / max(float(np.median(strand)), _TINY), _MIN_TEXELS[0])
+    lengths = np.linalg.norm(np.diff(strips.frames.center, axis=1), axis=-1).sum(axis=1)
+    along = across * float(np.median(lengths / width)) / _TEXEL_LENGTH
+    return across, max(along, _MIN_TEXELS[1])
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from ..errors import HairloomError
 from ..params import Settings, choice, integer, number, when
@@ -10,6 +10,8 @@ from .atlas_grid import AtlasGrid
 
 #: Sizes that engines take: powers of two, so that each mip map halves it.
 SIZES = (512, 1024, 2048, 4096)
+#: Those that an automatic atlas has, the smallest that does.
+_AUTOMATIC = (128, 256, 512, 1024, 2048)
 #: What a tile must have left between its padding, across and along [pixels].
 MIN_TILE = (4, 8)
 
@@ -36,8 +38,17 @@ class AtlasSettings(Settings):
         description="What the texture of the cards is made from",
     )
     size: str = choice(
-        "2048",
-        tuple((str(size), str(size), f"{size} x {size} pixels") for size in SIZES),
+        "auto",
+        (
+            # files hold the place in this list, so that new ones come after those that were there
+            *((str(size), str(size), f"{size} x {size} pixels") for size in (*SIZES, 256, 128)),
+            (
+                "auto",
+                "Automatic",
+                "As few pixels as show strands one and a half pixels wide, up to "
+                f"{_AUTOMATIC[-1]} x {_AUTOMATIC[-1]}, with no more tiles than there are cards",
+            ),
+        ),
         label="Size",
         description="Width and height of the atlas in pixels",
         shown_when=when("atlas.source", "baked"),
@@ -45,7 +56,8 @@ class AtlasSettings(Settings):
     columns: int = integer(
         16,
         label="Columns",
-        description="Tiles side by side; a power of two keeps tiles apart in all mip maps",
+        description="Tiles side by side; a power of two keeps tiles apart in all mip maps. If the "
+        "size is automatic, columns times rows is the maximum number of tiles",
         soft=(1, 32),
         hard=(1, 64),
         shown_when=when("atlas.source", "baked"),
@@ -85,9 +97,28 @@ class AtlasSettings(Settings):
         shown_when=when("atlas.source", "baked"),
     )
 
+    def fitted(self, tile_count: int, across: float, along: float) -> AtlasSettings:
+        """Where the size is automatic, the smallest that has this many tiles, or as many as the
+        settings allow, of these pixels each; else the same settings.
+
+        Args:
+            across, along: what a tile should have between its padding [pixels].
+        """
+        if self.size != "auto":
+            return self
+        count = max(min(tile_count, self.columns * self.rows), 1)
+        columns = [1 << power for power in range(count.bit_length())]
+        sides = [
+            max(each * (across + 2 * self.padding), -(-count // each) * (along + 2 * self.padding))
+            for each in columns
+        ]
+        side, best = min(zip(sides, columns, strict=True))
+        size = next((size for size in _AUTOMATIC if size >= side), _AUTOMATIC[-1])
+        return replace(self, size=str(size), columns=best, rows=-(-count // best))
+
     @property
     def side(self) -> int:
-        """Width and height [pixels]."""
+        """Width and height of an atlas whose size is not automatic [pixels]."""
         return int(self.size)
 
     @property

@@ -221,15 +221,22 @@ def card_maps(inputs: CardInputs, build: CardBuild, draw: AtlasDraw) -> CardMaps
     texture, color = settings[TextureSettings], inputs.rig.strands.color
     look, strands = settings[ShadingSettings], settings[StrandSettings]
     colored = "base" not in pictures and drawn_color(color, look) is not None
-    made = hair_textures(texture, build.finest.atlas.columns)
     if build.plan is None:
+        made = hair_textures(texture, build.finest.atlas.columns)
         textures = made.with_pictures(pictures)
         by_name = {name: getattr(textures, name) for name in TEXTURES}
         mean = mean_look(color, look).base_color if colored else None
         return CardMaps(by_name, textures, texture.highlights, base_color=mean)
     maps = baked_atlas(inputs.rig, build.plan, look, strands, draw)
-    # as many strips above each other as the atlas has rows
-    rows = (build.plan.grid.rows, 1)
+    # as many strips above each other as the atlas has rows, and no finer than the atlas
+    size, grid = build.plan.size, build.plan.grid
+    across, along = (max(size // count, 8) for count in (grid.columns, grid.rows))
+    fitting = replace(
+        texture,
+        variant_width=min(texture.variant_width, across),
+        height=min(texture.height, along),
+    )
+    made, rows = hair_textures(fitting, grid.columns), (grid.rows, 1)
     noises = {"shift": np.tile(made.shift, rows), "noise": np.tile(made.noise, rows)}
     by_name = {**maps.by_name, **noises, **pictures}
     gain = 1.0 if "base" in pictures else maps.base_gain

@@ -187,6 +187,41 @@ def test_an_atlas_that_is_too_small_says_by_how_much() -> None:
     assert AtlasSettings(size="1024", columns=32, rows=4, padding=8).grid.tile_count == 128
 
 
+@pytest.mark.parametrize(("count", "radius", "size"), [(20, 1e-3, 256), (400, 5e-4, 1024)])
+def test_an_automatic_atlas_is_as_large_as_its_strands_need(
+    count: int, radius: float, size: int
+) -> None:
+    """Strands are one and a half texels wide at least; half the size would leave them thinner."""
+    parts = tufts(np.full(count, 0.02), np.full(count, 0.1), np.full(count, 5), radius)
+    settings = AtlasSettings(strand_width=1.0)
+    plan = plan_atlas(*parts, np.zeros(len(parts[1]), int), settings)
+    assert plan.size == size
+    used = len(plan.strips)
+    assert used == min(count, settings.columns * settings.rows)
+    assert used > plan.grid.columns * (plan.grid.rows - 1)  # no row of tiles is empty
+
+    def texels(side: int) -> float:
+        across = side / plan.grid.columns - 2 * settings.padding
+        return 2.0 * radius / 0.02 * across
+
+    assert texels(plan.size) >= 1.5 > texels(plan.size // 2)
+
+
+def test_an_automatic_atlas_has_an_end() -> None:
+    """Where that is too small for its strands, it says so."""
+    parts = tufts(np.full(64, 0.02), np.full(64, 0.2), np.full(64, 5), 1e-6)
+    plan = plan_atlas(*parts, np.zeros(len(parts[1]), int), AtlasSettings())
+    assert plan.size == 2048
+    (note,) = plan.notes
+    assert note.startswith("strands are 0.")
+
+
+def test_a_chosen_size_is_that_of_the_atlas() -> None:
+    parts = tufts(np.full(3, 0.02), np.full(3, 0.2), np.full(3, 5), 1e-3)
+    plan = plan_atlas(*parts, np.zeros(15, int), AtlasSettings(size="4096", columns=8, rows=2))
+    assert (plan.size, plan.grid.columns, plan.grid.rows) == (4096, 8, 2)
+
+
 def test_strands_without_width_are_refused() -> None:
     parts = tufts(np.array([0.1]), np.array([0.2]), np.array([4]), 0.0)
     with pytest.raises(HairloomError, match="no strand has a width"):

@@ -1,0 +1,153 @@
+"""How much hair there is in the atlas of shipped cards, and how cards of fur look.
+
+Grooms that nobody here made, and the fur that ships on Blender's monkey, with no setting changed:
+widths are found, children are added. Cards are made as *Make Cards* and the exporters make them.
+
+- opaque_percent: of the texels, those whose alpha is above 0.5.
+- strand_texels: how wide the median strand is drawn in the atlas, on the mean of its rows.
+- side_texels: width and height of the atlas; of twenty strands alone as well.
+- Of fur: triangles of the average card, and how far its cards are from the strands themselves, from
+  four sides: the sum of alpha, and the mean colour of what is covered, the worst channel.
+
+Writes out/bench_engines/cards_NAME.png, strands above and cards below, and the atlases' alpha.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import bpy
+import numpy as np
+from _cards_strands import _differences, _shown
+from _sight_grooms import GROOMS, rig_of
+from extension_loader import REPOSITORY
+
+import hairloom
+from hairloom.addon.blender.base.images import contact_sheet, write_png
+from hairloom.addon.blender.cards.build import (
+    BuiltCards,
+    CardInputs,
+    MappedCards,
+    build_steps,
+    read_inputs,
+)
+from hairloom.addon.blender.cards.show import without_strands
+from hairloom.addon.blender.sessions.prepared_groom import PreparedGroom
+from hairloom.addon.blender.sessions.snapshots import snapshot_of
+from hairloom.addon.card_flow import card_groom
+from hairloom.addon.cards.atlas import AtlasPlan
+from hairloom.addon.cards.steps import result_of
+from hairloom.addon.pipeline import Rig, rest_occlusion, rest_openness
+from hairloom.addon.render.camera import frame_camera
+from hairloom.addon.render.frame import render_image
+from hairloom.addon.render.snapshot import MeshSnapshot, Snapshot
+from hairloom.addon.shading.ambient_settings import AmbientSettings
+from hairloom.addon.shading.lights import Light
+from hairloom.addon.shading.settings import ShadingSettings, StrandSettings
+from hairloom.addon.shading.volume.settings import VolumeSettings
+
+OUTPUT = REPOSITORY / "out" / "bench_engines"
+HAIR, FURS, STYLES = ("sintel", "ponytail"), ("bear", "mohawk"), ("short_coat", "shaggy_coat")
+FEW = 20
+SIDES = ((0, -1, 0.2), (1, 0, 0.2), (0, 1, 0.2), (0.3, -0.3, 1))
+SIZE, SAMPLES, FIELD_OF_VIEW = 320, 2, np.radians(30.0)
+SUN, STRENGTH, WORLD = (0.4, 0.6, -0.8), 4.0, (0.3, 0.3, 0.3)
+
+
+def atlas_figures(names: list[str]) -> dict[str, Any]:
+    """Of these grooms, or of all; and the worst of each figure."""
+    found: dict[str, Any] = {}
+    chosen = names or [*HAIR, "mohawk", *STYLES, "few"]
+    for name in chosen:
+        inputs = _inputs(name)
+        made = result_of(build_steps(inputs))
+        figures = _of_atlas(name, inputs, made)
+        if name in FURS or name in STYLES:
+            figures |= _of_fur(name, inputs, made)
+        print(name, {key: round(value, 3) for key, value in figures.items()}, flush=True)
+        found |= {f"{name}_{key}": value for key, value in figures.items()}
+    return found
+
+
+def _inputs(name: str) -> CardInputs:
+    if name in STYLES:
+        return _added(name)
+    if name == "few":
+        strands, head = GROOMS["built_in"]()
+        few = strands.take(np.linspace(0, strands.strand_count - 1, FEW).astype(int))
+        return CardInputs(rig_of((few, head), name, "none"))
+    return CardInputs(rig_of(GROOMS[name](), name))
+
+
+def _added(style: str) -> CardInputs:
+    """By the artist's own button."""
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    if not hasattr(bpy.types.Scene, "hairloom"):
+        hairloom.register()
+    bpy.ops.mesh.primitive_monkey_add(size=0.2)
+    bpy.context.object.modifiers.new("Smooth", "SUBSURF").levels = 2
+    bpy.ops.hairloom.add_hairstyle(style=style, plays=False)
+    return read_inputs(bpy.context.object, bpy.context.evaluated_depsgraph_get())[0]
+
+
+def _of_atlas(name: str, inputs: CardInputs, made: MappedCards) -> dict[str, float]:
+    plan, alpha = made.build.plan, made.maps.by_name["alpha"]
+    assert plan is not None
+    OUTPUT.mkdir(parents=True, exist_ok=True)
+    opaque = np.ones_like(alpha)
+    write_png(OUTPUT / f"atlas_{name}.png", np.stack([alpha, alpha, alpha, opaque], axis=-1))
+    return {
+        "opaque_percent": 100.0 * float((alpha > 0.5).mean()),
+        "strand_texels": _strand_texels(inputs, plan),
+        "side_texels": len(alpha),
+        "cards": made.build.finest.card_count,
+        "triangles": len(made.build.finest.triangles),
+        "order_wrong_percent": 100.0 * made.build.wrong_fraction,
+    }
+
+
+def _strand_texels(inputs: CardInputs, plan: AtlasPlan) -> float:
+    radius = card_groom(inputs.rig, inputs.settings[StrandSettings]).radius[plan.strands]
+    tile = plan.tile_of_strand
+    widths = 2.0 * radius * plan.thickness[tile, None] / plan.strips.width[tile]
+    across = plan.size / plan.grid.columns * (1.0 - 2.0 * plan.grid.padding[0])
+    return float(np.median(widths.mean(axis=1))) * across
+
+
+def _of_fur(name: str, inputs: CardInputs, made: MappedCards) -> dict[str, float]:
+    strands = _lit(inputs)
+    cards = BuiltCards.of(inputs.rig, made)
+    drawn = replace(without_strands(strands), cards=cards.drawn(cards.rest, inputs.settings))
+    pictures = [_from_all_sides(inputs.rig, hair) for hair in (strands, drawn)]
+    shown = [_shown(each) for row in pictures for each in row]
+    write_png(OUTPUT / f"cards_{name}.png", contact_sheet(shown, len(SIDES)))
+    coverage, color = _differences(*pictures)
+    finest = made.build.finest
+    return {
+        "fur_triangles": len(finest.triangles) / finest.card_count,
+        "fur_coverage_percent": 100.0 * coverage,
+        "fur_color_percent": 100.0 * color,
+    }
+
+
+def _lit(inputs: CardInputs) -> Snapshot:
+    rig = inputs.rig
+    holes = () if rig.head is None else (replace(MeshSnapshot.of(rig.head), is_holdout=True),)
+    ambient, settings = inputs.settings[AmbientSettings], inputs.settings
+    occlusion, openness = (f(rig, ambient) for f in (rest_occlusion, rest_openness))
+    hair = snapshot_of(PreparedGroom(rig, ambient, occlusion, openness=openness))
+    return replace(
+        hair,
+        shading=settings[ShadingSettings],
+        volume=settings[VolumeSettings].multiplied(extinction=hair.extinction),
+        strand_settings=settings[StrandSettings],
+        meshes=holes,
+        lights=(Light.sun(SUN, (1.0, 1.0, 1.0), STRENGTH),),
+        ambient=WORLD,
+    )
+
+
+def _from_all_sides(rig: Rig, hair: Snapshot) -> list[np.ndarray]:
+    cameras = [frame_camera(rig.strands.bounds(), side, FIELD_OF_VIEW, 1.0) for side in SIDES]
+    return [render_image(hair, camera, SIZE, SIZE, SAMPLES) for camera in cameras]
