@@ -24,6 +24,7 @@ from .occlusion_settings import CardOcclusionSettings
 from .on_skin import on_skin
 from .order_check import wrong_fraction
 from .settings import CardSettings
+from .short_hair import fitted_to_length
 from .sort import VIEW_COUNT, CardOrders, SortBy, card_of_vertex, in_order, order_steps
 from .steps import map_progress
 from .strand_occlusion import strands_occlusion
@@ -72,6 +73,7 @@ class CardBuild:
     wrong_fraction: of the pixels of the finest level those that are drawn in a wrong order, see
         `order_check.wrong_fraction`.
     order_notes: where that is much, what can be done.
+    shape_notes: where cards are other ones than the settings ask for.
     """
 
     levels: tuple[CardMesh, ...]
@@ -80,6 +82,7 @@ class CardBuild:
     plan: AtlasPlan | None
     wrong_fraction: float = 0.0
     order_notes: tuple[str, ...] = ()
+    shape_notes: tuple[str, ...] = ()
 
     @property
     def finest(self) -> CardMesh:
@@ -88,7 +91,8 @@ class CardBuild:
     @property
     def notes(self) -> tuple[str, ...]:
         """What the artist should know."""
-        return (*(() if self.plan is None else self.plan.notes), *self.order_notes)
+        of_atlas = () if self.plan is None else self.plan.notes
+        return (*self.shape_notes, *of_atlas, *self.order_notes)
 
 
 #: Gives the alpha of the atlas, (height, width), or None for opaque cards; may bake it from the
@@ -113,6 +117,7 @@ def card_steps(
         HairloomError: the atlas is too small for its tiles, or there is nothing to bake into it.
     """
     yield "Cards from strands"
+    settings, atlas, shape_notes = fitted_to_length(settings, atlas, groom.strands)
     cards, plan = uncut_cards(groom, settings, atlas)
     yield "Levels of detail"
     error = None
@@ -123,7 +128,7 @@ def card_steps(
     usual = float(np.median(cards.strips.width[:, 0])) if len(cards) else 0.0
     meshes = tuple(on_skin(mesh, groom.head, usual) for mesh in meshes)
     unsorted = tuple(mesh.triangles for mesh in meshes)
-    build = CardBuild(meshes, unsorted, errors, plan)
+    build = CardBuild(meshes, unsorted, errors, plan, shape_notes=shape_notes)
     yield "Atlas"
     alpha = alpha_of(build)
     shading = _occlusion_steps(groom, settings, build.finest, alpha, others, occlusion)
