@@ -242,8 +242,8 @@ class DynamicsSettings(MotionSettings):
     jump_turn: float = number(
         math.radians(120.0),
         label="Jump Turn",
-        description="At a cut hair goes along as it is, at no speed: where its roots turn so far in a "
-        "frame; 0 is never",
+        description="At a cut hair goes along as it is, at no speed: where its roots turn so far "
+        "in a frame; 0 is never",
         soft=(0.0, math.pi),
         hard=(0.0, math.pi),
         unit="angle",
