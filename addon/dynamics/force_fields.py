@@ -39,7 +39,7 @@ _HALVES = 16
 _OCTAVES = 3
 _NOWHERE = (0.0, 0.0, 0.0)
 #: The gradients of Perlin's noise, by the lowest four bits of a hash.
-_GRADIENTS = np.array(
+GRADIENTS = np.array(
     [
         *((x, y, 0) for y in (1, -1) for x in (1, -1)),
         *((x, 0, z) for z in (1, -1) for x in (1, -1)),
@@ -341,7 +341,7 @@ def perlin(permutation: Ints, points: Floats) -> Floats:
     inside = points - whole
     fade = inside * inside * inside * (inside * (inside * 6.0 - 15.0) + 10.0)
     twice = np.tile(permutation, 2)
-    gradient = np.ascontiguousarray(_GRADIENTS[twice & 15].T)
+    gradient = np.ascontiguousarray(GRADIENTS[twice & 15].T)
     seen = np.stack([inside, inside - np.float32(1.0)])
     values = []
     for x in (0, 1):

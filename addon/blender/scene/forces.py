@@ -11,7 +11,14 @@ import numpy as np
 from mathutils import noise
 
 from ...arrays import Floats, Ints
-from ...dynamics.force_fields import ENDLESS, NO_FIELDS, Falloff, ForceField, ForceFields
+from ...dynamics.force_fields import (
+    ENDLESS,
+    GRADIENTS,
+    NO_FIELDS,
+    Falloff,
+    ForceField,
+    ForceFields,
+)
 
 #: Blender's kinds that act on hair -> ours; and why the others do not.
 _KINDS = {
@@ -171,14 +178,14 @@ def permutation() -> Ints:
     for where it begins, which only one place explains.
     """
     seen = [_gradient(0, 0, z) for z in range(256)]
-    window = 24
+    window, edges = 24, [tuple(edge) for edge in GRADIENTS.astype(int).tolist()]
     starts = {tuple((seen * 2)[at : at + window]): at for at in range(256)}
     ahead = np.array([starts[tuple(_gradient(0, y, z) for z in range(window))] for y in range(256)])
     known = [_gradient(0, 0, z) for z in range(256)]
     for begin in range(256):  # p[0]
         first = (begin - ahead[-begin % 256]) % 256  # p[p[0]]
         found = (np.roll(ahead, begin) + first) % 256
-        if [_GRADIENTS[found[(first + z) % 256] & 15] for z in range(256)] == known:
+        if [edges[found[(first + z) % 256] & 15] for z in range(256)] == known:
             return found
     raise AssertionError("Blender's noise is not Perlin's")
 
@@ -191,17 +198,3 @@ def _gradient(x: int, y: int, z: int) -> tuple[int, int, int]:
     ]
     one, two, three = (round(slope) for slope in slopes)
     return one, two, three
-
-
-def _edges() -> tuple[tuple[int, int, int], ...]:
-    """The gradients of Perlin's noise, by the lowest four bits of a hash."""
-    signs = ((1, 1), (-1, 1), (1, -1), (-1, -1))
-    flat = (
-        [(a, b, 0) for a, b in signs],
-        [(a, 0, b) for a, b in signs],
-        [(0, a, b) for a, b in signs],
-    )
-    return (*flat[0], *flat[1], *flat[2], (1, 1, 0), (0, -1, 1), (-1, 1, 0), (0, -1, -1))
-
-
-_GRADIENTS = _edges()
