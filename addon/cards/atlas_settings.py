@@ -9,9 +9,9 @@ from ..params import Settings, choice, integer, number, when
 from .atlas_grid import AtlasGrid
 
 #: Sizes that engines take: powers of two, so that each mip map halves it.
-SIZES = (512, 1024, 2048, 4096)
-#: Those that an automatic atlas has, the smallest that does.
-_AUTOMATIC = (128, 256, 512, 1024, 2048)
+SIZES = (128, 256, 512, 1024, 2048, 4096)
+#: The largest that an automatic atlas has.
+_AUTOMATIC_MAX = 2048
 #: What a tile must have left between its padding, across and along [pixels].
 MIN_TILE = (4, 8)
 
@@ -40,14 +40,13 @@ class AtlasSettings(Settings):
     size: str = choice(
         "auto",
         (
-            # files hold the place in this list, so that new ones come after those that were there
-            *((str(size), str(size), f"{size} x {size} pixels") for size in (*SIZES, 256, 128)),
             (
                 "auto",
                 "Automatic",
                 "As few pixels as show strands one and a half pixels wide, up to "
-                f"{_AUTOMATIC[-1]} x {_AUTOMATIC[-1]}, with no more tiles than there are cards",
+                f"{_AUTOMATIC_MAX} x {_AUTOMATIC_MAX}, with no more tiles than there are cards",
             ),
+            *((str(size), str(size), f"{size} x {size} pixels") for size in SIZES),
         ),
         label="Size",
         description="Width and height of the atlas in pixels",
@@ -113,7 +112,7 @@ class AtlasSettings(Settings):
             for each in columns
         ]
         side, best = min(zip(sides, columns, strict=True))
-        size = next((size for size in _AUTOMATIC if size >= side), _AUTOMATIC[-1])
+        size = next(size for size in SIZES if size >= min(side, _AUTOMATIC_MAX))
         return replace(self, size=str(size), columns=best, rows=-(-count // best))
 
     @property
