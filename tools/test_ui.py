@@ -31,6 +31,8 @@ from random_parts import random_parts
 REPOSITORY = Path(__file__).resolve().parents[1]
 OUTPUT = REPOSITORY / "out" / "window"
 INSTALLED = OUTPUT / "installed"
+#: Compiled shaders, which all sessions need: compiling them is a third of a short session.
+CACHE = OUTPUT / "cache"
 BACKENDS = ("opengl", "vulkan")
 #: What runs in this Blender's own Python. On OpenGL `make test` has run the rest already, with
 #: Blender as a module: each test runs on each backend that concerns it, and in both Blenders.
@@ -99,7 +101,7 @@ def run_blender(
         process = subprocess.Popen(
             [REPOSITORY / "tools" / "window_blender", how, *arguments],
             cwd=REPOSITORY,
-            env=os.environ | environment,
+            env=os.environ | {"HAIRLOOM_CACHE": str(CACHE)} | environment,
             stdout=stream,
             stderr=subprocess.STDOUT,
             start_new_session=True,
@@ -302,7 +304,7 @@ def main(arguments: list[str]) -> int:
         print(f"no such session: {', '.join(sorted(unknown))}")
         return 2
     shutil.rmtree(OUTPUT, ignore_errors=True)
-    OUTPUT.mkdir(parents=True)
+    CACHE.mkdir(parents=True)
     tally = Tally()
     installed = install_extension(tally)
     if installed and not wanted:
