@@ -1,5 +1,6 @@
 """Makes what comes from the code: tables of parameters and verbs, the figure of the flows, the
-texts to translate, the page of the gallery, the index of the decisions, the pictures.
+texts to translate, the page of the gallery, the index of the decisions, the shading of cards in
+HLSL, the pictures.
 
 python tools/make_docs.py [--check | --pictures]
 
@@ -20,6 +21,7 @@ from pathlib import Path
 import decisions_index
 import flow_figure
 import gallery
+import hair_hlsl
 from extension_loader import PACKAGE, REPOSITORY, load_package
 from small_pictures import write_small
 
@@ -99,6 +101,7 @@ def main() -> int:
         return 0 if current else 1
     PARAMETERS.write_text(text, encoding="utf-8")
     flow_figure.FIGURE.write_text(flow_figure.figure(), encoding="utf-8")
+    hair_hlsl.write()
     VERBS.write_text(verb_tables(), encoding="utf-8")
     TEXTS.write_text(texts_to_translate(), encoding="utf-8")
     gallery.PAGE.write_text(gallery.page(), encoding="utf-8")

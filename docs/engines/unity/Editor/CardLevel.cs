@@ -1,0 +1,285 @@
+using System;
+using System.Collections.Generic;
+using System.IO;
+using System.Linq;
+using System.Text;
+using UnityEngine;
+
+namespace Hairloom
+{
+    /// A level of detail in Unity's axes: x points the other way than in glTF, v of textures upwards.
+    ///
+    /// The file is read here, and not by an importer of meshes, for those sort triangles anew.
+    public sealed class CardLevel
+    {
+        public string Name;
+        public Vector3[] Positions;
+        public Vector3[] Normals;
+
+        /// Of the strands, from root to tip; w is 1.
+        public Vector4[] Tangents;
+
+        public Vector2[] Places;
+
+        /// Ambient occlusion, and how far along the strands the vertex lies.
+        public Vector2[] Occlusion;
+
+        /// Corners of triangles from the inside to the outside of the hair.
+        public int[] Front;
+
+        /// The order for triangles that are seen from behind; the same one if the export has no other.
+        public int[] Back;
+
+        /// Height of the hair on the screen, of the screen's, below which the next level takes over.
+        public float EndHeight;
+
+        public static CardLevel[] All(string glb, Sidecar sidecar)
+        {
+            var file = new Glb(glb);
+            var backs = BackIndices(glb, sidecar);
+            var coverage = file.Coverage(sidecar.levels[0].node);
+            var levels = new List<CardLevel>();
+            foreach (var each in sidecar.levels)
+            {
+                var level = file.Level(each);
+                level.Back = backs == null || each.buffer_back_first < 0
+                    ? level.Front
+                    : level.Turned(backs, each, glb);
+                var part = levels.Count < coverage.Length ? coverage[levels.Count] : 0.0f;
+                level.EndHeight = Mathf.Sqrt(part);
+                levels.Add(level);
+            }
+            return levels.ToArray();
+        }
+
+        static int[] BackIndices(string glb, Sidecar sidecar)
+        {
+            var buffer = sidecar.index_buffer;
+            if (string.IsNullOrEmpty(buffer?.file))
+                return null;
+            var path = Sidecar.Beside(glb, buffer.file);
+            if (!File.Exists(path))
+                throw new CardFileException($"{path}: it is missing; copy all files of the export");
+            var bytes = File.ReadAllBytes(path);
+            var size = buffer.type == "uint16" ? 2 : 4;
+            return Enumerable.Range(0, bytes.Length / size)
+                .Select(i => size == 2 ? BitConverter.ToUInt16(bytes, 2 * i) : (int)BitConverter.ToUInt32(bytes, 4 * i))
+                .ToArray();
+        }
+
+        int[] Turned(int[] backs, SidecarLevel level, string glb)
+        {
+            if (level.buffer_back_first + level.indices > backs.Length)
+                throw new CardFileException($"{glb}: its index buffer is cut off; export the cards again");
+            var chosen = new int[level.indices];
+            Array.Copy(backs, level.buffer_back_first, chosen, 0, level.indices);
+            return Glb.Mirrored(chosen, Positions.Length, glb);
+        }
+    }
+
+    /// A binary glTF file as Hairloom writes it: plain floats, one primitive for each level.
+    sealed class Glb
+    {
+        const uint Magic = 0x46546C67, JsonChunk = 0x4E4F534A;
+        const int Float = 5126, UnsignedShort = 5123, UnsignedInt = 5125;
+        const string Changed = "another program has changed it since; use the file that Hairloom wrote";
+
+        readonly string path;
+        readonly byte[] bytes;
+        readonly int binary;
+        readonly Document document;
+
+        public Glb(string path)
+        {
+            this.path = path;
+            bytes = File.ReadAllBytes(path);
+            if (bytes.Length < 28 || BitConverter.ToUInt32(bytes, 0) != Magic
+                || BitConverter.ToUInt32(bytes, 16) != JsonChunk)
+                throw Fault("it is no binary glTF file");
+            long size = BitConverter.ToUInt32(bytes, 12);
+            if (28 + size > bytes.Length || BitConverter.ToUInt32(bytes, 8) > bytes.Length)
+                throw Fault("it is cut off; copy it again");
+            try
+            {
+                document = JsonUtility.FromJson<Document>(Encoding.UTF8.GetString(bytes, 20, (int)size));
+            }
+            catch (ArgumentException error)
+            {
+                throw Fault($"its JSON cannot be read ({error.Message})");
+            }
+            if (document?.nodes == null || document.meshes == null || document.accessors == null
+                || document.bufferViews == null)
+                throw Fault(Changed);
+            binary = 28 + (int)size;
+        }
+
+        /// Of the screen, at which each level ends.
+        public float[] Coverage(string node)
+        {
+            return Named(node).extras?.MSFT_screencoverage ?? new float[0];
+        }
+
+        public CardLevel Level(SidecarLevel expected)
+        {
+            var mesh = At(document.meshes, Named(expected.node).mesh);
+            if (mesh.primitives == null || mesh.primitives.Length != 1)
+                throw Fault(Changed);
+            var corners = mesh.primitives[0].attributes;
+            var position = Floats(corners.POSITION, "VEC3");
+            var normal = Floats(corners.NORMAL, "VEC3");
+            var across = Floats(corners.TANGENT, "VEC4");
+            var place = Floats(corners.TEXCOORD_0, "VEC2");
+            var occlusion = Floats(corners.TEXCOORD_1, "VEC2");
+            var count = position.Length / 3;
+            if (new[] { normal.Length / 3, across.Length / 4, place.Length / 2, occlusion.Length / 2 }
+                .Any(other => other != count))
+                throw Fault(Changed);
+            var level = new CardLevel
+            {
+                Name = expected.node,
+                Positions = Made(count, i => Vector(position, 3 * i)),
+                Normals = Made(count, i => Vector(normal, 3 * i)),
+                Places = Made(count, i => new Vector2(place[2 * i], 1.0f - place[2 * i + 1])),
+                Occlusion = Made(count, i => new Vector2(occlusion[2 * i], occlusion[2 * i + 1])),
+                Tangents = Made(count, i => Along(Vector(normal, 3 * i), Vector(across, 4 * i))),
+                Front = Mirrored(Indices(mesh.primitives[0].indices), count, path),
+            };
+            if (level.Front.Length != expected.indices)
+                throw Fault(Changed);
+            return level;
+        }
+
+        /// Triangles in the same order, of which Unity takes the same side as the front.
+        public static int[] Mirrored(int[] indices, int count, string path)
+        {
+            if (indices.Length % 3 != 0 || indices.Any(index => index < 0 || index >= count))
+                throw new CardFileException($"{path}: triangles name vertices that it does not have; {Changed}");
+            return Made(indices.Length, i => indices[i % 3 == 1 ? i + 1 : i % 3 == 2 ? i - 1 : i]);
+        }
+
+        static T[] Made<T>(int count, Func<int, T> make)
+        {
+            var made = new T[count];
+            for (var i = 0; i < count; i++)
+                made[i] = make(i);
+            return made;
+        }
+
+        static Vector3 Vector(float[] values, int first)
+        {
+            return new Vector3(-values[first], values[first + 1], values[first + 2]);
+        }
+
+        /// In glTF strands run along cross(normal, tangent), which a mirror turns around.
+        static Vector4 Along(Vector3 normal, Vector3 across)
+        {
+            var along = -Vector3.Cross(normal, across);
+            return new Vector4(along.x, along.y, along.z, 1.0f);
+        }
+
+        Node Named(string name)
+        {
+            return document.nodes.FirstOrDefault(node => node.name == name)
+                ?? throw Fault($"it has no {name}, which its sidecar names; {Changed}");
+        }
+
+        float[] Floats(int number, string type)
+        {
+            var accessor = At(document.accessors, number);
+            if (accessor.componentType != Float || accessor.type != type)
+                throw Fault($"its vertices are compressed; {Changed}");
+            var values = new float[accessor.count * (type[3] - '0')];
+            Buffer.BlockCopy(bytes, Start(accessor, 4 * values.Length), values, 0, 4 * values.Length);
+            return values;
+        }
+
+        int[] Indices(int number)
+        {
+            var accessor = At(document.accessors, number);
+            if (accessor.componentType != UnsignedShort && accessor.componentType != UnsignedInt)
+                throw Fault($"its triangles are compressed; {Changed}");
+            var isShort = accessor.componentType == UnsignedShort;
+            var start = Start(accessor, (isShort ? 2 : 4) * accessor.count);
+            return Made(accessor.count, i => isShort
+                ? BitConverter.ToUInt16(bytes, start + 2 * i)
+                : (int)BitConverter.ToUInt32(bytes, start + 4 * i));
+        }
+
+        int Start(Accessor accessor, long size)
+        {
+            var view = At(document.bufferViews, accessor.bufferView);
+            var first = (long)view.byteOffset + accessor.byteOffset;
+            if (view.byteStride != 0 || size < 0 || first < 0 || accessor.byteOffset + size > view.byteLength
+                || binary + first + size > bytes.Length)
+                throw Fault(Changed);
+            return (int)(binary + first);
+        }
+
+        T At<T>(T[] all, int number)
+        {
+            return number >= 0 && number < all.Length ? all[number] : throw Fault(Changed);
+        }
+
+        CardFileException Fault(string what)
+        {
+            return new CardFileException($"{path}: {what}");
+        }
+
+#pragma warning disable 649  // the fields are read from JSON
+        [Serializable]
+        sealed class Document
+        {
+            public Node[] nodes;
+            public Mesh[] meshes;
+            public Accessor[] accessors;
+            public BufferView[] bufferViews;
+        }
+
+        [Serializable]
+        sealed class Node
+        {
+            public string name;
+            public int mesh = -1;
+            public Extras extras;
+        }
+
+        [Serializable]
+        sealed class Extras
+        {
+            public float[] MSFT_screencoverage;
+        }
+
+        [Serializable]
+        sealed class Mesh
+        {
+            public Primitive[] primitives;
+        }
+
+        [Serializable]
+        sealed class Primitive
+        {
+            public Attributes attributes;
+            public int indices = -1;
+        }
+
+        [Serializable]
+        sealed class Attributes
+        {
+            public int POSITION = -1, NORMAL = -1, TANGENT = -1, TEXCOORD_0 = -1, TEXCOORD_1 = -1;
+        }
+
+        [Serializable]
+        sealed class Accessor
+        {
+            public int bufferView = -1, byteOffset, componentType, count;
+            public string type;
+        }
+
+        [Serializable]
+        sealed class BufferView
+        {
+            public int byteOffset, byteLength, byteStride;
+        }
+#pragma warning restore 649
+    }
+}

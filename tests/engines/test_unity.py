@@ -1,0 +1,414 @@
+"""The package for Unity, compiled and run where Unity is not.
+
+Its C# runs against stubs of what it calls (unity/Stubs.cs), its shaders go through glslang's HLSL
+with stubs of what they include. What Unity itself makes of both is not seen here.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import hair_hlsl
+import numpy as np
+import pytest
+from extension_loader import REPOSITORY
+
+pytest.importorskip("bpy", reason="writing cards needs Blender or the bpy module")
+
+from engine_assets import OUTPUT, Asset, written_asset
+
+from hairloom.addon.cards.export_settings import CardExportSettings
+from hairloom.addon.exchange.cards.glb_file import GlbFile
+from hairloom.addon.shading.marschner.fibre import Fibre
+from hairloom.addon.shading.marschner.tables import marschner_tables
+
+HERE = Path(__file__).parent / "unity"
+PACKAGE = REPOSITORY / "docs" / "engines" / "unity"
+SHADERS = PACKAGE / "Shaders" / "HairloomCards.hlsl"
+ENTRIES = {
+    "vertex": "vert",
+    "fragment": "frag",
+    "vertex_of_shadow": "vert",
+    "fragment_of_shadow": "frag",
+}
+
+
+@pytest.fixture(scope="module")
+def asset(gpu_context: Any) -> Asset:
+    return written_asset("unity", "marschner", CardExportSettings(index_buffer=True))
+
+
+@pytest.fixture(scope="module")
+def imported(sandbox: str) -> Callable[..., dict[str, Any]]:
+    """Imports a GLB as Unity would call the package."""
+    program = OUTPUT / "unity.exe"
+    OUTPUT.mkdir(parents=True, exist_ok=True)
+    sources = sorted([*HERE.glob("*.cs"), *(PACKAGE / "Editor").glob("*.cs")])
+    options = ["-langversion:latest", "-warnaserror", "-r:System.Web.Extensions.dll"]
+    compiled = subprocess.run(
+        [sandbox, "run", "mcs", *options, f"-out:{program}", *map(str, sources)],
+        capture_output=True,
+        text=True,
+    )
+    assert compiled.returncode == 0, compiled.stdout + compiled.stderr
+
+    def run(glb: Path, *options: str) -> dict[str, Any]:
+        done = subprocess.run(
+            [sandbox, "run", "mono", str(program), str(glb), *options],
+            capture_output=True,
+            text=True,
+        )
+        assert done.returncode == 0, done.stdout + done.stderr
+        return dict(json.loads(done.stdout))
+
+    return run
+
+
+@pytest.fixture(scope="module")
+def hair(imported: Callable[..., dict[str, Any]], asset: Asset) -> dict[str, Any]:
+    return imported(glb_of(asset.folder))
+
+
+def glb_of(folder: Path) -> Path:
+    return next(folder.glob("*.glb"))
+
+
+def values(glb: Path, node: str) -> dict[str, np.ndarray]:
+    """What the file holds of a level, by another reader."""
+    file = GlbFile.of(glb.read_bytes(), str(glb))
+    part = file.content["meshes"][file.content["nodes"][file.node(node)]["mesh"]]["primitives"][0]
+    found = {name: np.asarray(file.values(number)) for name, number in part["attributes"].items()}
+    return found | {"indices": np.asarray(file.values(part["indices"])).reshape(-1, 3)}
+
+
+def level(
+    hair: dict[str, Any], number: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[Any]]:
+    """Positions, normals, directions of strands, and the triangles of each part."""
+    mesh = hair["meshes"][number]
+    vectors = (np.reshape(mesh[name], (-1, 3)) for name in ("positions", "normals", "tangents"))
+    place, normal, along = vectors
+    return place, normal, along, [np.reshape(part, (-1, 3)) for part in mesh["parts"]]
+
+
+def sidecar_of(folder: Path) -> dict[str, Any]:
+    path = next(folder.glob("*.hairloom.json"))
+    return dict(json.loads(path.read_text(encoding="utf-8")))
+
+
+def test_every_level_comes_in_the_order_of_the_file(asset: Asset, hair: dict[str, Any]) -> None:
+    sidecar = sidecar_of(asset.folder)
+    assert not hair["errors"] and not hair["warnings"]
+    assert [mesh["name"] for mesh in hair["meshes"]] == [each["node"] for each in sidecar["levels"]]
+    for number, each in enumerate(sidecar["levels"]):
+        expected = values(glb_of(asset.folder), each["node"])
+        place, _, _, (opaque, _back, front) = level(hair, number)
+        np.testing.assert_allclose(place * (-1, 1, 1), expected["POSITION"], atol=1e-7)
+        for part in (opaque, front):
+            wanted = np.sort(expected["indices"], axis=1)
+            np.testing.assert_array_equal(np.sort(part, axis=1), wanted)
+
+
+def test_back_faces_have_the_order_of_the_index_buffer(asset: Asset, hair: dict[str, Any]) -> None:
+    sidecar = sidecar_of(asset.folder)
+    buffer = sidecar["index_buffer"]
+    kind = {"uint16": "<u2", "uint32": "<u4"}[buffer["type"]]
+    all_indices = np.fromfile(asset.folder / buffer["file"], kind)
+    for number, each in enumerate(sidecar["levels"]):
+        first = each["buffer_back_first"]
+        wanted = all_indices[first : first + each["indices"]].reshape(-1, 3)
+        _, _, _, (_, back, front) = level(hair, number)
+        np.testing.assert_array_equal(np.sort(back, axis=1), np.sort(wanted, axis=1))
+        assert (back != front).any()
+
+
+def test_a_mirror_leaves_fronts_in_front(asset: Asset, hair: dict[str, Any]) -> None:
+    """Unity's fronts are clockwise, its axes left-handed: the same cross product tells fronts."""
+    node = sidecar_of(asset.folder)["levels"][0]["node"]
+    file = values(glb_of(asset.folder), node)
+    place, normal, _, parts = level(hair, 0)
+
+    def faces(place: np.ndarray, normal: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+        a, b, c = (place[triangles[:, k]] for k in range(3))
+        across = np.cross(b - a, c - a)
+        return np.asarray(np.einsum("ij,ij->i", across, normal[triangles].sum(axis=1)) > 0.0)
+
+    in_file = faces(file["POSITION"], file["NORMAL"], file["indices"])
+    np.testing.assert_array_equal(faces(place, normal, parts[2]), in_file)
+    assert in_file.any()
+
+
+def test_strands_run_from_root_to_tip(asset: Asset, hair: dict[str, Any]) -> None:
+    """Along each edge on which a strand goes on, its direction leads on too."""
+    place, normal, along, parts = level(hair, 0)
+    how_far = np.array(hair["meshes"][0]["along"])
+    begin, end = np.concatenate([parts[0][:, [0, 1]], parts[0][:, [1, 2]]]).T
+    further = how_far[end] - how_far[begin]
+    leads = np.einsum("ij,ij->i", place[end] - place[begin], along[begin] + along[end])
+    does_go_on = np.abs(further) > 0.02
+    assert does_go_on.sum() > 100
+    assert (leads[does_go_on] * further[does_go_on] > 0.0).mean() > 0.99
+    np.testing.assert_allclose(np.einsum("ij,ij->i", normal, along), 0.0, atol=2e-3)
+
+
+def test_levels_take_over_where_the_file_says(asset: Asset, hair: dict[str, Any]) -> None:
+    content = GlbFile.of(glb_of(asset.folder).read_bytes(), "").content
+    coverage = content["nodes"][0]["extras"]["MSFT_screencoverage"]
+    np.testing.assert_allclose(hair["heights"], np.sqrt(coverage), rtol=1e-6)
+    assert sorted(hair["heights"], reverse=True) == hair["heights"]
+
+
+def test_materials_are_the_passes_of_the_sidecar(asset: Asset, hair: dict[str, Any]) -> None:
+    """Of their passes, states, values and textures."""
+    sidecar = sidecar_of(asset.folder)
+    assert [each["queue"] for each in hair["materials"]] == sorted(
+        each["queue"] for each in hair["materials"]
+    )
+    for material, one in zip(hair["materials"], sidecar["passes_fallback"], strict=True):
+        found = material["values"]
+        assert found["_Cull"] == ["none", "front", "back"].index(one["cull"])
+        assert bool(found["_ZWrite"]) == one["depth_write"]
+        assert (found["_SrcBlend"] == 1) == (one["blend"] == "off")
+        assert found["_model"] == 1
+        for name, value in sidecar["material"]["values"].items():
+            if f"_{name}" in found:
+                wanted = [*value, 0.0] if isinstance(value, list) else value
+                assert found[f"_{name}"] == pytest.approx(wanted, rel=1e-6), name
+        for name, lanes in sidecar["material"]["fibre"].items():
+            assert found[f"_fibre_{name}"] == pytest.approx(lanes, rel=1e-6)
+        assert found["_alpha_texture"] == sidecar["textures"]["alpha"]["file"]
+        assert found["_paths"] == sidecar["material"]["tables"]["paths"]["file"]
+    alpha = [
+        (each["values"]["_MinAlpha"], each["values"]["_MaxAlpha"]) for each in hair["materials"]
+    ]
+    opaque, least = sidecar["opaque_alpha"], sidecar["min_alpha"]
+    wanted_alpha = [(opaque, 2.0), (0.0, opaque), (least, opaque)]
+    np.testing.assert_allclose(alpha, wanted_alpha, rtol=1e-6)
+
+
+def test_every_value_of_a_material_is_a_property_of_the_shader(hair: dict[str, Any]) -> None:
+    shader = (PACKAGE / "Shaders" / "HairloomCards.shader").read_text(encoding="utf-8")
+    unused = {"_color_texture", "ShadowCaster"} | {
+        f"_{role}_mask" for role in ("base", "tangent", "normal")
+    }
+    for name in set(hair["materials"][0]["values"]) - unused:
+        assert f" {name} (" in shader, name
+
+
+def test_textures_keep_their_values(asset: Asset, hair: dict[str, Any]) -> None:
+    sidecar = sidecar_of(asset.folder)
+    for file, how in hair["textures"].items():
+        is_table = file.endswith(".exr")
+        color = "linear" if is_table else sidecar["texture_files"][file]["color_space"]
+        assert how["sRGB"] == (color == "sRGB"), file
+        assert (how["format"] == "RGBAFloat") == is_table, file
+    assert any(how["sRGB"] for how in hair["textures"].values())
+
+
+def test_in_the_high_definition_pipeline_its_own_material_is_used(
+    imported: Callable[..., dict[str, Any]], asset: Asset
+) -> None:
+    found = imported(glb_of(asset.folder), "hdrp")
+    assert {each["shader"] for each in found["materials"]} == {"HDRP/Lit"}
+    assert [each["values"]["_SurfaceType"] for each in found["materials"]] == [0, 1, 1]
+
+
+def _without_sidecar(folder: Path) -> None:
+    next(folder.glob("*.hairloom.json")).unlink()
+
+
+def _of_another(folder: Path) -> None:
+    glb_of(folder).rename(folder / "other.glb")
+    sidecar = next(folder.glob("*.hairloom.json"))
+    sidecar.rename(folder / "other.hairloom.json")
+
+
+def _cut_off(folder: Path) -> None:
+    glb = glb_of(folder)
+    glb.write_bytes(glb.read_bytes()[:5000])
+
+
+def _half_the_triangles(folder: Path) -> None:
+    glb = glb_of(folder)
+    content = glb.read_bytes()
+    size = int.from_bytes(content[12:16], "little")
+    document = json.loads(content[20 : 20 + size])
+    indices = document["accessors"][document["meshes"][0]["primitives"][0]["indices"]]
+    indices["count"] //= 2
+    text = json.dumps(document, separators=(",", ":")).encode()
+    glb.write_bytes(content[:20] + text.ljust(size) + content[20 + size :])
+
+
+def _quantised(folder: Path) -> None:
+    glb = glb_of(folder)
+    glb.write_bytes(glb.read_bytes().replace(b'"componentType":5126', b'"componentType":5122'))
+
+
+def _garbage(folder: Path) -> None:
+    next(folder.glob("*.hairloom.json")).write_text("{no", encoding="utf-8")
+
+
+def _newer(folder: Path) -> None:
+    sidecar = next(folder.glob("*.hairloom.json"))
+    sidecar.write_text(json.dumps(sidecar_of(folder) | {"hairloom_sidecar": 99}), encoding="utf-8")
+
+
+def _elsewhere(folder: Path) -> None:
+    sidecar = next(folder.glob("*.hairloom.json"))
+    content = sidecar_of(folder)
+    content["index_buffer"]["file"] = "../../secret.bin"
+    sidecar.write_text(json.dumps(content), encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("damage", "message"),
+    [
+        (_without_sidecar, "missing"),
+        (_of_another, "belongs to"),
+        (_cut_off, "cut off"),
+        (_half_the_triangles, "another program has changed it"),
+        (_quantised, "compressed"),
+        (_garbage, "no JSON"),
+        (_newer, "update this package"),
+        (_elsewhere, "lies elsewhere"),
+    ],
+)
+def test_what_cannot_be_read_is_named(
+    imported: Callable[..., dict[str, Any]],
+    asset: Asset,
+    damage: Callable[[Path], None],
+    message: str,
+) -> None:
+    folder = OUTPUT / "unity_damaged"
+    shutil.rmtree(folder, ignore_errors=True)
+    shutil.copytree(asset.folder, folder)
+    damage(folder)
+    found = imported(glb_of(folder))
+    assert len(found["errors"]) == 1 and message in found["errors"][0], found["errors"]
+
+
+def test_a_missing_texture_is_named_and_the_rest_is_shown(
+    imported: Callable[..., dict[str, Any]], asset: Asset
+) -> None:
+    folder = OUTPUT / "unity_damaged"
+    shutil.rmtree(folder, ignore_errors=True)
+    shutil.copytree(asset.folder, folder)
+    missing = sidecar_of(folder)["textures"]["alpha"]["file"]
+    (folder / missing).unlink()
+    found = imported(glb_of(folder))
+    assert not found["errors"] and len(found["meshes"]) > 1
+    assert found["warnings"] and all(missing in each for each in found["warnings"])
+
+
+@pytest.mark.parametrize("entry", ENTRIES)
+def test_the_shaders_compile(sandbox: str, entry: str) -> None:
+    OUTPUT.mkdir(parents=True, exist_ok=True)
+    program = OUTPUT / f"unity_{entry}.spv"
+    options = ["-D", "-V", "-S", ENTRIES[entry], "-e", entry, "-D_ADDITIONAL_LIGHTS", f"-I{HERE}"]
+    options += ["--auto-map-bindings", "--auto-map-locations", "-o", str(program)]
+    for command in (
+        ["glslangValidator", *options, str(SHADERS)],
+        ["spirv-val", str(program)],
+    ):
+        done = subprocess.run([sandbox, "run", *command], capture_output=True, text=True)
+        assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_its_shading_is_that_of_the_other_engines(
+    sandbox: str, gpu_context: Any, tmp_path: Path
+) -> None:
+    """HLSL by glslang and SPIRV-Cross beside the text that it was made from, both on the GPU."""
+    probe = (HERE / "probe.glsl").read_text(encoding="utf-8")
+    shading = hair_hlsl.SOURCE.read_text(encoding="utf-8")
+    hlsl, program = OUTPUT / "unity_probe.hlsl", OUTPUT / "unity_probe.spv"
+    hlsl.write_text(hair_hlsl.hlsl(shading + probe) + PROBE_HLSL, encoding="utf-8")
+    compile_it = ["glslangValidator", "-D", "-V", "-S", "frag", "-e", "main", "-o", str(program)]
+    compile_it += ["--auto-map-bindings", "--auto-map-locations", str(hlsl)]
+    for command in (compile_it, ["spirv-cross", "--version", "430", str(program)]):
+        done = subprocess.run([sandbox, "run", *command], capture_output=True, text=True)
+        assert done.returncode == 0, done.stdout + done.stderr
+    found = probed(tmp_path / "hlsl.glsl", as_function(done.stdout), "at = place; main_of_hlsl()")
+    glsl = shading + probe + PROBE_GLSL
+    expected = probed(tmp_path / "glsl.glsl", glsl, "result_of_probe = probe_both(place)")
+    assert np.isfinite(expected).all() and expected.std(axis=(0, 1)).min() > 0.01
+    np.testing.assert_allclose(found, expected, atol=2e-5, rtol=2e-4)
+
+
+PROBE_HLSL = """
+Texture2D longitudinal, azimuthal, paths;
+
+float4 main(float2 at : TEXCOORD0) : SV_Target
+{
+  return probe(longitudinal, azimuthal, paths, at.x, (int)at.y);
+}
+"""
+PROBE_GLSL = """
+vec4 result_of_probe;
+
+vec4 probe_both(vec2 at)
+{
+  return probe(longitudinal, azimuthal, paths, at.x, int(at.y));
+}
+"""
+
+
+def as_function(text: str) -> str:
+    """A fragment program of SPIRV-Cross with plain variables, and the textures of ours."""
+    text = re.sub(r"#version.*", "", text)
+    text = re.sub(r"layout\(location = \d+\) in vec2 (\w+);", r"vec2 \1;\n#define at \1", text)
+    result = r"vec4 \1;\n#define result_of_probe \1"
+    text = re.sub(r"layout\(location = \d+\) out vec4 (\w+);", result, text)
+    sampler = (
+        r"(?:layout\(binding = \d+\) )?uniform sampler2D (\w*?(longitudinal|azimuthal|paths)\w*);"
+    )
+    text = re.sub(sampler, r"#define \1 \2", text)
+    return text.replace("void main()", "void main_of_hlsl()")
+
+
+def probed(file: Path, text: str, call: str) -> np.ndarray:
+    """Both models at 4,096 places, (64, 128, 4)."""
+    import gpu
+
+    from hairloom.addon.render.shader_program import ShaderRecipe, program
+    from hairloom.addon.render.shader_source import SHADER_FOLDER
+    from hairloom.addon.render.textures import texture_from, texture_to_array
+
+    file.write_text(text + PROBE_MAIN.replace("CALL", call), encoding="utf-8")
+    fibre = marschner_tables(Fibre(), 32)
+    tables = {
+        "longitudinal": fibre.longitudinal[0],
+        "azimuthal": fibre.azimuthal,
+        "paths": fibre.paths,
+    }
+    recipe = ShaderRecipe(
+        name=file.stem,
+        compute=file.name,
+        textures=tuple(("FLOAT_2D", name) for name in tables),
+        images=(("RGBA32F", "result"),),
+        folders=(file.parent, SHADER_FOLDER),
+    )
+    shader = program(recipe)
+    result = gpu.types.GPUTexture((128, 64), format="RGBA32F")
+    textures = {name: texture_from(table, "RGBA32F") for name, table in tables.items()}
+    shader.bind(textures=textures, images={"result": result})
+    gpu.compute.dispatch(shader.shader, 16, 8, 1)
+    pixels = texture_to_array(result)
+    gpu.shader.unbind()
+    return np.asarray(pixels)
+
+
+PROBE_MAIN = """
+void main()
+{
+  ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
+  vec2 place = vec2(float(pixel.x / 2 + 64 * pixel.y) * 0.05, float(pixel.x % 2));
+  CALL;
+  imageStore(result, pixel, result_of_probe);
+}
+"""

@@ -1,0 +1,16 @@
+// What HairloomCards.hlsl calls of Unity's own file of this name, for a compiler without Unity.
+#define CBUFFER_START(name) cbuffer name {
+#define CBUFFER_END };
+#define UNITY_REVERSED_Z 1
+#define UNITY_NEAR_CLIP_VALUE 1.0
+#define half4 float4
+
+float4x4 object_to_world, world_to_clip;
+float3 camera;
+
+float3 TransformObjectToWorld(float3 place) { return mul(object_to_world, float4(place, 1.0)).xyz; }
+float3 TransformObjectToWorldNormal(float3 normal) { return mul((float3x3)object_to_world, normal); }
+float3 TransformObjectToWorldDir(float3 direction) { return mul((float3x3)object_to_world, direction); }
+float4 TransformWorldToHClip(float3 place) { return mul(world_to_clip, float4(place, 1.0)); }
+float3 GetWorldSpaceNormalizeViewDir(float3 place) { return normalize(camera - place); }
+float2 GetNormalizedScreenSpaceUV(float4 position) { return position.xy; }
