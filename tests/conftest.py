@@ -23,7 +23,7 @@ def gpu_context() -> Any:
 @pytest.fixture(scope="session")
 def shared_data() -> Path:
     """The folder of the real grooms: HAIRLOOM_DATA, else shared/data beside the repository."""
-    folder = Path(os.environ.get("HAIRLOOM_DATA", REPOSITORY.parent / "shared" / "data"))
+    folder = Path(os.environ.get("HAIRLOOM_DATA") or REPOSITORY.parent / "shared" / "data")
     if not folder.is_dir():
         pytest.skip(f"the real grooms are not here: no folder {folder}; set HAIRLOOM_DATA")
     return folder

@@ -18,6 +18,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..arrays import Floats, Ints
+from .halton import radical_inverse
 
 #: of the hash: even numbers, so that lower bits alone decide about a bit
 _MIXING = (0x6C50B47C, 0xB82F1E52, 0xC7AFE638, 0x8D22F6E6)
@@ -32,18 +33,9 @@ def shifts(number: int, sample: int) -> tuple[float, float]:
         number: of the mesh; four have sequences of their own.
         sample: number of the sample, from 0.
     """
-    front = 2 * number % len(_BASES)
-    return _halton(sample, _BASES[front]), _halton(sample, _BASES[front + 1])
-
-
-def _halton(index: int, base: int) -> float:
-    """The digits of a number behind the point, in reverse."""
-    value, fraction = 0.0, 1.0
-    while index:
-        index, digit = divmod(index, base)
-        fraction /= base
-        value += fraction * digit
-    return value
+    first = 2 * number % len(_BASES)
+    front, back = (radical_inverse(np.array([sample]), _BASES[first + k]) for k in (0, 1))
+    return float(front[0]), float(back[0])
 
 
 def scrambled(place: Ints, seed: Ints, other_seed: Ints) -> Floats:

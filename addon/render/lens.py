@@ -11,8 +11,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..arrays import Floats, Ints
+from ..arrays import Floats
 from .camera import Camera
+from .halton import radical_inverse
 
 _FEWEST_BLADES = 3
 
@@ -37,7 +38,7 @@ class Lens:
         Evenly over the aperture. The first is the middle; more samples begin with those of fewer.
         """
         number = np.arange(count)
-        turn, out = _radical_inverse(number, 2), np.sqrt(_radical_inverse(number, 3))
+        turn, out = radical_inverse(number, 2), np.sqrt(radical_inverse(number, 3))
         if self.blades < _FEWEST_BLADES:
             angle = 2.0 * np.pi * turn
             unit = out[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
@@ -63,12 +64,3 @@ def through(camera: Camera, lens: Lens, place: Floats) -> Camera:
     sheared[:2, 2] = -right / lens.focus, -up / lens.focus
     view = moved @ np.asarray(camera.view, np.float64)
     return replace(camera, view=view, projection=np.asarray(camera.projection) @ sheared)
-
-
-def _radical_inverse(number: Ints, base: int) -> Floats:
-    """The digits of whole numbers behind the point, in reverse (Halton 1960)."""
-    found, left, place = np.zeros(len(number)), number.astype(np.int64), 1.0 / base
-    while left.any():
-        left, digit = np.divmod(left, base)
-        found, place = found + place * digit, place / base
-    return found

@@ -1,0 +1,20 @@
+"""A sequence that fills [0, 1) evenly (Halton 1960, "On the Efficiency of Certain Quasi-Random
+Sequences of Points in Evaluating Multi-Dimensional Integrals").
+
+Pure numpy: importable without gpu.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..arrays import Floats, Ints
+
+
+def radical_inverse(number: Ints, base: int) -> Floats:
+    """The digits of whole numbers (n,) behind the point, in reverse, (n,)."""
+    found, left, place = np.zeros(len(number)), number.astype(np.int64), 1.0 / base
+    while left.any():
+        left, digit = np.divmod(left, base)
+        found, place = found + place * digit, place / base
+    return found
