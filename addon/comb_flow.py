@@ -17,7 +17,8 @@ from .arrays import Floats, Ints
 from .pipeline import Grown, Rig
 from .strands import StrandSet
 from .strands.center_lines import center_lines
-from .strands.resample import evenly_spaced, resample
+from .strands.needed_points import with_points
+from .strands.resample import resample
 
 
 def combed(rig: Rig, curves: StrandSet, number: Ints) -> Rig:
@@ -37,20 +38,24 @@ def combed(rig: Rig, curves: StrandSet, number: Ints) -> Rig:
         guide_grid[guides] = center_lines(moved, cv_count).grid
     grown, own = rig.grown, rig.own_count
     if grown is not None and own is not None:
-        grown, touched = _grown(grown, curves, number)
+        grown, touched = _grown(grown, strands.with_points(points.copy()), number)
         if len(touched):
             put_children(points, strands.offsets, grown, touched, own)
     return replace(rig, strands=replace(strands, points=points), guide_grid=guide_grid, grown=grown)
 
 
-def _grown(grown: Grown, curves: StrandSet, number: Ints) -> tuple[Grown, Ints]:
-    """The children's parents as they are now, and which of the rig's children they shape again."""
+def _grown(grown: Grown, strands: StrandSet, number: Ints) -> tuple[Grown, Ints]:
+    """The children's parents as they are now, and which of the rig's children they shape again.
+
+    Args:
+        strands: of the rig, of which those of these numbers have moved.
+    """
     is_moved = np.isin(grown.parents, number)
     parents = np.flatnonzero(is_moved)
     if not len(parents):
         return grown, parents
     grid = grown.shapes.grid.copy()
-    moved = curves.take(np.searchsorted(number, grown.parents[parents]))
+    moved = strands.take(grown.parents[parents])
     grid[parents] = resample(moved, grid.shape[1]).grid
     shapes = replace(grown.shapes, points=grid.reshape(-1, 3))
     touched = np.flatnonzero(grown.growth.touched(is_moved)[grown.kept])
@@ -78,9 +83,7 @@ def _strands(grid: Floats) -> StrandSet:
 def _put(points: Floats, offsets: Ints, number: Ints, strands: StrandSet) -> None:
     """Write strands in place of those of these numbers, by as many points as those have."""
     counts = (offsets[1:] - offsets[:-1])[number]
-    for count in np.unique(counts).tolist():
-        some = np.flatnonzero(counts == count)
-        taken = strands.take(some)
-        if (taken.point_counts != count).any():
-            taken = evenly_spaced(taken, count)
-        points[offsets[number[some], None] + np.arange(count)] = taken.grid
+    if not np.array_equal(counts, strands.point_counts):
+        strands = with_points(strands, counts, strands.point_counts != counts)
+    first = np.repeat(offsets[number] - strands.offsets[:-1], counts)
+    points[first + np.arange(len(strands.points))] = strands.points

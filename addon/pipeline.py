@@ -67,7 +67,7 @@ from .strands.face import is_face_hair
 from .strands.frames import strand_tangents, volume_normals
 from .strands.join import joined
 from .strands.kept import NOTHING_KEPT, Kept
-from .strands.needed_points import LOST, MAX_POINTS, with_needed_points
+from .strands.needed_points import LOST, MAX_POINTS, with_needed_points, with_own_points
 from .strands.resample import resample
 from .strands.root_motions import RootMotions
 from .strands.vectors import dot
@@ -208,6 +208,7 @@ class Motion:
     clearance: how far strands stay from these; None before there are any.
     guide_clearance: the same of guides.
     leans: how strands were bent that were led out in the frame before.
+    begun: the pose in which it began, in which the dynamics knows the style.
     """
 
     dynamics: DynamicsState
@@ -220,6 +221,7 @@ class Motion:
     clearance: Clearance | None = None
     guide_clearance: GuideClearance | None = None
     leans: Leans = NO_LEANS
+    begun: Pose | None = None
 
     def drive(
         self,
@@ -229,13 +231,20 @@ class Motion:
         duration: float,
         force_fields: ForceFields,
         held: Held | None = None,
+        simulated: Floats | None = None,
     ) -> Drive:
         """What acts in a frame of `duration` [s] that carries the guides to `target`."""
-        earlier = self.carried_earlier if duration else None
-        ratio = self.duration / duration if duration else 1.0
-        before, clearance = self.carried_guides, self.guide_clearance
         return Drive(
-            before, target, colliders, gravity, earlier, force_fields, ratio, held, clearance
+            self.carried_guides,
+            target,
+            colliders,
+            gravity,
+            self.carried_earlier if duration else None,
+            force_fields,
+            self.duration / duration if duration else 1.0,
+            held,
+            self.guide_clearance,
+            simulated,
         )
 
 
@@ -253,6 +262,7 @@ def prepare(
     partings: Floats | None = None,
     head_field: Callable[[], DistanceField | None] = lambda: None,
     kept: Kept = NOTHING_KEPT,
+    is_animated: bool = False,
 ) -> Rig:
     """Bind strands to the head, choose the guides, weigh them for every strand, find all widths,
     and what is held.
@@ -270,6 +280,7 @@ def prepare(
         head_field: is called if there are children: what they are led out of; None: of nothing.
         kept: of the groom that was made last, which may be the same but for what an artist combs
             or paints; it changes nothing but the time.
+        is_animated: whether the strands will have other shapes, so that all keep their own points.
 
     Raises:
         HairloomError: no strands, or a groom of another scale than the head.
@@ -279,7 +290,10 @@ def prepare(
             "it has no strands that can be used", place=place, remedy="Choose hair that has strands"
         )
     bound = strands if head is None else bind_roots(strands, head, place=place).strands
-    own = with_needed_points(bound, settings.cv_count)
+    if is_animated:
+        own = with_own_points(bound, settings.cv_count)
+    else:
+        own = with_needed_points(bound, settings.cv_count)
     lines = center_lines(bound, settings.cv_count)
     reach = settings.tip_distance * _hair_length(own) if holders else 0.0
     holds = find_holds(own, holders, reach)
@@ -293,7 +307,7 @@ def prepare(
     weights = _weights(lines, guide_lines, kind, guide_kind, parted)
     notes = _lost_length(bound, own)
     rig = Rig(own, head, guides, guide_lines.grid, weights, _frames(own, head), notes)
-    ground = _Ground(density, masks, parted, head_field, kept)
+    ground = _Ground(density, masks, parted, head_field, kept, is_animated)
     if children is not None and children.method == "auto":
         rig = _automatic(rig, children, ground, widths, place)
     else:
@@ -320,6 +334,7 @@ class _Ground:
     partings: Partings | None
     field: Callable[[], DistanceField | None]
     kept: Kept
+    is_animated: bool
 
 
 def _numbers(rig: Rig) -> Ints | None:
@@ -435,7 +450,11 @@ def _with_children(
         kept=kept,
     )
     made, chosen = _outside(made, ground.field(), _hair_length(shapes), kept)
-    strands = joined(own, with_needed_points(made.strands, cv_count, kept=kept))
+    if ground.is_animated:
+        children = with_own_points(made.strands, cv_count)
+    else:
+        children = with_needed_points(made.strands, cv_count, kept=kept)
+    strands = joined(own, children)
     if len(rig.guides) < own.strand_count:
         # shaped by their neighbours among all strands, they move as guides do
         lines = center_lines(own.take(rig.guides), cv_count)
@@ -593,7 +612,20 @@ def begin(rig: Rig, pose: Pose) -> Motion:
     """Hair at rest in this pose."""
     guides = style_of_guides(rig, pose)
     state = start(guides, rig.curl_room, rig.strands_of_guides)
-    return Motion(state, guides, guides, pose)
+    return Motion(state, guides, guides, pose, begun=pose)
+
+
+def with_style(rig: Rig, motion: Motion) -> Motion:
+    """A running motion whose guides return to the shapes and the lengths that this rig has.
+
+    Args:
+        rig: the same groom as before with curves of other shapes, see `style_flow`.
+    """
+    state, begun = motion.dynamics, motion.begun or motion.pose
+    style = start(style_of_guides(rig, begun), rig.curl_room, rig.strands_of_guides)
+    # distances in the settings stay what they are
+    rest = replace(style.rest, size=state.rest.size)
+    return replace(motion, dynamics=replace(state, rest=rest))
 
 
 def advance(
@@ -606,6 +638,7 @@ def advance(
     duration: float,
     force_fields: ForceFields = NO_FIELDS,
     led: LedOut = NOT_LED,
+    simulated: Floats | None = None,
 ) -> Motion:
     """One frame of motion: the roots go with the head, the dynamics moves the rest.
 
@@ -615,10 +648,12 @@ def advance(
         force_fields: of the scene.
         led: the strands that were led out at this moment of the motion: from how they were bent
             the next frame's are led.
+        simulated: (guide_count,), see `blend.blended`; None: all of the motion is.
     """
     target = style_of_guides(rig, pose)
-    motion = with_clearance(rig, motion, colliders, settings)
-    drive = motion.drive(target, colliders, gravity, duration, force_fields, held_cvs(rig, pose))
+    motion = with_clearance(rig, motion, colliders, settings, simulated)
+    held = held_cvs(rig, pose)
+    drive = motion.drive(target, colliders, gravity, duration, force_fields, held, simulated)
     state = advance_dynamics(motion.dynamics, drive, settings, duration)
     guides, before = grid_at_frame_end(state, drive, duration), motion.carried_guides
     return Motion(
@@ -632,6 +667,7 @@ def advance(
         motion.clearance,
         motion.guide_clearance,
         led.leans,
+        motion.begun,
     )
 
 
@@ -700,23 +736,30 @@ def go_along(
         colliders,
         motion.clearance,
         motion.guide_clearance,
+        begun=motion.begun,
     )
 
 
 def with_clearance(
-    rig: Rig, motion: Motion, colliders: tuple[PosedCollider, ...], settings: DynamicsSettings
+    rig: Rig,
+    motion: Motion,
+    colliders: tuple[PosedCollider, ...],
+    settings: DynamicsSettings,
+    simulated: Floats | None = None,
 ) -> Motion:
     """The motion that knows how far hair stays from colliders, from the first frame with any on.
 
     Guides stay as far as their radius says, strands as far as guides do at their roots, but
     neither farther than they were at that frame's begin, in their style and as their roots
-    carried them.
+    carried them. Strands of which nothing is simulated go where their style goes.
     """
     size = motion.dynamics.rest.size
     kept, reach = settings.radius_root * size, farthest_kept(settings, size)
     before = tuple(posed.at_begin() for posed in colliders)
     strands, guides = motion.clearance, motion.guide_clearance
-    if colliders and (strands is None or strands.kept != kept):
+    if simulated is not None and not simulated.any():
+        strands = None
+    elif colliders and (strands is None or strands.kept != kept):
         strands = clearance_at(carried(rig, motion.pose), rig.strands.offsets, before, kept)
     if colliders and (guides is None or guides.reach != reach):
         guides = guide_clearance(motion.carried_guides, before, reach)

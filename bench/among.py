@@ -1,5 +1,5 @@
-"""Hair among hair, whether it keeps volume and locks, does nothing at rest, and what it costs; and
-the scene's force fields.
+"""Hair among hair, whether it keeps volume and locks, does nothing at rest, and what it costs; the
+scene's force fields; and hair that follows an animated style.
 
 volume_kept          a ponytail in a style that bears nothing, 2 s below its tie: cells as wide as
                      two strands are apart that it runs through, over those at rest; without: the
@@ -13,6 +13,9 @@ cost_ratio_*         a frame at 24 a second with Volume over one without, on a h
 field_error          force fields of every kind, shape and falloff beside Blender's particles: the
                      largest difference of accelerations at 200 places, over the largest one
 field_cost_ratio_*   a frame as above with four force fields over one without
+style_follow_mm      of curves and children that nodes move, on a surface that turns, and of which
+                     nothing is simulated: how far any drawn strand is from where the curves are
+style_frame_ms       a frame of it that is simulated; read_once: the same with a style that is still
 
 The last line is one JSON object; the exit status is 1 if a limit is missed.
 
@@ -34,6 +37,7 @@ import numpy as np
 from _field_particles import field_error
 from _forms import ComputeForm, Form, NumpyForm, has_compute, play
 from _shaken_head import Shake, guides_on, new_head, surface_of
+from _style_follow import style_follow
 
 from hairloom.addon import register, unregister
 from hairloom.addon.dynamics.colliders import CapsuleCollider, DistanceField, PosedCollider
@@ -64,6 +68,7 @@ LIMITS: dict[str, Callable[[float], bool]] = {
     "rest_motion_mm": lambda motion: motion < 0.01,
     "crossing_percent": lambda percent: percent <= 5.0,
     "field_error": lambda error: error <= 0.01,
+    "style_follow_mm": lambda distance: distance <= 0.1,
     "cost_ratio": lambda ratio: ratio <= 1.6,
 }
 
@@ -75,7 +80,7 @@ def main() -> int:
     asked = options.parse_args()
     gpu.init()
     found: dict[str, object] = {"guides": GUIDES, "renderer": gpu.platform.renderer_get()}
-    found |= field_errors()
+    found |= in_blender()
     found |= volumes() | {"rest_motion_mm": rest_motion()} | crossings()
     if not asked.skip_cost:
         for name, count in SIZES.items():
@@ -156,17 +161,20 @@ def rest_motion() -> float:
     return round(max(float(farthest[1] - farthest[0]), 0.0) * 1e3, 4)
 
 
-def field_errors() -> dict[str, object]:
-    """The largest, and of which case it is; of Blender's particles in an empty scene."""
+def in_blender() -> dict[str, object]:
+    """The largest error of force fields, and of which case it is, of Blender's particles; and how
+    hair follows its style."""
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     register()
     try:
         points = np.random.default_rng(3).uniform(-1.0, 1.0, (200, 3))
         errors = field_error(points)
+        followed = style_follow()
     finally:
         unregister()
     worst = max(errors, key=errors.__getitem__)
-    return {"field_error": errors[worst], "field_worst": worst, "field_cases": len(errors)}
+    found = {"field_error": errors[worst], "field_worst": worst, "field_cases": len(errors)}
+    return found | followed
 
 
 def crossings() -> dict[str, object]:

@@ -1,8 +1,26 @@
 // Guides at a frame's very end: moved as a whole to where their roots are, and what is held to where
-// it is held, which bridges the time that is left over. One invocation a CV. Defines: HAS_HELD.
+// it is held, which bridges the time that is left over; between there and their style where not all
+// of them is simulated. One invocation a CV. Defines: HAS_HELD, IS_BLENDED.
 //
-// Twin of grid_at_frame_end in addon/dynamics/step.py.
+// Twin of grid_at_frame_end in addon/dynamics/step.py, and of blended in addon/dynamics/blend.py.
 #include "lib_strand_texel.glsl"
+#ifdef IS_BLENDED
+#include "lib_blend.glsl"
+#endif
+
+vec3 style_at(int guide, int cv)
+{
+  return texelFetch(styles_now, strand_texel(guide, cv, cv_count), 0).xyz;
+}
+
+vec3 simulated_at(int guide, int cv, vec3 displacement)
+{
+  ivec2 texel = strand_texel(guide, cv, cv_count);
+#ifdef HAS_HELD
+  displacement += texelFetch(beside_root, texel, 0).xyz;
+#endif
+  return texelFetch(positions, texel, 0).xyz + displacement;
+}
 
 void main()
 {
@@ -11,10 +29,24 @@ void main()
     return;
   }
   ivec2 root = strand_texel(id.y, 0, cv_count);
-  ivec2 texel = strand_texel(id.y, id.x, cv_count);
-  vec3 displacement = texelFetch(styles_now, root, 0).xyz - texelFetch(positions, root, 0).xyz;
-#ifdef HAS_HELD
-  displacement += texelFetch(beside_root, texel, 0).xyz;
+  vec3 displacement = style_at(id.y, 0) - texelFetch(positions, root, 0).xyz;
+  vec3 place = simulated_at(id.y, id.x, displacement);
+#ifdef IS_BLENDED
+  float fraction = texelFetch(fractions, root, 0).x;
+  if (fraction < 1.0) {
+    place = style_at(id.y, fraction > 0.0 ? 0 : id.x);
+  }
+  if (fraction > 0.0 && fraction < 1.0) {
+    vec3 before = simulated_at(id.y, 0, displacement);
+    vec3 style_before = place;
+    for (int cv = 1; cv <= id.x; cv++) {
+      vec3 here = simulated_at(id.y, cv, displacement);
+      vec3 style_here = style_at(id.y, cv);
+      place += blended_segment(here - before, style_here - style_before, fraction);
+      before = here;
+      style_before = style_here;
+    }
+  }
 #endif
-  imageStore(bridged, texel, vec4(texelFetch(positions, texel, 0).xyz + displacement, 0.0));
+  imageStore(bridged, strand_texel(id.y, id.x, cv_count), vec4(place, 0.0));
 }

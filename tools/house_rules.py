@@ -30,7 +30,15 @@ BLENDER = {
 #: modules that stand beside the rooms: the ground floor, and the flows over the pure rooms
 GROUND = {"errors", "arrays"}
 PURE = {"params", "strands", "groom", "dynamics", "refine", "shading", "cards", "exchange"}
-FLOWS = {"pipeline", "card_flow", "comb_flow", "paint_flow", "settle_flow", "parameters"}
+FLOWS = {
+    "pipeline",
+    "card_flow",
+    "comb_flow",
+    "paint_flow",
+    "settle_flow",
+    "style_flow",
+    "parameters",
+}
 
 #: The rooms of blender/, in the order of the data: properties say what is read from the scene with
 #: its colliders and bakes; cards and strands leave it; a session moves it, the viewport shows it,
@@ -79,6 +87,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "settle_flow": PURE | {"pipeline"},
     "comb_flow": PURE | {"pipeline"},
     "paint_flow": PURE | {"pipeline", "comb_flow"},
+    "style_flow": PURE | {"pipeline", "comb_flow"},
     "parameters": PURE,
     "render": PURE | {"gpu"},
     **{f"blender.{room}": PURE | FLOWS | {"render", "gpu"} | BLENDER for room in BLENDER_ROOMS},

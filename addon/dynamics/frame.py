@@ -40,6 +40,8 @@ class Drive:
     earlier_ratio: duration of that frame, over that of this one.
     held: the CVs that go with these targets whatever the rest of the guide does; None: none.
     clearance: how far guides stay from colliders at most; None: as far as their radius says.
+    simulated: (guide_count,), how much of what is shown of each guide is simulated, see
+        `blend.blended`; None: all of it.
 
     Hand the same array on from frame to frame, now to before to earlier: what is known of it then
     need not be worked out again.
@@ -54,6 +56,7 @@ class Drive:
     earlier_ratio: float = 1.0
     held: Held | None = None
     clearance: GuideClearance | None = None
+    simulated: Floats | None = None
 
     @property
     def targets(self) -> tuple[Floats, ...]:
@@ -104,6 +107,13 @@ def check_drive(state: DynamicsState, drive: Drive, known: tuple[Floats, ...] = 
         raise HairloomError(
             f"distances from colliders are known of {clearance.distances.shape[:2]} guides and "
             f"CVs, the simulation has {(state.guide_count, state.cv_count)}",
+            place="dynamics",
+            remedy="Start the simulation again",
+        )
+    if drive.simulated is not None and drive.simulated.shape != (state.guide_count,):
+        raise HairloomError(
+            f"it is known of {drive.simulated.shape} guides how much is simulated, the simulation "
+            f"has {state.guide_count}",
             place="dynamics",
             remedy="Start the simulation again",
         )

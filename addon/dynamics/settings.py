@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from ..params import choice, curve, integer, number, toggle
+from ..params import choice, curve, integer, mask, number, toggle
 from .motion_settings import MotionSettings
 
 
@@ -152,6 +152,24 @@ class DynamicsSettings(MotionSettings):
         source="Grid of density and velocity, Petrovic, Henne and Anderson 2005",
         panel="Style",
     )
+    animated_style: bool = toggle(
+        False,
+        label="Animated Style",
+        description="Read the curves again in each frame, so that hair returns to them as shape "
+        "keys, modifiers, nodes or a cache move them; off, they are read once",
+        panel="Style",
+    )
+    simulated: float = number(
+        1.0,
+        label="Simulated",
+        description="Fraction of the motion that is simulated: at 0 hair goes exactly as its style "
+        "does, at 1 as the simulation says",
+        soft=(0.0, 1.0),
+        hard=(0.0, 1.0),
+        unit="factor",
+        panel="Style",
+    )
+    simulated_mask: str = mask("simulated", label="Simulated Mask")
     length_solver: str = choice(
         "direct",
         (

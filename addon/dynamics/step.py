@@ -32,6 +32,7 @@ from itertools import pairwise
 import numpy as np
 
 from ..arrays import Floats, Ints
+from .blend import blended
 from .colliders import Pose, poses_through
 from .constraints import (
     PINNED,
@@ -173,7 +174,8 @@ def grid_at_frame_end(state: DynamicsState, drive: Drive, duration: float) -> Fl
     """CVs at the frame's very end, (guide_count, cv_count, 3) world [m], for drawing.
 
     Bridges the time that is left over: each guide is moved as a whole to where its root is now,
-    and what is held to where it is held.
+    and what is held to where it is held. What is not to be seen of the simulation goes with the
+    style.
 
     Args:
         duration: of the frame [s].
@@ -182,7 +184,10 @@ def grid_at_frame_end(state: DynamicsState, drive: Drive, duration: float) -> Fl
     beside_root = displacement_beside_root(state.time_left, drive, duration)
     if beside_root is not None:
         displacement = displacement + beside_root
-    return (state.grid + displacement).astype(np.float32)
+    grid = (state.grid + displacement).astype(np.float32)
+    if drive.simulated is None:
+        return grid
+    return blended(grid, drive.target_now.astype(np.float32), drive.simulated)
 
 
 def displacement_beside_root(time_left: float, drive: Drive, duration: float) -> Floats | None:

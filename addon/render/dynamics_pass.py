@@ -17,6 +17,8 @@ strand_layout.strand_rows:
     force_fields   RGBA32F: see force_fields.ForceFields.table; only where any act
     clearances     RGBA32F: of each CV, see clearance.GuideClearance; only where there are colliders
     beside_root    RGBA32F: xyz [m], see step.displacement_beside_root; both only where CVs are held
+    fractions      R32F: of a guide's first CV how much of it is simulated, see blend.blended; only
+                   where not all is
 
 Limitations: a CV keeps two contacts at once, the most pressing ones, where numpy keeps one for each
 collider. A set of balls has each of its balls asked, numpy only near ones. Two forms that round
@@ -58,8 +60,10 @@ CONTACT_SLOTS = 2
 GROUP_SIZE = 32
 
 
-def _bridge_recipe(*, held: bool) -> ShaderRecipe:
-    names = ["positions", "styles_now", *["beside_root"] * held]
+@lru_cache(maxsize=4)
+def bridge_recipe(*, held: bool, blended: bool) -> ShaderRecipe:
+    """The program of a frame's very end."""
+    names = ["positions", "styles_now", *["beside_root"] * held, *["fractions"] * blended]
     return ShaderRecipe(
         name="dynamics_bridge",
         compute="dynamics_bridge.comp.glsl",
@@ -67,11 +71,8 @@ def _bridge_recipe(*, held: bool) -> ShaderRecipe:
         images=(("RGBA32F", "bridged"),),
         integers=("cv_count", "guide_count"),
         group_size=(16, 4),
-        defines=(("HAS_HELD", 1),) if held else (),
+        defines=(*[("HAS_HELD", 1)] * held, *[("IS_BLENDED", 1)] * blended),
     )
-
-
-BRIDGE_RECIPE, HELD_BRIDGE_RECIPE = _bridge_recipe(held=False), _bridge_recipe(held=True)
 
 
 @lru_cache(maxsize=32)
@@ -168,15 +169,21 @@ class DynamicsPass:
             if count:
                 frame = Frame.of(state, drive, settings, duration, dt)
                 self._advance(frame, count, dt / state.substep if state.substep else 1.0)
-            self._is_bridged = left > 0.0 or not count
+            self._is_bridged = left > 0.0 or not count or drive.simulated is not None
             if self._is_bridged:
-                self._bridge(displacement_beside_root(left, drive, duration))
+                self._bridge(displacement_beside_root(left, drive, duration), drive.simulated)
         self._state = replace(
             state,
             substep=dt if count else state.substep,
             time_left=left,
             time=state.time + count * dt,
         )
+
+    def take_rest(self, rest: Rest) -> None:
+        """Guides have other shapes and lengths from the next frame on."""
+        self._state = replace(self._state, rest=rest)
+        if "positions" in self._textures:
+            self._upload_rest(rest)
 
     def read(self) -> DynamicsState:
         """The state as it is now, read back; step.advance and another pass can go on from it."""
@@ -212,12 +219,7 @@ class DynamicsPass:
             push = np.zeros_like(here) if state.push is None else state.push.transpose(2, 1, 0)
             textures["pushes"] = points_texture(push)
             self._is_pushed = state.push is not None
-            textures["rest_shapes"] = texture_from(strand_rows(rest_shapes(state.rest)), "RGBA32F")
-            lengths = of_segments(state.rest.length)
-            textures["rest_lengths"] = texture_from(strand_rows(lengths), "R32F")
-            if state.rest.room is not None:
-                rooms = of_segments(state.rest.room)
-                textures["curl_rooms"] = texture_from(strand_rows(rooms), "R32F")
+            self._upload_rest(state.rest)
         self._styles = [(style, self._style_texture(style)) for style in drive.targets]
         now, before, *earlier = (texture for _, texture in self._styles)
         textures |= {"styles_now": now, "styles_before": before}
@@ -231,6 +233,14 @@ class DynamicsPass:
             distances = strand_rows(drive.clearance.distances)
             textures["clearances"] = texture_from(distances, "RGBA32F")
         self._clearance = drive.clearance
+
+    def _upload_rest(self, rest: Rest) -> None:
+        textures = self._textures
+        textures["rest_shapes"] = texture_from(strand_rows(rest_shapes(rest)), "RGBA32F")
+        lengths = of_segments(rest.length)
+        textures["rest_lengths"] = texture_from(strand_rows(lengths), "R32F")
+        if rest.room is not None:
+            textures["curl_rooms"] = texture_from(strand_rows(of_segments(rest.room)), "R32F")
 
     def _style_texture(self, style: Floats) -> Any:
         known = (texture for other, texture in self._styles if other is style)
@@ -290,13 +300,16 @@ class DynamicsPass:
         gpu.compute.dispatch(shader.shader, -(-state.guide_count // GROUP_SIZE), 1, 1)
         gpu.shader.unbind()
 
-    def _bridge(self, beside_root: Floats | None) -> None:
+    def _bridge(self, beside_root: Floats | None, simulated: Floats | None) -> None:
         """Fill `bridged`."""
         state, textures = self._state, dict(self._textures)
-        recipe = BRIDGE_RECIPE
+        recipe = bridge_recipe(held=beside_root is not None, blended=simulated is not None)
         if beside_root is not None:
-            recipe = HELD_BRIDGE_RECIPE
             textures["beside_root"] = points_texture(beside_root)
+        if simulated is not None:
+            fractions = np.zeros((state.guide_count, state.cv_count, 1), np.float32)
+            fractions[:, 0, 0] = simulated
+            textures["fractions"] = texture_from(strand_rows(fractions), "R32F")
         shader = program(recipe)
         shader.bind(
             textures={name: textures[name] for _, name in recipe.textures},

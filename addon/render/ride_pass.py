@@ -144,6 +144,13 @@ class RidePass:
         released_with_shaders(self)
         released_with_shaders(self.points)  # a snapshot may outlive this pass
 
+    def take_style(self, strands: StrandSet, guide_grid: Floats, riders: Riders) -> None:
+        """The same strands and guides have other shapes at rest from the next frame on."""
+        self._strands, self._guide_grid, self._riders = strands, guide_grid, riders
+        self._root_mean = strands.roots.mean(axis=0, dtype=np.float64)
+        if self._textures:
+            self._upload_style()
+
     def carry(
         self, head_positions: Floats | None, matrix: Floats, anchors: Floats | None = None
     ) -> None:
@@ -242,21 +249,11 @@ class RidePass:
         """Everything that is constant, and the textures that the shaders write."""
         strands, textures = self._strands, self._textures
         layout, count = self.points.layout, strands.strand_count
-        points = np.column_stack([strands.points, strands.radius])
-        textures["rest_points"] = texture_from(layout.pixels(points), "RGBA32F")
+        self._upload_style()
         spans = strand_rows(layout.spans[:, None])
         textures["strand_spans"] = texture_from(spans, "RGBA32F")
         guide_strands = self._guides[:, None, None].astype(np.float32)
         textures["guide_strands"] = texture_from(strand_rows(guide_strands), "R32F")
-        points = _padded(self._guide_grid)
-        if self._riders.gives is not None:
-            points[:, :-1, 3] = self._riders.gives
-            textures["guide_axes"] = _empty(*self._guide_grid.shape[:2])
-        textures["guide_points"] = texture_from(strand_rows(points), "RGBA32F")
-        weights = self._riders.weights
-        per_meter = self._riders.segments_per_meter[weights.guide] * self._riders.reach[:, None]
-        riding = np.stack([weights.guide, weights.weight, per_meter], axis=1)
-        textures["guide_weights"] = texture_from(strand_rows(_padded(riding)), "RGBA32F")
         textures["guide_turns"] = _empty(*self._guide_grid.shape[:2])
         at_rest = np.zeros((*self._guide_grid.shape[:2], 4))
         at_rest[:, :-1, 3] = 1.0
@@ -271,6 +268,21 @@ class RidePass:
             self._run_roots(self._holds.rest_positions)
             rest_frames = textures.pop("frames")
             textures |= {"frames": textures["rest_frames"], "rest_frames": rest_frames}
+
+    def _upload_style(self) -> None:
+        """What depends on the shapes at rest."""
+        strands, textures = self._strands, self._textures
+        points = np.column_stack([strands.points, strands.radius])
+        textures["rest_points"] = texture_from(self.points.layout.pixels(points), "RGBA32F")
+        points = _padded(self._guide_grid)
+        if self._riders.gives is not None:
+            points[:, :-1, 3] = self._riders.gives
+            textures["guide_axes"] = _empty(*self._guide_grid.shape[:2])
+        textures["guide_points"] = texture_from(strand_rows(points), "RGBA32F")
+        weights = self._riders.weights
+        per_meter = self._riders.segments_per_meter[weights.guide] * self._riders.reach[:, None]
+        riding = np.stack([weights.guide, weights.weight, per_meter], axis=1)
+        textures["guide_weights"] = texture_from(strand_rows(_padded(riding)), "RGBA32F")
 
     def _run_roots(self, head_positions: Floats) -> None:
         assert self._holds is not None

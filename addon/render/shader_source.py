@@ -16,7 +16,7 @@ from pathlib import Path
 from types import MappingProxyType
 
 from ..cards.bake import SAMPLES, SPARSE_RANGE, SPARSE_STEPS
-from ..dynamics import among, springs
+from ..dynamics import among, blend, springs
 from ..dynamics.colliders.signed_distance import FLATTEST
 from ..dynamics.constraints import CONTACT_WEIGHT, HELD, HELD_SWEEPS, PINNED
 from ..dynamics.contacts import (
@@ -110,6 +110,7 @@ CONSTANTS: Mapping[str, str] = MappingProxyType(
         "among_farthest": repr(among.FARTHEST),
         "among_pressed": repr(among.PRESSED),
         "among_tiny": repr(among.TINY),
+        "blend_opposite": repr(float(blend.OPPOSITE)),
         "held_sweeps": str(HELD_SWEEPS),
         "hold_sweeps": str(SWEEPS),
         "hold_near": repr(NEAR),

@@ -25,6 +25,15 @@ _STEP = 1.25
 _CHUNK = 100_000
 
 
+def with_own_points(strands: StrandSet, least: int, most: int = MAX_POINTS) -> StrandSet:
+    """The same strands with all of their points, whatever their shape needs now: they may move.
+
+    One of fewer than `least` gets more between them, one of more than `most` has that many.
+    """
+    own = strands.point_counts
+    return with_points(strands, np.clip(own, least, most), own > most)
+
+
 def with_needed_points(
     strands: StrandSet, least: int, most: int = MAX_POINTS, kept: Kept = NOTHING_KEPT
 ) -> StrandSet:
@@ -51,10 +60,16 @@ def with_needed_points(
         needed, is_even = _needed(strands, least, most, stray)
     if np.array_equal(needed, own) and not is_even.any():
         return strands
+    return with_points(strands, needed, is_even)
+
+
+def with_points(strands: StrandSet, counts: Ints, is_even: Bools) -> StrandSet:
+    """The same strands with these point counts, (strand_count,): evenly along them, or their own
+    points and more between them."""
     parts, order = [], []
-    for count in np.unique(needed).tolist():
+    for count in np.unique(counts).tolist():
         for are_even in (False, True):
-            chosen = np.flatnonzero((needed == count) & (is_even == are_even))
+            chosen = np.flatnonzero((counts == count) & (is_even == are_even))
             if len(chosen):
                 some = strands.take(chosen)
                 parts.append(resample(some, count) if are_even else _refined(some, count))

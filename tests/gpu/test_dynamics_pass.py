@@ -109,6 +109,7 @@ class Scene:
     is_bent: bool = True
     is_fast: bool = False  # colliders swing ten times as far
     is_combed: bool = False  # guides stay no farther from colliders than they are at first
+    is_blended: bool = False  # not all of what is shown is simulated
 
     @property
     def settings(self) -> DynamicsSettings:
@@ -172,9 +173,17 @@ class Scene:
                     self.force_fields,
                     held=self.held,
                     clearance=self.clearance,
+                    simulated=self.simulated,
                 )
             )
         return drives
+
+    @property
+    def simulated(self) -> np.ndarray | None:
+        """None of some guides, all of others."""
+        if not self.is_blended:
+            return None
+        return np.linspace(-0.2, 1.2, self.guide_count).clip(0.0, 1.0).astype(np.float32)
 
     @cached_property
     def clearance(self) -> GuideClearance | None:
@@ -258,6 +267,8 @@ IN_AIR = {
     "24 frames a second": Scene({"substep_rate": 100.0}, fps=24.0),
     "more frames than substeps": Scene({"substep_rate": 50.0}, fps=60.0),
     "many substeps": Scene({"substep_rate": 2000.0}, fps=24.0),
+    "blended": Scene(LIMP, is_blended=True),
+    "blended and held": Scene(LIMP, is_blended=True, is_held=True, fps=50.0),
     "2 CVs": Scene(cv_count=2),
     "3 CVs": Scene(cv_count=3),
     "4 CVs": Scene(cv_count=4, is_held=True),
@@ -328,7 +339,7 @@ def assert_equal(scene: Scene, make_pass: Any, tolerance: float, seconds: float 
     assert moved > 0.002 or scene.cv_count == 2, "the hair must do something"
 
 
-@pytest.mark.parametrize("scene", few_by_name(IN_AIR, "64 CVs", "32 CVs"))
+@pytest.mark.parametrize("scene", few_by_name(IN_AIR, "64 CVs", "32 CVs", "blended and held"))
 def test_equals_numpy_in_air(make_pass: Any, scene: Scene) -> None:
     assert_equal(scene, make_pass, FREE)
 
@@ -339,6 +350,22 @@ def test_equals_numpy_at_colliders(make_pass: Any, scene: Scene) -> None:
     alone = replace(scene, on_head=(), standing=())
     difference = played(scene).position - played(alone).position
     assert np.abs(difference).max() > 1e-3 or scene in UNTOUCHED, "the solids must be met"
+
+
+def test_guides_take_another_style_in_mid_play(make_pass: Any) -> None:
+    """Longer, and of another shape, while they move."""
+    scene = Scene()
+    state = scene.start()
+    dynamics = make_pass(state)
+    for number, drive in enumerate(scene.drives(0.3)):
+        if number == 6:
+            style = scene.carried(0.0) * np.linspace(1.0, 1.3, scene.cv_count)[:, None]
+            state = replace(state, rest=start(style).rest)
+            dynamics.take_rest(state.rest)
+        state = advance(state, drive, scene.settings, 1.0 / scene.fps)
+        dynamics.advance(drive, scene.settings, 1.0 / scene.fps)
+    assert np.abs(dynamics.read().position - state.position).max() < FREE
+    assert np.abs(state.position - played(scene).position).max() > 0.005
 
 
 def played(scene: Scene) -> DynamicsState:

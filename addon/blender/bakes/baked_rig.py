@@ -5,7 +5,7 @@ A frame keeps all vertices of the head, so that it is drawn whole wherever it be
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -55,7 +55,21 @@ class BakedRig:
         guides = self.rig.guide_grid.shape
         if (found, held) != (head, anchors) or frame["guides"].shape != guides:
             return False
+        style = frame.get("style"), frame.get("style_guides")
+        known = self.rig.strands.points, self.rig.guide_grid
+        if any(
+            each is not None and each.shape != own.shape
+            for each, own in zip(style, known, strict=True)
+        ):
+            return False
         return led_in(frame).fits(self.rig.strands.offsets)
+
+    def styled(self, frame: Arrays) -> Rig:
+        """The rig in the style of a frame that fits."""
+        if "style" not in frame:
+            return self.rig
+        strands = self.rig.strands.with_points(frame["style"])
+        return replace(self.rig, strands=strands, guide_grid=frame["style_guides"])
 
     def strands(self, frame: Arrays) -> Floats:
         """All strands in a frame, (point_count, 3) float32 world [m].
@@ -67,12 +81,17 @@ class BakedRig:
             raise HairloomError(
                 "a frame is of another groom than the bake", place="bake", remedy="Bake again"
             )
-        return pipeline.strands_at(self.rig, self.pose(frame), frame["guides"], led_in(frame))
+        rig, pose = self.styled(frame), self.pose(frame)
+        return pipeline.strands_at(rig, pose, frame["guides"], led_in(frame))
 
 
-def frame_arrays(pose: Pose, guides: Floats, led: LedOut) -> Arrays:
+def frame_arrays(pose: Pose, guides: Floats, led: LedOut, styled: Rig | None = None) -> Arrays:
     """One frame: guides (guide_count, cv_count, 3) world [m], what carries them, and the strands
-    that were led out of colliders: what shows a frame has no colliders."""
+    that were led out of colliders: what shows a frame has no colliders.
+
+    Args:
+        styled: the rig in the style of this frame; None: in its own.
+    """
     arrays: Arrays = {
         "guides": guides,
         "matrix": np.asarray(pose.matrix, np.float64),
@@ -83,6 +102,8 @@ def frame_arrays(pose: Pose, guides: Floats, led: LedOut) -> Arrays:
         arrays["head"] = pose.head_positions
     if pose.anchors is not None:
         arrays["anchors"] = pose.anchors
+    if styled is not None:
+        arrays |= {"style": styled.strands.points, "style_guides": styled.guide_grid}
     return arrays
 
 

@@ -25,14 +25,14 @@ from ..colliders.carriers import is_deforming, is_left_out
 from ..colliders.obstacles import shape_of, sources_of
 from ..colliders.ties import holders_of
 from ..properties.groom_settings import GroomSettings
-from ..scene.curves import COLOR_ATTRIBUTE, GROUP_ATTRIBUTES
+from ..scene.curves import COLOR_ATTRIBUTE, GROUP_ATTRIBUTES, read_curves
 from ..scene.forces import force_fields_of, gravity_of
 from ..scene.partings import parting_state, partings_of
 from ..scene.surfaces import read_positions
 from .simulated import SOLVER_VERSION, Hashed, hashes
 
 #: The parts of a rig hash that determine the rig; the others only matter to a bake.
-RIG_PARTS = ("hair", "head", "guides", "widths", "children", "partings", "ties")
+RIG_PARTS = ("hair", "head", "guides", "widths", "children", "partings", "ties", "style")
 
 
 def groom_rig_hash(
@@ -58,6 +58,11 @@ def groom_rig_hash(
     held = _tie_shapes(hair)
     if held:
         grown["ties"] = held
+    dynamics = settings[DynamicsSettings]
+    if dynamics.animated_style:
+        grown["style"] = ("animated",)
+    if dynamics.simulated_mask:
+        grown["simulated"] = (_weights_before_modifiers(head, dynamics.simulated_mask),)
     return hashes(
         hair=_curves_parts(hair),
         head=() if head is None else mesh_parts(head),
@@ -82,13 +87,23 @@ def groom_frame_hash(
         head: that carries it. pose: where it is, see `poses.read_pose`.
     """
     ties = _tie_places(hair, depsgraph)
+    style = _style(hair, depsgraph)
     return hashes(
         pose=pose.matrix if pose.head_positions is None else pose.head_positions,
         settings=_dynamics(hair),
         colliders=collider_places(hair, head, depsgraph),
         **({"ties": ties} if ties else {}),
+        **({"style": style} if style else {}),
         forces=(gravity_of(depsgraph.scene), force_fields_of(hair, depsgraph)[0].table),
     )
+
+
+def _style(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> tuple[Floats | Ints, ...]:
+    """The curves of the frame, where the style is animated."""
+    if not _dynamics(hair).animated_style:
+        return ()
+    strands = read_curves(hair, depsgraph).strands
+    return strands.points, strands.offsets
 
 
 def settings_part(hair: bpy.types.Object) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import bpy
 
 from ... import pipeline
+from ...dynamics.settings import DynamicsSettings
 from ...groom.children_settings import ChildrenSettings
 from ...groom.settings import GuideSettings
 from ...groom.width_settings import WidthSettings
@@ -41,6 +42,7 @@ def rig_from(
         partings=source.partings,
         head_field=lambda: solid_of(source.head),
         kept=kept,
+        is_animated=settings[DynamicsSettings].animated_style,
     )
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 import bpy
 
 from ...cards.drawing_settings import CardDrawingSettings
+from ...dynamics.settings import DynamicsSettings
 from ...groom.children_settings import ChildrenSettings
 from ...groom.settings import GuideSettings
 from ...groom.width_settings import WidthSettings
@@ -75,12 +76,13 @@ class GroomSettings:
         return self[CardDrawingSettings].shown_as == "cards"
 
     @property
-    def of_rig(self) -> tuple[SettingsMap, str]:
-        """What decides which strands and guides there are."""
+    def of_rig(self) -> tuple[SettingsMap, str, bool]:
+        """What decides which strands and guides there are, and by which points."""
+        is_animated = self[DynamicsSettings].animated_style
         if self[ChildrenSettings].method == "none":
-            return self.sections.only(GuideSettings, WidthSettings), ""
+            return self.sections.only(GuideSettings, WidthSettings), "", is_animated
         kinds = (GuideSettings, WidthSettings, ChildrenSettings)
-        return self.sections.only(*kinds), self.children_density
+        return self.sections.only(*kinds), self.children_density, is_animated
 
     def acts_at_once(self, before: GroomSettings) -> bool:
         """Whether only such settings differ that need nothing to be read or made again."""

@@ -153,6 +153,20 @@ def masks_on(
     return Masks(weights), tuple(warnings)
 
 
+def read_simulated(
+    hair: bpy.types.Object, head: Surface | None, depsgraph: bpy.types.Depsgraph
+) -> tuple[Floats | None, str]:
+    """How much of hair is simulated at each vertex of the head, (vertex_count,); without usable
+    weights the same everywhere, None, with a warning."""
+    surface, name = head_of(hair), hair.hairloom.dynamics.simulated_mask
+    if head is None or surface is None or not name:
+        return None, ""
+    try:
+        return np.minimum(_mask(surface, depsgraph, name), 1.0), ""
+    except HairloomError as error:
+        return None, str(error)
+
+
 def _mask(head: bpy.types.Object, depsgraph: bpy.types.Depsgraph, name: str) -> Floats:
     weights = read_weights(head, depsgraph, name)
     if not np.isfinite(weights).all():

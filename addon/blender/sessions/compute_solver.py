@@ -80,6 +80,7 @@ class ComputeSolver:
         gravity: Floats,
         duration: float,
         force_fields: ForceFields = NO_FIELDS,
+        simulated: Floats | None = None,
     ) -> None:
         if self._is_baked:
             self._take(self.motion)
@@ -87,14 +88,14 @@ class ComputeSolver:
             self._draw()  # what was not shown counts too: motion does not depend on who looks
             self._since = duration
         motion = self._motion = pipeline.with_clearance(
-            self._rig, self._motion, colliders, settings
+            self._rig, self._motion, colliders, settings, simulated
         )
         self._ride.leading.take(motion.clearance)
         if self._dynamics is None:
             self._dynamics = DynamicsPass(motion.dynamics, self._colliders)
         rig = self._rig
         target, held = pipeline.style_of_guides(rig, pose), pipeline.held_cvs(rig, pose)
-        drive = motion.drive(target, colliders, gravity, duration, force_fields, held)
+        drive = motion.drive(target, colliders, gravity, duration, force_fields, held, simulated)
         self._dynamics.advance(drive, settings, duration)
         self._motion = replace(
             motion,
@@ -105,6 +106,14 @@ class ComputeSolver:
             colliders=colliders,
         )
         self._is_resting = self._is_drawn = False
+
+    def take_style(self, rig: Rig) -> None:
+        if self._motion.clearance is not None and not self._is_resting:
+            self._draw()  # the frame before, by its style
+        self._rig, self._motion = rig, pipeline.with_style(rig, self._motion)
+        self._ride.take_style(rig.strands, rig.guide_grid, rig.riders)
+        if self._dynamics is not None:
+            self._dynamics.take_rest(self._motion.dynamics.rest)
 
     def has_jumped(self, pose: Pose, settings: DynamicsSettings, duration: float) -> bool:
         return pipeline.has_jumped(self._rig, self._motion, pose, settings, duration)

@@ -5,12 +5,13 @@ It holds numbers and arrays, never a reference into Blender's data.
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import bpy
 import numpy as np
 
 from ...arrays import Floats, Ints
+from ...dynamics.settings import DynamicsSettings
 from ...pipeline import Pose, Rig
 from ...shading.ambient_settings import AmbientSettings
 from ...strands import StrandSet
@@ -18,14 +19,22 @@ from ...strands.affine import moved
 from ...strands.clean import Cleaned
 from ...strands.colors import color_notes
 from ...strands.kept import Kept
+from ...style_flow import at_rest, styled
 from ..bakes.baked_rig import BakedRig, RestMatrices
 from ..bakes.groom_hashes import groom_frame_hash, groom_rig_hash
 from ..base.objects import Body, head_of, matrix_of
 from ..colliders.ties import Holding
 from ..properties.groom_settings import GroomSettings
+from ..scene.curves import read_curves
 from ..scene.partings import is_same_state, parting_state, read_partings
 from ..scene.poses import check_finite, read_pose
-from ..scene.source import read_density, read_masks, read_source, usable_curves
+from ..scene.source import (
+    read_density,
+    read_masks,
+    read_simulated,
+    read_source,
+    usable_curves,
+)
 from .prepared_groom import BuildRequest, rig_of
 
 #: Points that lie nearer than this to where they were have not moved, as a part of how far they are
@@ -60,6 +69,9 @@ class GroomSource:
         self._parting_state = parting_state(hair)
         self.settings = GroomSettings.of(hair, depsgraph)
         self._kept = Kept()
+        self._read_simulated(depsgraph)
+        self._style_warning = ""
+        self._styled: _Styled | None = None
         self.request = BuildRequest(
             self.name, self.source, self.settings, holding=self._holding, kept=self._kept
         )
@@ -77,7 +89,8 @@ class GroomSource:
     @property
     def warnings(self) -> tuple[str, ...]:
         """What the artist should know about what was read, and about what holds the hair now."""
-        return (*self.source.warnings, *self._holding.warnings)
+        own = filter(None, (self._simulated_warning, self._style_warning))
+        return (*self.source.warnings, *self._holding.warnings, *own)
 
     @property
     def holder_uids(self) -> frozenset[int]:
@@ -139,9 +152,14 @@ class GroomSource:
         """
         hair, known = self.hair.found(), self.request
         before = known.source
+        settings = GroomSettings.of(hair)
         read, strands, back = self._read_curves(hair, depsgraph)
+        is_animated = settings[DynamicsSettings].animated_style
+        if is_animated and np.array_equal(strands.offsets, before.strands.offsets):
+            strands = strands.with_points(before.strands.points)  # each frame has its own
         if _same(strands, before.strands, back):
             strands = before.strands
+        self._read_simulated(depsgraph)
         density, warning = read_density(hair, before.head, depsgraph)
         masks, mask_warnings = read_masks(hair, before.head, depsgraph)
         holding = Holding.of(hair, depsgraph, known.holding, back)
@@ -164,7 +182,6 @@ class GroomSource:
             partings=partings,
             parting_warnings=parting_warnings,
         )
-        settings = GroomSettings.of(hair)
         request = BuildRequest(self.name, source, settings, holding=holding, kept=self._kept)
         if (
             request.gives_rig_of(known)
@@ -247,6 +264,40 @@ class GroomSource:
             return pose
         return replace(pose, anchors=self._holding.anchors(self.hair.found(), rig.holds, depsgraph))
 
+    def styled(self, rig: Rig, depsgraph: bpy.types.Depsgraph) -> Rig:
+        """The rig with the curves as they are in this frame; with those of the last frame that
+        fitted, and a warning, where there are others now.
+
+        Raises:
+            HairloomError: the hair is gone.
+        """
+        hair, known = self.hair.found(), self._styled
+        if known is None or known.base is not rig:
+            known = _Styled(rig, self.source.strands, rig)
+        curves = read_curves(hair, depsgraph).strands
+        self._style_warning = _misfit(hair.name, curves, known.curves, depsgraph)
+        if not self._style_warning:
+            back = self.hair.rest @ np.linalg.pinv(matrix_of(hair, depsgraph))
+            curves = at_rest(rig, curves, self.pose(rig, depsgraph), back)
+            if not _same_places(curves, known.curves, back):
+                known = _Styled(rig, curves, styled(rig, curves))
+        self._styled = known
+        return known.rig
+
+    def simulated(self, rig: Rig) -> Floats | None:
+        """How much of each guide is simulated, (guide_count,); None: all of all."""
+        factor, strands = self.settings[DynamicsSettings].simulated, rig.strands
+        if self._simulated is None or rig.head is None or strands.root_triangle is None:
+            return None if factor == 1.0 else np.full(len(rig.guides), factor, np.float32)
+        assert strands.root_barycentric is not None
+        corners = self._simulated[rig.head.triangles[strands.root_triangle[rig.guides]]]
+        painted = (corners * strands.root_barycentric[rig.guides]).sum(axis=1)
+        return np.clip(painted * factor, 0.0, 1.0).astype(np.float32)
+
+    def _read_simulated(self, depsgraph: bpy.types.Depsgraph) -> None:
+        found = read_simulated(self.hair.found(), self.source.head, depsgraph)
+        self._simulated, self._simulated_warning = found
+
     def rig_hash(self, depsgraph: bpy.types.Depsgraph) -> str:
         """See `simulated.Simulated`."""
         hair = self.hair.found()
@@ -260,16 +311,48 @@ class GroomSource:
         return groom_frame_hash(hair, head, pose, depsgraph)
 
 
+def _misfit(name: str, now: StrandSet, known: StrandSet, depsgraph: bpy.types.Depsgraph) -> str:
+    """What is said where the curves of a frame are not those that the hair was made from."""
+    if np.array_equal(now.offsets, known.offsets):
+        return ""
+    counts = (
+        f"{now.strand_count:,} usable curves with {now.point_count:,} points, not"
+        f" {known.strand_count:,} with {known.point_count:,}"
+    )
+    return (
+        f"{name}: in frame {depsgraph.scene.frame_current} it has {counts}, so its style stays that"
+        " of the last frame that fits. Let modifiers and caches keep the number of curves and"
+        " points, or turn Animated Style off"
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Styled:
+    """A rig by the style of a frame.
+
+    base: the rig that it comes from. curves: the artist's own, at rest, that it was made by.
+    """
+
+    base: Rig
+    curves: StrandSet
+    rig: Rig
+
+
 def _same(one: StrandSet, other: StrandSet, back: Floats) -> bool:
     """Whether two readings give the same hair, but for rounding on the way `back` to rest."""
-    farthest = max(np.abs(one.points).max(initial=0.0), np.abs(back[:3, 3]).max())
     return (
         np.array_equal(one.offsets, other.offsets)
-        and np.allclose(one.points, other.points, rtol=0.0, atol=_ROUNDING * farthest)
+        and _same_places(one, other, back)
         and np.allclose(one.radius, other.radius, rtol=1e-5)
         and np.array_equal(one.group, other.group)
         and _same_colors(one.color, other.color)
     )
+
+
+def _same_places(one: StrandSet, other: StrandSet, back: Floats) -> bool:
+    """Whether the points of two readings are the same, but for rounding on the way `back`."""
+    farthest = max(np.abs(one.points).max(initial=0.0), np.abs(back[:3, 3]).max())
+    return np.allclose(one.points, other.points, rtol=0.0, atol=_ROUNDING * farthest)
 
 
 def _same_colors(one: Floats | None, other: Floats | None) -> bool:

@@ -58,6 +58,7 @@ class NumpySolver:
         gravity: Floats,
         duration: float,
         force_fields: ForceFields = NO_FIELDS,
+        simulated: Floats | None = None,
     ) -> None:
         # what was not shown counts too: motion does not depend on who looks
         led = NOT_LED if self._motion.clearance is None else self.led()
@@ -72,8 +73,14 @@ class NumpySolver:
                 duration,
                 force_fields,
                 led,
+                simulated,
             )
         )
+
+    def take_style(self, rig: Rig) -> None:
+        if self._motion.clearance is not None:
+            self.led()  # of the frame before, by its style
+        self._rig, self._motion = rig, pipeline.with_style(rig, self._motion)
 
     def has_jumped(self, pose: Pose, settings: DynamicsSettings, duration: float) -> bool:
         return pipeline.has_jumped(self._rig, self._motion, pose, settings, duration)

@@ -88,6 +88,7 @@ class Session:
         self._begun: tuple[Pose, tuple[PosedCollider, ...]] | None = None
         self._posed: tuple[PosedCollider, ...] = ()
         self._field_notes: tuple[str, ...] = ()
+        self._styled: Rig | None = None
         self.figures: Figures | None = None
         self.are_figures_current = False
         self.picture = GroomPicture(
@@ -117,7 +118,8 @@ class Session:
 
     @property
     def rig(self) -> Rig:
-        return self.groom.rig
+        """The groom in the style of the frame that is shown."""
+        return self._styled or self.groom.rig
 
     @property
     def is_made(self) -> bool:
@@ -162,7 +164,7 @@ class Session:
 
     def constants(self) -> Arrays:
         """See `baked_rig.rig_arrays`."""
-        return rig_arrays(self.rig, self._source.rests)
+        return rig_arrays(self.groom.rig, self._source.rests)
 
     def rig_hash(self, depsgraph: bpy.types.Depsgraph) -> str:
         """See `simulated.Simulated`."""
@@ -228,6 +230,8 @@ class Session:
             # strands are others now, and guides go on
             motion = replace(self.solver.motion, clearance=None) if goes_on else None
             self.solver = solver_of(groom.rig, self.settings[DynamicsSettings].device, motion)
+            self._styled = None
+            self._take_style(depsgraph)
         self.picture.take_groom(groom, self.settings)
         self.light(depsgraph)
         if is_same or goes_on:
@@ -290,10 +294,13 @@ class Session:
         """
         if self.is_playing or not self.is_made:
             return
+        if self.settings[DynamicsSettings].animated_style:
+            self.rest(depsgraph)  # which reads the curves as they are
+            return
         moved = self._source.moved_curves(depsgraph)
         if moved is None:
             return
-        self.groom = replace(self.groom, rig=combed(self.rig, *moved))
+        self.groom = replace(self.groom, rig=combed(self.groom.rig, *moved))
         self.solver = NumpySolver.at_rest(self.rig, self._pose(depsgraph))
         self._show()
 
@@ -305,6 +312,8 @@ class Session:
             HairloomError: as `rest`.
         """
         if self.is_playing or self.rig.grown is None or self.rig.holds is not None:
+            return
+        if self.settings[DynamicsSettings].animated_style:
             return
         if not self._source.has_other_paint(depsgraph):
             return
@@ -361,6 +370,7 @@ class Session:
         Raises:
             HairloomError: the hair or its head is gone, or the head's mesh is another one.
         """
+        self._take_style(depsgraph)
         self.solver.rest(self._pose(depsgraph))
         self._begun, self.figures = None, None
         _, self._field_notes = force_fields_of(self.hair.found(), depsgraph)
@@ -371,6 +381,19 @@ class Session:
             for _ in range(self.settings[DynamicsSettings].pre_roll):
                 self._simulate(depsgraph, 1.0 / rate)
         self._show()
+
+    def _take_style(self, depsgraph: bpy.types.Depsgraph) -> None:
+        """Go by the curves as they are in this frame, where the style is animated."""
+        rig = self.groom.rig
+        if self.settings[DynamicsSettings].animated_style and self.is_made:
+            rig = self._source.styled(rig, depsgraph)
+        self._go_by(rig)
+
+    def _go_by(self, rig: Rig) -> None:
+        """Let the solver go by this style of the groom."""
+        if rig is not self.rig:
+            self.solver.take_style(rig)
+        self._styled = None if rig is self.groom.rig else rig
 
     def has_moved(self, depsgraph: bpy.types.Depsgraph) -> bool:
         """Whether the body is elsewhere than in what is shown.
@@ -438,6 +461,7 @@ class Session:
             HairloomError: as `rest`.
         """
         with self.times.measured("simulation"):
+            self._take_style(depsgraph)
             scale = self.settings[DynamicsSettings].time_scale
             if scale:
                 self._simulate(depsgraph, duration * scale)
@@ -453,9 +477,8 @@ class Session:
             return
         self._posed = () if self.obstacles is None else self.obstacles.move(depsgraph, duration)
         fields, self._field_notes = force_fields_of(self.hair.found(), depsgraph)
-        self.solver.advance(
-            pose, self._posed, settings, gravity_of(depsgraph.scene), duration, fields
-        )
+        gravity, simulated = gravity_of(depsgraph.scene), self._source.simulated(self.rig)
+        self.solver.advance(pose, self._posed, settings, gravity, duration, fields, simulated)
 
     def _go_along(self, depsgraph: bpy.types.Depsgraph, pose: Pose, duration: float) -> None:
         """A frame in which hair goes with its head as it is; see `pipeline.go_along`."""
@@ -490,7 +513,9 @@ class Session:
 
     def recorded(self) -> Arrays:
         """See `baked_rig.frame_arrays`."""
-        return frame_arrays(self.solver.pose, self.solver.guides(), self.solver.led())
+        guides, led = self.solver.guides(), self.solver.led()
+        styled = self.rig if self.settings[DynamicsSettings].animated_style else None
+        return frame_arrays(self.solver.pose, guides, led, styled)
 
     def show_recorded(self, frame: Arrays) -> None:
         """Hair as it was recorded, on the head as that was.
@@ -498,13 +523,14 @@ class Session:
         Raises:
             HairloomError: the frame is of another groom.
         """
-        baked = BakedRig(self.rig, self._source.rests)
+        baked = BakedRig(self.groom.rig, self._source.rests)
         if not baked.fits(frame):
             raise HairloomError(
                 "its bake is of another groom, or of other guides",
                 place=self.name,
                 remedy="Bake again, or delete the bake",
             )
+        self._go_by(baked.styled(frame))
         self.solver.carry(baked.pose(frame), frame["guides"], led_in(frame))
         self._show()
 

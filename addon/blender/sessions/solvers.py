@@ -60,8 +60,13 @@ class Solver(Protocol):
         gravity: Floats,
         duration: float,
         force_fields: ForceFields = NO_FIELDS,
+        simulated: Floats | None = None,
     ) -> None:
         """One frame of motion, as pipeline.advance."""
+
+    def take_style(self, rig: Rig) -> None:
+        """Go by this rig in the next frame: the same groom with curves of other shapes, see
+        `pipeline.with_style`."""
 
     def has_jumped(self, pose: Pose, settings: DynamicsSettings, duration: float) -> bool:
         """Whether the head is elsewhere all of a sudden, see `pipeline.has_jumped`."""

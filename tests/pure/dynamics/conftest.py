@@ -132,6 +132,8 @@ def random_settings(random: np.random.Generator, **fixed: Any) -> DynamicsSettin
             values[parameter.name] = bool(random.integers(2))
         elif parameter.kind == "choice":
             values[parameter.name] = random.choice([name for name, _, _ in parameter.choices])
+        elif parameter.kind == "mask":
+            continue
         else:
             low, high = parameter.hard_range
 

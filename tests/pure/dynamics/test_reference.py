@@ -18,7 +18,7 @@ from hairloom.addon.dynamics.measure import deepest_penetration
 from hairloom.addon.dynamics.reference.step import advance_slowly
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.dynamics.state import start
-from hairloom.addon.dynamics.step import advance
+from hairloom.addon.dynamics.step import Drive, advance
 
 #: [m] in 0.4 s of float32 against float64: limp strands enlarge what rounding starts about
 #: seventyfold (the slow form does it too, started one rounding apart), contacts more.
@@ -93,6 +93,25 @@ def test_held_cvs(kit, shake, solver):
     np.testing.assert_allclose(fast[-1].grid[held], expected, atol=1e-4)
     for one, other in zip(fast, slow, strict=True):
         np.testing.assert_allclose(one.position, other.position, atol=FREE)
+
+
+def test_another_style_in_mid_play(kit, shake):
+    """Longer and of another shape, as if nodes had moved the curves of the style."""
+    first = kit.curly(6, 10)
+    second = first * np.linspace(1.0, 1.3, 10)[:, None] + [0.0, 0.01, 0.0]
+    settings, found = DynamicsSettings(**TIGHT), []
+    for form in (advance, advance_slowly):
+        state, before = start(first), first
+        for frame in range(1, 11):
+            style = first if frame < 4 else second
+            state = replace(state, rest=start(style).rest)
+            now = kit.moved(shake(frame / 50.0), style)
+            state = form(state, Drive(before, now, (), kit.EARTH), settings, 1.0 / 50.0)
+            before = now
+        found.append(state.grid)
+    np.testing.assert_allclose(*found, atol=FREE)
+    length = np.linalg.norm(np.diff(found[0], axis=1), axis=2)
+    np.testing.assert_allclose(length, np.linalg.norm(np.diff(second, axis=1), axis=2), rtol=0.003)
 
 
 @pytest.mark.parametrize("held", few_in_commits([True, False]))

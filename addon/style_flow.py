@@ -1,0 +1,80 @@
+"""The flow of an animated style: curves that shape keys, modifiers, nodes or a cache move are the
+style of each frame.
+
+A rig is at rest, so what a frame shows is brought back there: children, guides and weights, roots
+on the head and occlusion stay those of the rig, and everything that moves it goes on as it is. The
+curves may have been moved by the object alone, so that their roots are where they were at rest, or
+go with their surface already, as Blender's own hair nodes have them do: what brings their roots
+nearer to those of the rig is what has happened.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from .arrays import Floats
+from .comb_flow import combed
+from .pipeline import Pose, Rig, motions_of
+from .refine.ride import ride
+from .strands import StrandSet
+from .strands.needed_points import with_points
+from .strands.root_motions import RootMotions
+
+
+def at_rest(rig: Rig, curves: StrandSet, pose: Pose, back: Floats) -> StrandSet:
+    """The artist's own curves of this moment, brought back to where the rig is.
+
+    Args:
+        curves: all of them, world space now.
+        pose: where the body is now.
+        back: (4, 4) from where the hair's object is now to where it was at rest.
+    """
+    is_there = np.allclose(back, np.eye(4))
+    by_object = curves if is_there else curves.transformed(back)
+    if rig.head is None:
+        return by_object
+    by_surface = carried_back(curves, motions_of(rig, pose, slice(curves.strand_count)))
+    return min(by_object, by_surface, key=lambda strands: _away(rig, strands))
+
+
+def styled(rig: Rig, curves: StrandSet) -> Rig:
+    """The rig with another style.
+
+    Args:
+        curves: all of the artist's own, at rest.
+    """
+    own = curves.strand_count
+    counts = rig.strands.point_counts[:own]
+    curves = with_points(curves, counts, curves.point_counts > counts)
+    now = combed(rig, curves, np.arange(own))
+    return now if rig.grown is not None else _with_children_riding(rig, now)
+
+
+def _with_children_riding(rig: Rig, now: Rig) -> Rig:
+    """The rig of this moment with children of which nobody knows how they have grown, as in a bake:
+    they ride on their guides."""
+    if not rig.child_count:
+        return now
+    first = rig.strands.offsets[rig.own_count]
+    still = RootMotions.of_matrix(np.eye(4))
+    ridden = ride(rig.strands.points, rig.riders, rig.guide_grid, now.guide_grid, still)
+    points = np.concatenate([now.strands.points[:first], ridden[first:]])
+    return replace(now, strands=now.strands.with_points(points))
+
+
+def carried_back(strands: StrandSet, motions: RootMotions) -> StrandSet:
+    """Strands that go with their roots, where they were at rest; undoes `groom.roots.follow`."""
+    strand = np.repeat(np.arange(strands.strand_count), strands.point_counts)
+    turn = motions.turn.transpose(2, 0, 1).astype(np.float64) + np.eye(3)
+    shift, origin = (each.T.astype(np.float64) for each in (motions.shift, motions.origin))
+    turned = strands.points - (shift + origin)[strand]
+    local = np.einsum("nij,nj->ni", np.linalg.inv(turn)[strand], turned)
+    return replace(strands, points=(local + origin[strand]).astype(np.float32))
+
+
+def _away(rig: Rig, strands: StrandSet) -> float:
+    """How far roots are from those of the rig, on average [m]."""
+    own = rig.strands.roots[: strands.strand_count]
+    return float(np.linalg.norm(strands.roots - own, axis=1).mean())

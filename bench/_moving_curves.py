@@ -1,0 +1,90 @@
+"""Hair curves that geometry nodes move by themselves."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+import numpy as np
+
+#: how far tips go to the side, and how much longer strands get, in a frame [m]
+SIDE, LONGER = 0.004, 0.002
+
+
+def move_by_nodes(hair: Any) -> Any:
+    """A modifier by which tips go to +X and up, ever farther with the frames; the curves at frame 1
+    stay as they are."""
+    group = bpy.data.node_groups.new("Moving", "GeometryNodeTree")
+    for name, way in (("Geometry", "INPUT"), ("Geometry", "OUTPUT")):
+        group.interface.new_socket(name, in_out=way, socket_type="NodeSocketGeometry")
+    new, link = group.nodes.new, group.links.new
+    ends = new("NodeGroupInput"), new("NodeGroupOutput")
+    place, time, along = (
+        new("GeometryNodeSetPosition"),
+        new("GeometryNodeInputSceneTime"),
+        new("GeometryNodeSplineParameter"),
+    )
+    since, by_along, square = (new("ShaderNodeMath") for _ in range(3))
+    since.operation, by_along.operation, square.operation = "SUBTRACT", "MULTIPLY", "MULTIPLY"
+    since.inputs[1].default_value = 1.0
+    link(time.outputs["Frame"], since.inputs[0])
+    link(along.outputs["Factor"], square.inputs[0])
+    link(along.outputs["Factor"], square.inputs[1])
+    link(since.outputs[0], by_along.inputs[0])
+    link(square.outputs[0], by_along.inputs[1])
+    offset = new("ShaderNodeVectorMath")
+    offset.operation = "SCALE"
+    offset.inputs[0].default_value = (SIDE, 0.0, LONGER)
+    link(by_along.outputs[0], offset.inputs["Scale"])
+    link(offset.outputs[0], place.inputs["Offset"])
+    link(ends[0].outputs[0], place.inputs["Geometry"])
+    link(place.outputs["Geometry"], ends[1].inputs[0])
+    modifier = hair.modifiers.new("Moving", "NODES")
+    modifier.node_group = group
+    return modifier
+
+
+def apart(points: Any, offsets: Any, curves: Any) -> float:
+    """How far strands are from curves, as lines, either way [m]."""
+    farthest = 0.0
+    for number in range(len(offsets) - 1):
+        strand = points[offsets[number] : offsets[number + 1]].astype(np.float64)
+        own = curves.offsets[number : number + 2]
+        curve = curves.points[own[0] : own[1]].astype(np.float64)
+        farthest = max(farthest, _away(strand, curve), _away(curve, strand))
+    return farthest
+
+
+def _away(points: Any, line: Any) -> float:
+    """Of the point that is farthest from a line of straight pieces."""
+    begin, way = line[:-1], np.diff(line, axis=0)
+    beside = points[:, None] - begin
+    part = (beside * way).sum(axis=2) / np.maximum((way * way).sum(axis=1), 1e-30)
+    nearest = np.linalg.norm(beside - np.clip(part, 0.0, 1.0)[..., None] * way, axis=2)
+    return float(nearest.min(axis=1).max())
+
+
+def lose_curves(hair: Any, frame: int) -> None:
+    """A modifier that takes three curves away from this frame on."""
+    group = bpy.data.node_groups.new("Losing", "GeometryNodeTree")
+    for name, way in (("Geometry", "INPUT"), ("Geometry", "OUTPUT")):
+        group.interface.new_socket(name, in_out=way, socket_type="NodeSocketGeometry")
+    new, link = group.nodes.new, group.links.new
+    ends = new("NodeGroupInput"), new("NodeGroupOutput")
+    gone, time, index = (
+        new("GeometryNodeDeleteGeometry"),
+        new("GeometryNodeInputSceneTime"),
+        new("GeometryNodeInputIndex"),
+    )
+    gone.domain = "CURVE"
+    is_due, is_first, both = new("ShaderNodeMath"), new("ShaderNodeMath"), new("ShaderNodeMath")
+    is_due.operation, is_first.operation, both.operation = "GREATER_THAN", "LESS_THAN", "MULTIPLY"
+    is_due.inputs[1].default_value, is_first.inputs[1].default_value = frame - 0.5, 2.5
+    link(time.outputs["Frame"], is_due.inputs[0])
+    link(index.outputs[0], is_first.inputs[0])
+    link(is_due.outputs[0], both.inputs[0])
+    link(is_first.outputs[0], both.inputs[1])
+    link(both.outputs[0], gone.inputs["Selection"])
+    link(ends[0].outputs[0], gone.inputs["Geometry"])
+    link(gone.outputs[0], ends[1].inputs[0])
+    hair.modifiers.new("Losing", "NODES").node_group = group

@@ -1,0 +1,148 @@
+"""Curves that nodes move are the style of each frame: exactly where nothing is simulated."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+import pytest
+
+from hairloom.addon.blender.bakes.cache import Cache
+from hairloom.addon.blender.bakes.playback import rig_in
+from hairloom.addon.blender.preview import previews
+from hairloom.addon.blender.preview.bake import Bake
+from hairloom.addon.blender.scene.curves import read_curves
+from hairloom.addon.strands.strand_set import StrandSet
+
+sys.path.append(str(Path(__file__).parents[2] / "bench"))
+from _moving_curves import apart, lose_curves, move_by_nodes
+
+pytestmark = pytest.mark.draws
+LAST = 8
+
+
+@pytest.fixture(params=["numpy", "compute"])
+def moving(request: Any, gpu_context: Any, new_hair: Any, sphere: Any, tmp_path: Any) -> Any:
+    """Hair on a head that turns, which nodes move, its style animated."""
+    scene = bpy.context.scene
+    scene.frame_start, scene.frame_end = 1, LAST
+    hair = new_hair(sphere)
+    move_by_nodes(hair)
+    for frame, turn in ((1, 0.0), (LAST, 1.0)):
+        sphere.rotation_euler.x = turn
+        sphere.keyframe_insert("rotation_euler", frame=frame)
+    dynamics = hair.hairloom.dynamics
+    dynamics.device, dynamics.animated_style = request.param, True
+    hair.hairloom.bake.folder = str(tmp_path / "bake")
+    scene.frame_set(1)
+    return hair
+
+
+def session_at_start(hair: Any, evaluated: Any) -> Any:
+    session = previews.start(hair, evaluated())
+    assert session.solver.form == hair.hairloom.dynamics.device
+    hair.hairloom.bake.follows = True
+    bpy.context.scene.frame_set(1)
+    return session
+
+
+def seen(hair: Any, evaluated: Any) -> StrandSet:
+    """As Blender itself shows the curves."""
+    return read_curves(hair, evaluated()).strands
+
+
+def test_at_0_hair_is_where_blender_shows_its_curves(moving: Any, evaluated: Any) -> None:
+    moving.hairloom.dynamics.simulated = 0.0
+    session = session_at_start(moving, evaluated)
+    first = seen(moving, evaluated).points
+    for frame in range(1, LAST + 1):
+        bpy.context.scene.frame_set(frame)
+        now = seen(moving, evaluated)
+        assert apart(session.strands, session.rig.strands.offsets, now) < 2e-6, frame
+    assert np.abs(now.points - first).max() > 0.05
+
+
+def test_at_1_hair_lags_behind_its_style_and_has_the_lengths_of_that(
+    moving: Any, evaluated: Any
+) -> None:
+    session = session_at_start(moving, evaluated)
+    for frame in range(1, LAST + 1):
+        bpy.context.scene.frame_set(frame)
+    now, rig = seen(moving, evaluated), session.rig
+    assert 0.005 < apart(session.strands, rig.strands.offsets, now) < 0.1
+    lengths = rig.strands.with_points(session.strands).lengths()
+    np.testing.assert_allclose(lengths, now.lengths(), rtol=0.01)
+    assert np.ptp(now.lengths()) > 0.01, "some strands have become longer"
+
+
+def test_what_is_painted_0_goes_with_the_style_and_the_rest_is_simulated(
+    moving: Any, evaluated: Any
+) -> None:
+    head = moving.data.surface
+    group = head.vertex_groups.new(name="Loose")
+    upper = [vertex.index for vertex in head.data.vertices if vertex.co.z > -0.02]
+    group.add(upper, 1.0, "REPLACE")
+    moving.hairloom.dynamics.simulated_mask = "Loose"
+    session = session_at_start(moving, evaluated)
+    is_upper = session.rig.strands.roots[session.rig.guides, 2]
+    for frame in range(1, LAST + 1):
+        bpy.context.scene.frame_set(frame)
+    rig, now = session.rig, seen(moving, evaluated)
+    lines = now.take(rig.guides)
+    away = [
+        apart(guide, np.array([0, len(guide)]), lines.take(np.array([number])))
+        for number, guide in enumerate(session.solver.guides())
+    ]
+    lower, upper = np.array(away)[is_upper < -0.06], np.array(away)[is_upper > 0.02]
+    assert lower.max() < 2e-3 and upper.min() > 5e-3  # CVs lie on straight pieces between points
+
+
+def test_a_bake_has_the_style_of_each_frame(moving: Any, evaluated: Any) -> None:
+    moving.hairloom.dynamics.simulated = 0.3
+    session = session_at_start(moving, evaluated)
+    played = []
+    for frame in range(1, LAST + 1):
+        bpy.context.scene.frame_set(frame)
+        played.append(session.strands.copy())
+    for _ in Bake.of([moving], bpy.context.scene).steps():
+        pass
+    cache = Cache(Path(moving.hairloom.bake.folder))
+    for frame, strands in enumerate(played, 1):
+        np.testing.assert_allclose(rig_in(cache).strands(cache.frame(frame)), strands, atol=2e-6)
+    bpy.context.scene.frame_set(5)
+    np.testing.assert_allclose(session.strands, played[4], atol=2e-6)
+    previews.stop(session)
+    fresh = previews.start(moving, evaluated())
+    assert fresh.rig.strands.point_count == len(played[4])
+    np.testing.assert_allclose(fresh.strands, played[4], atol=2e-6)
+
+
+def test_curves_that_are_lost_in_mid_play_leave_the_last_style_that_fits(
+    moving: Any, evaluated: Any
+) -> None:
+    lose_curves(moving, 5)
+    session = session_at_start(moving, evaluated)
+    for frame in range(1, 5):
+        bpy.context.scene.frame_set(frame)
+    assert not any("Animated Style" in each for each in session.warnings)
+    style, before = session.rig, session.strands.copy()
+    bpy.context.scene.frame_set(5)
+    assert session.rig is style and session.is_playing
+    assert 0.0 < np.abs(session.strands - before).max() < 0.05, "it goes on"
+    (warning,) = (each for each in session.warnings if "Animated Style" in each)
+    assert "frame 5" in warning and "57 usable curves" in warning and "not 60" in warning
+
+
+def test_both_forms_agree_halfway(moving: Any, evaluated: Any) -> None:
+    moving.hairloom.dynamics.simulated = 0.5
+    session, found = session_at_start(moving, evaluated), []
+    for form in ("numpy", "compute"):
+        moving.hairloom.dynamics.device = form
+        for frame in range(1, LAST + 1):
+            bpy.context.scene.frame_set(frame)
+        assert session.solver.form == form
+        found.append(session.strands.copy())
+    np.testing.assert_allclose(*found, atol=2e-4)
