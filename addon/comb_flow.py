@@ -21,16 +21,19 @@ from .strands.needed_points import with_points
 from .strands.resample import resample
 
 
-def combed(rig: Rig, curves: StrandSet, number: Ints) -> Rig:
+def combed(rig: Rig, curves: StrandSet, number: Ints, *, is_animated: bool = False) -> Rig:
     """The rig with some of the artist's curves elsewhere.
 
     Args:
         curves: (n,) world space at rest, as they are now.
         number: (n,) ascending, which of the rig's own strands these are.
+        is_animated: whether strands have kept their own points, see `pipeline.prepare`.
     """
     strands, cv_count = rig.strands, rig.guide_grid.shape[1]
     points = strands.points.copy()
-    _put(points, strands.offsets, number, curves)
+    counts, before = strands.point_counts[number], curves.point_counts
+    is_even = before > counts if is_animated else before != counts
+    _put(points, strands.offsets, number, with_points(curves, counts, is_even))
     guide_grid = rig.guide_grid.copy()
     guides = np.flatnonzero(np.isin(rig.guides, number))
     if len(guides):
@@ -70,6 +73,8 @@ def put_children(points: Floats, offsets: Ints, grown: Grown, chosen: Ints, own:
         own: how many strands come before them.
     """
     children = _strands(grown.growth.shapes(grown.shapes.grid, grown.kept[chosen]))
+    counts = (offsets[1:] - offsets[:-1])[own + chosen]
+    children = with_points(children, counts, children.point_counts != counts)
     _put(points, offsets, own + chosen, children)
 
 
@@ -81,9 +86,6 @@ def _strands(grid: Floats) -> StrandSet:
 
 
 def _put(points: Floats, offsets: Ints, number: Ints, strands: StrandSet) -> None:
-    """Write strands in place of those of these numbers, by as many points as those have."""
-    counts = (offsets[1:] - offsets[:-1])[number]
-    if not np.array_equal(counts, strands.point_counts):
-        strands = with_points(strands, counts, strands.point_counts != counts)
-    first = np.repeat(offsets[number] - strands.offsets[:-1], counts)
+    """Write strands in place of those of these numbers, which have as many points."""
+    first = np.repeat(offsets[number] - strands.offsets[:-1], strands.point_counts)
     points[first + np.arange(len(strands.points))] = strands.points

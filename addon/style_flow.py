@@ -19,7 +19,6 @@ from .comb_flow import combed
 from .pipeline import Pose, Rig, motions_of
 from .refine.ride import ride
 from .strands import StrandSet
-from .strands.needed_points import with_points
 from .strands.root_motions import RootMotions
 
 
@@ -45,10 +44,7 @@ def styled(rig: Rig, curves: StrandSet) -> Rig:
     Args:
         curves: all of the artist's own, at rest.
     """
-    own = curves.strand_count
-    counts = rig.strands.point_counts[:own]
-    curves = with_points(curves, counts, curves.point_counts > counts)
-    now = combed(rig, curves, np.arange(own))
+    now = combed(rig, curves, np.arange(curves.strand_count), is_animated=True)
     return now if rig.grown is not None else _with_children_riding(rig, now)
 
 

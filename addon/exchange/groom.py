@@ -35,6 +35,7 @@ class Groom:
     bones: that carry the strands; they go into a .tfxbone file beside .tfx.
     dropped: by a reader: reason -> number of strands left out.
     source: by a reader: the file.
+    motion: by a reader: where the points are at other times.
 
     Raises:
         HairloomError: shapes that do not fit the strands, or closest guides without IDs.
@@ -50,6 +51,7 @@ class Groom:
     bones: BoneWeights | None = None
     dropped: Mapping[str, int] = field(default_factory=lambda: MappingProxyType({}))
     source: Path | None = None
+    motion: ReadMotion | None = None
 
     def __post_init__(self) -> None:
         strands = self.strands.strand_count
@@ -69,6 +71,8 @@ class Groom:
             object.__setattr__(self, name, value)
         if self.bones is not None and self.bones.strand_count != strands:
             raise _broken(f"bones of {self.bones.strand_count} strands instead of {strands}")
+        if self.motion is not None and self.motion.positions.shape[1] != len(self.strands.points):
+            raise _broken(f"a motion of {self.motion.positions.shape[1]} points")
         if (self.closest_guides is None) != (self.guide_weights is None):
             raise _broken("closest_guides and guide_weights come together or not at all")
         if self.closest_guides is not None and self.strand_id is None:
@@ -88,6 +92,9 @@ class Groom:
                 changes[name] = value[strands]
         if self.bones is not None:
             changes["bones"] = self.bones.take(strands)
+        if self.motion is not None:
+            positions = self.motion.positions[:, points_of(self.strands, strands)]
+            changes["motion"] = replace(self.motion, positions=positions)
         return replace(self, **changes)
 
     def guides(self) -> Groom:
@@ -103,6 +110,42 @@ class Groom:
         if self.is_guide is None:
             return np.zeros(self.strands.strand_count, bool)
         return self.is_guide
+
+
+#: No motion of a file has more frames: nearly seven minutes at 24 frames a second.
+MAX_FRAMES = 10_000
+
+
+@dataclass(frozen=True, eq=False)
+class ReadMotion:
+    """The points of a file at the times that it has.
+
+    times: (n,) [s], ascending. positions: (n, point_count, 3) float32 [m], all finite.
+    """
+
+    times: Floats
+    positions: Floats
+
+    def at_frames(self, rate: float) -> tuple[int, Floats]:
+        """The first whole frame, and the points at this and all that follow, (frames, point_count,
+        3); in between two times they go straight.
+
+        Args:
+            rate: frames in a second; frame f is at f / rate seconds.
+        """
+        first, last = round(self.times[0] * rate), round(self.times[-1] * rate)
+        number = np.arange(first, min(last, first + MAX_FRAMES) + 1)
+        left, part = between(self.times, number / rate)
+        near, far = self.positions[left], self.positions[left + 1]
+        return first, np.asarray(near + (far - near) * part[:, None, None], np.float32)
+
+
+def between(times: Floats, wanted: Floats) -> tuple[Ints, Floats]:
+    """Of wanted times (n,), which of two or more ascending ones comes before each, and how far it
+    is to the next, in 0 to 1."""
+    left = np.clip(np.searchsorted(times, wanted, side="right") - 1, 0, len(times) - 2)
+    part = (wanted - times[left]) / (times[left + 1] - times[left])
+    return left, np.clip(part, 0.0, 1.0).astype(np.float32)
 
 
 @dataclass(frozen=True)

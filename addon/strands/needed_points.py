@@ -58,14 +58,14 @@ def with_needed_points(
         needed, is_even = kept.rows("points", (least, most, stray), (strands.grid,), of)
     else:
         needed, is_even = _needed(strands, least, most, stray)
-    if np.array_equal(needed, own) and not is_even.any():
-        return strands
     return with_points(strands, needed, is_even)
 
 
 def with_points(strands: StrandSet, counts: Ints, is_even: Bools) -> StrandSet:
     """The same strands with these point counts, (strand_count,): evenly along them, or their own
     points and more between them."""
+    if np.array_equal(counts, strands.point_counts) and not is_even.any():
+        return strands
     parts, order = [], []
     for count in np.unique(counts).tolist():
         for are_even in (False, True):

@@ -15,6 +15,9 @@ from hairloom.addon.blender.bakes.playback import rig_in
 from hairloom.addon.blender.preview import previews
 from hairloom.addon.blender.preview.bake import Bake
 from hairloom.addon.blender.scene.curves import read_curves
+from hairloom.addon.blender.strands.import_groom import import_strands, read_ground
+from hairloom.addon.exchange.alembic.groom_alembic import write_groom_alembic
+from hairloom.addon.exchange.groom import Groom, GroomMotion
 from hairloom.addon.strands.strand_set import StrandSet
 
 sys.path.append(str(Path(__file__).parents[2] / "bench"))
@@ -134,6 +137,33 @@ def test_curves_that_are_lost_in_mid_play_leave_the_last_style_that_fits(
     assert 0.0 < np.abs(session.strands - before).max() < 0.05, "it goes on"
     (warning,) = (each for each in session.warnings if "Animated Style" in each)
     assert "frame 5" in warning and "57 usable curves" in warning and "not 60" in warning
+
+
+def test_a_groom_that_moves_in_a_file_comes_with_all_its_frames(
+    moving: Any, evaluated: Any, tmp_path: Path
+) -> None:
+    """Where it was exported; and it is the style of each frame at once."""
+    shown = []
+    for frame in range(1, LAST + 1):
+        bpy.context.scene.frame_set(frame)
+        shown.append(seen(moving, evaluated).points)
+    strands = seen(moving, evaluated)
+    rate, path = 24.0, tmp_path / "hair.abc"
+    first = Groom(strands.with_points(shown[0]))
+    write_groom_alembic(path, first, motion=GroomMotion(shown, rate))
+    bpy.context.scene.frame_set(1)
+    (hair,), outcome = import_strands(
+        path, read_ground(moving.data.surface, evaluated()), bpy.context.collection
+    )
+    assert "moving in 8 frames" in outcome.result and hair.hairloom.dynamics.animated_style
+    hair.hairloom.dynamics.device = moving.hairloom.dynamics.device
+    hair.hairloom.dynamics.simulated = 0.0
+    session = session_at_start(hair, evaluated)
+    for frame, points in enumerate(shown, 1):
+        bpy.context.scene.frame_set(frame)
+        np.testing.assert_allclose(seen(hair, evaluated).points, points, atol=1e-6)
+        expected = strands.with_points(points)
+        assert apart(session.strands, session.rig.strands.offsets, expected) < 2e-6
 
 
 def test_both_forms_agree_halfway(moving: Any, evaluated: Any) -> None:

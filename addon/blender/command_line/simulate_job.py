@@ -23,6 +23,7 @@ from ..colliders.ties import copy_holders
 from ..preview.bake import Bake
 from ..scene.curves import write_curves
 from ..scene.partings import copy_partings
+from ..strands.import_groom import let_move
 from .bake_job import write_bake
 from .inputs import Inputs
 from .job_options import add_motion_options
@@ -133,6 +134,8 @@ def _hair_of_open_scene(job: Job, inputs: Inputs) -> bpy.types.Object:
     hair = bpy.data.objects.get(job.sources.groom or "")
     if hair is None:
         hair = write_curves("Hair", inputs.strands, head, scene.collection)
+        if inputs.groom is not None and inputs.groom.motion is not None:
+            let_move(hair, inputs.groom.motion)
     hair.data.surface = head
     if job.sources.collider is not None and inputs.collider is not None:
         collider = bpy.data.objects.get(job.sources.collider)

@@ -17,7 +17,7 @@ import numpy as np
 from ...errors import HairloomError
 from ...exchange.files import child_process
 from ...exchange.files.file_space import FileSpace
-from ...exchange.groom import Groom
+from ...exchange.groom import Groom, ReadMotion
 from ...exchange.read_groom import ReadGroom
 from ...exchange.strand_formats import STRAND_FORMATS, strand_format
 from ...exchange.strand_reading import read_strands
@@ -25,9 +25,11 @@ from ...groom.root_fit import LOOSE_DISTANCE, better_fit
 from ...groom.roots import bind_roots
 from ...strands import StrandSet, Surface
 from ...strands.closest_point import ClosestPointSearch
+from ..bakes.groom_hashes import frame_rate
 from ..base.outcome import Outcome
 from ..base.thread_work import ThreadWork
 from ..scene.curves import write_curves
+from ..scene.curves_motion import store_motion
 from ..scene.groom_attributes import store_groom
 from ..scene.surfaces import read_surface
 from .child_python import python_for
@@ -116,7 +118,7 @@ def read_file(path: Path, ground: Ground | None, choices: StrandImport) -> FileS
     )
     groom, warnings = _bound(read, ground, choices, path)
     hair = tuple((each, path.stem + end) for each, end in _objects(groom, choices.guides))
-    result = f"{path.name}: {_counts(groom)}, {_format(path, read)}"
+    result = f"{path.name}: {_counts(groom)}{_moving(groom)}, {_format(path, read)}"
     return FileStrands(hair, Outcome(result, read.dropped, (*read.notes, *warnings)))
 
 
@@ -167,7 +169,17 @@ def _written(
 ) -> bpy.types.Object:
     hair = write_curves(name, groom.strands, ground and ground.head, collection)
     store_groom(hair.data, groom)
+    if groom.motion is not None:
+        let_move(hair, groom.motion)
     return hair
+
+
+def let_move(hair: bpy.types.Object, motion: ReadMotion) -> None:
+    """Let new curves, which lie in the world, go where a file has them at each frame; they are the
+    style of the frame then."""
+    store_motion(hair, *motion.at_frames(frame_rate(bpy.context.scene)))
+    hair.parent = None  # the file says where they are, whatever carries the surface
+    hair.hairloom.dynamics.animated_style = True
 
 
 def _bound(
@@ -240,6 +252,10 @@ def _counts(groom: Groom) -> str:
     counts += [f"{guides:,} guides"] if guides else []
     groups = len(np.unique(groom.strands.group))
     return " and ".join(counts) + (f" in {groups:,} groups" if groups > 1 else "")
+
+
+def _moving(groom: Groom) -> str:
+    return "" if groom.motion is None else f", moving in {len(groom.motion.times):,} frames"
 
 
 def _format(path: Path, read: ReadGroom) -> str:

@@ -5,8 +5,10 @@
 Alembic's library may crash, or ask for all memory, on a damaged file. So this module imports no
 other of ours: it can be run by its path in a process that may die. The result has, for each curves
 object N in the file's order, "N/name", "N/matrix" (4, 4) that takes row vectors to the world,
-"N/points", "N/counts", "N/widths" where there are some, and "N/groom_*" as the file has them; and
-what the file says of itself: "application", and "groom_*" of the top object.
+"N/points", "N/counts", "N/widths" where there are some, and "N/groom_*" as the file has them; of
+curves that move "N/times" [s] and "N/motion" (times, points, 3) in the world, as long as they have
+the same counts, and else "N/ended", the time from which on they have others; and what the file says
+of itself: "application", and "groom_*" of the top object.
 """
 
 from __future__ import annotations
@@ -25,6 +27,8 @@ type Arrays = dict[str, NDArray[Any]]
 MEMORY = 4 << 30
 #: Objects below each other; a damaged file may have them in a circle.
 DEEPEST = 64
+#: Samples of motion: nearly seven minutes at 24 frames a second.
+MAX_TIMES = 10_000
 #: Exit codes, as `run_reader` expects them: after an error that is reported on stderr; where the
 #: results cannot be written.
 REPORTED, NO_ROOM = 3, 4
@@ -33,7 +37,7 @@ _VECTORS = {2: "IV2fArrayProperty", 3: "IV3fArrayProperty"}
 
 
 def read_curves(path: str) -> Arrays:
-    """All curves of a file, at the first of their samples.
+    """All curves of a file, at the first of their samples and at all others.
 
     Raises:
         ImportError: no alembic3d. RuntimeError, ValueError: a file that the library cannot read.
@@ -44,11 +48,14 @@ def read_curves(path: str) -> Arrays:
     found: Arrays = {}
     application = Abc.GetArchiveInfo(archive).get("appName", "")
     found["application"] = np.array(str(application))
-    _walk(archive.getTop(), np.eye(4), found, 0)
+    _walk(archive.getTop(), (), found, 0)
     return found
 
 
-def _walk(thing: Any, matrix: NDArray[np.float64], found: Arrays, depth: int) -> None:
+def _walk(thing: Any, above: tuple[Any, ...], found: Arrays, depth: int) -> None:
+    """Args:
+    above: the schemas of what places it in the world, the outermost first.
+    """
     from alembic3d import Abc, AbcGeom
 
     if depth > DEEPEST:
@@ -58,28 +65,69 @@ def _walk(thing: Any, matrix: NDArray[np.float64], found: Arrays, depth: int) ->
         number = sum(name.endswith("/points") for name in found)
         schema = Abc.ICompoundProperty(thing.getProperties(), ".geom")
         found[f"{number}/name"] = np.array(thing.getName())
-        found[f"{number}/matrix"] = matrix
+        found[f"{number}/matrix"] = _matrix(above)
         _read_geometry(schema, f"{number}/", found)
+        _read_motion(schema, above, f"{number}/", found)
         _read_user(schema, found)
     elif AbcGeom.IXform.matches(meta):
         _read_user(Abc.ICompoundProperty(thing.getProperties(), ".xform"), found)
-        place = AbcGeom.IXform(thing, Abc.WrapExistingFlag.kWrapExisting).getSchema().getValue()
-        matrix = np.array([list(row) for row in place.getMatrix()], np.float64) @ matrix
+        place = AbcGeom.IXform(thing, Abc.WrapExistingFlag.kWrapExisting).getSchema()
+        above = (*above, place)
     for child in thing.children:
-        _walk(child, matrix, found, depth + 1)
+        _walk(child, above, found, depth + 1)
+
+
+def _matrix(above: tuple[Any, ...], *when: Any) -> NDArray[np.float64]:
+    """(4, 4) that takes row vectors to the world, at a time or at the first."""
+    matrix = np.eye(4)
+    for place in above:
+        own = np.array([list(row) for row in place.getValue(*when).getMatrix()], np.float64)
+        matrix = own @ matrix
+    return matrix
+
+
+def _read_motion(schema: Any, above: tuple[Any, ...], prefix: str, found: Arrays) -> None:
+    from alembic3d import Abc
+
+    headers = {header.getName(): header for header in schema.propertyheaders}
+    if "P" not in headers or "nVertices" not in headers:
+        return
+    points, counts = (Abc.IArrayProperty(schema, name) for name in ("P", "nVertices"))
+    moving = [each for each in (points, *above) if each.getNumSamples() > 1]
+    if not moving:
+        return
+    times = np.unique(np.concatenate([_times(each) for each in moving]))
+    if len(times) > MAX_TIMES:
+        raise ValueError(f"it has more than {MAX_TIMES:,} frames")
+    first, positions = found[prefix + "counts"], []
+    for time in times.tolist():
+        when = Abc.ISampleSelector(float(time))
+        here = _values(schema, headers["P"], when)
+        own = np.array(counts.getValue(when))
+        if len(here) != len(found[prefix + "points"]) or not np.array_equal(own, first):
+            found[prefix + "ended"] = np.array(time)
+            break
+        matrix = _matrix(above, when)
+        with np.errstate(over="ignore", invalid="ignore"):
+            placed = here.astype(np.float64) @ matrix[:3, :3] + matrix[3, :3]
+            positions.append(placed.astype(np.float32))
+    found[prefix + "times"] = times[: len(positions)]
+    found[prefix + "motion"] = np.array(positions, np.float32)
+
+
+def _times(moving: Any) -> NDArray[np.float64]:
+    """Of the samples of a property [s]."""
+    sampling = moving.getTimeSampling()
+    count = moving.getNumSamples()
+    return np.array([sampling.getSampleTime(number) for number in range(count)], np.float64)
 
 
 def _read_geometry(schema: Any, prefix: str, found: Arrays) -> None:
-    from alembic3d import Abc
-
     for header in schema.propertyheaders:
         name = header.getName()
         ours = {"P": "points", "nVertices": "counts", "width": "widths"}.get(name)
         if ours is not None:
             found[prefix + ours] = _values(schema, header)
-            if ours == "points":
-                samples = Abc.IArrayProperty(schema, name).getNumSamples()
-                found[prefix + "samples"] = np.array(samples)
         elif name == ".arbGeomParams":
             _read_attributes(schema, header, prefix, found)
 
@@ -100,8 +148,8 @@ def _read_attributes(schema: Any, header: Any, prefix: str, found: Arrays) -> No
             found[prefix + each.getName()] = _values(parent, each)
 
 
-def _values(parent: Any, header: Any) -> NDArray[Any]:
-    """A property's first sample, whatever its type; indexed ones are expanded."""
+def _values(parent: Any, header: Any, *when: Any) -> NDArray[Any]:
+    """A property's first sample, or that of a time, of any type; indexed ones are expanded."""
     from alembic3d import Abc
 
     name = header.getName()
@@ -116,9 +164,9 @@ def _values(parent: Any, header: Any) -> NDArray[Any]:
     kind = header.getDataType()
     typed = _VECTORS.get(kind.getExtent()) if kind.getPod().name == "kFloat32POD" else None
     if typed is None:
-        return np.array(Abc.IArrayProperty(parent, name).getValue())
+        return np.array(Abc.IArrayProperty(parent, name).getValue(*when))
     anyhow = Abc.Argument(Abc.SchemaInterpMatching.kNoMatching)
-    return np.array(getattr(Abc, typed)(parent, name, anyhow).getValue())
+    return np.array(getattr(Abc, typed)(parent, name, anyhow).getValue(*when))
 
 
 def _limit_memory(path: str) -> None:

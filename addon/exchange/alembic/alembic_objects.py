@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ...arrays import Floats, Ints
 from ...errors import HairloomError
+from ..read_motion import ended_at, motion_of
 from .alembic_curves import Arrays
 
 type _Values = NDArray[Any]
@@ -30,6 +31,7 @@ class Joined:
     color: (point_count, 3), or None.
     uniform: strand_id, is_guide, closest_guides, guide_weights of each curve, or None.
     group_names: group -> name.
+    motion: times [s] and the points at these, (n, point_count, 3), or None.
     notes: what could not be used.
     """
 
@@ -41,6 +43,7 @@ class Joined:
     color: Floats | None
     uniform: Arrays
     group_names: dict[int, str]
+    motion: tuple[Floats, Floats] | None
     notes: tuple[str, ...]
 
 
@@ -110,6 +113,7 @@ def joined(found: Arrays, path: Path) -> Joined:
         ),
         uniform=_guides(objects),
         group_names=names,
+        motion=motion_of([_moving(each) for each in objects]),
         notes=_notes(objects),  # after all others, which add to them
     )
 
@@ -135,9 +139,17 @@ def _object(found: Arrays, number: int, path: Path) -> _Object:
     counts = counts.astype(np.int64)
     if len(counts) and (counts.min() < 0 or counts.sum() != len(points)):
         raise _lying(path, name, f"its curves want {counts.sum()} points and it has {len(points)}")
-    moves = int(own["samples"]) > 1
-    notes = [f"{name}: its motion was left out"] if moves else []
+    ended = [ended_at(float(own["ended"]), "other counts of points")] if "ended" in own else []
+    notes = [f"{name}: {note}" for note in ended]
     return _Object(name, _placed(points, own["matrix"]), counts, own, notes)
+
+
+def _moving(each: _Object) -> tuple[Floats | None, Floats]:
+    """See `motion_of`."""
+    times, positions = each.arrays.get("times"), each.arrays.get("motion")
+    if times is None or positions is None or positions.shape[1:] != each.points.shape:
+        return None, each.points[None]
+    return times, positions
 
 
 def _placed(points: Floats, matrix: Floats) -> Floats:

@@ -21,7 +21,8 @@ from ...strands.clean import clean
 from ..files.file_space import FileSpace
 from ..files.subprocess_reader import run_reader
 from ..groom import Groom
-from ..read_groom import ReadGroom
+from ..read_groom import ReadGroom, kept_points
+from ..read_motion import sound_motion
 from . import alembic_curves
 from .alembic_curves import Arrays
 from .alembic_library import alembic_library
@@ -41,7 +42,7 @@ def read_groom_alembic(
     with_guides: bool = True,
     python: Sequence[str] | None = None,
 ) -> ReadGroom:
-    """Read all curves of a file, at their first frame.
+    """Read all curves of a file, at their first frame, and their motion.
 
     Args:
         space: the file's unit and axes. None: what our own files say of themselves; of others, Y
@@ -65,7 +66,7 @@ def read_groom_alembic(
         unit = "metres" if space.per_metre == 1.0 else "centimetres"
         notes.append(f"it names no unit and no axes: read in {unit}, {up or space.up} up")
     space = replace(space, up=up or space.up, per_metre=space.per_metre / factor)
-    groom = _groom(curves, space, path)
+    groom = _groom(curves, space, path, notes)
     if not with_guides:
         groom = groom.without_guides()
     if not groom.strands.strand_count:
@@ -127,7 +128,8 @@ def _guessed_space(curves: Joined) -> FileSpace:
     return FileSpace("Y", 1.0 if extent < WIDEST_IN_METRES else 100.0)
 
 
-def _groom(curves: Joined, space: FileSpace, path: Path) -> Groom:
+def _groom(curves: Joined, space: FileSpace, path: Path, notes: list[str]) -> Groom:
+    """Notes grow."""
     # What overflows becomes infinite, and what is not finite is dropped and counted.
     with np.errstate(over="ignore", invalid="ignore"):
         points = space.from_file(curves.points)
@@ -146,6 +148,13 @@ def _groom(curves: Joined, space: FileSpace, path: Path) -> Groom:
         raise _error(path, problem, "Export the groom again")
     kept = cleaned.kept
     optional: dict[str, Any] = {name: values[kept] for name, values in curves.uniform.items()}
+    if curves.motion is not None:
+        times, positions = curves.motion
+        with np.errstate(over="ignore", invalid="ignore"):
+            placed = space.from_file(positions.reshape(-1, 3)).reshape(positions.shape)
+        placed = np.stack([kept_points(each, curves.offsets, cleaned) for each in placed])
+        optional["motion"], note = sound_motion(times, placed)
+        notes += [note] if note else []
     return Groom(
         cleaned.strands,
         path.stem,

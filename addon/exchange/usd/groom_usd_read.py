@@ -1,8 +1,9 @@
 """Reading grooms from the BasisCurves of USD files: whichever prims, bases and primvars they use.
 
 Units, axes and the places of prims come from the file. Strands are read at rest: values without a
-time, or those of the first one. Instances of prims are read as often as they stand in the file;
-point instancers are not, and of other geometry only its number is reported.
+time, or those of the first one; and, where they move, at all times. Instances of prims are read as
+often as they stand in the file; point instancers are not, and of other geometry only its number is
+reported.
 """
 
 from __future__ import annotations
@@ -20,7 +21,8 @@ from ...strands.clean import clean
 from ..files.axes import to_z_up
 from ..files.file_space import FileSpace
 from ..groom import Groom
-from ..read_groom import ReadGroom
+from ..read_groom import ReadGroom, kept_points
+from ..read_motion import motion_of, sound_motion
 from .usd_curves import Curves, UnusableCurvesError, curves_of
 from .usd_library import usd_arrays
 from .usd_reader import Arrays, unpacked
@@ -86,10 +88,9 @@ class _Reading:
         """The curves of each prim that has usable ones."""
         notes, problems = dict[str, list[str]](), dict[str, list[str]]()
         for prim in unpacked(self._arrays):
-            local = prim["matrix"].T  # USD has row vectors
             path = str(prim["path"])
             try:
-                piece = curves_of(prim, self._to_blender @ local)
+                piece = curves_of(prim, self._to_blender)
             except UnusableCurvesError as error:
                 problems.setdefault(str(error), []).append(path)
                 continue
@@ -166,6 +167,12 @@ def _joined(pieces: list[Curves], path: Path, name: str, notes: list[str]) -> Gr
         )
     if len(pieces) > 1:
         notes.append(f"its {len(pieces):,} prims of curves became one groom")
+    found, motion = motion_of([(piece.times, piece.positions) for piece in pieces]), None
+    if found is not None:
+        times, positions = found
+        kept = np.stack([kept_points(each, offsets, cleaned) for each in positions])
+        motion, note = sound_motion(times, kept)
+        notes += [note] if note else []
     return Groom(
         cleaned.strands,
         name=name,
@@ -173,6 +180,7 @@ def _joined(pieces: list[Curves], path: Path, name: str, notes: list[str]) -> Gr
         group_names=group_names,
         dropped=cleaned.dropped,
         source=path,
+        motion=motion,
         **_identities(pieces, cleaned.kept, notes),
     )
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ...arrays import Bools, Floats, Ints
 from ...strands.affine import mean_scale, moved
 from ...strands.clean import are_widths
+from ..read_motion import ended_at
 from .usd_basis import OnCurves, points_on_curves
 from .usd_reader import Arrays
 
@@ -24,6 +25,8 @@ class Curves:
 
     offsets: (curve_count + 1,).
     notes: what had to be changed or left out.
+    times, positions: when it moves (n,) [s], and the points then (n, point_count, 3); None and the
+        points (1, point_count, 3) where it does not.
     """
 
     name: str
@@ -39,6 +42,8 @@ class Curves:
     closest_guides: Ints | None
     guide_weights: Floats | None
     notes: tuple[str, ...]
+    times: Floats | None
+    positions: Floats
 
     @property
     def curve_count(self) -> int:
@@ -49,16 +54,17 @@ class UnusableCurvesError(Exception):
     """Why nothing of a prim can be used."""
 
 
-def curves_of(prim: Arrays, matrix: Floats) -> Curves:
+def curves_of(prim: Arrays, space: Floats) -> Curves:
     """What a prim holds, as strands.
 
     Args:
         prim: the arrays of a prim, by the names of `usd_reader`.
-        matrix: (4, 4), from the prim's space to Blender's, in metres.
+        space: (4, 4), from the stage's space to Blender's, in metres.
 
     Raises:
         UnusableCurvesError: it has no curves, counts that do not fit, or is closed.
     """
+    matrix = space @ prim["matrix"].T  # USD has row vectors
     points = _array(prim.get("points"), np.float32, 3)
     counts = _array(prim.get("counts"), np.int64)
     if points is None or counts is None or not len(points) or not len(counts):
@@ -77,8 +83,8 @@ def curves_of(prim: Arrays, matrix: Floats) -> Curves:
     radius, notes = _radius(values, widths_interpolation, mean_scale(matrix))
     if values.on_curves.vertex is not None:
         notes += (f"its {basis} curves became points on the curves",)
-    if int(prim["samples"]) > 1:
-        notes += ("its motion was left out",)
+    if "ended" in prim:
+        notes += (ended_at(float(prim["ended"]), "another number of points"),)
     wrong = values.on_curves.wrong_count
     if wrong:
         notes += (f"{wrong:,} curves have a number of points that {basis} curves cannot have",)
@@ -88,9 +94,11 @@ def curves_of(prim: Arrays, matrix: Floats) -> Curves:
     ids = values.of_strands("groom_id", np.int32)
     guide = values.of_strands("groom_guide", np.int32)
     uvs = (values.of_strands(name, np.float32, 2) for name in _ROOT_UVS)
+    placed = moved(values.mixed(points), matrix)
+    times, positions = _motion(prim, values, space)
     return Curves(
         name=str(prim["name"]),
-        points=moved(values.mixed(points), matrix),
+        points=placed,
         offsets=values.on_curves.offsets,
         radius=radius,
         group=values.of_strands("groom_group_id", np.int32),
@@ -102,7 +110,20 @@ def curves_of(prim: Arrays, matrix: Floats) -> Curves:
         closest_guides=values.of_strands("groom_closest_guides", np.int32, 3),
         guide_weights=values.of_strands("groom_guide_weights", np.float32, 3),
         notes=notes + tuple(values.notes),
+        times=times,
+        positions=placed[None] if times is None else positions,
     )
+
+
+def _motion(prim: Arrays, values: _Values, space: Floats) -> tuple[Floats | None, Floats]:
+    """Times and the points at these; see `Curves`."""
+    if len(prim.get("times", ())) < 2:
+        return None, np.zeros((0, 0, 3), np.float32)
+    positions = [
+        moved(values.mixed(points), space @ matrix.T)  # USD has row vectors
+        for points, matrix in zip(prim["motion"], prim["matrices"], strict=True)
+    ]
+    return prim["times"], np.array(positions, np.float32)
 
 
 def _radius(

@@ -7,11 +7,13 @@ machine holds. So only this process opens files, and it has limits of time, memo
 imports no other module of ours. It ends with REPORTED, and a line on stderr, after an error.
 
 The result has, for each BasisCurves in the file's order, "name", "path", "matrix" (4, 4) that takes
-row vectors to the stage, "points", "counts", "widths", "samples" of points over time, "traits"
-(wrap, type, basis, interpolation of widths) and, for each primvar of PRIMVARS that it has,
-"primvar/NAME" without indices and "interpolation/NAME", all of them `packed`. And it has of the
-stage "up", "unit", "has_unit", "prim_names" (name and label of the topmost one), "version" (major
-and minor; -1 where it names none), "others" (types of other geometry) and "other_counts".
+row vectors to the stage, "points", "counts", "widths", "traits" (wrap, type, basis, interpolation
+of widths), of those that move "times" [s], "motion" (times, points, 3) and "matrices" (times, 4,
+4), as long as they have as many points, and else "ended", the time from which on they have others;
+and, for each primvar of PRIMVARS that it has, "primvar/NAME" without indices and
+"interpolation/NAME", all of them `packed`. And it has of the stage "up", "unit", "has_unit",
+"prim_names" (name and label of the topmost one), "version" (major and minor; -1 where it names
+none), "others" (types of other geometry) and "other_counts".
 """
 
 from __future__ import annotations
@@ -80,11 +82,11 @@ def read_curves(path: str) -> Arrays:
             raise _TooMuchError(f"it has more than {MAX_PRIMS:,} prims with all instances")
         if prim.IsA(UsdGeom.BasisCurves):
             curves = _of_curves(prim)
-            points += len(curves.get("points", ()))
+            points += len(curves.get("points", ())) * max(len(_times(prim)), 1)
             if points > MAX_POINTS:
-                raise _TooMuchError(f"it has more than {MAX_POINTS:,} points")
+                raise _TooMuchError(f"it has more than {MAX_POINTS:,} points in all frames")
             matrix = np.array(cache.GetLocalToWorldTransform(prim), np.float64)
-            curves_prims.append(curves | {"matrix": matrix})
+            curves_prims.append(curves | {"matrix": matrix} | _motion(prim, curves))
         elif prim.IsA(UsdGeom.PointInstancer):
             others["PointInstancer"] += 1
             walk.PruneChildren()
@@ -170,7 +172,6 @@ def _of_curves(prim: Any) -> Arrays:
         "name": prim.GetName(),
         "path": str(prim.GetPath()),
         "traits": [str(trait) for trait in traits],
-        "samples": curves.GetPointsAttr().GetNumTimeSamples(),
     }
     for name in PRIMVARS:
         primvar = primvars.GetPrimvar(name)
@@ -179,6 +180,41 @@ def _of_curves(prim: Any) -> Arrays:
             values[f"interpolation/{name}"] = str(primvar.GetInterpolation())
     arrays = {name: _array(value) for name, value in values.items()}
     return {name: array for name, array in arrays.items() if array is not None}
+
+
+def _times(prim: Any) -> list[float]:
+    """At which its points, or the places of what it is in, are given; none where nothing moves."""
+    from pxr import UsdGeom
+
+    times = set(UsdGeom.BasisCurves(prim).GetPointsAttr().GetTimeSamples())
+    above = prim
+    while above and above.IsA(UsdGeom.Xformable):
+        times |= set(UsdGeom.Xformable(above).GetTimeSamples())
+        above = above.GetParent()
+    return sorted(times) if len(times) > 1 else []
+
+
+def _motion(prim: Any, curves: Arrays) -> Arrays:
+    from pxr import UsdGeom
+
+    times, attribute = _times(prim), UsdGeom.BasisCurves(prim).GetPointsAttr()
+    if not times or "points" not in curves:
+        return {}
+    rate = prim.GetStage().GetTimeCodesPerSecond()
+    positions, matrices = [], []
+    found: Arrays = {}
+    for time in times:
+        here = _array(attribute.Get(time))
+        if here is None or here.shape != curves["points"].shape:
+            found["ended"] = np.array(time / rate)
+            break
+        positions.append(here.astype(np.float32))
+        place = UsdGeom.XformCache(time).GetLocalToWorldTransform(prim)
+        matrices.append(np.array(place, np.float64))
+    found["times"] = np.array(times[: len(positions)], np.float64) / rate
+    found["motion"] = np.array(positions, np.float32).reshape(-1, *curves["points"].shape)
+    found["matrices"] = np.array(matrices, np.float64).reshape(-1, 4, 4)
+    return found
 
 
 def _value(attribute: Any) -> Any:

@@ -137,18 +137,47 @@ def test_several_grooms_in_a_file_become_one_and_that_is_told(tmp_path: Path) ->
     assert "two.abc: its 2 curves objects became one groom." in read.notes
 
 
+@pytest.mark.parametrize("parts", ["both", "guides"])
 @pytest.mark.parametrize("suffix", [".abc", ".usdc"])
-def test_of_motion_the_first_frame_is_read_and_that_is_told(tmp_path: Path, suffix: str) -> None:
+def test_motion_is_read_with_all_its_frames(tmp_path: Path, suffix: str, parts: str) -> None:
     hair = groom()
     rest = hair.strands.points
-    motion = GroomMotion([rest, rest + 1.0, rest + 2.0], rate=24.0)
+    motion = GroomMotion([rest, rest + 1.0, rest + [0.0, 3.0, 0.0]], rate=24.0, first_frame=5)
+    path = tmp_path / f"hair{suffix}"
     if suffix == ".abc":
-        write_groom_alembic(tmp_path / "hair.abc", hair, BLENDER, motion=motion)
+        write_groom_alembic(path, hair, BLENDER, motion=motion)
     else:
-        write_usd(tmp_path / "hair.usdc", hair, motion=motion)
-    read = read_strands(tmp_path / f"hair{suffix}", parts="both")
-    np.testing.assert_array_equal(read.strands.points, rest)
-    assert any("its motion was left out" in note for note in read.notes)
+        write_usd(path, hair, motion=motion)
+    read = read_strands(path, parts=parts)
+    expected = rest if parts == "both" else hair.guides().strands.points
+    np.testing.assert_array_equal(read.strands.points, expected)
+    assert read.groom.motion is not None
+    first, positions = read.groom.motion.at_frames(24.0)
+    assert (first, len(positions)) == (5, 3)
+    np.testing.assert_allclose(
+        positions[2] - positions[0], expected * 0 + [0.0, 3.0, 0.0], atol=1e-6
+    )
+    half, doubled = read.groom.motion.at_frames(48.0)
+    assert (half, len(doubled)) == (10, 5)
+    np.testing.assert_allclose(doubled[1], (positions[0] + positions[1]) / 2.0, atol=1e-6)
+
+
+def test_a_motion_that_loses_points_ends_before_and_that_is_reported(tmp_path: Path) -> None:
+    stage = Usd.Stage.CreateNew(str(tmp_path / "hair.usda"))
+    UsdGeom.SetStageMetersPerUnit(stage, 1.0)
+    stage.SetTimeCodesPerSecond(24.0)
+    curves = UsdGeom.BasisCurves.Define(stage, "/hair")
+    curves.CreateTypeAttr("linear")
+    points = curves.CreatePointsAttr()
+    for time in (1.0, 2.0):
+        points.Set([(0, 0, 0), (0, 0.1 * time, 0)], time)
+    points.Set([(0, 0, 0)], 3.0)
+    curves.CreateCurveVertexCountsAttr([2])
+    stage.Save()
+    read = read_strands(tmp_path / "hair.usda")
+    assert read.groom.motion is not None and len(read.groom.motion.times) == 2
+    (note,) = (each for each in read.notes if "motion" in each)
+    assert "at 0.125 s it has another number of points" in note
 
 
 def groom_of_groups() -> Groom:

@@ -1,0 +1,102 @@
+"""Motion of imported hair curves: an attribute for each frame, and a modifier that shows the one
+of the scene's frame.
+
+So the file needs nothing but itself, and curves move without Hairloom, too.
+"""
+
+from __future__ import annotations
+
+import bpy
+
+from ...arrays import Floats
+from ..base.attributes import set_attribute
+
+#: of the modifier and its node group
+NAME = "Hairloom Motion"
+#: of the attributes; the frame follows
+PREFIX = "motion_"
+_FIRST, _LAST = "First Frame", "Last Frame"
+_MARK, _VERSION = "hairloom_curves_motion", 1
+
+
+def store_motion(hair: bpy.types.Object, first: int, positions: Floats) -> None:
+    """Let curves move.
+
+    Args:
+        first: the scene frame of the first positions.
+        positions: (frames, point_count, 3) [m] object space.
+    """
+    for frame, points in enumerate(positions, first):
+        set_attribute(hair.data, f"{PREFIX}{frame}", "POINT", points)
+    modifier = hair.modifiers.new(NAME, "NODES")
+    modifier.node_group = nodes = _node_group()
+    for socket, value in ((_FIRST, first), (_LAST, first + len(positions) - 1)):
+        identifier = nodes.interface.items_tree[socket].identifier
+        getattr(modifier.properties.inputs, identifier).value = value
+
+
+def _node_group() -> bpy.types.NodeTree:
+    known = (group for group in bpy.data.node_groups if group.get(_MARK) == _VERSION)
+    return next((group for group in known if group.library is None), None) or _new_node_group()
+
+
+def _new_node_group() -> bpy.types.NodeTree:
+    """Between two frames points go straight; before the first and after the last they rest."""
+    tree = bpy.data.node_groups.new(NAME, "GeometryNodeTree")
+    tree[_MARK] = _VERSION
+    tree.is_modifier = True
+    new_socket, new, link = tree.interface.new_socket, tree.nodes.new, tree.links.new
+    new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
+    new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
+    for name in (_FIRST, _LAST):
+        new_socket(name, in_out="INPUT", socket_type="NodeSocketInt")
+    begin, end, time = (
+        new(kind) for kind in ("NodeGroupInput", "NodeGroupOutput", "GeometryNodeInputSceneTime")
+    )
+    clamped, part, following = new("ShaderNodeClamp"), _math(tree, "FRACT"), _math(tree, "CEIL")
+    whole, mix, place = _math(tree, "FLOOR"), new("ShaderNodeMix"), new("GeometryNodeSetPosition")
+    link(time.outputs["Frame"], clamped.inputs["Value"])
+    link(begin.outputs[_FIRST], clamped.inputs["Min"])
+    link(begin.outputs[_LAST], clamped.inputs["Max"])
+    for each in (part, whole, following):
+        link(clamped.outputs[0], each.inputs[0])
+    mix.data_type = "VECTOR"
+    near, far = _of_frame(tree, whole), _of_frame(tree, following)
+    link(part.outputs[0], mix.inputs["Factor"])
+    for value, socket in ((near, "A"), (far, "B")):
+        own = next(each for each in mix.inputs if each.name == socket and each.type == "VECTOR")
+        link(value.outputs["Attribute"], own)
+    result = next(each for each in mix.outputs if each.type == "VECTOR")
+    link(result, place.inputs["Position"])
+    link(near.outputs["Exists"], place.inputs["Selection"])
+    link(begin.outputs["Geometry"], place.inputs["Geometry"])
+    link(place.outputs["Geometry"], end.inputs["Geometry"])
+    rows = ((begin, time), (clamped,), (whole, following, part), (near, far), (mix,), (place,))
+    for across, nodes in enumerate((*rows, (end,))):
+        for down, node in enumerate(nodes):
+            node.location = 220.0 * across, -220.0 * down
+    return tree
+
+
+def _math(tree: bpy.types.NodeTree, operation: str) -> bpy.types.Node:
+    node = tree.nodes.new("ShaderNodeMath")
+    node.operation = operation
+    return node
+
+
+def _of_frame(tree: bpy.types.NodeTree, frame: bpy.types.Node) -> bpy.types.Node:
+    """The attribute of a whole frame."""
+    new, link = tree.nodes.new, tree.links.new
+    text, name, attribute = (
+        new("FunctionNodeValueToString"),
+        new("GeometryNodeStringJoin"),
+        new("GeometryNodeInputNamedAttribute"),
+    )
+    prefix = new("FunctionNodeInputString")
+    prefix.string = PREFIX
+    attribute.data_type = "FLOAT_VECTOR"
+    link(frame.outputs[0], text.inputs["Value"])
+    link(text.outputs[0], name.inputs["Strings"])
+    link(prefix.outputs[0], name.inputs["Strings"])  # what is linked last comes first
+    link(name.outputs[0], attribute.inputs["Name"])
+    return attribute

@@ -1,0 +1,56 @@
+"""The motion of a file's curves objects as that of one groom."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..arrays import Floats
+from .groom import ReadMotion, between
+
+#: Times nearer than this [s] are one.
+_SAME_TIME = 1.0e-5
+
+
+def motion_of(
+    parts: Sequence[tuple[Floats | None, Floats]],
+) -> tuple[Floats, Floats] | None:
+    """Times and points of all parts, (n,) and (n, point_count, 3); None where none moves.
+
+    Args:
+        parts: times of each, (k,), and its points at these, (k, own_count, 3); None: it is still,
+            k = 1.
+    """
+    known = [times for times, _ in parts if times is not None and len(times) > 1]
+    if not known or not all(np.isfinite(times).all() for times in known):
+        return None
+    every = np.unique(np.concatenate(known))
+    times = every[np.append(True, np.diff(every) > _SAME_TIME)]
+    return times, np.concatenate([_at(times, *part) for part in parts], axis=1)
+
+
+def _at(times: Floats, own: Floats | None, positions: Floats) -> Floats:
+    """A part at the times of all."""
+    if own is None or len(own) < 2:
+        return np.repeat(positions[:1], len(times), axis=0)
+    if len(own) == len(times) and np.allclose(own, times, rtol=0.0, atol=_SAME_TIME):
+        return positions
+    left, part = between(own, times)
+    near, far = positions[left], positions[left + 1]
+    mixed: Floats = near + (far - near) * part[:, None, None]
+    return mixed
+
+
+def sound_motion(times: Floats, positions: Floats) -> tuple[ReadMotion | None, str]:
+    """The motion up to the first time at which a point is not finite, and what is said of that."""
+    is_sound = np.isfinite(positions).all(axis=(1, 2))
+    count = len(times) if is_sound.all() else int(is_sound.argmin())
+    note = ""
+    if count < len(times):
+        note = ended_at(float(times[count]), "points that are no numbers")
+    return (ReadMotion(times[:count], positions[:count]) if count > 1 else None), note
+
+
+def ended_at(seconds: float, reason: str) -> str:
+    return f"at {seconds:g} s it has {reason}, so its motion ends before"
