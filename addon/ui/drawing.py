@@ -7,6 +7,7 @@ from typing import Any
 
 import bpy
 
+from ..blender.properties.groups import OVERLAYS
 from ..params import Parameter
 
 #: Draws one section of the panels of a groom.
@@ -49,6 +50,15 @@ def draw_section(
         own.prop(group, parameter.name, slider=parameter.kind in {"number", "integer"})
         if parameter.name in masks:
             own.prop(group, masks[parameter.name].name, text="", icon="GROUP_VERTEX")
+
+
+def draw_overlays(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
+    """What may be drawn over the view as lines, three in a row."""
+    column = layout.column(align=True)
+    for first in range(0, len(OVERLAYS), 3):
+        row = column.row(align=True)
+        for kind, _, _ in OVERLAYS[first : first + 3]:
+            row.prop_enum(hair.hairloom, "shown_overlays", kind)
 
 
 def _draw_curve(layout: bpy.types.UILayout, group: Any, parameter: Parameter) -> None:

@@ -10,6 +10,7 @@ import rna_keymap_ui
 
 from ..blender.preview import previews
 from ..blender.properties.presets import shipped
+from .drawing import draw_overlays
 from .operators_strand_export import draw_strand_exports
 from .operators_strand_import import draw_imports
 from .selection import active_mesh, chosen_hair
@@ -125,9 +126,8 @@ def _draw_overlays(self: Any, context: bpy.types.Context) -> None:
     column.separator()
     is_shown = previews.session_of(hair[0]) is not None
     column.operator("hairloom.preview", text="Hairloom", icon="HIDE_OFF", depress=is_shown)
-    shown = column.row(align=True)
-    shown.prop(hair[0].hairloom, "shown_overlays")
-    shown.prop(hair[0].hairloom, "show_counts", text="", icon="INFO")
+    draw_overlays(column, hair[0])
+    column.prop(hair[0].hairloom, "show_counts")
     column.prop(hair[0].hairloom, "hide_original")
 
 

@@ -10,7 +10,7 @@ import bpy
 from ..blender.preview import previews
 from ..blender.scene.particle_hair import hair_systems
 from ..blender.setup.foreign_heads import may_be_head
-from .drawing import Draw
+from .drawing import Draw, draw_overlays
 from .help import draw_help
 from .long_work import draw_progress
 from .operators_adopted import draw_sort
@@ -61,7 +61,7 @@ def draw_preview(layout: bpy.types.UILayout, context: bpy.types.Context) -> None
     row = parts.row(align=True)
     row.prop(hair.hairloom, "debug_view", text="")
     row.prop(hair.hairloom, "show_counts", text="", icon="INFO")
-    layout.row(align=True).prop(hair.hairloom, "shown_overlays")
+    draw_overlays(layout, hair)
     layout.prop(hair.hairloom, "hide_original")
 
 

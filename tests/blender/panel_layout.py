@@ -53,6 +53,9 @@ class Layout:
     def prop(self, data: Any, name: str, text: str | None = None, **_: Any) -> None:
         self._element(data.bl_rna.properties[name].name if text is None else text)
 
+    def prop_enum(self, data: Any, name: str, value: str) -> None:
+        self._element(data.bl_rna.properties[name].enum_items[value].name)
+
     def menu(self, name: str, text: str = "", **_: Any) -> None:
         self._element(text)
 

@@ -11,11 +11,13 @@ from hairloom.addon.blender.base import latest_job
 from hairloom.addon.blender.colliders import fields
 from hairloom.addon.blender.preview import previews
 from hairloom.addon.blender.properties.groups import OVERLAYS
-from hairloom.addon.blender.viewport import overlay
+from hairloom.addon.blender.viewport import motion_lines, overlay
 from hairloom.addon.blender.viewport.debug_lines import shape_lines
+from hairloom.addon.blender.viewport.overlay_text import graph_lines
 from hairloom.addon.dynamics.colliders import (
     CapsuleCollider,
     DistanceField,
+    PosedCollider,
     SphereCollider,
     SphereSetCollider,
 )
@@ -136,3 +138,62 @@ def test_each_light_has_a_line_towards_it(preview):
     ways = np.diff(points.reshape(2, -1, 3)[:, :2], axis=1)[:, 0]
     ways /= np.linalg.norm(ways, axis=1)[:, None]
     assert sorted(ways[:, 2]) == pytest.approx([1.0, 1.0], abs=1e-3), "a sun shines down"
+
+
+def played(preview, evaluated, kind):
+    """Hair that plays and shows an overlay: the session, and the lines of that."""
+    hair, _, session = preview
+    previews.play(evaluated())
+    hair.hairloom.shown_overlays = {kind}
+    return session, overlays(session)
+
+
+def test_stretch_shows_each_segment_of_the_guides_once_and_none_at_rest_as_stretched(
+    preview, evaluated
+):
+    session, found = played(preview, evaluated, "stretch")
+    guides = session.solver.guides()
+    (lines,) = found
+    assert lines.color == motion_lines.STRETCHES[0][1]
+    np.testing.assert_array_equal(lines.points[::2], guides[:, :-1].reshape(-1, 3))
+    longer = guides.copy()
+    longer[3, -1] = guides[3, -2] + 1.1 * (guides[3, -1] - guides[3, -2])
+    session.solver.carry(session.solver.pose, longer)
+    worst = dict(motion_lines.stretch_lines(session))[motion_lines.STRETCHES[2][1]]
+    np.testing.assert_allclose(worst, longer[3, -2:], atol=1e-6)
+
+
+def test_contacts_show_what_touches_and_how_deep_the_rest_is(preview, evaluated, monkeypatch):
+    """A ball around a tip."""
+    session, _ = played(preview, evaluated, "contacts")
+    tip = session.solver.guides()[0, -1]
+    center = (tip + [0.004, 0.0, 0.0]).astype(np.float32)
+    ball = PosedCollider(SphereCollider(center, 0.01), np.eye(4), np.eye(4))
+    monkeypatch.setattr(session, "_posed", (ball,))
+    inside = dict(motion_lines.contact_lines(session))[motion_lines.INSIDE].reshape(-1, 2, 3)
+    assert (np.abs(inside[:, 0] - tip).max(axis=1) < 1e-6).any()
+    away = np.linalg.norm(inside - center, axis=2)
+    assert away[:, 0].max() < 0.01
+    np.testing.assert_allclose(away[:, 1], 0.01, rtol=1e-3)
+
+
+def test_density_shows_the_cells_that_two_slices_cut(preview, evaluated):
+    session, found = played(preview, evaluated, "density")
+    guides = session.solver.guides()
+    cell = session.solver.motion.dynamics.rest.hair_grid.cell
+    squares = np.concatenate([lines.points.reshape(-1, 8, 3) for lines in found])
+    flat = np.ptp(squares, axis=1)
+    assert (flat.min(axis=1) < 1e-5).all(), "each lies in a plane"
+    np.testing.assert_allclose(np.sort(flat, axis=1)[:, 1:], 0.88 * cell, rtol=1e-3)
+    middle = guides[:, 0].mean(axis=0)
+    points = guides.reshape(-1, 3) - middle + motion_lines.BEGIN * cell
+    cells = np.unique(np.floor(points / cell), axis=0)
+    cut = sum((cells[:, axis] == 0.0).sum() for axis in (0, 1))
+    assert len(squares) == cut > 10
+
+
+def test_the_graph_of_milliseconds_goes_from_edge_to_edge_and_up_by_its_values():
+    corner, extent = np.array([10.0, 20.0]), np.array([100.0, 40.0])
+    lines = graph_lines([0.0, 25.0, 50.0], 50.0, corner, extent)
+    np.testing.assert_allclose(lines, [[10, 20], [60, 40], [60, 40], [110, 60]])
+    assert len(graph_lines([1.0], 50.0, corner, extent)) == 0

@@ -53,6 +53,22 @@ OVERLAYS = (
         "they push points of the hair, the same at 10 m/s²",
     ),
     ("lights", "Lights", "From the hair towards each light that shines on it"),
+    (
+        "stretch",
+        "Stretch",
+        "Guides by how far they are from the lengths of their style: yellow from 1 %, red from 5 %",
+    ),
+    (
+        "contacts",
+        "Contacts",
+        "Points of guides that touch a collider; red: how deep they are inside",
+    ),
+    (
+        "density",
+        "Density",
+        "Two slices of the cells in which hair feels hair: green as dense as at rest, blue less, "
+        "yellow and red more",
+    ),
 )
 _DEBUG_VIEWS = (
     ("none", "Hair", "Hair as it is shaded"),
@@ -257,7 +273,8 @@ class HAIRLOOM_PG_character(bpy.types.PropertyGroup):
             items=OVERLAYS,
             options={"ENUM_FLAG"},
             name="Overlays",
-            description="What acts on the hair, drawn into the viewport as lines",
+            description="What acts on the hair, and what happens to it, drawn into the viewport as "
+            "lines",
             default=set(),
             update=lambda self, _context: changed.settings(self.id_data),
             override=OVERRIDABLE,

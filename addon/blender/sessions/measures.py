@@ -15,7 +15,9 @@ import numpy as np
 from ...dynamics.figures import Figures, blank_table
 
 #: The median of this many frames is reported, and only of those not older than this [s].
-_KEPT, _LATEST = 15, 10.0
+_REPORTED, _LATEST = 15, 10.0
+#: Frames of which the times are kept, for a graph.
+_KEPT = 60
 
 #: of a frame
 PARTS = ("simulation", "drawing")
@@ -41,8 +43,13 @@ class FrameTimes:
         # a frame that takes long does not make its own parts old
         frame = sum(times[-1][1] for times in self._times.values() if times)
         oldest = time.perf_counter() - _LATEST - frame
-        recent = [spent for when, spent in self._times[part] if when > oldest]
+        last = list(self._times[part])[-_REPORTED:]
+        recent = [spent for when, spent in last if when > oldest]
         return 1000.0 * median(recent) if recent else None
+
+    def history(self, part: str) -> list[float]:
+        """Of the last frames, however old, the latest last [ms]."""
+        return [1000.0 * spent for _, spent in self._times[part]]
 
     @property
     def line(self) -> str:

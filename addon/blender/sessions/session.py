@@ -122,6 +122,11 @@ class Session:
         return self._styled or self.groom.rig
 
     @property
+    def posed(self) -> tuple[PosedCollider, ...]:
+        """What the hair collides with, where it is in the frame that is shown."""
+        return self._posed
+
+    @property
     def is_made(self) -> bool:
         """Whether there is hair to be shown; False until the first one is made."""
         return not self.groom.is_placeholder

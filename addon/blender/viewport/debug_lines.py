@@ -1,5 +1,6 @@
-"""What acts on the hair, as thin lines in the 3D view: colliders, wind and lights; and the guides,
-while brushes comb them and Blender's own thick strands are hidden."""
+"""What acts on the hair, as thin lines in the 3D view: colliders, wind and lights; what happens to
+it, see `motion_lines`; and the guides, while brushes comb them and Blender's own thick strands are
+hidden."""
 
 from __future__ import annotations
 
@@ -26,9 +27,9 @@ from ...pipeline import carried_guides, root_normals, root_turns
 from ...render import gpu_objects
 from ...shading.lights import Light
 from ...strands.affine import moved
-from ..properties.groups import OVERLAYS
 from ..scene.forces import force_fields_of
 from ..sessions.session import Session
+from .motion_lines import contact_lines, density_lines, stretch_lines
 
 #: Linear colours with alpha.
 COLORS = {
@@ -36,6 +37,7 @@ COLORS = {
     "wind": (0.2, 0.55, 1.0, 0.9),
     "lights": (1.0, 0.8, 0.25, 0.7),
 }
+MOTION_LINES = {"stretch": stretch_lines, "contacts": contact_lines, "density": density_lines}
 #: Of guides under a brush.
 GUIDES = (0.9, 0.9, 0.9, 0.35)
 #: Corners of a circle.
@@ -98,10 +100,12 @@ def debug_lines_of(
         ),
         "lights": lambda: light_lines(session.snapshot.lights, *points),
     }
+    lines = [(COLORS[kind], make()) for kind, make in made.items() if kind in wanted]
+    if session.is_playing:
+        for kind, make_colored in MOTION_LINES.items():
+            lines += make_colored(session) if kind in wanted else ()
     return combed + tuple(
-        Lines(COLORS[kind], lines.astype(np.float32))
-        for kind, _, _ in OVERLAYS
-        if kind in wanted and len(lines := made[kind]())
+        Lines(color, points.astype(np.float32)) for color, points in lines if len(points)
     )
 
 

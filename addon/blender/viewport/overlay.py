@@ -35,7 +35,7 @@ from ..sessions.session import Session
 from ..sessions.snapshots import with_all_strands
 from . import view_transform
 from .debug_lines import Lines, debug_lines_of, draw_lines
-from .overlay_text import card_counts_line, counts_line, write_lines
+from .overlay_text import card_counts_line, counts_line, draw_graphs, write_lines
 
 
 @dataclass(frozen=True)
@@ -267,6 +267,8 @@ def _draw_counts(context: Any) -> None:
         if drawing.counts_of
     ]
     write_lines(context, lines + notes)
+    graphs = [drawing.times for _, drawing in shown_in(context) if drawing.counts_of]
+    draw_graphs(context, graphs, len(lines + notes))
 
 
 def _counts_of(drawn: Drawn) -> str:

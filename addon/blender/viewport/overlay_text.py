@@ -1,17 +1,27 @@
-"""Counts of what is drawn, as text in a corner of a 3D view."""
+"""Counts of what is drawn, as text in a corner of a 3D view, and a graph of its frames above."""
 
 from __future__ import annotations
 
 from typing import Any
 
 import blf
+import gpu
+import numpy as np
 
+from ...arrays import Floats
+from ...render import gpu_objects
 from ...render.strand_pass import Statistics
+from ..sessions.measures import PARTS, FrameTimes
 
 #: In pixels at UI scale 1: from the edges, and from line to line as a factor of the letters' size.
 _MARGIN, _LINE = 12.0, 1.5
 _OF_CARDS = ("cards", "triangles", "vertices")
 _FONT = 0  # Blender's own
+#: Of a graph: width and height at UI scale 1, the milliseconds that fit, at least, and the colours
+#: of the parts of a frame and of the line at 1/24 s.
+_WIDTH, _HEIGHT, _FULL = 180.0, 40.0, 50.0
+_COLORS = {"simulation": (0.3, 0.7, 1.0, 0.95), "drawing": (1.0, 0.65, 0.2, 0.95)}
+_RULE = (1.0, 1.0, 1.0, 0.25)
 
 
 def counts_line(name: str, guide_count: int, strand_count: int, drawn: Statistics) -> str:
@@ -38,10 +48,7 @@ def card_counts_line(name: str, guide_count: int, drawn: tuple[int, ...]) -> str
 
 def write_lines(context: Any, lines: list[str]) -> None:
     """Write into the view's lower left corner, where Blender itself writes nothing."""
-    system = context.preferences.system
-    size = context.preferences.ui_styles[0].widget.points * system.ui_scale
-    left, bottom = free_corner(context.area, context.region)
-    margin = _MARGIN * system.ui_scale
+    size, left, bottom = _corner(context)
     blf.size(_FONT, size)
     blf.color(_FONT, *context.preferences.themes[0].view_3d.space.text_hi, 1.0)
     blf.enable(_FONT, blf.SHADOW)
@@ -49,10 +56,63 @@ def write_lines(context: Any, lines: list[str]) -> None:
         blf.shadow(_FONT, 5, 0.0, 0.0, 0.0, 0.8)
         blf.shadow_offset(_FONT, 1, -1)
         for index, line in enumerate(reversed(lines)):
-            blf.position(_FONT, left + margin, bottom + margin + index * _LINE * size, 0.0)
+            blf.position(_FONT, left, bottom + index * _LINE * size, 0.0)
             blf.draw(_FONT, line)
     finally:
         blf.disable(_FONT, blf.SHADOW)
+
+
+def _corner(context: Any) -> tuple[float, float, float]:
+    """Of letters the size, and the left and bottom edge of what is written [pixels]."""
+    system = context.preferences.system
+    size = context.preferences.ui_styles[0].widget.points * system.ui_scale
+    left, bottom = free_corner(context.area, context.region)
+    margin = _MARGIN * system.ui_scale
+    return size, left + margin, bottom + margin
+
+
+def draw_graphs(context: Any, times: list[FrameTimes], line_count: int) -> None:
+    """The milliseconds of the last frames of each groom, side by side above so many lines."""
+    size, left, bottom = _corner(context)
+    scale = context.preferences.system.ui_scale
+    bottom += line_count * _LINE * size
+    for each in times:
+        histories = {part: each.history(part) for part in PARTS}
+        if max(map(len, histories.values())) < 2:
+            continue
+        full = max(_FULL, *(max(history, default=0.0) for history in histories.values()))
+        place = np.array([left, bottom]), np.array([_WIDTH, _HEIGHT]) * scale
+        _draw(_RULE, graph_lines([1000.0 / 24.0] * 2, full, *place))
+        for part, history in histories.items():
+            _draw(_COLORS[part], graph_lines(history, full, *place))
+        left += (_WIDTH + _MARGIN) * scale
+
+
+def graph_lines(history: list[float], full: float, corner: Floats, extent: Floats) -> Floats:
+    """Values from left to right as lines, (2n, 2) [pixels]; `full` reaches the top."""
+    if len(history) < 2:
+        return np.zeros((0, 2))
+    along = np.linspace(0.0, 1.0, len(history))
+    points = corner + np.stack([along, np.array(history) / full], axis=1) * extent
+    return np.stack([points[:-1], points[1:]], axis=1).reshape(-1, 2)
+
+
+def _draw(color: tuple[float, float, float, float], points: Floats) -> None:
+    if not len(points):
+        return
+    shader = gpu.shader.from_builtin("UNIFORM_COLOR")
+    layout = gpu.types.GPUVertFormat()
+    layout.attr_add(id="pos", comp_type="F32", len=2, fetch_mode="FLOAT")
+    vertices = gpu_objects.vertex_buffer(layout, len(points))
+    vertices.attr_fill("pos", np.ascontiguousarray(points, np.float32))
+    blend = gpu.state.blend_get()
+    gpu.state.blend_set("ALPHA")
+    try:
+        shader.bind()
+        shader.uniform_float("color", color)
+        gpu_objects.batch(type="LINES", buf=vertices).draw(shader)
+    finally:
+        gpu.state.blend_set(blend)
 
 
 def free_corner(area: Any, region: Any) -> tuple[int, int]:

@@ -1,0 +1,123 @@
+"""What happens to hair that is simulated, as coloured lines: where guides are longer or shorter
+than their style, where they touch or have entered colliders, and how dense the hair is by cells."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from ...arrays import Bools, Floats, Ints
+from ...dynamics.among import BEGIN
+from ...dynamics.colliders import signed_distance
+from ...dynamics.contacts import radius_of_all
+from ...dynamics.settings import DynamicsSettings
+from ...dynamics.turn import rotation_from, sample
+from ..sessions.session import Session
+
+type Color = tuple[float, float, float, float]
+#: a fraction of the length, from which on segments have a colour
+STRETCHES: tuple[tuple[float, Color], ...] = (
+    (0.0, (0.25, 0.6, 0.3, 0.25)),
+    (0.01, (1.0, 0.75, 0.1, 0.9)),
+    (0.05, (1.0, 0.15, 0.1, 1.0)),
+)
+#: of points that touch, and of those that are inside
+TOUCHING: Color = (0.2, 0.9, 0.6, 0.9)
+INSIDE: Color = (1.0, 0.15, 0.1, 1.0)
+#: how far from a collider a point touches it, in terms of its own distance; how long its line is,
+#: in terms of the hair's length
+_NEAR, _TICK = 1.05, 0.03
+#: how dense hair is in a cell, in terms of the mean of all cells with hair at rest
+DENSITIES: tuple[tuple[float, Color], ...] = (
+    (0.0, (0.2, 0.4, 1.0, 0.35)),
+    (0.5, (0.2, 0.9, 0.5, 0.6)),
+    (1.5, (1.0, 0.75, 0.1, 0.8)),
+    (3.0, (1.0, 0.15, 0.1, 1.0)),
+)
+#: Squares are smaller than their cells by this, so that the colours of neighbours are told apart.
+_INSET = 0.06
+
+type Colored = Iterator[tuple[Color, Floats]]
+
+
+def stretch_lines(session: Session) -> Colored:
+    """Segments of all guides by how far they are from the lengths of their style."""
+    now, rest = session.solver.guides(), session.solver.motion.dynamics.rest.length.T
+    segments = np.stack([now[:, :-1], now[:, 1:]], axis=2)
+    length = np.linalg.norm(segments[:, :, 1] - segments[:, :, 0], axis=2)
+    change = np.abs(length / np.maximum(rest, 1.0e-12) - 1.0)
+    for color, chosen in _classes(change, STRETCHES):
+        yield color, segments[chosen].reshape(-1, 3)
+
+
+def contact_lines(session: Session) -> Colored:
+    """From points of guides that touch a collider, away from it; from those inside, to where they
+    would come out."""
+    settings, guides = session.settings[DynamicsSettings], session.solver.guides()
+    count, cv_count, _ = guides.shape
+    size = session.solver.motion.dynamics.rest.size
+    radius = radius_of_all(settings, cv_count, count, size).reshape(cv_count, count).T
+    reach = max(float(radius.max(initial=0.0)) * _NEAR, 1.0e-6)
+    found = signed_distance(guides.reshape(-1, 3), session.posed, reach)
+    distance, outward = found[0].reshape(count, cv_count), found[1].reshape(guides.shape)
+    is_inside = (distance < 0.0) & np.isfinite(radius)
+    touches = (distance <= radius * _NEAR) & (distance < reach) & ~is_inside & np.isfinite(radius)
+    tick = np.full(distance.shape, _TICK * size, np.float32)
+    for color, chosen, long in ((TOUCHING, touches, tick), (INSIDE, is_inside, -distance)):
+        ends = guides[chosen] + outward[chosen] * long[chosen][:, None]
+        yield color, np.stack([guides[chosen], ends], axis=1).reshape(-1, 3)
+
+
+def density_lines(session: Session) -> Colored:
+    """Two slices of the hair grid through the middle of the roots: cells with hair as squares, by
+    how dense it is."""
+    rest, guides = session.solver.motion.dynamics.rest, session.solver.guides()
+    if not len(guides):
+        return
+    grid = rest.hair_grid
+    turn = rotation_from(rest.sample, sample(guides))
+    middle = guides[:, 0].mean(axis=0, dtype=np.float64)
+    place = grid.place(turn, middle)
+    at_rest, _ = _cells(grid.place(np.eye(3), grid.middle).cells(rest.position), grid.mass)
+    usual = float(at_rest.mean())
+    mass, cell = _cells(place.cells(np.ascontiguousarray(guides.transpose(2, 1, 0))), grid.mass)
+    for across in (0, 1):
+        is_cut = cell[:, across] == np.floor(BEGIN[across])
+        squares = _squares(cell[is_cut], across)
+        for color, chosen in _classes(mass[is_cut] / usual, DENSITIES):
+            corners = (squares[chosen].reshape(-1, 3) - BEGIN) * grid.cell
+            yield color, corners @ turn.T + middle
+
+
+def _cells(places: Floats, mass: Floats) -> tuple[Floats, Ints]:
+    """How much hair there is in each cell that has any, (n,), and which cells these are, (n, 3).
+
+    Args:
+        places: (3, cv_count, guide_count) in cells. mass: (guide_count,).
+    """
+    every = np.floor(places.reshape(3, -1).T).astype(np.int64)
+    cells, index = np.unique(every, axis=0, return_inverse=True)
+    weights = np.broadcast_to(mass, places.shape[1:]).ravel()
+    return np.bincount(index.ravel(), weights, len(cells)), cells
+
+
+def _squares(cells: Ints, across: int) -> Floats:
+    """The outlines of cells in the plane across an axis, (n, 8, 3) in cells."""
+    one, other = (axis for axis in range(3) if axis != across)
+    corner = np.array([[0, 0], [1, 0], [1, 0], [1, 1], [1, 1], [0, 1], [0, 1], [0, 0]], float)
+    corner = _INSET + corner * (1.0 - 2.0 * _INSET)
+    squares = np.repeat(cells[:, None].astype(np.float64), 8, axis=1)
+    squares[..., across] += 0.5
+    squares[..., one] += corner[:, 0]
+    squares[..., other] += corner[:, 1]
+    return squares
+
+
+def _classes(
+    values: Floats, colors: tuple[tuple[float, Color], ...]
+) -> Iterator[tuple[Color, Bools]]:
+    """Each colour, and where values are from its begin up to that of the next one."""
+    ends = [begin for begin, _ in colors[1:]] + [np.inf]
+    for (begin, color), end in zip(colors, ends, strict=True):
+        yield color, (values >= begin) & (values < end)
