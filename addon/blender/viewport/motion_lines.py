@@ -35,7 +35,7 @@ DENSITIES: tuple[tuple[float, Color], ...] = (
     (1.5, (1.0, 0.75, 0.1, 0.8)),
     (3.0, (1.0, 0.15, 0.1, 1.0)),
 )
-#: Squares are smaller than their cells by this, so that the colours of neighbours are told apart.
+#: Squares are smaller than their cells by this, so that neighbours do not share a line.
 _INSET = 0.06
 
 type Colored = Iterator[tuple[Color, Floats]]

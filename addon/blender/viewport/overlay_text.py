@@ -72,7 +72,7 @@ def _corner(context: Any) -> tuple[float, float, float]:
 
 
 def draw_graphs(context: Any, times: list[FrameTimes], line_count: int) -> None:
-    """The milliseconds of the last frames of each groom, side by side above so many lines."""
+    """The milliseconds of the last frames of each groom, side by side above the lines."""
     size, left, bottom = _corner(context)
     scale = context.preferences.system.ui_scale
     bottom += line_count * _LINE * size
