@@ -41,7 +41,11 @@ from hairloom.addon.params import Parameter
 CV_COUNTS = (2, 3, 4, 8, 16, 24)
 FRAME_RATES = (12.0, 24.0, 30.0, 60.0, 120.0)
 #: Left out: what no step reads, and what is drawn by itself, so that the runs stay what they were.
-_NOT_DRAWN = {"device", "collider_resolution", "curl_stretch", "curl_bounce"}
+_NOT_DRAWN = {"device", "collider_resolution", "curl_stretch", "curl_bounce"} | {
+    "animated_style",
+    "simulated",
+    "simulated_mask",
+}
 #: Sweeps over a segment in a second of simulation; with more of them a run takes minutes.
 _SWEEPS = 60_000
 #: Shorter than this a strand has no length to be compared with [m].
