@@ -128,6 +128,10 @@ class Measure:
         self._stretch = self._penetration = 0.0
         self._change, self._depth = (np.zeros(len(offsets) - 1) for _ in range(2))
 
+    def take_style(self, rest: DynamicsState) -> None:
+        """Guides have these lengths from the next frame on."""
+        self._rest = rest
+
     def add(
         self, points: Floats, rest_lengths: Floats, guides: Floats, colliders: Colliders
     ) -> None:

@@ -113,6 +113,9 @@ def test_a_bake_has_the_style_of_each_frame(moving: Any, evaluated: Any) -> None
     for _ in Bake.of([moving], bpy.context.scene).steps():
         pass
     cache = Cache(Path(moving.hairloom.bake.folder))
+    figures = cache.facts.figures
+    assert figures is not None, "it was measured"
+    assert figures.stretch_max_percent < 1.5 and figures.strands_stretch_max_percent < 1.5
     for frame, strands in enumerate(played, 1):
         np.testing.assert_allclose(rig_in(cache).strands(cache.frame(frame)), strands, atol=2e-6)
     bpy.context.scene.frame_set(5)

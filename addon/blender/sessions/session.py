@@ -506,7 +506,10 @@ class Session:
 
     def measure_into(self, measure: Measure) -> None:
         """Take the present frame into account; reads strands back from a GPU."""
-        guides = self.solver.guides()
+        guides, rig = self.solver.guides(), self.rig
+        if self._styled is not None:
+            style = pipeline.carried_guides(rig, self.solver.pose)
+            measure.take_style(start(style, rig.curl_room))
         measure.add(self.solver.strands(), self._rest_lengths(), guides, self._posed)
 
     def _rest_lengths(self) -> Floats:
