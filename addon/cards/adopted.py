@@ -230,9 +230,17 @@ def _groups(triangles: Ints, card: Ints, group: Ints | None) -> Ints:
 def _direction_notes(axes: UvAxes, island: Ints, card: Ints, head: Surface | None) -> Iterator[str]:
     if head is None:
         yield "There is no head, so the higher end of the cards was taken for their roots"
-    doubtful = len(np.unique(card[axes.is_doubtful[island]]))
-    if doubtful:
-        yield f"The UVs of {_cards(doubtful)} run another way than most, or leave the root open"
+    count = int(card.max()) + 1
+    against, unsaid = (
+        len(np.unique(card[flags[island]])) for flags in (axes.is_against, axes.is_unsaid)
+    )
+    if against:
+        yield f"The UVs of {against} of {_cards(count)} run another way than those of the others"
+    if unsaid:
+        yield (
+            f"The UVs of {unsaid} of {_cards(count)} leave open which end is the root. "
+            "Choose it under Root to Tip"
+        )
 
 
 def _shape_notes(source: Surface, card: Ints, is_mixed: Bools) -> Iterator[str]:

@@ -42,12 +42,14 @@ class UvAxes:
 
     axis: (island_count,) 0 where hair runs along u, 1 along v.
     is_down: (island_count,) whether the root is where that coordinate is largest.
-    is_doubtful: (island_count,) whether only the other islands decided, or it runs against them.
+    is_against: (island_count,) whether it runs another way than the others.
+    is_unsaid: (island_count,) whether nothing says which end is the root, not even the others.
     """
 
     axis: Ints
     is_down: Bools
-    is_doubtful: Bools
+    is_against: Bools
+    is_unsaid: Bools
 
 
 def uv_axes(
@@ -66,7 +68,7 @@ def uv_axes(
         count = int(island.max()) + 1
         known_axis, known_end = _KNOWN[direction]
         nobody = np.zeros(count, bool)
-        return UvAxes(np.full(count, known_axis), np.full(count, known_end), nobody)
+        return UvAxes(np.full(count, known_axis), np.full(count, known_end), nobody, nobody)
     area = _sums(island, _areas(corners))
     lengths = _lengths(corners, uv, island)
     ratio = np.log(np.maximum(lengths[:, 1], 1e-12) / np.maximum(lengths[:, 0], 1e-12))
@@ -77,16 +79,16 @@ def uv_axes(
     length = np.take_along_axis(lengths, axis[:, None], axis=1)[:, 0]
     end = _end_evidence(corners, uv, distance, island, axis) / np.maximum(length, 1e-12)
     is_down = np.zeros(len(axis), bool)
-    is_doubtful = axis != usual
+    is_against, is_unsaid = axis != usual, np.zeros(len(axis), bool)
     for each in (0, 1):
         own = axis == each
         vote = float((area * np.clip(end, -1.0, 1.0))[own].sum())
         is_strong = np.abs(end) > _CLEAR_END
         is_down[own] = np.where(is_strong, end > 0.0, vote > 0.0)[own]
-        against = is_strong & ((end > 0.0) != (vote > 0.0))
-        is_unsaid = np.full(len(axis), abs(vote) <= _NO_END * float(area[own].sum()))
-        is_doubtful |= own & (against | (is_unsaid & ~is_strong))
-    return UvAxes(axis, is_down, is_doubtful)
+        is_against |= own & is_strong & ((end > 0.0) != (vote > 0.0))
+        if abs(vote) <= _NO_END * float(area[own].sum()):
+            is_unsaid |= own & ~is_strong
+    return UvAxes(axis, is_down, is_against, is_unsaid & ~is_against)
 
 
 def coordinate_gradients(corners: Floats, uv: Floats) -> Floats:

@@ -81,6 +81,25 @@ def test_our_own_cards_are_understood_whichever_way_they_lie(laid: str, stands: 
     assert known.notes == ()
 
 
+def test_cards_that_run_another_way_are_counted_and_of_how_many() -> None:
+    mesh = hanging()
+    turned = np.unique(mesh.triangles[mesh.card < 4])
+    uv = mesh.uv.copy()
+    uv[turned] = LAID["down"](uv[turned])
+    adopted = adopt_cards(as_source(mesh, uv), ball(), place="test")
+    said = "The UVs of 4 of 24 cards run another way than those of the others"
+    assert adopted.notes == (said,)
+
+
+def test_cards_whose_root_nothing_tells_are_said_to_be_such() -> None:
+    """They lie flat, without a head."""
+    mesh = hanging()
+    flat = Surface(mesh.positions * [1.0, 1.0, 0.0], mesh.triangles, mesh.uv[mesh.triangles])
+    notes = adopt_cards(flat, None, place="test").notes
+    assert any("The UVs of 24 of 24 cards leave open which end is the root" in n for n in notes)
+    assert not any("another way" in note for note in notes)
+
+
 def test_without_a_head_the_higher_end_is_the_root() -> None:
     mesh = hanging()
     adopted = adopt_cards(as_source(mesh), None, place="test")
@@ -238,7 +257,9 @@ def test_a_ponytail_of_an_artist(shared_data: Path, body: Surface) -> None:
     adopted = adopt_cards(source, body, place="ponytail01")
     mesh = adopted.mesh
     assert mesh.card_count == 48
-    assert len(adopted.notes) == 1 and "another way than most" in adopted.notes[0]
+    assert (
+        len(adopted.notes) == 1 and "The UVs of 6 of 48 cards run another way" in adopted.notes[0]
+    )
     sizes = np.bincount(mesh.card)
     tail, locks = int(sizes.argmax()), np.flatnonzero(sizes <= 36)
     for card in (tail, *locks):
