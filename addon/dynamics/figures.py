@@ -29,6 +29,8 @@ STRETCHED, INSIDE = 0.01, 0.001
 class Figures:
     """Of some frames, each guide and each strand by its worst one. Reports have the same names.
 
+    Segments and strands shorter than a hundredth of the median one count as that long in stretches.
+
     stretch_max_percent: of a guide's segment, but of no curl's, for these may stretch.
     penetration_max_mm: of a guide's point, also where it was inside at rest.
     strands_stretch_*: change of length of all strands as drawn; the worst, and the 99th percentile.

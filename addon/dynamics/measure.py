@@ -12,12 +12,16 @@ from .colliders.signed_distance import signed_distance
 from .constraints import PINNED, TINY, directions
 from .state import DynamicsState
 
+#: What is shorter than this fraction of the median counts as that long: where hair is a thousandth
+#: of a millimetre long, rounding of float32 alone makes it many times as long.
+SHORTEST = 0.01
+
 
 def max_stretch(state: DynamicsState) -> float:
     """Largest change of a simulated segment's length, as a fraction of its rest length.
 
     Segments between pinned CVs belong to the style, those without length cannot stretch, and those
-    of curls may.
+    of curls may. See SHORTEST.
     """
     rest = state.rest.length[PINNED - 1 :]
     if not rest.size:
@@ -26,7 +30,8 @@ def max_stretch(state: DynamicsState) -> float:
     is_fixed = rest > TINY
     if state.rest.room is not None:
         is_fixed &= state.rest.room[PINNED - 1 :] == 0.0
-    change = np.divide(np.abs(length - rest), rest, out=np.zeros_like(rest), where=is_fixed)
+    long = np.maximum(rest, np.float32(SHORTEST * state.rest.size / len(state.rest.length)))
+    change = np.divide(np.abs(length - rest), long, out=np.zeros_like(rest), where=is_fixed)
     return float(change.max())
 
 
@@ -58,10 +63,11 @@ def length_changes(points: Floats, offsets: Ints, rest_lengths: Floats) -> Float
     Args:
         points: (point_count, 3) [m], strand after strand.
         offsets: (strand_count + 1,), strand s is points[offsets[s]:offsets[s + 1]].
-        rest_lengths: (strand_count,) [m].
+        rest_lengths: (strand_count,) [m]; see SHORTEST.
     """
     change = np.abs(lengths(points, offsets) - rest_lengths)
-    return np.asarray(change / np.maximum(rest_lengths, TINY))
+    shortest = SHORTEST * float(np.median(rest_lengths)) if len(rest_lengths) else 0.0
+    return np.asarray(change / np.maximum(rest_lengths, max(shortest, TINY)))
 
 
 def are_outside(points: Floats, colliders: tuple[PosedCollider, ...]) -> Bools:

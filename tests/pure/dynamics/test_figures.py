@@ -55,6 +55,26 @@ def test_each_strand_counts_by_its_worst_frame():
     assert measure.figures.stretch_max_percent == pytest.approx(10.0, abs=1e-3)
 
 
+def test_what_is_too_short_to_be_measured_does_not_decide():
+    """A strand and guide of 2 micrometres, in segments of 0.0003 mm, where the next float is 0.0001
+    mm off: 6 micrometres more are 300 % of it, and 0.3 % of what counts."""
+    grid = upright() + np.float32(1.0)
+    grid[0] = 1.0
+    grid[0, :, 2] += np.linspace(0.0, 2.0e-6, POINTS)
+    points, offsets = grid.reshape(-1, 3), np.arange(COUNT + 1) * POINTS
+    measure = Measure(start(grid[:4]), points, offsets, ())
+    now = grid.copy()
+    now[0, -1, 2] += 6.0e-6
+    lengths = np.where(np.arange(COUNT) == 0, 2.0e-6, LENGTHS)
+    measure.add(now.reshape(-1, 3), lengths, now[:4], ())
+    assert 0.2 < measure.figures.strands_stretch_max_percent < 0.5
+    assert 1.0 < measure.figures.stretch_max_percent < 3.0  # of a hundredth of 29 mm
+    now = grid.copy()
+    now[3, -1, 2] += 0.1 * 0.2 / (POINTS - 1)
+    measure.add(now.reshape(-1, 3), lengths, now[:4], ())
+    assert measure.figures.stretch_max_percent == pytest.approx(10.0, abs=0.1)
+
+
 def test_only_what_was_outside_at_rest_counts_as_inside():
     grid = upright()
     measure = measure_of(grid, ball(0.0))
