@@ -80,17 +80,6 @@ def flat(surface: Surface) -> Plane | None:
     return Plane(origin, axes[2], surface) if is_flat else None
 
 
-def is_closed(surface: Surface) -> bool:
-    """Whether the mesh has an inside: each edge is passed as often one way as the other. Vertices
-    at one place are one, since files part them along seams."""
-    _, same = np.unique(surface.positions, axis=0, return_inverse=True)
-    corners = same.reshape(-1)[surface.triangles].astype(np.int64)
-    start, end = corners.ravel(), np.roll(corners, -1, axis=1).ravel()
-    low, high = np.minimum(start, end), np.maximum(start, end)
-    _, edge = np.unique(low * len(surface.positions) + high, return_inverse=True)
-    return not np.bincount(edge.reshape(-1), np.sign(end - start)).any()
-
-
 @dataclass(frozen=True, eq=False)
 class Trimmed:
     """points: (point_count, 3) float32 [m]. is_trimmed, is_outside: (strand_count,), shorter than

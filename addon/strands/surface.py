@@ -12,6 +12,11 @@ from ..arrays import Floats, Ints
 from ..errors import HairloomError
 from .affine import moved
 from .vectors import unit
+from .weld import same_places
+
+#: Vertices at one place share a normal where their own are within 41 degrees of it (cosine): those
+#: of a box that is cut apart at its edges stay 45 degrees and more away.
+_SMOOTH = 0.75
 
 
 @dataclass(frozen=True)
@@ -56,8 +61,17 @@ class Surface:
         a, b, c = np.moveaxis(self.corners, 1, 0)
         return unit(np.cross(b - a, c - a))
 
+    def welded_triangles(self) -> Ints:
+        """The triangles by numbers of places: vertices at one place have the same one."""
+        triangles: Ints = self.once(_places)[self.triangles]
+        return triangles
+
     def vertex_normals(self) -> Floats:
-        """Unit normals, (vertex_count, 3), weighted by angle (Thuermer and Wuethrich 1998)."""
+        """Unit normals, (vertex_count, 3), weighted by angle (Thuermer and Wuethrich 1998).
+
+        Vertices at one place share theirs, so that seams of UVs are not seen, but where they face
+        apart, as at hard edges and on sheets with two sides.
+        """
         corners, normals = self.corners, self.triangle_normals()
         total = np.zeros_like(self.positions)
         for corner in range(3):
@@ -65,7 +79,19 @@ class Surface:
             two = unit(corners[:, (corner + 2) % 3] - corners[:, corner])
             angle = np.arccos(np.clip(np.einsum("ij,ij->i", one, two), -1.0, 1.0))
             np.add.at(total, self.triangles[:, corner], normals * angle[:, None])
-        return unit(total)
+        return self._shared(total)
+
+    def _shared(self, total: Floats) -> Floats:
+        """Unit normals, (vertex_count, 3), of sums of normals around each vertex."""
+        own, place = unit(total), self.once(_places)
+        count = int(place.max(initial=-1)) + 1
+        if count == len(own):
+            return own
+        of_place = np.zeros((count, 3), np.float32)
+        np.add.at(of_place, place, total)
+        shared = unit(of_place)[place]
+        is_smooth = np.einsum("ij,ij->i", own, shared) > _SMOOTH
+        return np.where(is_smooth[:, None], shared, own)
 
     def bounds(self) -> tuple[Floats, Floats]:
         """Lowest and highest corner, each (3,) [m]."""
@@ -103,6 +129,11 @@ class Surface:
             return replace(self, positions=positions)
         uv = None if self.corner_uv is None else self.corner_uv[:, ::-1]
         return replace(self, positions=positions, triangles=self.triangles[:, ::-1], corner_uv=uv)
+
+
+def _places(surface: Surface) -> Ints:
+    """A number for each vertex, the same for those at one place, (vertex_count,)."""
+    return same_places(surface.positions)
 
 
 def _are_equal(some: tuple[Any, ...], others: tuple[Any, ...]) -> bool:

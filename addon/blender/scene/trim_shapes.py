@@ -10,9 +10,10 @@ import numpy as np
 from ...arrays import Bools, Floats
 from ...dynamics.colliders.winding import winding_number
 from ...errors import HairloomError
-from ...groom.trim import Plane, Shape, flat, is_closed
+from ...groom.trim import Plane, Shape, flat
 from ...strands import Surface
 from ...strands.crossings import first_crossings
+from ...strands.mesh_faults import edges_of
 from ..base.objects import head_of, matrix_of
 from .own_collections import objects_in
 from .surfaces import read_surface
@@ -70,7 +71,7 @@ def read_shape(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Shape:
     shape = flat(surface)
     if shape is not None:
         return shape
-    if not is_closed(surface):
+    if not edges_of(surface).are_closed:
         raise HairloomError(
             "it is neither closed nor flat, so it has no inside",
             place=obj.name,

@@ -22,7 +22,7 @@ from ...strands import Surface
 from .chart import Chart, barycentric, chart_of, covering
 from .gutter import clamped, gutter_at
 from .near_borders import nearest_borders
-from .seams import Borders, copies_of, find_borders, welded
+from .seams import Borders, copies_of, find_borders
 
 #: [texels] how far an island goes on beyond its borders
 GUTTER = 32
@@ -148,7 +148,7 @@ def _copies(
     surface: Surface, chart: Chart, seams: Borders, triangle_island: Ints
 ) -> tuple[Floats, Ints]:
     """See SkinLayout.copies and end_copies."""
-    vertex = welded(surface)
+    vertex = surface.welded_triangles()
     copies, of_vertex = copies_of(vertex, chart.place, chart.is_mapped, triangle_island)
     ends = np.stack([vertex[seams.triangle, end] for end in (seams.start, seams.end)], axis=1)
     first, last = (np.searchsorted(of_vertex, ends, side) for side in ("left", "right"))

@@ -52,7 +52,7 @@ def find_borders(surface: Surface, place: Floats, is_mapped: Bools) -> tuple[Bor
         place: (triangle_count, 3, 2) of the corners in the map [texels].
         is_mapped: (triangle_count,) whether a triangle has a place in the map at all.
     """
-    vertex = welded(surface)
+    vertex = surface.welded_triangles()
     mapped = np.flatnonzero(is_mapped)
     triangle, start = np.repeat(mapped, 3), np.tile(np.arange(3), len(mapped))
     end = (start + 1) % 3
@@ -78,18 +78,12 @@ def find_borders(surface: Surface, place: Floats, is_mapped: Bools) -> tuple[Bor
     return Borders(*(array[~is_joined] for array in borders)), island
 
 
-def welded(surface: Surface) -> Ints:
-    """The same number for vertices at the same place, (triangle_count, 3)."""
-    _, number = np.unique(surface.positions, axis=0, return_inverse=True)
-    return np.asarray(number).ravel()[surface.triangles]
-
-
 def copies_of(vertex: Ints, place: Floats, is_mapped: Bools, island: Ints) -> tuple[Floats, Ints]:
     """All places of each vertex in the map: rows of x, y and island, sorted by vertex, and the
     vertex of each row.
 
     Args:
-        vertex: (triangle_count, 3), see `welded`. Others as in `find_borders`.
+        vertex: (triangle_count, 3), see `Surface.welded_triangles`. Others as in `find_borders`.
     """
     number = vertex[is_mapped].ravel()
     where = place[is_mapped].reshape(-1, 2)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hairloom.addon.arrays import Floats
-from hairloom.addon.groom.trim import Plane, flat, is_closed, trimmed
+from hairloom.addon.groom.trim import Plane, flat, trimmed
 from hairloom.addon.strands import StrandSet, Surface
 from hairloom.addon.strands.crossings import first_crossings
 
@@ -100,17 +100,6 @@ def test_a_flat_mesh_cuts_as_far_as_it_reaches() -> None:
     assert cut.is_trimmed.tolist() == [True, False, True]
     assert np.abs(cut.points.reshape(3, 9, 3)[[0, 2], -1, 2]).max() < 1e-7
     assert flat(box(0.1)) is None
-
-
-def test_what_is_closed_has_an_inside() -> None:
-    whole = box(0.1)
-    assert is_closed(whole)
-    assert not is_closed(Surface(whole.positions, whole.triangles[1:]))
-    # parted at all edges, as files have it along seams
-    assert is_closed(Surface(whole.corners.reshape(-1, 3), np.arange(36).reshape(12, 3)))
-    turned = whole.triangles.copy()
-    turned[0] = turned[0, ::-1]
-    assert not is_closed(Surface(whole.positions, turned))
 
 
 def test_first_crossings_are_those_of_brute_force() -> None:

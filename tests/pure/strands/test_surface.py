@@ -33,6 +33,34 @@ def test_vertex_normals_do_not_see_the_diagonals() -> None:
     assert cube().vertex_normals() == pytest.approx(CORNERS / np.sqrt(3.0), abs=1e-6)
 
 
+def split(surface: Surface, is_split: Any) -> Surface:
+    """With vertices of their own for these triangles, as files have them along seams."""
+    positions, triangles = list(surface.positions), surface.triangles.copy()
+    for triangle in np.flatnonzero(is_split):
+        triangles[triangle] = len(positions) + np.arange(3)
+        positions += list(surface.corners[triangle])
+    return Surface(np.array(positions), triangles)
+
+
+def test_vertex_normals_do_not_see_seams_but_hard_edges() -> None:
+    """A tube of 24 sides, parted on one half, has the normals of the whole one; a box that is
+    parted everywhere has those of its faces."""
+    angle = 2.0 * np.pi * np.arange(24) / 24
+    rings = [np.stack([np.cos(angle), np.sin(angle), np.full(24, z)], axis=1) for z in (0, 1, 2)]
+    one = np.arange(48)
+    right = one - one % 24 + (one + 1) % 24
+    quads = np.stack([one, right, right + 24, one + 24], axis=1)
+    tube = Surface(
+        np.concatenate(rings), np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+    )
+    parted = split(tube, tube.corners.mean(axis=1)[:, 0] > 0.0)
+    expected = tube.vertex_normals()[tube.triangles]
+    np.testing.assert_allclose(parted.vertex_normals()[parted.triangles], expected, atol=1e-6)
+    box = split(cube(), np.ones(12, bool))
+    faces = np.repeat(cube().triangle_normals(), 3, axis=0)
+    np.testing.assert_allclose(box.vertex_normals()[8:], faces, atol=1e-6)
+
+
 def test_triangle_without_area_has_no_normal() -> None:
     surface = Surface([[0, 0, 0], [1, 0, 0], [2, 0, 0]], [[0, 1, 2]])
     assert (surface.triangle_normals() == 0).all()

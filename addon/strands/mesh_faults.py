@@ -1,0 +1,58 @@
+"""Where a mesh is no closed surface: its edges tell."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from ..arrays import Ints
+from .surface import Surface
+
+
+@dataclass(frozen=True, eq=False)
+class Edges:
+    """The edges between different places.
+
+    uses: (edge_count,) how many triangles have each. turns: of these, how many more pass it one
+        way than the other; 0 where neighbours look to the same side.
+    """
+
+    uses: Ints
+    turns: Ints
+
+    @property
+    def are_closed(self) -> bool:
+        """Whether there is an inside: each edge is passed as often one way as the other."""
+        return not self.turns.any()
+
+    @cached_property
+    def open_count(self) -> int:
+        """Of one triangle alone."""
+        return int((self.uses == 1).sum())
+
+    @cached_property
+    def crowded_count(self) -> int:
+        """Of more than two triangles."""
+        return int((self.uses > 2).sum())
+
+    @cached_property
+    def opposed_count(self) -> int:
+        """Of two triangles that look to different sides."""
+        return int(((self.uses == 2) & (self.turns != 0)).sum())
+
+
+def edges_of(surface: Surface) -> Edges:
+    return surface.once(_edges_of)
+
+
+def _edges_of(surface: Surface) -> Edges:
+    corners = surface.welded_triangles().astype(np.int64)
+    start, end = corners.ravel(), np.roll(corners, -1, axis=1).ravel()
+    start, end = start[start != end], end[start != end]
+    key = np.minimum(start, end) * len(surface.positions) + np.maximum(start, end)
+    _, edge = np.unique(key, return_inverse=True)
+    edge = np.asarray(edge).reshape(-1)
+    turns = np.bincount(edge, np.sign(end - start)).astype(np.int64)
+    return Edges(np.bincount(edge), np.abs(turns))
