@@ -62,6 +62,29 @@ def test_what_cannot_be_used_is_told_by_name_and_the_others_go_on(scene, make):
     assert warning.startswith(bad.name + ":") and warning.count(".") >= 2
 
 
+def test_a_mesh_that_is_not_closed_collides_and_is_told(scene):
+    """A box without its first face, with one that looks inwards, and with a wall within."""
+    cube = scene.cube()
+    assert scene.obstacles().warnings == ()
+    corners = [vertex.co[:] for vertex in cube.data.vertices]
+    faces = [tuple(polygon.vertices) for polygon in cube.data.polygons]
+    quad = faces[0]
+    opposite = next(face for face in faces if not set(face) & set(quad))
+    near = [min(opposite, key=lambda v: math.dist(corners[v], corners[at])) for at in quad]
+    faults = {
+        "4 edges with one face alone": faces[1:],
+        "at 4 edges faces look to different sides": [quad[::-1], *faces[1:]],
+        "edges with more than two faces": [*faces, (quad[0], quad[2], near[2], near[0])],
+    }
+    for words, wrong in faults.items():
+        cube.data = bpy.data.meshes.new("Wrong")
+        cube.data.from_pydata(corners, [], wrong)
+        found = scene.obstacles()
+        assert len(moved(found)) == 1
+        (warning,) = [text for text in found.warnings if words in text]
+        assert warning.startswith("Cube: ")
+
+
 def test_excluded_from_the_view_layer(scene):
     away = bpy.data.collections.new("Away")
     scene.colliders.children.link(away)

@@ -18,6 +18,7 @@ from ...dynamics.colliders import PosedCollider
 from ...dynamics.settings import DynamicsSettings
 from ...errors import HairloomError
 from ...strands import Surface
+from ...strands.mesh_faults import edges_of
 from ..base.objects import Body
 from .carriers import is_left_out
 from .fields import NotMadeYetError
@@ -34,6 +35,7 @@ class Obstacles:
     head_uid: int | None
     _unusable: dict[str, str] = field(default_factory=dict)
     _failed: dict[str, str] = field(default_factory=dict)
+    _doubtful: list[str] = field(default_factory=list)
 
     @classmethod
     def of(
@@ -83,6 +85,8 @@ class Obstacles:
                 balls.setdefault(_carried_by(obj), []).append(made)
             elif made is not None:
                 found.parts.append(made)
+                if isinstance(made, FieldPart) and not is_head:
+                    found._doubtful += _mesh_notes(made.surface, obj.name)
         if not is_whole:
             raise NotMadeYetError
         found.parts += [BallsPart.new(group, depsgraph) for group in balls.values()]
@@ -93,7 +97,8 @@ class Obstacles:
     def warnings(self) -> tuple[str, ...]:
         """What is left out and why, and what cannot be followed well."""
         seen = [text for part in self.parts for text in part.warnings.values()]
-        return tuple(dict.fromkeys([*self._unusable.values(), *self._failed.values(), *seen]))
+        lost = (*self._unusable.values(), *self._failed.values())
+        return tuple(dict.fromkeys([*lost, *self._doubtful, *seen]))
 
     def move(self, depsgraph: bpy.types.Depsgraph, duration: float) -> tuple[PosedCollider, ...]:
         """Move to the present pose within `duration` [s]; returns the trajectories.
@@ -170,6 +175,30 @@ def sources_of(
     if collection is not None:
         objects += collection.all_objects
     return tuple(obj for obj in dict.fromkeys(objects) if obj != owner)
+
+
+def _mesh_notes(surface: Surface, name: str) -> Iterator[str]:
+    """What keeps a mesh from being a closed surface, and what that does to hair."""
+    edges = edges_of(surface)
+    if edges.open_count:
+        yield (
+            f"{name}: {_edges(edges.open_count)} with one face alone. Hair collides with it as if "
+            "its holes were closed (Mesh > Clean Up > Fill Holes closes them)."
+        )
+    if edges.crowded_count:
+        yield (
+            f"{name}: {_edges(edges.crowded_count)} with more than two faces, so hair may get into "
+            "it there. Delete its inner faces (Select > Select All by Trait > Interior Faces)."
+        )
+    if edges.opposed_count:
+        yield (
+            f"{name}: at {_edges(edges.opposed_count)} faces look to different sides, so hair may "
+            "get into it there. Turn them outwards (Mesh > Normals > Recalculate Outside)."
+        )
+
+
+def _edges(count: int) -> str:
+    return "1 edge" if count == 1 else f"{count:,} edges"
 
 
 def _carried_by(obj: bpy.types.Object) -> object:
