@@ -12,9 +12,9 @@ help: ## this list
 setup: ## make .venv from the lock file; nothing to do when it is there
 	@tools/setup
 
-demo: setup ## the whole way on a groom: GROOM=x.tfx HEAD=x.obj COLLIDER=x.obj OUT=out, all optional
+demo: setup ## the whole way on a groom: GROOM=x.tfx HEAD=x.obj COLLIDER=x.obj OPTIONS="..." OUT=out, all optional
 	$(PYTHON) tools/headless.py demo $(if $(GROOM),--groom "$(GROOM)") $(if $(HEAD),--head "$(HEAD)") \
-	    $(if $(COLLIDER),--collider "$(COLLIDER)") --output "$(OUT)"
+	    $(if $(COLLIDER),--collider "$(COLLIDER)") --output "$(OUT)" $(OPTIONS)
 
 lint: setup
 	.venv/bin/ruff check .

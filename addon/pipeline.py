@@ -289,7 +289,10 @@ def prepare(
         raise HairloomError(
             "it has no strands that can be used", place=place, remedy="Choose hair that has strands"
         )
-    bound = strands if head is None else bind_roots(strands, head, place=place).strands
+    bound, away = strands, 0.0
+    if head is not None:
+        held = bind_roots(strands, head, place=place)
+        bound, away = held.strands, held.looseness(head)
     if is_animated:
         own = with_own_points(bound, settings.cv_count)
     else:
@@ -305,7 +308,7 @@ def prepare(
         parted = Partings.of(partings, head)
     guide_kind = None if kind is None else kind[guides]
     weights = _weights(lines, guide_lines, kind, guide_kind, parted)
-    notes = _lost_length(bound, own)
+    notes = (*_loose(away), *_lost_length(bound, own))
     rig = Rig(own, head, guides, guide_lines.grid, weights, _frames(own, head), notes)
     ground = _Ground(density, masks, parted, head_field, kept, is_animated)
     if children is not None and children.method == "auto":
@@ -323,6 +326,16 @@ def prepare(
         holds = find_holds(rig.strands, holders, reach)
     assert holds is not None
     return replace(rig, holds=holds, notes=(*rig.notes, *idle(holds, holders)))
+
+
+def _loose(away: float) -> tuple[str, ...]:
+    """A note on roots that lie so far [m] from the surface; none where that is 0."""
+    if not away:
+        return ()
+    return (
+        f"its roots lie {1e3 * away:.3g} mm from the surface (median), so they move beside it. "
+        "Check unit, up axis and place of both, or press Snap to Surface.",
+    )
 
 
 @dataclass(frozen=True)

@@ -67,7 +67,7 @@ def length_changes(points: Floats, offsets: Ints, rest_lengths: Floats) -> Float
     """
     change = np.abs(lengths(points, offsets) - rest_lengths)
     shortest = SHORTEST * float(np.median(rest_lengths)) if len(rest_lengths) else 0.0
-    return np.asarray(change / np.maximum(rest_lengths, max(shortest, TINY)))
+    return np.asarray(change / np.maximum(rest_lengths, max(shortest, float(TINY))))
 
 
 def are_outside(points: Floats, colliders: tuple[PosedCollider, ...]) -> Bools:

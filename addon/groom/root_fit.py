@@ -13,6 +13,7 @@ from ..strands.closest_point import ClosestPointSearch
 #: Median distance of the roots, as a part of the surface's diagonal, beyond which the groom
 #: cannot belong to it; grooms that fit lie within 1 %.
 IMPLAUSIBLE_DISTANCE = 0.15
+#: And beyond which an artist should look.
 LOOSE_DISTANCE = 0.01
 #: Factors between the units that grooms come in: powers of ten, inch and foot, to and from metres.
 _UNIT_FACTORS = (*(10.0**n for n in range(-4, 5)), 0.0254, 0.3048, 1 / 0.0254, 1 / 0.3048)

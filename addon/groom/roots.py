@@ -13,7 +13,7 @@ from ..strands.blocks import blocks_of
 from ..strands.closest_point import ClosestPointSearch, search_of
 from ..strands.root_motions import RootMotions
 from ..strands.vectors import cross_rows, dot_rows
-from .root_fit import IMPLAUSIBLE_DISTANCE, fitting_factor
+from .root_fit import IMPLAUSIBLE_DISTANCE, LOOSE_DISTANCE, fitting_factor
 
 #: Sine of a triangle's first angle below which rounding in float64 decides about its normal.
 _FLAT = 1.0e-9
@@ -27,6 +27,13 @@ class BoundRoots:
 
     strands: StrandSet
     distance: Floats
+
+    def looseness(self, surface: Surface) -> float:
+        """How far the roots lie from the surface, the median [m]; 0 where that is near enough for
+        hair that grows on it."""
+        distance = float(np.median(self.distance)) if len(self.distance) else 0.0
+        low, high = surface.bounds()
+        return distance if distance > LOOSE_DISTANCE * float(np.linalg.norm(high - low)) else 0.0
 
 
 @dataclass(frozen=True)
@@ -155,7 +162,8 @@ def _check_scale(
         f"this groom is of another scale than the head: its roots span {roots_size:.3g} m,"
         f" the head spans {surface_size:.3g} m",
         place=place,
-        remedy=f"Scale the groom by {factor:.4g} (pass --groom-scale {factor:.4g})",
+        remedy=f"Scale the groom by {factor:.4g} (pass --groom-scale {factor:.4g}), or the head by "
+        f"{1.0 / factor:.4g} (pass --head-scale {1.0 / factor:.4g})",
     )
 
 

@@ -27,6 +27,7 @@ from ..blender.strands.import_groom import (
     add_to_scene,
     read_ground,
     read_in_thread,
+    settle_ground,
 )
 from .long_work import LongWork, Steps, threaded
 from .reports import tell
@@ -73,6 +74,17 @@ class HAIRLOOM_OT_import_strands(LongWork, ImportHelper, bpy.types.Operator):
         soft_max=100.0,
         precision=4,
     )
+    head_scale: FloatProperty(
+        name="Scale of Head",
+        description="What the size of the active mesh is multiplied by, about the scene's origin: "
+        "0.01 for a head in centimetres",
+        default=1.0,
+        min=1.0e-6,
+        max=1.0e6,
+        soft_min=0.001,
+        soft_max=100.0,
+        precision=4,
+    )
     guides: EnumProperty(
         name="Guides", description="What becomes of guides in Alembic and USD files", items=GUIDES
     )
@@ -89,13 +101,17 @@ class HAIRLOOM_OT_import_strands(LongWork, ImportHelper, bpy.types.Operator):
     def steps(self, context: bpy.types.Context) -> Steps[None]:
         """Where a file cannot be used, the others still come in."""
         head = active_mesh(context) if self.onto_mesh else None
-        ground = head and read_ground(head, context.evaluated_depsgraph_get())
+        ground = head and read_ground(head, context.evaluated_depsgraph_get(), self.head_scale)
         choices = StrandImport(
             up=None if self.up == "FILE" else self.up,
             scale=self.scale,
             guides=self.guides.lower(),
         )
         found = yield from threaded(read_in_thread(self._paths(), ground, choices))
+        if ground is not None and any(isinstance(each, FileStrands) for each in found):
+            settle_ground(ground)
+            for note in ground.notes:
+                report(self, "WARNING", note)
         imported: list[bpy.types.Object] = []
         for each in found:
             if isinstance(each, FileStrands):
@@ -121,6 +137,9 @@ class HAIRLOOM_OT_import_strands(LongWork, ImportHelper, bpy.types.Operator):
         row = layout.row(heading="" if mesh is None else mesh.name)
         row.enabled = mesh is not None
         row.prop(self, "onto_mesh")
+        row = layout.row()
+        row.enabled = mesh is not None and self.onto_mesh
+        row.prop(self, "head_scale")
 
     def _paths(self) -> list[Path]:
         """Several files chosen or dropped, else the one of `filepath`."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,14 +13,16 @@ import bpy
 import numpy as np
 import pytest
 
+from hairloom.addon import pipeline
 from hairloom.addon.blender.command_line import command_line
 from hairloom.addon.blender.command_line.inputs import Sources, read_inputs
+from hairloom.addon.errors import HairloomError
 from hairloom.addon.exchange.alembic.groom_alembic import write_groom_alembic
 from hairloom.addon.exchange.groom import Groom
 from hairloom.addon.exchange.hair_file import write_hair_file
 from hairloom.addon.exchange.tressfx import write_tfx
 from hairloom.addon.exchange.usd.groom_usd import write_usd
-from hairloom.addon.groom.settings import GrowSettings
+from hairloom.addon.groom.settings import GrowSettings, GuideSettings
 from hairloom.addon.strands import StrandSet
 
 pytestmark = pytest.mark.usefixtures("extension")
@@ -194,6 +197,48 @@ def test_axes_and_scale_of_a_groom_are_passed_on(tmp_path: Path, head: Path) -> 
     x, y, z = hairdo().without_guides().strands.points.T
     points = read_inputs(sources, GrowSettings()).strands.points
     np.testing.assert_allclose(points, np.stack([x, z, -y], axis=1) * 2.0, atol=1e-6)
+
+
+def test_files_in_centimetres_are_told_and_both_can_be_scaled(tmp_path: Path, head: Path) -> None:
+    """A box of 24 m and hair on it; the collider is of the head's space."""
+    large = np.array([line.split()[1:] for line in HEAD_OBJ.splitlines() if line[:2] == "v "])
+    vertices = [f"v {' '.join(map(str, row))}" for row in large.astype(float) * 120.0]
+    others = [line for line in HEAD_OBJ.splitlines() if line[:2] != "v "]
+    path = tmp_path / "large.obj"
+    path.write_text("\n".join([*vertices, *others]))
+    write_tfx(tmp_path / "hair.tfx", hairdo(), scale=1.0 / 120.0)
+    sources = Sources(str(tmp_path / "hair.tfx"), str(path))
+    notes = read_inputs(sources, GrowSettings()).notes
+    assert any("--groom-scale 0.01 --head-scale 0.01" in note for note in notes)
+    scaled = replace(sources, groom_scale=1 / 120, head_scale=1 / 120, collider=str(path))
+    inputs = read_inputs(scaled, GrowSettings())
+    assert not any("centimetres" in note for note in inputs.notes)
+    expected = read_inputs(Sources(str(tmp_path / "hair.tfx"), str(head)), GrowSettings()).head
+    assert inputs.head is not None and expected is not None and inputs.collider is not None
+    np.testing.assert_allclose(inputs.head.positions, expected.positions, atol=1e-6)
+    np.testing.assert_allclose(inputs.collider.positions, expected.positions, atol=1e-6)
+    expected_points = hairdo().without_guides().strands.points
+    np.testing.assert_allclose(inputs.strands.points, expected_points, atol=1e-5)
+
+
+@pytest.mark.usefixtures("sphere")
+def test_only_heads_of_files_can_be_scaled() -> None:
+    for name in ("Head", None):
+        with pytest.raises(HairloomError, match="only a head that is read from a file"):
+            read_inputs(Sources(None, name, head_scale=0.01), GrowSettings())
+
+
+def test_hair_beside_its_head_is_told(tmp_path: Path, head: Path) -> None:
+    """Two centimetres above a box of 20: near enough to be bound to it, and no error."""
+    moved = np.eye(4)
+    moved[2, 3] = 0.02
+    strands = hairdo().without_guides().strands
+    for matrix, is_told in ((np.eye(4), False), (moved, True)):
+        write_tfx(tmp_path / "hair.tfx", Groom(strands.transformed(matrix)))
+        sources = Sources(str(tmp_path / "hair.tfx"), str(head))
+        inputs = read_inputs(sources, GrowSettings())
+        rig = pipeline.prepare(inputs.strands, inputs.head, GuideSettings(), place="hair.tfx")
+        assert any("its roots lie 20 mm from" in note for note in rig.notes) == is_told
 
 
 def test_a_name_that_is_neither_an_object_nor_a_file_is_told(

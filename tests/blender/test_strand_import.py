@@ -292,10 +292,45 @@ def test_hair_with_other_axes_that_is_near_by_chance_comes_in_with_a_warning(
     assert "median" not in told()
 
 
-def test_hair_of_an_odd_size_without_a_head_is_a_warning(tmp_path, told):
-    write_tfx(tmp_path / "hair.tfx", hairdo(), scale=0.001)
+@pytest.mark.parametrize(
+    ("scale", "words"),
+    [(0.001, "Scale hair.tfx by 0.01 (--groom-scale 0.01)"), (100.0, "mm large")],
+)
+def test_hair_of_an_odd_size_without_a_head_is_a_warning(tmp_path, told, scale, words):
+    write_tfx(tmp_path / "hair.tfx", hairdo(), scale=scale)
     imported(tmp_path / "hair.tfx")
-    assert "m wide. Import it with another scale" in told()
+    assert words in told()
+
+
+def test_hair_and_head_in_centimetres_are_told_and_scaled_together(tmp_path, head, told):
+    """A head of 24 m at the origin, in an object of its own scale, and hair on it."""
+    head.scale *= 100.0
+    head.location *= 100.0
+    bpy.context.view_layer.update()
+    large = np.array(head.matrix_world)
+    write_tfx(tmp_path / "hair.tfx", hairdo(), scale=0.01)
+    imported(tmp_path / "hair.tfx")
+    bpy.context.view_layer.objects.active = head
+    head.select_set(True)
+    assert "Scale both by 0.01 (--groom-scale 0.01 --head-scale 0.01)" in told()
+    (hair,) = imported(tmp_path / "hair.tfx", scale=0.01, head_scale=0.01)
+    assert "centimetres" not in told()
+    expected = np.diag([0.01, 0.01, 0.01, 1.0]) @ large
+    np.testing.assert_allclose(np.array(head.matrix_world), expected, atol=1e-6)
+    points = read_curves(hair, bpy.context.evaluated_depsgraph_get()).strands.points
+    np.testing.assert_allclose(points, hairdo().without_guides().strands.points, atol=1e-5)
+
+
+def test_of_several_uv_maps_the_one_that_counts_is_named(tmp_path, head, told):
+    imported(write(tmp_path / "hair.abc", hairdo()))
+    assert "UV maps" not in told()
+    other = head.data.uv_layers.new(name="Lightmap")
+    head.data.uv_layers.active = other
+    bpy.context.view_layer.objects.active = head
+    head.select_set(True)
+    (hair,) = imported(write(tmp_path / "hair.abc", hairdo()))
+    assert "Head: of its 2 UV maps hair and its shadow take the active one, 'Lightmap'" in told()
+    assert hair.data.surface_uv_map == "Lightmap"
 
 
 def test_a_head_that_has_no_uvs_keeps_the_files_own_and_is_told(tmp_path, head, told):

@@ -185,6 +185,7 @@ def _sources(verb: Verb, options: argparse.Namespace) -> Sources:
         collider=options.collider,
         groom_scale=options.groom_scale,
         groom_up=options.groom_up,
+        head_scale=options.head_scale,
         need_head=verb.needs_head,
         need_uv=options.strict,
         density_group=options.density_group,

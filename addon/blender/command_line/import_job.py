@@ -11,8 +11,9 @@ import bpy
 from ...errors import HairloomError
 from ...exchange.strand_formats import SUFFIXES
 from ..base.outcome import dropped_phrase
-from ..scene.mesh_files import import_mesh_file
+from ..scene.mesh_files import import_mesh_file, scale_object
 from ..strands.import_groom import GUIDES, Ground, StrandImport, import_strands, read_ground
+from .job_options import add_head_scale_option
 from .job_steps import Job, tell_notes
 from .object_settings import named_objects, put_settings
 from .verb import Verb
@@ -22,7 +23,9 @@ def import_grooms(job: Job) -> None:
     """Import grooms of files into a scene: hair curves, bound to a head if one is named."""
     options, report = job.options, job.report
     choices = StrandImport(options.groom_up, options.groom_scale, options.guides)
-    ground = _ground(options.head)
+    ground = _ground(options.head, options.head_scale)
+    if ground is not None:
+        tell_notes(list(ground.notes), report)
     objects: list[dict[str, Any]] = []
     for path in options.files:
         with report.stage("import"):
@@ -46,14 +49,21 @@ def import_grooms(job: Job) -> None:
     report.facts.update(head=ground and ground.head.name, objects=objects)
 
 
-def _ground(head: str | None) -> Ground | None:
+def _ground(head: str | None, scale: float) -> Ground | None:
     """The mesh of the scene, or of a file, that hair is bound to."""
     if head is None:
+        if scale != 1.0:
+            raise HairloomError(
+                "there is no head to scale", place="--head-scale", remedy="Name it with --head"
+            )
         return None
     if head in bpy.context.view_layer.objects or not Path(head).suffix:
         (mesh,) = named_objects([head], lambda obj: bool(obj.type == "MESH"), "a mesh")
     else:
-        mesh = import_mesh_file(Path(head))
+        mesh = import_mesh_file(Path(head), scale)
+        scale = 1.0
+    if scale != 1.0:
+        scale_object(mesh, scale)
     return read_ground(mesh, bpy.context.evaluated_depsgraph_get())
 
 
@@ -74,6 +84,9 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         default=1.0,
         metavar="FACTOR",
         help="what lengths are multiplied by, beside what the files say of their unit",
+    )
+    add_head_scale_option(
+        what, "what the head is multiplied by, about the scene's origin (default: 1)"
     )
     what.add_argument(
         "--guides",

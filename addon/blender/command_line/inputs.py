@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import bpy
+import numpy as np
 
 from ...arrays import Floats
 from ...errors import HairloomError
@@ -15,6 +16,7 @@ from ...exchange.strand_reading import read_strands
 from ...groom.face_hair import grow_with_face
 from ...groom.grow import grow, scalp_density
 from ...groom.settings import GrowSettings
+from ...groom.size_notes import size_note
 from ...strands import StrandSet, Surface
 from ...strands.colors import color_notes
 from ...strands.join import joined
@@ -24,9 +26,9 @@ from ..base.vertex_weights import read_weights
 from ..scene.built_in_head import HeadLook, built_in_head
 from ..scene.curves import read_curves
 from ..scene.head_look import head_look
-from ..scene.mesh_files import read_mesh_file
+from ..scene.mesh_files import read_file_meshes
 from ..scene.partings import read_partings
-from ..scene.surfaces import read_surface
+from ..scene.surfaces import read_surface, uv_map_note
 from ..setup.hairstyles import face_hair, is_bust
 from ..strands.child_python import python_for
 
@@ -40,6 +42,7 @@ class Sources:
     groom None: one is grown on the head. head None: the one that hair curves name as their
     surface; the built-in one where a groom is grown. collider None: the head itself.
     groom_scale, groom_up: of a groom's file, see `strand_reading.read_strands`.
+    head_scale: of the files of head and collider.
     need_head: whether a groom without a head is refused.
     need_uv: whether a head without UVs is refused.
     density_group, length_group: vertex groups or attributes of a head in the open scene, by name,
@@ -54,6 +57,7 @@ class Sources:
     collider: str | None = None
     groom_scale: float = 1.0
     groom_up: str | None = None
+    head_scale: float = 1.0
     need_head: bool = True
     need_uv: bool = False
     density_group: str = ""
@@ -92,20 +96,21 @@ def read_inputs(sources: Sources, grow_settings: GrowSettings) -> Inputs:
         HairloomError: naming the file or object that cannot be used, and what to do.
     """
     head_name = sources.head or _surface_name(sources.groom)
+    head, said = _read_head(head_name, sources)
     if sources.groom is not None:
         strands, dropped, groom, notes = _read_groom(sources.groom, sources)
-        head = _read_head(head_name, sources)
+        notes = (*notes, *_size_notes(sources, strands, head))
         mesh = bpy.data.objects.get(head_name or "")
         if sources.with_face and head is not None and mesh is not None and is_bust(mesh):
             face = at_once(face_hair(mesh, head, bpy.context.evaluated_depsgraph_get()))
             strands = joined(strands, face)
     else:
-        head, dropped, groom, notes = _read_head(head_name, sources), {}, None, ()
         assert head is not None, "the built-in one is always there"
+        dropped, groom, notes = {}, None, _size_notes(sources, None, head)
         strands = _grown(head, head_name, sources, grow_settings)
-    collider = head
+    notes, collider = (*notes, *said), head
     if sources.collider is not None:
-        collider = _read_mesh(sources.collider, need_uv=False)
+        collider, _ = _read_mesh(sources.collider, replace(sources, need_uv=False))
     head_object = bpy.data.objects.get(head_name or "")
     name = sources.groom or BUILT_IN
     if head is not None and head.corner_uv is None:
@@ -147,19 +152,26 @@ def look_of_head(sources: Sources, head: Surface | None) -> HeadLook | None:
     return head_look(sources.head or _surface_name(sources.groom), head, sources.skin)
 
 
-def _read_head(name: str | None, sources: Sources) -> Surface | None:
-    """The head of this name; without one the built-in head, for hair that is grown here."""
+def _read_head(name: str | None, sources: Sources) -> tuple[Surface | None, tuple[str, ...]]:
+    """The head of this name; without one the built-in head, for hair that is grown here. And what
+    is to be said of it."""
+    if sources.head_scale != 1.0 and (name is None or not _is_mesh_file(name)):
+        raise HairloomError(
+            "only a head that is read from a file can be scaled",
+            place="--head-scale",
+            remedy="Name the file with --head, or scale the object in the scene",
+        )
     if name is not None:
-        return _read_mesh(name, need_uv=sources.need_uv)
+        return _read_mesh(name, sources)
     if sources.groom is None:
-        return built_in_head().surface
+        return built_in_head().surface, ()
     if sources.need_head:
         raise HairloomError(
             "it has no head to move with",
             place=sources.groom,
             remedy="Name the head with --head FILE_OR_OBJECT",
         )
-    return None
+    return None, ()
 
 
 def head_of_sources(sources: Sources) -> Surface | None:
@@ -168,7 +180,7 @@ def head_of_sources(sources: Sources) -> Surface | None:
     name = sources.head or _surface_name(sources.groom)
     if name is None and sources.groom is None:
         return built_in_head().surface
-    return None if name is None else _read_mesh(name, need_uv=sources.need_uv)
+    return None if name is None else _read_mesh(name, sources)[0]
 
 
 def _partings(groom: str | None) -> tuple[Floats | None, tuple[str, ...]]:
@@ -218,14 +230,36 @@ def _read_groom(
     raise _unknown(source, "hair curves", "a groom's file such as hair.abc")
 
 
-def _read_mesh(source: str, *, need_uv: bool) -> Surface:
-    mesh_object = bpy.data.objects.get(source)
+def _read_mesh(source: str, sources: Sources) -> tuple[Surface, tuple[str, ...]]:
+    """The mesh of an object or a file, and what is to be said of it."""
+    mesh_object, need_uv = bpy.data.objects.get(source), sources.need_uv
     if mesh_object is not None:
         depsgraph = bpy.context.evaluated_depsgraph_get()
-        return read_surface(mesh_object, depsgraph, need_uv=need_uv, place=source)
-    if Path(source).suffix:
-        return read_mesh_file(Path(source), need_uv=need_uv)
-    raise _unknown(source, "mesh", "a mesh file such as head.obj")
+        surface = read_surface(mesh_object, depsgraph, need_uv=need_uv, place=source)
+        return surface, tuple(filter(None, [uv_map_note(mesh_object)]))
+    if not _is_mesh_file(source):
+        raise _unknown(source, "mesh", "a mesh file such as head.obj")
+    surface, notes = read_file_meshes(Path(source), need_uv=need_uv)
+    if sources.head_scale != 1.0:
+        surface = replace(surface, positions=surface.positions * np.float32(sources.head_scale))
+    return surface, notes
+
+
+def _is_mesh_file(source: str) -> bool:
+    """Whether it names a file rather than an object of the scene."""
+    return bpy.data.objects.get(source) is None and bool(Path(source).suffix)
+
+
+def _size_notes(
+    sources: Sources, strands: StrandSet | None, head: Surface | None
+) -> tuple[str, ...]:
+    """What to say of files that seem to be in another unit than metres."""
+    hair = at = None
+    if sources.groom and strands is not None and bpy.data.objects.get(sources.groom) is None:
+        hair = Path(sources.groom).name, strands.points
+    if head is not None and sources.head and _is_mesh_file(sources.head):
+        at = Path(sources.head).name, head.positions
+    return tuple(filter(None, [size_note(hair, at)]))
 
 
 def _unknown(source: str, kind: str, example: str) -> HairloomError:

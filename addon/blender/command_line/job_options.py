@@ -47,6 +47,7 @@ def add_hair_options(parser: argparse.ArgumentParser) -> None:
     sources.add_argument(
         "--groom-up", choices=("Y", "Z"), help="up in a groom file (default: as the file says)"
     )
+    add_head_scale_option(sources, "scale the files of head and collider (default: 1)")
     sources.add_argument(
         "--density-group",
         default="",
@@ -74,6 +75,10 @@ def add_hair_options(parser: argparse.ArgumentParser) -> None:
     sources.add_argument(
         "--strict", action="store_true", help="fail when a single strand must be dropped"
     )
+
+
+def add_head_scale_option(parser: Any, about: str) -> None:
+    parser.add_argument("--head-scale", type=float, default=1.0, metavar="FACTOR", help=about)
 
 
 def add_scene_option(parser: argparse.ArgumentParser) -> None:
@@ -306,6 +311,7 @@ _LIMITS = (
     ("seconds", 0.0, 3600.0),
     ("frame_rate", 1.0, 1000.0),
     ("groom_scale", 1e-6, 1e6),
+    ("head_scale", 1e-6, 1e6),
 )
 
 

@@ -9,10 +9,11 @@ from typing import Any
 
 import bpy
 import numpy as np
+from mathutils import Matrix
 
 from ...errors import HairloomError
 from ...strands import Surface
-from .surfaces import read_surface
+from .surfaces import read_surface, uv_map_note
 
 _IMPORTERS: dict[str, Callable[[str], Any]] = {
     ".obj": lambda path: bpy.ops.wm.obj_import(filepath=path),
@@ -30,7 +31,13 @@ _PURGED = ("objects", "meshes", "materials", "images", "collections", "cameras",
 
 
 def read_mesh_file(path: Path, *, need_uv: bool) -> Surface:
-    """All meshes of a file as one Surface, in metres, Blender's Z up; the scene is not changed.
+    """`read_file_meshes` without what is to be said."""
+    return read_file_meshes(path, need_uv=need_uv)[0]
+
+
+def read_file_meshes(path: Path, *, need_uv: bool) -> tuple[Surface, tuple[str, ...]]:
+    """All meshes of a file as one Surface, in metres, Blender's Z up, and what is to be said of
+    it; the scene is not changed.
 
     Raises:
         HairloomError: no such file, a format that Blender does not read, no faces, or no UVs
@@ -39,7 +46,8 @@ def read_mesh_file(path: Path, *, need_uv: bool) -> Surface:
     with meshes_of_file(path) as meshes:
         depsgraph = bpy.context.evaluated_depsgraph_get()
         parts = [read_surface(mesh, depsgraph, need_uv=need_uv, place=str(path)) for mesh in meshes]
-    return merged(parts)
+        notes = tuple(filter(None, map(uv_map_note, meshes)))
+    return merged(parts), notes
 
 
 @contextmanager
@@ -56,20 +64,29 @@ def meshes_of_file(path: Path) -> Iterator[list[bpy.types.Object]]:
         bpy.data.batch_remove(_data_blocks() - before)
 
 
-def import_mesh_file(path: Path) -> bpy.types.Object:
-    """The only mesh of a file, added to the open scene.
+def import_mesh_file(path: Path, scale: float = 1.0) -> bpy.types.Object:
+    """The only mesh of a file, added to the open scene; its place and size are scaled.
 
     Raises:
         HairloomError: no such file, a format that Blender does not read, or not one mesh.
     """
     meshes = _imported(path)
     if len(meshes) == 1:
+        if scale != 1.0:
+            scale_object(meshes[0], scale)
         return meshes[0]
     raise HairloomError(
         f"it holds {len(meshes)} meshes, and hair grows on one",
         place=str(path),
         remedy="Join them, or open a scene with them and name one",
     )
+
+
+def scale_object(obj: bpy.types.Object, scale: float) -> None:
+    """Scale an object about the world's origin, as its file had been in another unit."""
+    bpy.context.view_layer.update()
+    obj.matrix_world = Matrix.Scale(scale, 4) @ obj.matrix_world
+    bpy.context.view_layer.update()
 
 
 def _imported(path: Path) -> list[bpy.types.Object]:

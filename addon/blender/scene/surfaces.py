@@ -44,6 +44,17 @@ def read_surface(
     return surface.transformed(np.array(obj.evaluated_get(depsgraph).matrix_world))
 
 
+def uv_map_note(obj: bpy.types.Object) -> str:
+    """Which of several UV maps counts; "" where there are not several."""
+    maps = obj.data.uv_layers
+    if len(maps) < 2:
+        return ""
+    return (
+        f"{obj.name}: of its {len(maps)} UV maps hair and its shadow take the active one, "
+        f"'{maps.active.name}'. Make another one active (Data > UV Maps) if that is not the skin's."
+    )
+
+
 def read_positions(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, *, place: str) -> Floats:
     """The vertices of the evaluated mesh, (vertex_count, 3) float32 [m], world space.
 

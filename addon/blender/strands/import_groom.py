@@ -21,8 +21,9 @@ from ...exchange.groom import Groom, ReadMotion
 from ...exchange.read_groom import ReadGroom
 from ...exchange.strand_formats import STRAND_FORMATS, strand_format
 from ...exchange.strand_reading import read_strands
-from ...groom.root_fit import LOOSE_DISTANCE, better_fit
+from ...groom.root_fit import better_fit
 from ...groom.roots import bind_roots
+from ...groom.size_notes import size_note
 from ...strands import StrandSet, Surface
 from ...strands.closest_point import ClosestPointSearch
 from ..bakes.groom_hashes import frame_rate
@@ -31,15 +32,14 @@ from ..base.thread_work import ThreadWork
 from ..scene.curves import write_curves
 from ..scene.curves_motion import store_motion
 from ..scene.groom_attributes import store_groom
-from ..scene.surfaces import read_surface
+from ..scene.mesh_files import scale_object
+from ..scene.surfaces import read_surface, uv_map_note
 from .child_python import python_for
 
 #: title of each format, and the suffixes of its files
 FILE_KINDS = tuple((each.title, each.suffixes) for each in STRAND_FORMATS)
 #: what becomes of guides beside strands: left out, hair curves of their own, among the strands
 GUIDES = ("leave", "apart", "among")
-#: Hair of an extent beyond these is no hair of a head, nor of an animal [m].
-_MIN_EXTENT, _MAX_EXTENT = 0.005, 20.0
 
 
 @dataclass(frozen=True)
@@ -61,11 +61,16 @@ class Ground:
     """The mesh that imported hair is bound to, read once for all files.
 
     name: of the head, which a thread must not ask for.
+    surface: in world space, scaled.
+    scale: of the head, which it gets when hair comes into the scene.
+    notes: what is to be said of it.
     """
 
     head: bpy.types.Object
     name: str
     surface: Surface
+    scale: float = 1.0
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -76,13 +81,19 @@ class FileStrands:
     outcome: Outcome
 
 
-def read_ground(head: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Ground:
-    """The mesh as Blender shows it.
+def read_ground(
+    head: bpy.types.Object, depsgraph: bpy.types.Depsgraph, scale: float = 1.0
+) -> Ground:
+    """The mesh as Blender shows it, scaled about the world's origin.
 
     Raises:
         HairloomError: it has no faces.
     """
-    return Ground(head, head.name, read_surface(head, depsgraph, need_uv=False, place=head.name))
+    surface = read_surface(head, depsgraph, need_uv=False, place=head.name)
+    if scale != 1.0:
+        surface = replace(surface, positions=surface.positions * np.float32(scale))
+    notes = tuple(filter(None, [uv_map_note(head)]))
+    return Ground(head, head.name, surface, scale, notes)
 
 
 def import_strands(
@@ -148,6 +159,12 @@ def read_in_thread(
     return ThreadWork(work, "Hairloom import")
 
 
+def settle_ground(ground: Ground) -> None:
+    """Give the head its scale."""
+    if ground.scale != 1.0:
+        scale_object(ground.head, ground.scale)
+
+
 def add_to_scene(
     read: FileStrands, ground: Ground | None, collection: bpy.types.Collection
 ) -> list[bpy.types.Object]:
@@ -188,7 +205,8 @@ def _bound(
     """Strands with the mesh's UVs at their roots, which Blender's own hair tools go by."""
     groom = read.groom
     if ground is None:
-        return groom, _size_warning(groom.strands, path)
+        note = size_note((path.name, groom.strands.points), None)
+        return groom, (note,) if note else ()
     surface = ground.surface
     loose = groom.strands if surface.corner_uv is None else replace(groom.strands, root_uv=None)
     try:
@@ -198,9 +216,9 @@ def _bound(
         if remedy is None:
             raise
         raise HairloomError(error.problem, place=path.name, remedy=remedy) from error
-    warnings = []
-    distance = float(np.median(bound.distance))
-    if distance > LOOSE_DISTANCE * float(np.linalg.norm(np.ptp(surface.positions, axis=0))):
+    head = ground.name, surface.positions
+    warnings = list(filter(None, [size_note((path.name, groom.strands.points), head)]))
+    if distance := bound.looseness(surface):
         remedy = _remedy(loose, read.axes, surface, choices)
         remedy = remedy or "Check the axes and the place of both"
         warnings.append(
@@ -233,15 +251,10 @@ def _remedy(
         scale = f"{fit.factor * choices.scale:.4g}"
         wanted.append(f"a scale of {scale}")
         options.append(f"--groom-scale {scale}")
-    return f"Import it with {' and '.join(wanted)} ({' '.join(options)})"
-
-
-def _size_warning(strands: StrandSet, path: Path) -> tuple[str, ...]:
-    low, high = strands.bounds()
-    extent = float((high - low).max())
-    if _MIN_EXTENT <= extent <= _MAX_EXTENT:
-        return ()
-    return (f"{path.name}: its hair is {extent:.3g} m wide. Import it with another scale.",)
+    remedy = f"Import it with {' and '.join(wanted)} ({' '.join(options)})"
+    if fit.factor == 1.0:
+        return remedy
+    return f"{remedy}, or scale the head by {1.0 / fit.factor:.4g}"
 
 
 def _counts(groom: Groom) -> str:

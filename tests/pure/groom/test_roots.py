@@ -139,7 +139,19 @@ def test_a_groom_in_another_unit_is_told_with_the_factor_back(egg: Surface, unit
     head_size = np.linalg.norm(np.ptp(egg.positions, axis=0))
     assert f"{roots_size:.3g} m" in error.problem
     assert f"{head_size:.3g} m" in error.problem
-    assert error.remedy.endswith(f"(pass --groom-scale {1.0 / unit:.4g})")
+    assert f"(pass --groom-scale {1.0 / unit:.4g})" in error.remedy
+    assert error.remedy.endswith(f"(pass --head-scale {unit:.4g})")
+
+
+def test_roots_beside_the_surface_are_loose_and_by_how_much(egg: Surface) -> None:
+    """Moved along z by a tenth of its size: no root is farther, and the median is near that."""
+    strands = hair_on(egg, 200)
+    assert bind_roots(strands, egg, place="hair.tfx").looseness(egg) == 0.0
+    step = 0.1 * float(np.linalg.norm(np.ptp(egg.positions, axis=0)))
+    matrix = np.eye(4)
+    matrix[2, 3] = step
+    loose = bind_roots(strands.transformed(matrix), egg, place="hair.tfx").looseness(egg)
+    assert 0.2 * step < loose < step
 
 
 def test_a_groom_in_another_place_is_not_called_another_scale(egg: Surface) -> None:

@@ -1,0 +1,45 @@
+"""Grooms and heads of files that are far too large to be in metres."""
+
+from __future__ import annotations
+
+from ..arrays import Floats
+
+#: Hair, a head or a body that is larger than this is in another unit [m]: a horse is 3 m, a man of
+#: MakeHuman's 17 dm.
+MAX_EXTENT = 12.0
+#: And hair that is smaller [m].
+MIN_EXTENT = 0.005
+#: What is this many times smaller than the other is in metres already: a beard is a thirtieth of a
+#: man.
+_OTHER_UNIT = 50.0
+
+
+def size_note(hair: tuple[str, Floats] | None, head: tuple[str, Floats] | None) -> str:
+    """What to say of files whose numbers are no metres; "" where they may be.
+
+    Args:
+        hair, head: name and points (n, 3) [m] as they were read; None is not from a file.
+    """
+    found = {"--groom-scale": hair, "--head-scale": head}
+    sizes = {
+        option: (what[0], float((what[1].max(axis=0) - what[1].min(axis=0)).max()))
+        for option, what in found.items()
+        if what is not None and len(what[1])
+    }
+    large = " and ".join(f"{name} is {_meters(size)} large" for name, size in sizes.values())
+    largest = max((size for _, size in sizes.values()), default=0.0)
+    if largest > MAX_EXTENT:
+        wrong = [option for option, (_, size) in sizes.items() if size * _OTHER_UNIT > largest]
+        options = " ".join(f"{option} 0.01" for option in wrong)
+        each = "both" if len(wrong) > 1 else sizes[wrong[0]][0]
+        return (
+            f"{large}, as in centimetres or decimetres. Scale {each} by 0.01 ({options}) or by 0.1."
+        )
+    if "--groom-scale" in sizes and sizes["--groom-scale"][1] < MIN_EXTENT:
+        return f"{large}. Import hair with another scale (--groom-scale)."
+    return ""
+
+
+def _meters(size: float) -> str:
+    """Such as "264 m" or "1.3 mm"."""
+    return f"{size:,.3g} m" if size >= 0.1 else f"{1e3 * size:.3g} mm"

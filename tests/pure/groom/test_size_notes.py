@@ -1,0 +1,41 @@
+"""Files whose numbers are no metres: what is said of them, and that others are left in peace."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hairloom.addon.groom.size_notes import size_note
+
+
+def thing(name: str, size: float) -> tuple[str, np.ndarray]:
+    return name, np.array([[1.0, 1.0, 1.0], [1.0 + size, 1.0, 1.0]], np.float32)
+
+
+@pytest.mark.parametrize("hair", [None, 0.05, 0.3, 2.6])
+@pytest.mark.parametrize("head", [None, 0.25, 1.8, 9.0])
+def test_what_may_be_metres_is_left_in_peace(hair: float | None, head: float | None) -> None:
+    assert not size_note(hair and thing("a.tfx", hair), head and thing("b.obj", head))
+
+
+@pytest.mark.parametrize(
+    ("hair", "head", "options"),
+    [
+        (264.0, 199.0, "both by 0.01 (--groom-scale 0.01 --head-scale 0.01)"),
+        (30.0, None, "a.tfx by 0.01 (--groom-scale 0.01)"),
+        (None, 17.0, "b.obj by 0.01 (--head-scale 0.01)"),
+        (6.0, 170.0, "both by 0.01 (--groom-scale 0.01 --head-scale 0.01)"),  # a beard
+        (1.99, 199.0, "b.obj by 0.01 (--head-scale 0.01)"),
+    ],
+)
+def test_centimetres_are_named_with_what_scales_them(
+    hair: float | None, head: float | None, options: str
+) -> None:
+    note = size_note(hair and thing("a.tfx", hair), head and thing("b.obj", head))
+    assert options in note and "centimetres" in note
+    assert ("a.tfx is" in note) == (hair is not None)
+    assert ("b.obj is" in note) == (head is not None)
+
+
+def test_hair_of_nothing_is_named() -> None:
+    assert size_note(thing("a.tfx", 0.003), None).startswith("a.tfx is 3 mm large.")
