@@ -13,10 +13,13 @@ from ..strands.blocks import blocks_of
 from ..strands.closest_point import ClosestPointSearch, search_of
 from ..strands.root_motions import RootMotions
 from ..strands.vectors import cross_rows, dot_rows
-from .root_fit import IMPLAUSIBLE_DISTANCE, LOOSE_DISTANCE, fitting_factor
+from .root_fit import IMPLAUSIBLE_DISTANCE, LOOSE_DISTANCE, better_fit, fitting_factor
 
 #: Sine of a triangle's first angle below which rounding in float64 decides about its normal.
 _FLAT = 1.0e-9
+#: Fewer roots, and roots that span less than this part of the surface, say nothing of its scale
+#: where they are near to it.
+_FEW, _PATCH = 16, 0.01
 
 
 @dataclass(frozen=True)
@@ -146,13 +149,21 @@ def _check_scale(
         return
     low, high = surface.bounds()
     surface_size = float(np.linalg.norm(high - low))
-    if np.median(distance) <= IMPLAUSIBLE_DISTANCE * surface_size:
-        return
     roots_size = float(np.linalg.norm(np.ptp(roots, axis=0)))
-    factor = fitting_factor(roots, search)
+    away = float(np.median(distance))
+    is_far = away > IMPLAUSIBLE_DISTANCE * surface_size
+    # the hair of a head in metres may lie between the legs of a body in decimetres, which are near
+    is_apart = away > IMPLAUSIBLE_DISTANCE * roots_size and len(roots) >= _FEW
+    is_apart &= roots_size > _PATCH * surface_size
+    if is_far:
+        factor = fitting_factor(roots, search)
+    elif is_apart and (clear := better_fit({"": roots}, search)) is not None:
+        factor = clear.factor
+    else:
+        return
     if factor is None:
         raise HairloomError(
-            f"its roots lie {np.median(distance):.3g} m from the head (median); they span"
+            f"its roots lie {away:.3g} m from the head (median); they span"
             f" {roots_size:.3g} m, the head spans {surface_size:.3g} m, and no usual unit makes"
             " them meet",
             place=place,

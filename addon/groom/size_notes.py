@@ -9,9 +9,8 @@ from ..arrays import Floats
 MAX_EXTENT = 12.0
 #: And hair that is smaller [m].
 MIN_EXTENT = 0.005
-#: What is this many times smaller than the other is in metres already: a beard is a thirtieth of a
-#: man.
-_OTHER_UNIT = 50.0
+#: Beside such a one, what is smaller than this [m], or so many times smaller, is in metres already.
+_IN_METRES, _TIMES_SMALLER = 1.0, 50.0
 
 
 def size_note(hair: tuple[str, Floats] | None, head: tuple[str, Floats] | None) -> str:
@@ -29,7 +28,8 @@ def size_note(hair: tuple[str, Floats] | None, head: tuple[str, Floats] | None) 
     large = " and ".join(f"{name} is {_meters(size)} large" for name, size in sizes.values())
     largest = max((size for _, size in sizes.values()), default=0.0)
     if largest > MAX_EXTENT:
-        wrong = [option for option, (_, size) in sizes.items() if size * _OTHER_UNIT > largest]
+        least = max(_IN_METRES, largest / _TIMES_SMALLER)
+        wrong = [option for option, (_, size) in sizes.items() if size > least]
         options = " ".join(f"{option} 0.01" for option in wrong)
         each = "both" if len(wrong) > 1 else sizes[wrong[0]][0]
         return (

@@ -25,10 +25,12 @@ from hairloom.addon.blender.pictures import turntable as turntable_module
 from hairloom.addon.blender.pictures import video
 from hairloom.addon.blender.pictures.sheet import COLUMNS, VIEWS, Sheet, labelled
 from hairloom.addon.blender.pictures.showing import file_name, shown_groom
+from hairloom.addon.blender.pictures.studio import FIELD_OF_VIEW, MARGIN
 from hairloom.addon.blender.pictures.turntable import Turntable, TurntableSettings
 from hairloom.addon.blender.properties.presets import shipped
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.exchange.files import moving, stale_temp_files
+from hairloom.addon.render.camera import frame_points
 
 pytestmark = [pytest.mark.draws, pytest.mark.usefixtures("gpu_context")]
 
@@ -126,6 +128,21 @@ def test_the_groom_stays_whole_in_view_and_does_not_drift(
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(("top", "foot"), [(0.3, 0.3), (0.1, 0.5)])
+def test_feet_are_not_cut_off_however_wide_they_stand(top: float, foot: float) -> None:
+    """A body that is a round pillar or a cone, at all turns: within the picture, and it fills that
+    but for the studio's room around."""
+    random = np.random.default_rng(1)
+    height, angle = np.array([0.0, 1.8])[random.integers(0, 2, 4000)], random.uniform(0, 6.3, 4000)
+    reach = np.where(height > 0.0, top, foot)
+    places = np.stack([reach * np.cos(angle), reach * np.sin(angle), height], axis=1)
+    outline = turntable_module.turned_around(places, np.array([0.0, 0.0, 0.9]))
+    camera = frame_points(outline, (0.0, -1.0, 0.14), FIELD_OF_VIEW, 1.0, margin=MARGIN)
+    seen = np.column_stack([places, np.ones(4000)]) @ (camera.projection @ camera.view).T
+    farthest = np.abs(seen[:, :2] / seen[:, 3:]).max()
+    assert 0.98 / MARGIN < farthest < 1.001 / MARGIN
+
+
 def test_lights_turn_with_the_camera_or_stay_on_the_groom(table: Turntable) -> None:
     follows = [table.picture(frame) for frame in (0, 1)]
     table.settings = replace(SMALL, lights="groom")

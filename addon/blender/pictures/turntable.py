@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Generator, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -18,9 +19,9 @@ from ...errors import HairloomError
 from ...exchange.files.atomic import folder_unwritable
 from ...exchange.files.file_set import written_together
 from ...pipeline import Pose
-from ...render.camera import Camera, frame_camera
+from ...render.camera import Camera
 from ...shading.lights import Light
-from .studio import FIELD_OF_VIEW, Studio
+from .studio import Studio
 from .video import write_video
 
 #: what the lights move with: identifier, label, description
@@ -36,8 +37,8 @@ LIGHTS = (
 FRAMES, SIDES = (1, 10_000), (16, 4096)
 #: how far above the groom the camera stands, as z of a direction of unit length across
 _HEIGHT = 0.14
-#: below 1, because nothing fills the corners of the box that the camera holds
-_MARGIN = 0.9
+#: layers of what turns, and corners of a circle around one
+_LAYERS, _CORNERS = 48, 64
 
 
 @dataclass(frozen=True)
@@ -128,15 +129,17 @@ class Turntable:
 
     def camera(self, frame: int) -> Camera:
         """The camera of a frame, on a circle around the groom, from its front to its right."""
-        low, high = self.studio.bounds(self.pose, self.points)
-        middle, reach = (low + high) / 2.0, float(np.hypot(*(high - low)[:2])) / 2.0
-        # turning about the centre, the groom fills a cylinder
-        around = np.array([reach, reach, float(high[2] - low[2]) / 2.0])
-        aspect = self.settings.width / self.settings.height
-        held = middle - around, middle + around
-        direction = self.studio.side.turned(0.0, _HEIGHT)
-        first = frame_camera(held, direction, FIELD_OF_VIEW, aspect, margin=_MARGIN)
+        first, middle = self._first
         return replace(first, view=first.view @ _turned_about(middle, frame / self.settings.frames))
+
+    @cached_property
+    def _first(self) -> tuple[Camera, Floats]:
+        """The camera of frame 0, which holds what the groom passes as it turns, and the middle."""
+        held = self.studio.held(self.pose, self.points).astype(np.float64)
+        middle = (held.min(axis=0) + held.max(axis=0)) / 2.0
+        aspect = self.settings.width / self.settings.height
+        direction = self.studio.side.turned(0.0, _HEIGHT)
+        return self.studio.framed(turned_around(held, middle), direction, aspect), middle
 
     def steps(self) -> Generator[int]:
         """Write everything; yields the number of finished pictures.
@@ -165,6 +168,28 @@ class Turntable:
     def _lights(self, frame: int) -> tuple[Light, ...]:
         follows = self.settings.lights == "camera"
         return self.studio.lights(self.camera(frame if follows else 0))
+
+
+def turned_around(points: Floats, middle: Floats) -> Floats:
+    """The outline (n, 3) of all that points (m, 3) pass as they turn about the vertical through the
+    middle (3,): circles, at both ends of each of _LAYERS layers as wide as what is in it."""
+    reach = np.hypot(*(points - middle)[:, :2].T)
+    low, high = points[:, 2].min(), points[:, 2].max()
+    thick = max(float(high - low), 1.0e-30) / _LAYERS
+    layer = np.minimum((points[:, 2] - low) // thick, _LAYERS - 1).astype(int)
+    radius = np.zeros(_LAYERS)
+    np.maximum.at(radius, layer, reach)
+    used = np.flatnonzero(np.bincount(layer, minlength=_LAYERS))
+    angle = 2.0 * np.pi * np.arange(_CORNERS) / _CORNERS
+    circle = np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=1) / np.cos(
+        np.pi / _CORNERS
+    )
+    rings = []
+    for each in used:
+        heights = points[layer == each, 2]
+        for height in (heights.min(), heights.max()):
+            rings.append(radius[each] * circle + [middle[0], middle[1], height])
+    return np.concatenate(rings)
 
 
 def _turned_about(middle: Floats, turns: float) -> Floats:

@@ -143,6 +143,16 @@ def test_a_groom_in_another_unit_is_told_with_the_factor_back(egg: Surface, unit
     assert error.remedy.endswith(f"(pass --head-scale {unit:.4g})")
 
 
+def test_hair_of_a_head_between_the_legs_of_a_larger_body_is_of_another_scale(
+    egg: Surface,
+) -> None:
+    """A groom a tenth as large is near to the body by the body's own measure."""
+    small = hair_on(egg, 200).transformed(np.diag([0.1, 0.1, 0.1, 1.0]))
+    with pytest.raises(HairloomError, match="another scale") as caught:
+        bind_roots(small, egg, place="hair.tfx")
+    assert "(pass --head-scale 0.1)" in caught.value.remedy
+
+
 def test_roots_beside_the_surface_are_loose_and_by_how_much(egg: Surface) -> None:
     """Moved along z by a tenth of its size: no root is farther, and the median is near that."""
     strands = hair_on(egg, 200)

@@ -25,6 +25,7 @@ def test_what_may_be_metres_is_left_in_peace(hair: float | None, head: float | N
         (30.0, None, "a.tfx by 0.01 (--groom-scale 0.01)"),
         (None, 17.0, "b.obj by 0.01 (--head-scale 0.01)"),
         (6.0, 170.0, "both by 0.01 (--groom-scale 0.01 --head-scale 0.01)"),  # a beard
+        (0.46, 16.9, "b.obj by 0.01 (--head-scale 0.01)"),
         (1.99, 199.0, "b.obj by 0.01 (--head-scale 0.01)"),
     ],
 )
