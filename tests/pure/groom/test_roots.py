@@ -12,6 +12,7 @@ from hairloom.addon.arrays import Floats
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.groom.roots import RootFrames, bind_roots, follow, root_frames, root_motions
 from hairloom.addon.strands import StrandSet, Surface
+from hairloom.addon.strands.closest_point import closest_point
 
 
 def hair_on(surface: Surface, count: int, offset: float = 0.0) -> StrandSet:
@@ -146,10 +147,16 @@ def test_a_groom_in_another_unit_is_told_with_the_factor_back(egg: Surface, unit
 def test_hair_of_a_head_between_the_legs_of_a_larger_body_is_of_another_scale(
     egg: Surface,
 ) -> None:
-    """A groom a tenth as large is near to the body by the body's own measure."""
-    small = hair_on(egg, 200).transformed(np.diag([0.1, 0.1, 0.1, 1.0]))
+    """A groom a tenth as large at the foot of a body, which stands on the ground: nearer to it than
+    a seventh of its size."""
+    low, _ = egg.bounds()
+    body = Surface(egg.positions - low * [0.0, 0.0, 1.0], egg.triangles)
+    whole = hair_on(body, 200)
+    small = whole.transformed(np.diag([0.1, 0.1, 0.1, 1.0]))
+    away = np.median(closest_point(small.roots, body).distance)
+    assert away < 0.15 * np.linalg.norm(np.ptp(body.positions, axis=0))
     with pytest.raises(HairloomError, match="another scale") as caught:
-        bind_roots(small, egg, place="hair.tfx")
+        bind_roots(small, body, place="hair.tfx")
     assert "(pass --head-scale 0.1)" in caught.value.remedy
 
 
