@@ -24,5 +24,5 @@ def sintel_rig() -> Rig:
     """11,400 strands."""
     folder = Path(os.environ.get("HAIRLOOM_DATA", REPOSITORY.parent / "shared" / "data")) / "sintel"
     strands = read_tfx(folder / "SintelHairOriginal-sintel_hair.16points.tfx").strands
-    head = read_mesh_file(folder / "sintel.obj", need_uv=False)
+    head = read_mesh_file(folder / "sintel.obj", need_uv=False)[0]
     return pipeline.prepare(strands, head, GuideSettings(), place="Sintel")

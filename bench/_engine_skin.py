@@ -64,7 +64,7 @@ def sintel() -> Snapshot:
     """Sintel's bust under the studio's lights, with hair over the forehead."""
     data = Path(os.environ.get("HAIRLOOM_DATA", REPOSITORY.parent / "shared" / "data")) / "sintel"
     hair = read_tfx(data / "SintelHairOriginal-sintel_hair.16points.tfx").strands
-    head = read_mesh_file(data / "sintel.obj", need_uv=True)
+    head = read_mesh_file(data / "sintel.obj", need_uv=True)[0]
     return Snapshot(
         hair.grid.astype(np.float32),
         hair.radius.reshape(hair.strand_count, -1).astype(np.float32),

@@ -111,4 +111,4 @@ def _file(path: Path) -> StrandSet:
 
 
 def _mesh(path: Path) -> Surface:
-    return read_mesh_file(path, need_uv=False)
+    return read_mesh_file(path, need_uv=False)[0]

@@ -82,7 +82,7 @@ def sintel() -> Sitter:
     folder = Path(data) / "sintel"
     strands = read_tfx(folder / "SintelHairOriginal-sintel_hair.16points.tfx").strands
     camera = frame_camera(strands.bounds(), VIEW_DIRECTION, FIELD_OF_VIEW, 1.0, margin=MARGIN)
-    head = read_mesh_file(folder / "sintel.obj", need_uv=False)
+    head = read_mesh_file(folder / "sintel.obj", need_uv=False)[0]
     return Sitter(strands.grid.astype(np.float32), head, camera)
 
 

@@ -9,7 +9,7 @@ from ..arrays import Floats
 MAX_EXTENT = 12.0
 #: And hair that is smaller [m].
 MIN_EXTENT = 0.005
-#: Beside such a one, what is smaller than this [m], or so many times smaller, is in metres already.
+#: Beside such a one, what is smaller than this [m], or this many times smaller, is in metres.
 _IN_METRES, _TIMES_SMALLER = 1.0, 50.0
 
 

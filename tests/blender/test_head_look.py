@@ -83,7 +83,7 @@ def test_another_mesh_has_its_own_materials_or_plain_skin(tmp_path: Path) -> Non
 
     file = tmp_path / "painted.obj"
     bpy.ops.wm.obj_export(filepath=str(file), export_selected_objects=True)
-    read = head_look(str(file), read_mesh_file(file, need_uv=False), "light")
+    read = head_look(str(file), read_mesh_file(file, need_uv=False)[0], "light")
     assert read is not None
     assert sorted(material.color for _, material in read) == [
         pytest.approx(color, abs=1e-3) for color in sorted(colors)

@@ -71,10 +71,10 @@ def test_files_are_simulated_as_the_same_scene_is_baked(new_hair, sphere, tmp_pa
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
 
     scene = bpy.context.scene
-    surface = read_mesh_file(head, need_uv=True)
+    surface = read_mesh_file(head, need_uv=True)[0]
     own = mesh_object("My head", surface, scene)
     hair = write_curves("My hair", read_tfx(groom).strands, own, scene.collection)
-    other = mesh_object("My ball", read_mesh_file(ball, need_uv=False), scene)
+    other = mesh_object("My ball", read_mesh_file(ball, need_uv=False)[0], scene)
     other.parent = own
     hair.hairloom.collider = other
     hair.hairloom.dynamics.sag_compensation, hair.data.hairloom.guides.guide_count = 0.0, 12

@@ -65,7 +65,12 @@ def endless(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def begun(*paths: Path) -> Generator[Any]:
     """The operator's steps, as a click begins them."""
     operator = SimpleNamespace(
-        onto_mesh=True, up="FILE", scale=1.0, guides="LEAVE", _paths=lambda: list(paths)
+        onto_mesh=True,
+        up="FILE",
+        scale=1.0,
+        head_scale=1.0,
+        guides="LEAVE",
+        _paths=lambda: list(paths),
     )
     steps: Any = HAIRLOOM_OT_import_strands.steps
     result: Generator[Any] = steps(operator, bpy.context)

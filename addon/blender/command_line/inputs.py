@@ -26,7 +26,7 @@ from ..base.vertex_weights import read_weights
 from ..scene.built_in_head import HeadLook, built_in_head
 from ..scene.curves import read_curves
 from ..scene.head_look import head_look
-from ..scene.mesh_files import read_file_meshes
+from ..scene.mesh_files import read_mesh_file
 from ..scene.partings import read_partings
 from ..scene.surfaces import read_surface, uv_map_note
 from ..setup.hairstyles import face_hair, is_bust
@@ -239,7 +239,7 @@ def _read_mesh(source: str, sources: Sources) -> tuple[Surface, tuple[str, ...]]
         return surface, tuple(filter(None, [uv_map_note(mesh_object)]))
     if not _is_mesh_file(source):
         raise _unknown(source, "mesh", "a mesh file such as head.obj")
-    surface, notes = read_file_meshes(Path(source), need_uv=need_uv)
+    surface, notes = read_mesh_file(Path(source), need_uv=need_uv)
     if sources.head_scale != 1.0:
         surface = replace(surface, positions=surface.positions * np.float32(sources.head_scale))
     return surface, notes

@@ -30,12 +30,7 @@ _IMPORTERS: dict[str, Callable[[str], Any]] = {
 _PURGED = ("objects", "meshes", "materials", "images", "collections", "cameras", "lights")
 
 
-def read_mesh_file(path: Path, *, need_uv: bool) -> Surface:
-    """`read_file_meshes` without what is to be said."""
-    return read_file_meshes(path, need_uv=need_uv)[0]
-
-
-def read_file_meshes(path: Path, *, need_uv: bool) -> tuple[Surface, tuple[str, ...]]:
+def read_mesh_file(path: Path, *, need_uv: bool) -> tuple[Surface, tuple[str, ...]]:
     """All meshes of a file as one Surface, in metres, Blender's Z up, and what is to be said of
     it; the scene is not changed.
 
