@@ -16,10 +16,13 @@ import numpy as np
 
 from ..arrays import Floats, Ints
 
-#: A capacity is at most 1 / 16 above the one before, and below 32 each number is one.
-_STEP = 16
-#: Strands are drawn from near to far in this many steps.
-_SLABS = 16
+#: A capacity is at most 1 / step above the one before; the finest step that needs few draws.
+_STEPS = (16, 8, 4, 2, 1)
+#: Strands are drawn from near to far in this many steps if that leaves any capacities, and in more
+#: if there are draws left.
+_SLABS, _MOST_SLABS = 4, 16
+#: draws of a groom's strands, and of those that throw the shadow of one light
+MOST_CLASSES, MOST_MAP_CLASSES = 16, 5
 
 
 @dataclass(frozen=True)
@@ -41,24 +44,31 @@ class DetailClass:
         return 2 * (self.capacity + 1) * self.count
 
 
-def detail_classes(totals: Ints, depths: Floats) -> tuple[Ints, tuple[DetailClass, ...]]:
+def detail_classes(
+    totals: Ints, depths: Floats | None = None, held: Ints | None = None
+) -> tuple[Ints, tuple[DetailClass, ...]]:
     """The strands that are drawn, in order of their classes, and these classes.
 
-    Near strands come first: what they hide is then not shaded. The depths are cut into slabs, and
-    each slab has its own classes. Within a class strands keep their order, so that two pictures
-    of one view are the same, and strands that are not drawn change no other's place.
+    With depths near strands come first: what they hide is then not shaded. The depths are cut into
+    slabs, and each slab has its own classes. Within a class strands keep their order, so that two
+    pictures of one view are the same, and strands that are not drawn change no other's place.
 
     Args:
         totals: (strand_count,) pieces of each strand, 0 for those that are not drawn.
-        depths: (strand_count,) how far each strand is, in any unit.
+        depths: (strand_count,) how far each strand is, in any unit; None: the order is no matter.
+        held: capacities that hold all totals, growing from 0; None: as few as MOST_CLASSES need.
     """
     if not len(totals):
         return np.zeros(0, np.intp), ()
-    series = capacities(int(totals.max()))
-    place = _slabs(depths) * len(series) + np.searchsorted(series, totals)
-    place[totals == 0] = _SLABS * len(series)
+    found = _series(totals, MOST_CLASSES if depths is None else MOST_CLASSES // _SLABS)
+    series, used = found if held is None else (held, len(held))
+    slabs = 1 if depths is None else min(max(MOST_CLASSES // max(used, 1), 1), _MOST_SLABS)
+    place = np.searchsorted(series, totals)
+    if depths is not None:
+        place = place + _slabs(depths, slabs) * len(series)
+    place[totals == 0] = slabs * len(series)
     order = np.argsort(place.astype(np.uint16), kind="stable")  # by radix, so in linear time
-    counts = np.bincount(place, minlength=_SLABS * len(series))[: _SLABS * len(series)]
+    counts = np.bincount(place, minlength=slabs * len(series))[: slabs * len(series)]
     first, classes = 0, []
     for slot in np.flatnonzero(counts).tolist():
         classes.append(DetailClass(int(series[slot % len(series)]), first, int(counts[slot])))
@@ -66,18 +76,38 @@ def detail_classes(totals: Ints, depths: Floats) -> tuple[Ints, tuple[DetailClas
     return order[:first], tuple(classes)
 
 
-def _slabs(depths: Floats) -> Ints:
-    """Which of _SLABS equal parts of all depths each lies in, 0 the nearest."""
+def _series(totals: Ints, most: int) -> tuple[Ints, int]:
+    """The finest capacities of which these strands use no more than so many, and how many."""
+    present = np.flatnonzero(np.bincount(totals)[1:]) + 1
+    for step in _STEPS:
+        series = capacities(int(totals.max()), step)
+        used = len(np.unique(np.searchsorted(series, present)))
+        if used <= most:
+            break
+    return series, used
+
+
+def spread_capacities(totals: Ints) -> Ints:
+    """0, and MOST_MAP_CLASSES capacities or fewer, each for about as many strands.
+
+    Few draws then waste little; of strands whose pieces change it would mix up their order.
+    """
+    places = np.linspace(0.0, 1.0, MOST_MAP_CLASSES + 1)
+    return np.unique([0, *np.quantile(totals, places[1:], method="higher")])
+
+
+def _slabs(depths: Floats, count: int) -> Ints:
+    """Which of so many equal parts of all depths each lies in, 0 the nearest."""
     depths = np.nan_to_num(depths, nan=0.0, posinf=0.0, neginf=0.0)
     span = max(float(np.ptp(depths)), 1.0e-30)
     fraction = (depths - depths.min()) / span
-    return np.minimum((fraction * _SLABS).astype(np.int64), _SLABS - 1)
+    return np.minimum((fraction * count).astype(np.int64), count - 1)
 
 
 @lru_cache(maxsize=64)
-def capacities(most: int) -> Ints:
+def capacities(most: int, step: int) -> Ints:
     """0, and all capacities up to the first that holds `most` pieces, growing."""
     series = [0]
     while series[-1] < most:
-        series.append(series[-1] + max(series[-1] // _STEP, 1))
+        series.append(series[-1] + max(series[-1] // step, 1))
     return np.array(series)

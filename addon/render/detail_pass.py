@@ -95,6 +95,8 @@ class DetailPass:
         serial: int,
         camera: Camera,
         size: tuple[int, int],
+        *,
+        by_depth: bool = True,
     ) -> DetailOrder:
         """What is to be drawn; computed only where something is new since the last time.
 
@@ -102,6 +104,7 @@ class DetailPass:
             points: the textures cv_points and strand_spans of the snapshot, see strand_pass.py.
             serial: grows whenever one of them is another one or is written.
             size: width and height of the final picture [pixels].
+            by_depth: near strands come first; else their order is no matter.
 
         Raises:
             ShaderError: the shader does not compile here.
@@ -115,11 +118,11 @@ class DetailPass:
         if is_even and culling == "none" and thinned == Thinning():
             return _even_order(snapshot)
         seen = _view_values(view, camera, snapshot.root_center, shades)
-        asked = (serial, seen.tobytes(), snapshot.detail, thinned, self._extent)
+        asked = (serial, seen.tobytes(), snapshot.detail, thinned, self._extent, by_depth)
         if self._order is None or self._asked != asked:
             recipe = detail_recipe(snapshot.detail.mode, culling)
             factors, totals = self._computed(recipe, snapshot, points, seen)
-            self._order = _ordered(factors, totals, _widths(snapshot, thinned))
+            self._order = _ordered(factors, totals, _widths(snapshot, thinned), by_depth)
             self._asked = asked
         return self._order
 
@@ -219,10 +222,10 @@ def _widths(snapshot: Snapshot, thinned: Thinning) -> Floats:
     return width_factor(snapshot.rank, thinned.fraction, thinned.widening)
 
 
-def _ordered(factors: Any, totals: Floats, widths: Floats) -> DetailOrder:
+def _ordered(factors: Any, totals: Floats, widths: Floats, by_depth: bool) -> DetailOrder:
     """The strands that have pieces and a width, in classes."""
     pieces = np.where(widths > 0.0, totals[:, 0], 0.0)
-    drawn, classes = detail_classes(pieces.astype(np.int32), totals[:, 1])
+    drawn, classes = detail_classes(pieces.astype(np.int32), totals[:, 1] if by_depth else None)
     order = np.zeros((len(drawn), 1, 4), np.float32)
     order[:, 0, 0], order[:, 0, 1], order[:, 0, 2] = drawn, pieces[drawn], widths[drawn]
     texture = texture_from(strand_rows(order), "RGBA32F") if classes else None

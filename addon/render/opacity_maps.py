@@ -16,7 +16,7 @@ moving camera costs nothing.
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
@@ -33,11 +33,20 @@ from ..shading.volume.shadow_lights import shadow_frames
 from . import gpu_objects
 from .mesh_depths import MeshDepths
 from .shader_feature import ShaderFeature
+from .shader_program import ShaderRecipe, program
 from .shader_source import LAYER_TEXEL_CAPACITY
 from .snapshot import Caster
 from .textures import drawing_into, drawing_state
 
 _NOTHING = (0.0, 0.0, 0.0, 0.0)
+#: while a view turns, shadows lag behind its lights by about this angle, and never by more [rad]
+_LAG, _MOST_LAG = float(np.radians(4.0)), float(np.radians(15.0))
+_NO_STARTS_RECIPE = ShaderRecipe(
+    name="opacity_no_starts",
+    compute="opacity_no_starts.comp.glsl",
+    images=(("R32UI", "starts"),),
+    integers=("map_index", "side"),
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,10 +85,13 @@ class OpacityMaps:
             },
         )
 
-    def forget_starts(self) -> None:
-        """As if no light had met any hair."""
-        if self.starts is not None:
-            self.starts.clear(format="UINT", value=(-1,))  # beyond all depths
+    def forget_starts(self, number: int) -> None:
+        """As if the light of this map had met no hair."""
+        side = self.size.side // START_TEXELS
+        shader = program(_NO_STARTS_RECIPE)
+        shader.bind(images={"starts": self.starts}, integers={"map_index": number, "side": side})
+        gpu.compute.dispatch(shader.shader, -(-2 * side // 8), -(-side // 8), 1)
+        gpu.shader.unbind()
 
 
 def new_maps(values: Floats, size: MapSize) -> OpacityMaps:
@@ -124,14 +136,16 @@ class OpacityDrawing:
     """Keeps the maps of one groom from draw to draw; making one touches no GPU.
 
     note: what the artist is to know of the last draw, or nothing.
+    is_behind: some maps are those of where their lights were before, see `maps`.
     """
 
     def __init__(self) -> None:
         self._maps: OpacityMaps | None = None
-        self._drawn: tuple[Any, ...] = ()
-        self._meshes_drawn: tuple[Any, ...] = ()
+        self._drawn_of: tuple[Any, ...] = ()
+        self._frames: dict[int, LightFrame] = {}
+        self._meshes_drawn: dict[int, tuple[Any, ...]] = {}
         self._casters = MeshDepths()
-        self.note = ""
+        self.note, self.is_behind = "", False
 
     def maps(
         self,
@@ -141,6 +155,8 @@ class OpacityDrawing:
         settings: VolumeSettings,
         casters: tuple[Caster, ...],
         spacing: float = 0.0,
+        *,
+        is_turning: bool = False,
     ) -> OpacityMaps:
         """The maps of a frame.
 
@@ -149,43 +165,77 @@ class OpacityDrawing:
             lights: in the order in which the shader knows them.
             casters: meshes, world space; another object whenever one is another.
             spacing: of strands whose hairs fill the space between them [m]; 0: none do.
+            is_turning: the lights hang on a view that moves. Then no more than one map a frame is
+                drawn again, as long as all of them lag little.
         """
-        frames = shadow_frames(lights, ball, settings)
-        count = sum(frame is not None for frame in frames)
-        size = fitted_size(settings, count, gpu.capabilities.max_texture_size_get())
-        self.note = size_note(settings, count, size)
+        frames = dict(enumerate(shadow_frames(lights, ball, settings)))
+        wanted = {light: frame for light, frame in frames.items() if frame is not None}
+        size = fitted_size(settings, len(wanted), gpu.capabilities.max_texture_size_get())
+        self.note = size_note(settings, len(wanted), size)
         size = even_size(size, spacing, ball.radius)
-        values = pack_opacity(frames, settings, size)
-        drawn = (hair.state, settings, values.tobytes(), tuple(map(id, casters)))
-        if self._maps is None or self._drawn != drawn:
-            shadowing = [index for index, frame in enumerate(frames) if frame is not None]
+        place = ball.center.tobytes(), ball.radius
+        drawn_of = (hair.state, settings, size, *place, tuple(wanted), tuple(map(id, casters)))
+        is_other = self._maps is None or self._drawn_of != drawn_of
+        if is_other:
+            self._frames = {}
+        due = due_maps(self._frames, wanted, is_turning=is_turning)
+        if self._maps is None or is_other or due:
+            self._frames |= {light: wanted[light] for light in due}
+            values = pack_opacity([self._frames.get(light) for light in frames], settings, size)
             self._maps = maps = self._maps_of(values, size)
-            maps.forget_starts()
-            self._draw_casters(maps, shadowing, casters)
-            for number, light in enumerate(shadowing):
-                _draw_map(maps, number, light, hair)
-            self._drawn = drawn
+            self._casters.hold(casters)
+            for number, light in enumerate(wanted):
+                if light in due:
+                    self._draw_casters(maps, number, light, casters)
+                    _draw_map(maps, number, light, hair)
+            self._drawn_of = drawn_of
+        self.is_behind = bool(due_maps(self._frames, wanted))
         return self._maps
 
     def _maps_of(self, values: Floats, size: MapSize) -> OpacityMaps:
         """The textures of the draw before where they have this size, with other values."""
         if self._maps is not None and self._maps.size == size:
             return replace(self._maps, values=values)
-        self._meshes_drawn = ()
+        self._meshes_drawn = {}
         return new_maps(values, size)
 
     def _draw_casters(
-        self, maps: OpacityMaps, shadowing: list[int], casters: tuple[Caster, ...]
+        self, maps: OpacityMaps, number: int, light: int, casters: tuple[Caster, ...]
     ) -> None:
         """The depths of meshes, if a light sees others than before, or from elsewhere."""
-        seen = (tuple(map(id, casters)), maps.values[: -4 * LAYER_TEXEL_CAPACITY - 4].tobytes())
-        self._casters.hold(casters)
-        if self._meshes_drawn == seen:
-            return
-        rows = maps.values[: 4 * 4 * LIGHT_CAPACITY].reshape(4, LIGHT_CAPACITY, 4)
-        for number, light in enumerate(shadowing):
-            self._casters.draw(maps.meshes, number, rows[:, light])
-        self._meshes_drawn = seen
+        rows = maps.values[: 4 * 4 * LIGHT_CAPACITY].reshape(4, LIGHT_CAPACITY, 4)[:, light]
+        seen = tuple(map(id, casters)), rows.tobytes()
+        if self._meshes_drawn.get(number) != seen:
+            self._casters.draw(maps.meshes, number, rows)
+            self._meshes_drawn[number] = seen
+
+
+def due_maps(
+    drawn: Mapping[int, LightFrame], wanted: Mapping[int, LightFrame], *, is_turning: bool = False
+) -> tuple[int, ...]:
+    """The lights whose maps are to be drawn, or drawn again.
+
+    Args:
+        drawn, wanted: frames by light; either none is drawn yet, or all are.
+        is_turning: as for `OpacityDrawing.maps`.
+    """
+    if not drawn:
+        return tuple(wanted)
+    lags = {light: _turn(drawn[light], frame) for light, frame in wanted.items()}
+    behind = tuple(
+        light for light, frame in wanted.items() if (drawn[light].to_map != frame.to_map).any()
+    )
+    if not is_turning or not behind or max(lags.values()) > _MOST_LAG:
+        return behind
+    last = max(behind, key=lambda light: lags[light])
+    return (last,) if lags[last] > _LAG else ()
+
+
+def _turn(one: LightFrame, other: LightFrame) -> float:
+    """The angle between the ways along which two frames look [rad]."""
+    ways = one.to_depth[:3], other.to_depth[:3]
+    lengths = np.linalg.norm(ways[0]) * np.linalg.norm(ways[1])
+    return float(np.arccos(np.clip(ways[0] @ ways[1] / lengths, -1.0, 1.0)))
 
 
 def _draw_map(maps: OpacityMaps, number: int, light: int, hair: HairInMaps) -> None:
@@ -196,6 +246,7 @@ def _draw_map(maps: OpacityMaps, number: int, light: int, hair: HairInMaps) -> N
     meshes = ShaderFeature(textures={"opacity_meshes": ("DEPTH_2D_ARRAY", maps.meshes)})
     features = [place]
     if maps.starts is not None:
+        maps.forget_starts(number)
         hair.draw_starts(maps, number, place)
         features.append(
             ShaderFeature(

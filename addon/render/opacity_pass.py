@@ -21,7 +21,7 @@ from ..shading.volume.light_frame import Ball
 from ..shading.volume.map_size import START_TEXELS
 from ..shading.volume.settings import VolumeSettings
 from .capabilities import capabilities
-from .detail_classes import DetailClass, detail_classes
+from .detail_classes import DetailClass, detail_classes, spread_capacities
 from .feature_programs import UniformBlocks, bound
 from .opacity_maps import OpacityDrawing, OpacityMaps
 from .opacity_starts import draw_starts
@@ -88,7 +88,8 @@ class _Casting:
             chosen = np.sort(np.argsort(rank, kind="stable")[:count])
         classes: tuple[DetailClass, ...] = (DetailClass(layout.cv_count - 1, 0, count),)
         if not layout.cv_count:
-            order, classes = detail_classes(layout.counts[chosen] - 1, np.zeros(count))
+            pieces = layout.counts[chosen] - 1
+            order, classes = detail_classes(pieces, held=spread_capacities(pieces))
             chosen = chosen[order]
         spans = texture_from(strand_rows(layout.spans[chosen][:, None]), "RGBA32F")
         return cls(layout, rank, count, spans, classes)
@@ -178,6 +179,11 @@ class OpacityPass:
         """What the artist is to know of the last draw, or nothing."""
         return self._drawing.note
 
+    @property
+    def is_behind(self) -> bool:
+        """Whether maps are those of where lights were before, see OpacityDrawing.maps."""
+        return self._drawing.is_behind
+
     def maps(
         self,
         points: Any,
@@ -191,6 +197,8 @@ class OpacityPass:
         spacing: float = 0.0,
         looks: Any = None,
         rank: Floats | None = None,
+        *,
+        is_turning: bool = False,
     ) -> OpacityMaps:
         """The maps of a frame.
 
@@ -199,7 +207,7 @@ class OpacityPass:
             serial: another number whenever the points are others.
             rank: see Snapshot.
             looks: texture cv_looks where points are unevenly spaced, see strand_pass.py.
-            ball, lights, casters, spacing: as in OpacityDrawing.maps.
+            ball, lights, casters, spacing, is_turning: as in OpacityDrawing.maps.
         """
         count = max(round(layout.strand_count * settings.strand_fraction), 1)
         casting = self._casting
@@ -211,4 +219,6 @@ class OpacityPass:
         )
         state = serial, casting, strands, capabilities().image_atomics
         hair = _Strands(state, curves, look, self._blocks, casting, self._ribbons)
-        return self._drawing.maps(hair, ball, lights, settings, casters, spacing)
+        return self._drawing.maps(
+            hair, ball, lights, settings, casters, spacing, is_turning=is_turning
+        )

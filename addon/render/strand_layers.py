@@ -32,6 +32,7 @@ import numpy as np
 from ..arrays import Ints
 from ..shading.volume.transparency import LAYERS
 from . import gpu_objects
+from .kept_picture import KeptPicture
 from .pixel_parts import PixelPart, pixel_parts
 from .shader_program import ShaderProgram, ShaderRecipe, program, released_with_shaders
 from .shader_source import LAYER_ROW, ShaderError
@@ -97,21 +98,29 @@ class StrandLayers:
         self._seen: Any = None
         self._fronts: Any = None
         self._triangle: Any = None
+        self._picture: KeptPicture | None = None
 
     def draw(
-        self, drawing: StrandDrawing, *, is_own_target: bool, in_parts: bool = False
+        self,
+        drawing: StrandDrawing,
+        *,
+        is_own_target: bool,
+        in_parts: bool = False,
+        picture: KeptPicture | None = None,
     ) -> LayersDrawn:
         """Gather, order, shade, and put the result over what is in the bound framebuffer.
 
         Args:
             is_own_target: nobody else has set a scissor for that framebuffer.
             in_parts: whether it is likely to have no room at once, so that this is not even tried.
+            picture: takes the result as well.
 
         Raises:
             ShaderError: a shader does not compile here, or there is no memory at all.
         """
         left, bottom, width, height = gpu.state.viewport_get()
         self._fit((left + width, bottom + height))
+        self._picture = picture
         if not in_parts and self._is_gathered(drawing) and self._is_finished(drawing):
             return LayersDrawn(1)
         counts, drawn, missing = self._counted(drawing), 0, 0
@@ -184,12 +193,20 @@ class StrandLayers:
                 return False
             self._too_long = longest - LONGEST_IN_SOFTWARE
         _dispatch(drawing.shade(images, seen_count), seen_count, LAYER_ROW)
+        self._show(drawing)
+        if self._picture is not None:
+            with self._picture.drawing():
+                self._show(drawing)
+        return True
+
+    def _show(self, drawing: StrandDrawing) -> None:
+        """Colours and depths of all lists, into the bound framebuffer."""
+        images = self._images
         with drawing_state(depth_test="NONE", depth_write=False, blend="ALPHA_PREMULT"):
             self._triangle.draw(drawing.show(images, writes_depth=False).shader)
         with drawing_state(depth_test="ALWAYS"):
             gpu.state.color_mask_set(False, False, False, False)
             self._triangle.draw(drawing.show(images, writes_depth=True).shader)
-        return True
 
     def _counts(self) -> tuple[int, int, int, int]:
         """How many fragments there are, pixels that have some, fragments that are seen, and the
@@ -235,16 +252,22 @@ class StrandLayers:
                 self._max_rows = rows = rows // 2
 
     def _fit(self, size: tuple[int, int]) -> None:
-        """Buffers for this many pixels; the old ones, where they are not far too large."""
+        """Buffers for this many pixels; the old ones, where they are not far too large. Views of
+        several shapes that take turns have the same ones.
+        """
         kept, wanted = self._size, size
         is_held = kept[0] >= wanted[0] and kept[1] >= wanted[1]
-        if is_held and kept[0] * kept[1] <= 4 * max(wanted[0] * wanted[1], 1):
+        is_far_too_large = kept[0] * kept[1] > 4 * max(wanted[0] * wanted[1], 1)
+        if is_held and not is_far_too_large:
             return
+        if not is_far_too_large:
+            size = max(kept[0], wanted[0]), max(kept[1], wanted[1])
         self._size = size
         self._count = gpu_objects.texture((4, 1), format="R32UI")
         self._heads = gpu_objects.texture(size, format="R32UI")
         self._pixels = gpu_objects.texture(size, format="R32UI")
-        self._make_nodes(min(FIRST_ROWS, self._max_rows))
+        if self._nodes is None or is_far_too_large:
+            self._make_nodes(min(FIRST_ROWS, self._max_rows))
         self._fronts = gpu_objects.texture(size, format="RG32F")
         if self._triangle is None:
             self._triangle = gpu_objects.triangle()

@@ -16,7 +16,7 @@ How many pieces each segment has comes from detail_pass.py, unless all have equa
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Hashable, Iterator, Sequence, Set
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
@@ -25,7 +25,7 @@ import numpy as np
 
 from ..params.glsl import struct_values
 from ..shading.drawn_strands import drawn_color, natural_strands, own_colors
-from ..shading.lights import kept_lights
+from ..shading.lights import Light, kept_lights
 from ..shading.settings import StrandSettings
 from ..shading.strand_noise import SEED_LIMIT
 from ..shading.volume.light_frame import Ball
@@ -37,6 +37,7 @@ from .feature_programs import UniformBlocks
 from .hair_ball import HairBall
 from .hashed_strands import HASHED_STRANDS
 from .inter_groom_shadow import NOBODY, InterGroomShadow
+from .kept_picture import KeptPicture
 from .marschner_textures import marschner_feature, scattering_feature
 from .opacity_maps import OpacityMaps
 from .opacity_pass import OpacityPass
@@ -83,19 +84,43 @@ class Statistics:
         )
 
 
+@dataclass(eq=False)
+class _Lit:
+    """What draws the maps of one light. light: None before the first."""
+
+    light: tuple[Light, ...] | None = None
+    opacity: OpacityPass = field(default_factory=OpacityPass)
+
+
+@dataclass(eq=False)
+class _View:
+    """What is kept for one view.
+
+    lit: by its lights; other views may have the same. asked: the lights of its last draw.
+    parts: in how many its strands were drawn last.
+    """
+
+    detail: DetailPass = field(default_factory=DetailPass)
+    lit: _Lit = field(default_factory=_Lit)
+    asked: tuple[Light, ...] | None = None
+    parts: int = 0
+
+
 class StrandPass:
     """Keeps one groom's strands on the GPU from draw to draw.
 
     Making one touches no GPU; the first draw does. Arrays of a snapshot are uploaded only when
     they are other objects than in the draw before.
 
+    Views are known by any name; what depends on them is kept for each. Whoever draws into one
+    picture needs none.
+
     statistics: of the last draw.
     """
 
     def __init__(self) -> None:
-        self._detail = DetailPass()
-        self._opacity = OpacityPass()
         self._points_serial = 0
+        self._views: dict[Hashable, _View] = {}
         self.statistics = Statistics()
         self.release()
         released_with_shaders(self)
@@ -111,6 +136,9 @@ class StrandPass:
         display: Display | None = None,
         samples: int = 1,
         others: Sequence[OpacityMaps] = (),
+        view: Hashable = None,
+        is_turning: bool = False,
+        picture: KeptPicture | None = None,
     ) -> None:
         """Draw all strands into the bound framebuffer, depth-tested against what is in it.
 
@@ -123,11 +151,15 @@ class StrandPass:
                 and the settings of detail count in the latter.
             others: maps of other hair that may be in the way of light. Counts where this hair has
                 maps itself, see `opacity`.
+            view: which one this is.
+            is_turning: as for `opacity`.
+            picture: takes what is drawn, so that it can be shown again.
 
         Raises:
             ShaderError: the shader does not compile here, or points on the GPU were released.
         """
-        in_parts = self.statistics.layers.parts > 1
+        own = self._views.setdefault(view, _View())
+        in_parts = own.parts > 1
         self.statistics = Statistics()
         if not snapshot.strand_count:
             return
@@ -135,10 +167,13 @@ class StrandPass:
         self._upload(snapshot)
         size = width // samples, height // samples
         serial = self._points_serial
-        order = self._detail.order(snapshot, self._textures, serial, camera, size)
+        is_debug = snapshot.debug_view != "none"
+        transparency = "none" if is_debug else drawn_transparency(snapshot.strand_settings)
+        by_depth = transparency != "layers"
+        order = own.detail.order(snapshot, self._textures, serial, camera, size, by_depth=by_depth)
         if not order.classes:
             return
-        is_debug = snapshot.debug_view != "none"
+        maps = None if is_debug else self.opacity(snapshot, view=view, is_turning=is_turning)
         drawing = StrandDrawing(
             order=order,
             ribbon=self._ribbons.of,
@@ -148,7 +183,7 @@ class StrandPass:
                 self._strands_feature(snapshot),
                 self._curves(snapshot),
             ),
-            shading=tuple(self._shading(snapshot, others)),
+            shading=tuple(self._shading(snapshot, maps, others)),
             shown=(
                 *(() if display is None else (display.feature,)),
                 *((self._debug_feature(snapshot.debug_view),) if is_debug else ()),
@@ -156,11 +191,15 @@ class StrandPass:
             output_encoding=output_encoding,
             samples_across=samples,
         )
-        transparency = "none" if is_debug else drawn_transparency(snapshot.strand_settings)
         layers = LayersDrawn()
         if transparency == "layers":
-            is_own_target = output == "scene_linear"
-            layers = LAYERS_OF_PIXELS.draw(drawing, is_own_target=is_own_target, in_parts=in_parts)
+            layers = LAYERS_OF_PIXELS.draw(
+                drawing,
+                is_own_target=output == "scene_linear",
+                in_parts=in_parts,
+                picture=picture,
+            )
+            own.parts = layers.parts
         elif transparency == "hashed":
             HASHED_STRANDS.draw(drawing)
         else:
@@ -173,10 +212,17 @@ class StrandPass:
             layers=layers,
         )
 
-    def opacity(self, snapshot: Snapshot) -> OpacityMaps | None:
+    def opacity(
+        self, snapshot: Snapshot, *, view: Hashable = None, is_turning: bool = False
+    ) -> OpacityMaps | None:
         """How much hair lies between each light and every place; None where it throws no shadow.
 
-        Drawn into separate textures, and only when something has changed.
+        Drawn into separate textures, and only when something has changed. Views in the same light
+        have the same ones.
+
+        Args:
+            view: as for `draw`.
+            is_turning: the lights hang on a view that moves, see OpacityDrawing.maps.
 
         Raises:
             ShaderError: as `draw`.
@@ -184,7 +230,7 @@ class StrandPass:
         if snapshot.volume.shadows == "none" or not snapshot.strand_count:
             return None
         self._upload(snapshot)
-        return self._opacity.maps(
+        return self._lit_by(snapshot, view).maps(
             self._textures["cv_points"],
             self._points_serial,
             snapshot.layout,
@@ -196,7 +242,27 @@ class StrandPass:
             snapshot.spacing,
             None if snapshot.along is None else self._textures["cv_looks"],
             snapshot.rank,
+            is_turning=is_turning,
         )
+
+    def _lit_by(self, snapshot: Snapshot, view: Hashable) -> OpacityPass:
+        """What draws the maps of this light: that of a view which is lit by it, or of this one."""
+        light, own = snapshot.lights, self._views.setdefault(view, _View())
+        lit = next((each.lit for each in self._views.values() if each.lit.light == light), own.lit)
+        if lit.light not in (light, None) and own.asked == light:
+            lit = _Lit()  # another view, which was lit alike, has turned
+        lit.light = own.asked = light
+        own.lit = lit
+        return lit.opacity
+
+    def is_behind(self, view: Hashable) -> bool:
+        """Whether shadows in a view lag behind its lights, so that it has to be drawn again."""
+        own = self._views.get(view)
+        return own is not None and own.lit.opacity.is_behind
+
+    def forget_views(self, shown: Set[Hashable]) -> None:
+        """Let go of what was kept for views other than these."""
+        self._views = {view: own for view, own in self._views.items() if view in shown}
 
     def ball(self, snapshot: Snapshot) -> Ball:
         """A sphere that holds all its strands."""
@@ -205,12 +271,11 @@ class StrandPass:
     def release(self) -> None:
         """Let go of all that lies on the GPU; the next draw uploads again."""
         self._blocks = UniformBlocks()
-        self._opacity.release()
+        self._views = {}
         self._ball, self._between = HairBall(), InterGroomShadow()
         self._textures: dict[str, Any] = {}
         self._uploaded: dict[str, tuple[Any, ...]] = {}
         self._ribbons = Ribbons()
-        self._detail.release()
 
     def _strands_feature(self, snapshot: Snapshot) -> ShaderFeature:
         """What all programs that know how wide strands are have."""
@@ -224,7 +289,7 @@ class StrandPass:
         return curves_feature(textures["cv_points"], textures["strand_spans"], looks)
 
     def _shading(
-        self, snapshot: Snapshot, others: Sequence[OpacityMaps]
+        self, snapshot: Snapshot, maps: OpacityMaps | None, others: Sequence[OpacityMaps]
     ) -> Iterator[ShaderFeature]:
         """What all programs that shade these strands have.
 
@@ -241,7 +306,7 @@ class StrandPass:
             return
         if "cv_colors" in self._textures:
             yield self._color_feature()
-        is_marschner, maps = snapshot.shading.model == "marschner", self.opacity(snapshot)
+        is_marschner = snapshot.shading.model == "marschner"
         if is_marschner:
             yield marschner_feature(snapshot)
         if "cv_openness" in self._textures:

@@ -13,6 +13,7 @@ from ..base import suspension
 from ..base.latest_job import unwatch_all
 from ..cards.object import remember_names, remember_numbers
 from ..properties import changed, library_overrides
+from ..viewport import views
 from . import previews as registry
 from . import scene_events
 from .previews import previews
@@ -56,11 +57,13 @@ def on_undo_post(*_: Any) -> None:
 
 @persistent
 def on_depsgraph_update(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+    views.scene_changed()
     _react(scene_events.updated, depsgraph)
 
 
 @persistent
 def on_frame_change(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+    views.scene_changed()
     _react(scene_events.frame_changed, depsgraph)
 
 

@@ -7,7 +7,7 @@ Drawing itself never reads a data-block: all it asks Blender for is which view i
 from __future__ import annotations
 
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -17,12 +17,15 @@ import numpy as np
 
 from ...render.body_shadow import BodyShadow
 from ...render.camera import Camera
+from ...render.capabilities import capabilities
 from ...render.card_pass import CardPass
 from ...render.display import Display
+from ...render.kept_picture import KeptPicture
+from ...render.opacity_maps import OpacityMaps
 from ...render.scene_pass import ONE_AT_A_TIME
 from ...render.scene_snapshot import SceneSnapshot
 from ...render.snapshot import Snapshot
-from ...render.strand_pass import Statistics, StrandPass
+from ...render.strand_pass import Statistics, StrandPass, drawn_transparency
 from ...shading.environment import Environment, world_suns
 from ...shading.lights import Light, three_point_lights
 from ..base.objects import LayerKey, is_solid, layer_key, layers_with, spaces_without
@@ -36,6 +39,15 @@ from ..sessions.snapshots import with_all_strands
 from . import view_transform
 from .debug_lines import Lines, debug_lines_of, draw_lines
 from .overlay_text import card_counts_line, counts_line, draw_graphs, write_lines
+from .views import (
+    View,
+    forget_closed_views,
+    forget_views,
+    view_marks,
+    view_of,
+    was_drawn,
+    was_shown_again,
+)
 
 
 @dataclass(frozen=True)
@@ -197,53 +209,149 @@ def _draw(what: Callable[[Any], None]) -> None:
 
 def _draw_strands(context: Any) -> None:
     look_at_layers()
-    space, view = context.space_data, context.region_data
-    camera = _camera(view)
+    view, camera = view_of(context.region_data), _camera(context.region_data)
+    shown = list(_shown_now(context, camera, has_turned=view.turns_to(camera)))
+    if not shown:
+        view.picture.release()
+        return
+    marks = (*view_marks(context, camera), *(mark for each in shown for mark in each.marks))
+    with ONE_AT_A_TIME:
+        for each in shown:
+            each.draw_body_shadow(camera)
+        if view.picture.is_of(marks):
+            view.picture.show()
+            for uid, counted in view.counted.items():
+                _overlay.drawn[uid].strand_pass.statistics = counted
+            was_shown_again(view, context.space_data.shading)
+        else:
+            _draw_anew(view, camera, shown, marks)
+            was_drawn(view)
+
+
+def _draw_anew(view: View, camera: Camera, shown: list[_Shown], marks: tuple[Any, ...]) -> None:
+    """All grooms into the view that is being drawn, and into its picture if that can be kept."""
+    forget_closed_views(each.strand_pass for each in _overlay.drawn.values())
+    picture = view.picture if all(each.can_be_kept for each in shown) else None
+    if picture is None:
+        view.picture.release()
+    else:
+        picture.begin()
+    for each in shown:
+        with each.drawing.times.measured("drawing"):
+            each.draw(camera, picture)
+    view.is_behind = any(each.drawn.strand_pass.is_behind(view.address) for each in shown)
+    view.counted = {each.uid: each.drawn.strand_pass.statistics for each in shown}
+    if picture is not None and not view.is_behind:
+        picture.marks = marks
+
+
+@dataclass(frozen=True, eq=False)
+class _Shown:
+    """One groom in the view that is being drawn.
+
+    snapshot: as it is seen and lit there. shades_body: its shadow lies on the head.
+    is_turning: its lights hang on the view, which moves. sees_all: also strands behind heads.
+    """
+
+    uid: int
+    drawn: Drawn
+    drawing: Drawing
+    snapshot: Snapshot
+    display: Display | None
+    address: int
+    shades_body: bool
+    is_turning: bool
+    sees_all: bool
+
+    @property
+    def marks(self) -> tuple[Any, ...]:
+        """All that its picture depends on, beside the view."""
+        snapshot = self.snapshot
+        points, harmonics, display = snapshot.device_points, snapshot.harmonics, self.display
+        return (
+            *(self.uid, self.drawing.snapshot, 0 if points is None else points.serial),
+            *(snapshot.lights, snapshot.ambient, b"" if harmonics is None else harmonics.tobytes()),
+            *(() if display is None else (display.table, display.gain, display.gamma)),
+            *(self.sees_all, capabilities().image_atomics),
+        )
+
+    @property
+    def can_be_kept(self) -> bool:
+        """Cards are drawn among strands, and the other ways write depth of their own."""
+        snapshot = self.snapshot
+        is_plain = snapshot.cards is None and snapshot.debug_view == "none"
+        return is_plain and drawn_transparency(snapshot.strand_settings) == "layers"
+
+    @property
+    def _card_maps(self) -> OpacityMaps | None:
+        has_cards = self.snapshot.cards is not None
+        return self.drawn.card_pass.opacity(self.snapshot) if has_cards else None
+
+    def draw_body_shadow(self, camera: Camera) -> None:
+        """Before all hair: it lies on what Blender has drawn."""
+        if not self.shades_body:
+            return
+        maps = self._card_maps or self.drawn.strand_pass.opacity(
+            self.snapshot, view=self.address, is_turning=self.is_turning
+        )
+        if maps is not None:
+            _, _, width, height = gpu.state.viewport_get()
+            shadow = self.drawn.shadow
+            shadow.draw(self.snapshot, maps, camera, width, height, display=self.display)
+
+    def draw(self, camera: Camera, picture: KeptPicture | None) -> None:
+        """Its hair; strands go into the picture as well."""
+        _, _, width, height = gpu.state.viewport_get()
+        snapshot, display, drawn = self.snapshot, self.display, self.drawn
+        drawn.strand_pass.draw(
+            snapshot,
+            camera,
+            width,
+            height,
+            output="viewport",
+            display=display,
+            view=self.address,
+            is_turning=self.is_turning,
+            picture=picture,
+        )
+        drawn.card_pass.draw(
+            snapshot,
+            camera,
+            width,
+            height,
+            opacity=self._card_maps,
+            output="viewport",
+            display=display,
+        )
+
+
+def _shown_now(context: Any, camera: Camera, *, has_turned: bool) -> Iterator[_Shown]:
+    """All grooms of the view that is being drawn."""
+    space = context.space_data
     address, studio = space.as_pointer(), three_point_lights(camera.view)
     display = view_transform.display_of(space.shading, context.scene)
     for uid, drawing in shown_in(context):
-        snapshot, drawn = drawing.snapshot, _overlay.drawn[uid]
-        if is_seen_through(space.shading) or address in drawing.bare_in:
+        snapshot = drawing.snapshot
+        sees_all = is_seen_through(space.shading) or address in drawing.bare_in
+        if sees_all:
             snapshot = with_all_strands(snapshot)
         snapshot = lit(snapshot, space.shading, studio)
-        shades_body = _shades_body(snapshot, space) and address not in drawing.bare_in
-        # colours that stand for numbers are no light
-        shown_by = display if snapshot.debug_view == "none" else None
-        with ONE_AT_A_TIME, drawing.times.measured("drawing"):
-            _draw_groom(drawn, snapshot, camera, shown_by, shades_body=shades_body)
+        yield _Shown(
+            uid,
+            _overlay.drawn[uid],
+            drawing,
+            snapshot,
+            # colours that stand for numbers are no light
+            display if snapshot.debug_view == "none" else None,
+            context.region_data.as_pointer(),
+            shades_body=_shades_body(snapshot, space) and address not in drawing.bare_in,
+            is_turning=has_turned and snapshot.lights is studio,
+            sees_all=sees_all,
+        )
 
 
 def _camera(view: Any) -> Camera:
     return Camera(np.array(view.view_matrix), np.array(view.window_matrix))
-
-
-def _draw_groom(
-    drawn: Drawn,
-    snapshot: Snapshot,
-    camera: Camera,
-    display: Display | None,
-    *,
-    shades_body: bool,
-) -> None:
-    """Into the view that is being drawn."""
-    _, _, width, height = gpu.state.viewport_get()
-    strand_pass, card_pass, maps = drawn.strand_pass, drawn.card_pass, None
-    if snapshot.cards is not None:
-        maps = card_pass.opacity(snapshot)
-    if shades_body:
-        maps = maps or strand_pass.opacity(snapshot)
-        if maps is not None:
-            drawn.shadow.draw(snapshot, maps, camera, width, height, display=display)
-    strand_pass.draw(snapshot, camera, width, height, output="viewport", display=display)
-    card_pass.draw(
-        snapshot,
-        camera,
-        width,
-        height,
-        opacity=maps,
-        output="viewport",
-        display=display,
-    )
 
 
 def _draw_debug_lines(context: Any) -> None:
@@ -364,6 +472,7 @@ def _remove_handlers() -> None:
         bpy.types.SpaceView3D.draw_handler_remove(handle, "WINDOW")
     _overlay.handles = ()
     forget_layers()
+    forget_views()
 
 
 def forget_layers() -> None:

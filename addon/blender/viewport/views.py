@@ -1,0 +1,153 @@
+"""The 3D views into which we draw: what is kept for each, and when one has to be drawn again.
+
+A view in which nothing has changed shows its kept picture. What is in the way of strands in it may
+change unseen while an engine still compiles or samples: so, in views other than Solid and
+Wireframe, the last redraw of a row of them is followed by one that draws strands anew.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+import bpy
+import gpu
+
+from ...render.camera import Camera
+from ...render.kept_picture import KeptPicture
+from ...render.strand_pass import Statistics, StrandPass
+from ..base.redraw import redraw_views
+
+#: what is in such views changes with the scene, the view and its switches alone
+STEADY = ("SOLID", "WIREFRAME")
+#: [s] without a redraw until one is asked for that draws anew, and until shadows no longer lag
+_REST, _LAG = 0.5, 0.1
+
+
+@dataclass(eq=False)
+class View:
+    """What is kept for a 3D view.
+
+    address: of its region's data. counted: what its picture shows, by session number of the hair.
+    is_behind: its shadows lag behind its lights. is_again: its picture was shown once more.
+    """
+
+    address: int
+    picture: KeptPicture = field(default_factory=KeptPicture)
+    counted: dict[int, Statistics] = field(default_factory=dict)
+    is_behind: bool = False
+    is_again: bool = False
+    seen_from: bytes = b""
+
+    def turns_to(self, camera: Camera) -> bool:
+        """Whether it was drawn before, from elsewhere."""
+        before, self.seen_from = self.seen_from, camera.view.tobytes()
+        return before not in (b"", self.seen_from)
+
+
+class _Known:
+    """Views by address, how often any scene has changed, and names of switches by owners' kinds."""
+
+    def __init__(self) -> None:
+        self.views: dict[int, View] = {}
+        self.switches: dict[str, tuple[str, ...]] = {}
+        self.changes = 0
+
+
+_known = _Known()
+
+
+def view_of(region_data: Any) -> View:
+    """What is kept for the view that is being drawn."""
+    address = region_data.as_pointer()
+    return _known.views.setdefault(address, View(address))
+
+
+def scene_changed() -> None:
+    """What is in the way of strands may be elsewhere; no picture holds any more."""
+    _known.changes += 1
+
+
+def view_marks(context: Any, camera: Camera) -> tuple[Any, ...]:
+    """All that may change what is drawn of the scene into a view, and where."""
+    space, region_data = context.space_data, context.region_data
+    clipped = tuple(map(tuple, region_data.clip_planes)) if region_data.use_clip_planes else ()
+    return (
+        *(_known.changes, context.scene.session_uid, context.view_layer.name, context.mode),
+        *(context.scene.render.engine, space.local_view is not None),
+        *(camera.view.tobytes(), camera.projection.tobytes(), gpu.state.viewport_get()),
+        *(clipped, _switches(space.shading), _switches(space.overlay)),
+    )
+
+
+def _switches(owner: Any) -> tuple[Any, ...]:
+    """All that can be set on it, as it is now."""
+    kind = owner.bl_rna.identifier
+    if kind not in _known.switches:
+        kinds = ("BOOLEAN", "INT", "FLOAT", "ENUM")
+        found = (each.identifier for each in owner.bl_rna.properties if each.type in kinds)
+        _known.switches[kind] = tuple(found)
+    return tuple(_plain(getattr(owner, name)) for name in _known.switches[kind])
+
+
+def _plain(value: Any) -> Any:
+    is_one = isinstance(value, bool | int | float | str)
+    return value if is_one else tuple(map(_plain, value))
+
+
+def forget_views() -> None:
+    """No view of ours is drawn any more."""
+    _known.views.clear()
+    for timer in (_draw_anew, _catch_up):
+        if bpy.app.timers.is_registered(timer):
+            bpy.app.timers.unregister(timer)
+
+
+def forget_closed_views(passes: Iterable[StrandPass]) -> None:
+    """Let go of what was kept for views that no window shows any more."""
+    shown = frozenset(_addresses())
+    if not shown >= _known.views.keys():
+        _known.views = {at: view for at, view in _known.views.items() if at in shown}
+        for each in passes:
+            each.forget_views(shown)
+
+
+def _addresses() -> Iterator[int]:
+    for window in bpy.context.window_manager.windows:
+        for area in window.screen.areas:
+            if area.type == "VIEW_3D":
+                regions = (each for each in area.regions if each.type == "WINDOW")
+                yield from (each.data.as_pointer() for each in regions if each.data is not None)
+
+
+def was_shown_again(view: View, shading: Any) -> None:
+    """A view has shown its kept picture."""
+    if shading.type not in STEADY:
+        view.is_again = True
+        _soon(_draw_anew, _REST)
+
+
+def was_drawn(view: View) -> None:
+    """A view was drawn anew."""
+    view.is_again = False
+    if view.is_behind:
+        _soon(_catch_up, _LAG)
+
+
+def _soon(timer: Callable[[], None], pause: float) -> None:
+    """Once, this long after the last call."""
+    if bpy.app.timers.is_registered(timer):
+        bpy.app.timers.unregister(timer)
+    bpy.app.timers.register(timer, first_interval=pause)
+
+
+def _draw_anew() -> None:
+    for view in _known.views.values():
+        if view.is_again:
+            view.picture.forget()
+    redraw_views()
+
+
+def _catch_up() -> None:
+    redraw_views()

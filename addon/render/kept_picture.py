@@ -1,0 +1,99 @@
+"""The picture of one view's strands, kept so that a view in which nothing changed shows it again.
+
+    color RGBA16F: premultiplied, as it goes into the view
+    depth DEPTH32F: of the nearest hair that hides more than half of what lies behind it; 1 is none
+
+That is 12 bytes a pixel. Strands are drawn into the view, depth-tested against what is in it, and
+what they add is shown into this picture as well: so it holds for as long as what is in the view has
+the same depths. Whoever keeps it says by marks what it was drawn of.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import gpu
+
+from . import gpu_objects
+from .shader_program import ShaderRecipe, program, released_with_shaders
+from .textures import drawing_into, drawing_state
+
+_NOTHING = (0.0, 0.0, 0.0, 0.0)
+_SHOWN_RECIPE = ShaderRecipe(
+    name="kept_picture",
+    vertex="strand_layers.vert.glsl",
+    fragment="kept_picture.frag.glsl",
+    textures=(("FLOAT_2D", "kept_color"), ("DEPTH_2D", "kept_depth")),
+    integers=("writes_depth",),
+    outputs=(("VEC4", "color"),),
+)
+
+
+class KeptPicture:
+    """Making one touches no GPU.
+
+    marks: what it is of, see `is_of`; empty: nothing that may be shown again.
+    """
+
+    def __init__(self) -> None:
+        self.release()
+        released_with_shaders(self)
+
+    def release(self) -> None:
+        """Let go of all that lies on the GPU; the picture is gone."""
+        self.marks: tuple[Any, ...] = ()
+        self._color: Any = None
+        self._depth: Any = None
+        self._triangle: Any = None
+
+    def forget(self) -> None:
+        """It is not to be shown again; its textures stay."""
+        self.marks = ()
+
+    def is_of(self, marks: tuple[Any, ...]) -> bool:
+        """Whether it was drawn of the same objects and of equal numbers."""
+        return (
+            bool(self.marks)
+            and len(self.marks) == len(marks)
+            and all(a is b or a == b for a, b in zip(self.marks, marks, strict=True))
+        )
+
+    def begin(self) -> None:
+        """An empty picture, as large as the viewport reaches."""
+        left, bottom, width, height = gpu.state.viewport_get()
+        size = left + width, bottom + height
+        self.forget()
+        if self._color is None or (self._color.width, self._color.height) != size:
+            self._color = gpu_objects.texture(size, format="RGBA16F")
+            self._depth = gpu_objects.texture(size, format="DEPTH_COMPONENT32F")
+            self._triangle = gpu_objects.triangle()
+        with self.drawing():
+            self._target.clear(color=_NOTHING, depth=1.0)
+
+    @contextmanager
+    def drawing(self) -> Iterator[None]:
+        """Draw into it, where the bound framebuffer's viewport is."""
+        viewport = gpu.state.viewport_get()
+        # renders draw in a context of their own, which shares textures and no framebuffers
+        self._target = gpu_objects.framebuffer(depth_slot=self._depth, color_slots=(self._color,))
+        with drawing_into(self._target):
+            gpu.state.viewport_set(*viewport)
+            yield
+
+    def show(self) -> None:
+        """Put it over what is in the bound framebuffer, as the strands were."""
+        with drawing_state(depth_test="NONE", depth_write=False, blend="ALPHA_PREMULT"):
+            self._draw(writes_depth=False)
+        with drawing_state(depth_test="ALWAYS"):
+            gpu.state.color_mask_set(False, False, False, False)
+            self._draw(writes_depth=True)
+
+    def _draw(self, *, writes_depth: bool) -> None:
+        shader = program(_SHOWN_RECIPE)
+        shader.bind(
+            textures={"kept_color": self._color, "kept_depth": self._depth},
+            integers={"writes_depth": int(writes_depth)},
+        )
+        self._triangle.draw(shader.shader)

@@ -1,0 +1,14 @@
+// A picture of strands that was kept, into the target once more: their colour, or the depth of those that
+// hide more than half of what lies behind them.
+
+void main()
+{
+  ivec2 pixel = ivec2(gl_FragCoord.xy);
+  float front = texelFetch(kept_depth, pixel, 0).x;
+  color = texelFetch(kept_color, pixel, 0);
+  bool is_empty = writes_depth != 0 ? front >= 1.0 : color.a == 0.0;
+  if (is_empty) {
+    discard;
+  }
+  gl_FragDepth = front;
+}

@@ -1,0 +1,211 @@
+"""A view's picture that is kept is shown again, and nothing else is asked of the GPU."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from gpu_calls import gpu_calls
+
+from hairloom.addon.strands import Surface
+
+pytestmark = pytest.mark.usefixtures("gpu_context")
+
+SIZE, PLACE = 48, (9, 5)
+BACKGROUND = (0.2, 0.1, 0.0, 0.3)
+
+
+@pytest.fixture(scope="module")
+def scene(frame: Any) -> Any:
+    """Two grooms of wide, thin and short strands before and behind a mesh."""
+    random = np.random.default_rng(3)
+    ends = random.uniform(-0.5, 0.5, (2, 400, 2, 3)).astype(np.float32)
+    square = np.array([[-0.3, 0, -0.3], [0.3, 0, -0.3], [0.3, 0.1, 0.4]], np.float32)
+    mesh = frame.MeshSnapshot.of(Surface(square, np.array([[0, 1, 2]])))
+    grooms = [frame.Snapshot(each, np.full((400, 2), 4e-3), meshes=(mesh,)) for each in ends]
+    camera = frame.Camera(
+        frame.look_at((0.3, -2.0, 0.2), (0, 0, 0)), frame.perspective(0.6, 1.0, 0.1, 5.0)
+    )
+    return grooms, camera
+
+
+def drawn(grooms: Any, camera: Any, draw_hair: Any) -> np.ndarray:
+    """Colours and depths of a target in which a mesh is, and then hair, (height, width, 5)."""
+    import gpu
+
+    from hairloom.addon.render.mesh_pass import MeshPass
+    from hairloom.addon.render.textures import drawing_into
+
+    size = SIZE + 20, SIZE + 11
+    color = gpu.types.GPUTexture(size, format="RGBA32F")
+    depth = gpu.types.GPUTexture(size, format="DEPTH_COMPONENT32F")
+    target = gpu.types.GPUFrameBuffer(depth_slot=depth, color_slots=(color,))
+    with drawing_into(target):
+        target.clear(color=BACKGROUND, depth=1.0)
+        gpu.state.viewport_set(*PLACE, SIZE, SIZE)
+        MeshPass().draw(grooms[0], camera, SIZE, SIZE)
+        draw_hair()
+    pixels = np.asarray(color.read()).reshape(size[1], size[0], 4)
+    return np.dstack([pixels, np.array(depth.read()).reshape(size[1], size[0], 1)])
+
+
+def test_what_is_shown_again_is_what_was_drawn(frame: Any, scene: Any) -> None:
+    """Beside a mesh that hides some of it, in a part of the target, of two grooms."""
+    from hairloom.addon.render.kept_picture import KeptPicture
+
+    (grooms, camera), kept = scene, KeptPicture()
+    passes = [frame.StrandPass() for _ in grooms]
+
+    def draw_hair(picture: Any) -> None:
+        for own, groom in zip(passes, grooms, strict=True):
+            own.draw(groom, camera, SIZE, SIZE, output="viewport", picture=picture)
+
+    plain = drawn(grooms, camera, lambda: draw_hair(None))
+
+    def draw_and_keep() -> None:
+        kept.begin()
+        draw_hair(kept)
+
+    assert (drawn(grooms, camera, draw_and_keep) == plain).all(), "keeping changes nothing"
+    again = drawn(grooms, camera, kept.show)
+    assert (again[..., 4] == plain[..., 4]).all()
+    assert np.abs(again - plain).max() < 1.0 / 510.0
+    empty = drawn(grooms, camera, lambda: None)
+    changed = (plain != empty).any(axis=-1)
+    assert changed[PLACE[1] :, PLACE[0] :][:SIZE, :SIZE].mean() > 0.3
+    assert (again[~changed] == empty[~changed]).all()
+    assert (plain[..., 4] < empty[..., 4]).any(), "hair has depths"
+
+
+def test_showing_again_reads_nothing_and_draws_two_triangles(frame: Any, scene: Any) -> None:
+    from hairloom.addon.render.kept_picture import KeptPicture
+
+    (grooms, camera), kept = scene, KeptPicture()
+
+    def keep() -> None:
+        kept.begin()
+        frame.StrandPass().draw(grooms[0], camera, SIZE, SIZE, output="viewport", picture=kept)
+
+    drawn(grooms, camera, keep)
+    calls: list[Any] = []
+    drawn(grooms, camera, lambda: calls.append(gpu_calls(kept.show)))
+    assert calls == [{"draws": 2}]
+
+
+def test_a_picture_is_of_its_marks_alone() -> None:
+    from hairloom.addon.render.kept_picture import KeptPicture
+
+    kept, thing = KeptPicture(), object()
+    assert not kept.is_of(()), "nothing is kept yet"
+    kept.marks = (thing, 1, (2.0, "a"))
+    assert kept.is_of((thing, 1, (2.0, "a")))
+    for other in ((object(), 1, (2.0, "a")), (thing, 2, (2.0, "a")), (thing, 1)):
+        assert not kept.is_of(other)
+    kept.forget()
+    assert not kept.is_of((thing, 1, (2.0, "a")))
+
+
+def test_a_groom_in_many_lengths_takes_few_draws(frame: Any, scene: Any) -> None:
+    """With three lights' maps, strands of 1 to 60 segments take at most 40 draws."""
+    from hairloom.addon.render.kept_picture import KeptPicture
+    from hairloom.addon.render.strand_layout import StrandLayout
+
+    grooms, camera = scene
+    random = np.random.default_rng(1)
+    counts = random.integers(2, 61, 300)
+    points = np.cumsum(random.normal(0.0, 0.02, (counts.sum(), 3)), axis=0).astype(np.float32)
+    layout = StrandLayout(np.concatenate([[0], np.cumsum(counts)]))
+    groom = replace(
+        grooms[0],
+        points=points - points.mean(axis=0),
+        radius=np.full(len(points), 2e-3, np.float32),
+        layout=layout,
+        along=np.concatenate([np.linspace(0.0, 1.0, count) for count in counts]).astype(np.float32),
+        occlusion=None,
+        lights=studio(camera),
+    )
+    own, kept, calls = frame.StrandPass(), KeptPicture(), []
+
+    def draw() -> None:
+        kept.begin()
+        own.draw(groom, camera, SIZE, SIZE, output="viewport", picture=kept)
+
+    drawn([groom], camera, lambda: calls.append(gpu_calls(draw)))
+    assert own.statistics.strands == 300 and 10 < calls[0]["draws"] <= 40
+
+
+def studio(camera: Any) -> Any:
+    from hairloom.addon.shading.lights import three_point_lights
+
+    return three_point_lights(camera.view)
+
+
+def turned(frame: Any, degrees: float) -> Any:
+    angle = np.radians(degrees)
+    eye = 2.0 * np.sin(angle), -2.0 * np.cos(angle), 0.2
+    return frame.Camera(frame.look_at(eye, (0, 0, 0)), frame.perspective(0.6, 1.0, 0.1, 5.0))
+
+
+def test_shadows_lag_while_a_view_turns_and_are_exact_once_it_rests(frame: Any, scene: Any) -> None:
+    grooms, _ = scene
+    own, alone = frame.StrandPass(), frame.StrandPass()
+
+    def dispatches(degrees: float, *, is_turning: bool) -> tuple[int, float]:
+        groom, maps = replace(grooms[0], lights=studio(turned(frame, degrees))), []
+        calls = gpu_calls(lambda: maps.append(own.opacity(groom, view=1, is_turning=is_turning)))
+        lag = np.abs(maps[0].values - alone.opacity(groom).values).max()
+        return calls["dispatches"] // 2, float(lag)
+
+    assert dispatches(0.0, is_turning=True)[0] == 3, "all maps at first"
+    for degrees, count in ((1.0, 0), (2.0, 0), (6.0, 1), (7.0, 1), (7.5, 1)):
+        assert dispatches(degrees, is_turning=True)[0] == count and own.is_behind(1)
+    assert dispatches(40.0, is_turning=True) == (3, 0.0), "nor does any lag far behind"
+    assert not own.is_behind(1)
+    assert dispatches(41.0, is_turning=True)[0] == 0 and own.is_behind(1)
+    assert dispatches(41.0, is_turning=False) == (3, 0.0)
+    assert not own.is_behind(1)
+    assert dispatches(41.0, is_turning=False)[0] == 0
+
+
+def test_views_beside_each_other_keep_what_is_theirs(frame: Any, scene: Any) -> None:
+    """Two views in turn compute no detail and draw no map again, and are what each is alone."""
+    grooms, _ = scene
+    cameras = {name: turned(frame, degrees) for name, degrees in (("a", 0.0), ("b", 120.0))}
+    own = frame.StrandPass()
+
+    def picture(by: Any, name: str) -> tuple[np.ndarray, Any]:
+        camera, calls = cameras[name], []
+        groom = replace(grooms[0], lights=studio(camera))
+
+        def draw() -> None:
+            by.draw(groom, camera, SIZE, SIZE, output="viewport", view=name)
+
+        found = drawn([groom], camera, lambda: calls.append(gpu_calls(draw)))
+        return found, calls[0]
+
+    alone = {name: picture(frame.StrandPass(), name)[0] for name in cameras}
+    for turn in range(3):
+        for name in cameras:
+            found, calls = picture(own, name)
+            assert (found == alone[name]).all()
+            # a barrier, the order and the shading
+            assert turn == 0 or calls["dispatches"] == 3
+    own.forget_views({"a"})
+    assert picture(own, "a")[1]["dispatches"] == 3
+    assert picture(own, "b")[1]["dispatches"] > 3
+
+
+def test_views_in_the_same_light_share_its_maps(frame: Any, scene: Any) -> None:
+    """Until one of them turns with its studio."""
+    grooms, camera = scene
+    groom, own = replace(grooms[0], lights=studio(camera)), frame.StrandPass()
+    first = own.opacity(groom, view="a")
+    assert own.opacity(groom, view="b") is first
+    other = replace(groom, lights=studio(turned(frame, 90.0)))
+    for _ in range(2):
+        assert own.opacity(other, view="b") is not first
+        kept = own.opacity(groom, view="a")
+        assert kept is own.opacity(groom, view="a") and (kept.values == first.values).all()
+    assert own.opacity(groom, view="a") is kept

@@ -1,0 +1,40 @@
+"""What a piece of work asks of the gpu module: what it reads back, draws, dispatches and makes."""
+
+from __future__ import annotations
+
+import sys
+from collections import Counter
+from collections.abc import Callable
+from typing import Any
+
+#: function of the gpu module -> what it counts as
+_CALLS = {
+    "GPUTexture.read": "reads",
+    "GPUFrameBuffer.read_color": "reads",
+    "GPUFrameBuffer.read_depth": "reads",
+    "GPUBatch.draw": "draws",
+    "GPUBatch.draw_instanced": "draws",
+    "GPUBatch.draw_range": "draws",
+    "dispatch": "dispatches",
+}
+
+
+def gpu_calls(work: Callable[[], Any]) -> Counter[str]:
+    """How often work does what, in this thread. Types of the gpu module cannot be changed, so the
+    interpreter is asked for the calls of built-in functions.
+    """
+    found: Counter[str] = Counter()
+
+    def note(_frame: Any, event: str, function: Any) -> None:
+        if event == "c_call":
+            kind = _CALLS.get(function.__qualname__)
+            if kind is not None:
+                found[kind] += 1
+
+    before = sys.getprofile()
+    sys.setprofile(note)
+    try:
+        work()
+    finally:
+        sys.setprofile(before)
+    return found
