@@ -59,6 +59,7 @@ SCREENS = {
     "session_midplay": _LARGE,
     "session_random": "800x600x24",
     "session_refinement": _LARGE,
+    "session_still_views": "800x600x24",
     "session_strand_export": _LARGE,
 }
 #: random actions, and how many of each seed

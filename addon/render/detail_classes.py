@@ -20,9 +20,9 @@ from ..arrays import Floats, Ints
 _STEPS = (16, 8, 4, 2, 1)
 #: Strands are drawn from near to far in this many steps if that leaves any capacities, and in more
 #: if there are draws left.
-_SLABS, _MOST_SLABS = 4, 16
+_SLABS, _MAX_SLABS = 4, 16
 #: draws of a groom's strands, and of those that throw the shadow of one light
-MOST_CLASSES, MOST_MAP_CLASSES = 16, 5
+MAX_CLASSES, MAX_MAP_CLASSES = 16, 5
 
 
 @dataclass(frozen=True)
@@ -56,13 +56,13 @@ def detail_classes(
     Args:
         totals: (strand_count,) pieces of each strand, 0 for those that are not drawn.
         depths: (strand_count,) how far each strand is, in any unit; None: the order is no matter.
-        held: capacities that hold all totals, growing from 0; None: as few as MOST_CLASSES need.
+        held: capacities that hold all totals, growing from 0; None: as few as MAX_CLASSES need.
     """
     if not len(totals):
         return np.zeros(0, np.intp), ()
-    found = _series(totals, MOST_CLASSES if depths is None else MOST_CLASSES // _SLABS)
+    found = _series(totals, MAX_CLASSES if depths is None else MAX_CLASSES // _SLABS)
     series, used = found if held is None else (held, len(held))
-    slabs = 1 if depths is None else min(max(MOST_CLASSES // max(used, 1), 1), _MOST_SLABS)
+    slabs = 1 if depths is None else min(max(MAX_CLASSES // max(used, 1), 1), _MAX_SLABS)
     place = np.searchsorted(series, totals)
     if depths is not None:
         place = place + _slabs(depths, slabs) * len(series)
@@ -77,7 +77,7 @@ def detail_classes(
 
 
 def _series(totals: Ints, most: int) -> tuple[Ints, int]:
-    """The finest capacities of which these strands use no more than so many, and how many."""
+    """The finest capacities of which these strands use this many or fewer, and how many."""
     present = np.flatnonzero(np.bincount(totals)[1:]) + 1
     for step in _STEPS:
         series = capacities(int(totals.max()), step)
@@ -88,16 +88,16 @@ def _series(totals: Ints, most: int) -> tuple[Ints, int]:
 
 
 def spread_capacities(totals: Ints) -> Ints:
-    """0, and MOST_MAP_CLASSES capacities or fewer, each for about as many strands.
+    """0, and MAX_MAP_CLASSES capacities or fewer, each for about as many strands.
 
     Few draws then waste little; of strands whose pieces change it would mix up their order.
     """
-    places = np.linspace(0.0, 1.0, MOST_MAP_CLASSES + 1)
+    places = np.linspace(0.0, 1.0, MAX_MAP_CLASSES + 1)
     return np.unique([0, *np.quantile(totals, places[1:], method="higher")])
 
 
 def _slabs(depths: Floats, count: int) -> Ints:
-    """Which of so many equal parts of all depths each lies in, 0 the nearest."""
+    """Which of this many equal parts of all depths each lies in, 0 the nearest."""
     depths = np.nan_to_num(depths, nan=0.0, posinf=0.0, neginf=0.0)
     span = max(float(np.ptp(depths)), 1.0e-30)
     fraction = (depths - depths.min()) / span

@@ -11,7 +11,7 @@ all its texels, texel t in slot t % slots.
 
 Drawn are first the depths of meshes, then where deep layers start and end, then the sums of the
 layers by additive blending. What has not changed since the last draw is not drawn again, so that a
-moving camera costs nothing.
+moving camera costs nothing. Lights that are attached to a view which moves lag a little behind it.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ from .textures import drawing_into, drawing_state
 
 _NOTHING = (0.0, 0.0, 0.0, 0.0)
 #: while a view turns, shadows lag behind its lights by about this angle, and never by more [rad]
-_LAG, _MOST_LAG = float(np.radians(4.0)), float(np.radians(15.0))
+_LAG, _MAX_LAG = float(np.radians(8.0)), float(np.radians(20.0))
 _NO_STARTS_RECIPE = ShaderRecipe(
     name="opacity_no_starts",
     compute="opacity_no_starts.comp.glsl",
@@ -165,8 +165,8 @@ class OpacityDrawing:
             lights: in the order in which the shader knows them.
             casters: meshes, world space; another object whenever one is another.
             spacing: of strands whose hairs fill the space between them [m]; 0: none do.
-            is_turning: the lights hang on a view that moves. Then no more than one map a frame is
-                drawn again, as long as all of them lag little.
+            is_turning: the lights are attached to a view that moves. Then no more than one map a
+                frame is drawn again, as long as all of them lag little.
         """
         frames = dict(enumerate(shadow_frames(lights, ball, settings)))
         wanted = {light: frame for light, frame in frames.items() if frame is not None}
@@ -225,17 +225,17 @@ def due_maps(
     behind = tuple(
         light for light, frame in wanted.items() if (drawn[light].to_map != frame.to_map).any()
     )
-    if not is_turning or not behind or max(lags.values()) > _MOST_LAG:
+    if not is_turning or not behind or max(lags.values()) > _MAX_LAG:
         return behind
     last = max(behind, key=lambda light: lags[light])
     return (last,) if lags[last] > _LAG else ()
 
 
 def _turn(one: LightFrame, other: LightFrame) -> float:
-    """The angle between the ways along which two frames look [rad]."""
-    ways = one.to_depth[:3], other.to_depth[:3]
-    lengths = np.linalg.norm(ways[0]) * np.linalg.norm(ways[1])
-    return float(np.arccos(np.clip(ways[0] @ ways[1] / lengths, -1.0, 1.0)))
+    """The angle between the directions in which two frames look [rad]."""
+    along = one.to_depth[:3], other.to_depth[:3]
+    lengths = np.linalg.norm(along[0]) * np.linalg.norm(along[1])
+    return float(np.arccos(np.clip(along[0] @ along[1] / lengths, -1.0, 1.0)))
 
 
 def _draw_map(maps: OpacityMaps, number: int, light: int, hair: HairInMaps) -> None:

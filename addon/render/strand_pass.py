@@ -222,7 +222,7 @@ class StrandPass:
 
         Args:
             view: as for `draw`.
-            is_turning: the lights hang on a view that moves, see OpacityDrawing.maps.
+            is_turning: the lights are attached to a view that moves, see OpacityDrawing.maps.
 
         Raises:
             ShaderError: as `draw`.

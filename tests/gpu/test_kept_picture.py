@@ -159,7 +159,7 @@ def test_shadows_lag_while_a_view_turns_and_are_exact_once_it_rests(frame: Any, 
         return calls["dispatches"] // 2, float(lag)
 
     assert dispatches(0.0, is_turning=True)[0] == 3, "all maps at first"
-    for degrees, count in ((1.0, 0), (2.0, 0), (6.0, 1), (7.0, 1), (7.5, 1)):
+    for degrees, count in ((1.0, 0), (5.0, 0), (12.0, 1), (13.0, 1), (13.5, 1)):
         assert dispatches(degrees, is_turning=True)[0] == count and own.is_behind(1)
     assert dispatches(40.0, is_turning=True) == (3, 0.0), "nor does any lag far behind"
     assert not own.is_behind(1)

@@ -41,6 +41,7 @@ MODULES = {
     "hair_file": "exchange.hair_file",
     "hair_scene": "blender.engine.hair_scene",
     "import_groom": "blender.strands.import_groom",
+    "kept_picture": "render.kept_picture",
     "latest_job": "blender.base.latest_job",
     "long_work": "ui.long_work",
     "overlay": "blender.viewport.overlay",
@@ -57,6 +58,7 @@ MODULES = {
     "tables": "shading.marschner.tables",
     "tressfx": "exchange.tressfx",
     "view_transform": "blender.viewport.view_transform",
+    "views": "blender.viewport.views",
 }
 
 

@@ -224,11 +224,11 @@ def _draw_strands(context: Any) -> None:
                 _overlay.drawn[uid].strand_pass.statistics = counted
             was_shown_again(view, context.space_data.shading)
         else:
-            _draw_anew(view, camera, shown, marks)
+            _draw_afresh(view, camera, shown, marks)
             was_drawn(view)
 
 
-def _draw_anew(view: View, camera: Camera, shown: list[_Shown], marks: tuple[Any, ...]) -> None:
+def _draw_afresh(view: View, camera: Camera, shown: list[_Shown], marks: tuple[Any, ...]) -> None:
     """All grooms into the view that is being drawn, and into its picture if that can be kept."""
     forget_closed_views(each.strand_pass for each in _overlay.drawn.values())
     picture = view.picture if all(each.can_be_kept for each in shown) else None
@@ -250,7 +250,8 @@ class _Shown:
     """One groom in the view that is being drawn.
 
     snapshot: as it is seen and lit there. shades_body: its shadow lies on the head.
-    is_turning: its lights hang on the view, which moves. sees_all: also strands behind heads.
+    is_turning: its lights are attached to the view, which moves.
+    sees_all: strands behind heads as well.
     """
 
     uid: int

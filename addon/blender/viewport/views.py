@@ -2,7 +2,7 @@
 
 A view in which nothing has changed shows its kept picture. What is in the way of strands in it may
 change unseen while an engine still compiles or samples: so, in views other than Solid and
-Wireframe, the last redraw of a row of them is followed by one that draws strands anew.
+Wireframe, the last redraw of a row of them is followed by one that draws strands afresh.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from ..base.redraw import redraw_views
 
 #: what is in such views changes with the scene, the view and its switches alone
 STEADY = ("SOLID", "WIREFRAME")
-#: [s] without a redraw until one is asked for that draws anew, and until shadows no longer lag
+#: [s] without a redraw until one is asked for that draws afresh, and until shadows no longer lag
 _REST, _LAG = 0.5, 0.1
 
 
@@ -99,7 +99,7 @@ def _plain(value: Any) -> Any:
 def forget_views() -> None:
     """No view of ours is drawn any more."""
     _known.views.clear()
-    for timer in (_draw_anew, _catch_up):
+    for timer in (_draw_afresh, _catch_up):
         if bpy.app.timers.is_registered(timer):
             bpy.app.timers.unregister(timer)
 
@@ -125,11 +125,11 @@ def was_shown_again(view: View, shading: Any) -> None:
     """A view has shown its kept picture."""
     if shading.type not in STEADY:
         view.is_again = True
-        _soon(_draw_anew, _REST)
+        _soon(_draw_afresh, _REST)
 
 
 def was_drawn(view: View) -> None:
-    """A view was drawn anew."""
+    """A view was drawn afresh."""
     view.is_again = False
     if view.is_behind:
         _soon(_catch_up, _LAG)
@@ -142,7 +142,7 @@ def _soon(timer: Callable[[], None], pause: float) -> None:
     bpy.app.timers.register(timer, first_interval=pause)
 
 
-def _draw_anew() -> None:
+def _draw_afresh() -> None:
     for view in _known.views.values():
         if view.is_again:
             view.picture.forget()

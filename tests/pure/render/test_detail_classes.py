@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hairloom.addon.render.detail_classes import MOST_CLASSES, capacities, detail_classes
+from hairloom.addon.render.detail_classes import MAX_CLASSES, capacities, detail_classes
 
 
 def test_capacities_grow_by_a_sixteenth_at_most() -> None:
@@ -21,11 +21,11 @@ def test_each_strand_is_in_the_class_that_just_holds_it(most: int, by_depth: boo
     random = np.random.default_rng(most)
     totals, depths = random.integers(0, most + 1, 3000), random.random(3000)
     order, classes = detail_classes(totals, depths if by_depth else None)
-    assert len(classes) <= MOST_CLASSES
+    assert len(classes) <= MAX_CLASSES
     assert sorted(order) == np.flatnonzero(totals).tolist()
     assert sum(c.count for c in classes) == len(order)
     held = sorted({drawn.capacity for drawn in classes})
-    slab = 1.0 / min(max(MOST_CLASSES // len(held), 1), 16)
+    slab = 1.0 / min(max(MAX_CLASSES // len(held), 1), 16)
     before, first = dict(zip(held, [0, *held], strict=False)), 0
     for drawn in classes:
         assert drawn.first == first

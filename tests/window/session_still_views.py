@@ -1,0 +1,141 @@
+"""Views in which nothing changes show what they have drawn; whatever changes is seen at once."""
+
+import sys
+from pathlib import Path
+
+import bpy
+from mathutils import Euler
+
+sys.path.append(str(Path(__file__).parent))
+import driver
+from artist import changed, look_from_front, new_head, pixels_at_rest, press, viewport
+from driver import of_hairloom, until
+
+#: share of a view's pixels by which Blender's own redraw differs
+SAME = 0.002
+#: how often strands were drawn, and a picture was shown again
+counted = {"drawn": 0, "again": 0}
+
+
+def steps():
+    yield from press("ESC")  # the splash screen takes the first event
+    driver.enable_extension()
+    count_draws()
+    yield from set_the_scene()
+    yield from nothing_is_drawn_twice("solid")
+    yield from what_is_in_the_way_is_seen()
+    yield from what_a_view_shows_is_seen()
+    yield from after_an_orbit_shadows_are_exact()
+    viewport().spaces.active.shading.type = "MATERIAL"
+    yield from pixels_at_rest("material")
+    yield from it_comes_to_rest()
+    yield from a_ball_comes_and_goes("material")
+    assert of_hairloom("overlay").failure() == ""
+
+
+def count_draws():
+    kept, strands = of_hairloom("kept_picture").KeptPicture, of_hairloom("strand_pass").StrandPass
+    for owner, name, key in ((kept, "show", "again"), (strands, "draw", "drawn")):
+        setattr(owner, name, counting(getattr(owner, name), key))
+
+
+def counting(original, key):
+    def count(*values, **options):
+        counted[key] += 1
+        return original(*values, **options)
+
+    return count
+
+
+def set_the_scene():
+    new_head()
+    bpy.ops.hairloom.grow(strand_count=1500, length=0.06)
+    bpy.context.object.data.hairloom.children.method = "none"
+    viewport().spaces.active.overlay.show_overlays = False
+    look_from_front(0.7)
+    bpy.ops.hairloom.preview()
+    yield from until(lambda: counted["drawn"], "no hair is drawn")
+    yield from pixels_at_rest("at-first")
+
+
+def nothing_is_drawn_twice(label):
+    before = yield from pixels_at_rest(f"{label}-before")
+    drawn, again = counted.values()
+    after = yield from pixels_at_rest(f"{label}-after")
+    assert counted["drawn"] == drawn, "strands are drawn afresh"
+    assert counted["again"] >= again + 3
+    assert changed(before, after, 0.01) == 0.0
+
+
+def what_is_in_the_way_is_seen():
+    """The head goes, and comes back."""
+    before = yield from a_ball_comes_and_goes("solid")
+    for hidden in (True, False):
+        bpy.data.objects["Head"].hide_set(hidden)
+        found = yield from pixels_at_rest(f"head-hidden-{hidden}")
+        assert (changed(before, found) < SAME) != hidden
+
+
+def a_ball_comes_and_goes(label):
+    """Before the hair; what the view was before is given back."""
+    before = yield from pixels_at_rest(f"{label}-nothing-in-the-way")
+    ball = bpy.data.objects.new("Ball", bpy.data.objects["Head"].data)
+    bpy.context.scene.collection.objects.link(ball)
+    ball.location = 0.05, -0.2, 0.0
+    covered = yield from pixels_at_rest(f"{label}-ball-in-the-way")
+    assert changed(before, covered) > 0.02
+    expected = yield from drawn_afresh(f"{label}-ball-afresh")
+    assert changed(covered, expected) < SAME
+    bpy.data.objects.remove(ball)
+    back = yield from pixels_at_rest(f"{label}-ball-gone")
+    assert changed(before, back) < SAME
+    return before
+
+
+def what_a_view_shows_is_seen():
+    shading = viewport().spaces.active.shading
+    before = yield from pixels_at_rest("opaque")
+    shading.show_xray = True
+    through = yield from pixels_at_rest("x-ray")
+    expected = yield from drawn_afresh("x-ray-afresh")
+    assert changed(before, through) > 0.005 and changed(through, expected) < SAME
+    shading.show_xray = False
+    back = yield from pixels_at_rest("opaque-again")
+    assert changed(before, back) < SAME
+
+
+def after_an_orbit_shadows_are_exact():
+    view = viewport().spaces.active.region_3d
+    for degrees in range(0, 30, 3):
+        view.view_rotation = Euler((1.5708, 0.0, degrees / 57.3)).to_quaternion()
+        yield 1
+    found = yield from pixels_at_rest("orbited")
+    expected = yield from drawn_afresh("orbited-afresh", with_maps=True)
+    assert changed(found, expected, 0.02) == 0.0
+    look_from_front(0.7)
+    yield from pixels_at_rest("orbited-back")
+
+
+def drawn_afresh(label, *, with_maps=False):
+    """The view as it is without anything that was kept."""
+    views = of_hairloom("views")
+    for view in views._known.views.values():
+        view.picture.forget()
+    if with_maps:
+        for each in of_hairloom("overlay")._overlay.drawn.values():
+            each.strand_pass.forget_views(frozenset())
+    return (yield from pixels_at_rest(label))
+
+
+def it_comes_to_rest():
+    """An engine redraws a view for its samples: hair is drawn once more after them, and no more."""
+    for _ in range(40):
+        yield 1
+    drawn = counted["drawn"]
+    for _ in range(60):
+        yield 1
+    assert counted["drawn"] <= drawn + 1, "a view in which nothing changes is drawn for ever"
+    assert counted["again"] > 0
+
+
+driver.play(steps())
