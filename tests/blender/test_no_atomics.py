@@ -115,9 +115,16 @@ def test_the_preview_is_drawn_without_atomics(
         capabilities.choose_image_atomics(choice)
         drawn = overlay.Drawn(overlay.Drawing(session.snapshot))
         lit = replace(session.snapshot, lights=three_point_lights(camera.view))
+        shown = overlay._Shown(
+            *(0, drawn, drawn.drawing, lit, None, 0),
+            shades_body=True,
+            is_turning=False,
+            sees_all=False,
+        )
         target.sized(96, 96).clear((0.0, 0.0, 0.0, 0.0))
         with target.drawing():
-            overlay._draw_groom(drawn, lit, camera, None, shades_body=True)
+            shown.draw_body_shadow(camera)
+            shown.draw(camera, None)
         pictures.append(texture_to_array(target.color))
     layers, hashed = pictures
     assert (layers[..., 3] > 0.1).mean() > 0.05 and not np.array_equal(layers, hashed)
