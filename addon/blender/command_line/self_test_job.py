@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import argparse
+import json
 from dataclasses import asdict
+from pathlib import Path
 
 from ...errors import HairloomError
+from ...exchange.files.atomic import write_text_atomic
 from ...render.capabilities import capabilities
+from ..setup import benchmark
 from ..setup import self_test as tests
 from .job_steps import Job
 from .verb import Verb
@@ -27,11 +32,31 @@ def self_test(job: Job) -> None:
             place=failed[0].name,
             remedy="Update the GPU's driver, or run on another machine",
         )
+    if job.options.benchmark:
+        _write_benchmark(job, Path(job.options.benchmark))
+
+
+def _write_benchmark(job: Job, path: Path) -> None:
+    with job.report.stage("benchmark"):
+        found = benchmark.measured()
+    write_text_atomic(path, json.dumps(found, indent=2) + "\n")
+    job.report.add_output(path)
+    print(f"Wrote {path}")
+
+
+def _add_options(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--benchmark",
+        metavar="FILE",
+        help="also measure how fast frames are here, which takes minutes without a GPU, and write "
+        "device, driver and milliseconds as JSON",
+    )
 
 
 SELF_TEST = Verb(
     "self-test",
     self_test,
+    _add_options,
     takes_hair=False,
     takes_settings=False,
     operators=("self_test", "copy_report"),

@@ -1,0 +1,171 @@
+"""How fast frames are on this machine: what `self-test --benchmark` writes, for anyone to send.
+
+A ball of hair that is shaken, simulated where this machine simulates, drawn as the preview draws
+it: by layers, in a studio's light, with its shadows. Each time ends when the GPU has done the work,
+since a pixel that it leads to is read back then; the first round, which compiles, does not count.
+"""
+
+from __future__ import annotations
+
+import platform
+import statistics
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import gpu
+import numpy as np
+
+from ... import pipeline
+from ...dynamics.settings import DynamicsSettings
+from ...groom.settings import GuideSettings
+from ...pipeline import Pose, Rig
+from ...render.accumulation import Target
+from ...render.camera import Camera, frame_camera
+from ...render.snapshot import Snapshot
+from ...render.strand_pass import StrandPass, drawn_transparency
+from ...shading.ambient_settings import AmbientSettings
+from ...shading.lights import three_point_lights
+from ...strands import StrandSet
+from ..base.gpu_context import ensure_gpu
+from ..base.report import environment
+from ..sessions.prepared_groom import prepared
+from ..sessions.snapshots import snapshot_of
+from ..sessions.solvers import Solver, computed_on, form_of, solver_of
+
+#: of the JSON: another number when figures mean something else
+VERSION = 1
+SIZES = ((960, 540), (1920, 1080), (3840, 2160))
+STRANDS, POINTS = 11_400, 16
+#: rounds at most, and seconds after which there is no further one
+_ROUNDS, _SECONDS = 9, 3.0
+_DIRECTION, _FIELD_OF_VIEW = (0.0, -1.0, 0.2), 0.5
+_GRAVITY, _FRAME = np.array([0.0, 0.0, -9.81]), 1.0 / 60.0
+
+
+def measured(
+    sizes: tuple[tuple[int, int], ...] = SIZES, strand_count: int = STRANDS
+) -> dict[str, Any]:
+    """All figures, as they are written; takes seconds on a GPU, and minutes without one.
+
+    Args:
+        sizes: of pictures [pixels].
+
+    Raises:
+        HairloomError: there is no GPU here.
+        ShaderError: it cannot draw hair.
+    """
+    ensure_gpu()
+    rig = hair_ball(strand_count)
+    form = form_of("automatic")
+    plain = snapshot_of(prepared(rig, AmbientSettings(), with_occluders=False))
+    bench = _Bench(rig, solver_of(rig, form), StrandPass(), Target(), plain)
+    return {
+        "benchmark": VERSION,
+        "device": gpu.platform.renderer_get(),
+        "vendor": gpu.platform.vendor_get(),
+        **environment(),
+        "system": platform.platform(),
+        "is_software": gpu.platform.device_type_get() == "SOFTWARE",
+        "simulated_on": computed_on(form),
+        "transparency": drawn_transparency(plain.strand_settings),
+        "strands": strand_count,
+        "points": POINTS,
+        "simulation_ms": bench.time(bench.simulate),
+        "maps_ms": bench.time(bench.draw_maps, bench.simulate),
+        "frames": [bench.frame(*size) for size in sizes],
+    }
+
+
+@dataclass(eq=False)
+class _Bench:
+    """Hair that is shaken, and a target that it is drawn into."""
+
+    rig: Rig
+    solver: Solver
+    strands: StrandPass
+    target: Target
+    plain: Snapshot
+    moments: int = 0
+
+    def simulate(self) -> None:
+        """A frame of motion, with the strands that ride on the guides."""
+        self.moments += 1
+        moved = np.eye(4)
+        moved[0, 3] = 0.02 * np.sin(0.3 * self.moments)
+        self.solver.advance(Pose(None, moved), (), DynamicsSettings(), _GRAVITY, _FRAME)
+        self.shown()
+
+    def shown(self) -> Snapshot:
+        return replace(
+            self.solver.shown(self.plain), lights=three_point_lights(self.camera(1.0).view)
+        )
+
+    def camera(self, aspect: float) -> Camera:
+        points = self.rig.strands.points
+        box = points.min(axis=0), points.max(axis=0)
+        return frame_camera(box, _DIRECTION, _FIELD_OF_VIEW, aspect)
+
+    def draw_maps(self) -> None:
+        self.strands.opacity(self.shown())
+
+    def frame(self, width: int, height: int) -> dict[str, float]:
+        """Of one size: layers alone, and all that a frame takes which plays."""
+        camera = self.camera(width / height)
+
+        def draw() -> None:
+            self.target.sized(width, height).clear((0.0, 0.0, 0.0, 0.0))
+            with self.target.drawing():
+                self.strands.draw(self.shown(), camera, width, height)
+
+        def play() -> None:
+            self.simulate()
+            draw()
+
+        layers = self.time(draw)
+        return {
+            "width": width,
+            "height": height,
+            "layers_ms": layers,
+            "frame_ms": self.time(play),
+        }
+
+    def time(self, work: Callable[[], None], before: Callable[[], None] | None = None) -> float:
+        """Median milliseconds until the GPU has done it. `before`: is not timed."""
+        times: list[float] = []
+        begin = time.perf_counter()
+        while len(times) < 2 or (len(times) <= _ROUNDS and time.perf_counter() - begin < _SECONDS):
+            if before is not None:
+                before()
+            _finish()
+            start = time.perf_counter()
+            work()
+            _finish()
+            times.append(1000.0 * (time.perf_counter() - start))
+        return round(statistics.median(times[1:]), 3)
+
+
+def _finish() -> None:
+    """Wait for all that the GPU has still to do: it works in order, and a pixel comes back."""
+    last = gpu.types.GPUTexture((1, 1), format="R32F")
+    last.clear(format="FLOAT", value=(0.0,))
+    last.read()
+
+
+def hair_ball(strand_count: int) -> Rig:
+    """Strands of 15 cm out of a ball of 10 cm, evenly spread and bent downwards."""
+    along, numbers = np.linspace(0.0, 1.0, POINTS), np.arange(strand_count)
+    height = 1.0 - (2.0 * numbers + 1.0) / strand_count
+    turn = numbers * np.pi * (3.0 - np.sqrt(5.0))
+    across = np.sqrt(1.0 - height * height)
+    out = np.stack([across * np.cos(turn), across * np.sin(turn), height], axis=1)
+    points = out[:, None] * (0.1 + 0.15 * along[:, None])
+    points[..., 2] -= 0.1 * along * along
+    strands = StrandSet(
+        points=points.reshape(-1, 3),
+        offsets=np.arange(strand_count + 1) * POINTS,
+        radius=np.full(strand_count * POINTS, 4.0e-5),
+        group=np.zeros(strand_count, np.int32),
+    )
+    return pipeline.prepare(strands, None, GuideSettings(), place="the benchmark")
