@@ -7,6 +7,7 @@ Wireframe, the last redraw of a row of them is followed by one that draws strand
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from typing import Any
@@ -23,6 +24,8 @@ from ..base.redraw import redraw_views
 STEADY = ("SOLID", "WIREFRAME")
 #: [s] without a redraw until one is asked for that draws afresh, and until shadows no longer lag
 _REST, _LAG = 0.5, 0.1
+#: redraws that make a row, and seconds without a draw after which one does
+_ROW, _LONG = 3, 5.0
 
 
 @dataclass(eq=False)
@@ -30,13 +33,17 @@ class View:
     """What is kept for a 3D view.
 
     address: of its region's data. counted: what its picture shows, by session number of the hair.
-    is_behind: its shadows lag behind its lights. is_again: its picture was shown once more.
+    is_behind: its shadows lag behind its lights.
+    drawn_at: when its strands were drawn [s]. shown_again: how often its picture was since then.
+    is_again: so that its strands are to be drawn after it.
     """
 
     address: int
     picture: KeptPicture = field(default_factory=KeptPicture)
     counted: dict[int, Statistics] = field(default_factory=dict)
     is_behind: bool = False
+    drawn_at: float = 0.0
+    shown_again: int = 0
     is_again: bool = False
     seen_from: bytes = b""
 
@@ -123,14 +130,16 @@ def _addresses() -> Iterator[int]:
 
 def was_shown_again(view: View, shading: Any) -> None:
     """A view has shown its kept picture."""
-    if shading.type not in STEADY:
+    view.shown_again += 1
+    is_row = view.shown_again >= _ROW or time.monotonic() - view.drawn_at > _LONG
+    if shading.type not in STEADY and is_row:
         view.is_again = True
         _soon(_draw_afresh, _REST)
 
 
 def was_drawn(view: View) -> None:
     """A view was drawn afresh."""
-    view.is_again = False
+    view.is_again, view.shown_again, view.drawn_at = False, 0, time.monotonic()
     if view.is_behind:
         _soon(_catch_up, _LAG)
 
