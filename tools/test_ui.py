@@ -45,7 +45,7 @@ COMMIT_TESTS = {
 TESTS_LIMIT_S = 3600
 SESSION_LIMIT_S = float(os.environ.get("HAIRLOOM_SESSION_LIMIT", "1800"))
 #: For a commit each session plays on one backend: these on Vulkan, for they look at what is drawn.
-ON_VULKAN = ("cards", "engine", "look", "shadows", "first_light", "random")
+ON_VULKAN = ("cards", "engine", "look", "shadows", "first_light", "random", "still_views")
 #: One makes pictures of the documentation, one waits for minutes: they are played where all is.
 NOT_IN_COMMITS = ("guide_pictures", "autosave")
 #: Most of a session's time goes into drawing the window. Some need another screen than the usual
