@@ -190,21 +190,22 @@ def hiding_and_local_view():
 
 
 def what_acts_on_it():
-    """Colliders, wind and lights as lines in the view, which go with Blender's own overlays."""
+    """What moves hair, and what it does, as lines in the view, which go with Blender's overlays."""
     hair, overlay = bpy.data.objects["Hair"], viewport().spaces.active.overlay
     bpy.ops.object.light_add(type="SUN", rotation=(0.6, 0.6, 0.0))
     ball = bpy.data.objects.new("Ball", bpy.data.objects["Head"].data)
     bpy.context.collection.objects.link(ball)
     hair.hairloom.dynamics.wind_speed = 8.0
     without = yield from pixels_at_rest("no-overlays")
-    for kind in ("colliders", "wind", "lights"):
+    kinds = {"colliders", "wind", "lights", "stretch", "density"}
+    for kind in sorted(kinds):
         hair.hairloom.shown_overlays = set()
         yield from until(lambda: changed(without, pixels("no-overlays-again")) < 1e-4, "lines stay")
         hair.hairloom.shown_overlays = {kind}
         yield from until(
             lambda kind=kind: 0.0002 < changed(without, pixels(kind)) < 0.1, f"no {kind}"
         )
-    hair.hairloom.shown_overlays = {"colliders", "wind", "lights"}
+    hair.hairloom.shown_overlays = kinds
     yield
     driver.screenshot("all-overlays")
     overlay.show_overlays = False

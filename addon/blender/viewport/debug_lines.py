@@ -101,7 +101,7 @@ def debug_lines_of(
         "lights": lambda: light_lines(session.snapshot.lights, *points),
     }
     lines = [(COLORS[kind], make()) for kind, make in made.items() if kind in wanted]
-    if session.is_playing:
+    if session.is_made:
         for kind, make_colored in MOTION_LINES.items():
             lines += make_colored(session) if kind in wanted else ()
     return combed + tuple(
