@@ -16,7 +16,8 @@ _SAME_TIME = 1.0e-5
 def motion_of(
     parts: Sequence[tuple[Floats | None, Floats]],
 ) -> tuple[Floats, Floats] | None:
-    """Times and points of all parts, (n,) and (n, point_count, 3); None where none moves.
+    """Times and points of all parts, (n,) and (n, point_count, 3); None where none moves: programs
+    write still hair at each frame, too.
 
     Args:
         parts: times of each, (k,), and its points at these, (k, own_count, 3); None: it is still,
@@ -27,7 +28,9 @@ def motion_of(
         return None
     every = np.unique(np.concatenate(known))
     times = every[np.append(True, np.diff(every) > _SAME_TIME)]
-    return times, np.concatenate([_at(times, *part) for part in parts], axis=1)
+    positions = np.concatenate([_at(times, *part) for part in parts], axis=1)
+    is_still = np.array_equal(positions[1:], np.broadcast_to(positions[:1], positions[1:].shape))
+    return None if is_still else (times, positions)
 
 
 def _at(times: Floats, own: Floats | None, positions: Floats) -> Floats:

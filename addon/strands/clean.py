@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 
@@ -36,6 +38,7 @@ def clean(
     group: Ints | None = None,
     root_uv: Floats | None = None,
     color: Floats | None = None,
+    unfit: Mapping[str, Bools] = MappingProxyType({}),
 ) -> Cleaned:
     """Make a `StrandSet` from curves of any origin.
 
@@ -47,18 +50,20 @@ def clean(
         group: (curve_count,); absent: one group, 0.
         root_uv: (curve_count, 2); values that are not finite become 0.
         color: (point_count, 3) scene-linear; see `usable_colors`.
+        unfit: reason -> (curve_count,) which curves cannot be used for it, whatever their points.
     """
     points = np.asarray(points, np.float32).reshape(-1, 3)
     offsets = np.asarray(offsets, np.int64)
     counts = np.diff(offsets)
     curve_count = len(counts)
     color = None if color is None else usable_colors(color, offsets)
-    if radius is not None and _are_sound(points, offsets, radius, root_uv):
+    if not unfit and radius is not None and _are_sound(points, offsets, radius, root_uv):
         group = np.zeros(curve_count, np.int32) if group is None else group
         strands = StrandSet(points, offsets, radius, group, root_uv, color=color)
         return Cleaned(strands, {}, np.arange(curve_count))
 
     faults = {
+        **unfit,
         "fewer than two points": counts < 2,
         "a point that is not finite": _any_per_curve(~np.isfinite(points).all(axis=1), offsets),
         "a point farther than 1,000 km away": _any_per_curve(

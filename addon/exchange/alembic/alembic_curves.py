@@ -5,10 +5,10 @@
 Alembic's library may crash, or ask for all memory, on a damaged file. So this module imports no
 other of ours: it can be run by its path in a process that may die. The result has, for each curves
 object N in the file's order, "N/name", "N/matrix" (4, 4) that takes row vectors to the world,
-"N/points", "N/counts", "N/widths" where there are some, and "N/groom_*" as the file has them; of
-curves that move "N/times" [s] and "N/motion" (times, points, 3) in the world, as long as they have
-the same counts, and else "N/ended", the time from which on they have others; and what the file says
-of itself: "application", and "groom_*" of the top object.
+"N/points", "N/counts", "N/basis", "N/widths" where there are some, and "N/groom_*" as the file has
+them; of curves that move "N/times" [s] and "N/motion" (times, points, 3) in the world, as long as
+they have the same counts, and else "N/ended", the time from which on they have others; and what the
+file says of itself: "application", and "groom_*" of the top object.
 """
 
 from __future__ import annotations
@@ -33,6 +33,8 @@ MAX_TIMES = 10_000
 #: results cannot be written.
 REPORTED, NO_ROOM = 3, 4
 
+#: In Alembic's enumerations. Curves of other bases run through their points, or near them.
+_CUBIC, _BEZIER = 0, 1
 _VECTORS = {2: "IV2fArrayProperty", 3: "IV3fArrayProperty"}
 
 
@@ -93,7 +95,7 @@ def _read_motion(schema: Any, above: tuple[Any, ...], prefix: str, found: Arrays
     if "P" not in headers or "nVertices" not in headers:
         return
     points, counts = (Abc.IArrayProperty(schema, name) for name in ("P", "nVertices"))
-    moving = [each for each in (points, *above) if each.getNumSamples() > 1]
+    moving = [each for each in (points, *above) if not each.isConstant()]
     if not moving:
         return
     times = np.unique(np.concatenate([_times(each) for each in moving]))
@@ -123,11 +125,17 @@ def _times(moving: Any) -> NDArray[np.float64]:
 
 
 def _read_geometry(schema: Any, prefix: str, found: Arrays) -> None:
+    from alembic3d import Abc
+
     for header in schema.propertyheaders:
         name = header.getName()
         ours = {"P": "points", "nVertices": "counts", "width": "widths"}.get(name)
         if ours is not None:
             found[prefix + ours] = _values(schema, header)
+        elif name == "curveBasisAndType":
+            kind, _, basis, _ = tuple(Abc.IScalarProperty(schema, name).getValue())
+            is_bezier = kind == _CUBIC and basis == _BEZIER
+            found[prefix + "basis"] = np.array("bezier" if is_bezier else "linear")
         elif name == ".arbGeomParams":
             _read_attributes(schema, header, prefix, found)
 

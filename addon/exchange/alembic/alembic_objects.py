@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...arrays import Floats, Ints
+from ...arrays import Bools, Floats, Ints
 from ...errors import HairloomError
+from ..curve_basis import OnCurves, points_on_curves, unfit_curves, usable_basis
 from ..read_motion import ended_at, motion_of
 from .alembic_curves import Arrays
 
@@ -32,6 +33,7 @@ class Joined:
     uniform: strand_id, is_guide, closest_guides, guide_weights of each curve, or None.
     group_names: group -> name.
     motion: times [s] and the points at these, (n, point_count, 3), or None.
+    unfit: see `unfit_curves`.
     notes: what could not be used.
     """
 
@@ -44,31 +46,45 @@ class Joined:
     uniform: Arrays
     group_names: dict[int, str]
     motion: tuple[Floats, Floats] | None
+    unfit: dict[str, Bools]
     notes: tuple[str, ...]
 
 
 @dataclass
 class _Object:
-    """One curves object, and what of it could not be used."""
+    """One curves object, and what of it could not be used.
+
+    points: on the curves. counts: of each curve. control_count: points that the file has.
+    """
 
     name: str
     points: Floats
     counts: Ints
     arrays: Arrays
+    control_count: int
+    on_curves: OnCurves
     notes: list[str] = field(default_factory=list)
 
     def of_curves(self, name: str, width: int = 1) -> _Values | None:
         """An attribute's value for each curve, from as many, or from one for all."""
-        return self._spread(name, width, {len(self.counts): None, 1: len(self.counts)})
+        values = self._values(name, width, (len(self.counts), 1))
+        if values is None or len(values) == len(self.counts):
+            return values
+        return np.repeat(values, len(self.counts), axis=0)
 
     def of_points(self, name: str, width: int = 1) -> _Values | None:
         """An attribute's value for each point, from as many, or from one a curve or for all."""
-        curves, points = len(self.counts), len(self.points)
-        return self._spread(name, width, {points: None, curves: self.counts, 1: points})
+        curves, ends = len(self.counts), self.on_curves.varying_count
+        values = self._values(name, width, (self.control_count, ends, curves, 1))
+        if values is None:
+            return None
+        if len(values) == self.control_count:
+            return values if self.on_curves.vertex is None else self.on_curves.vertex.of(values)
+        if len(values) == ends and self.on_curves.varying is not None:
+            return self.on_curves.varying.of(values)
+        return np.repeat(values, self.counts if len(values) == curves else len(self.points), axis=0)
 
-    def _spread(
-        self, name: str, width: int, repeats: dict[int, Ints | int | None]
-    ) -> _Values | None:
+    def _values(self, name: str, width: int, counts: tuple[int, ...]) -> _Values | None:
         values = self.arrays.get(name)
         if values is None or not values.size:
             return None
@@ -76,11 +92,10 @@ class _Object:
             self.notes.append(f"{self.name}: {name} is of another type")
             return None
         values = values.reshape(-1, width) if width > 1 else values.ravel()
-        if len(values) not in repeats:
+        if len(values) not in counts:
             self.notes.append(f"{self.name}: {name} has {len(values)} values")
             return None
-        times = repeats[len(values)]
-        return values if times is None else np.repeat(values, times, axis=0)
+        return values
 
 
 def joined(found: Arrays, path: Path) -> Joined:
@@ -114,6 +129,7 @@ def joined(found: Arrays, path: Path) -> Joined:
         uniform=_guides(objects),
         group_names=names,
         motion=motion_of([_moving(each) for each in objects]),
+        unfit=_unfit(objects),
         notes=_notes(objects),  # after all others, which add to them
     )
 
@@ -122,6 +138,20 @@ def _notes(objects: list[_Object]) -> tuple[str, ...]:
     together = f"its {len(objects):,} curves objects became one groom"
     notes = tuple(note for each in objects for note in each.notes)
     return (together, *notes) if len(objects) > 1 else notes
+
+
+def _unfit(objects: list[_Object]) -> dict[str, Bools]:
+    """Why curves cannot be used -> which of all."""
+    of_objects = [unfit_curves(each.on_curves, str(each.arrays.get("basis"))) for each in objects]
+    return {
+        reason: np.concatenate(
+            [
+                unfit.get(reason, np.zeros(len(each.counts), bool))
+                for each, unfit in zip(objects, of_objects, strict=True)
+            ]
+        )
+        for reason in dict.fromkeys(reason for unfit in of_objects for reason in unfit)
+    }
 
 
 def _numbers(found: Arrays) -> list[int]:
@@ -139,17 +169,24 @@ def _object(found: Arrays, number: int, path: Path) -> _Object:
     counts = counts.astype(np.int64)
     if len(counts) and (counts.min() < 0 or counts.sum() != len(points)):
         raise _lying(path, name, f"its curves want {counts.sum()} points and it has {len(points)}")
+    basis, said = usable_basis(str(own.get("basis", "linear")), counts)
     ended = [ended_at(float(own["ended"]), "other counts of points")] if "ended" in own else []
-    notes = [f"{name}: {note}" for note in ended]
-    return _Object(name, _placed(points, own["matrix"]), counts, own, notes)
+    notes = [f"{name}: {note}" for note in (*ended, *said)]
+    on_curves = points_on_curves(basis, True, counts)
+    placed = _placed(points, own["matrix"])
+    if on_curves.vertex is not None:
+        notes.append(f"{name}: its {basis} curves became points on the curves")
+        placed = on_curves.vertex.of(placed)
+    return _Object(name, placed, np.diff(on_curves.offsets), own, len(points), on_curves, notes)
 
 
 def _moving(each: _Object) -> tuple[Floats | None, Floats]:
     """See `motion_of`."""
     times, positions = each.arrays.get("times"), each.arrays.get("motion")
-    if times is None or positions is None or positions.shape[1:] != each.points.shape:
+    if times is None or positions is None or positions.shape[1:] != (each.control_count, 3):
         return None, each.points[None]
-    return times, positions
+    vertex = each.on_curves.vertex
+    return times, positions if vertex is None else np.array([vertex.of(at) for at in positions])
 
 
 def _placed(points: Floats, matrix: Floats) -> Floats:

@@ -141,6 +141,7 @@ def _groom(curves: Joined, space: FileSpace, path: Path, notes: list[str]) -> Gr
             group=curves.group,
             root_uv=curves.root_uv,
             color=curves.color,
+            unfit=curves.unfit,
         )
     if not cleaned.strands.strand_count:
         reasons = ", ".join(f"{count} with {why}" for why, count in cleaned.dropped.items())

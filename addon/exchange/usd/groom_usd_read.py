@@ -157,6 +157,7 @@ def _joined(pieces: list[Curves], path: Path, name: str, notes: list[str]) -> Gr
             group=groups,
             root_uv=_of_all("root UVs", [piece.root_uv for piece in pieces], notes),
             color=_colors(pieces),
+            unfit=_unfit(pieces),
         )
     if not cleaned.strands.strand_count:
         reasons = ", ".join(f"{count:,} with {why}" for why, count in cleaned.dropped.items())
@@ -183,6 +184,15 @@ def _joined(pieces: list[Curves], path: Path, name: str, notes: list[str]) -> Gr
         motion=motion,
         **_identities(pieces, cleaned.kept, notes),
     )
+
+
+def _unfit(pieces: list[Curves]) -> dict[str, Bools]:
+    """Why curves cannot be used -> which of all."""
+    none = [np.zeros(piece.curve_count, bool) for piece in pieces]
+    return {
+        reason: _together([p.unfit.get(reason, no) for p, no in zip(pieces, none, strict=True)])
+        for reason in dict.fromkeys(reason for piece in pieces for reason in piece.unfit)
+    }
 
 
 def _together(arrays: list[NDArray[Any]]) -> NDArray[Any]:

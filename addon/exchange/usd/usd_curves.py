@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from ...arrays import Bools, Floats, Ints
 from ...strands.affine import mean_scale, moved
 from ...strands.clean import are_widths
+from ..curve_basis import OnCurves, points_on_curves, unfit_curves, usable_basis
 from ..read_motion import ended_at
-from .usd_basis import OnCurves, points_on_curves
 from .usd_reader import Arrays
 
 #: Where programs put the UVs of roots, Blender's among them; the first one found counts.
@@ -24,6 +24,7 @@ class Curves:
     """What a prim holds; what is None is not known. Arrays are as in `Groom`.
 
     offsets: (curve_count + 1,).
+    unfit: see `unfit_curves`.
     notes: what had to be changed or left out.
     times, positions: when it moves (n,) [s], and the points then (n, point_count, 3); None and the
         points (1, point_count, 3) where it does not.
@@ -41,6 +42,7 @@ class Curves:
     is_guide: Bools | None
     closest_guides: Ints | None
     guide_weights: Floats | None
+    unfit: dict[str, Bools]
     notes: tuple[str, ...]
     times: Floats | None
     positions: Floats
@@ -77,17 +79,16 @@ def curves_of(prim: Arrays, space: Floats) -> Curves:
     wrap, kind, basis, widths_interpolation = map(str, prim["traits"])
     if kind == "linear":
         basis = "linear"
+    basis, said = usable_basis(basis, counts)
     if wrap == "periodic":
         raise UnusableCurvesError("its curves are closed")
     values = _Values(prim, points_on_curves(basis, wrap == "pinned", counts), counts)
     radius, notes = _radius(values, widths_interpolation, mean_scale(matrix))
+    notes += said
     if values.on_curves.vertex is not None:
         notes += (f"its {basis} curves became points on the curves",)
     if "ended" in prim:
         notes += (ended_at(float(prim["ended"]), "another number of points"),)
-    wrong = values.on_curves.wrong_count
-    if wrong:
-        notes += (f"{wrong:,} curves have a number of points that {basis} curves cannot have",)
     color = values.of_points("groom_color", 3)
     if color is None:
         color = values.of_points("displayColor", 3)
@@ -109,6 +110,7 @@ def curves_of(prim: Arrays, space: Floats) -> Curves:
         is_guide=None if guide is None else guide > 0,
         closest_guides=values.of_strands("groom_closest_guides", np.int32, 3),
         guide_weights=values.of_strands("groom_guide_weights", np.float32, 3),
+        unfit=unfit_curves(values.on_curves, basis),
         notes=notes + tuple(values.notes),
         times=times,
         positions=placed[None] if times is None else positions,

@@ -285,6 +285,28 @@ def foreign(path: Path, application: str = "Maya") -> None:
             wrong.set(AbcGeom.OInt32GeomParamSample(values, scope.kUniformScope))
 
 
+def test_bezier_curves_become_points_on_them(tmp_path: Path) -> None:
+    """At thirds, where De Casteljau's construction has them; widths are those of ends, as Blender
+    writes them."""
+    archive = Abc.CreateArchiveWithInfo(str(tmp_path / "a.abc"), "Blender", "")
+    schema = AbcGeom.OCurves(archive.getTop(), "hair").getSchema()
+    sample = AbcGeom.OCurvesSchemaSample()
+    control = np.array([[0, 0, 0], [0, 3, 0], [3, 3, 0], [3, 0, 0]], np.float32)
+    sample.setPositions(imath.V3fArrayFromBuffer(control))
+    sample.setCurvesNumVertices(imath.IntArrayFromBuffer(np.array([4], np.int32)))
+    sample.setType(AbcGeom.CurveType.kCubic)
+    sample.setBasis(AbcGeom.BasisType.kBezierBasis)
+    widths = imath.FloatArrayFromBuffer(np.array([0.06, 0.03], np.float32))
+    sample.setWidths(AbcGeom.OFloatGeomParamSample(widths, AbcGeom.GeometryScope.kVaryingScope))
+    schema.set(sample)
+    del schema, archive
+    read = read_groom_alembic(tmp_path / "a.abc")
+    thirds = [(0, 0), (7 / 9, 2), (20 / 9, 2), (3, 0)]
+    np.testing.assert_allclose(read.strands.points, [(x, 0, y) for x, y in thirds], atol=1e-5)
+    np.testing.assert_allclose(read.strands.radius, [0.03, 0.025, 0.02, 0.015], rtol=1e-5)
+    assert "a.abc: hair: its bezier curves became points on the curves." in read.notes
+
+
 def test_files_of_other_programs_are_read(tmp_path: Path) -> None:
     foreign(tmp_path / "a.abc")
     read = read_groom_alembic(tmp_path / "a.abc")

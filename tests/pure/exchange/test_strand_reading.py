@@ -180,6 +180,67 @@ def test_a_motion_that_loses_points_ends_before_and_that_is_reported(tmp_path: P
     assert "at 0.125 s it has another number of points" in note
 
 
+@pytest.mark.parametrize("suffix", [".abc", ".usdc"])
+def test_still_hair_that_is_written_at_each_frame_has_no_motion(
+    tmp_path: Path, suffix: str
+) -> None:
+    hair = groom()
+    motion = GroomMotion([hair.strands.points] * 3, rate=24.0)
+    if suffix == ".abc":
+        write_groom_alembic(tmp_path / "hair.abc", hair, BLENDER, motion=motion)
+    else:
+        write_usd(tmp_path / "hair.usdc", hair, motion=motion)
+    read = read_strands(tmp_path / f"hair{suffix}", parts="both")
+    assert not any("motion" in note for note in read.notes)
+
+
+def stage_of_curves(path: Path, counts: list[int], basis: str = "") -> Usd.Stage:
+    """Curves side by side, each a metre long and straight, of this many points."""
+    stage = Usd.Stage.CreateNew(str(path))
+    UsdGeom.SetStageMetersPerUnit(stage, 1.0)
+    UsdGeom.SetStageUpAxis(stage, "Z")
+    curves = UsdGeom.BasisCurves.Define(stage, "/top/hair")
+    UsdGeom.Xform.Define(stage, "/top")
+    curves.CreateTypeAttr("cubic" if basis else "linear")
+    if basis:
+        curves.CreateBasisAttr(basis)
+    points = [(x, 0.0, z) for x, n in enumerate(counts) for z in np.linspace(0.0, 1.0, n).tolist()]
+    curves.CreatePointsAttr(points)
+    curves.CreateCurveVertexCountsAttr(counts)
+    return stage
+
+
+@pytest.mark.parametrize("moves", [True, False])
+def test_hair_that_its_parent_moves_has_motion(tmp_path: Path, moves: bool) -> None:
+    stage = stage_of_curves(tmp_path / "hair.usda", [3])
+    place = UsdGeom.Xform.Get(stage, "/top").AddTranslateOp()
+    for time in (1.0, 2.0, 3.0):
+        place.Set((time if moves else 1.0, 0.0, 0.0), time)
+    stage.SetStartTimeCode(1.0)
+    stage.SetEndTimeCode(3.0)
+    stage.Save()
+    read = read_strands(tmp_path / "hair.usda")
+    assert read.strands.points[0].tolist() == [1.0, 0.0, 0.0]
+    motion = read.groom.motion
+    assert (motion is not None) == moves
+    if motion is not None:
+        assert motion.positions[:, 0].tolist() == [[1, 0, 0], [2, 0, 0], [3, 0, 0]]
+
+
+def test_bezier_curves_of_a_wrong_number_of_points_are_dropped_for_that(tmp_path: Path) -> None:
+    stage_of_curves(tmp_path / "hair.usda", [4, 7, 5, 7], "bezier").Save()
+    read = read_strands(tmp_path / "hair.usda")
+    assert read.strands.point_counts.tolist() == [4, 7, 7]
+    assert read.dropped == {"a number of points that bezier curves cannot have": 1}
+
+
+def test_bezier_curves_that_are_points_are_read_as_such(tmp_path: Path) -> None:
+    stage_of_curves(tmp_path / "hair.usda", [4, 5, 6], "bezier").Save()
+    read = read_strands(tmp_path / "hair.usda")
+    assert read.strands.point_counts.tolist() == [4, 5, 6] and not read.dropped
+    assert any("it says bezier, but" in note for note in read.notes)
+
+
 def groom_of_groups() -> Groom:
     strands = replace(groom().strands, group=np.array([0, 0, 1, 1, 1], np.int32))
     return Groom(strands, group_names={0: "front", 1: "back"})

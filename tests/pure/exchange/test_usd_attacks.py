@@ -102,7 +102,7 @@ def test_what_is_packed_comes_back() -> None:
         {
             "points": random.random((n, 3)).astype(np.float32 if n % 3 else np.float64),
             "matrix": random.random((4, 4)),
-            "samples": np.array(n),
+            "moves": np.array(n > 3),
             "traits": np.array(["a" * n, "\u00e9\ud83d"]),
             "name": np.array(f"prim {n}"),
             **({"widths": np.arange(n)} if n % 2 else {}),

@@ -1,4 +1,4 @@
-"""From the control points of USD's curves to points on them, which is what strands are made of.
+"""From control points of curves in files to points on them, which is what strands are made of.
 
 After the documentation of UsdGeomBasisCurves: how many segments a curve has, and which values each
 interpolation has for it. Hair runs through its points, as linear and pinned Catmull-Rom curves do.
@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...arrays import Floats, Ints
+from ..arrays import Bools, Floats, Ints
 
 #: A cubic Bezier segment's four weights at 0, 1/3 and 2/3 of it.
 _AT_THIRDS = np.array([[27, 0, 0, 0], [8, 12, 6, 1], [1, 6, 12, 8]], np.float32) / 27.0
@@ -45,14 +45,15 @@ class OnCurves:
     vertex: from values for each control point; None: they are those of the points.
     varying: from values for each end of a segment; None: they are those of the points.
     varying_count: how many values of the latter kind there must be.
-    wrong_count: curves that are without points, because their number does not fit the basis.
+    is_unfit: (curve_count,) without points, because their number does not fit the basis; None: all
+        do.
     """
 
     offsets: Ints
     vertex: Mix | None
     varying: Mix | None
     varying_count: int
-    wrong_count: int = 0
+    is_unfit: Bools | None = None
 
 
 def points_on_curves(basis: str, is_pinned: bool, counts: Ints) -> OnCurves:
@@ -81,12 +82,42 @@ def points_on_curves(basis: str, is_pinned: bool, counts: Ints) -> OnCurves:
         return OnCurves(offsets, mix if basis == "bspline" else None, None, len(own))
     inner_offsets = np.concatenate([[0], np.cumsum(np.maximum(counts - 2, 0))])
     inner = Mix(mix.index[is_inner], mix.weight[is_inner])
-    return OnCurves(inner_offsets, inner, None, int(inner_offsets[-1]))
+    is_unfit = (counts > 1) & (counts < 4)
+    return OnCurves(
+        inner_offsets,
+        inner,
+        None,
+        int(inner_offsets[-1]),
+        is_unfit if is_unfit.any() else None,
+    )
+
+
+def usable_basis(basis: str, counts: Ints) -> tuple[str, tuple[str, ...]]:
+    """The basis that curves are read with, and what is to be said of it.
+
+    Where most Bezier curves have a number of points that such curves cannot have, somebody has
+    written points on the curves, as Blender does of hair.
+    """
+    if basis != "bezier" or 2 * int(_are_bezier(counts).sum()) > len(counts):
+        return basis, ()
+    return "linear", ("it says bezier, but its numbers of points are of curves through them",)
+
+
+def unfit_curves(on_curves: OnCurves, basis: str) -> dict[str, Bools]:
+    """Why curves cannot be used -> which, (curve_count,); for `clean`."""
+    if on_curves.is_unfit is None:
+        return {}
+    return {f"a number of points that {basis} curves cannot have": on_curves.is_unfit}
+
+
+def _are_bezier(counts: Ints) -> Bools:
+    is_bezier: Bools = (counts >= 4) & (counts % 3 == 1)
+    return is_bezier
 
 
 def _of_bezier(counts: Ints, offsets: Ints, curve: Ints, place: Ints) -> OnCurves:
     """As many points as control points: every third control point is one, two lie between."""
-    is_sound = (counts >= 4) & (counts % 3 == 1)
+    is_sound = _are_bezier(counts)
     ends = (counts + 2) // 3  # one more than segments
     end_offsets = np.concatenate([[0], np.cumsum(ends)])
     own = np.flatnonzero(is_sound[curve])
@@ -101,5 +132,5 @@ def _of_bezier(counts: Ints, offsets: Ints, curve: Ints, place: Ints) -> OnCurve
         Mix(index, _AT_THIRDS[third]),
         Mix(np.stack([end, next_end], axis=1), np.stack([1 - fraction, fraction], axis=1)),
         int(end_offsets[-1]),
-        int((~is_sound).sum()),
+        None if is_sound.all() else ~is_sound,
     )
