@@ -184,10 +184,12 @@ class OpacityDrawing:
             values = pack_opacity([self._frames.get(light) for light in frames], settings, size)
             self._maps = maps = self._maps_of(values, size)
             self._casters.hold(casters)
-            for number, light in enumerate(wanted):
-                if light in due:
-                    self._draw_casters(maps, number, light, casters)
-                    _draw_map(maps, number, light, hair)
+            places = [(number, light) for number, light in enumerate(wanted) if light in due]
+            # all meshes first: else Mesa on the CPU reads depths of a map that it still draws
+            for number, light in places:
+                self._draw_casters(maps, number, light, casters)
+            for number, light in places:
+                _draw_map(maps, number, light, hair)
             self._drawn_of = drawn_of
         self.is_behind = bool(due_maps(self._frames, wanted))
         return self._maps

@@ -21,6 +21,7 @@ from ... import pipeline
 from ...dynamics.settings import DynamicsSettings
 from ...groom.settings import GuideSettings
 from ...pipeline import Pose, Rig
+from ...render import gpu_objects
 from ...render.accumulation import Target
 from ...render.camera import Camera, frame_camera
 from ...render.snapshot import Snapshot
@@ -148,7 +149,7 @@ class _Bench:
 
 def _finish() -> None:
     """Wait for all that the GPU has still to do: it works in order, and a pixel comes back."""
-    last = gpu.types.GPUTexture((1, 1), format="R32F")
+    last = gpu_objects.texture((1, 1), format="R32F")
     last.clear(format="FLOAT", value=(0.0,))
     last.read()
 
