@@ -10,6 +10,7 @@ import bpy
 
 from ...arrays import Floats
 from ..base.attributes import set_attribute
+from ..base.node_groups import own_node_group
 
 #: of the modifier and its node group
 NAME = "Hairloom Motion"
@@ -29,25 +30,15 @@ def store_motion(hair: bpy.types.Object, first: int, positions: Floats) -> None:
     for frame, points in enumerate(positions, first):
         set_attribute(hair.data, f"{PREFIX}{frame}", "POINT", points)
     modifier = hair.modifiers.new(NAME, "NODES")
-    modifier.node_group = nodes = _node_group()
+    modifier.node_group = nodes = own_node_group(NAME, _MARK, _VERSION, _fill)
     for socket, value in ((_FIRST, first), (_LAST, first + len(positions) - 1)):
         identifier = nodes.interface.items_tree[socket].identifier
         getattr(modifier.properties.inputs, identifier).value = value
 
 
-def _node_group() -> bpy.types.NodeTree:
-    known = (group for group in bpy.data.node_groups if group.get(_MARK) == _VERSION)
-    return next((group for group in known if group.library is None), None) or _new_node_group()
-
-
-def _new_node_group() -> bpy.types.NodeTree:
+def _fill(tree: bpy.types.NodeTree) -> None:
     """Between two frames points go straight; before the first and after the last they rest."""
-    tree = bpy.data.node_groups.new(NAME, "GeometryNodeTree")
-    tree[_MARK] = _VERSION
-    tree.is_modifier = True
     new_socket, new, link = tree.interface.new_socket, tree.nodes.new, tree.links.new
-    new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
-    new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
     for name in (_FIRST, _LAST):
         new_socket(name, in_out="INPUT", socket_type="NodeSocketInt")
     begin, end, time = (
@@ -75,7 +66,6 @@ def _new_node_group() -> bpy.types.NodeTree:
     for across, nodes in enumerate((*rows, (end,))):
         for down, node in enumerate(nodes):
             node.location = 220.0 * across, -220.0 * down
-    return tree
 
 
 def _math(tree: bpy.types.NodeTree, operation: str) -> bpy.types.Node:

@@ -18,6 +18,7 @@ import numpy as np
 
 from ...arrays import Floats
 from ...errors import HairloomError
+from ..base.node_groups import own_node_group
 from ..base.objects import Handle
 
 NAME = "Hairloom Cloth"
@@ -48,7 +49,7 @@ def add_modifier(obj: bpy.types.Object) -> bpy.types.Modifier:
     modifier = fin_modifier(obj)
     if modifier is None:
         modifier = obj.modifiers.new(NAME, "NODES")
-        modifier.node_group = _node_group()
+        modifier.node_group = own_node_group(NAME, _MARK, _VERSION, _fill)
         modifier.show_in_editmode = False
     return modifier
 
@@ -168,17 +169,7 @@ def _suspects(obj: bpy.types.Object, *, above: bool) -> str:
     return f" ({', '.join(names)})" if names else ""
 
 
-def _node_group() -> bpy.types.NodeTree:
-    known = (group for group in bpy.data.node_groups if group.get(_MARK) == _VERSION)
-    return next((group for group in known if group.library is None), None) or _new_node_group()
-
-
-def _new_node_group() -> bpy.types.NodeTree:
-    tree = bpy.data.node_groups.new(NAME, "GeometryNodeTree")
-    tree[_MARK] = _VERSION
-    tree.is_modifier = True
-    for direction in ("INPUT", "OUTPUT"):
-        tree.interface.new_socket("Geometry", in_out=direction, socket_type="NodeSocketGeometry")
+def _fill(tree: bpy.types.NodeTree) -> None:
     names = (
         "NodeGroupInput",
         "GeometryNodeStoreNamedAttribute",
@@ -207,4 +198,3 @@ def _new_node_group() -> bpy.types.NodeTree:
     simulated.inputs["Name"].default_value = POSITION
     tree.links.new(simulated.outputs["Exists"], chain[3].inputs["Selection"])
     tree.links.new(simulated.outputs["Attribute"], chain[3].inputs["Position"])
-    return tree
