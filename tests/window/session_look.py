@@ -314,15 +314,30 @@ def a_picture_is_a_button(hair):
     yield from until(lambda: _pink(driver.screenshot("picture")), "no picture of the look")
     before = driver.screenshot("picture")
     yield from click(*_pink(before))
-    yield from until(lambda: _changed_corner(before) is not None, "no pictures to choose from")
-    yield from click(*_changed_corner(before))
-    name = bpy.context.window_manager.hairloom_presets.shading
-    assert name.startswith("looks/") and name != "looks/dyed", name
+    corner = yield from _steady(lambda: _changed_corner(before), "no pictures to choose from")
+    yield from click(*corner)
+    chosen = bpy.context.window_manager.hairloom_presets
+    yield from until(lambda: chosen.shading != "looks/dyed", "no picture was clicked")
+    name = chosen.shading
+    assert name.startswith("looks/"), name
     entry = presets.preset_of(hair, presets.shipped("shading"))
     assert entry is not None and entry.name == name
     bpy.ops.ed.undo()
     yield
     assert bpy.context.window_manager.hairloom_presets.shading == "looks/dyed"
+
+
+def _steady(look, message):
+    """What is seen, once it is the same in two drawings one after the other."""
+    last = None
+
+    def is_steady():
+        nonlocal last
+        before, last = last, look()
+        return last is not None and last == before
+
+    yield from until(is_steady, message)
+    return last
 
 
 def _pink(screen):
