@@ -36,6 +36,8 @@ NO_LIGHT = 0.0
 #: what differs where a popup lies; how many of these it has at least, and how far inside of its
 #: corner the first picture is, in pixels
 SEEN, POPUP_PIXELS, IN_CORNER = 8, 20_000, 40
+#: the brightest that the popup's own colour may be in any channel
+DARK = 36
 #: a picture of the look Dyed has more that is pink
 PINK_PIXELS = 20
 
@@ -351,9 +353,13 @@ def _pink(screen):
 
 
 def _changed_corner(before):
-    """A pixel in the picture at the lower left of the popup that has come; None before it comes."""
-    now = driver.screenshot("pictures")
-    rows, columns = np.nonzero(np.abs(now.astype(int) - before).max(axis=2) > SEEN)
+    """A pixel in the picture at the lower left of the popup that has come; None before it comes.
+
+    The popup is darker than all else. It opens above the button or below it, as there is room.
+    """
+    now = driver.screenshot("pictures").astype(int)
+    is_popup = (np.abs(now - before).max(axis=2) > SEEN) & (now.max(axis=2) < DARK)
+    rows, columns = np.nonzero(is_popup)
     if len(rows) < POPUP_PIXELS:
         return None
     return int(columns.min()) + IN_CORNER, len(now) - int(rows.max()) + IN_CORNER
