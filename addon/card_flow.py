@@ -58,10 +58,16 @@ def card_build_steps(
 
 
 def card_groom(rig: Rig, drawn: StrandSettings = _AS_THEY_ARE) -> CardGroom:
-    """What cards are made from, without the occlusion of the strands."""
-    strands = card_strands(rig.strands)
+    """What cards are made from, without the occlusion of the strands.
+
+    Baby hair is left out: it lies singly on the skin along hairlines and partings, and cards of it
+    would be dashes there.
+    """
+    number = np.delete(np.arange(rig.strands.strand_count), rig.baby_hair)
+    strands = card_strands(rig.strands.take(number) if len(rig.baby_hair) else rig.strands)
     radius = drawn_radius(strands.radius.reshape(strands.strand_count, -1), drawn)
-    return CardGroom(strands, rig.guides, radius, root_normals(rig), rig.head)
+    # guides are the artist's own strands, which come first, so they keep their numbers
+    return CardGroom(strands, number, rig.guides, radius, root_normals(rig)[number], rig.head)
 
 
 def occluder_of(rig: Rig, drawn: StrandSettings = _AS_THEY_ARE) -> CardOccluder:

@@ -121,6 +121,7 @@ class Rig:
     children_line: what automatic children there are, and why; empty where there are none.
     holds: where strands are held by ties or by a surface; None: nowhere.
     grown: how its children have grown; None without any, and where it comes from a bake.
+    baked_baby_hair: which strands are baby hair where it comes from a bake.
     """
 
     strands: StrandSet
@@ -135,6 +136,13 @@ class Rig:
     children_line: str = ""
     holds: Holds | None = None
     grown: Grown | None = None
+    baked_baby_hair: Ints = field(default_factory=lambda: np.zeros(0, np.int32))
+
+    @property
+    def baby_hair(self) -> Ints:
+        """Which strands are short and fine hair of the hairline and of partings."""
+        fineness = _fineness(self)
+        return self.baked_baby_hair if fineness is None else np.flatnonzero(fineness < 1.0)
 
     @property
     def guides_line(self) -> str:

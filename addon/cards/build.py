@@ -45,6 +45,7 @@ class CardGroom:
     """What cards are made from.
 
     strands: uniform, one at least.
+    number: (strand_count,) of each in the groom, on which its colour depends.
     guides: (guide_count,) which of them are guides.
     radius: (strand_count, cv_count) [m], as strands are drawn.
     root_normal: (strand_count, 3) unit normals of the head under the roots.
@@ -54,6 +55,7 @@ class CardGroom:
     """
 
     strands: StrandSet
+    number: Ints
     guides: Ints
     radius: Floats
     root_normal: Floats

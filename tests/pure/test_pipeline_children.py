@@ -4,9 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from baby_hair import short_strands, wig
 from small_wig import GUIDES, curves, sheet
 
 from hairloom.addon import pipeline
+from hairloom.addon.card_flow import card_groom
+from hairloom.addon.cards.card_strands import card_strands
 from hairloom.addon.groom.children_settings import ChildrenSettings
 from hairloom.addon.strands import Surface
 
@@ -140,3 +143,13 @@ def test_baby_hair_is_fine_where_widths_are_found() -> None:
     is_baby = cut < 0.5 * plain
     assert 50 < is_baby.sum() < 1500
     assert np.median(radius[is_baby]) < 0.65 * np.median(radius[~is_baby])
+
+
+def test_cards_are_made_from_all_hair_but_baby_hair() -> None:
+    rig = wig()
+    groom = card_groom(rig)
+    np.testing.assert_array_equal(groom.number, np.flatnonzero(~short_strands(rig)))
+    expected = card_strands(rig.strands.take(groom.number))
+    np.testing.assert_array_equal(groom.strands.points, expected.points)
+    np.testing.assert_array_equal(groom.root_normal, pipeline.root_normals(rig)[groom.number])
+    np.testing.assert_array_equal(groom.strands.roots[groom.guides], rig.guide_grid[:, 0])

@@ -130,6 +130,7 @@ def rig_arrays(rig: Rig, rests: RestMatrices) -> Arrays:
         "widths": np.array(rig.widths.numbers),
         "widths_reason": np.array(rig.widths.reason, np.str_),
         "children_line": np.array(rig.children_line, np.str_),
+        "baby_hair": rig.baby_hair,
     }
     if rig.holds is not None:
         arrays |= _hold_arrays(rig.holds) | {"tie_rests": rests.ties}
@@ -243,7 +244,9 @@ def _rig_of(arrays: Arrays) -> BakedRig:
         Widths.of(arrays["widths"], str(arrays["widths_reason"])),
         str(arrays["children_line"]),
         _holds_of(arrays, strands),
+        baked_baby_hair=arrays.get("baby_hair", np.zeros(0, np.int32)),
     )
+    _check_indices(rig.baby_hair, strands.strand_count)
     ties = arrays.get("tie_rests", np.zeros((0, 4, 4)))
     rests = RestMatrices(arrays["hair_rest"], arrays.get("head_rest"), ties)
     return BakedRig(rig, rests)

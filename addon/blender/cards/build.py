@@ -16,14 +16,13 @@ import gpu
 import numpy as np
 
 from ...arrays import Floats
-from ...card_flow import bound_cards, card_build_steps, cards_at
+from ...card_flow import bound_cards, card_build_steps, card_groom, cards_at
 from ...cards.atlas import AtlasPlan
 from ...cards.atlas_maps import AtlasMaps, dilated
 from ...cards.atlas_settings import AtlasSettings
 from ...cards.bake import sampled_maps
 from ...cards.bake_strands import FlatStrands, flat_strands
 from ...cards.build import CardBuild
-from ...cards.card_strands import card_strands
 from ...cards.drawing_settings import CardDrawingSettings
 from ...cards.follow import CardBinding
 from ...cards.occlusion_settings import CardOcclusionSettings
@@ -42,7 +41,6 @@ from ...shading.drawn_strands import (
     brightest_look,
     card_color,
     drawn_color,
-    drawn_radius,
     in_color,
     mean_look,
     strand_variation,
@@ -255,7 +253,7 @@ def card_maps(inputs: CardInputs, build: CardBuild, draw: AtlasDraw) -> CardMaps
 
 def _card_color(rig: Rig) -> Floats | None:
     """The colours that the atlas is baked from, (point_count, 3)."""
-    return card_strands(rig.strands).color
+    return card_groom(rig).strands.color
 
 
 def drawn_maps(flat: FlatStrands, size: int) -> AtlasMaps:
@@ -282,14 +280,12 @@ def baked_atlas(
     Args:
         drawn: how wide strands are drawn.
     """
-    strands = card_strands(rig.strands)
-    grid = strands.grid
-    count, cv_count = grid.shape[:2]
-    radius = drawn_radius(strands.radius.reshape(count, cv_count), drawn)
+    groom = card_groom(rig, drawn)
+    strands, grid = groom.strands, groom.strands.grid
     colors = strand_variation(
-        np.arange(count), cv_count, shading, strands.color_grid, strands.group
+        groom.number, grid.shape[1], shading, strands.color_grid, strands.group
     )
-    flat = flat_strands(plan, grid, radius, colors)
+    flat = flat_strands(plan, grid, groom.radius, colors)
     return dilated(draw(flat, plan.size), plan.grid)
 
 

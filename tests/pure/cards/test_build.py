@@ -309,7 +309,7 @@ def test_half_a_million_strands_become_cards() -> None:
     strands = falling(500_000, cv_count=8)
     normal = np.tile(np.float32([0.0, 0.0, 1.0]), (500_000, 1))
     radius = strands.radius.reshape(500_000, -1)
-    groom = CardGroom(strands, np.arange(0, 500_000, 500), radius, normal, None)
+    groom = CardGroom(strands, np.arange(500_000), np.arange(0, 500_000, 500), radius, normal, None)
     cards, _ = uncut_cards(groom, CardSettings(source="clusters"), replace(MADE))
     assert len(cards) >= 800
 
