@@ -22,8 +22,10 @@ from ..strands.resample import resample
 #: directions around the hair that are tried
 _AROUND = 16
 #: how far above the hair the eye may be, as z of a direction of unit length across; and how good
-#: it is to look from there, since one looks at a head from its own height
+#: it is to look from there
 _HEIGHTS = ((0.16, 1.0), (0.7, 0.8), (1.7, 0.6))
+#: one looks at a head from its own height, if this much of its face is seen from there
+_LEVEL_FACE = 0.5
 #: a three-quarter view is turned by this from the front [rad]
 _THREE_QUARTER = float(np.radians(29.0))
 #: what counts where no face is seen, as a fraction of the whole face
@@ -74,10 +76,11 @@ def good_side(strands: StrandSet, body: Surface | None) -> GoodSide:
     level = np.stack([np.sin(angles), -np.cos(angles), np.zeros(_AROUND)], axis=1)
     areas = np.array([seen.areas(_raised(each, _HEIGHTS[0][0])) for each in level])
     whole = areas.max(axis=0)
+    is_face = whole[1] > _MIN_FACE * whole[0]
     good = _goodness(areas, whole) * (1.0 - 0.5 * _PREFERENCE * level[:, 1])
     # short hair is seen as well from behind, but a face only from its front
     front = _leaning(good, level, _MIN_LEAN)
-    if front is None and whole[1] > _MIN_FACE * whole[0]:
+    if front is None and is_face:
         front = _leaning(areas[:, 1], level, _MIN_FACE_LEAN)
     if front is None:  # the best is the three-quarter view
         front = _turned(level[good.argmax()], _THREE_QUARTER)
@@ -88,6 +91,8 @@ def good_side(strands: StrandSet, body: Surface | None) -> GoodSide:
         for turn, preferred in ((-_THREE_QUARTER, 1.0 + _PREFERENCE), (_THREE_QUARTER, 1.0))
     ]
     asked = np.array([seen.areas(direction) for direction, _ in candidates])
+    if is_face and asked[:2, 1].max() > _LEVEL_FACE * whole[1]:
+        candidates, asked = candidates[:2], asked[:2]
     factors = np.array([factor for _, factor in candidates])
     best = (_goodness(asked, np.maximum(whole, asked.max(axis=0))) * factors).argmax()
     return GoodSide(front, candidates[best][0])
