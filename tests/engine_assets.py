@@ -69,7 +69,11 @@ def glb_axes(vector: Any) -> list[float]:
 
 
 def written_asset(
-    folder_name: str, look_name: str, export: CardExportSettings, name: str | None = None
+    folder_name: str,
+    look_name: str,
+    export: CardExportSettings,
+    name: str | None = None,
+    file: str = "cards.glb",
 ) -> Asset:
     is_baked = look_name == "baked"
     model = "marschner" if is_baked else look_name
@@ -97,7 +101,7 @@ def written_asset(
         look,
     )
     output = CardOutput(name=name, settings=export)
-    written = write_cards(folder / "cards.glb", CardInputs(rig, settings), output)
+    written = write_cards(folder / file, CardInputs(rig, settings), output)
     view = {
         "eye": glb_axes(EYE),
         "target": glb_axes(TARGET),

@@ -43,6 +43,7 @@ MENU = {
         "docs/cards_export",
         "docs/card_textures",
         "docs/engines/README",
+        "docs/engines/unreal",
         "docs/strands_export",
     ),
     "Pipelines": ("docs/command-line", "docs/verbs", "docs/parameters", "docs/farm/README"),

@@ -7,7 +7,6 @@ with stubs of what they include. What Unity itself makes of both is not seen her
 from __future__ import annotations
 
 import json
-import re
 import shutil
 import subprocess
 from collections.abc import Callable
@@ -22,11 +21,10 @@ from extension_loader import REPOSITORY
 pytest.importorskip("bpy", reason="writing cards needs Blender or the bpy module")
 
 from engine_assets import OUTPUT, Asset, written_asset
+from hlsl_on_gpu import as_function, probed
 
 from hairloom.addon.cards.export_settings import CardExportSettings
 from hairloom.addon.exchange.cards.glb_file import GlbFile
-from hairloom.addon.shading.marschner.fibre import Fibre
-from hairloom.addon.shading.marschner.tables import marschner_tables
 
 HERE = Path(__file__).parent / "unity"
 PACKAGE = REPOSITORY / "docs" / "engines" / "unity"
@@ -354,61 +352,5 @@ vec4 result_of_probe;
 vec4 probe_both(vec2 at)
 {
   return probe(longitudinal, azimuthal, paths, at.x, int(at.y));
-}
-"""
-
-
-def as_function(text: str) -> str:
-    """A fragment program of SPIRV-Cross with plain variables, and the textures of ours."""
-    text = re.sub(r"#version.*", "", text)
-    text = re.sub(r"layout\(location = \d+\) in vec2 (\w+);", r"vec2 \1;\n#define at \1", text)
-    result = r"vec4 \1;\n#define result_of_probe \1"
-    text = re.sub(r"layout\(location = \d+\) out vec4 (\w+);", result, text)
-    sampler = (
-        r"(?:layout\(binding = \d+\) )?uniform sampler2D (\w*?(longitudinal|azimuthal|paths)\w*);"
-    )
-    text = re.sub(sampler, r"#define \1 \2", text)
-    return text.replace("void main()", "void main_of_hlsl()")
-
-
-def probed(file: Path, text: str, call: str) -> np.ndarray:
-    """Both models at 4,096 places, (64, 128, 4)."""
-    import gpu
-
-    from hairloom.addon.render.shader_program import ShaderRecipe, program
-    from hairloom.addon.render.shader_source import SHADER_FOLDER
-    from hairloom.addon.render.textures import texture_from, texture_to_array
-
-    file.write_text(text + PROBE_MAIN.replace("CALL", call), encoding="utf-8")
-    fibre = marschner_tables(Fibre(), 32)
-    tables = {
-        "longitudinal": fibre.longitudinal[0],
-        "azimuthal": fibre.azimuthal,
-        "paths": fibre.paths,
-    }
-    recipe = ShaderRecipe(
-        name=file.stem,
-        compute=file.name,
-        textures=tuple(("FLOAT_2D", name) for name in tables),
-        images=(("RGBA32F", "result"),),
-        folders=(file.parent, SHADER_FOLDER),
-    )
-    shader = program(recipe)
-    result = gpu.types.GPUTexture((128, 64), format="RGBA32F")
-    textures = {name: texture_from(table, "RGBA32F") for name, table in tables.items()}
-    shader.bind(textures=textures, images={"result": result})
-    gpu.compute.dispatch(shader.shader, 16, 8, 1)
-    pixels = texture_to_array(result)
-    gpu.shader.unbind()
-    return np.asarray(pixels)
-
-
-PROBE_MAIN = """
-void main()
-{
-  ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
-  vec2 place = vec2(float(pixel.x / 2 + 64 * pixel.y) * 0.05, float(pixel.x % 2));
-  CALL;
-  imageStore(result, pixel, result_of_probe);
 }
 """

@@ -3,9 +3,13 @@
 import hair_hlsl
 
 
-def test_the_file_is_what_the_code_makes() -> None:
-    made = hair_hlsl.hlsl(hair_hlsl.SOURCE.read_text(encoding="utf-8"))
-    assert hair_hlsl.TARGET.read_text(encoding="utf-8") == made, "run make docs"
+def test_the_files_are_what_the_code_makes() -> None:
+    source = hair_hlsl.SOURCE.read_text(encoding="utf-8")
+    for path, made in (
+        (hair_hlsl.TARGET, hair_hlsl.hlsl(source)),
+        (hair_hlsl.NODES, hair_hlsl.nodes(source)),
+    ):
+        assert path.read_text(encoding="utf-8") == made, "run make docs"
 
 
 def test_words_calls_and_vectors_of_one_number() -> None:

@@ -1,0 +1,452 @@
+"""The importer for Unreal, run where Unreal is not.
+
+Its script runs against a stub of the module `unreal` (unreal/unreal_stub.py), whose names are those
+of Epic's pages; the HLSL of its nodes goes through glslang and runs on the GPU beside the text that
+it was made from. What Unreal itself makes of both is not seen here.
+"""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import json
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import hair_hlsl
+import numpy as np
+import pytest
+from extension_loader import REPOSITORY
+
+pytest.importorskip("bpy", reason="writing cards needs Blender or the bpy module")
+
+from engine_assets import OUTPUT, Asset, written_asset
+from hlsl_on_gpu import as_function, probed
+
+from hairloom.addon.cards.export_settings import CardExportSettings
+
+HERE = Path(__file__).parent / "unreal"
+FOLDER = REPOSITORY / "docs" / "engines" / "unreal"
+MESH_VIEW = REPOSITORY / "tests" / "blender" / "mesh_view.py"
+PROBE = Path(__file__).parent / "unity" / "probe.glsl"
+LOOKS = {"kajiya_kay": "unreal", "marschner": "hairloom", "baked": "unreal_compact"}
+
+
+@pytest.fixture(scope="module", params=LOOKS)
+def asset(request: pytest.FixtureRequest, gpu_context: Any) -> Asset:
+    settings = CardExportSettings(packing=LOOKS[request.param])
+    return written_asset(f"unreal_{request.param}", request.param, settings, file="cards.fbx")
+
+
+@pytest.fixture(scope="module")
+def unreal() -> Iterator[ModuleType]:
+    """The stub under the name of the module."""
+    spec = importlib.util.spec_from_file_location("unreal", HERE / "unreal_stub.py")
+    assert spec is not None and spec.loader is not None
+    stub = importlib.util.module_from_spec(spec)
+    sys.modules["unreal"] = stub
+    spec.loader.exec_module(stub)
+    yield stub
+    del sys.modules["unreal"]
+
+
+@pytest.fixture(scope="module")
+def importer(unreal: ModuleType) -> Iterator[ModuleType]:
+    sys.path.insert(0, str(FOLDER))
+    unreal.levels_of.append(triangles_of)
+    yield importlib.import_module("hairloom_import")
+    sys.path.remove(str(FOLDER))
+
+
+@pytest.fixture(autouse=True)
+def _empty_project(unreal: ModuleType) -> None:
+    unreal.reset()
+
+
+def triangles_of(fbx: str) -> list[int]:
+    """Of each level of an FBX file, by ufbx."""
+    result = OUTPUT / "unreal_mesh.json"
+    command = [sys.executable, str(MESH_VIEW), fbx, str(result)]
+    if subprocess.run(command, capture_output=True, timeout=120).returncode:
+        return []
+    meshes = json.loads(result.read_text(encoding="utf-8"))["meshes"]
+    return [len(meshes[name]["sizes"]) for name in sorted(meshes)]
+
+
+def sidecar_of(folder: Path) -> dict[str, Any]:
+    (path,) = folder.glob("*.hairloom.json")
+    return dict(json.loads(path.read_text(encoding="utf-8")))
+
+
+def code_of(material: Any, about: str) -> str:
+    (node,) = (
+        each for each in material.values[""] if about in (each.values.get("description") or "")
+    )
+    return str(node.values["code"])
+
+
+def attributes_of(material: Any) -> dict[str, Any]:
+    """Pin of the material -> the node that goes there."""
+    (node,) = (each for each in material.values[""] if "the material" in each.inputs)
+    return {pin: source for pin, (source, _) in node.inputs.items() if pin != "the material"}
+
+
+def test_all_of_an_export_comes_into_the_project(
+    importer: ModuleType, unreal: ModuleType, asset: Asset
+) -> None:
+    assert importer.main([str(asset.folder / "cards.fbx"), "/Game/Hair/"]) == 0
+    assert [kind for kind, _ in unreal.log_lines] == ["log"]
+    sidecar = sidecar_of(asset.folder)
+    pictures = {f"/Game/Hair/T_{Path(file).stem}" for file in sidecar["texture_files"]}
+    assert set(unreal.assets) == pictures | {"/Game/Hair/M_cards", "/Game/Hair/SM_cards"}
+    assert set(unreal.saved) == set(unreal.assets)
+    for file, entry in sidecar["texture_files"].items():
+        texture = unreal.assets[f"/Game/Hair/T_{Path(file).stem}"]
+        assert texture.values["srgb"] == (entry["color_space"] == "sRGB")
+    again = dict(unreal.assets)
+    assert importer.main([str(asset.folder / "cards.fbx"), "/Game/Hair"]) == 0
+    assert set(unreal.assets) == set(again)
+
+
+def test_triangles_stay_in_their_order_and_levels_where_the_file_says(
+    importer: ModuleType, unreal: ModuleType, asset: Asset
+) -> None:
+    """The switch is set while Unreal builds the mesh, and is put back."""
+    importer.main([str(asset.folder / "cards.fbx"), "/Game/Hair"])
+    mesh, sidecar = unreal.assets["/Game/Hair/SM_cards"], sidecar_of(asset.folder)
+    assert mesh.order == 2 and unreal.console_variables["r.TriangleOrderOptimization"] == 1
+    assert mesh.triangles == [level["triangles"] for level in sidecar["levels"]]
+    assert all(build["remove_degenerates"] is False for build in mesh.build.values())
+    # at that size on a screen of 1,080 lines the level is off by one pixel
+    for size, level in list(zip(mesh.screen_sizes, sidecar["levels"], strict=True))[1:]:
+        visible = 2.0 * unreal.BoxSphereBounds.sphere_radius / size
+        assert level["error"] / visible * 1080.0 <= 1.0 + 1e-6
+    assert mesh.screen_sizes == sorted(mesh.screen_sizes, reverse=True)
+    assert len(set(mesh.screen_sizes[1:])) > 1 or len(sidecar["levels"]) < 3
+
+
+def test_the_material_is_hair_of_unreal(
+    importer: ModuleType, unreal: ModuleType, asset: Asset
+) -> None:
+    importer.main([str(asset.folder / "cards.fbx"), "/Game/Hair"])
+    material, sidecar = unreal.assets["/Game/Hair/M_cards"], sidecar_of(asset.folder)
+    assert material.values["shading_model"] == "MaterialShadingModel.MSM_HAIR"
+    assert material.values["blend_mode"] == "BlendMode.BLEND_MASKED"
+    pins = attributes_of(material)
+    assert set(pins) == {
+        "BaseColor",
+        "Metallic",
+        "Specular",
+        "Roughness",
+        "ClearCoat",
+        "AmbientOcclusion",
+        "Normal",
+        "OpacityMask",
+    }
+    names = {pin: node.values.get("parameter_name") for pin, node in pins.items()}
+    assert (names["Metallic"], names["ClearCoat"]) == ("Scatter", "Backlit")
+    values = sidecar["material"]["values"]
+    tint = next(
+        node for node in material.values[""] if node.values.get("parameter_name") == "TipTint"
+    )
+    assert tint.values["default_value"] == values["tip_tint"]
+    role = sidecar["textures"]["highlights_by"]
+    source, _ = pins["Normal"].inputs["Texel"]
+    file = Path(sidecar["textures"][role]["file"]).stem
+    assert source.values["texture"].path == f"/Game/Hair/T_{file}"
+    has_slant = "hair_view_compensated_alpha(Alpha" in code_of(material, "coverage")
+    assert has_slant == ("view_compensated_alpha" in sidecar["textures"])
+
+
+def test_a_highlight_is_as_wide_as_ours() -> None:
+    """Of Unreal's: exp(-(theta_i + theta_r)^2 / 2 roughness^4); theta_h is half of that sum."""
+    plan = importlib.import_module("hairloom_plan")
+    width = 0.1
+    marschner = {"model": "marschner", "values": {"width_r": width}}
+    assert plan.roughness(marschner) ** 2 / 2.0 == pytest.approx(width)
+    theta = np.linspace(-0.3, 0.3, 61)
+    ours = np.cos(theta) ** 90.0
+    found = plan.roughness({"model": "kajiya_kay", "values": {"primary_exponent": 90.0}})
+    np.testing.assert_allclose(np.exp(-0.5 * (2.0 * theta) ** 2 / found**4), ours, atol=0.01)
+
+
+def test_a_groom_gets_strands_cards_and_its_head(
+    importer: ModuleType, unreal: ModuleType, asset: Asset, tmp_path: Path
+) -> None:
+    groom = tmp_path / "Zöpfe.abc"
+    groom.write_bytes(b"")
+    head = unreal._put(unreal.SkeletalMesh(), "/Game/Head/SK_Head")
+    command = [str(asset.folder / "cards.fbx"), "/Game/Hair", "--groom", str(groom)]
+    command += ["--skeletal-mesh", head.path, "--simulate"]
+    assert importer.main(command) == 0
+    made = unreal.assets["/Game/Hair/G_Zopfe"]
+    for number, levels in enumerate(made.values["hair_groups_lod"]):
+        near, far = levels.values["lo_ds"]
+        assert near.values["geometry_type"] == "GroomGeometryType.STRANDS"
+        assert far.values["geometry_type"] == "GroomGeometryType.CARDS"
+        assert 0.0 < far.values["screen_size"] < near.values["screen_size"]
+        assert far.values["visible"] == (number == 0)
+    (cards,) = made.values["hair_groups_cards"]
+    assert cards.values["imported_mesh"] is unreal.assets["/Game/Hair/SM_cards"]
+    textures = cards.values["textures"].values.get("textures", [])
+    is_packed = "_Depth" in "".join(sidecar_of(asset.folder)["texture_files"])
+    slots = ["Depth", "Coverage", "Tangent", "Attributes", "Material", "Auxiliary"]
+    wanted = [f"/Game/Hair/T_cards_{slot}" for slot in slots]
+    assert [each.path for each in textures] == (wanted if is_packed else [])
+    warnings = [text for kind, text in unreal.log_lines if kind == "warning"]
+    assert len(warnings) == (0 if is_packed else 1)
+    solver = made.values["hair_groups_physics"][1].get_editor_property("solver_settings")
+    assert solver.values["enable_simulation"] is True
+    binding = unreal.assets["/Game/Hair/G_Zopfe_Binding"]
+    assert binding.values == {"groom": made, "target_skeletal_mesh": head}
+    strands = made.values["hair_groups_materials"][0].values["material"]
+    assert "OpacityMask" not in attributes_of(strands)
+    assert "/Game/Hair/M_cards_Strands" in unreal.saved
+
+
+# Bad input
+
+
+def _copied(asset: Asset, name: str = "unreal_damaged") -> Path:
+    folder = OUTPUT / name
+    shutil.rmtree(folder, ignore_errors=True)
+    shutil.copytree(asset.folder, folder)
+    return folder
+
+
+def _changed(folder: Path, change: Callable[[dict[str, Any]], None]) -> None:
+    (path,) = folder.glob("*.hairloom.json")
+    content = sidecar_of(folder)
+    change(content)
+    path.write_text(json.dumps(content), encoding="utf-8")
+
+
+def _without_sidecar(folder: Path) -> None:
+    (folder / "cards.hairloom.json").unlink()
+
+
+def _garbage(folder: Path) -> None:
+    (folder / "cards.hairloom.json").write_text("{no", encoding="utf-8")
+
+
+def _newer(folder: Path) -> None:
+    _changed(folder, lambda content: content.update(hairloom_sidecar=99))
+
+
+def _elsewhere(folder: Path) -> None:
+    _changed(folder, lambda content: content["textures"]["base"].update(file="../../secret.png"))
+
+
+def _half(folder: Path) -> None:
+    _changed(folder, lambda content: content.pop("textures"))
+
+
+def _cut_off(folder: Path) -> None:
+    (folder / "cards.fbx").write_bytes(b"Kaydara FBX Binary")
+
+
+@pytest.mark.parametrize(
+    ("damage", "message"),
+    [
+        (_without_sidecar, "missing"),
+        (_garbage, "cannot be read"),
+        (_newer, "newer"),
+        (_elsewhere, "lies elsewhere"),
+        (_half, "damaged"),
+        (_cut_off, "cannot import"),
+    ],
+)
+def test_what_cannot_be_read_is_named_in_one_sentence(
+    importer: ModuleType,
+    unreal: ModuleType,
+    asset: Asset,
+    damage: Callable[[Path], None],
+    message: str,
+) -> None:
+    folder = _copied(asset)
+    damage(folder)
+    assert importer.main([str(folder / "cards.fbx"), "/Game/Hair"]) == 1
+    ((kind, text),) = unreal.log_lines
+    assert kind == "error" and message in text and "; " in text
+
+
+def test_what_can_be_shown_is_shown(importer: ModuleType, unreal: ModuleType, asset: Asset) -> None:
+    """Files of another name with letters that content folders do not take, and without alpha."""
+    folder = _copied(asset)
+    alpha = sidecar_of(folder)["textures"]["alpha"]["file"]
+    (folder / alpha).unlink()
+    for each in ("cards.fbx", "cards.hairloom.json"):
+        (folder / each).rename(folder / each.replace("cards", "Zöpfe 头发"))
+    assert importer.main([str(folder / "Zöpfe 头发.fbx"), "/Game/Hair"]) == 0
+    warnings = [text for kind, text in unreal.log_lines if kind == "warning"]
+    assert len(warnings) == 2
+    assert "names cards.fbx" in warnings[0] and alpha in warnings[1]
+    assert "OpacityMask" not in attributes_of(unreal.assets["/Game/Hair/M_Zopfe"])
+    assert "/Game/Hair/SM_Zopfe" in unreal.saved
+
+
+def test_a_mesh_that_another_program_reduced_is_named(
+    importer: ModuleType, unreal: ModuleType, asset: Asset
+) -> None:
+    folder = _copied(asset)
+    _changed(folder, lambda content: content["levels"][0].update(triangles=7))
+    assert importer.main([str(folder / "cards.fbx"), "/Game/Hair"]) == 0
+    (warning,) = (text for kind, text in unreal.log_lines if kind == "warning")
+    assert "another program has changed" in warning and " 7, " in warning
+
+
+def test_a_project_that_cannot_be_written_is_named(
+    importer: ModuleType, unreal: ModuleType, asset: Asset
+) -> None:
+    unreal.can_save = False
+    assert importer.main([str(asset.folder / "cards.fbx"), "/Game/Hair"]) == 1
+    ((kind, text),) = unreal.log_lines
+    assert kind == "error" and "cannot be saved" in text and "free space" in text
+
+
+def test_names_stay_apart_and_plain(importer: ModuleType) -> None:
+    plan = importlib.import_module("hairloom_plan")
+    assert plan.asset_name("Haar/Ä.001") == "Haar_A_001"
+    first, second = plan.asset_name("头发"), plan.asset_name("髪型")
+    assert first != second and first.isascii() and first.startswith("Hair_")
+
+
+# The shading
+
+
+def test_the_nodes_shade_as_the_other_engines_do(
+    importer: ModuleType,
+    unreal: ModuleType,
+    sandbox: str,
+    asset: Asset,
+    tmp_path: Path,
+) -> None:
+    """Bodies of the Custom nodes by glslang and SPIRV-Cross, beside the GLSL, both on the GPU."""
+    importer.main([str(asset.folder / "cards.fbx"), "/Game/Hair"])
+    material, sidecar = unreal.assets["/Game/Hair/M_cards"], sidecar_of(asset.folder)
+    hlsl, program = OUTPUT / "unreal_probe.hlsl", OUTPUT / "unreal_probe.spv"
+    probe = PROBE.read_text(encoding="utf-8")
+    waves = probe[: probe.index("vec4 probe(")]
+    shading = hair_hlsl.SOURCE.read_text(encoding="utf-8")
+    # glslang takes functions inside of functions for recursion: the struct stands before them
+    struct = hair_hlsl.nodes(shading)
+    struct = struct.replace("HairloomShading shading", "static HairloomShading shading")
+    others = hair_hlsl.hlsl(shading + waves)
+    others = others[others.index("float probe_wave") :].removesuffix(hair_hlsl.ENDING)
+    others = others.replace("hair_unit", "shading.hair_unit")
+    hlsl.write_text(struct + others + nodes_of(material), encoding="utf-8")
+    compile_it = ["glslangValidator", "-D", "-V", "-S", "frag", "-e", "main", "-o", str(program)]
+    compile_it += ["--auto-map-bindings", "--auto-map-locations", str(hlsl)]
+    for command in (compile_it, ["spirv-cross", "--version", "430", str(program)]):
+        done = subprocess.run([sandbox, "run", *command], capture_output=True, text=True)
+        assert done.returncode == 0, done.stdout + done.stderr
+    found = probed(tmp_path / "hlsl.glsl", as_function(done.stdout), "at = place; main_of_hlsl()")
+    glsl = shading + waves + expected_glsl(sidecar)
+    expected = probed(tmp_path / "glsl.glsl", glsl, "result_of_probe = probe_both(place)")
+    assert np.isfinite(expected).all()
+    assert (expected.std(axis=(0, 1)) > 0.01).sum() >= 3
+    np.testing.assert_allclose(found, expected, atol=2e-5, rtol=2e-4)
+
+
+#: what a pin gets where its value differs from pixel to pixel, in HLSL and in GLSL
+WAVES = {
+    "Base": "probe_vector(x, 1.0)",
+    "Card": "probe_vector(x, 4.0).xy",
+    "Position": "probe_direction(x, 11.0)",
+    "Normal": "probe_direction(x, 14.0)",
+    "Tangent": "probe_direction(x, 17.0)",
+    "ToEye": "probe_direction(x, 20.0)",
+    "Alpha": "probe_wave(x, 23.0)",
+}
+DIRECTION, SHIFT = "probe_vector(x, 7.0)", "probe_wave(x, 7.0)"
+
+
+def nodes_of(material: Any) -> str:
+    """The Custom nodes as functions of their pins, as Unreal writes them, and a program that calls
+    them: the colour where y is 0, else the direction, and the coverage."""
+    functions, calls = [], {}
+    for pin, node in attributes_of(material).items():
+        if pin not in ("BaseColor", "Normal", "OpacityMask"):
+            continue
+        values = {name: value_of(name, *node.inputs[name]) for name in pins_of(node)}
+        kinds = ", ".join(f"{kind} {name}" for name, (kind, _) in values.items())
+        size = node.values["output_type"][-1].replace("1", "")
+        # no derivative is the same in a program that runs over an array
+        code = node.values["code"].replace("cross(ddx(Position), ddy(Position))", "Position")
+        struct = hair_hlsl.NODES.read_text(encoding="utf-8")
+        assert code.startswith(struct)
+        code = code.removeprefix(struct)
+        functions.append(f"float{size} node_{pin}({kinds})\n{{\n{code}}}\n")
+        calls[pin] = f"node_{pin}({', '.join(value for _, value in values.values())})"
+    return "\n".join(functions) + (
+        "\nfloat4 main(float2 at : TEXCOORD0) : SV_Target\n{\n  float x = at.x;\n"
+        f"  float3 color = {calls['BaseColor']};\n  float3 way = {calls['Normal']};\n"
+        f"  return float4(at.y > 0.5 ? way : color, {calls['OpacityMask']});\n}}\n"
+    )
+
+
+def pins_of(node: Any) -> list[str]:
+    return [each.values["input_name"] for each in node.values["inputs"]]
+
+
+def value_of(name: str, source: Any, output: str) -> tuple[str, str]:
+    """Kind and value of what a pin gets: a parameter's own, or waves."""
+    value = source.values.get("default_value")
+    if isinstance(value, float | int):
+        return "float", f"{value:.9g}"
+    if value is not None:
+        return "float3", f"float3({value.r:.9g}, {value.g:.9g}, {value.b:.9g})"
+    if name == "Texel":
+        return ("float3", DIRECTION) if output == "RGB" else ("float", SHIFT)
+    kind = {"Card": "float2", "Alpha": "float"}.get(name, "float3")
+    return kind, WAVES[name]
+
+
+def expected_glsl(sidecar: dict[str, Any]) -> str:
+    """The same by the shared shading, from the sidecar."""
+    material, textures = sidecar["material"], sidecar["textures"]
+    values = material["values"]
+    names = ["tip_tint", "tint_start", "tint_end", "grey_fraction", "base_color", "tip_color"]
+    lines = [f"  hair.{name} = {glsl_of(values[name])};" for name in names]
+    if material["model"] == "marschner":
+        lines += [
+            f"  hair.fibre_{end} = {glsl_of(material['fibre'][end])};" for end in ("root", "tip")
+        ]
+    noise = glsl_of(values["shift_noise"])
+    up, out = "vec3(0.0, 1.0, 0.0)", "vec3(0.0, 0.0, 1.0)"
+    if textures["highlights_by"] == "tangent":
+        is_down = "g" in textures["tangent"].get("inverted", "")
+        texel = f"mix({DIRECTION}, 1.0 - {DIRECTION}, vec3(0.0, {float(is_down)}, 0.0))"
+        strand = f"hair_tangent({texel}, {up}, {out}, {noise})"
+    else:
+        strand = f"hair_shifted({up}, {out}, {noise} * ({SHIFT} - 0.5))"
+    facing = textures.get("view_compensated_alpha")
+    alpha = WAVES["Alpha"]
+    if facing:
+        range_of_facing = glsl_of([facing["mean_facing"], facing["min_facing"]])
+        along = f"normalize(cross({WAVES['Normal']}, {WAVES['Tangent']}))"
+        alpha = (
+            f"hair_view_compensated_alpha({alpha}, {WAVES['Position']}, {along}, {WAVES['ToEye']}, "
+            f"{range_of_facing})"
+        )
+    gain = glsl_of(textures["base"]["gain"])
+    return (
+        "vec4 result_of_probe;\n\nvec4 probe_both(vec2 place)\n{\n  float x = place.x;\n"
+        f"  HairMaterial hair;\n  hair.model = {int(material['model'] == 'marschner')};\n"
+        + "\n".join(lines)
+        + f"\n  vec3 strand = {strand};\n"
+        f"  vec3 color = hair_color(hair, 1.0 - {WAVES['Card']}.y, {gain} * {WAVES['Base']});\n"
+        "  vec3 way = vec3(-strand.x, strand.y, -strand.z);\n"
+        f"  return vec4(place.y > 0.5 ? way : color, {alpha});\n}}\n"
+    )
+
+
+def glsl_of(value: Any) -> str:
+    if isinstance(value, list):
+        return f"vec{len(value)}({', '.join(f'{each:.9g}' for each in value)})"
+    return f"float({value:.9g})"
