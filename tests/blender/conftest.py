@@ -12,7 +12,30 @@ from engine_stage import SIZE, set_world  # noqa: E402
 
 import hairloom  # noqa: E402  it is loaded by tests/conftest.py
 from hairloom.addon import registration  # noqa: E402
+from hairloom.addon.dynamics.colliders import DistanceField  # noqa: E402
 from hairloom.addon.strands import StrandSet  # noqa: E402
+
+
+@pytest.fixture(autouse=True, scope="session")
+def same_fields() -> Iterator[Any]:
+    """The distance field of a mesh is made once for all tests: it takes seconds, most tests have
+    the same head, and those in tests/pure show what a field is. It gives what makes one."""
+    made: dict[tuple[Any, ...], DistanceField] = {}
+    make = DistanceField.from_surface
+
+    def found(surface: Any, settings: Any, **place: str) -> DistanceField:
+        corner = surface.positions[surface.triangles].astype(np.float64)
+        volume = np.linalg.det(corner).sum() / 6.0
+        # Blender cuts even quads along this diagonal or that, from one mesh to the next
+        shape = surface.positions.tobytes(), len(corner), round(volume, 9)
+        key = (*shape, settings.collider_resolution)
+        if key not in made:
+            made[key] = make(surface, settings, **place)
+        return made[key]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(DistanceField, "from_surface", found)
+        yield make
 
 
 @pytest.fixture(autouse=True)

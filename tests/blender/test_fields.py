@@ -23,7 +23,8 @@ FRAME = 1.0 / 60.0
 
 
 @pytest.fixture(autouse=True)
-def no_fields():
+def no_fields(same_fields, monkeypatch):
+    monkeypatch.setattr(DistanceField, "from_surface", same_fields)
     fields.forget()
     yield
     fields.forget()
