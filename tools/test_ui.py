@@ -45,9 +45,20 @@ COMMIT_TESTS = {
 TESTS_LIMIT_S = 3600
 SESSION_LIMIT_S = float(os.environ.get("HAIRLOOM_SESSION_LIMIT", "1800"))
 #: For a commit each session plays on one backend: these on Vulkan, for they look at what is drawn.
-ON_VULKAN = ("cards", "engine", "look", "shadows", "first_light", "random", "still_views")
-#: One makes pictures of the documentation, one waits for minutes: they are played where all is.
-NOT_IN_COMMITS = ("guide_pictures", "autosave")
+ON_VULKAN = ("cards", "engine", "look", "shadows", "random", "still_views")
+#: What is played where all is. One makes pictures of the documentation, one waits for minutes, and
+#: five draw for minutes what shorter ones look at too: light and shadows `engine` and `shadows`,
+#: what cuts Play short `random` and `everyday`, work that is cancelled `long_work`, and the hair
+#: that is drawn from near and far `layers`.
+NOT_IN_COMMITS = (
+    "guide_pictures",
+    "autosave",
+    "body_shadow",
+    "first_light",
+    "jobs",
+    "midplay",
+    "refinement",
+)
 #: Most of a session's time goes into drawing the window. Some need another screen than the usual
 #: one: long panels are pictured uncut, Blender's own texts and gizmos must be a small part of what
 #: is compared, and random actions need not look closely.

@@ -23,9 +23,10 @@ from ..strands.resample import resample
 _AROUND = 16
 #: how far above the hair the eye may be, as z of a direction of unit length across; and how good
 #: it is to look from there
-_HEIGHTS = ((0.16, 1.0), (0.7, 0.8), (1.7, 0.6))
-#: one looks at a head from its own height, if this much of its face is seen from there
-_LEVEL_FACE = 0.5
+_HEIGHTS = ((0.16, 1.0), (0.4, 0.92), (0.7, 0.8), (1.7, 0.6))
+#: one looks at a head from no higher than so many of these, if this much of its face is seen from
+#: its own height
+_LOW_HEIGHTS, _LEVEL_FACE = 2, 0.5
 #: a three-quarter view is turned by this from the front [rad]
 _THREE_QUARTER = float(np.radians(29.0))
 #: what counts where no face is seen, as a fraction of the whole face
@@ -92,7 +93,8 @@ def good_side(strands: StrandSet, body: Surface | None) -> GoodSide:
     ]
     asked = np.array([seen.areas(direction) for direction, _ in candidates])
     if is_face and asked[:2, 1].max() > _LEVEL_FACE * whole[1]:
-        candidates, asked = candidates[:2], asked[:2]
+        low = 2 * _LOW_HEIGHTS  # two directions of each height
+        candidates, asked = candidates[:low], asked[:low]
     factors = np.array([factor for _, factor in candidates])
     best = (_goodness(asked, np.maximum(whole, asked.max(axis=0))) * factors).argmax()
     return GoodSide(front, candidates[best][0])
