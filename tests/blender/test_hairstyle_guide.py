@@ -63,6 +63,7 @@ def test_the_bob_is_alike_on_both_sides_and_ends_at_the_chin():
     assert tips[:, 2].min() > -0.075 - 1e-6
 
 
+@pytest.mark.slow
 def test_the_crop_is_swept_to_one_side():
     walk = Walk("swept")
     gone = []
@@ -77,6 +78,7 @@ def test_the_crop_is_swept_to_one_side():
     assert walk.hair.data.hairloom.children.fly_aways == pytest.approx(0.06)
 
 
+@pytest.mark.slow
 def test_ringlets_wind_and_end_on_the_ball():
     walk = Walk("ringlets")
     walk.step()

@@ -8,7 +8,8 @@ from flat_ground import guides_at, settings, sheet
 
 from hairloom.addon import pipeline
 from hairloom.addon.arrays import Floats
-from hairloom.addon.groom.children import CHILD_POINTS, make_children
+from hairloom.addon.groom import children
+from hairloom.addon.groom.children import make_children
 from hairloom.addon.groom.children_settings import ChildrenSettings
 from hairloom.addon.groom.settings import GuideSettings
 from hairloom.addon.params.curve import along
@@ -87,12 +88,13 @@ def test_a_clump_winds_as_one_and_clumps_each_their_own_way() -> None:
     assert np.diff(angle).max() < 2.0  # all around
 
 
-def test_curls_that_have_no_room_say_so_and_are_finite() -> None:
+def test_curls_that_have_no_room_say_so_and_are_finite(monkeypatch: pytest.MonkeyPatch) -> None:
     wanted = settings(curl=0.02, curl_length=0.005, strand_count=100)
     made = make_children(standing(), SURFACE, wanted, place="test")
     assert made.strands.grid.shape[1] == 512
     assert any("Curls need 4,801 points a child and have 512" in each for each in made.notes)
-    many = settings(curl=0.02, curl_length=0.1, strand_count=CHILD_POINTS // 50)
+    monkeypatch.setattr(children, "CHILD_POINTS", 10_000)
+    many = settings(curl=0.02, curl_length=0.1, strand_count=10_000 // 50)
     count = make_children(standing(), SURFACE, many, place="test").growth.cv_count
     assert count == 50
 
