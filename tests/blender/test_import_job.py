@@ -127,7 +127,6 @@ def test_guides_can_be_apart_on_a_head_of_the_scene(tmp_path: Path, sphere: Any)
         ("Nobody", "Nobody: this does not name a mesh"),
         ("Camera", "Camera: this does not name a mesh"),
         ("none.obj", "none.obj: there is no such file"),
-        ("two.obj", "it holds 2 meshes"),
     ],
 )
 def test_a_head_that_is_none_is_named(
@@ -136,8 +135,6 @@ def test_a_head_that_is_none_is_named(
     bpy.context.collection.objects.link(
         bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
     )
-    triangle = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf -3 -2 -1\n"
-    (tmp_path / "two.obj").write_text(f"o one\n{triangle}o two\n{triangle}")
     write_groom_alembic(tmp_path / "hair.abc", hairdo())
     name = str(tmp_path / head) if "." in head else head
     output = tmp_path / "scene.blend"
@@ -145,6 +142,32 @@ def test_a_head_that_is_none_is_named(
     assert command_line.run(arguments) == 1
     assert problem in capfd.readouterr().err
     assert not output.exists()
+
+
+def test_a_head_of_several_meshes_is_one(tmp_path: Path) -> None:
+    """With an eye in front of it, whose UV map has another name; each vertex stays where it was."""
+    corners = {"head": ((0.0, 0.0, 0.1), 0.2), "eye": ((0.0, -0.1, 0.15), 0.02)}
+    for name, (place, size) in corners.items():
+        bpy.ops.mesh.primitive_cube_add(size=size, location=place)
+        bpy.context.object.name = name
+        bpy.context.object.data.uv_layers[0].name = f"UV of {name}"
+    head, report = tmp_path / "head.glb", tmp_path / "report.json"
+    bpy.ops.export_scene.gltf(filepath=str(head))
+    for name in corners:
+        bpy.data.objects.remove(bpy.data.objects[name])
+    write_groom_alembic(tmp_path / "hair.abc", hairdo())
+    scene = tmp_path / "scene.blend"
+    arguments = ["import", str(tmp_path / "hair.abc"), "--head", str(head)]
+    arguments += ["--output", str(scene), "--report", str(report)]
+    assert command_line.run(arguments) == 0
+    told = json.loads(report.read_text())
+    assert f"head.glb: its 2 meshes (eye, head) are one, {told['head']}" in told["notes"]
+    (hair,) = grooms_of(scene).values()
+    joined = hair.data.surface
+    assert joined.name == told["head"] and len(joined.data.uv_layers) == 1
+    y, z = np.array([(joined.matrix_world @ each.co)[1:] for each in joined.data.vertices]).T
+    assert (y.min(), y.max()) == pytest.approx((-0.11, 0.1), abs=1e-6)
+    assert (z.min(), z.max()) == pytest.approx((0.0, 0.2), abs=1e-6)
 
 
 def test_one_bad_file_keeps_the_scene_from_being_written(

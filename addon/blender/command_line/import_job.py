@@ -23,9 +23,8 @@ def import_grooms(job: Job) -> None:
     """Import grooms of files into a scene: hair curves, bound to a head if one is named."""
     options, report = job.options, job.report
     choices = StrandImport(options.groom_up, options.groom_scale, options.guides)
-    ground = _ground(options.head, options.head_scale)
-    if ground is not None:
-        tell_notes(list(ground.notes), report)
+    ground, notes = _ground(options.head, options.head_scale)
+    tell_notes([*notes, *(ground.notes if ground else ())], report)
     objects: list[dict[str, Any]] = []
     for path in options.files:
         with report.stage("import"):
@@ -49,22 +48,23 @@ def import_grooms(job: Job) -> None:
     report.facts.update(head=ground and ground.head.name, objects=objects)
 
 
-def _ground(head: str | None, scale: float) -> Ground | None:
-    """The mesh of the scene, or of a file, that hair is bound to."""
+def _ground(head: str | None, scale: float) -> tuple[Ground | None, tuple[str, ...]]:
+    """The mesh of the scene, or of a file, that hair is bound to, and what is to be said of it."""
+    notes: tuple[str, ...] = ()
     if head is None:
         if scale != 1.0:
             raise HairloomError(
                 "there is no head to scale", place="--head-scale", remedy="Name it with --head"
             )
-        return None
+        return None, notes
     if head in bpy.context.view_layer.objects or not Path(head).suffix:
         (mesh,) = named_objects([head], lambda obj: bool(obj.type == "MESH"), "a mesh")
     else:
-        mesh = import_mesh_file(Path(head), scale)
+        mesh, notes = import_mesh_file(Path(head), scale)
         scale = 1.0
     if scale != 1.0:
         scale_object(mesh, scale)
-    return read_ground(mesh, bpy.context.evaluated_depsgraph_get())
+    return read_ground(mesh, bpy.context.evaluated_depsgraph_get()), notes
 
 
 def _add_options(parser: argparse.ArgumentParser) -> None:
@@ -73,7 +73,9 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         "files", nargs="+", type=Path, metavar="FILE", help="grooms: " + ", ".join(SUFFIXES)
     )
     what.add_argument(
-        "--head", help="mesh that the hair is bound to: of the scene, or a file such as head.obj"
+        "--head",
+        help="mesh that the hair is bound to: of the scene, or a file such as head.obj, whose "
+        "meshes become one",
     )
     what.add_argument(
         "--groom-up", choices=("Y", "Z"), help="up in the files (default: as they say)"

@@ -59,22 +59,36 @@ def meshes_of_file(path: Path) -> Iterator[list[bpy.types.Object]]:
         bpy.data.batch_remove(_data_blocks() - before)
 
 
-def import_mesh_file(path: Path, scale: float = 1.0) -> bpy.types.Object:
-    """The only mesh of a file, added to the open scene; its place and size are scaled.
+def import_mesh_file(path: Path, scale: float = 1.0) -> tuple[bpy.types.Object, tuple[str, ...]]:
+    """The mesh of a file, added to the open scene, and what is to be said of it; its place and size
+    are scaled. Several meshes, as of a head with its eyes, are joined to one.
 
     Raises:
-        HairloomError: no such file, a format that Blender does not read, or not one mesh.
+        HairloomError: no such file, or a format that Blender does not read.
     """
     meshes = _imported(path)
-    if len(meshes) == 1:
-        if scale != 1.0:
-            scale_object(meshes[0], scale)
-        return meshes[0]
-    raise HairloomError(
-        f"it holds {len(meshes)} meshes, and hair grows on one",
-        place=str(path),
-        remedy="Join them, or open a scene with them and name one",
-    )
+    names = [each.name for each in meshes]
+    mesh = max(meshes, key=lambda each: len(each.data.vertices))
+    notes: tuple[str, ...] = ()
+    if len(meshes) > 1:
+        _join(mesh, meshes)
+        notes = (f"{path.name}: its {len(names)} meshes ({', '.join(names)}) are one, {mesh.name}",)
+    if scale != 1.0:
+        scale_object(mesh, scale)
+    return mesh, notes
+
+
+def _join(target: bpy.types.Object, meshes: list[bpy.types.Object]) -> None:
+    """All meshes into the target, with one UV map: that which each of them shows."""
+    for each in meshes:
+        if each.data.users > 1:  # of linked duplicates each becomes a part
+            each.data = each.data.copy()
+        if each.data.uv_layers.active is not None:
+            each.data.uv_layers.active.name = "UVMap"
+    with bpy.context.temp_override(
+        active_object=target, object=target, selected_editable_objects=meshes
+    ):
+        bpy.ops.object.join()
 
 
 def scale_object(obj: bpy.types.Object, scale: float) -> None:
