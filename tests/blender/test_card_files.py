@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 import tempfile
+import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -76,6 +77,7 @@ def test_the_index_buffer_holds_the_indices_of_the_glb(tmp_path: Path) -> None:
         expected = glb.accessor(primitive["indices"]).ravel()
         found = indices[level["buffer_first"] :][: level["indices"]]
         np.testing.assert_array_equal(found, expected)
+        assert level["indices_adler32"] == zlib.adler32(expected.astype("<u4").tobytes())
         back = indices[level["buffer_back_first"] :][: level["indices"]]
         corners = {tuple(triangle) for triangle in found.reshape(-1, 3).tolist()}
         assert {tuple(triangle) for triangle in back.reshape(-1, 3).tolist()} == corners

@@ -20,6 +20,16 @@ from extension_loader import REPOSITORY
 
 pytest.importorskip("bpy", reason="writing cards needs Blender or the bpy module")
 
+from damaged_assets import (
+    DAMAGES,
+    damaged,
+    other_levels,
+    renamed,
+    reordered,
+    without_index_buffer,
+    without_textures,
+    without_unused,
+)
 from engine_assets import OUTPUT, Asset, written_asset
 from hlsl_on_gpu import as_function, probed
 
@@ -221,26 +231,9 @@ def _without_sidecar(folder: Path) -> None:
     next(folder.glob("*.hairloom.json")).unlink()
 
 
-def _of_another(folder: Path) -> None:
-    glb_of(folder).rename(folder / "other.glb")
-    sidecar = next(folder.glob("*.hairloom.json"))
-    sidecar.rename(folder / "other.hairloom.json")
-
-
 def _cut_off(folder: Path) -> None:
     glb = glb_of(folder)
     glb.write_bytes(glb.read_bytes()[:5000])
-
-
-def _half_the_triangles(folder: Path) -> None:
-    glb = glb_of(folder)
-    content = glb.read_bytes()
-    size = int.from_bytes(content[12:16], "little")
-    document = json.loads(content[20 : 20 + size])
-    indices = document["accessors"][document["meshes"][0]["primitives"][0]["indices"]]
-    indices["count"] //= 2
-    text = json.dumps(document, separators=(",", ":")).encode()
-    glb.write_bytes(content[:20] + text.ljust(size) + content[20 + size :])
 
 
 def _quantised(folder: Path) -> None:
@@ -268,9 +261,8 @@ def _elsewhere(folder: Path) -> None:
     ("damage", "message"),
     [
         (_without_sidecar, "missing"),
-        (_of_another, "belongs to"),
+        (other_levels, "which its sidecar names"),
         (_cut_off, "cut off"),
-        (_half_the_triangles, "another program has changed it"),
         (_quantised, "compressed"),
         (_garbage, "no JSON"),
         (_newer, "update this package"),
@@ -291,17 +283,23 @@ def test_what_cannot_be_read_is_named(
     assert len(found["errors"]) == 1 and message in found["errors"][0], found["errors"]
 
 
-def test_a_missing_texture_is_named_and_the_rest_is_shown(
-    imported: Callable[..., dict[str, Any]], asset: Asset
+@pytest.mark.parametrize(
+    "damage", [renamed, without_textures, without_index_buffer, reordered, without_unused]
+)
+def test_what_can_be_shown_is_shown(
+    imported: Callable[..., dict[str, Any]], asset: Asset, damage: Callable[[Path], None]
 ) -> None:
-    folder = OUTPUT / "unity_damaged"
-    shutil.rmtree(folder, ignore_errors=True)
-    shutil.copytree(asset.folder, folder)
-    missing = sidecar_of(folder)["textures"]["alpha"]["file"]
-    (folder / missing).unlink()
+    folder = damaged(asset.folder, OUTPUT / "unity_damaged", damage)
     found = imported(glb_of(folder))
-    assert not found["errors"] and len(found["meshes"]) > 1
-    assert found["warnings"] and all(missing in each for each in found["warnings"])
+    assert not found["errors"] and len(found["meshes"]) == 3
+    assert found["warnings"] and all(DAMAGES[damage] in each for each in found["warnings"])
+    values = found["materials"][0]["values"]
+    assert (values["_has_tangent_map"], values["_base_gain"] == 1.0) == (
+        (0, True) if damage is without_textures else (1, values["_base_gain"] == 1.0)
+    )
+    _, _, _, (_, back, front) = level(found, 0)
+    has_own_order = damage in (renamed, without_textures)
+    assert (back != front).any() == has_own_order
 
 
 @pytest.mark.parametrize("entry", ENTRIES)

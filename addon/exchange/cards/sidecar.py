@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import math
 import re
+import zlib
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -207,6 +208,7 @@ def _level(cards: CardFile, number: int) -> dict[str, Any]:
         "bounds": _bounds(cards.format, mesh),
         **({"error": cards.errors[number] * scale} if cards.errors else {}),
         "indices": len(mesh.triangles) * 3,
+        "indices_adler32": zlib.adler32(mesh.triangles.astype("<u4").tobytes()),
         "ranges": group_ranges(mesh, by_layer=whole is not None),
         **({} if whole is None else {"cards_in_order": whole}),
     }

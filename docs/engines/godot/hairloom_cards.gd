@@ -6,17 +6,19 @@
 ## as under user://, are read as they are: NAME.glb, NAME.hairloom.json and the textures beside them.
 class_name HairloomCards
 
+const HairMaterial := preload("hairloom_material.gd")
 const Import := preload("hairloom_import.gd")
 
 
-## The cards, or null with an error in the log.
+## The cards, or null with an error in the log. Without a sidecar that fits they come in the plain
+## material of the file; the log says why.
 ##
 ## level: shows this one alone, 0 the finest; -1: all, each from the distance at which it takes over.
 static func load_cards(path: String, level := -1) -> Node3D:
 	var scene := _imported(path)
 	if scene == null:
 		scene = _read(path)
-	if scene == null or level < 0:
+	if scene == null or level < 0 or not scene.has_meta(Import.KEY):
 		return scene
 	var names: Array = scene.get_meta(Import.KEY)
 	for number in names.size():
@@ -33,11 +35,12 @@ static func _imported(path: String) -> Node3D:
 	var scene: Node3D = load(path).instantiate()
 	if scene.has_meta(Import.KEY):
 		return scene
-	scene.free()
-	if not FileAccess.file_exists(path):
-		push_error("%s: Godot has imported it by itself. Enable the add-on Hairloom in the project's " % path
-				+ "settings, and import the file again")
-	return null
+	if FileAccess.file_exists(path):
+		scene.free()
+		return null
+	push_warning("%s: Godot has imported it by itself. Enable the add-on Hairloom in the project's " % path
+			+ "settings, and import the file again")
+	return scene
 
 
 static func _read(path: String) -> Node3D:
@@ -53,9 +56,7 @@ static func _read(path: String) -> Node3D:
 		scene = document.generate_scene(state)
 	GLTFDocument.unregister_gltf_document_extension(import)
 	if scene == null:
-		push_error("%s: it cannot be read; export the cards again" % path)
-	elif not scene.has_meta(Import.KEY):
-		push_error("%s: no sidecar, NAME.hairloom.json, lies beside it; export the cards again" % path)
-		scene.free()
-		scene = null
+		push_error("%s: it cannot be read; %s" % [path, Import.REMEDY])
+	elif not FileAccess.file_exists(HairMaterial.beside(path)):
+		push_warning("%s: no sidecar, NAME.hairloom.json, lies beside it; copy all files of the export" % path)
 	return scene

@@ -10,15 +10,23 @@ const FIELD_OF_VIEW := 75.0
 ## of a distance: nothing flickers where a level takes over
 const MARGIN := 0.05
 const KEY := &"hairloom"
+const REMEDY := "use the file that Hairloom wrote"
 
 
 ## The file's scene holds the finest level alone (MSFT_lod); here the others stand beside it.
 func _import_preflight(state: GLTFState, _extensions: PackedStringArray) -> Error:
-	var sidecar = HairMaterial.sidecar_of(state.base_path.path_join(state.filename))
-	if sidecar == null or state.has_meta(KEY):
+	if state.has_meta(KEY):
+		return ERR_SKIP
+	var path := _path(state)
+	var sidecar = HairMaterial.sidecar_of(path)
+	if sidecar == null:
+		return ERR_SKIP
+	var nodes: Array = state.json.get("nodes", [])
+	var there := nodes.map(func(node): return node.get("name", ""))
+	if not sidecar["levels"].all(func(level): return level["node"] in there):
+		push_error("%s: its levels are not those of its sidecar; %s" % [path, REMEDY])
 		return ERR_SKIP
 	state.set_meta(KEY, sidecar)
-	var nodes: Array = state.json.get("nodes", [])
 	for number in nodes.size():
 		var lod: Dictionary = nodes[number].get("extensions", {}).get("MSFT_lod", {})
 		for holder in nodes + state.json.get("scenes", []):
@@ -33,18 +41,57 @@ func _import_post(state: GLTFState, root: Node) -> Error:
 	var material := HairMaterial.of(sidecar, state.base_path)
 	var names: Array = sidecar["levels"].map(func(level): return level["node"])
 	var ends := _distances(state, sidecar)
+	var is_as_written := true
 	for node in root.find_children("*", "Node3D", true, false):
 		var level := names.find(String(node.name))
 		if level < 0:
 			continue
 		var hair := _finished(node)
 		hair.material_override = material
+		is_as_written = _is_written(hair.mesh, sidecar["levels"][level], material) and is_as_written
 		hair.visibility_range_begin = ends[level - 1] if level > 0 else 0.0
 		hair.visibility_range_begin_margin = MARGIN * hair.visibility_range_begin
 		hair.visibility_range_end = ends[level]
 		hair.visibility_range_end_margin = MARGIN * ends[level]
+	if not is_as_written:
+		push_warning("%s: another program has changed it, so hair may show holes; %s"
+				% [_path(state), REMEDY])
 	root.set_meta(KEY, names)
 	return OK
+
+
+## Of the GLB, whose suffix Godot leaves out.
+static func _path(state: GLTFState) -> String:
+	return state.base_path.path_join(state.filename.trim_suffix(".glb") + ".glb")
+
+
+## Whether triangles and vertices are those that Hairloom wrote, in their order.
+static func _is_written(mesh: Mesh, level: Dictionary, material: ShaderMaterial) -> bool:
+	var arrays := mesh.surface_get_arrays(0)
+	if arrays[Mesh.ARRAY_TEX_UV2] == null:  # an optimiser has taken it for unused
+		HairMaterial.set_all(material, "has_openness", false)
+		return false
+	var indices: PackedInt32Array = arrays[Mesh.ARRAY_INDEX]
+	if mesh.get_surface_count() != 1 or indices.size() != int(level["indices"]):
+		return false
+	for first in range(0, indices.size(), 3):  # Godot has turned them over
+		var second := indices[first + 1]
+		indices[first + 1] = indices[first + 2]
+		indices[first + 2] = second
+	var sum := int(level.get("indices_adler32", -1))
+	return sum < 0 or _adler32(indices.to_byte_array()) == sum
+
+
+static func _adler32(bytes: PackedByteArray) -> int:
+	var low := 1
+	var high := 0
+	for byte in bytes:
+		low += byte
+		high += low
+		if high >= 1 << 40:  # far from the largest number
+			low %= 65521
+			high %= 65521
+	return (high % 65521) * 65536 + low % 65521
 
 
 ## Where each level ends [m]; 0: nowhere.

@@ -12,18 +12,33 @@ const HERE := "res://addons/hairloom/godot/"
 const PASSES := ["opaque", "back", "front"]
 const TEXTURES := ["base", "alpha", "shift", "noise", "tangent", "normal"]
 const TABLES := ["longitudinal", "azimuthal", "paths"]
+const VERSION := 2
+const ENDING := ".hairloom.json"
 
 
-## Of a GLB, or null if none lies beside it.
+## Of a GLB, or null if none lies beside it, or none that can be used: hair is then as Godot has it.
 static func sidecar_of(path: String) -> Variant:
-	var beside := path.trim_suffix(".glb") + ".hairloom.json"
-	if not FileAccess.file_exists(beside):
+	var sidecar_path := beside(path)
+	if not FileAccess.file_exists(sidecar_path):
 		return null
-	var sidecar = JSON.parse_string(FileAccess.get_file_as_string(beside))
-	if sidecar is Dictionary and "hairloom_sidecar" in sidecar:
-		return sidecar
-	push_error("%s: it is no sidecar of Hairloom; export the cards again" % beside)
-	return null
+	var json := JSON.new()  # says nothing itself
+	var is_read := json.parse(FileAccess.get_file_as_string(sidecar_path)) == OK
+	var sidecar = json.data if is_read else null
+	if not (sidecar is Dictionary and sidecar.get("levels", []) and "hairloom_sidecar" in sidecar):
+		push_error("%s: it is no sidecar of Hairloom; export the cards again" % sidecar_path)
+		return null
+	if sidecar["hairloom_sidecar"] > VERSION:
+		push_error("%s: a newer Hairloom wrote it; update this add-on" % sidecar_path)
+		return null
+	if beside(sidecar.get("file", "")) != beside(path.get_file()):
+		push_warning("%s: it names %s; rename both files back if the hair looks wrong"
+				% [sidecar_path, sidecar.get("file", "")])
+	return sidecar
+
+
+## The path of the sidecar; Godot's editor leaves the suffix of a GLB out.
+static func beside(path: String) -> String:
+	return (path.left(-4) if path.to_lower().ends_with(".glb") else path) + ENDING
 
 
 ## Three passes, each with the next one.
@@ -45,13 +60,19 @@ static func of(sidecar: Dictionary, folder: String) -> ShaderMaterial:
 	return first
 
 
+## Of all passes.
+static func set_all(material: ShaderMaterial, uniform: String, value: Variant) -> void:
+	while material != null:
+		material.set_shader_parameter(uniform, value)
+		material = material.next_pass
+
+
 static func _values(sidecar: Dictionary, folder: String) -> Dictionary:
 	var material: Dictionary = sidecar["material"]
 	var values := {
 		"model": 1 if material["model"] == "marschner" else 0,
 		"opaque_alpha": sidecar["opaque_alpha"],
 		"min_alpha": sidecar["min_alpha"],
-		"has_tangent_map": sidecar["textures"]["highlights_by"] == "tangent",
 	}
 	for name in material["values"]:
 		var value = material["values"][name]
@@ -62,16 +83,22 @@ static func _values(sidecar: Dictionary, folder: String) -> Dictionary:
 	for name in material.get("fibre", {}):
 		var lane: Array = material["fibre"][name]
 		values["fibre_" + name] = Vector4(lane[0], lane[1], lane[2], lane[3])
+	var found := {}  # a texture that is missing is as one that the export has not
 	for name in TEXTURES:
 		if name in sidecar["textures"]:
 			var entry: Dictionary = sidecar["textures"][name]
-			values[name + "_texture"] = _texture(entry, folder, false)
-			values[name + "_mask"] = _mask(entry)
-	values["base_gain"] = sidecar["textures"].get("base", {}).get("gain", 1.0)
+			var texture := _texture(entry, folder, false)
+			if texture != null:
+				found[name] = entry
+				values[name + "_texture"] = texture
+				values[name + "_mask"] = _mask(entry)
+	values["base_gain"] = found.get("base", {}).get("gain", 1.0)
 	var facing: Dictionary = sidecar["textures"].get("view_compensated_alpha", {})
 	values["facing_range"] = Vector2(facing.get("mean_facing", 0.0), facing.get("min_facing", 0.0))
-	values["has_normal_map"] = "normal" in sidecar["textures"]
-	values["has_shift"] = "shift" in sidecar["textures"]
+	var by: String = sidecar["textures"].get("highlights_by", "shift")
+	values["has_tangent_map"] = by == "tangent" and "tangent" in found
+	values["has_normal_map"] = "normal" in found
+	values["has_shift"] = "shift" in found
 	for name in TABLES:
 		if name in material.get("tables", {}):
 			values[name] = _texture(material["tables"][name], folder, true)
@@ -88,9 +115,9 @@ static func _mask(entry: Dictionary) -> Vector4:
 static func _texture(entry: Dictionary, folder: String, is_table: bool) -> Texture2D:
 	var path := folder.path_join(entry["file"])
 	var file := ProjectSettings.globalize_path(path) if Engine.is_editor_hint() else path
-	var image := Image.load_from_file(file)
+	var image := Image.load_from_file(file) if FileAccess.file_exists(file) else null
 	if image == null:
-		push_error("%s: a texture of the hair is missing; export the cards again" % path)
+		push_error("%s: this texture of the hair is missing; copy all files of the export" % path)
 		return null
 	if is_table:
 		image.flip_y()  # the lowest row comes first

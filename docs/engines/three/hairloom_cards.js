@@ -19,58 +19,134 @@ const REPEATED = ['shift', 'noise'];
 // of a distance: nothing flickers where a level takes over
 const HYSTERESIS = 0.05;
 
+const VERSION = 2;
+const REMEDY = 'use the file that Hairloom wrote';
+// the sidecar's levels give way to the next where that one is off by a pixel of this many lines
+const SCREEN_HEIGHT = 1080;
+
 // Options: level (0 the finest; without it a THREE.LOD shows each from the distance at which it takes
 // over), fieldOfView (of the camera for which these distances are, in degrees), shading (address of
-// hair_shading.gdshaderinc), addressOf (file name -> address, for files that lie elsewhere).
+// hair_shading.gdshaderinc), addressOf (file name -> address, for files that lie elsewhere), warn (gets a
+// sentence for each thing that is wrong; what can be shown is shown).
 export async function loadHairloomCards(
   url,
-  { level, fieldOfView = 50, shading = SHADING, addressOf = addressesBeside(url) } = {},
+  { level, fieldOfView = 50, shading = SHADING, addressOf, warn = console.warn } = {},
 ) {
-  const name = url.toString().split('/').pop();
+  const name = addressOf
+    ? url.toString().split('/').pop()
+    : decodeURIComponent(addressBeside(url).pathname.split('/').pop());
+  addressOf ??= (file) => new URL(encodeURIComponent(file), addressBeside(url)).href;
   const [sidecar, formulas, gltf] = await Promise.all([
-    fetch(addressOf(name.replace(/\.glb$/, '.hairloom.json'))).then((file) => file.json()),
+    sidecarOf(name, addressOf, warn),
     fetch(shading).then((file) => file.text()),
-    new GLTFLoader().loadAsync(addressOf(name)),
+    gltfOf(name, addressOf),
   ]);
-  const uniforms = await uniformsOf(sidecar, addressOf);
-  const groupOf = async (each) => {
+  const levels = sidecar?.levels.filter((each) => numberOf(gltf, each) >= 0) ?? [];
+  const nodes = await Promise.all(
     // Coarser levels are no part of the scene (MSFT_lod), so the node is asked for by its number.
-    const node = await gltf.parser.getDependency('node', numberOf(gltf, each));
-    const backIndex = await backIndexOf(sidecar, each, addressOf);
+    levels.map((each) => gltf.parser.getDependency('node', numberOf(gltf, each))),
+  );
+  if (!nodes.length || !nodes.every((node) => node.isMesh)) {
+    if (sidecar) warn(`${name}: its levels are not those of its sidecar; ${REMEDY}`);
+    return gltf.scene; // in the plain material of the file
+  }
+  const isAsWritten = levels.map((each, number) => isWritten(nodes[number].geometry, each));
+  if (!isAsWritten.every(Boolean)) {
+    warn(`${name}: another program has changed it, so hair may show holes; ${REMEDY}`);
+  }
+  const uniforms = await uniformsOf(sidecar, addressOf, warn);
+  const backs = await indicesOf(sidecar, addressOf, warn);
+  const groupOf = (number) => {
+    const backIndex = backs && isAsWritten[number] ? backIndexOf(backs, levels[number]) : null;
     const group = new THREE.Group();
-    group.add(...passesOf(node, sidecar, backIndex, formulas, uniforms));
+    group.add(...passesOf(completed(nodes[number]), sidecar, backIndex, formulas, uniforms));
     return group;
   };
-  const hair = level === undefined ? new THREE.LOD() : await groupOf(sidecar.levels[level]);
+  const last = levels.length - 1;
+  const hair = level === undefined ? new THREE.LOD() : groupOf(Math.min(level, last));
   if (level === undefined) {
-    const groups = await Promise.all(sidecar.levels.map(groupOf));
-    const begins = beginsOf(gltf, sidecar, fieldOfView);
-    groups.forEach((group, number) => hair.addLevel(group, begins[number], HYSTERESIS));
+    const begins = beginsOf(gltf, levels, fieldOfView);
+    begins.forEach((begin, number) => hair.addLevel(groupOf(number), begin, HYSTERESIS));
   }
-  if (sidecar.motion?.kind === 'joints') {
-    hair.add(gltf.scene.getObjectByName('hair_root')); // all levels are bound to its joints
+  const root = gltf.scene.getObjectByName('hair_root');
+  if (sidecar.motion?.kind === 'joints' && root) {
+    hair.add(root); // all levels are bound to its joints
     hair.animations = gltf.animations;
   }
   return hair;
 }
 
-function addressesBeside(url) {
-  const address = new URL(url, document.baseURI);
-  return (name) => new URL(name, address).href;
+function addressBeside(url) {
+  return new URL(url, document.baseURI);
+}
+
+// The sidecar of a GLB; null, with a sentence, where the file has to be shown without.
+async function sidecarOf(name, addressOf, warn) {
+  const file = name.replace(/\.glb$/i, '.hairloom.json');
+  const plain = (what) => {
+    warn(`${file}: ${what}. ${name} is shown in its plain material`);
+    return null;
+  };
+  const answer = await fetch(addressOf(file)).catch(() => null);
+  if (!answer?.ok) return plain('it is missing; copy all files of the export');
+  const sidecar = await answer.json().catch(() => null);
+  if (!sidecar?.levels?.length) return plain('it is no sidecar of Hairloom; export the cards again');
+  if (sidecar.hairloom_sidecar > VERSION) return plain('a newer Hairloom wrote it; update this module');
+  if (sidecar.file !== name) {
+    warn(`${file}: it names ${sidecar.file}, not ${name}; rename both files back if the hair looks wrong`);
+  }
+  return sidecar;
+}
+
+async function gltfOf(name, addressOf) {
+  try {
+    return await new GLTFLoader().loadAsync(addressOf(name));
+  } catch (error) {
+    throw new Error(`${name}: it cannot be read (${error.message}); ${REMEDY}`);
+  }
 }
 
 function numberOf(gltf, { node }) {
   return gltf.parser.json.nodes.findIndex(({ name }) => name === node);
 }
 
+// Whether triangles and vertices are those that Hairloom wrote, in their order.
+function isWritten({ index, attributes }, { indices, indices_adler32: sum }) {
+  if (!index || index.count !== indices || !attributes.uv1 || !attributes.tangent) return false;
+  return sum === undefined || adler32(new Uint8Array(Uint32Array.from(index.array).buffer)) === sum;
+}
+
+function adler32(bytes) {
+  let [low, high] = [1, 0];
+  for (const byte of bytes) {
+    low = (low + byte) % 65521;
+    high = (high + low) % 65521;
+  }
+  return high * 65536 + low;
+}
+
+// What an optimiser has taken for unused: open to the light, at the root, any direction.
+function completed(node) {
+  const { geometry } = node;
+  const { count } = geometry.attributes.position;
+  for (const [name, values] of Object.entries({ uv1: [1, 0], tangent: [1, 0, 0, 1] })) {
+    const all = Array.from({ length: count }, () => values).flat();
+    if (!geometry.attributes[name]) {
+      geometry.setAttribute(name, new THREE.Float32BufferAttribute(all, values.length));
+    }
+  }
+  return node;
+}
+
 // From what distance each level is shown: where the hair takes up the fraction of the screen that the
 // file has for the level before.
-function beginsOf(gltf, { levels }, fieldOfView) {
+function beginsOf(gltf, levels, fieldOfView) {
   const { minimum, maximum } = levels[0].bounds;
   const size = Math.max(...maximum.map((high, axis) => high - minimum[axis]));
   const slope = 2 * Math.tan(THREE.MathUtils.degToRad(fieldOfView) / 2);
   const { extras } = gltf.parser.json.nodes[numberOf(gltf, levels[0])];
-  const coverage = extras?.MSFT_screencoverage ?? [];
+  const coverage = extras?.MSFT_screencoverage ?? levels.slice(1).map(({ error }, number) =>
+    error ? Math.min(1, size / (error * SCREEN_HEIGHT)) ** 2 : 0.25 ** (number + 1));
   return levels.map((_, number) => (number ? size / (slope * Math.sqrt(coverage[number - 1])) : 0));
 }
 
@@ -87,21 +163,31 @@ function passesOf(node, sidecar, backIndex, formulas, uniforms) {
     if (node.isSkinnedMesh) {
       mesh.bind(node.skeleton, node.bindMatrix);
       mesh.frustumCulled = false; // it moves out of its bounds
+    } else {
+      node.updateMatrix();
+      mesh.applyMatrix4(node.matrix); // rounded positions are scaled back by it
     }
     mesh.renderOrder = 1 + number; // after all opaque meshes, including the head
     return mesh;
   });
 }
 
-async function backIndexOf({ index_buffer: buffer }, level, addressOf) {
-  if (!buffer || level.buffer_back_first === undefined) return null;
-  const bytes = await (await fetch(addressOf(buffer.file))).arrayBuffer();
-  const isShort = buffer.type === 'uint16';
-  const all = isShort ? new Uint16Array(bytes) : new Uint32Array(bytes);
-  const indices = all.slice(level.buffer_back_first, level.buffer_back_first + level.indices);
-  return isShort
-    ? new THREE.Uint16BufferAttribute(indices, 1)
-    : new THREE.Uint32BufferAttribute(indices, 1);
+// All indices of the index buffer; null if back faces have no order of their own.
+async function indicesOf({ index_buffer: buffer, levels }, addressOf, warn) {
+  const last = levels[levels.length - 1];
+  if (!buffer || last.buffer_back_first === undefined) return null;
+  const answer = await fetch(addressOf(buffer.file)).catch(() => null);
+  const bytes = answer?.ok ? await answer.arrayBuffer() : new ArrayBuffer(0);
+  const size = buffer.type === 'uint16' ? 2 : 4;
+  if (bytes.byteLength < (last.buffer_back_first + last.indices) * size) {
+    warn(`${buffer.file}: it is missing or cut off, so back faces have the order of front faces`);
+    return null;
+  }
+  return size === 2 ? new Uint16Array(bytes) : new Uint32Array(bytes);
+}
+
+function backIndexOf(all, { buffer_back_first: first, indices }) {
+  return new THREE.BufferAttribute(all.slice(first, first + indices), 1);
 }
 
 const DEPTH = { less: THREE.LessDepth, equal: THREE.EqualDepth };
@@ -118,7 +204,7 @@ function materialOf(pass, sidecar, formulas, uniforms) {
       IS_OPAQUE: blended ? 0 : 1,
       LEAST_ALPHA: leastAlpha(pass, sidecar).toFixed(6),
       NORMAL_MAP: sidecar.textures.normal ? 1 : 0,
-      TANGENT_MAP: sidecar.textures.highlights_by === 'tangent' ? 1 : 0,
+      TANGENT_MAP: sidecar.textures.highlights_by === 'tangent' && sidecar.textures.tangent ? 1 : 0,
       VIEW_COMPENSATED_ALPHA: sidecar.textures.view_compensated_alpha ? 1 : 0,
     },
     vertexShader: VERTEX,
@@ -140,13 +226,13 @@ function leastAlpha(pass, sidecar) {
   return pass.pixels.includes('min_alpha') ? sidecar.min_alpha : 0.0;
 }
 
-async function uniformsOf(sidecar, addressOf) {
+// Leaves textures out of the sidecar that cannot be loaded.
+async function uniformsOf(sidecar, addressOf, warn) {
   const { model, values, fibre, tables } = sidecar.material;
   const facing = sidecar.textures.view_compensated_alpha;
   const uniforms = {
     facing_range: { value: new THREE.Vector2(facing?.mean_facing, facing?.min_facing) },
     model: { value: model === 'marschner' ? 1 : 0 },
-    base_gain: { value: sidecar.textures.base?.gain ?? 1.0 }, // 8 bits hold no more than 1
   };
   for (const [name, value] of Object.entries(values)) {
     if (Array.isArray(value)) uniforms[name] = { value: new THREE.Vector3(...value) };
@@ -155,18 +241,25 @@ async function uniformsOf(sidecar, addressOf) {
   for (const [name, value] of Object.entries(fibre ?? {})) {
     uniforms[`fibre_${name}`] = { value: new THREE.Vector4(...value) };
   }
+  const loaded = (file, promise) =>
+    promise.catch(() => {
+      warn(`${file}: it is missing; copy all files of the export`);
+      return null;
+    });
   await Promise.all([
     ...Object.entries(TEXTURES).map(async ([name, empty]) => {
       const entry = sidecar.textures[name];
-      uniforms[`${name}_texture`] = {
-        value: entry ? await textureOf(addressOf(entry.file), name) : plain(empty),
-      };
+      const texture = entry && (await loaded(entry.file, textureOf(addressOf(entry.file), name)));
+      if (!texture) delete sidecar.textures[name];
+      uniforms[`${name}_texture`] = { value: texture || plain(empty) };
       uniforms[`${name}_mask`] = { value: maskOf(entry) };
     }),
     ...TABLES.filter((name) => tables && tables[name]).map(async (name) => {
-      uniforms[name] = { value: await tableOf(addressOf(tables[name].file)) };
+      const { file } = tables[name];
+      uniforms[name] = { value: (await loaded(file, tableOf(addressOf(file)))) || plain(0) };
     }),
   ]);
+  uniforms.base_gain = { value: sidecar.textures.base?.gain ?? 1.0 }; // 8 bits hold no more than 1
   return uniforms;
 }
 

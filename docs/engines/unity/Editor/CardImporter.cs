@@ -28,7 +28,10 @@ namespace Hairloom
         {
             var sidecar = Sidecar.Of(path);
             context.DependsOnSourceAsset(Sidecar.PathOf(path));
-            var levels = CardLevel.All(path, sidecar);
+            if (sidecar.file != Path.GetFileName(path))
+                context.LogImportWarning(
+                    $"{Sidecar.PathOf(path)}: it names {sidecar.file}; rename both files back if the hair looks wrong");
+            var levels = CardLevel.All(path, sidecar, text => context.LogImportWarning(text));
             var materials = CardMaterials.Of(sidecar, path, context);
             var root = new GameObject(Path.GetFileNameWithoutExtension(path));
             context.AddObjectToAsset("root", root);

@@ -33,35 +33,45 @@ namespace Hairloom
         /// Height of the hair on the screen, of the screen's, below which the next level takes over.
         public float EndHeight;
 
-        public static CardLevel[] All(string glb, Sidecar sidecar)
+        /// Whether triangles and vertices are those that Hairloom wrote, in their order.
+        public bool IsAsWritten;
+
+        /// warn: gets a sentence for each thing that is wrong; what can be shown is shown.
+        public static CardLevel[] All(string glb, Sidecar sidecar, Action<string> warn)
         {
             var file = new Glb(glb);
-            var backs = BackIndices(glb, sidecar);
+            var backs = BackIndices(glb, sidecar, warn);
             var coverage = file.Coverage(sidecar.levels[0].node);
             var levels = new List<CardLevel>();
             foreach (var each in sidecar.levels)
             {
                 var level = file.Level(each);
-                level.Back = backs == null || each.buffer_back_first < 0
+                level.Back = backs == null || each.buffer_back_first < 0 || !level.IsAsWritten
                     ? level.Front
                     : level.Turned(backs, each, glb);
                 var part = levels.Count < coverage.Length ? coverage[levels.Count] : 0.0f;
                 level.EndHeight = Mathf.Sqrt(part);
                 levels.Add(level);
             }
+            if (!levels.All(level => level.IsAsWritten))
+                warn($"{glb}: another program has changed it, so hair may show holes; "
+                    + "use the file that Hairloom wrote");
             return levels.ToArray();
         }
 
-        static int[] BackIndices(string glb, Sidecar sidecar)
+        static int[] BackIndices(string glb, Sidecar sidecar, Action<string> warn)
         {
             var buffer = sidecar.index_buffer;
             if (string.IsNullOrEmpty(buffer?.file))
                 return null;
             var path = Sidecar.Beside(glb, buffer.file);
-            if (!File.Exists(path))
-                throw new CardFileException($"{path}: it is missing; copy all files of the export");
-            var bytes = File.ReadAllBytes(path);
+            var bytes = File.Exists(path) ? File.ReadAllBytes(path) : new byte[0];
             var size = buffer.type == "uint16" ? 2 : 4;
+            if (sidecar.levels.Any(level => size * (level.buffer_back_first + level.indices) > bytes.Length))
+            {
+                warn($"{path}: it is missing or cut off, so back faces have the order of front faces");
+                return null;
+            }
             return Enumerable.Range(0, bytes.Length / size)
                 .Select(i => size == 2 ? BitConverter.ToUInt16(bytes, 2 * i) : (int)BitConverter.ToUInt32(bytes, 4 * i))
                 .ToArray();
@@ -69,8 +79,6 @@ namespace Hairloom
 
         int[] Turned(int[] backs, SidecarLevel level, string glb)
         {
-            if (level.buffer_back_first + level.indices > backs.Length)
-                throw new CardFileException($"{glb}: its index buffer is cut off; export the cards again");
             var chosen = new int[level.indices];
             Array.Copy(backs, level.buffer_back_first, chosen, 0, level.indices);
             return Glb.Mirrored(chosen, Positions.Length, glb);
@@ -127,14 +135,21 @@ namespace Hairloom
             var corners = mesh.primitives[0].attributes;
             var position = Floats(corners.POSITION, "VEC3");
             var normal = Floats(corners.NORMAL, "VEC3");
-            var across = Floats(corners.TANGENT, "VEC4");
             var place = Floats(corners.TEXCOORD_0, "VEC2");
-            var occlusion = Floats(corners.TEXCOORD_1, "VEC2");
             var count = position.Length / 3;
+            // what another program has taken for unused: any direction; open to the light, at the root
+            var isWhole = corners.TANGENT >= 0 && corners.TEXCOORD_1 >= 0;
+            var across = corners.TANGENT >= 0
+                ? Floats(corners.TANGENT, "VEC4")
+                : Made(4 * count, i => i % 4 == 0 ? 1.0f : 0.0f);
+            var occlusion = corners.TEXCOORD_1 >= 0
+                ? Floats(corners.TEXCOORD_1, "VEC2")
+                : Made(2 * count, i => i % 2 == 0 ? 1.0f : 0.0f);
+            var indices = Indices(mesh.primitives[0].indices);
             if (new[] { normal.Length / 3, across.Length / 4, place.Length / 2, occlusion.Length / 2 }
                 .Any(other => other != count))
                 throw Fault(Changed);
-            var level = new CardLevel
+            return new CardLevel
             {
                 Name = expected.node,
                 Positions = Made(count, i => Vector(position, 3 * i)),
@@ -142,11 +157,10 @@ namespace Hairloom
                 Places = Made(count, i => new Vector2(place[2 * i], 1.0f - place[2 * i + 1])),
                 Occlusion = Made(count, i => new Vector2(occlusion[2 * i], occlusion[2 * i + 1])),
                 Tangents = Made(count, i => Along(Vector(normal, 3 * i), Vector(across, 4 * i))),
-                Front = Mirrored(Indices(mesh.primitives[0].indices), count, path),
+                Front = Mirrored(indices, count, path),
+                IsAsWritten = isWhole && indices.Length == expected.indices
+                    && (expected.indices_adler32 == 0 || Adler32(indices) == expected.indices_adler32),
             };
-            if (level.Front.Length != expected.indices)
-                throw Fault(Changed);
-            return level;
         }
 
         /// Triangles in the same order, of which Unity takes the same side as the front.
@@ -155,6 +169,19 @@ namespace Hairloom
             if (indices.Length % 3 != 0 || indices.Any(index => index < 0 || index >= count))
                 throw new CardFileException($"{path}: triangles name vertices that it does not have; {Changed}");
             return Made(indices.Length, i => indices[i % 3 == 1 ? i + 1 : i % 3 == 2 ? i - 1 : i]);
+        }
+
+        /// Of 32-bit little-endian numbers.
+        static uint Adler32(int[] indices)
+        {
+            uint low = 1, high = 0;
+            foreach (var index in indices)
+                for (var shift = 0; shift < 32; shift += 8)
+                {
+                    low = (low + (uint)(index >> shift & 255)) % 65521;
+                    high = (high + low) % 65521;
+                }
+            return high * 65536 + low;
         }
 
         static T[] Made<T>(int count, Func<int, T> make)

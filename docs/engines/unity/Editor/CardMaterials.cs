@@ -111,19 +111,22 @@ namespace Hairloom
             material.SetFloat("_MaxAlpha", pass.IsBlended ? sidecar.opaque_alpha : 2.0f);
             material.SetShaderPassEnabled("ShadowCaster", !pass.IsBlended);
             // "color" is for materials that know nothing of hair
-            foreach (var each in sidecar.textures.Used().Where(each => each.Key != "color"))
+            // one that is missing is as one that the export has not
+            Func<string, bool> has = role => textures.TryGetValue(role, out var texture) && texture != null;
+            foreach (var each in sidecar.textures.Used().Where(each => each.Key != "color" && has(each.Key)))
             {
                 material.SetTexture($"_{each.Key}_texture", textures[each.Key]);
                 material.SetVector($"_{each.Key}_mask", each.Value.Mask());
             }
             foreach (var each in Tables(sidecar))
                 material.SetTexture($"_{each.Key}", Texture(Sidecar.Beside(glb, each.Value.file), context));
-            material.SetFloat("_base_gain", sidecar.textures.@base?.gain ?? 1.0f);
+            material.SetFloat("_base_gain", has("base") ? sidecar.textures.@base.gain : 1.0f);
             var facing = sidecar.textures.view_compensated_alpha ?? new SidecarFacing();
             material.SetVector("_facing_range", new Vector4(facing.mean_facing, facing.min_facing));
-            material.SetFloat("_has_tangent_map", sidecar.textures.highlights_by == "tangent" ? 1.0f : 0.0f);
-            material.SetFloat("_has_normal_map", textures.ContainsKey("normal") ? 1.0f : 0.0f);
-            material.SetFloat("_has_shift", textures.ContainsKey("shift") ? 1.0f : 0.0f);
+            var hasTangents = sidecar.textures.highlights_by == "tangent" && has("tangent");
+            material.SetFloat("_has_tangent_map", hasTangents ? 1.0f : 0.0f);
+            material.SetFloat("_has_normal_map", has("normal") ? 1.0f : 0.0f);
+            material.SetFloat("_has_shift", has("shift") ? 1.0f : 0.0f);
             material.SetFloat("_model", sidecar.material.model == "marschner" ? 1.0f : 0.0f);
             SetAll(material, "_", sidecar.material.values);
             SetAll(material, "_fibre_", sidecar.material.fibre);

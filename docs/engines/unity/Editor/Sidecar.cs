@@ -71,8 +71,6 @@ namespace Hairloom
                 throw new CardFileException($"{path}: it is no sidecar of Hairloom; export the cards again");
             if (sidecar.hairloom_sidecar > Version)
                 throw new CardFileException($"{path}: a newer Hairloom wrote it; update this package");
-            if (sidecar.file != Path.GetFileName(glb))
-                throw new CardFileException($"{path}: it belongs to {sidecar.file}; export the cards again");
             return sidecar;
         }
     }
@@ -83,6 +81,7 @@ namespace Hairloom
         public string node;
         public int triangles;
         public int indices;
+        public uint indices_adler32;
         public int buffer_back_first = -1;
     }
 

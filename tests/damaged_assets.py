@@ -1,0 +1,161 @@
+"""Exports as they come out of other hands: each function changes a folder with `cards.glb`."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hairloom.addon.exchange.cards.glb_file import GlbFile
+
+NAME = "Zöpfe 头发"
+
+
+def sidecar_of(folder: Path) -> dict[str, Any]:
+    (path,) = folder.glob("*.hairloom.json")
+    return dict(json.loads(path.read_text(encoding="utf-8")))
+
+
+def change_sidecar(folder: Path, change: Callable[[dict[str, Any]], object]) -> None:
+    (path,) = folder.glob("*.hairloom.json")
+    content = sidecar_of(folder)
+    change(content)
+    path.write_text(json.dumps(content), encoding="utf-8")
+
+
+def without_sidecar(folder: Path) -> None:
+    (folder / "cards.hairloom.json").unlink()
+
+
+def garbage(folder: Path) -> None:
+    (folder / "cards.hairloom.json").write_text("{no", encoding="utf-8")
+
+
+def renamed(folder: Path) -> None:
+    """Mesh and sidecar; the sidecar still names cards.glb."""
+    for end in (".glb", ".hairloom.json"):
+        (folder / f"cards{end}").rename(folder / f"{NAME}{end}")
+
+
+def other_levels(folder: Path) -> None:
+    """The sidecar of another hair lies beside the mesh."""
+
+    def change(content: dict[str, Any]) -> None:
+        for level in content["levels"]:
+            level["node"] = f"other_{level['node']}"
+
+    change_sidecar(folder, change)
+
+
+def without_textures(folder: Path) -> None:
+    roles = sidecar_of(folder)["textures"]
+    for role in ("tangent", "normal", "base"):
+        if role in roles:
+            (folder / roles[role]["file"]).unlink()
+
+
+def without_index_buffer(folder: Path) -> None:
+    (folder / sidecar_of(folder)["index_buffer"]["file"]).unlink()
+
+
+def _finest(file: GlbFile) -> dict[str, Any]:
+    """The primitive of the finest level."""
+    node = file.content["nodes"][file.node("cards_LOD0")]
+    return dict(file.content["meshes"][node["mesh"]]["primitives"][0])
+
+
+def _changed(folder: Path, change: Callable[[GlbFile], None]) -> None:
+    path = folder / "cards.glb"
+    file = GlbFile.of(path.read_bytes(), str(path))
+    change(file)
+    path.write_bytes(file.data())
+
+
+def reordered(folder: Path) -> None:
+    """As an optimiser of vertex caches does: the same triangles in another order."""
+
+    def change(file: GlbFile) -> None:
+        accessor = file.content["accessors"][_finest(file)["indices"]]
+        view = file.content["bufferViews"][accessor["bufferView"]]
+        begin = view.get("byteOffset", 0) + accessor.get("byteOffset", 0)
+        kind = {5123: "<u2", 5125: "<u4"}[accessor["componentType"]]
+        indices = np.frombuffer(file.binary, kind, accessor["count"], begin).reshape(-1, 3)
+        content = np.random.default_rng(3).permutation(indices).tobytes()
+        file.binary[begin : begin + len(content)] = content
+
+    _changed(folder, change)
+
+
+def without_unused(folder: Path) -> None:
+    """Without the second UV map, which no plain material needs."""
+
+    def change(file: GlbFile) -> None:
+        for mesh in file.content["meshes"]:
+            mesh["primitives"][0]["attributes"].pop("TEXCOORD_1")
+
+    _changed(folder, change)
+
+
+def quantised(folder: Path) -> None:
+    """KHR_mesh_quantization of positions: 16 bits, scaled back by the node."""
+
+    def change(file: GlbFile) -> None:
+        content = file.content
+        for node in content["nodes"]:
+            if "mesh" not in node:
+                continue
+            attributes = content["meshes"][node["mesh"]]["primitives"][0]["attributes"]
+            positions = np.asarray(file.values(attributes["POSITION"]), float)
+            scale = float(np.abs(positions).max())
+            steps = np.round(positions / scale * 32767.0).astype("<i2")
+            padded = np.zeros((len(steps), 4), "<i2")  # each vertex begins at 4 bytes
+            padded[:, :3] = steps
+            file.binary += b"\0" * (-len(file.binary) % 4)
+            view = {"buffer": 0, "byteOffset": len(file.binary), "byteLength": padded.nbytes}
+            content["bufferViews"].append(view | {"byteStride": 8})
+            file.binary += padded.tobytes()
+            accessor = {
+                "bufferView": len(content["bufferViews"]) - 1,
+                "componentType": 5122,
+                "normalized": True,
+                "count": len(steps),
+                "type": "VEC3",
+                "min": steps.min(axis=0).tolist(),
+                "max": steps.max(axis=0).tolist(),
+            }
+            attributes["POSITION"] = len(content["accessors"])
+            content["accessors"].append(accessor)
+            node["scale"] = [scale] * 3
+        for key in ("extensionsUsed", "extensionsRequired"):
+            content.setdefault(key, []).append("KHR_mesh_quantization")
+
+    _changed(folder, change)
+
+
+#: what was done -> what one sentence says of it; an empty one: nothing
+DAMAGES: dict[Callable[[Path], None], str] = {
+    without_sidecar: "is missing",
+    garbage: "is no sidecar",
+    renamed: "names cards.glb",
+    other_levels: "its sidecar",
+    without_textures: "is missing",
+    without_index_buffer: "is missing",
+    reordered: "another program has changed",
+    without_unused: "another program has changed",
+    quantised: "",  # rounded to 65,536 steps: nothing that one sees
+}
+
+
+def damaged(folder: Path, target: Path, damage: Callable[[Path], None]) -> Path:
+    """A damaged copy of an export's files."""
+    shutil.rmtree(target, ignore_errors=True)
+    target.mkdir(parents=True)
+    for file in folder.iterdir():
+        if file.is_file():
+            shutil.copy2(file, target)
+    damage(target)
+    return target
