@@ -9,7 +9,7 @@ index, takes bone -1 for none, and gives strands beyond the last one the weights
 from __future__ import annotations
 
 import struct
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -36,6 +36,7 @@ class BoneWeights:
     names: of the bones.
     bone: (strand_count, 4) int32, indices into `names`, 0 where the weight is 0.
     weight: (strand_count, 4) float32, not negative, their sum is 1.
+    loose_count: strands that no bone carried, and that go with the first one.
 
     Raises:
         HairloomError: shapes that do not fit, an index that is no bone's, no sum of 1.
@@ -44,6 +45,7 @@ class BoneWeights:
     names: tuple[str, ...]
     bone: Ints
     weight: Floats
+    loose_count: int = 0
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "bone", np.ascontiguousarray(self.bone, np.int32))
@@ -100,7 +102,8 @@ def bones_at_roots(
         )
     corners = vertex_weights[triangles[strands.root_triangle]]
     weights = np.einsum("sc,scb->sb", strands.root_barycentric, corners)
-    return strongest_bones(names, weights)
+    loose = int((weights.sum(axis=1) <= 0.0).sum())
+    return replace(strongest_bones(names, weights), loose_count=loose)
 
 
 def write_tfxbone(path: Path, weights: BoneWeights, strand_count: int | None = None) -> None:

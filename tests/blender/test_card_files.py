@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import shutil
+import subprocess
+import sys
 import tempfile
 import zlib
 from collections.abc import Iterator
@@ -236,6 +238,43 @@ def test_a_folder_that_may_not_be_written_to_keeps_its_files(
             folder.chmod(0o755)
         assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
     assert "Permission denied" in capfd.readouterr().err
+
+
+@contextmanager
+def small_disk(folder: Path, size: int) -> Iterator[Path]:
+    """A disk of this many bytes."""
+    folder.mkdir()
+    command = ["mount", "-t", "tmpfs", "-o", f"size={size}", "none", str(folder)]
+    if subprocess.run(command, capture_output=True).returncode:
+        pytest.skip("nothing can be mounted here")
+    try:
+        yield folder
+    finally:
+        subprocess.run(["umount", str(folder)], check=True)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="disks are mounted as Linux does")
+@pytest.mark.parametrize("suffix", few_in_commits([".fbx", ".glb", ".obj", ".usdc"]))
+def test_a_disk_that_becomes_full_at_the_mesh_keeps_its_files(
+    tmp_path: Path, suffix: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """All textures fit, and half of the mesh; names have letters of two scripts."""
+    name = f"Zöpfe 头发{suffix}"
+    options = ("--textures", "dds", "--levels", "1", *BAKED, "--set", "atlas.size=256")
+    assert cards(tmp_path / name, *options) == 0
+    assert sidecar_of(tmp_path / name)["file"] == name
+    sizes = {path.name: path.stat().st_size for path in tmp_path.iterdir()}
+    kept = b"of another day"
+    pages = sum(-(-size // 4096) for file, size in sizes.items() if file != name)
+    pages += 1 + sizes[name] // 2 // 4096
+    with small_disk(tmp_path / "disk", 4096 * pages) as disk:
+        (disk / name).write_bytes(kept)
+        capfd.readouterr()
+        assert cards(disk / name, *options) == 1
+        assert {path.name: path.read_bytes() for path in disk.iterdir()} == {name: kept}
+    said = capfd.readouterr().err
+    assert "Traceback" not in said and said.count("cannot be written") == 1
+    assert f"{name}: this file cannot be written (No space left on device)" in said
 
 
 @contextmanager

@@ -79,6 +79,57 @@ def test_bones_are_left_out_where_they_are_not_wanted_or_not_there(
     assert {p.name for p in tmp_path.iterdir()} == {"a.tfx", "b.tfx"}
 
 
+@pytest.mark.parametrize(
+    ("renamed", "sentence"),
+    [
+        (("skull",), "strands, which go with jaw. Weight the head there"),
+        (("skull", "jaw"), "Head: no bone of Rig moves it, so no .tfxbone was written"),
+    ],
+    ids=["head", "all"],
+)
+def test_bones_that_were_renamed_are_told(
+    new_hair: Any,
+    sphere: Any,
+    tmp_path: Path,
+    told: Callable[[], str],
+    renamed: tuple[str, ...],
+    sentence: str,
+) -> None:
+    """As where a rig was made again: Blender renames the groups of its own bones."""
+    armature = skinned(sphere)
+    new_hair(sphere)
+    for name in renamed:
+        armature.data.bones[name].name = f"Kopf_{name}"
+        sphere.vertex_groups[f"Kopf_{name}"].name = name
+    bpy.ops.hairloom.export_tressfx(filepath=str(tmp_path / "hair.tfx"))
+    assert sentence in told()
+    assert (tmp_path / "hair.tfxbone").exists() == (renamed == ("skull",))
+
+
+def test_an_armature_that_is_scaled_by_100_changes_nothing(
+    new_hair: Any, sphere: Any, tmp_path: Path
+) -> None:
+    """As FBX files in centimetres come in: the armature is large, and the head in it small."""
+    armature = skinned(sphere)
+    new_hair(sphere)
+    bpy.ops.hairloom.export_tressfx(filepath=str(tmp_path / "hair.tfx"))
+    armature.scale = (100.0, 100.0, 100.0)
+    sphere.parent = armature
+    for vertex in sphere.data.vertices:
+        vertex.co *= 0.01
+    for point in bpy.data.objects["Hair"].data.points:
+        point.position *= 0.01
+        point.radius *= 0.01
+    bpy.context.view_layer.update()
+    bpy.ops.hairloom.export_tressfx(filepath=str(tmp_path / "large.tfx"))
+    before, after = (read_tfx(tmp_path / f"{name}.tfx").strands for name in ("hair", "large"))
+    np.testing.assert_allclose(after.points, before.points, atol=2e-6)
+    np.testing.assert_allclose(after.radius, before.radius, rtol=1e-4)
+    small, large = (read_tfxbone(tmp_path / f"{name}.tfxbone") for name in ("hair", "large"))
+    assert small.names == large.names
+    np.testing.assert_array_equal(small.bone, large.bone)
+
+
 def test_the_check_says_what_the_engine_will_see(
     new_hair: Any, sphere: Any, told: Callable[[], str]
 ) -> None:

@@ -7,8 +7,9 @@ as they are not asked to triangulate, which they need not: cards are triangles a
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager, redirect_stdout
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from dataclasses import dataclass
 from io import StringIO
 from pathlib import Path
@@ -21,6 +22,7 @@ from ...arrays import Floats
 from ...cards.card_mesh import CardMesh
 from ...errors import HairloomError
 from ...exchange.cards.card_formats import FBX, GLB, OBJ, USD, CardFormat
+from ...exchange.files.atomic import DISK_FULL, as_system_says, unwritable
 from ...exchange.files.names import plain_name
 from ...exchange.textures.srgb import srgb_decoded
 from ...strands.vectors import unit
@@ -79,15 +81,20 @@ def write_card_mesh(
     check_exporter(file_format, str(path))
     scene_of_cards = card_scene(levels, name, look, file_format, portable=portable, texels=texels)
     with scene_of_cards as scene, shown(scene):
+        said = StringIO()
         try:
-            with redirect_stdout(StringIO()):  # running commentary; errors go to stderr
+            with redirect_stdout(StringIO()), redirect_stderr(said):  # no running commentary
                 _EXPORTERS[file_format.name](path, portable)
         except RuntimeError as error:
+            if as_system_says(path, _reason(error)) == DISK_FULL:
+                raise unwritable(path, DISK_FULL) from error
+            print(said.getvalue(), end="", file=sys.stderr)
             raise HairloomError(
                 f"Blender's exporter of {file_format.title} failed ({_reason(error)})",
                 place=path.name,
                 remedy="Try another file name or folder",
             ) from error
+        print(said.getvalue(), end="", file=sys.stderr)
 
 
 def check_cards(levels: Sequence[CardMesh], place: str) -> None:

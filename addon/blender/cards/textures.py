@@ -140,7 +140,11 @@ def _together(
 def png_of(path: Path, pixels: Floats, *, is_color: bool = False) -> bytes:
     """(height, width, channels) as a PNG of 8 bits; `path` lies in the folder it may use."""
     picture = path.with_name(".picture.png")
-    write_texture(picture, pixels, is_color=is_color, depth="uint8", is_packed=True)
+    try:
+        write_texture(picture, pixels, is_color=is_color, depth="uint8", is_packed=True)
+    except HairloomError as error:  # of the file that it is for, not of one that nobody knows
+        place = error.place.replace(picture.name, path.name)
+        raise HairloomError(error.problem, place=place, remedy=error.remedy) from error
     data = picture.read_bytes()
     picture.unlink()
     return data

@@ -37,6 +37,18 @@ def has_bones(hair: bpy.types.Object) -> bool:
     return skin is not None and bool(_bone_names(skin))
 
 
+def unmoved_by(hair: bpy.types.Object) -> list[str]:
+    """A sentence where the head has an armature none of whose bones moves it."""
+    skin = head_of(hair)
+    armature = None if skin is None else skin.find_armature()
+    if skin is None or armature is None:
+        return []
+    return [
+        f"{skin.name}: no bone of {armature.name} moves it, so no .tfxbone was written. Give "
+        "vertex groups the names of their bones."
+    ]
+
+
 def _bone_names(skin: bpy.types.Object) -> tuple[str, ...]:
     """Deforming bones that have a vertex group, in the order of the groups."""
     armature = skin.find_armature()

@@ -22,7 +22,7 @@ from ...exchange.strand_writing import WrittenStrands, write_strands
 from ...exchange.tfxbone import BoneWeights
 from ..base.outcome import Outcome
 from ..base.thread_work import ThreadWork
-from ..scene.bone_weights import bones_of, has_bones
+from ..scene.bone_weights import bones_of, has_bones, unmoved_by
 from .groom_motion import Moving, common_rate, moving_hair, positions_of
 from .read_hair import ExportRequest, ExportStrands, still_hair
 
@@ -196,21 +196,33 @@ def _with_strands(groom: Groom, parts: str) -> Groom:
 def _bones(
     hair: list[bpy.types.Object], depsgraph: bpy.types.Depsgraph, outs: list[ExportStrands]
 ) -> tuple[BoneWeights | None, tuple[str, ...]]:
-    """The bones of all strands; none where some hair has no skinned head, which is reported."""
+    """The bones of all strands, none where some hair has no skinned head; and what is odd."""
     bones, without = [], []
+    notes: list[str] = []
     for each, out in zip(hair, outs, strict=True):
         own = bones_of(each, depsgraph, out.groom.strands)
         if own is None:
             without.append(each.name)
+            notes += unmoved_by(each)
         else:
             bones.append(own)
+            notes += _loose(each, own)
     if without and bones:
         names = ", ".join(without)
         return None, (
             f"{names}: no bone moves its head, so no .tfxbone was written. Write it to a file of "
             "its own.",
         )
-    return (joined_bones(bones) if bones else None), ()
+    return (joined_bones(bones) if bones else None), tuple(notes)
+
+
+def _loose(hair: bpy.types.Object, bones: BoneWeights) -> list[str]:
+    if not bones.loose_count:
+        return []
+    return [
+        f"{hair.name}: no bone moves the roots of {bones.loose_count} strands, which go with "
+        f"{bones.names[0]}. Weight the head there, and give vertex groups the names of their bones."
+    ]
 
 
 def _asked(thread: ThreadWork[Outcome], positions: Generator[Floats]) -> Iterator[Floats]:
