@@ -24,7 +24,7 @@ _AROUND = 16
 #: how far above the hair the eye may be, as z of a direction of unit length across; and how good
 #: it is to look from there
 _HEIGHTS = ((0.16, 1.0), (0.4, 0.92), (0.7, 0.8), (1.7, 0.6))
-#: one looks at a head from no higher than so many of these, if this much of its face is seen from
+#: one looks at a head from no higher than this many of these, if this much of its face is seen from
 #: its own height
 _LOW_HEIGHTS, _LEVEL_FACE = 2, 0.5
 #: a three-quarter view is turned by this from the front [rad]

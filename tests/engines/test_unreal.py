@@ -300,6 +300,13 @@ def test_a_mesh_that_another_program_reduced_is_named(
     assert "another program has changed" in warning and " 7, " in warning
 
 
+def test_levels_that_unreal_leaves_out_are_named(importer: ModuleType, asset: Asset) -> None:
+    plan = importlib.import_module("hairloom_plan")
+    whole = plan.plan_of(asset.folder / "cards.fbx")
+    finest = [whole.triangles[0]]
+    assert plan.found_triangles(whole, finest).endswith("taken 1 of its 3 levels")
+
+
 def test_a_project_that_cannot_be_written_is_named(
     importer: ModuleType, unreal: ModuleType, asset: Asset
 ) -> None:

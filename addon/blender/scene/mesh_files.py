@@ -68,7 +68,8 @@ def import_mesh_file(path: Path, scale: float = 1.0) -> tuple[bpy.types.Object, 
     """
     meshes = _imported(path)
     names = [each.name for each in meshes]
-    mesh = max(meshes, key=lambda each: len(each.data.vertices))
+    bpy.context.view_layer.update()
+    mesh = max(meshes, key=lambda each: max(each.dimensions))  # gives its name to all
     notes: tuple[str, ...] = ()
     if len(meshes) > 1:
         _join(mesh, meshes)

@@ -208,6 +208,8 @@ def found_triangles(plan: Plan, found: list[int]) -> str | None:
     """A sentence where the mesh that Unreal has is not the one that Hairloom wrote."""
     if tuple(found) == plan.triangles:
         return None
+    if tuple(found) == plan.triangles[: len(found)]:
+        return f"{plan.mesh}: Unreal has taken {len(found)} of its {len(plan.triangles)} levels"
     theirs, ours = (", ".join(map(str, counts)) for counts in (found, plan.triangles))
     return (
         f"{plan.mesh}: its levels have {theirs} triangles and those of its sidecar {ours}; another "
