@@ -24,6 +24,7 @@ from damaged_assets import (
     DAMAGES,
     damaged,
     other_levels,
+    quantised,
     renamed,
     reordered,
     without_index_buffer,
@@ -236,9 +237,12 @@ def _cut_off(folder: Path) -> None:
     glb.write_bytes(glb.read_bytes()[:5000])
 
 
-def _quantised(folder: Path) -> None:
+def _compressed(folder: Path) -> None:
+    """As by meshopt: the bytes lie in another buffer."""
     glb = glb_of(folder)
-    glb.write_bytes(glb.read_bytes().replace(b'"componentType":5126', b'"componentType":5122'))
+    content = glb.read_bytes().replace(b'"buffer":0,', b'"buffer":1,')
+    assert content != glb.read_bytes()
+    glb.write_bytes(content)
 
 
 def _garbage(folder: Path) -> None:
@@ -263,7 +267,7 @@ def _elsewhere(folder: Path) -> None:
         (_without_sidecar, "missing"),
         (other_levels, "which its sidecar names"),
         (_cut_off, "cut off"),
-        (_quantised, "compressed"),
+        (_compressed, "another program has changed it"),
         (_garbage, "no JSON"),
         (_newer, "update this package"),
         (_elsewhere, "lies elsewhere"),
@@ -300,6 +304,18 @@ def test_what_can_be_shown_is_shown(
     _, _, _, (_, back, front) = level(found, 0)
     has_own_order = damage in (renamed, without_textures)
     assert (back != front).any() == has_own_order
+
+
+def test_rounded_positions_are_where_they_were(
+    imported: Callable[..., dict[str, Any]], asset: Asset, hair: dict[str, Any]
+) -> None:
+    folder = damaged(asset.folder, OUTPUT / "unity_damaged", quantised)
+    found = imported(glb_of(folder))
+    assert not found["errors"] and not found["warnings"]
+    place, _, _, parts = level(found, 0)
+    expected, _, _, wanted = level(hair, 0)
+    assert 0.0 < np.abs(place - expected).max() < 0.1 / 32_000
+    np.testing.assert_array_equal(parts, wanted)
 
 
 @pytest.mark.parametrize("entry", ENTRIES)

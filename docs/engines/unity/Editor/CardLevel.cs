@@ -85,11 +85,12 @@ namespace Hairloom
         }
     }
 
-    /// A binary glTF file as Hairloom writes it: plain floats, one primitive for each level.
+    /// A binary glTF file as Hairloom writes it: one primitive for each level, floats or rounded numbers.
     sealed class Glb
     {
         const uint Magic = 0x46546C67, JsonChunk = 0x4E4F534A;
-        const int Float = 5126, UnsignedShort = 5123, UnsignedInt = 5125;
+        const int Byte = 5120, UnsignedByte = 5121, Short = 5122, UnsignedShort = 5123;
+        const int UnsignedInt = 5125, Float = 5126;
         const string Changed = "another program has changed it since; use the file that Hairloom wrote";
 
         readonly string path;
@@ -129,7 +130,8 @@ namespace Hairloom
 
         public CardLevel Level(SidecarLevel expected)
         {
-            var mesh = At(document.meshes, Named(expected.node).mesh);
+            var node = Named(expected.node);
+            var mesh = At(document.meshes, node.mesh);
             if (mesh.primitives == null || mesh.primitives.Length != 1)
                 throw Fault(Changed);
             var corners = mesh.primitives[0].attributes;
@@ -152,7 +154,7 @@ namespace Hairloom
             return new CardLevel
             {
                 Name = expected.node,
-                Positions = Made(count, i => Vector(position, 3 * i)),
+                Positions = Made(count, i => Vector(Placed(position, 3 * i, node), 0)),
                 Normals = Made(count, i => Vector(normal, 3 * i)),
                 Places = Made(count, i => new Vector2(place[2 * i], 1.0f - place[2 * i + 1])),
                 Occlusion = Made(count, i => new Vector2(occlusion[2 * i], occlusion[2 * i + 1])),
@@ -192,6 +194,12 @@ namespace Hairloom
             return made;
         }
 
+        /// Rounded positions are scaled back by their node.
+        static float[] Placed(float[] values, int first, Node node)
+        {
+            return Made(3, k => values[first + k] * node.scale[k] + node.translation[k]);
+        }
+
         static Vector3 Vector(float[] values, int first)
         {
             return new Vector3(-values[first], values[first + 1], values[first + 2]);
@@ -210,14 +218,47 @@ namespace Hairloom
                 ?? throw Fault($"it has no {name}, which its sidecar names; {Changed}");
         }
 
+        /// Numbers of an accessor, also those that another program has rounded (KHR_mesh_quantization).
         float[] Floats(int number, string type)
         {
             var accessor = At(document.accessors, number);
-            if (accessor.componentType != Float || accessor.type != type)
-                throw Fault($"its vertices are compressed; {Changed}");
-            var values = new float[accessor.count * (type[3] - '0')];
-            Buffer.BlockCopy(bytes, Start(accessor, 4 * values.Length), values, 0, 4 * values.Length);
-            return values;
+            if (accessor.type != type)
+                throw Fault(Changed);
+            var width = type[3] - '0';
+            var size = SizeOf(accessor.componentType);
+            var stride = StrideOf(accessor, width * size);
+            var start = Start(accessor, stride, width * size);
+            return Made(accessor.count * width, i =>
+                Number(start + i / width * stride + i % width * size, accessor));
+        }
+
+        int SizeOf(int componentType)
+        {
+            switch (componentType)
+            {
+                case Byte: case UnsignedByte: return 1;
+                case Short: case UnsignedShort: return 2;
+                case Float: return 4;
+                default: throw Fault($"its vertices are compressed; {Changed}");
+            }
+        }
+
+        float Number(int place, Accessor accessor)
+        {
+            switch (accessor.componentType)
+            {
+                case Byte: return Scaled((sbyte)bytes[place], sbyte.MaxValue, accessor.normalized);
+                case UnsignedByte: return Scaled(bytes[place], byte.MaxValue, accessor.normalized);
+                case Short: return Scaled(BitConverter.ToInt16(bytes, place), short.MaxValue, accessor.normalized);
+                case UnsignedShort:
+                    return Scaled(BitConverter.ToUInt16(bytes, place), ushort.MaxValue, accessor.normalized);
+                default: return BitConverter.ToSingle(bytes, place);
+            }
+        }
+
+        static float Scaled(int value, int most, bool isNormalized)
+        {
+            return isNormalized ? Math.Max(value / (float)most, -1.0f) : value;
         }
 
         int[] Indices(int number)
@@ -225,19 +266,26 @@ namespace Hairloom
             var accessor = At(document.accessors, number);
             if (accessor.componentType != UnsignedShort && accessor.componentType != UnsignedInt)
                 throw Fault($"its triangles are compressed; {Changed}");
-            var isShort = accessor.componentType == UnsignedShort;
-            var start = Start(accessor, (isShort ? 2 : 4) * accessor.count);
-            return Made(accessor.count, i => isShort
+            var size = accessor.componentType == UnsignedShort ? 2 : 4;
+            var start = Start(accessor, size, size);
+            return Made(accessor.count, i => size == 2
                 ? BitConverter.ToUInt16(bytes, start + 2 * i)
                 : (int)BitConverter.ToUInt32(bytes, start + 4 * i));
         }
 
-        int Start(Accessor accessor, long size)
+        int StrideOf(Accessor accessor, int size)
+        {
+            var stride = At(document.bufferViews, accessor.bufferView).byteStride;
+            return stride == 0 ? size : stride;
+        }
+
+        int Start(Accessor accessor, int stride, int size)
         {
             var view = At(document.bufferViews, accessor.bufferView);
             var first = (long)view.byteOffset + accessor.byteOffset;
-            if (view.byteStride != 0 || size < 0 || first < 0 || accessor.byteOffset + size > view.byteLength
-                || binary + first + size > bytes.Length)
+            var length = accessor.count == 0 ? 0 : (long)stride * (accessor.count - 1) + size;
+            if (view.buffer != 0 || stride < size || length < 0 || first < 0
+                || accessor.byteOffset + length > view.byteLength || binary + first + length > bytes.Length)
                 throw Fault(Changed);
             return (int)(binary + first);
         }
@@ -267,6 +315,7 @@ namespace Hairloom
         {
             public string name;
             public int mesh = -1;
+            public float[] scale = { 1.0f, 1.0f, 1.0f }, translation = { 0.0f, 0.0f, 0.0f };
             public Extras extras;
         }
 
@@ -299,13 +348,14 @@ namespace Hairloom
         sealed class Accessor
         {
             public int bufferView = -1, byteOffset, componentType, count;
+            public bool normalized;
             public string type;
         }
 
         [Serializable]
         sealed class BufferView
         {
-            public int byteOffset, byteLength, byteStride;
+            public int buffer, byteOffset, byteLength, byteStride;
         }
 #pragma warning restore 649
     }
