@@ -1,10 +1,39 @@
 // The detail factors of each strand's segments in one view, and its pieces in all, 0 where the head
 // hides it, and how far it is on average; one invocation a strand. MODE and CULLING are the
 // choices of DetailSettings.
+//
+// COUNTED: also what the strand asks for, see addon/render/detail_slots.py: x half its mean width in pixels,
+// y fragments that it may have at most, z of these those that a strand without a width has, w as many as one
+// would have that is no thinner than THIN_STRAND.
 #include "lib_strand_texel.glsl"
 #include "lib_culling.glsl"
 #include "lib_detail.glsl"
 #include "lib_detail_packing.glsl"
+
+#if COUNTED
+// An upper bound of a segment's length in the picture [pixels].
+float length_in_picture(Control control)
+{
+  vec2 half_size = seen.picture.xy;
+  float most = 2.0 * (half_size.x + half_size.y);
+  if (min(min(control.b0.w, control.b1.w), min(control.b2.w, control.b3.w)) < NEAREST) {
+    return most;
+  }
+  vec2 p0 = control.b0.xy / control.b0.w, p1 = control.b1.xy / control.b1.w;
+  vec2 p2 = control.b2.xy / control.b2.w, p3 = control.b3.xy / control.b3.w;
+  float size = length(half_size * (p1 - p0)) + length(half_size * (p2 - p1)) + length(half_size * (p3 - p2));
+  return min(size, most);
+}
+
+// Pixels that a ribbon covers a fraction of: it reaches their centres from coverage_reach() beyond its edges,
+// at most.
+const float EDGES = 2.0 * 0.7072;
+
+float pixels_covered(float pixels_long, float half_width)
+{
+  return pixels_long * (2.0 * half_width + EDGES);
+}
+#endif
 
 void main()
 {
@@ -24,6 +53,10 @@ void main()
   float angle_from = 0.0;
   int total = 0;
   float depth = clip_from.z + clip_to.z;
+#if COUNTED
+  float widening = texelFetch(strand_widths, strand_texel(strand, 0, 1), 0).x;
+  float width_sum = 0.0, strand_long = 0.0, fragments = 0.0, thick_fragments = 0.0;
+#endif
 #if CULLING == {{culling_hidden}}
   uint hiding = shades_over(from, (1u << uint(seen.center.w)) - 1u, seen);
 #endif
@@ -64,6 +97,16 @@ void main()
       pieces = is_outside(control) ? 1 : pieces;
 #endif
       total += pieces;
+#if COUNTED
+      float radius = max(texelFetch(cv_points, span_texel(span, segment), 0).w,
+                         texelFetch(cv_points, span_texel(span, segment + 1), 0).w);
+      float half_width = widening * radius * seen.picture.w / max(min(clip_from.w, clip_to.w), NEAREST);
+      float pixels_long = is_outside(control) ? 0.0 : length_in_picture(control);
+      width_sum += half_width;
+      strand_long += pixels_long;
+      fragments += pixels_covered(pixels_long, half_width);
+      thick_fragments += pixels_covered(pixels_long, max(half_width, {{thin_strand}}));
+#endif
       words[index >> 2] += uint(pieces - 1) << uint((index & 3) << 3);
 
       from = to;
@@ -79,6 +122,10 @@ void main()
   total = hiding != 0u ? 0 : total;
 #elif CULLING == {{culling_away}}
   total = faces_away(root, seen) ? 0 : total;
+#endif
+#if COUNTED
+  vec4 wanted_by = vec4(width_sum / float(last), fragments, strand_long * EDGES, thick_fragments);
+  imageStore(asked, strand_texel(strand, 0, 1), wanted_by);
 #endif
 #if MODE == {{mode_fixed}}
   depth = 0.0;  // where no strand is left out there is one draw, in which strands keep their order

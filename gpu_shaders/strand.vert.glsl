@@ -1,7 +1,8 @@
 // Strands, vertex stage: one instance a strand, no vertex attributes.
 //
 // ADAPTIVE 0: every segment has `subdivisions` pieces. ADAPTIVE 1: instances are strands in the
-// order of detail_pass.py, their stations as its factors say.
+// order of detail_pass.py, their stations as its factors say. IN_SLOTS: instances are parts of strands, see
+// detail_slots.py.
 //
 // COVERED: ribbons as wide as strands are, and as much wider as to reach all pixels that they cover a
 // fraction of. GATHERED: what it takes to find a fragment's looks later, in place of the looks.
@@ -11,19 +12,29 @@
 #if COVERED
 #  include "lib_coverage.glsl"
 #endif
+#if IN_SLOTS
+#  include "lib_detail_slots.glsl"
+#endif
 
 void main()
 {
   int station = gl_VertexID >> 1;
   float side = float(gl_VertexID & 1) * 2.0 - 1.0;
 #if ADAPTIVE
+#  if IN_SLOTS
+  DetailSlot slot = unpacked_slot(texelFetch(slots, strand_texel(gl_InstanceID, 0, 1), 0));
+  int strand = slot.strand, strand_pieces = slot.pieces;
+  float widening = slot.widening;
+  station = slot_station(slot, station, slot_pieces);
+#  else
   // x the strand, y its pieces, z factor of its width
   vec4 drawn = texelFetch(order, strand_texel(first_instance + gl_InstanceID, 0, 1), 0);
-  int strand = int(drawn.x);
+  int strand = int(drawn.x), strand_pieces = int(drawn.y);
   float widening = drawn.z;
+#  endif
   StrandSpan span = strand_span(strand_spans, strand);
   int texels = factor_texels(span.count);
-  StationSearch search = start_search(station, int(drawn.y));
+  StationSearch search = start_search(station, strand_pieces);
   for (int texel = 0; texel < texels; texel++) {
     search_factors(search, texelFetch(factors, counted_texel(span.factors + texel), 0));
   }

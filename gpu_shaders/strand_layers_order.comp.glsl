@@ -193,12 +193,12 @@ void keep_some(uint sorted, float covered)
 
 void main()
 {
-  ivec2 place = ivec2(gl_GlobalInvocationID.xy);
-  int width = imageSize(layer_pixels).x;
-  if (place.x >= width || place.x + place.y * width >= pixel_count) {
+  int at = int(gl_GlobalInvocationID.x) + int(gl_GlobalInvocationID.y) * {{layer_row}};
+  if (gl_GlobalInvocationID.x >= {{layer_row}}u || at >= int(imageLoad(layer_count, ivec2(1, 0)).x)) {
     return;
   }
-  uint packed_pixel = imageLoad(layer_pixels, place).x;
+  int width = imageSize(layer_pixels).x;
+  uint packed_pixel = imageLoad(layer_pixels, ivec2(at % width, at / width)).x;
   ivec2 pixel = ivec2(int(packed_pixel & 0xFFFFu), int(packed_pixel >> 16u));
   uint head = imageLoad(layer_heads, pixel).x;
   uvec4 nearest[LAYERS];
@@ -248,10 +248,10 @@ void main()
   imageStore(layer_fronts, pixel, vec4(front, 1.0 - behind_all, 0.0, 0.0));
   imageStore(layer_heads, pixel, uvec4(kept[0]));
   // no walk along the list, which might end too early: what is in it but not seen is no colour
-  uint at = imageAtomicAdd(layer_count, ivec2(2, 0), uint(kept_count)) + 1u;
+  uint first_seen = imageAtomicAdd(layer_count, ivec2(2, 0), uint(kept_count)) + 1u;
   for (int i = 0; i < LAYERS; i++) {
     if (i < kept_count) {
-      imageStore(layer_seen, layer_texel(at + uint(i)), uvec4(kept[i]));
+      imageStore(layer_seen, layer_texel(first_seen + uint(i)), uvec4(kept[i]));
     }
   }
 }

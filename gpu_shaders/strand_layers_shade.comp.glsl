@@ -1,16 +1,27 @@
-// Strands as layers, third step: the nodes that are seen, one an invocation. What tells a node's
-// colour gives way to the colour itself: yzw, as floats' bits, times its fraction of the pixel's light.
+// Strands as layers, third step: the nodes that are seen, as many as the GPU has counted, whatever the
+// number of invocations. What tells a node's colour gives way to the colour itself: yzw, as floats' bits,
+// times its fraction of the pixel's light.
+//
+// All invocations do equally many rounds, with nothing in some of them: a software driver fails, or takes
+// as long, where those that are idle leave a loop.
 #include "lib_layer_radiance.glsl"
 #include "lib_layer_packing.glsl"
 
 void main()
 {
-  ivec2 place = ivec2(gl_GlobalInvocationID.xy);
-  if (place.x + place.y * {{layer_row}} >= seen_count) {
-    return;
-  }
-  ivec2 texel = layer_texel(imageLoad(layer_seen, place).x);
-  uvec4 node = imageLoad(layer_nodes, texel);
-  vec3 light = uintBitsToFloat(node.y) * layer_radiance(int(node.z), layer_place(node.w));
-  imageStore(layer_nodes, texel, uvec4(node.x, floatBitsToUint(light)));
+  int across = int(gl_NumWorkGroups.x * gl_WorkGroupSize.x);
+  int all = across * int(gl_NumWorkGroups.y);
+  int own = int(gl_GlobalInvocationID.x) + int(gl_GlobalInvocationID.y) * across;
+  int seen_count = int(imageLoad(layer_count, ivec2(2, 0)).x);
+  int begin = 0;
+  do {
+    bool is_seen = begin + own < seen_count;
+    ivec2 texel = layer_texel(imageLoad(layer_seen, layer_texel(uint(begin + own + 1))).x);
+    uvec4 node = is_seen ? imageLoad(layer_nodes, texel) : uvec4(0u);
+    vec3 light = uintBitsToFloat(node.y) * layer_radiance(int(node.z), layer_place(node.w));
+    if (is_seen) {
+      imageStore(layer_nodes, texel, uvec4(node.x, floatBitsToUint(light)));
+    }
+    begin += all;
+  } while (begin < seen_count);
 }

@@ -10,27 +10,31 @@ Two steps, with a texel a strand as strand_layout.strand_rows has them, but for 
     totals  RG32F:   x pieces of the whole strand, 0 where it is not drawn; y its mean depth
     order   RGBA32F: x a strand that is drawn, y its pieces, z factor of its width; those of a class
                      lie side by side
+
+What moves in a view that was at rest before does not wait for the totals, see detail_slots.py.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from typing import Any
 
 import gpu
 import numpy as np
 
-from ..arrays import Floats
+from ..arrays import Floats, Ints
 from ..params.glsl import struct_values
 from ..refine.culling import shades_of
-from ..refine.detail import PictureView
+from ..refine.detail import NEAREST, PictureView
 from ..refine.settings import DetailSettings
 from ..refine.thinning import Thinning, thinning, width_factor
 from ..strands.arc_length import steps
 from . import gpu_objects
 from .camera import Camera
 from .detail_classes import DetailClass, detail_classes
+from .detail_slots import DetailSlots
+from .known_detail import KnownDetail, best_slot_pieces
 from .shader_program import ShaderRecipe, program
 from .shader_source import DETAIL_CHOICES, SHADE_CAPACITY
 from .snapshot import Snapshot
@@ -42,9 +46,13 @@ EDGE = 0.75
 _BLOCKS = (("DetailView", "seen"), ("DetailSettings", "detail"))
 
 
-def detail_recipe(mode: str, culling: str) -> ShaderRecipe:
-    """The program of one choice of each: a software driver computes all branches of a shader."""
-    return ShaderRecipe(
+def detail_recipe(mode: str, culling: str, *, counted: bool = False) -> ShaderRecipe:
+    """The program of one choice of each: a software driver computes all branches of a shader.
+
+    Args:
+        counted: what strands ask for as well, see detail_slots.py.
+    """
+    recipe = ShaderRecipe(
         name=f"detail_{mode}_{culling}",
         compute="detail.comp.glsl",
         structs=("struct_detail.glsl",),
@@ -57,7 +65,16 @@ def detail_recipe(mode: str, culling: str) -> ShaderRecipe:
         defines=(
             ("MODE", DETAIL_CHOICES["mode"].index(mode)),
             ("CULLING", DETAIL_CHOICES["culling"].index(culling)),
+            ("COUNTED", int(counted)),
         ),
+    )
+    if not counted:
+        return recipe
+    return replace(
+        recipe,
+        name=f"{recipe.name}_counted",
+        textures=(*recipe.textures, ("FLOAT_2D", "strand_widths")),
+        images=(*recipe.images, ("RGBA32F", "asked")),
     )
 
 
@@ -67,24 +84,27 @@ class DetailOrder:
 
     factors, order: textures as above; None where all segments have equally many pieces.
     classes: the draws that it needs.
-    pieces: of all strands.
+    strands, pieces: how many are drawn; of what moves, how many were at rest.
     subdivisions: pieces of each segment, where all have equally many; else 0.
+    slots: texture in place of the order, for what moves; one class is all of them.
     """
 
     factors: Any
     order: Any
     classes: tuple[DetailClass, ...]
+    strands: int
     pieces: int
     subdivisions: int = 0
+    slots: Any = None
 
 
 class DetailPass:
     """The detail of one groom in the view that was asked for last. Making one touches no GPU."""
 
     def __init__(self) -> None:
-        self._asked: tuple[Any, ...] = ()
-        self._order: DetailOrder | None = None
-        self._totals: Any = None
+        self._asked: tuple[Any, ...]
+        self._order: DetailOrder | None
+        self._known: KnownDetail | None
         self._extent: GroomExtent | None = None
         self.release()
 
@@ -97,6 +117,8 @@ class DetailPass:
         size: tuple[int, int],
         *,
         by_depth: bool = True,
+        counted: bool = False,
+        room: Callable[[int], int] | None = None,
     ) -> DetailOrder:
         """What is to be drawn; computed only where something is new since the last time.
 
@@ -105,6 +127,9 @@ class DetailPass:
             serial: grows whenever one of them is another one or is written.
             size: width and height of the final picture [pixels].
             by_depth: near strands come first; else their order is no matter.
+            counted: what strands ask for is counted, so that they may move next.
+            room: for what moves, see `may_move`: makes room for this many fragments, and says how
+                many have some. The GPU is not waited for.
 
         Raises:
             ShaderError: the shader does not compile here.
@@ -115,21 +140,42 @@ class DetailPass:
         culling = "none" if snapshot.detail.culling == "hidden" else snapshot.detail.culling
         culling = "hidden" if len(shades) else culling
         is_even = snapshot.detail.mode == "fixed" and bool(snapshot.layout.cv_count)
-        if is_even and culling == "none" and thinned == Thinning():
+        if is_even and culling == "none" and thinned == Thinning() and not counted:
             return _even_order(snapshot)
-        seen = _view_values(view, camera, snapshot.root_center, shades)
-        asked = (serial, seen.tobytes(), snapshot.detail, thinned, self._extent, by_depth)
-        if self._order is None or self._asked != asked:
-            recipe = detail_recipe(snapshot.detail.mode, culling)
-            factors, totals = self._computed(recipe, snapshot, points, seen)
-            self._order = _ordered(factors, totals, _widths(snapshot, thinned), by_depth)
-            self._asked = asked
-        return self._order
+        known = None if room is None else self._known
+        scale = _pixels_per_metre(view, snapshot.root_center)
+        needs: tuple[Any, ...] = by_depth, counted
+        if known is not None and room is not None:
+            needs = known.slots_at(scale), room(known.fragments_at(scale))
+        seen = _view_values(view, camera, snapshot, shades)
+        asked = (serial, seen.tobytes(), snapshot.detail, thinned, self._extent, *needs)
+        if self._order is not None and self._asked == asked:
+            return self._order
+        recipe = detail_recipe(snapshot.detail.mode, culling, counted=counted)
+        slot_pieces = 1 if known is None else known.slot_pieces
+        self._compute(recipe, snapshot, points, seen, thinned, slot_pieces)
+        if known is not None:
+            order = self._moving(known, *needs)
+        else:
+            totals = self._read_totals(snapshot.strand_count)
+            widths = _widths(snapshot, thinned)
+            order = _ordered(self._factors, totals, widths, by_depth)
+            self._known = self._counted(snapshot, totals, widths, scale) if counted else None
+        self._order, self._asked = order, asked
+        return order
+
+    def may_move(self, snapshot: Snapshot) -> bool:
+        """Whether enough was counted of these strands to draw them while they move."""
+        return self._known is not None and self._known.is_of(snapshot.layout, snapshot.detail)
 
     def release(self) -> None:
         """Let go of all that lies on the GPU; the next order is computed again."""
         self._blocks = {name: UniformBlock() for _, name in _BLOCKS}
-        self._asked, self._order, self._totals = (), None, None
+        self._asked, self._order, self._known = (), None, None
+        self._factors: Any = None
+        self._totals: Any = None
+        self._slots = DetailSlots()
+        self._strand_widths: tuple[Any, ...] = ()
 
     def _thinned(self, snapshot: Snapshot, view: PictureView) -> Thinning:
         if snapshot.rank is None or snapshot.detail.lod_height <= 0.0:
@@ -138,37 +184,80 @@ class DetailPass:
             self._extent = GroomExtent.of(snapshot)
         return self._extent.thinning(snapshot, view)
 
-    def _computed(
-        self, recipe: ShaderRecipe, snapshot: Snapshot, points: Mapping[str, Any], seen: Floats
-    ) -> tuple[Any, Floats]:
-        """The texture of factors, and pieces and depth of each strand (strand_count, 2)."""
+    def _compute(
+        self,
+        recipe: ShaderRecipe,
+        snapshot: Snapshot,
+        points: Mapping[str, Any],
+        seen: Floats,
+        thinned: Thinning,
+        slot_pieces: int,
+    ) -> None:
+        """The textures of factors and totals, and what strands ask for where that is counted."""
         count = snapshot.strand_count
-        factors, totals = self._targets(snapshot.layout)
+        self._fit(snapshot.layout)
+        textures = {name: points[name] for name in ("cv_points", "strand_spans")}
+        images = {"factors": self._factors, "totals": self._totals}
+        is_counted = recipe.images[-1][1] == "asked"
+        if is_counted:
+            textures["strand_widths"] = self._widths_texture(snapshot, thinned)
+            images["asked"] = self._slots.asked(count)
         shader = program(recipe)
         shader.bind(
             blocks={
                 "seen": self._blocks["seen"].holding(seen),
                 "detail": self._blocks["detail"].holding(struct_values(snapshot.detail)),
             },
-            textures={name: points[name] for _, name in recipe.textures},
-            images={"factors": factors, "totals": totals},
+            textures=textures,
+            images=images,
             integers={"strand_count": count},
         )
         across, _ = recipe.group_size
         gpu.compute.dispatch(shader.shader, -(-count // across), 1, 1)
         gpu.shader.unbind()
-        return factors, from_strand_rows(texture_to_array(totals), count, 1).reshape(count, 2)
+        if is_counted:
+            self._slots.count(self._totals, textures["strand_widths"], count, slot_pieces)
 
-    def _targets(self, layout: StrandLayout) -> tuple[Any, Any]:
+    def _read_totals(self, count: int) -> Floats:
+        """Pieces and depth of each strand (strand_count, 2); waits for the GPU."""
+        return from_strand_rows(texture_to_array(self._totals), count, 1).reshape(count, 2)
+
+    def _counted(
+        self, snapshot: Snapshot, totals: Floats, widths: Floats, scale: float
+    ) -> KnownDetail:
+        """What is known for the next frames."""
+        pieces = _drawn_pieces(totals, widths)
+        slot_pieces, slots = best_slot_pieces(pieces)
+        fragments = self._slots.demanded()[2]
+        strands = int(np.count_nonzero(pieces))
+        return KnownDetail(
+            *(snapshot.layout, snapshot.detail, scale, slot_pieces, slots, fragments),
+            *(strands, int(pieces.sum(dtype=np.int64))),
+        )
+
+    def _moving(self, known: KnownDetail, slot_count: int, capacity: int) -> DetailOrder:
+        """As many slots as may be needed, filled by the GPU."""
+        slots = self._slots.filled(slot_count, capacity)
+        drawn = DetailClass(known.slot_pieces, 0, slot_count)
+        counts = known.strands, known.pieces
+        return DetailOrder(self._factors, None, (drawn,), *counts, slots=slots)
+
+    def _widths_texture(self, snapshot: Snapshot, thinned: Thinning) -> Any:
+        """Factor of each strand's width, a texel a strand."""
+        made_of = snapshot.rank, thinned, snapshot.strand_count
+        kept = self._strand_widths
+        if not kept or kept[0] is not made_of[0] or kept[1:3] != made_of[1:]:
+            widths = _widths(snapshot, thinned)[:, None, None]
+            self._strand_widths = (*made_of, texture_from(strand_rows(widths), "R32F"))
+        return self._strand_widths[-1]
+
+    def _fit(self, layout: StrandLayout) -> None:
         """Textures that the shader writes, those of the last time if they fit."""
-        sizes = [layout.factor_size, strand_rows_size(layout.strand_count, 1)]
-        if self._order is not None:
-            kept = self._order.factors, self._totals
-            if [(texture.width, texture.height) for texture in kept] == sizes:
-                return kept
-        factors = gpu_objects.texture(sizes[0], format="RGBA32F")
-        self._totals = gpu_objects.texture(sizes[1], format="RG32F")
-        return factors, self._totals
+        sizes = layout.factor_size, strand_rows_size(layout.strand_count, 1)
+        kept = self._factors, self._totals
+        if None in kept or tuple((each.width, each.height) for each in kept) != sizes:
+            self._factors = gpu_objects.texture(sizes[0], format="RGBA32F")
+            self._totals = gpu_objects.texture(sizes[1], format="RG32F")
 
 
 @dataclass(frozen=True, eq=False)
@@ -212,7 +301,8 @@ def _even_order(snapshot: Snapshot) -> DetailOrder:
     subdivisions = min(snapshot.detail.subdivisions, snapshot.detail.max_subdivisions)
     pieces = (snapshot.layout.cv_count - 1) * subdivisions
     drawn = DetailClass(pieces, 0, snapshot.strand_count)
-    return DetailOrder(None, None, (drawn,), pieces * snapshot.strand_count, subdivisions)
+    counts = snapshot.strand_count, pieces * snapshot.strand_count
+    return DetailOrder(None, None, (drawn,), *counts, subdivisions)
 
 
 def _widths(snapshot: Snapshot, thinned: Thinning) -> Floats:
@@ -224,12 +314,17 @@ def _widths(snapshot: Snapshot, thinned: Thinning) -> Floats:
 
 def _ordered(factors: Any, totals: Floats, widths: Floats, by_depth: bool) -> DetailOrder:
     """The strands that have pieces and a width, in classes."""
-    pieces = np.where(widths > 0.0, totals[:, 0], 0.0)
-    drawn, classes = detail_classes(pieces.astype(np.int32), totals[:, 1] if by_depth else None)
+    pieces = _drawn_pieces(totals, widths)
+    drawn, classes = detail_classes(pieces, totals[:, 1] if by_depth else None)
     order = np.zeros((len(drawn), 1, 4), np.float32)
     order[:, 0, 0], order[:, 0, 1], order[:, 0, 2] = drawn, pieces[drawn], widths[drawn]
     texture = texture_from(strand_rows(order), "RGBA32F") if classes else None
-    return DetailOrder(factors, texture, classes, int(pieces.sum(dtype=np.int64)))
+    return DetailOrder(factors, texture, classes, len(drawn), int(pieces.sum(dtype=np.int64)))
+
+
+def _drawn_pieces(totals: Floats, widths: Floats) -> Ints:
+    """Of each strand, 0 where it is not drawn."""
+    return np.where(widths > 0.0, totals[:, 0], 0.0).astype(np.int32)
 
 
 def _shades(snapshot: Snapshot, view: PictureView, widening: float) -> Floats:
@@ -247,10 +342,21 @@ def _shades(snapshot: Snapshot, view: PictureView, widening: float) -> Floats:
     return packed
 
 
-def _view_values(view: PictureView, camera: Camera, center: Floats, shades: Floats) -> Floats:
+def _view_values(view: PictureView, camera: Camera, snapshot: Snapshot, shades: Floats) -> Floats:
     """`DetailView` in std140, (28 + 12 SHADE_CAPACITY,); GLSL's matrices are stored by columns."""
     space = np.zeros(12 * SHADE_CAPACITY)
     space[: shades.size] = shades.ravel()
-    picture, middle = [*view.half_size, 0.0, 0.0], [*center, len(shades)]
+    fullness = snapshot.strand_settings.fullness * _focal_length(view)
+    picture, middle = [*view.half_size, 0.0, fullness], [*snapshot.root_center, len(shades)]
     values: list[Any] = [view.view_projection.T.ravel(), camera.eye, picture, middle, space]
     return np.concatenate(values).astype(np.float32)
+
+
+def _focal_length(view: PictureView) -> float:
+    """Pixels of a metre at a depth of 1, as clip space's w has it."""
+    return float(view.projection[1, 1]) * view.half_size[1]
+
+
+def _pixels_per_metre(view: PictureView, place: Floats) -> float:
+    depth = float(view.view_projection[3] @ [*place, 1.0])
+    return _focal_length(view) / max(abs(depth), NEAREST)

@@ -54,11 +54,7 @@ class KeptPicture:
 
     def is_of(self, marks: tuple[Any, ...]) -> bool:
         """Whether it was drawn of the same objects and of equal numbers."""
-        return (
-            bool(self.marks)
-            and len(self.marks) == len(marks)
-            and all(a is b or a == b for a, b in zip(self.marks, marks, strict=True))
-        )
+        return are_same(self.marks, marks)
 
     def begin(self) -> None:
         """An empty picture, as large as the viewport reaches."""
@@ -97,3 +93,12 @@ class KeptPicture:
             integers={"writes_depth": int(writes_depth)},
         )
         self._triangle.draw(shader.shader)
+
+
+def are_same(marks: tuple[Any, ...], others: tuple[Any, ...]) -> bool:
+    """Whether both are of the same objects and of equal numbers; no marks are of nothing."""
+    return (
+        bool(marks)
+        and len(marks) == len(others)
+        and all(a is b or a == b for a, b in zip(marks, others, strict=True))
+    )

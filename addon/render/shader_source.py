@@ -74,6 +74,8 @@ LAYER_TEXEL_CAPACITY = 18
 START_SCALE = float(1 << 24)
 #: Strands' fragments in one row of the texture that holds the lists of all pixels.
 LAYER_ROW = 4096
+#: [pixels] half the width up to which a strand is made wider for others that are not drawn
+THIN_STRAND = 1.5
 #: binary digits of how many layers a pixel may have
 LIST_DIGITS = 26
 #: Triangles, seams and copies of seams' ends in one row of the textures of skin.
@@ -168,6 +170,7 @@ CONSTANTS: Mapping[str, str] = MappingProxyType(
         "unseen_fraction": repr(UNSEEN_FRACTION),
         "list_digits": str(LIST_DIGITS),
         "depth_end": str(DEPTH_END),
+        "thin_strand": repr(THIN_STRAND),
         "skin_triangles_across": str(SKIN_TRIANGLES_ACROSS),
         "skin_seams_across": str(SKIN_SEAMS_ACROSS),
         "skin_copies_across": str(SKIN_COPIES_ACROSS),

@@ -23,7 +23,7 @@ _SETTINGS = (StrandSettings, ShadingSettings)
 #: of shading, for programs without the features that turn these on
 _PLAIN = (("MARSCHNER", 0), ("SHADOWS", 0), ("SCATTERING", 0))
 #: of strand.vert.glsl, likewise
-_WHOLE = (("ADAPTIVE", 0), ("DEBUG", 0), ("UNEVEN", 0))
+_WHOLE = (("ADAPTIVE", 0), ("IN_SLOTS", 0), ("DEBUG", 0), ("UNEVEN", 0))
 _VARYINGS = (
     ("smooth", "VEC3", "strand_point"),
     ("smooth", "VEC3", "strand_tangent"),
@@ -99,8 +99,11 @@ _SHADE_RECIPE = ShaderRecipe(
     compute="strand_layers_shade.comp.glsl",
     structs=_STRUCTS,
     settings=_SETTINGS,
-    images=(("R32UI", "layer_seen", "READ"), ("RGBA32UI", "layer_nodes", "READ_WRITE")),
-    integers=("seen_count",),
+    images=(
+        ("R32UI", "layer_count", "READ"),
+        ("R32UI", "layer_seen", "READ"),
+        ("RGBA32UI", "layer_nodes", "READ_WRITE"),
+    ),
     group_size=(64, 1),
     defines=(*_PLAIN, ("UNEVEN", 0)),
 )
@@ -172,10 +175,9 @@ class StrandDrawing:
         """How many fragments the list of each pixel would have, into its head."""
         self._draw(self._bound(_COUNT_RECIPE, [*self.points, self._detail], images, {}))
 
-    def shade(self, images: Mapping[str, Any], seen_count: int) -> ShaderProgram:
+    def shade(self, images: Mapping[str, Any]) -> ShaderProgram:
         """Bind the program that shades the nodes that are seen."""
-        features = [*self.points, *self.shading]
-        return self._bound(_SHADE_RECIPE, features, images, {"seen_count": seen_count})
+        return self._bound(_SHADE_RECIPE, [*self.points, *self.shading], images, {})
 
     def show(self, images: Mapping[str, Any], *, writes_depth: bool) -> ShaderProgram:
         """Bind what adds up these lists."""
@@ -191,6 +193,16 @@ class StrandDrawing:
         order = self.order
         if order.factors is None:
             return ShaderFeature(name="fixed", integers={"subdivisions": order.subdivisions})
+        if order.slots is not None:
+            return ShaderFeature(
+                name="slots",
+                textures={
+                    "slots": ("UINT_2D", order.slots),
+                    "factors": ("FLOAT_2D", order.factors),
+                },
+                integers={"slot_pieces": order.classes[0].capacity},
+                defines={"ADAPTIVE": 1, "IN_SLOTS": 1},
+            )
         return ShaderFeature(
             name="adaptive",
             textures={"order": ("FLOAT_2D", order.order), "factors": ("FLOAT_2D", order.factors)},
@@ -200,7 +212,7 @@ class StrandDrawing:
 
     def _draw(self, shader: ShaderProgram) -> None:
         for drawn in self.order.classes:
-            if self.order.factors is not None:
+            if self.order.order is not None:
                 shader.shader.uniform_int("first_instance", drawn.first)
             self.ribbon(drawn.capacity).draw_instanced(
                 shader.shader, instance_start=0, instance_count=drawn.count

@@ -18,19 +18,23 @@ memory decides how often strands are drawn, and never what is seen. A part of on
 room is drawn by depth, the farthest first, each over what is there: exact but for the colours of
 Blender's viewport, which are added up as they are encoded. So is a part with a list too long for a
 software driver, whose shaders end after 65,535 rounds of all their loops.
+
+What moves is not waited for: nothing is read back, and as many invocations order and shade as the
+view's size suggests, as often as the counts on the GPU say. Room is made beforehand for what was
+counted of the view before, and detail_slots.py has no more fragments drawn than have room.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import gpu
 import numpy as np
 
 from ..arrays import Ints
-from ..shading.volume.transparency import LAYERS
+from ..shading.volume.transparency import LAYERS, TURNING_LAYERS
 from . import gpu_objects
 from .kept_picture import KeptPicture
 from .pixel_parts import PixelPart, pixel_parts
@@ -43,6 +47,8 @@ from .textures import drawing_rows, drawing_state
 FIRST_ROWS, MAX_ROWS = 256, 3072
 #: a count that turned out too small is made this much larger than what was found
 _SPARE = 1.25
+#: pixels of which the fragments of what moves are shaded by one invocation, one after the other
+_SHADED_IN_TURN = 16
 #: fragments of a pixel that a software driver can order: each takes some 20 rounds of loops
 LONGEST_IN_SOFTWARE = 3072
 
@@ -57,9 +63,12 @@ _ORDER_RECIPE = ShaderRecipe(
         ("R32UI", "layer_seen"),
         ("RG32F", "layer_fronts"),
     ),
-    integers=("pixel_count",),
     group_size=(64, 1),
     defines=(("LAYERS", LAYERS),),
+)
+#: shades fewer layers
+_TURNING_ORDER_RECIPE = replace(
+    _ORDER_RECIPE, name="strand_layers_order_turning", defines=(("LAYERS", TURNING_LAYERS),)
 )
 _DONE_RECIPE = ShaderRecipe(
     name="strand_layers_done", compute="strand_layers_done.comp.glsl", group_size=(1, 1)
@@ -106,6 +115,8 @@ class StrandLayers:
         *,
         is_own_target: bool,
         in_parts: bool = False,
+        is_moving: bool = False,
+        is_turning: bool = False,
         picture: KeptPicture | None = None,
     ) -> LayersDrawn:
         """Gather, order, shade, and put the result over what is in the bound framebuffer.
@@ -113,14 +124,21 @@ class StrandLayers:
         Args:
             is_own_target: nobody else has set a scissor for that framebuffer.
             in_parts: whether it is likely to have no room at once, so that this is not even tried.
+            is_moving: the GPU is not waited for, see `room_for`.
+            is_turning: so does the whole view, so that fewer layers do.
             picture: takes the result as well.
 
         Raises:
             ShaderError: a shader does not compile here, or there is no memory at all.
         """
-        left, bottom, width, height = gpu.state.viewport_get()
-        self._fit((left + width, bottom + height))
+        self._fit(_viewport_end())
         self._picture = picture
+        if is_moving:
+            self._store(lambda: drawing.gather(self._images, self._capacity))
+            *_, width, height = gpu.state.viewport_get()
+            self._order(width * height, _TURNING_ORDER_RECIPE if is_turning else _ORDER_RECIPE)
+            self._shade(drawing, -(-width * height // _SHADED_IN_TURN))
+            return LayersDrawn(1)
         if not in_parts and self._is_gathered(drawing) and self._is_finished(drawing):
             return LayersDrawn(1)
         counts, drawn, missing = self._counted(drawing), 0, 0
@@ -138,6 +156,17 @@ class StrandLayers:
                 continue
             drawn, missing = drawn + 1, missing + max(beyond, 0) + self._too_long
         return LayersDrawn(drawn, missing)
+
+    def room_for(self, count: int) -> int:
+        """Make room for this many fragments in the bound viewport, and say how many have some.
+
+        Raises:
+            ShaderError: there is no memory at all.
+        """
+        self._fit(_viewport_end())
+        if count > self._capacity:
+            self._make_room(int(max(count, _SPARE * self._capacity)))
+        return self._capacity
 
     def _is_gathered(self, drawing: StrandDrawing) -> bool:
         """Gather all fragments at once, where they have room or can be given it."""
@@ -180,24 +209,28 @@ class StrandLayers:
         pixel_count = self._pixel_count
         if not pixel_count:
             return True
-        images = self._images
-        order = program(_ORDER_RECIPE)
-        order.bind(
-            images={name: images[name] for _, name, *_ in _ORDER_RECIPE.images},
-            integers={"pixel_count": pixel_count},
-        )
-        _dispatch(order, pixel_count, self._pixels.width)
+        self._order(pixel_count)
         _, _, seen_count, longest = self._counts()
         if is_software() and longest > LONGEST_IN_SOFTWARE:
             if not even_if_too_long:
                 return False
             self._too_long = longest - LONGEST_IN_SOFTWARE
-        _dispatch(drawing.shade(images, seen_count), seen_count, LAYER_ROW)
+        self._shade(drawing, seen_count)
+        return True
+
+    def _order(self, count: int, recipe: ShaderRecipe = _ORDER_RECIPE) -> None:
+        """Order all lists that there are, by as many invocations."""
+        order = program(recipe)
+        order.bind(images={name: self._images[name] for _, name, *_ in recipe.images})
+        _dispatch(order, count)
+
+    def _shade(self, drawing: StrandDrawing, count: int) -> None:
+        """Shade all that is seen, by as many invocations, and show it."""
+        _dispatch(drawing.shade(self._images), count)
         self._show(drawing)
         if self._picture is not None:
             with self._picture.drawing():
                 self._show(drawing)
-        return True
 
     def _show(self, drawing: StrandDrawing) -> None:
         """Colours and depths of all lists, into the bound framebuffer."""
@@ -278,10 +311,16 @@ def is_software() -> bool:
     return str(gpu.platform.device_type_get()) == "SOFTWARE"
 
 
-def _dispatch(shader: ShaderProgram, count: int, across: int) -> None:
-    """One invocation for each of the first `count` texels of a texture `across` texels wide."""
-    columns = -(-min(count, across) // shader.recipe.group_size[0])
-    gpu.compute.dispatch(shader.shader, columns, -(-count // across), 1)
+def _dispatch(shader: ShaderProgram, count: int) -> None:
+    """This many invocations, in rows."""
+    columns = -(-min(count, LAYER_ROW) // shader.recipe.group_size[0])
+    gpu.compute.dispatch(shader.shader, columns, -(-count // LAYER_ROW), 1)
+
+
+def _viewport_end() -> tuple[int, int]:
+    """How far the viewport of the bound framebuffer reaches, across and up [pixels]."""
+    left, bottom, width, height = gpu.state.viewport_get()
+    return left + width, bottom + height
 
 
 #: of all grooms and views

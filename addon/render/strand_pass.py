@@ -97,13 +97,14 @@ class _View:
     """What is kept for one view.
 
     lit: by its lights; other views may have the same. asked: the lights of its last draw.
-    parts: in how many its strands were drawn last.
+    parts: in how many its strands were drawn last at rest. is_moving: they were not at rest last.
     """
 
     detail: DetailPass = field(default_factory=DetailPass)
     lit: _Lit = field(default_factory=_Lit)
     asked: tuple[Light, ...] | None = None
     parts: int = 0
+    is_moving: bool = False
 
 
 class StrandPass:
@@ -138,6 +139,7 @@ class StrandPass:
         others: Sequence[OpacityMaps] = (),
         view: Hashable = None,
         is_turning: bool = False,
+        is_moving: bool = False,
         picture: KeptPicture | None = None,
     ) -> None:
         """Draw all strands into the bound framebuffer, depth-tested against what is in it.
@@ -153,13 +155,15 @@ class StrandPass:
                 maps itself, see `opacity`.
             view: which one this is.
             is_turning: as for `opacity`.
+            is_moving: what is seen differs from what the view showed before, and soon from this:
+                what the GPU would have to be waited for is taken from before, see `is_behind`.
             picture: takes what is drawn, so that it can be shown again.
 
         Raises:
             ShaderError: the shader does not compile here, or points on the GPU were released.
         """
         own = self._views.setdefault(view, _View())
-        in_parts = own.parts > 1
+        own.is_moving = False
         self.statistics = Statistics()
         if not snapshot.strand_count:
             return
@@ -169,8 +173,14 @@ class StrandPass:
         serial = self._points_serial
         is_debug = snapshot.debug_view != "none"
         transparency = "none" if is_debug else drawn_transparency(snapshot.strand_settings)
-        by_depth = transparency != "layers"
-        order = own.detail.order(snapshot, self._textures, serial, camera, size, by_depth=by_depth)
+        is_layered = transparency == "layers"
+        own.is_moving = is_moving and is_layered and own.detail.may_move(snapshot)
+        order = own.detail.order(
+            *(snapshot, self._textures, serial, camera, size),
+            by_depth=not is_layered,
+            counted=is_layered and view is not None,
+            room=LAYERS_OF_PIXELS.room_for if own.is_moving else None,
+        )
         if not order.classes:
             return
         maps = None if is_debug else self.opacity(snapshot, view=view, is_turning=is_turning)
@@ -192,21 +202,23 @@ class StrandPass:
             samples_across=samples,
         )
         layers = LayersDrawn()
-        if transparency == "layers":
+        if is_layered:
             layers = LAYERS_OF_PIXELS.draw(
                 drawing,
                 is_own_target=output == "scene_linear",
-                in_parts=in_parts,
+                in_parts=own.parts > 1,
+                is_moving=own.is_moving,
+                is_turning=is_turning,
                 picture=picture,
             )
-            own.parts = layers.parts
+            own.parts = own.parts if own.is_moving else layers.parts
         elif transparency == "hashed":
             HASHED_STRANDS.draw(drawing)
         else:
             with drawing_state():
                 drawing.draw()
         self.statistics = Statistics(
-            strands=sum(drawn.count for drawn in order.classes),
+            strands=order.strands,
             pieces=order.pieces,
             vertices=sum(drawn.vertex_count for drawn in order.classes),
             layers=layers,
@@ -256,9 +268,11 @@ class StrandPass:
         return lit.opacity
 
     def is_behind(self, view: Hashable) -> bool:
-        """Whether shadows in a view lag behind its lights, so that it has to be drawn again."""
+        """Whether a view has to be drawn again once it rests: its shadows lag behind its lights, or
+        it was drawn without waiting for the GPU.
+        """
         own = self._views.get(view)
-        return own is not None and own.lit.opacity.is_behind
+        return own is not None and (own.is_moving or own.lit.opacity.is_behind)
 
     def forget_views(self, shown: Set[Hashable]) -> None:
         """Let go of what was kept for views other than these."""

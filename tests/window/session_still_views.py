@@ -6,10 +6,11 @@ from pathlib import Path
 import bpy
 from mathutils import Euler
 
-sys.path.append(str(Path(__file__).parent))
+sys.path += [str(Path(__file__).parent), str(Path(__file__).parents[2] / "tools")]
 import driver
 from artist import changed, look_from_front, new_head, pixels_at_rest, press, viewport
 from driver import of_hairloom, until
+from gpu_calls import gpu_calls
 
 #: share of a view's pixels by which Blender's own redraw differs
 SAME = 0.002
@@ -26,6 +27,7 @@ def steps():
     yield from what_is_in_the_way_is_seen()
     yield from what_a_view_shows_is_seen()
     yield from after_an_orbit_shadows_are_exact()
+    yield from what_moves_waits_for_nothing()
     viewport().spaces.active.shading.type = "MATERIAL"
     yield from pixels_at_rest("material")
     yield from it_comes_to_rest()
@@ -114,6 +116,32 @@ def after_an_orbit_shadows_are_exact():
     assert changed(found, expected, 0.02) == 0.0
     look_from_front(0.7)
     yield from pixels_at_rest("orbited-back")
+
+
+def what_moves_waits_for_nothing():
+    """Frames of an orbit, then of playback while hair is simulated: what each draw reads back."""
+    strands, reads, space = of_hairloom("strand_pass").StrandPass, [], viewport().spaces.active
+    draw = strands.draw
+
+    def noted(*values, **options):
+        if options.get("is_moving"):
+            reads.append(gpu_calls(lambda: draw(*values, **options))["reads"])
+        else:
+            draw(*values, **options)
+
+    strands.draw = noted
+    for degrees in range(0, 30, 3):
+        space.region_3d.view_rotation = Euler((1.5708, 0.0, degrees / 57.3)).to_quaternion()
+        yield 1
+    assert len(reads) >= 5 and not any(reads), reads
+    reads.clear()
+    bpy.ops.screen.animation_play()
+    yield from until(lambda: len(reads) > 12, "the hair does not play")
+    bpy.ops.screen.animation_cancel(restore_frame=True)
+    strands.draw = draw
+    assert not any(reads), reads
+    look_from_front(0.7)
+    yield from pixels_at_rest("played-back")
 
 
 def drawn_afresh(label, *, with_maps=False):

@@ -236,9 +236,10 @@ def _draw_afresh(view: View, camera: Camera, shown: list[_Shown], marks: tuple[A
         view.picture.release()
     else:
         picture.begin()
+    is_moving = view.moves_to(marks)
     for each in shown:
         with each.drawing.times.measured("drawing"):
-            each.draw(camera, picture)
+            each.draw(camera, picture, is_moving=is_moving)
     view.is_behind = any(each.drawn.strand_pass.is_behind(view.address) for each in shown)
     view.counted = {each.uid: each.drawn.strand_pass.statistics for each in shown}
     if picture is not None and not view.is_behind:
@@ -300,7 +301,7 @@ class _Shown:
             shadow = self.drawn.shadow
             shadow.draw(self.snapshot, maps, camera, width, height, display=self.display)
 
-    def draw(self, camera: Camera, picture: KeptPicture | None) -> None:
+    def draw(self, camera: Camera, picture: KeptPicture | None, *, is_moving: bool) -> None:
         """Its hair; strands go into the picture as well."""
         _, _, width, height = gpu.state.viewport_get()
         snapshot, display, drawn = self.snapshot, self.display, self.drawn
@@ -313,6 +314,7 @@ class _Shown:
             display=display,
             view=self.address,
             is_turning=self.is_turning,
+            is_moving=is_moving,
             picture=picture,
         )
         drawn.card_pass.draw(

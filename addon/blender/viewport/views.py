@@ -16,7 +16,7 @@ import bpy
 import gpu
 
 from ...render.camera import Camera
-from ...render.kept_picture import KeptPicture
+from ...render.kept_picture import KeptPicture, are_same
 from ...render.strand_pass import Statistics, StrandPass
 from ..base.redraw import redraw_views
 
@@ -32,14 +32,16 @@ _ROW, _LONG = 3, 5.0
 class View:
     """What is kept for a 3D view.
 
-    address: of its region's data. counted: what its picture shows, by session number of the hair.
-    is_behind: its shadows lag behind its lights.
+    address: of its region's data. marks: what was drawn into it last, see KeptPicture.
+    counted: what its picture shows, by session number of the hair.
+    is_behind: its shadows lag behind its lights, or it was drawn without waiting for the GPU.
     drawn_at: when its strands were drawn [s]. shown_again: how often its picture was since then.
     is_again: so that its strands are to be drawn after it.
     """
 
     address: int
     picture: KeptPicture = field(default_factory=KeptPicture)
+    marks: tuple[Any, ...] = ()
     counted: dict[int, Statistics] = field(default_factory=dict)
     is_behind: bool = False
     drawn_at: float = 0.0
@@ -51,6 +53,11 @@ class View:
         """Whether it was drawn before, from elsewhere."""
         before, self.seen_from = self.seen_from, camera.view.tobytes()
         return before not in (b"", self.seen_from)
+
+    def moves_to(self, marks: tuple[Any, ...]) -> bool:
+        """Whether something else was drawn before."""
+        before, self.marks = self.marks, marks
+        return not are_same(before, marks)
 
 
 class _Known:

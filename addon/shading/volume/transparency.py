@@ -23,6 +23,8 @@ from ...arrays import Floats
 
 #: Layers of a pixel that are shaded, at most.
 LAYERS = 8
+#: while a view turns with its lights
+TURNING_LAYERS = 3
 #: Layers are shaded until no more than this fraction of the pixel's light comes from behind them,
 #: where that are not more of them.
 UNSEEN_FRACTION = 0.03

@@ -1,0 +1,196 @@
+"""What moves is drawn without reading anything back, and nothing of it is missing."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from gpu_calls import gpu_calls
+
+from hairloom.addon.refine.settings import DetailSettings
+from hairloom.addon.shading.lights import three_point_lights
+from hairloom.addon.shading.settings import ShadingSettings, StrandSettings
+from hairloom.addon.shading.volume.settings import VolumeSettings
+from hairloom.addon.strands import Surface
+
+pytestmark = pytest.mark.usefixtures("gpu_context")
+
+SIZE = 128
+#: a view, by name, as the overlay knows one
+VIEW = "a view"
+
+
+def curls(frame: Any, *, outward: float = 1.0, **more: Any) -> Any:
+    """A ball with curly hair of 5 to 20 cm, all of it on the side of +y where `outward` is 0."""
+    random = np.random.default_rng(5)
+    out = random.normal(size=(1500, 1, 3))
+    out[..., 1] = np.where(outward > 0.0, out[..., 1], np.abs(out[..., 1]) + 1.0)
+    out /= np.linalg.norm(out, axis=2, keepdims=True)
+    along = np.linspace(0.0, 1.0, 9)[None, :, None]
+    length = random.uniform(0.05, 0.2, (1500, 1, 1))
+    turn = along * random.uniform(2.0, 14.0, (1500, 1, 1)) + random.uniform(0, 7, (1500, 1, 3))
+    strands = out * (0.1 + length * along) + 0.02 * along * np.sin(turn)
+    ball = np.array([[-0.09, 0.0, -0.09], [0.09, 0.0, -0.09], [0.0, 0.0, 0.09]], np.float32)
+    settings = {
+        "meshes": (frame.MeshSnapshot.of(Surface(ball, np.array([[0, 1, 2]]))),),
+        "ambient": (1.0, 1.0, 1.0),
+        "shading": ShadingSettings(
+            model="kajiya_kay", base_color=(1.0, 1.0, 1.0), color_variation=0.5
+        ),
+        "detail": DetailSettings(lod_height=0.0),
+        "volume": VolumeSettings(shadows="none"),
+    }
+    radius = np.full(strands.shape[:2], 3e-4, np.float32)
+    return frame.Snapshot(strands.astype(np.float32), radius, **(settings | more))
+
+
+def seen_from(frame: Any, degrees: float = 0.0, distance: float = 1.0) -> Any:
+    angle = np.radians(degrees)
+    eye = distance * np.sin(angle), -distance * np.cos(angle), 0.2 * distance
+    return frame.Camera(frame.look_at(eye, (0, 0, 0)), frame.perspective(0.6, 1.0, 0.01, 5.0))
+
+
+def drawn(frame: Any, own: Any, groom: Any, camera: Any, **options: Any) -> Any:
+    """The picture (SIZE, SIZE, 4), over a mesh, and what was asked of the GPU for the hair."""
+    import gpu
+
+    from hairloom.addon.render.mesh_pass import MeshPass
+    from hairloom.addon.render.textures import drawing_into
+
+    color = gpu.types.GPUTexture((SIZE, SIZE), format="RGBA32F")
+    depth = gpu.types.GPUTexture((SIZE, SIZE), format="DEPTH_COMPONENT32F")
+    target = gpu.types.GPUFrameBuffer(depth_slot=depth, color_slots=(color,))
+
+    def draw_hair() -> None:
+        own.draw(groom, camera, SIZE, SIZE, output="viewport", view=VIEW, **options)
+
+    with drawing_into(target):
+        target.clear(color=(0.0, 0.0, 0.0, 0.0), depth=1.0)
+        MeshPass().draw(groom, camera, SIZE, SIZE)
+        calls = gpu_calls(draw_hair)
+    return np.asarray(color.read()).reshape(SIZE, SIZE, 4), calls
+
+
+def moved(groom: Any, number: int) -> Any:
+    return replace(groom, points=groom.points + np.float32(0.002 * number))
+
+
+def test_what_moves_waits_for_nothing_and_is_what_is_drawn_at_rest(frame: Any) -> None:
+    """It plays, and the view turns, with its lights or without; and then it rests."""
+    lit = curls(frame, lights=three_point_lights(seen_from(frame).view), volume=VolumeSettings())
+    for groom in (curls(frame), lit):
+        own = frame.StrandPass()
+        assert drawn(frame, own, groom, seen_from(frame), is_moving=True)[1]["reads"] > 0
+        assert not own.is_behind(VIEW), "nothing is known of a view before its first draw"
+        for number in range(1, 4):
+            now, camera = moved(groom, number), seen_from(frame, degrees=5.0 * number)
+            found, calls = drawn(frame, own, now, camera, is_moving=True)
+            assert calls["reads"] == 0 and calls["draws"] > 0 and own.is_behind(VIEW)
+            expected, _ = drawn(frame, frame.StrandPass(), now, camera)
+            assert np.abs(found - expected).max() < 1e-5 and expected[..., 3].mean() > 0.1
+        found, calls = drawn(frame, own, now, camera)
+        assert np.abs(found - expected).max() < 1e-5 and calls["reads"] > 0
+        assert not own.is_behind(VIEW)
+    away = frame.Camera(frame.look_at((0, -1, 0), (0, -2, 0)), seen_from(frame).projection)
+    assert not drawn(frame, own, groom, away, is_moving=True)[0].any(), "and behind the eye"
+
+
+def test_a_view_that_turns_is_as_bright_and_covers_as_much(frame: Any) -> None:
+    """With three layers in place of eight, in other places of each pixel."""
+    from hairloom.addon.render.strand_layers import LAYERS_OF_PIXELS
+
+    own, groom = frame.StrandPass(), curls(frame)
+    drawn(frame, own, groom, seen_from(frame))
+    camera, seen = seen_from(frame, degrees=3.0), []
+    found, calls = drawn(frame, own, groom, camera, is_moving=True, is_turning=True)
+    seen.append(int(np.asarray(LAYERS_OF_PIXELS._count.read()).ravel()[2]))
+    expected, _ = drawn(frame, own, groom, camera)
+    seen.append(int(np.asarray(LAYERS_OF_PIXELS._count.read()).ravel()[2]))
+    assert calls["reads"] == 0 and 0 < seen[0] < 0.8 * seen[1]
+    assert np.abs(found - expected)[..., 3].max() < 1e-5
+    assert found[..., 1].mean() == pytest.approx(expected[..., 1].mean(), rel=0.02)
+    assert np.abs(blurred(found - expected)).max() < 0.05
+
+
+def test_other_strands_are_counted_first(frame: Any) -> None:
+    """More of them, or in more pieces: what was known says nothing of these."""
+    own, groom = frame.StrandPass(), curls(frame)
+    drawn(frame, own, groom, seen_from(frame))
+    fewer = frame.Snapshot(groom.points[:900].reshape(100, 9, 3), np.full((100, 9), 3e-4))
+    finer = replace(groom, detail=replace(groom.detail, error=0.05))
+    for other in (fewer, finer):
+        assert drawn(frame, own, other, seen_from(frame), is_moving=True)[1]["reads"] > 0
+
+
+def test_a_jump_coarsens_strands_and_loses_none(frame: Any, monkeypatch: Any) -> None:
+    """All were behind the head, and the view is on their side at once; and it comes much nearer."""
+    from hairloom.addon.render.known_detail import KnownDetail
+
+    spheres = np.array([[0.0, 0.0, 0.0, 0.098]], np.float32)
+    detail = DetailSettings(lod_height=0.0, culling="hidden")
+    groom = curls(frame, outward=0.0, detail=detail, occluder_spheres=spheres)
+    own = frame.StrandPass()
+    drawn(frame, own, groom, seen_from(frame, distance=3.0))
+    before = own.statistics
+    camera = seen_from(frame, degrees=180.0, distance=0.7)
+    # nor does it know how much nearer
+    monkeypatch.setattr(KnownDetail, "slots_at", lambda self, _: len(groom.roots))
+    found, calls = drawn(frame, own, groom, camera, is_moving=True)
+    still = frame.StrandPass()
+    expected, _ = drawn(frame, still, groom, camera)
+    assert calls["reads"] == 0
+    assert still.statistics.strands > 1.3 * before.strands
+    assert still.statistics.pieces > 2 * before.pieces
+    assert still.statistics.pieces > len(groom.roots) * own._views[VIEW].detail._known.slot_pieces
+    assert np.abs(found - expected).max() > 0.01, "it is coarser"
+    assert found[..., 3].sum() == pytest.approx(expected[..., 3].sum(), rel=0.05)
+    assert np.abs(blurred(found - expected)).max() < 0.1
+
+
+def blurred(picture: np.ndarray) -> np.ndarray:
+    """Means of 8 x 8 pixels."""
+    return picture.reshape(SIZE // 8, 8, SIZE // 8, 8, -1).mean(axis=(1, 3))
+
+
+@pytest.mark.parametrize("radius, rows", [(1e-4, 14), (2e-3, 25)])
+def test_fragments_without_room_are_made_up_for(
+    frame: Any, monkeypatch: Any, radius: float, rows: int
+) -> None:
+    """With room for two thirds of those that are expected: fewer strands, each wider."""
+    from hairloom.addon.render import strand_pass
+    from hairloom.addon.render.strand_layers import StrandLayers
+
+    layers, room = StrandLayers(rows), rows * 4096
+    monkeypatch.setattr(strand_pass, "LAYERS_OF_PIXELS", layers)
+    groom = curls(frame)
+    groom = replace(groom, radius=np.full_like(groom.radius, radius))
+    far, near = seen_from(frame, distance=8.0), seen_from(frame, distance=0.7)
+    own = frame.StrandPass()
+    drawn(frame, own, groom, far)
+    found, calls = drawn(frame, own, groom, near, is_moving=True)
+    counted = int(np.asarray(layers._count.read()).ravel()[0])
+    assert calls["reads"] == 0 and 0.5 * room < counted <= room
+    expected, _ = drawn(frame, own, groom, near)
+    assert own._views[VIEW].parts > 1, "at rest it is drawn in parts"
+    assert found[..., 3].mean() == pytest.approx(expected[..., 3].mean(), rel=0.05)
+    found, expected = blurred(found)[..., 3], blurred(expected)[..., 3]
+    assert np.abs(found - expected).mean() < 0.1
+    assert found[expected > 0.5].min() > 0.15, "no place is bald"
+
+
+@pytest.mark.parametrize("fullness", [0.2, 1.0, 20.0])
+def test_no_more_fragments_come_than_were_expected(frame: Any, fullness: float) -> None:
+    """From afar and so near that strands pass the eye; and not many times fewer come."""
+    from hairloom.addon.render.strand_layers import LAYERS_OF_PIXELS
+
+    groom = replace(
+        curls(frame), meshes=(), strand_settings=StrandSettings(fullness=fullness, tip_width=1.0)
+    )
+    for distance, most in ((5.0, 1.6), (1.0, 1.6), (0.3, 4.0)):
+        own = frame.StrandPass()
+        drawn(frame, own, groom, seen_from(frame, distance=distance))
+        found = int(np.asarray(LAYERS_OF_PIXELS._count.read()).ravel()[0])
+        expected = own._views[VIEW].detail._known.fragments
+        assert found <= expected <= most * found, (distance, found, expected)

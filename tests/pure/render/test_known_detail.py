@@ -1,0 +1,31 @@
+"""How many slots strands that move get."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hairloom.addon.refine.settings import DetailSettings
+from hairloom.addon.render.known_detail import KnownDetail, best_slot_pieces
+from hairloom.addon.render.strand_layout import StrandLayout
+
+
+def test_slots_are_as_large_as_costs_least() -> None:
+    assert best_slot_pieces(np.full(100, 12)) == (12, 100)
+    assert best_slot_pieces(np.zeros(5, int)) == (2, 0)
+    mixed = np.array([3] * 900 + [60] * 100)
+    pieces, slots = best_slot_pieces(mixed)
+    assert slots == 900 * -(-3 // pieces) + 100 * -(-60 // pieces)
+    assert slots * (pieces + 2) < 1000 * 62, "not as large as the largest"
+
+
+def test_what_comes_nearer_gets_more_and_each_strand_has_a_slot() -> None:
+    layout = StrandLayout.uniform(50, 4)
+    known = KnownDetail(layout, DetailSettings(), 100.0, 8, 80, 3000, 50, 500)
+    assert 80 <= known.slots_at(100.0) < 90 and known.slots_at(1.0) == known.slots_at(100.0)
+    assert 160 <= known.slots_at(400.0) < 180, "pieces grow as the root of the size does"
+    assert known.fragments_at(400.0) >= 4 * 3000
+    few = KnownDetail(layout, DetailSettings(), 100.0, 8, 10, 300, 5, 50)
+    assert few.slots_at(100.0) == 50, "those that were hidden may be seen"
+    assert known.is_of(StrandLayout.uniform(50, 4), DetailSettings())
+    assert not known.is_of(StrandLayout.uniform(51, 4), DetailSettings())
+    assert not known.is_of(layout, DetailSettings(error=2.0))
