@@ -91,11 +91,12 @@ def drawing_state(
 
 @contextmanager
 def drawing_into(framebuffer: Any) -> Iterator[None]:
-    """Draw into a framebuffer of our own; the one that was bound comes back with its scissor."""
-    scissor = gpu.state.scissor_get()
+    """Draw into a framebuffer of our own; the one that was bound comes back as it was."""
+    scissor, viewport = gpu.state.scissor_get(), gpu.state.viewport_get()
     with framebuffer.bind():
         yield
-    # Vulkan opens the scissor of a framebuffer that is bound again
+    # Vulkan opens both of a framebuffer that is bound again
+    gpu.state.viewport_set(*viewport)
     gpu.state.scissor_set(*scissor)
 
 

@@ -88,3 +88,10 @@ def test_each_switch_and_each_evaluation_is_a_mark() -> None:
     handlers.on_depsgraph_update(bpy.context.scene, depsgraph)
     handlers.on_frame_change(bpy.context.scene, depsgraph)
     assert views._known.changes == changes + 2
+
+
+def test_a_view_moves_until_it_is_drawn_of_the_same_again(view: views.View) -> None:
+    one, other = (object(), 1, b"a"), (object(), 1, b"a")
+    assert [view.moves_to(marks) for marks in (one, one, other, other, one)] == [
+        *(True, False, True, False, True)
+    ]

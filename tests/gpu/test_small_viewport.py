@@ -1,0 +1,75 @@
+"""Hair in a viewport that is smaller than its target stays in it, whatever is drawn on the way."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from hairloom.addon.refine.settings import DetailSettings
+from hairloom.addon.shading.lights import three_point_lights
+from hairloom.addon.shading.settings import StrandSettings
+
+pytestmark = pytest.mark.usefixtures("gpu_context")
+
+#: the target, and where in it the viewport lies: left, bottom, width, height
+SIZE, VIEWPORT = (90, 70), (13, 7, 48, 40)
+BACKGROUND = (0.2, 0.1, 0.0, 0.3)
+
+
+@pytest.mark.parametrize("transparency", ["layers", "hashed", "none"])
+@pytest.mark.parametrize("keeps", [False, True], ids=["plain", "kept"])
+def test_hair_stays_in_its_viewport(frame: Any, transparency: str, keeps: bool) -> None:
+    """With shadow maps, which have targets of their own; as the view moves, rests and is shown
+    again. Strands reach far beyond the viewport on all sides.
+    """
+    import gpu
+
+    from hairloom.addon.render.kept_picture import KeptPicture
+    from hairloom.addon.render.textures import drawing_into
+
+    left, bottom, width, height = VIEWPORT
+    random = np.random.default_rng(4)
+    ends = random.uniform(-2.0, 2.0, (300, 2, 3)).astype(np.float32)
+    camera = frame.Camera(
+        frame.look_at((0.0, -3.0, 0.0), (0, 0, 0)),
+        frame.perspective(0.5, width / height, 0.1, 9.0),
+    )
+    groom = frame.Snapshot(
+        ends,
+        np.full((300, 2), 4e-3, np.float32),
+        lights=three_point_lights(camera.view),
+        strand_settings=StrandSettings(transparency=transparency),
+        detail=DetailSettings(lod_height=0.0),
+    )
+    color = gpu.types.GPUTexture(SIZE, format="RGBA32F")
+    depth = gpu.types.GPUTexture(SIZE, format="DEPTH_COMPONENT32F")
+    target = gpu.types.GPUFrameBuffer(depth_slot=depth, color_slots=(color,))
+    own, kept = frame.StrandPass(), KeptPicture()
+    inside = np.zeros((SIZE[1], SIZE[0]), bool)
+    inside[bottom : bottom + height, left : left + width] = True
+
+    def draw(is_moving: bool) -> None:
+        picture = kept if keeps and transparency == "layers" else None
+        if picture is not None:
+            picture.begin()
+        options = {"view": 1, "is_moving": is_moving, "picture": picture}
+        own.draw(groom, camera, width, height, output="viewport", **options)
+
+    for step in ("rests", "moves", "shown again"):
+        with drawing_into(target):
+            target.clear(color=BACKGROUND, depth=1.0)
+            gpu.state.viewport_set(*VIEWPORT)
+            if step == "shown again" and keeps and transparency == "layers":
+                kept.show()
+            else:
+                draw(step == "moves")
+            assert tuple(gpu.state.viewport_get()) == VIEWPORT
+        pixels = np.asarray(color.read()).reshape(SIZE[1], SIZE[0], 4)
+        depths = np.asarray(depth.read()).reshape(SIZE[1], SIZE[0])
+        outside = np.abs(pixels[~inside] - BACKGROUND).max()
+        assert outside < 1e-6 and (depths[~inside] == 1.0).all(), step
+        is_hair = (np.abs(pixels - BACKGROUND) > 0.01).any(axis=-1)
+        for part in np.array_split(is_hair[bottom : bottom + height, left : left + width], 4):
+            assert part.any(), step
