@@ -4,8 +4,8 @@ Children that the new density does not want make room for those that it wants no
 points, as many as they were, and shapes as all children grow, in the clumps of their neighbours.
 So nothing else changes, and what was found for the whole groom stays, as in `comb_flow`. What it
 leaves to `pipeline.prepare`, which is to follow: how many children there are, occlusion where they
-have come, guides in motion, and all that `comb_flow` leaves to it. Children that a mask shapes in
-another way are shaped again, as combed ones are.
+have come, from where children scatter, guides in motion, and all that `comb_flow` leaves to it.
+Children that a mask shapes in another way are shaped again, as combed ones are.
 """
 
 from __future__ import annotations
@@ -17,8 +17,9 @@ import numpy as np
 
 from .arrays import Floats, Ints
 from .comb_flow import put_children
+from .dynamics.painted import PaintedGuides
 from .groom.child_roots import ChildRoots, child_roots
-from .groom.masks import NO_MASKS, Masks
+from .groom.masks import NO_MASKS, Masks, Places
 from .groom.roots import RootFrames, root_frames
 from .pipeline import Grown, Rig
 from .strands import Surface
@@ -68,26 +69,46 @@ def _grown(roots: ChildRoots, head: Surface, grown: Grown) -> tuple[Ints, Grown]
     return number, replace(grown, growth=more)
 
 
+def painted_guides(rig: Rig, masks: Masks) -> PaintedGuides | None:
+    """By what settings are multiplied at each guide; None where the masks are of other strands or
+    another head, which are on their way.
+
+    Args:
+        masks: of the settings of the motion.
+    """
+    own = rig.strands.strand_count if rig.own_count is None else rig.own_count
+    triangles = None if rig.head is None else len(rig.head.triangles)
+    if not all(each.fits(own, triangles) for each in masks.masks.values()):
+        return None
+    places, cv_count = Places.of_strands(rig.strands, rig.guides), rig.guide_grid.shape[1]
+    return PaintedGuides({of: each.along(places, cv_count) for of, each in masks.masks.items()})
+
+
 def _masked(rig: Rig, masks: Masks) -> Rig:
     """The rig with its children as these masks shape them."""
     grown, own, strands, head = rig.grown, rig.own_count, rig.strands, rig.head
     assert grown is not None and own is not None and head is not None
     growth, kept = grown.growth, grown.kept
+    masks = masks.of(grown.parents)
     if masks == growth.masks:
         return rig
     assert strands.root_triangle is not None and strands.root_barycentric is not None
-    factors = masks.at(head, strands.root_triangle[own:], strands.root_barycentric[own:])
-    was = growth.factors.take(kept)
+    triangle, barycentric = strands.root_triangle[own:], strands.root_barycentric[own:]
+    weights = growth.weights
+    factors = masks.at(Places(triangle, barycentric, weights.guide[kept], weights.weight[kept]))
+    was, fineness = growth.factors.take(kept), growth.fineness[kept]
     is_other = np.zeros(len(growth.root), bool)
-    for one, other in zip(factors.rows, was.rows, strict=True):
-        is_other[kept[one != other]] = True
+    for name in masks.masks.keys() | growth.masks.masks.keys():
+        is_other[kept[factors[name] != was[name]]] = True
     others = growth.factors.with_others(kept, factors)
     growth = replace(growth, masks=masks, factors=others)
     grown = replace(grown, growth=growth)
     touched = np.flatnonzero(growth.clumps.with_members(is_other)[kept])
     points = strands.points.copy()
     put_children(points, strands.offsets, grown, touched, own)
-    return replace(rig, strands=replace(strands, points=points), grown=grown)
+    finer = np.append(np.ones(own, np.float32), growth.fineness[kept] / fineness)
+    radius = strands.radius * np.repeat(finer, strands.point_counts)
+    return replace(rig, strands=replace(strands, points=points, radius=radius), grown=grown)
 
 
 def _moved(

@@ -19,6 +19,7 @@ from .dynamics.colliders import DistanceField, PosedCollider
 from .dynamics.constraints import PINNED
 from .dynamics.force_fields import NO_FIELDS, ForceFields
 from .dynamics.held import Held
+from .dynamics.painted import PaintedGuides, simulated_of
 from .dynamics.settings import DynamicsSettings
 from .dynamics.state import DynamicsState, rows_of, start
 from .dynamics.step import Drive, grid_at_frame_end
@@ -141,8 +142,9 @@ class Rig:
     @property
     def baby_hair(self) -> Ints:
         """Which strands are short and fine hair of the hairline and of partings."""
-        fineness = _fineness(self)
-        return self.baked_baby_hair if fineness is None else np.flatnonzero(fineness < 1.0)
+        if self.grown is None or self.own_count is None:
+            return self.baked_baby_hair
+        return self.own_count + np.flatnonzero(self.grown.growth.is_baby[self.grown.kept])
 
     @property
     def guides_line(self) -> str:
@@ -240,6 +242,7 @@ class Motion:
         force_fields: ForceFields,
         held: Held | None = None,
         simulated: Floats | None = None,
+        painted: PaintedGuides | None = None,
     ) -> Drive:
         """What acts in a frame of `duration` [s] that carries the guides to `target`."""
         return Drive(
@@ -253,6 +256,7 @@ class Motion:
             held,
             self.guide_clearance,
             simulated,
+            painted,
         )
 
 
@@ -466,7 +470,7 @@ def _with_children(
         settings,
         ground.density,
         ground.partings,
-        ground.masks,
+        ground.masks.of(parents),
         place=place,
         kept=kept,
     )
@@ -659,7 +663,7 @@ def advance(
     duration: float,
     force_fields: ForceFields = NO_FIELDS,
     led: LedOut = NOT_LED,
-    simulated: Floats | None = None,
+    painted: PaintedGuides | None = None,
 ) -> Motion:
     """One frame of motion: the roots go with the head, the dynamics moves the rest.
 
@@ -669,12 +673,15 @@ def advance(
         force_fields: of the scene.
         led: the strands that were led out at this moment of the motion: from how they were bent
             the next frame's are led.
-        simulated: (guide_count,), see `blend.blended`; None: all of the motion is.
+        painted: by what settings are multiplied at each guide; None: nothing is painted.
     """
+    simulated = simulated_of(painted, settings, len(rig.guides))
     target = style_of_guides(rig, pose)
     motion = with_clearance(rig, motion, colliders, settings, simulated)
     held = held_cvs(rig, pose)
-    drive = motion.drive(target, colliders, gravity, duration, force_fields, held, simulated)
+    drive = motion.drive(
+        target, colliders, gravity, duration, force_fields, held, simulated, painted
+    )
     state = advance_dynamics(motion.dynamics, drive, settings, duration)
     guides, before = grid_at_frame_end(state, drive, duration), motion.carried_guides
     return Motion(

@@ -47,10 +47,10 @@ void main()
   float ratio = found.x / rest.y;
   float over = clamp(ratio - (1.0 + {{among_slack}}), 0.0, 1.0);
   float under = clamp(rest.x / rest.y - ratio - {{among_slack}}, 0.0, 1.0);
-  vec3 shift = gradient * ((under * among.strength.y - over * among.strength.x) / density);
+  vec3 shift = gradient * ((under * among.strength.y - over * among.strength.x) * rest.w / density);
   shift *= {{among_farthest}} / max(length(shift), {{among_farthest}});
   vec3 push = among.into_x.xyz * shift.x + among.into_y.xyz * shift.y + among.into_z.xyz * shift.z;
-  float rubbed = 1.0 - exp(-among.strength.z * (min(ratio, 1.0) + over * {{among_pressed}}));
+  float rubbed = 1.0 - exp(-among.strength.z * (min(ratio, 1.0) + over * {{among_pressed}}) * rest.w);
   vec3 mean = found.yzw / (among.whole * density);
   before += (cv.motion - mean) * (rubbed / among.speed_ratio);
   imageStore(pushes, texel, vec4(push * among.strength.w, 0.0));

@@ -1,7 +1,7 @@
 // One frame of dynamics: one invocation a guide, which goes through all substeps.
 //
 // Twin of advance in addon/dynamics/step.py. Defines: CV_COUNT; RELAXATION;
-// HAS_HELD; HAS_SPRINGS; HAS_PUSHES, where hair feels other hair; HAS_AIR; HAS_FORCE_FIELDS; CONTACT_SLOTS, 0 where there are no colliders; HAS_ROUNDS and HAS_FIELDS, the
+// IS_PAINTED, where guides have numbers of their own; HAS_HELD; HAS_SPRINGS; HAS_PUSHES, where hair feels other hair; HAS_AIR; HAS_FORCE_FIELDS; CONTACT_SLOTS, 0 where there are no colliders; HAS_ROUNDS and HAS_FIELDS, the
 // kinds of colliders; HAS_SHARP, HAS_FOLLOWED and HAS_CLEARANCE, see lib_contacts.glsl.
 //
 // Loops of an unknown number of turns ask at their end: drivers on CPUs go once more through the
@@ -35,6 +35,10 @@ vec3 twist_curvature;
 #ifdef HAS_SPRINGS
 bool is_curled = false;
 #endif
+float own_kept;           // as in the block, or as this guide is painted
+float own_air;
+float own_carried = 1.0;  // by which what the moving style gives is multiplied
+float own_gravity = 1.0;
 vec3 fall[FREE_SIZE];  // [m] that gravity and other hair add to each free CV in a substep
 
 // How the path of a point is bent, times r (r + 1); twin of curvature in addon/dynamics/trajectory.py.
@@ -45,6 +49,15 @@ vec3 curvature_of(vec3 earlier, vec3 before, vec3 displacement)
 
 void load_guide(int guide)
 {
+  own_kept = frame.kept;
+  own_air = frame.air_fraction;
+#ifdef IS_PAINTED
+  vec4 own = texelFetch(painted_numbers, strand_texel(guide, 0, CV_COUNT), 0);
+  own_kept = own.x;
+  own_air = own.y;
+  own_carried = own.z;
+  own_gravity = own.w;
+#endif
   for (int cv = 0; cv < CV_COUNT; cv++) {
     ivec2 texel = strand_texel(guide, cv, CV_COUNT);
     vec4 here = imageLoad(positions, texel);
@@ -67,8 +80,13 @@ void load_guide(int guide)
     compliance[i] = 0.0;
     is_curled = is_curled || most[i] > 0.0;
 #endif
+#ifdef IS_PAINTED
+    band[i] = texelFetch(painted_bands, strand_texel(guide, i + 2, CV_COUNT), 0);
+    bend[i] = texelFetch(painted_numbers, texel, 0).x;
+#else
     band[i] = frame.band[i + 2];
     bend[i] = frame.own[i + 1].x;
+#endif
     radius[i] = frame.own[i + 2].y;
 #ifdef HAS_CLEARANCE
     radius[i] = min(radius[i], texelFetch(clearances, strand_texel(guide, i + 2, CV_COUNT), 0).x);
@@ -92,9 +110,9 @@ void find_fall(int guide)
     middle[i] = style_before[i + 2] + 0.5 * style_displacement[i + 2];
   }
   vec3 root = style_before[1] + 0.5 * style_displacement[1];
-  weight_on_style(frame.combed.xyz, root, middle, fall);
+  weight_on_style(frame.combed.xyz * own_gravity, root, middle, fall);
   for (int i = 0; i < FREE; i++) {
-    fall[i] = frame.fall.xyz - fall[i];
+    fall[i] = frame.fall.xyz * own_gravity - fall[i];
 #ifdef HAS_PUSHES
     fall[i] += texelFetch(pushes, strand_texel(guide, i + 2, CV_COUNT), 0).xyz;
 #endif
@@ -118,8 +136,8 @@ void predict(vec4 moment, vec3 air_displacement)
     before -= blown_by_fields(here, before, field_direction(tip_side - root_side));
 #endif
     vec3 impulse = style_displacement[i + 2] * moment.z + style_curvature[i + 2] * moment.w;
-    impulse += fall[i] + air_displacement * frame.air_fraction;
-    position[i + 2] = (here - before) * frame.kept + here + impulse;
+    impulse = impulse * own_carried + fall[i] + air_displacement * own_air;
+    position[i + 2] = (here - before) * own_kept + here + impulse;
     previous[i + 2] = here;
   }
 }

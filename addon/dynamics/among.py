@@ -155,12 +155,18 @@ class Strength:
 
 @dataclass(frozen=True)
 class Among:
-    """How hair feels other hair in a frame. first: its first substep, counted since the start."""
+    """How hair feels other hair in a frame.
+
+    first: its first substep, counted since the start.
+    volume: (guide_count,) float32, by which the setting is multiplied where it is painted; None: it
+        is not.
+    """
 
     grid: HairGrid
     place: Place
     strength: Strength
     first: int
+    volume: Floats | None = None
 
     def is_due(self, number: int) -> bool:
         """Whether hair feels before this substep of the frame."""
@@ -173,11 +179,16 @@ class Among:
 
     def feel(self, position: Floats, previous: Floats) -> tuple[Floats, Floats]:
         """See `feel`."""
-        return feel(self.grid, self.place, self.strength, position, previous)
+        return feel(self.grid, self.place, self.strength, position, previous, self.volume)
 
 
 def feel(
-    grid: HairGrid, place: Place, strength: Strength, position: Floats, previous: Floats
+    grid: HairGrid,
+    place: Place,
+    strength: Strength,
+    position: Floats,
+    previous: Floats,
+    volume: Floats | None = None,
 ) -> tuple[Floats, Floats]:
     """What friction takes from the motion of each CV at once, and what pressure and cohesion add in
     each substep until hair feels again; both (3, cv_count, guide_count) [m].
@@ -190,10 +201,14 @@ def feel(
     over = np.clip(ratio - np.float32(1.0 + SLACK), 0.0, 1.0)
     under = np.clip(grid.density / grid.full - ratio - np.float32(SLACK), 0.0, 1.0)
     amount = over * np.float32(-strength.push) + under * np.float32(strength.pull)
+    if volume is not None:
+        amount *= volume
     shift = felt.gradient * (amount / np.maximum(felt.density, np.float32(TINY)))
     far = np.sqrt((shift * shift).sum(axis=0))
     shift *= np.float32(FARTHEST) / np.maximum(far, np.float32(FARTHEST))
     rubbed = np.minimum(ratio, np.float32(1.0)) + over * np.float32(PRESSED)
+    if volume is not None:
+        rubbed *= volume
     rubbed = np.float32(1.0) - np.exp(rubbed * np.float32(-strength.friction))
     taken = (motion - felt.motion) * rubbed
     return taken, place.out(shift, strength.scale(grid.cell))

@@ -43,34 +43,42 @@ def solve_tridiagonal(diagonal: Floats, beside: Floats, right: Floats) -> None:
 
 
 class SharedBand:
-    """One symmetric positive definite matrix with two diagonals beside the main one, factored as
-    L D L^T, to be solved for many right sides.
+    """Symmetric positive definite matrices with two diagonals beside the main one, factored as
+    L D L^T, to be solved for many right sides: one for all guides, or one for each.
 
     Args:
-        matrix: (n, n) float64; entries farther than two from the diagonal are taken as zero.
+        main, beside, beyond: (n, 1) or (n, guide_count) float64, the diagonals; row i of the others
+            couples rows i and i + 1, and i and i + 2. What reaches beyond the matrix is not read.
 
-    near, far: (n,) float32, L beside the diagonal: row i takes near[i] of row i - 1, far[i] of
-    i - 2. inverse_pivot: (n,) float32, 1 / D.
+    near, far: float32 of the same shape, L beside the diagonal: row i takes near[i] of row i - 1,
+    far[i] of i - 2. inverse_pivot: 1 / D.
     """
 
-    def __init__(self, matrix: Floats) -> None:
-        count = len(matrix)
-        near, far, pivot = np.zeros(count), np.zeros(count), np.zeros(count)
-        for i in range(count):
+    def __init__(self, main: Floats, beside: Floats, beyond: Floats) -> None:
+        near, far, pivot = np.zeros_like(main), np.zeros_like(main), np.zeros_like(main)
+        for i in range(len(main)):
             if i >= 2:
-                far[i] = matrix[i, i - 2] / pivot[i - 2]
+                far[i] = beyond[i - 2] / pivot[i - 2]
             if i >= 1:
                 above = far[i] * pivot[i - 2] * near[i - 1] if i >= 2 else 0.0
-                near[i] = (matrix[i, i - 1] - above) / pivot[i - 1]
-            pivot[i] = matrix[i, i]
+                near[i] = (beside[i - 1] - above) / pivot[i - 1]
+            pivot[i] = main[i]
             pivot[i] -= near[i] ** 2 * pivot[i - 1] if i >= 1 else 0.0
             pivot[i] -= far[i] ** 2 * pivot[i - 2] if i >= 2 else 0.0
-        self.near, self.far = near.astype(np.float32), far.astype(np.float32)
-        self.inverse_pivot = (1.0 / pivot).astype(np.float32)
+        self._take(*(each.astype(np.float32) for each in (near, far, 1.0 / pivot)))
+
+    def _take(self, near: Floats, far: Floats, inverse_pivot: Floats) -> None:
+        self.near, self.far, self.inverse_pivot = near, far, inverse_pivot
         # arrays without axes: numpy takes these in half the time that it needs for numbers
         self._near, self._far = (
-            [np.array(factor) for factor in factors] for factors in (self.near, self.far)
+            [np.array(row[0]) if len(row) == 1 else row for row in rows] for rows in (near, far)
         )
+
+    def part(self, guides: slice) -> SharedBand:
+        """The matrices of these guides, where each has its own."""
+        some = SharedBand.__new__(SharedBand)
+        some._take(*(each[:, guides] for each in (self.near, self.far, self.inverse_pivot)))
+        return some
 
     def solve(self, right: Floats) -> None:
         """Replace `right` (3, n, guide_count) float32 by the solution."""
@@ -82,7 +90,7 @@ class SharedBand:
             subtract(row, multiply(rows[i - 1], self._near[i], scratch), row)
             if i >= 2:
                 subtract(row, multiply(rows[i - 2], self._far[i], scratch), row)
-        band *= self.inverse_pivot[:, None, None]
+        band *= self.inverse_pivot[:, None]
         for i, row in reversed(list(enumerate(rows[:-1], 1))):
             subtract(row, multiply(rows[i], self._near[i], scratch), row)
             if i + 1 < len(rows):

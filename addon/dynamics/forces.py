@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-import math
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -13,25 +14,31 @@ from .constraints import PINNED, chain_matrix, less_next, segments
 from .settings import DynamicsSettings
 
 
-def speed_kept(settings: DynamicsSettings, dt: float) -> float:
-    """Fraction of the speed that damping leaves after `dt` seconds."""
-    return math.exp(-(settings.damping + settings.style_damping) * dt)
-
-
-def carried_fraction(settings: DynamicsSettings, dt: float) -> float:
-    """Fraction of the head's own speed that swing damping gives to the hair in `dt` seconds.
+@dataclass(frozen=True)
+class Damped:
+    """What damping does in a substep; numbers, or of each guide (guide_count,).
 
     Swing damping acts on the speed against the carried style, air damping on the speed in the
-    world; both together leave  v kept + v_style (1 - kept) style_damping / (sum of both).
+    world; both together leave  v kept + v_style (1 - kept) style_damping / (sum of both), and the
+    same of the air.
+
+    kept: fraction of the speed that it leaves.
+    carried, air: fraction of the head's own speed, and of the air's, that it gives to the hair.
     """
-    both = settings.damping + settings.style_damping
-    return (1.0 - speed_kept(settings, dt)) * settings.style_damping / both if both else 0.0
 
+    kept: Any
+    carried: Any
+    air: Any
 
-def air_fraction(settings: DynamicsSettings, dt: float) -> float:
-    """Fraction of the air's speed that damping gives to the hair in `dt` seconds, as above."""
-    both = settings.damping + settings.style_damping
-    return (1.0 - speed_kept(settings, dt)) * settings.damping / both if both else 0.0
+    @classmethod
+    def of(cls, settings: DynamicsSettings, dt: float, swing: Any = None) -> Damped:
+        """Args:
+        swing: the rate of swing damping; None: that of the settings.
+        """
+        swing = np.float64(settings.style_damping) if swing is None else swing
+        both = settings.damping + swing
+        kept, whole = np.exp(-both * dt), np.where(both > 0.0, both, 1.0)
+        return cls(kept, (1.0 - kept) * swing / whole, (1.0 - kept) * settings.damping / whole)
 
 
 def brake(position: Floats, previous: Floats, drag: float, air_displacement: Floats | None) -> None:
@@ -55,7 +62,7 @@ def brake(position: Floats, previous: Floats, drag: float, air_displacement: Flo
     np.subtract(position, displacement, out=previous)
 
 
-def predict(position: Floats, previous: Floats, impulse: Floats, kept: float, out: Floats) -> None:
+def predict(position: Floats, previous: Floats, impulse: Floats, kept: Any, out: Floats) -> None:
     """Verlet step with time correction (Jakobsen 2001), all (3, cv_count, guide_count) [m].
 
     x' = x + (x - x_prev) kept + impulse, where `kept` holds damping and dt / dt_prev, and

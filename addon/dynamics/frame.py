@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -15,8 +15,9 @@ from .colliders import PosedCollider
 from .constraints import PINNED
 from .contacts import BETWEEN, BETWEEN_RADIUS, radius_of_all
 from .force_fields import NO_FIELDS, ForceFields
-from .forces import carried_fraction, combed_gravity, felt_gravity
+from .forces import Damped, combed_gravity, felt_gravity
 from .held import Held
+from .painted import PaintedFrame, PaintedGuides, painted_frame
 from .settings import DynamicsSettings
 from .springs import Springs
 from .state import DynamicsState, Rest, StyleRows, as_rows, checked_grid
@@ -42,6 +43,7 @@ class Drive:
     clearance: how far guides stay from colliders at most; None: as far as their radius says.
     simulated: (guide_count,), how much of what is shown of each guide is simulated, see
         `blend.blended`; None: all of it.
+    painted: by what settings are multiplied at each guide; None: nothing is painted.
 
     Hand the same array on from frame to frame, now to before to earlier: what is known of it then
     need not be worked out again.
@@ -57,6 +59,7 @@ class Drive:
     held: Held | None = None
     clearance: GuideClearance | None = None
     simulated: Floats | None = None
+    painted: PaintedGuides | None = None
 
     @property
     def targets(self) -> tuple[Floats, ...]:
@@ -117,6 +120,12 @@ def check_drive(state: DynamicsState, drive: Drive, known: tuple[Floats, ...] = 
             place="dynamics",
             remedy="Start the simulation again",
         )
+    if drive.painted is not None and not drive.painted.fits(state.cv_count, state.guide_count):
+        raise HairloomError(
+            f"what is painted is not {state.guide_count} finite numbers, one for each guide",
+            place="dynamics",
+            remedy="Start the simulation again",
+        )
     if np.shape(drive.gravity) != (3,) or not np.isfinite(drive.gravity).all():
         raise HairloomError(
             "gravity is not three finite numbers",
@@ -151,10 +160,12 @@ class Frame:
     time_left: float
     turn: Floats
     matrix: StyleBand
+    damped: Damped
     air: Air | None
     force_fields: ForceFields | None  # None where none acts
     size: float  # of the hair [m], see `state.Rest`
     among: Among | None  # None where hair does not feel other hair
+    painted: PaintedFrame | None  # None where nothing is painted
 
     @classmethod
     def of(
@@ -166,26 +177,37 @@ class Frame:
         dt: float,
     ) -> Frame:
         turn: Floats = np.eye(3)
-        among = None
+        among, painted = None, None
+        if drive.painted is not None and drive.painted.is_of_motion:
+            painted = painted_frame(drive.painted, settings, state.cv_count, state.guide_count, dt)
         if state.guide_count:
             before, now = (sample(grid) for grid in (drive.target_before, drive.target_now))
             turn = rotation_from(state.rest.sample, (before + now) / 2.0)
-            among = _among(state, drive, settings, turn, dt)
+            volume = None if painted is None else painted.volume
+            among = _among(state, drive, settings, turn, dt, volume)
         matrix = style_band(settings, state.cv_count, dt)
         air, fields = air_of(settings), drive.force_fields.by(settings.force_fields)
         time, left, size = state.time, state.time_left, state.rest.size
         return cls(
-            drive, settings, dt, duration, time, left, turn, matrix, air, fields, size, among
+            drive,
+            settings,
+            dt,
+            duration,
+            time,
+            left,
+            turn,
+            matrix,
+            Damped.of(settings, dt),
+            air,
+            fields,
+            size,
+            among,
+            painted,
         )
 
     def pieces(self, count: int) -> list[range]:
         """The substeps that guides may go through one guide after the other."""
         return [range(count)] if self.among is None else self.among.pieces(count)
-
-    @property
-    def carried_fraction(self) -> float:
-        """Fraction of the style's way in the frame that each CV gets in a substep."""
-        return carried_fraction(self.settings, self.dt) * self.dt / self.duration
 
     def span(self, number: int) -> tuple[float, float]:
         """Begin and end of a substep as fractions of the frame."""
@@ -200,16 +222,25 @@ class Frame:
 
 
 def _among(
-    state: DynamicsState, drive: Drive, settings: DynamicsSettings, turn: Floats, dt: float
+    state: DynamicsState,
+    drive: Drive,
+    settings: DynamicsSettings,
+    turn: Floats,
+    dt: float,
+    volume: Floats | None,
 ) -> Among | None:
-    """The grid goes with the roots, halfway through the frame, and turns with the groom."""
+    """The grid goes with the roots, halfway through the frame, and turns with the groom.
+
+    Args:
+        volume: see `Among`.
+    """
     strength = Strength.of(settings, dt)
     if strength is None or state.cv_count <= PINNED:
         return None
     grid = state.rest.hair_grid
     ends = [target[:, 0].mean(axis=0, dtype=np.float64) for target in drive.targets[:2]]
     place = grid.place(turn, (ends[0] + ends[1]) / 2.0)
-    return Among(grid, place, strength, round(state.time / dt))
+    return Among(grid, place, strength, round(state.time / dt), volume)
 
 
 @dataclass(frozen=True)
@@ -223,6 +254,7 @@ class Block:
     between: (len(BETWEEN), cv_count * n) [m], the same of points of the segment that ends there.
     held: (cv_count, n), see `held.Held.rows`; None where none of these guides is held.
     springs: of the guides that are curled; None where none of these gives.
+    matrix, damped: those of the frame, or each guide's own.
     """
 
     rest: Rest
@@ -235,6 +267,8 @@ class Block:
     between: Floats
     held: Floats | None
     springs: Springs | None
+    matrix: StyleBand
+    damped: Damped
 
     @classmethod
     def of(
@@ -248,8 +282,14 @@ class Block:
         displacement = now - before
         bent = curvature(earlier[0], before, now, drive.earlier_ratio) if earlier else None
         middle = before + displacement * np.float32(0.5)
-        impulse = displacement * np.float32(frame.carried_fraction)
-        impulse += felt_gravity(drive.gravity, settings, frame.turn, middle) * np.float32(dt * dt)
+        own = None if frame.painted is None else frame.painted.part(guides)
+        matrix, damped = frame.matrix, frame.damped
+        if own is not None:
+            matrix, damped = own.matrix, own.damped
+        carried = np.float32(damped.carried * (dt / frame.duration))
+        impulse = displacement * carried
+        felt = felt_gravity(drive.gravity, settings, frame.turn, middle) * np.float32(dt * dt)
+        impulse += felt if own is None else felt * own.gravity
         radius = radius_of_all(settings, state.cv_count, before.shape[2], state.rest.size)
         between = np.tile(radius * BETWEEN_RADIUS, (len(BETWEEN), 1))
         if drive.clearance is not None:
@@ -265,17 +305,21 @@ class Block:
         rest = state.rest.part(guides)
         combed = combed_gravity(drive.gravity, settings, frame.turn)
         springs = Springs.of(rest.room, rest.length, middle, combed, held, settings, dt)
+        if springs is not None and own is not None:
+            springs = replace(springs, load=springs.load * own.gravity[springs.guides])
         return cls(
             rest,
             before,
             displacement,
             bent,
             impulse,
-            None if bent is None else bent * np.float32(frame.carried_fraction),
+            None if bent is None else bent * carried,
             radius,
             between,
             held,
             springs,
+            matrix,
+            damped,
         )
 
     def style_at(self, moment: float) -> Floats:

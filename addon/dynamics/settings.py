@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from ..params import choice, curve, integer, mask, number, toggle
+from ..params import choice, curve, integer, number, toggle
 from .motion_settings import MotionSettings
 
 
@@ -55,6 +55,7 @@ class DynamicsSettings(MotionSettings):
         description="Fraction of the scene's gravity that pulls at the hair",
         soft=(0.0, 2.0),
         hard=(-10.0, 10.0),
+        is_painted=True,
     )
     sag_compensation: float = number(
         1.0,
@@ -74,6 +75,7 @@ class DynamicsSettings(MotionSettings):
         unit="rate",
         source="Global shape constraint, Han and Harada 2012",
         panel="Style",
+        is_painted=True,
     )
     style_tip: float = number(
         1.2,
@@ -84,6 +86,7 @@ class DynamicsSettings(MotionSettings):
         unit="rate",
         source="Global shape constraint, Han and Harada 2012",
         panel="Style",
+        is_painted=True,
     )
     style_along: tuple[float, ...] = curve(
         (1.0, 0.75, 0.5, 0.25, 0.0),
@@ -100,6 +103,7 @@ class DynamicsSettings(MotionSettings):
         hard=(0.0, 1000.0),
         unit="rate",
         panel="Style",
+        is_painted=True,
     )
     bend: float = number(
         1.5,
@@ -111,6 +115,7 @@ class DynamicsSettings(MotionSettings):
         unit="rate",
         source="Local shape constraint, Han and Harada 2012",
         panel="Style",
+        is_painted=True,
     )
     bend_along: tuple[float, ...] = curve(
         (1.0, 1.0, 1.0, 1.0, 1.0),
@@ -151,6 +156,7 @@ class DynamicsSettings(MotionSettings):
         unit="factor",
         source="Grid of density and velocity, Petrovic, Henne and Anderson 2005",
         panel="Style",
+        is_painted=True,
     )
     animated_style: bool = toggle(
         False,
@@ -168,8 +174,8 @@ class DynamicsSettings(MotionSettings):
         hard=(0.0, 1.0),
         unit="factor",
         panel="Style",
+        is_painted=True,
     )
-    simulated_mask: str = mask("simulated", label="Simulated Mask")
     length_solver: str = choice(
         "direct",
         (

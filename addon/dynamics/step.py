@@ -52,7 +52,7 @@ from .contacts import (
     touched_by,
 )
 from .force_fields import along_strands, blow
-from .forces import air_fraction, brake, predict, speed_kept
+from .forces import brake, predict
 from .frame import Block, Drive, Frame, check_drive, style_rows
 from .schedule import due_substeps
 from .settings import DynamicsSettings
@@ -130,9 +130,8 @@ def _advance_block(
     numbers: range,
 ) -> tuple[Floats, Floats]:
     """Position and previous position after these substeps; takes the arrays."""
-    settings, dt, rest = frame.settings, frame.dt, block.rest
+    settings, rest, damped = frame.settings, block.rest, block.damped
     spare = np.empty_like(position)
-    kept, blown = speed_kept(settings, dt), air_fraction(settings, dt)
     chain = _Chain(rest.length, block.held, rest.size, settings)
     for number in numbers:
         span = spans[number]
@@ -146,13 +145,13 @@ def _advance_block(
         if frame.force_fields is not None:
             _blow(position, previous, frame)
         if air_displacement is not None:
-            impulse = impulse + air_displacement[:, None] * np.float32(blown)
-        predict(position, previous, impulse, kept, out=spare)
+            impulse = impulse + air_displacement[:, None] * np.float32(damped.air)
+        predict(position, previous, impulse, damped.kept, out=spare)
         previous, position, spare = position, spare, previous
         pin(position, style, rest.length, block.held)
         if block.springs is not None:
             chain = replace(chain, length=block.springs.step(position, previous, rest.length))
-        restore_style(position, style, rest.shape, frame.matrix)
+        restore_style(position, style, rest.shape, block.matrix)
         pin(position, style, rest.length, block.held)
         chain.keep_lengths(position, None)
         _keep_outside(position, previous, block, chain, frame, poses[number])

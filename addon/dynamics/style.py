@@ -12,8 +12,9 @@ There both are relaxed CV after CV. Here they are the energies of one quadratic 
                                                           the frame of segment i-1
     g = (omega_global dt)^2,  s = (omega_bend dt)^2       backward Euler of springs
 
-whose matrix I + diag(g) + B^T diag(s) B is banded, constant, and the same for all guides: one solve
-with scalar factors brings the stiffest style back without iterations, stable for any dt.
+whose matrix I + diag(g) + B^T diag(s) B is banded, constant, and the same for all guides on which
+nothing is painted: one solve with scalar factors brings the stiffest style back without
+iterations, stable for any dt.
 
 Frames: on each segment a tangent t and a normal u, carried from segment to segment by the smallest
 rotation (Bishop 1975). With unit tangents that rotation is  u' = u - (u.t') / (1 + t.t') (t + t').
@@ -88,7 +89,8 @@ class LocalShape:
 class StyleBand:
     """band: the factored matrix.
 
-    pull: (cv_count - 2, 1), g of each free CV. bend: (cv_count - 2, 1), s of each inner CV.
+    pull: (cv_count - 2, 1), g of each free CV. bend: (cv_count - 2, 1), s of each inner CV. Where
+    stiffness is painted all are (cv_count - 2, guide_count).
     """
 
     pull: Floats
@@ -99,23 +101,50 @@ class StyleBand:
     def is_bending(self) -> bool:
         return bool(self.bend.any())
 
+    def part(self, guides: slice) -> StyleBand:
+        """Of these guides; itself where all share one."""
+        if self.pull.shape[1] == 1:
+            return self
+        return StyleBand(self.pull[:, guides], self.bend[:, guides], self.band.part(guides))
+
 
 @lru_cache(maxsize=8)
 def style_band(settings: DynamicsSettings, cv_count: int, dt: float) -> StyleBand:
     """The matrix of the style solve for all free CVs of any guide."""
-    free = cv_count - PINNED
+    root, tip, bend = (
+        np.array([[value]]) for value in (settings.style_root, settings.style_tip, settings.bend)
+    )
+    return painted_band(settings, root, tip, bend, cv_count, dt)
+
+
+def painted_band(
+    settings: DynamicsSettings, root: Floats, tip: Floats, bend: Floats, cv_count: int, dt: float
+) -> StyleBand:
+    """That of guides of which each has its own stiffness.
+
+    Args:
+        root, tip, bend: as in the settings, (cv_count or 1, guide_count or 1).
+    """
+
+    def rows(values: Floats, chosen: slice) -> Floats:
+        return values[chosen] if len(values) > 1 else values
+
+    free, inner = slice(PINNED, None), slice(1, -1)
     along = np.arange(PINNED, cv_count) / max(cv_count - 1, 1)
-    stiff = curve_along(settings.style_along, along)
-    frequency = settings.style_tip + (settings.style_root - settings.style_tip) * stiff
-    pull = (2.0 * np.pi * frequency * dt) ** 2
+    stiff = curve_along(settings.style_along, along)[:, None]
+    root, tip = rows(root, free), rows(tip, free)
+    pull = (2.0 * np.pi * (tip + (root - tip) * stiff) * dt) ** 2
     segments = cv_count - 1
-    inner = np.arange(1, cv_count - 1) / max(segments, 1)
-    swings = settings.bend * curve_along(settings.bend_along, inner)
-    bend = (2.0 * np.pi * swings * segments**2 / _CANTILEVER * dt) ** 2
-    second = np.eye(free) - 2.0 * np.eye(free, k=-1) + np.eye(free, k=-2)
-    matrix = np.eye(free) + np.diag(pull) + second.T @ (bend[:, None] * second)
-    column, bends = (values.astype(np.float32)[:, None] for values in (pull, bend))
-    return StyleBand(column, bends, SharedBand(matrix))
+    bent = curve_along(settings.bend_along, np.arange(1, cv_count - 1) / max(segments, 1))
+    swings = rows(bend, inner) * bent[:, None]
+    stay = (2.0 * np.pi * swings * segments**2 / _CANTILEVER * dt) ** 2
+    # B^T diag(s) B: s_i + 4 s_(i+1) + s_(i+2), beside it -2 (s_(i+1) + s_(i+2)), beyond it s_(i+2)
+    pull, stay = np.broadcast_arrays(pull, stay)
+    after = np.concatenate([stay, np.zeros((2, stay.shape[1]))])
+    main = 1.0 + pull + (stay + 4.0 * after[1:-1] + after[2:])
+    beside, beyond = -2.0 * (after[1:-1] + after[2:]), after[2:]
+    column, bends = (values.astype(np.float32) for values in (pull, stay))
+    return StyleBand(column, bends, SharedBand(main, beside, beyond))
 
 
 def restore_style(position: Floats, style: Floats, shape: LocalShape, matrix: StyleBand) -> None:

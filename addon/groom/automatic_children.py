@@ -51,5 +51,4 @@ def automatic(own: StrandSet, settings: ChildrenSettings) -> tuple[ChildrenSetti
         frizz_length=_WAVE,
         fly_aways=0.0,
         curl=0.0,
-        width=1.0,
     ), parts

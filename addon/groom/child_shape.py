@@ -137,7 +137,9 @@ def frizz(
                 grid[chunk, :, axis] += swing * part[:, None]
 
 
-def stray(grid: Floats, key: Ints, settings: ChildrenSettings, is_baby: Bools) -> None:
+def stray(
+    grid: Floats, key: Ints, settings: ChildrenSettings, painted: Floats, is_baby: Bools
+) -> None:
     """Let some strands wander off their path, in place, and all baby hair as the calmest of them;
     roots and lengths stay.
 
@@ -147,11 +149,12 @@ def stray(grid: Floats, key: Ints, settings: ChildrenSettings, is_baby: Bools) -
     Args:
         grid: (child_count, cv_count, 3) float32 [m].
         key: (child_count,) what is random about each depends on.
+        painted: (child_count,) by which their number is multiplied.
         is_baby: (child_count,) see `babies`.
     """
     if not settings.fly_aways and not is_baby.any():
         return
-    strayed = np.flatnonzero((uniform(key, _STRAYS) < settings.fly_aways) | is_baby)
+    strayed = np.flatnonzero((uniform(key, _STRAYS) < settings.fly_aways * painted) | is_baby)
     along = np.linspace(0.0, 1.0, grid.shape[1])[1:, None]
     for start in range(0, len(strayed), _CHUNK):
         chunk = strayed[start : start + _CHUNK]

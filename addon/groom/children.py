@@ -28,7 +28,7 @@ from .child_shape import babies, curl_points, curled, frizz, mixed, shorten, str
 from .children_settings import ChildrenSettings
 from .counter_random import named, normal
 from .hairline import nearness_to_border
-from .masks import NO_MASKS, Factors, Masks
+from .masks import NO_MASKS, Factors, Masks, Places
 from .partings import Partings
 from .weights import GUIDES_PER_STRAND, GuideWeights, child_weights, nearest_before
 
@@ -38,8 +38,10 @@ CHILD_POINTS, FEWEST_CHILD_POINTS = 12_000_000, 16
 _NEIGHBOUR = 3
 #: Random numbers of where a child takes its shape from; those of its shape are in `child_shape`.
 _PLACE = 0
-#: How wide baby hair is, in terms of the hair around it.
-_BABY_WIDTH = 0.5
+#: How wide baby hair is, in terms of the hair around it; and the finest that may be painted.
+_BABY_WIDTH, _FINEST = 0.5, 0.001
+#: What is painted and gives children their shapes, after clumps.
+_SHAPING = ("length", "fly_aways", "curl", "frizz")
 
 
 @dataclass(frozen=True)
@@ -90,7 +92,7 @@ class Growth:
         key, settings, factors = self.key[chosen], self.settings, self.factors.take(chosen)
         is_baby = babies(key, settings, self.border[chosen])
         shorten(grid, key, settings, factors["length"], is_baby)
-        stray(grid, key, settings, is_baby)
+        stray(grid, key, settings, factors["fly_aways"], is_baby)
         if settings.curl:
             lock = self.key[self.clumps.outermost()[chosen]]
             grid = curled(grid, lock, settings, self.size, self.cv_count, factors["curl"])
@@ -100,8 +102,13 @@ class Growth:
     @property
     def fineness(self) -> Floats:
         """How wide each is in terms of the hair around it, (child_count,)."""
-        is_baby = babies(self.key, self.settings, self.border)
-        return np.where(is_baby, np.float32(_BABY_WIDTH), np.float32(1.0))
+        painted = np.maximum(self.factors["width"], _FINEST).astype(np.float32)
+        return np.where(self.is_baby, np.float32(_BABY_WIDTH), np.float32(1.0)) * painted
+
+    @property
+    def is_baby(self) -> Bools:
+        """Which are baby hair, (child_count,)."""
+        return babies(self.key, self.settings, self.border)
 
     def touched(self, guides: Bools) -> Bools:
         """Children (child_count,) whose shapes these guides (guide_count,) have a part in."""
@@ -132,7 +139,7 @@ class Growth:
             guides: between which these have grown.
             beside: which children are neighbours, if they are drawn by clumps.
         """
-        weights = _weights(roots, guides, self.settings, self.partings, NOTHING_KEPT)
+        weights = _weights(roots, guides, self.settings, self.partings, self.masks, NOTHING_KEPT)
         more = self.clumps.joined(
             roots.point,
             guides.group[weights.guide[:, 0]],
@@ -150,9 +157,7 @@ class Growth:
                 np.concatenate([self.weights.weight, weights.weight]),
             ),
             clumps=more,
-            factors=self.factors.and_also(
-                self.masks.at(surface, roots.triangle, roots.barycentric)
-            ),
+            factors=self.factors.and_also(self.masks.at(_places(roots, weights))),
             border=np.concatenate([self.border, _border(self.guide_border, weights)]),
         )
 
@@ -175,7 +180,7 @@ def make_children(
         density: (vertex_count,), how densely children grow, not negative; None: wherever guides
             are near.
         partings: lines that the artist has drawn; None: there are none.
-        masks: what the artist has painted.
+        masks: what the artist has painted; of strands, by the guides.
         place: names the groom in error messages.
         kept: of the children that were made last.
 
@@ -188,10 +193,10 @@ def make_children(
             "it has no guides to grow children from", place=place, remedy="Draw some strands"
         )
     roots = child_roots(guides, surface, settings.strand_count, density, settings.seed)
-    weights = _weights(roots, guides, settings, partings, kept)
+    weights = _weights(roots, guides, settings, partings, masks, kept)
     group = guides.group[weights.guide[:, 0]]
     grid = mixed(roots.point, guides.grid, weights)
-    factors = masks.at(surface, roots.triangle, roots.barycentric)
+    factors = masks.at(_places(roots, weights))
     clumps = clump(grid, group, settings, factors["clump"], partings, kept)
     size = typical(guides.lengths())
     needed = max(curl_points(float(guides.lengths().max()), settings, size), grid.shape[1])
@@ -218,7 +223,7 @@ def make_children(
     fixed = replace(settings, strand_count=ChildrenSettings().strand_count), size, cv_count
     lock = roots.key[clumps.outermost()] if settings.curl else roots.key
     (shaped,) = kept.rows(
-        "varied", fixed, (grid, roots.key, lock, growth.border, *factors.rows), varied
+        "varied", fixed, (grid, roots.key, lock, growth.border, *factors.rows(_SHAPING)), varied
     )
     strands = StrandSet(
         points=shaped.reshape(-1, 3),
@@ -256,10 +261,11 @@ def _weights(
     guides: StrandSet,
     settings: ChildrenSettings,
     partings: Partings | None,
+    masks: Masks,
     kept: Kept,
 ) -> GuideWeights:
     if settings.method != "single":
-        place = _scattered(roots, guides.roots, settings)
+        place = _scattered(roots, guides.roots, settings, masks)
         return child_weights(
             place,
             guides.roots,
@@ -276,13 +282,25 @@ def _weights(
     return GuideWeights(np.repeat(nearest, GUIDES_PER_STRAND, axis=1).astype(np.int32), weight)
 
 
-def _scattered(roots: ChildRoots, guide_root: Floats, settings: ChildrenSettings) -> Floats:
+def _places(roots: ChildRoots, weights: GuideWeights) -> Places:
+    return Places(roots.triangle, roots.barycentric, weights.guide, weights.weight)
+
+
+def _scattered(
+    roots: ChildRoots, guide_root: Floats, settings: ChildrenSettings, masks: Masks
+) -> Floats:
     """Where children take their shapes from, (child_count, 3) [m]: from near them, at random."""
     if not settings.scatter or len(guide_root) < 2:
         return roots.point
     _, gap = nearest_points(guide_root, guide_root, min(_NEIGHBOUR + 1, len(guide_root)))
-    reach = settings.scatter * float(np.median(gap[:, -1]))
-    return roots.point + np.float32(reach) * normal(named(roots.key[:, None], np.arange(3)), _PLACE)
+    reach = np.float32(settings.scatter * float(np.median(gap[:, -1])))
+    away = reach * normal(named(roots.key[:, None], np.arange(3)), _PLACE)
+    mask = masks.masks.get("scatter")
+    if mask is not None:
+        nearest, _ = nearest_points(roots.point, guide_root, 1)
+        places = Places(roots.triangle, roots.barycentric, nearest, np.ones(nearest.shape))
+        away *= mask.at(places).astype(np.float32)[:, None]
+    return roots.point + away
 
 
 def _border(guide_border: Floats, weights: GuideWeights) -> Floats:

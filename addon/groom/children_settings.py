@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from ..params import Settings, choice, curve, either, integer, mask, number, when
+from ..params import Settings, choice, curve, either, integer, number, when
 
 _NALU = "Nguyen and Donnelly 2005, GPU Gems 2, chapter 23"
 _TARIQ = "Tariq 2008, Real-time hair rendering on the GPU"
@@ -63,6 +63,7 @@ class ChildrenSettings(Settings):
         soft=(0.0, 2.0),
         hard=(0.0, 100.0),
         shown_when=when("children.method", "multi"),
+        is_painted=True,
     )
     length: float = number(
         1.0,
@@ -71,9 +72,9 @@ class ChildrenSettings(Settings):
         unit="factor",
         soft=(0.1, 1.0),
         hard=(0.001, 1.0),
-        shown_when=when("children.method", "multi", "single"),
+        shown_when=when("children.method", "multi", "single", "auto"),
+        is_painted=True,
     )
-    length_mask: str = mask("length", label="Length Mask")
     length_variation: float = number(
         0.2,
         label="Length Variation",
@@ -91,8 +92,8 @@ class ChildrenSettings(Settings):
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),
         shown_when=when("children.method", "multi", "single"),
+        is_painted=True,
     )
-    clump_mask: str = mask("clump", label="Clump Mask")
     clump_along: tuple[float, float, float, float, float] = curve(
         (0.0, 0.25, 0.5, 0.75, 1.0),
         label="Clump Along",
@@ -118,8 +119,8 @@ class ChildrenSettings(Settings):
         soft=(0.0, 0.05),
         hard=(0.0, 1.0),
         shown_when=when("children.method", "multi", "single"),
+        is_painted=True,
     )
-    frizz_mask: str = mask("frizz", label="Frizz Mask")
     frizz_along: tuple[float, float, float, float, float] = curve(
         (0.0, 0.4, 0.7, 0.9, 1.0),
         label="Frizz Along",
@@ -146,6 +147,7 @@ class ChildrenSettings(Settings):
         soft=(0.0, 0.2),
         hard=(0.0, 1.0),
         shown_when=when("children.method", "multi", "single"),
+        is_painted=True,
     )
     baby_hair: float = number(
         0.8,
@@ -165,8 +167,8 @@ class ChildrenSettings(Settings):
         soft=(0.0, 0.05),
         hard=(0.0, 1.0),
         shown_when=when("children.method", "multi", "single"),
+        is_painted=True,
     )
-    curl_mask: str = mask("curl", label="Curl Mask")
     curl_length: float = number(
         0.12,
         label="Curl Length",
@@ -191,7 +193,8 @@ class ChildrenSettings(Settings):
         description="Width of children relative to their guides",
         soft=(0.1, 4.0),
         hard=(0.001, 1000.0),
-        shown_when=when("children.method", "multi", "single"),
+        shown_when=when("children.method", "multi", "single", "auto"),
+        is_painted=True,
     )
     seed: int = integer(
         1,

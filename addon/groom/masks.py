@@ -1,84 +1,288 @@
-"""Painted masks: by what a setting of children is multiplied, wherever they grow."""
+"""Painted masks: by what settings are multiplied, wherever hair grows.
+
+A parameter says that it may be painted (`is_painted`); its mask is what the parameter after it
+names. What was painted lies on the surface, in an image on its UVs, or on the artist's own strands.
+Any of them says how much it is at `Places`: at the roots of guides as of children.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from types import SimpleNamespace
+from typing import Self
 
 import numpy as np
 
 from ..arrays import Floats, Ints
-from ..strands import Surface
-from .children_settings import ChildrenSettings
+from ..params import Settings
+from ..strands import StrandSet, Surface
+from ..strands.arc_length import reached
+from ..strands.catmull_rom import even_places
+from ..strands.nearest import nearest_points
+from ..strands.resample import arc_length_positions
 
-#: parameter that may be painted -> the one that names its mask
-MASKS = {each.of: each.name for each in ChildrenSettings.parameters() if each.kind == "mask"}
-#: parameter -> its label
-LABELS = {each.name: each.label for each in ChildrenSettings.parameters()}
+#: Places along a strand at which it keeps what was painted on its points.
+_ALONG = 17
+
+
+def masks_of(settings: type[Settings]) -> dict[str, str]:
+    """Parameter that may be painted -> the one that names its mask."""
+    return {each.of: each.name for each in settings.parameters() if each.kind == "mask"}
+
+
+def mask_names(settings: Settings) -> dict[str, str]:
+    """Of each parameter that has a mask and acts, the name of that."""
+    sections = SimpleNamespace(**{settings.section: settings})
+    named = {of: str(getattr(settings, name)) for of, name in masks_of(type(settings)).items()}
+    acts = {p.name for p in settings.parameters() if not p.shown_when or p.shown_when(sections)}
+    return {of: name for of, name in named.items() if name and of in acts}
+
+
+@dataclass(frozen=True, eq=False)
+class Places:
+    """Where something grows, and between which of the artist's own strands.
+
+    triangle: (n,), barycentric: (n, 3), of the surface; None: there is none.
+    strand, weight: (n, k) which strands it is mixed from, and how much of each.
+    """
+
+    triangle: Ints | None
+    barycentric: Floats | None
+    strand: Ints
+    weight: Floats
+
+    @classmethod
+    def of_strands(cls, strands: StrandSet, chosen: Ints) -> Places:
+        """Where some of the artist's own strands grow."""
+        triangle, barycentric = strands.root_triangle, strands.root_barycentric
+        return cls(
+            None if triangle is None else triangle[chosen],
+            None if barycentric is None else barycentric[chosen],
+            chosen[:, None],
+            np.ones((len(chosen), 1), np.float32),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Mask:
+    """What was painted, not negative and finite."""
+
+    def __eq__(self, other: object) -> bool:
+        return type(self) is type(other) and all(
+            np.array_equal(one, vars(other)[name]) for name, one in vars(self).items()
+        )
+
+    def at(self, places: Places) -> Floats:
+        """How much it is, (n,)."""
+        raise NotImplementedError
+
+    def along(self, places: Places, cv_count: int) -> Floats:
+        """The same evenly spaced from root to tip, (cv_count, n); (1, n): alike at all of them."""
+        return self.at(places)[None]
+
+    def at_vertices(self, surface: Surface, strands: StrandSet) -> Floats:
+        """How much it is at each vertex, (vertex_count,).
+
+        Args:
+            strands: the artist's own, bound or not.
+        """
+        raise NotImplementedError
+
+    def fits(self, strand_count: int, triangle_count: int | None) -> bool:
+        """Whether it says something of this many of the artist's own strands, on a surface of this
+        many triangles; None: on none."""
+        raise NotImplementedError
+
+    def of(self, strands: Ints) -> Mask:
+        """The same, known by some of the artist's strands alone."""
+        return self
+
+    @property
+    def is_zero(self) -> bool:
+        return not any((values > 0.0).any() for values in vars(self).values())
+
+
+@dataclass(frozen=True, eq=False)
+class SurfaceMask(Mask):
+    """corners: (triangle_count, 3) float32, at the corners of the surface's triangles."""
+
+    corners: Floats
+
+    @classmethod
+    def of_vertices(cls, surface: Surface, weights: Floats) -> Self:
+        """Args:
+        weights: (vertex_count,).
+        """
+        return cls(np.asarray(weights, np.float32)[surface.triangles])
+
+    def at(self, places: Places) -> Floats:
+        triangle, barycentric = places.triangle, places.barycentric
+        assert triangle is not None and barycentric is not None, "what is painted has a surface"
+        a, b, c = self.corners[triangle].astype(np.float64).T
+        # so that it is exactly the same where it is painted evenly
+        found: Floats = a + barycentric[:, 1] * (b - a) + barycentric[:, 2] * (c - a)
+        return found
+
+    def fits(self, strand_count: int, triangle_count: int | None) -> bool:
+        return len(self.corners) == triangle_count
+
+    def at_vertices(self, surface: Surface, strands: StrandSet) -> Floats:
+        return _mean_at_vertices(surface, self.corners)
+
+
+@dataclass(frozen=True, eq=False)
+class ImageMask(Mask):
+    """pixels: (height, width) float32, the lowest row first. corner_uv: (triangle_count, 3, 2)."""
+
+    pixels: Floats
+    corner_uv: Floats
+
+    def at(self, places: Places) -> Floats:
+        triangle, barycentric = places.triangle, places.barycentric
+        assert triangle is not None and barycentric is not None, "what is painted has a surface"
+        return self._at(np.einsum("nk,nkj->nj", barycentric, self.corner_uv[triangle]))
+
+    def _at(self, uv: Floats) -> Floats:
+        """Between the middles of the four nearest pixels; the image begins again at its edges."""
+        height, width = self.pixels.shape
+        place = uv.astype(np.float64) * (width, height) - 0.5
+        corner = np.floor(place).astype(np.int64)
+        x, y = (place - corner).T
+        (left, low), (right, high) = (
+            (corner % (width, height)).T,
+            ((corner + 1) % (width, height)).T,
+        )
+        below = self.pixels[low, left] * (1.0 - x) + self.pixels[low, right] * x
+        above = self.pixels[high, left] * (1.0 - x) + self.pixels[high, right] * x
+        found: Floats = below + y * (above - below)
+        return found
+
+    def fits(self, strand_count: int, triangle_count: int | None) -> bool:
+        return len(self.corner_uv) == triangle_count
+
+    def at_vertices(self, surface: Surface, strands: StrandSet) -> Floats:
+        corners = self._at(self.corner_uv.reshape(-1, 2)).reshape(-1, 3)
+        return _mean_at_vertices(surface, corners)
+
+    @property
+    def is_zero(self) -> bool:
+        return not (self.pixels > 0.0).any()
+
+
+@dataclass(frozen=True, eq=False)
+class StrandMask(Mask):
+    """grid: (strand_count, _ALONG) or, where it is alike along each, (strand_count, 1)."""
+
+    grid: Floats
+
+    @classmethod
+    def of_points(cls, strands: StrandSet, values: Floats) -> Self:
+        """Args:
+        strands: the artist's own. values: (point_count,).
+        """
+        left, weight = arc_length_positions(strands, _ALONG)
+        return cls(values[left] + weight * (values[left + 1] - values[left]))
+
+    def at(self, places: Places) -> Floats:
+        return self._mixed(places, self.grid.mean(axis=1, dtype=np.float64)[:, None])[0]
+
+    def along(self, places: Places, cv_count: int) -> Floats:
+        grid = self.grid.astype(np.float64)
+        if grid.shape[1] > 1:
+            left, part = even_places(_ALONG, cv_count)
+            grid = grid[:, left] + part * (grid[:, left + 1] - grid[:, left])
+        return self._mixed(places, grid)
+
+    def _mixed(self, places: Places, grid: Floats) -> Floats:
+        """Values of strands (strand_count, k) at places, (k, n)."""
+        found = np.zeros((len(places.strand), grid.shape[1]))
+        for strand, weight in zip(places.strand.T, places.weight.T, strict=True):
+            found += grid[strand] * weight[:, None]
+        return found.T
+
+    def at_vertices(self, surface: Surface, strands: StrandSet) -> Floats:
+        nearest, _ = nearest_points(surface.positions, strands.roots, 1)
+        found: Floats = self.grid.mean(axis=1)[nearest[:, 0]]
+        return found
+
+    def fits(self, strand_count: int, triangle_count: int | None) -> bool:
+        return len(self.grid) == strand_count
+
+    def of(self, strands: Ints) -> StrandMask:
+        return StrandMask(self.grid[strands])
+
+    def at_points(self, strands: StrandSet) -> Floats:
+        """What it was painted with, (point_count,)."""
+        if self.grid.shape[1] == 1:
+            return np.repeat(self.grid[:, 0], strands.point_counts)
+        along = reached(strands.points, strands.offsets)
+        whole = np.repeat(along[strands.offsets[1:] - 1], strands.point_counts)
+        place = along / np.maximum(whole, 1.0e-30) * (_ALONG - 1)
+        left = np.minimum(place.astype(np.int64), _ALONG - 2)
+        rows = np.repeat(np.arange(strands.strand_count), strands.point_counts)
+        low, high = self.grid[rows, left], self.grid[rows, left + 1]
+        found: Floats = low + (place - left) * (high - low)
+        return found
+
+
+def _mean_at_vertices(surface: Surface, corners: Floats) -> Floats:
+    """The mean of values at corners around each vertex, (vertex_count,)."""
+    vertex, count = surface.triangles.ravel(), len(surface.positions)
+    total = np.bincount(vertex, corners.ravel(), count)
+    found: Floats = total / np.maximum(np.bincount(vertex, minlength=count), 1)
+    return found
 
 
 @dataclass(frozen=True, eq=False)
 class Masks:
-    """weights: of each painted parameter by its name, (vertex_count,), not negative and finite."""
+    """masks: of each painted parameter by its name."""
 
-    weights: Mapping[str, Floats] = field(default_factory=dict)
+    masks: Mapping[str, Mask] = field(default_factory=dict)
 
     def __eq__(self, other: object) -> bool:
-        if not isinstance(other, Masks) or self.weights.keys() != other.weights.keys():
-            return False
-        return all(np.array_equal(each, other.weights[name]) for name, each in self.weights.items())
+        return isinstance(other, Masks) and self.masks == other.masks
 
-    def at(self, surface: Surface, triangle: Ints, barycentric: Floats) -> Factors:
-        """Of children that grow there, (n,)."""
-        factors = {}
-        for name in MASKS:
-            weights = self.weights.get(name)
-            if weights is None:
-                factors[name] = np.ones(len(triangle))
-                continue
-            a, b, c = weights[surface.triangles[triangle]].astype(np.float64).T
-            # so that it is exactly the same where it is painted evenly
-            factors[name] = a + barycentric[:, 1] * (b - a) + barycentric[:, 2] * (c - a)
-        return Factors(factors)
+    def __bool__(self) -> bool:
+        return bool(self.masks)
+
+    def at(self, places: Places) -> Factors:
+        """Of what grows there."""
+        return Factors(len(places.strand), {n: each.at(places) for n, each in self.masks.items()})
+
+    def of(self, strands: Ints) -> Masks:
+        """See `Mask.of`."""
+        return Masks({name: each.of(strands) for name, each in self.masks.items()})
 
 
 NO_MASKS = Masks()
 
 
-def mask_names(settings: ChildrenSettings) -> dict[str, str]:
-    """Of each parameter that has a mask, the name of that; children that are as many as the body
-    needs have none."""
-    if settings.method not in ("multi", "single"):
-        return {}
-    named = {of: str(getattr(settings, name)) for of, name in MASKS.items()}
-    return {of: name for of, name in named.items() if name}
-
-
 @dataclass(frozen=True, eq=False)
 class Factors:
-    """by_name: of each parameter that may be painted, (child_count,)."""
+    """count: of what grows. painted: of each painted parameter, (count,); all others are 1."""
 
-    by_name: Mapping[str, Floats]
+    count: int
+    painted: Mapping[str, Floats]
 
     def __getitem__(self, name: str) -> Floats:
-        return self.by_name[name]
+        found = self.painted.get(name)
+        return np.ones(self.count) if found is None else found
 
-    @property
-    def rows(self) -> tuple[Floats, ...]:
-        return tuple(self.by_name.values())
+    def rows(self, names: tuple[str, ...]) -> tuple[Floats, ...]:
+        return tuple(self[name] for name in names)
 
     def take(self, chosen: Ints) -> Factors:
-        return Factors({name: each[chosen] for name, each in self.by_name.items()})
+        return Factors(len(chosen), {name: each[chosen] for name, each in self.painted.items()})
 
     def and_also(self, more: Factors) -> Factors:
-        return Factors(
-            {name: np.concatenate([each, more[name]]) for name, each in self.by_name.items()}
-        )
+        both = {n: np.concatenate([each, more[n]]) for n, each in self.painted.items()}
+        return Factors(self.count + more.count, both)
 
     def with_others(self, chosen: Ints, others: Factors) -> Factors:
-        """With those of some children (n,) others."""
+        """With those of some (n,) others."""
         found = {}
-        for name, each in self.by_name.items():
-            found[name] = each.copy()
+        for name in self.painted.keys() | others.painted.keys():
+            found[name] = self[name].copy()
             found[name][chosen] = others[name]
-        return Factors(found)
+        return Factors(self.count, found)

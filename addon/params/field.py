@@ -10,6 +10,9 @@ from difflib import get_close_matches
 from functools import cache
 from typing import Any, ClassVar, Literal, Self, TypedDict, Unpack
 
+import numpy as np
+
+from ..arrays import Floats
 from ..errors import HairloomError
 from .curve import PLACES, Curve
 
@@ -47,6 +50,7 @@ class Parameter:
     `source` names the paper or equation, or says "Hairloom".
     `panel` is the panel below that of the section in which it is drawn; none: in that one itself.
     It is drawn where `shown_when` holds, and greyed out where `active_when` does not.
+    `is_painted`: a mask may multiply it, which follows it by itself, see `Settings`.
     `of` is the parameter beside which a mask is drawn, and which it multiplies.
     """
 
@@ -63,6 +67,7 @@ class Parameter:
     panel: str = ""
     shown_when: Condition | None = None
     active_when: Condition | None = None
+    is_painted: bool = False
     of: str = ""
 
     def checked(self, value: Any, place: str) -> Any:
@@ -111,7 +116,7 @@ class Parameter:
         if self.choices:
             return "Use one of " + ", ".join(identifier for identifier, _, _ in self.choices)
         if self.kind == "mask":
-            return "Use the name of a vertex group or of a float attribute"
+            return "Use the name of a vertex group, of an attribute or of an image"
         if self.hard_range:
             low, high = self.hard_range
             return f"Use a value from {low:g} to {high:g} (default {self.default})"
@@ -145,6 +150,19 @@ class Settings:
     #: the toggle in the header of its panel
     header_toggle: ClassVar[str] = ""
 
+    def __init_subclass__(cls) -> None:
+        """Each parameter that may be painted is followed by the one that names its mask."""
+        super().__init_subclass__()
+        declared: dict[str, Any] = {}
+        for name, kind in vars(cls).get("__annotations__", {}).items():
+            declared[name] = kind
+            field = vars(cls).get(name)
+            parameter = getattr(field, "metadata", {}).get(_METADATA_KEY)
+            if parameter is not None and parameter.is_painted:
+                declared[mask_of(name)] = "str"
+                setattr(cls, mask_of(name), _mask(name, parameter))
+        cls.__annotations__ = declared
+
     def __post_init__(self) -> None:
         for parameter in self.parameters():
             value = parameter.checked(getattr(self, parameter.name), f"{self.section} settings")
@@ -169,6 +187,19 @@ class Settings:
                 name: min(max(each, limits[name][0]), limits[name][1])
                 for name, each in found.items()
             },
+        )
+
+    def painted(self, name: str, factor: Floats) -> Floats:
+        """A number where it is painted: times a factor, as far as its hard range reaches."""
+        (parameter,) = (each for each in self.parameters() if each.name == name)
+        return np.clip(getattr(self, name) * factor, *(parameter.hard_range or (None, None)))
+
+    def with_masks_of(self, other: Self) -> Self:
+        """The same with the masks of others where these name none: what is painted on one head is
+        not the matter of a preset."""
+        names = [each.name for each in self.parameters() if each.kind == "mask"]
+        return dataclasses.replace(
+            self, **{name: getattr(self, name) or getattr(other, name) for name in names}
         )
 
     def as_dict(self) -> dict[str, Any]:
@@ -220,6 +251,7 @@ class _Drawn(TypedDict, total=False):
     panel: str
     shown_when: Condition
     active_when: Condition
+    is_painted: bool
 
 
 def number(
@@ -330,14 +362,18 @@ def curve(
     )
 
 
-def mask(of: str, *, label: str) -> Any:
-    """Declare that a number of this name may be painted: this names the weights on the surface by
-    which it is multiplied."""
-    what = label.removesuffix(" Mask")
+def mask_of(name: str) -> str:
+    """The parameter that names the mask of another one."""
+    return f"{name}_mask"
+
+
+def _mask(of: str, parameter: Parameter) -> Any:
     description = (
-        f"Vertex group or float attribute on points of the surface by which {what} is multiplied; "
-        "empty: the same everywhere"
+        "What is painted, by which "
+        f"{parameter.label} is multiplied: a vertex group or an attribute of the surface, an "
+        "attribute of the curves, or an image on the surface's UVs; empty: the same everywhere"
     )
+    label = f"{parameter.label} Mask"
     return _declare(Parameter("", "mask", "", label, description, "Hairloom", of=of))
 
 

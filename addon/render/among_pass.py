@@ -1,7 +1,8 @@
 """Hair among hair on the GPU: `dynamics.among.feel`, of guides that lie in textures.
 
     hair_at_rest   RGBA32F in the layout of strand_layout.strand_rows: of each CV x its density at
-                   rest, y that above which it is crowded, z its mass
+                   rest, y that above which it is crowded, z its mass, w by which volume is
+                   multiplied where it is painted
     cell_sums      RGBA32F: of each cell x mass, yzw motion times mass, whole numbers
     densities      RGBA32F: the same smoothed
     gradients      RGBA32F: xyz how the smoothed mass grows along each axis
@@ -85,6 +86,7 @@ class AmongPass:
     def __init__(self) -> None:
         self._block, self._points = UniformBlock(), Ribbons()
         self._grid: HairGrid | None = None
+        self._volume: Floats | None = None
         self._textures: dict[str, Any] = {}
         self._target: Any = None
 
@@ -96,8 +98,8 @@ class AmongPass:
             speed_ratio: of the substep that comes to the one before it.
             pairs: the format of previous_positions.
         """
-        if among.grid is not self._grid:
-            self._make(among.grid)
+        if among.grid is not self._grid or among.volume is not self._volume:
+            self._make(among.grid, among.volume)
         cv_count, guide_count = among.grid.density.shape
         x, y, z = among.grid.counts
         block = self._block.holding(_block_of(among, speed_ratio))
@@ -120,15 +122,16 @@ class AmongPass:
             gpu.compute.dispatch(shader, *groups, 1)
         gpu.shader.unbind()
 
-    def _make(self, grid: HairGrid) -> None:
+    def _make(self, grid: HairGrid, volume: Floats | None) -> None:
         mass = np.broadcast_to(grid.mass, grid.density.shape)
-        numbers = np.stack([grid.density.T, grid.full.T, mass.T, np.zeros_like(mass.T)], axis=-1)
+        part = np.broadcast_to(np.float32(1.0) if volume is None else volume, mass.shape)
+        numbers = np.stack([grid.density.T, grid.full.T, mass.T, part.T], axis=-1)
         x, y, z = grid.counts
         self._textures = {"hair_at_rest": texture_from(strand_rows(numbers), "RGBA32F")}
         for name in ("cell_sums", "densities", "gradients"):
             self._textures[name] = gpu_objects.texture((x * z, y), format="RGBA32F")
         self._target = gpu_objects.framebuffer(color_slots=(self._textures["cell_sums"],))
-        self._grid = grid
+        self._grid, self._volume = grid, volume
 
 
 def _bound(recipe: ShaderRecipe, block: Any, textures: dict[str, Any]) -> Any:

@@ -19,11 +19,11 @@ from ..arrays import Floats
 from ..dynamics.constraints import PINNED, ROUNDING
 from ..dynamics.contacts import REACH, cv_radius
 from ..dynamics.force_fields import FARTHEST
-from ..dynamics.forces import air_fraction, carried_fraction, speed_kept
 from ..dynamics.frame import Frame
+from ..dynamics.painted import PaintedFrame
 from ..dynamics.settings import DynamicsSettings
 from ..dynamics.springs import give, stiffness
-from ..dynamics.style import style_band
+from ..dynamics.style import StyleBand, style_band
 from ..dynamics.trajectory import clamped_ratio
 from ..dynamics.wind import MODES
 from .shader_source import MOMENT_TEXELS
@@ -42,7 +42,7 @@ def moments_of(frame: Frame, first: int, spans: Floats) -> Floats:
     table = np.zeros((len(spans), MOMENT_TEXELS, 4), np.float32)
     begin, end = spans.T
     table[:, 0, 0] = end
-    table[:, 0, 2] = part = carried_fraction(frame.settings, frame.dt) * (end - begin)
+    table[:, 0, 2] = part = frame.damped.carried * (end - begin)
     if frame.drive.target_earlier is not None:
         ratio = clamped_ratio(frame.drive.earlier_ratio)
         table[:, 0, 1] = end * (end - 1.0) / (ratio * (ratio + 1.0))
@@ -77,8 +77,8 @@ def block_of(
     values[7:_NUMBERS] = (
         settings.length_tolerance,
         dt,
-        speed_kept(settings, dt),
-        air_fraction(settings, dt),
+        frame.damped.kept,
+        frame.damped.air,
         settings.drag,
         settings.friction,
         settings.depenetration_speed * frame.size * dt,
@@ -115,10 +115,40 @@ def _cv_values(settings: DynamicsSettings, cv_count: int, dt: float, size: float
     band, own = values = np.zeros((2, cv_count, 4), np.float32)
     if cv_count > PINNED:
         matrix = style_band(settings, cv_count, dt)
-        band[PINNED:, 0] = matrix.band.near
-        band[PINNED:, 1] = matrix.band.far
-        band[PINNED:, 2] = matrix.band.inverse_pivot
-        band[PINNED:, 3] = matrix.pull[:, 0]
-        own[1:-1, 0] = matrix.bend[:, 0]
+        band[:], own[:, 0] = bands_of(matrix, cv_count, 1)[0], bends_of(matrix, cv_count, 1)[0]
         own[PINNED:, 1] = cv_radius(settings, cv_count, size)
     return values.ravel()
+
+
+def bands_of(matrix: StyleBand, cv_count: int, guide_count: int) -> Floats:
+    """`band` of guides, (guide_count, cv_count, 4) float32."""
+    bands = np.zeros((guide_count, cv_count, 4), np.float32)
+    band = matrix.band
+    for lane, rows in enumerate((band.near, band.far, band.inverse_pivot, matrix.pull)):
+        bands[:, PINNED:, lane] = rows.T
+    return bands
+
+
+def bends_of(matrix: StyleBand, cv_count: int, guide_count: int) -> Floats:
+    """`own.x` of guides, (guide_count, cv_count) float32."""
+    bends = np.zeros((guide_count, cv_count), np.float32)
+    bends[:, 1:-1] = matrix.bend.T
+    return bends
+
+
+def own_of(frame: Frame, painted: PaintedFrame, cv_count: int) -> Floats:
+    """`painted_numbers` of dynamics_pass, (guide_count, cv_count, 4) float32."""
+    guide_count = len(painted.gravity)
+    own = np.zeros((guide_count, cv_count, 4), np.float32)
+    own[..., 0] = bends_of(painted.matrix, cv_count, guide_count)
+    damped, carried = painted.damped, float(frame.damped.carried)
+    own[:, 0] = np.stack(
+        [
+            damped.kept,
+            damped.air,
+            damped.carried / carried if carried else np.zeros(guide_count),
+            painted.gravity,
+        ],
+        axis=1,
+    )
+    return own

@@ -17,6 +17,10 @@ strand_layout.strand_rows:
     force_fields   RGBA32F: see force_fields.ForceFields.table; only where any act
     clearances     RGBA32F: of each CV, see clearance.GuideClearance; only where there are colliders
     beside_root    RGBA32F: xyz [m], see step.displacement_beside_root; both only where CVs are held
+    painted_bands  RGBA32F: of each CV near and far factor, inverse pivot and pull (style.StyleBand)
+    painted_numbers   RGBA32F: of a guide's first CV x the speed that damping leaves, y the fraction
+                   of the air's, z and w by which those of the style and gravity are multiplied;
+                   of all others x bend; both only where something is painted
     fractions      R32F: of a guide's first CV how much of it is simulated, see blend.blended; only
                    where not all is
 
@@ -41,6 +45,7 @@ from ..dynamics.constraints import PINNED
 from ..dynamics.contacts import REACH
 from ..dynamics.frame import Drive, Frame, check_drive
 from ..dynamics.held import Held
+from ..dynamics.painted import PaintedFrame
 from ..dynamics.schedule import due_substeps
 from ..dynamics.settings import DynamicsSettings
 from ..dynamics.state import DynamicsState, Rest, as_rows
@@ -48,7 +53,7 @@ from ..dynamics.step import displacement_beside_root
 from .among_pass import AmongPass
 from .capabilities import pair_format
 from .collider_textures import NOT_FOLLOWED, UploadedColliders
-from .dynamics_block import block_of, moments_of, spans_of
+from .dynamics_block import bands_of, block_of, moments_of, own_of, spans_of
 from .shader_program import ShaderRecipe, program, released_with_shaders
 from .strand_layout import from_strand_rows, strand_rows
 from .textures import UniformBlock, texture_from, texture_to_array
@@ -91,6 +96,7 @@ def dynamics_recipe(
     followed: bool = False,
     sharp: bool = False,
     clearance: bool = False,
+    painted: bool = False,
     pairs: str = "RG32F",
 ) -> ShaderRecipe:
     """The program for guides of this many CVs, without what the scene does not need.
@@ -110,10 +116,12 @@ def dynamics_recipe(
         "HAS_FOLLOWED": followed and cv_count > PINNED,
         "HAS_SHARP": sharp and cv_count > PINNED,
         "HAS_CLEARANCE": clearance,
+        "IS_PAINTED": painted,
     }
     textures = ["styles_earlier", "styles_before", "styles_now", "rest_shapes", "rest_lengths"]
     textures += ["moments"] + ["held_cvs"] * held + ["curl_rooms"] * springs
     textures += ["pushes"] * pushed + ["force_fields"] * (force_fields and cv_count > PINNED)
+    textures += ["painted_bands", "painted_numbers"] * painted
     textures += ["rounds"] * rounds + ["fields"] * fields + ["clearances"] * clearance
     return ShaderRecipe(
         name="dynamics",
@@ -208,6 +216,7 @@ class DynamicsPass:
         self._styles: list[tuple[Floats, Any]] = []  # those of the last frame, and their textures
         self._held: Held | None = None
         self._clearance: GuideClearance | None = None
+        self._painted: PaintedFrame | None = None
 
     def _upload(self, drive: Drive) -> None:
         state, textures = self._state, self._textures
@@ -242,6 +251,15 @@ class DynamicsPass:
         if rest.room is not None:
             textures["curl_rooms"] = texture_from(strand_rows(of_segments(rest.room)), "R32F")
 
+    def _upload_painted(self, frame: Frame) -> None:
+        painted, (cv_count, guide_count) = frame.painted, self._state.position.shape[1:]
+        if painted is not None:
+            bands = bands_of(painted.matrix, cv_count, guide_count)
+            self._textures["painted_bands"] = texture_from(strand_rows(bands), "RGBA32F")
+            numbers = strand_rows(own_of(frame, painted, cv_count))
+            self._textures["painted_numbers"] = texture_from(numbers, "RGBA32F")
+        self._painted = painted
+
     def _style_texture(self, style: Floats) -> Any:
         known = (texture for other, texture in self._styles if other is style)
         return next(known, None) or points_texture(style)
@@ -249,6 +267,8 @@ class DynamicsPass:
     def _advance(self, frame: Frame, count: int, speed_ratio: float) -> None:
         """All substeps of a frame; the first is `speed_ratio` as long as the one before it."""
         self._is_pushed &= frame.among is not None
+        if frame.painted is not self._painted:
+            self._upload_painted(frame)
         for numbers in frame.pieces(count):
             first, end = numbers[0], numbers[-1] + 1
             if frame.among is not None and (frame.among.is_due(first) or not self._is_pushed):
@@ -288,6 +308,7 @@ class DynamicsPass:
             followed=is_followed,
             sharp=is_sharp,
             clearance=bool(posed) and frame.drive.clearance is not None,
+            painted=frame.painted is not None,
             pairs=pair_format(),
         )
         block = block_of(frame, state.guide_count, state.cv_count, count, speed_ratio)

@@ -30,6 +30,7 @@ from hairloom.addon.dynamics.force_fields import (
 )
 from hairloom.addon.dynamics.held import Held
 from hairloom.addon.dynamics.measure import deepest_penetration, max_stretch
+from hairloom.addon.dynamics.painted import PaintedGuides
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.dynamics.state import DynamicsState, start
 from hairloom.addon.dynamics.step import Drive, advance, grid_at_frame_end
@@ -110,6 +111,7 @@ class Scene:
     is_fast: bool = False  # colliders swing ten times as far
     is_combed: bool = False  # guides stay no farther from colliders than they are at first
     is_blended: bool = False  # not all of what is shown is simulated
+    is_painted: bool = False  # each guide has its own numbers
 
     @property
     def settings(self) -> DynamicsSettings:
@@ -174,6 +176,7 @@ class Scene:
                     held=self.held,
                     clearance=self.clearance,
                     simulated=self.simulated,
+                    painted=self.painted,
                 )
             )
         return drives
@@ -184,6 +187,18 @@ class Scene:
         if not self.is_blended:
             return None
         return np.linspace(-0.2, 1.2, self.guide_count).clip(0.0, 1.0).astype(np.float32)
+
+    @cached_property
+    def painted(self) -> PaintedGuides | None:
+        """Stiffness also along the guides."""
+        if not self.is_painted:
+            return None
+        random = np.random.default_rng(3)
+        names = ("gravity", "style_root", "style_tip", "style_damping", "bend", "volume")
+        rows = {name: self.cv_count if name in ("style_root", "bend") else 1 for name in names}
+        return PaintedGuides(
+            {name: random.uniform(0.3, 1.7, (rows[name], self.guide_count)) for name in names}
+        )
 
     @cached_property
     def clearance(self) -> GuideClearance | None:
@@ -258,6 +273,9 @@ IN_AIR = {
     "held at 24 frames a second": Scene({"substep_rate": 100.0}, fps=24.0, is_held=True),
     "curls": Scene({"curl_stretch": 0.6, "sag_compensation": 0.6, **LOOSE}, is_curled=True),
     "held curls": Scene({"curl_bounce": 5.0, **LOOSE}, is_held=True, is_curled=True),
+    "painted": Scene(
+        LIMP | {"damping": 3.0, "wind_speed": 4.0, **LOOSE}, is_painted=True, is_curled=True
+    ),
     "curls with relaxation": Scene({"length_solver": "relaxation"}, is_curled=True),
     "relaxation": Scene({"length_solver": "relaxation"}),
     "relaxation without reach": Scene(
@@ -415,11 +433,12 @@ AMONG_OTHERS = {
         {"volume": 0.5, "substep_rate": 100.0, "style_tip": 0.3}, fps=24.0, guide_count=150
     ),
     "bundle": Bundle(FALLING, fps=24.0),
+    "painted": Bundle(FALLING, fps=24.0, is_painted=True),
     "bundle and ball": Bundle(FALLING, on_head=(BALL,), fps=24.0),
 }
 
 
-@pytest.mark.parametrize("scene", few_by_name(AMONG_OTHERS, "bundle"))
+@pytest.mark.parametrize("scene", few_by_name(AMONG_OTHERS, "bundle", "painted"))
 def test_hair_among_hair_equals_numpy(make_pass: Any, scene: Scene) -> None:
     assert_equal(scene, make_pass, TOUCHING)
 

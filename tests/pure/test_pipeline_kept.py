@@ -14,7 +14,7 @@ from tiers import few_in_commits
 from hairloom.addon import pipeline
 from hairloom.addon.dynamics.colliders import DistanceField
 from hairloom.addon.groom.children_settings import ChildrenSettings
-from hairloom.addon.groom.masks import Masks
+from hairloom.addon.groom.masks import Masks, SurfaceMask
 from hairloom.addon.groom.settings import GuideSettings
 from hairloom.addon.strands import StrandSet, Surface
 from hairloom.addon.strands.kept import Kept
@@ -62,6 +62,9 @@ def painted(stroke: int) -> np.ndarray:
     return np.where(away < 0.04, 0.3, 1.0).astype(np.float32)
 
 
+PAINTED = ("frizz", "length", "clump", "width", "scatter", "fly_aways")
+
+
 @pytest.mark.parametrize("does", [combed, painted])
 @pytest.mark.parametrize("guides", few_in_commits([30, 100]))
 @pytest.mark.parametrize(
@@ -69,7 +72,9 @@ def painted(stroke: int) -> np.ndarray:
     [
         ChildrenSettings(method="multi", strand_count=1500),
         ChildrenSettings(method="single", strand_count=1500, length_variation=0.4),
-        ChildrenSettings(method="multi", strand_count=4500, clump=0.7, frizz=0.05),
+        ChildrenSettings(
+            method="multi", strand_count=4500, clump=0.7, frizz=0.05, scatter=0.3, fly_aways=0.2
+        ),
     ],
     ids=["multi", "single", "clumped"],
 )
@@ -87,7 +92,7 @@ def test_it_is_what_is_made_from_nothing(
             place="a wig",
             children=settings,
             density=density,
-            masks=Masks({"frizz": density, "length": density, "clump": density}),
+            masks=Masks({name: SurfaceMask.of_vertices(HEAD, density) for name in PAINTED}),
             widths="found",
             head_field=lambda: field,
             **kept,

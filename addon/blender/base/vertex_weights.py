@@ -1,26 +1,56 @@
-"""Weights that an artist has painted or computed on a mesh, by name."""
+"""What an artist has painted or computed on a mesh or on hair curves, by name."""
 
 from __future__ import annotations
 
 import bpy
 import numpy as np
 
-from ...arrays import Floats
+from ...arrays import Floats, Ints
 from ...errors import HairloomError
+from .attributes import read_attribute
+
+#: Attributes that may be painted; colours count by their luminance (Rec. 709).
+_NUMBERS, _COLORS = ("FLOAT", "BOOLEAN"), ("FLOAT_COLOR", "BYTE_COLOR")
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)
+_DOMAINS = ("POINT", "CORNER", "FACE", "CURVE")
+#: Of Blender's own that are no paint; and what it keeps among images that is none.
+_NOT_PAINT, _NO_IMAGES = ("sharp_", "radius"), ("RENDER_RESULT", "COMPOSITING")
 
 
 def weight_names(obj: bpy.types.Object) -> list[str]:
     """The names that `read_weights` knows on this mesh object before its modifiers: its vertex
-    groups, then its float attributes on points."""
-    attributes = [one.name for one in obj.data.attributes if _is_weight(one)]
-    return [group.name for group in obj.vertex_groups] + attributes
+    groups, then its attributes."""
+    return [group.name for group in obj.vertex_groups] + attribute_names(obj.data)
+
+
+def attribute_names(data: bpy.types.Mesh | bpy.types.Curves) -> list[str]:
+    """The attributes of a mesh or of curves that are numbers or colours."""
+    return [
+        one.name
+        for one in data.attributes
+        if _is_weight(one) and not one.name.startswith((".", *_NOT_PAINT))
+    ]
+
+
+def image_names() -> list[str]:
+    return [each.name for each in bpy.data.images if each.type not in _NO_IMAGES]
+
+
+def mask_choices(hair: bpy.types.Object | None, surface: bpy.types.Object | None) -> list[str]:
+    """The names of all that a setting of hair may be painted by, each once."""
+    names: list[str] = []
+    if surface is not None and surface.type == "MESH":
+        names += weight_names(surface)
+    if hair is not None:
+        names += attribute_names(hair.data)
+    return list(dict.fromkeys([*names, *image_names()]))
 
 
 def read_weights(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, name: str) -> Floats:
     """Weight of each vertex of the evaluated mesh, (vertex_count,) float32.
 
-    A vertex group gives 0 to 1, and 0 where a vertex is not in it; a float attribute on points
-    gives its values. Where both have the name it is the group.
+    A vertex group gives 0 to 1, and 0 where a vertex is not in it; an attribute gives its values,
+    the mean around a vertex where it is not on points. Where both have the name it is the group.
 
     Raises:
         HairloomError: not a mesh, or neither a group nor such an attribute of this name.
@@ -34,22 +64,72 @@ def read_weights(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, name: st
     evaluated = obj.evaluated_get(depsgraph)
     mesh = evaluated.to_mesh()
     try:
-        return weights_on(obj, mesh, name)
+        values, domain = weights_on(obj, mesh, name)
+        if domain == "POINT":
+            return values
+        corners, triangles = at_corners(mesh, values, domain), _corners(mesh, "vertices")
+        count = len(mesh.vertices)
     finally:
         evaluated.to_mesh_clear()
+    around = np.bincount(triangles.ravel(), minlength=count)
+    total = np.bincount(triangles.ravel(), corners.ravel(), count)
+    return (total / np.maximum(around, 1)).astype(np.float32)
 
 
-def weights_on(obj: bpy.types.Object, mesh: bpy.types.Mesh, name: str) -> Floats:
-    """Like `read_weights`, on a mesh of this object, before or after its modifiers."""
+def has_weights(obj: bpy.types.Object, mesh: bpy.types.Mesh, name: str) -> bool:
+    """Whether `weights_on` finds any."""
+    attribute = mesh.attributes.get(name)
+    return name in obj.vertex_groups or (attribute is not None and _is_weight(attribute))
+
+
+def weights_on(obj: bpy.types.Object, mesh: bpy.types.Mesh, name: str) -> tuple[Floats, str]:
+    """What is painted on a mesh of this object, before or after its modifiers, float32, and the
+    domain of it.
+
+    Raises:
+        HairloomError: as `read_weights`.
+    """
     group = obj.vertex_groups.get(name)
     if group is not None:
-        return _group_weights(mesh, group.index)
-    attribute = mesh.attributes.get(name)
+        return _group_weights(mesh, group.index), "POINT"
+    found = painted_attribute(mesh, name)
+    if found is None:
+        raise missing_weights(obj, name, mesh.attributes.get(name))
+    return found
+
+
+def painted_attribute(
+    data: bpy.types.Mesh | bpy.types.Curves, name: str
+) -> tuple[Floats, str] | None:
+    """The numbers of an attribute, float32, and its domain; None where it is not there or is no
+    number."""
+    attribute = data.attributes.get(name)
     if attribute is None or not _is_weight(attribute):
-        raise _missing(obj, name, attribute)
-    weights = np.empty(len(mesh.vertices), np.float32)
-    attribute.data.foreach_get("value", weights)
-    return weights
+        return None
+    values = read_attribute(data, name, attribute.domain, None)
+    if values.ndim > 1:
+        values = values[:, :3] @ LUMINANCE
+    return values.astype(np.float32), str(attribute.domain)
+
+
+def at_corners(mesh: bpy.types.Mesh, values: Floats, domain: str) -> Floats:
+    """Values at the corners of the mesh's triangles, (triangle_count, 3)."""
+    if domain == "POINT":
+        return values[_corners(mesh, "vertices")]
+    if domain == "CORNER":
+        return values[_corners(mesh, "loops")]
+    mesh.calc_loop_triangles()
+    faces = np.empty(len(mesh.loop_triangles), np.int32)
+    mesh.loop_triangles.foreach_get("polygon_index", faces)
+    return np.repeat(values[faces][:, None], 3, axis=1)
+
+
+def _corners(mesh: bpy.types.Mesh, of: str) -> Ints:
+    """Vertices or loops of the mesh's triangles, (triangle_count, 3)."""
+    mesh.calc_loop_triangles()
+    numbers = np.empty((len(mesh.loop_triangles), 3), np.int32)
+    mesh.loop_triangles.foreach_get(of, numbers.ravel())
+    return numbers
 
 
 def set_group(obj: bpy.types.Object, name: str, weights: Floats) -> None:
@@ -70,18 +150,23 @@ def _group_weights(mesh: bpy.types.Mesh, index: int) -> Floats:
 
 
 def _is_weight(attribute: bpy.types.Attribute) -> bool:
-    return attribute.domain == "POINT" and attribute.data_type == "FLOAT"
+    return attribute.domain in _DOMAINS and attribute.data_type in _NUMBERS + _COLORS
 
 
-def _missing(
+def missing_weights(
     obj: bpy.types.Object, name: str, attribute: bpy.types.Attribute | None
 ) -> HairloomError:
+    """That this mesh has no weights of this name.
+
+    Args:
+        attribute: it has this one.
+    """
     if attribute is None:
         problem = f"it has neither a vertex group nor an attribute named '{name}'"
     else:
         problem = (
             f"its attribute '{name}' is {attribute.data_type} on {attribute.domain}, "
-            "not FLOAT on POINT"
+            "which is no number or colour of points, corners or faces"
         )
     there = ", ".join(weight_names(obj)[:8])
     paint = "Paint one (Weight Paint), or leave the field empty"

@@ -11,6 +11,7 @@ from ... import pipeline
 from ...arrays import Floats
 from ...dynamics.colliders import PosedCollider
 from ...dynamics.force_fields import NO_FIELDS, ForceFields
+from ...dynamics.painted import PaintedGuides, simulated_of
 from ...dynamics.settings import DynamicsSettings
 from ...pipeline import Motion, Pose, Rig
 from ...refine.lead_out import NOT_LED, LedOut
@@ -80,8 +81,9 @@ class ComputeSolver:
         gravity: Floats,
         duration: float,
         force_fields: ForceFields = NO_FIELDS,
-        simulated: Floats | None = None,
+        painted: PaintedGuides | None = None,
     ) -> None:
+        simulated = simulated_of(painted, settings, len(self._rig.guides))
         if self._is_baked:
             self._take(self.motion)
         if self._motion.clearance is not None and not self._is_resting:
@@ -95,7 +97,9 @@ class ComputeSolver:
             self._dynamics = DynamicsPass(motion.dynamics, self._colliders)
         rig = self._rig
         target, held = pipeline.style_of_guides(rig, pose), pipeline.held_cvs(rig, pose)
-        drive = motion.drive(target, colliders, gravity, duration, force_fields, held, simulated)
+        drive = motion.drive(
+            target, colliders, gravity, duration, force_fields, held, simulated, painted
+        )
         self._dynamics.advance(drive, settings, duration)
         self._motion = replace(
             motion,

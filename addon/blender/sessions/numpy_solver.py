@@ -11,6 +11,7 @@ from ... import pipeline
 from ...arrays import Floats
 from ...dynamics.colliders import PosedCollider
 from ...dynamics.force_fields import NO_FIELDS, ForceFields
+from ...dynamics.painted import PaintedGuides
 from ...dynamics.settings import DynamicsSettings
 from ...dynamics.state import rows_of
 from ...errors import HairloomError
@@ -58,7 +59,7 @@ class NumpySolver:
         gravity: Floats,
         duration: float,
         force_fields: ForceFields = NO_FIELDS,
-        simulated: Floats | None = None,
+        painted: PaintedGuides | None = None,
     ) -> None:
         # what was not shown counts too: motion does not depend on who looks
         led = NOT_LED if self._motion.clearance is None else self.led()
@@ -73,7 +74,7 @@ class NumpySolver:
                 duration,
                 force_fields,
                 led,
-                simulated,
+                painted,
             )
         )
 

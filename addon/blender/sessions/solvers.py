@@ -16,6 +16,7 @@ from ... import pipeline
 from ...arrays import Floats
 from ...dynamics.colliders import PosedCollider
 from ...dynamics.force_fields import NO_FIELDS, ForceFields
+from ...dynamics.painted import PaintedGuides
 from ...dynamics.settings import DynamicsSettings
 from ...errors import HairloomError
 from ...groom.settings import GuideSettings
@@ -60,7 +61,7 @@ class Solver(Protocol):
         gravity: Floats,
         duration: float,
         force_fields: ForceFields = NO_FIELDS,
-        simulated: Floats | None = None,
+        painted: PaintedGuides | None = None,
     ) -> None:
         """One frame of motion, as pipeline.advance."""
 

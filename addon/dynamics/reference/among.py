@@ -25,7 +25,6 @@ from ..among import (
     THIN,
     HairGrid,
 )
-from ..settings import DynamicsSettings
 
 
 @dataclass(frozen=True)
@@ -42,12 +41,12 @@ class Hair:
 
 
 def feel_slowly(
-    grid: HairGrid, rest: Floats, hair: Hair, settings: DynamicsSettings, dt: float, substeps: int
+    grid: HairGrid, rest: Floats, hair: Hair, volume: Floats, dt: float, substeps: int
 ) -> tuple[Floats, Floats]:
     """What `among.feel` does, as (n, 3) [m].
 
     Args:
-        rest: (n, 3) where all CVs were at rest.
+        rest: (n, 3) where all CVs were at rest. volume: (n,), the setting at each.
     """
     mass = np.tile(grid.mass.astype(np.float64)[:, None], (1, len(rest) // len(grid.mass))).ravel()
     still = Hair(rest, np.zeros_like(rest), np.eye(3), grid.middle)
@@ -61,10 +60,10 @@ def feel_slowly(
         ratio = density / crowded[cv]
         over = min(max(ratio - 1.0 - SLACK, 0.0), 1.0)
         under = min(max(at_rest[cv] / crowded[cv] - ratio - SLACK, 0.0), 1.0)
-        shift = gradient / density * (PULL * under - PUSH * over) * settings.volume
+        shift = gradient / density * (PULL * under - PUSH * over) * volume[cv]
         shift *= min(FARTHEST / max(float(np.linalg.norm(shift)), 1e-30), 1.0)
         push[cv] = hair.turn @ shift * grid.cell / substeps**2
-        rate = RUBBING * settings.volume * (min(ratio, 1.0) + PRESSED * over)
+        rate = RUBBING * volume[cv] * (min(ratio, 1.0) + PRESSED * over)
         taken[cv] = (hair.motion[cv] - mean) * (1.0 - math.exp(-rate * substeps * dt))
     return taken, push
 

@@ -29,6 +29,9 @@ from .contacts import Moment, Plane, is_deep, planes_of, push_out
 from .force_fields import blown_slowly
 from .shape import frames, hold, jacobian_of
 
+#: What each guide has a number of its own of.
+_PAINTED = ("gravity", "style_damping", "volume")
+
 
 def advance_slowly(
     state: DynamicsState, drive: Drive, settings: DynamicsSettings, duration: float
@@ -48,7 +51,7 @@ def advance_slowly(
         begin = (number * dt - state.time_left) / duration
         moment = Moment(begin, begin + dt / duration, state.time + number * dt, dt)
         for guide in guides:
-            guide.substep(drive, settings, moment)
+            guide.substep(drive, moment)
     if not guides:
         return state
     rows = [np.stack([g.x for g in guides]), np.stack([g.previous for g in guides])]
@@ -90,9 +93,9 @@ class _Push:
         middle = self.middles[:, 0].mean(axis=1, dtype=np.float64)
         at_rest = np.concatenate([guide.rest for guide in guides])
         hair = Hair(here, here - before, turn, middle)
-        taken, push = feel_slowly(
-            rest.hair_grid, at_rest, hair, self.settings, self.dt, self.substeps
-        )
+        cv_count = len(here) // len(guides)
+        volume = np.repeat([guide.settings.volume for guide in guides], cv_count)
+        taken, push = feel_slowly(rest.hair_grid, at_rest, hair, volume, self.dt, self.substeps)
         for guide, own in zip(guides, np.split(taken, len(guides)), strict=True):
             guide.previous = guide.previous + own
         self.rows = push.reshape(len(guides), -1, 3).transpose(2, 1, 0).astype(np.float32)
@@ -106,6 +109,15 @@ class _Guide:
     ) -> None:
         def points(rows: Floats) -> Floats:
             return rows[:, :, guide].T.astype(np.float64)
+
+        def painted(name: str) -> Floats:
+            factors = {} if drive.painted is None else drive.painted.factors
+            of_guide = factors.get(name, np.ones((1, guide + 1)))[:, guide]
+            return np.broadcast_to(of_guide, state.cv_count)
+
+        each = {name: float(painted(name).mean()) for name in _PAINTED}
+        self.settings = settings = settings.multiplied(**each)
+        self.stiffness = {name: painted(name) for name in ("style_root", "style_tip", "bend")}
 
         self.x, self.previous = points(state.position), points(state.previous)
         self.rest = points(state.rest.position)
@@ -137,7 +149,8 @@ class _Guide:
             turn @ (np.asarray(drive.gravity, np.float64) * settings.gravity)
         )
 
-    def substep(self, drive: Drive, settings: DynamicsSettings, moment: Moment) -> None:
+    def substep(self, drive: Drive, moment: Moment) -> None:
+        settings = self.settings
         air = self._air(settings, moment)
         self._brake(settings.drag, air, moment.dt)
         fields = drive.force_fields.by(settings.force_fields)
@@ -282,13 +295,16 @@ class _Guide:
         free = count - PINNED
         if free < 1:
             return
-        bend_frequency = 2.0 * math.pi * settings.bend * (count - 1) ** 2 / 3.5160
+        bend_frequency = 2.0 * math.pi * (count - 1) ** 2 / 3.5160
+        at_root, at_tip, bends = (
+            getattr(settings, name) * factor for name, factor in self.stiffness.items()
+        )
         turns = frames(self.x, style, self.twist_cv)
         rest_turns = frames(self.rest, self.rest, self.twist_cv)
         matrix, right = np.eye(free), self.x[PINNED:].copy()
         for cv in range(PINNED, count):
             along = float(curve_along(settings.style_along, np.array([cv / (count - 1)]))[0])
-            swings = settings.style_root * along + settings.style_tip * (1.0 - along)
+            swings = at_root[cv] * along + at_tip[cv] * (1.0 - along)
             pull = (2.0 * math.pi * swings * dt) ** 2
             matrix[cv - PINNED, cv - PINNED] += pull
             right[cv - PINNED] += pull * style[cv]
@@ -304,7 +320,7 @@ class _Guide:
                     wanted = wanted - weight * self.x[one]
             inner = {one - PINNED: w for one, w in weights.items() if one >= PINNED}
             along = float(curve_along(settings.bend_along, np.array([i / (count - 1)]))[0])
-            stiffness = (bend_frequency * along * dt) ** 2
+            stiffness = (bend_frequency * bends[i] * along * dt) ** 2
             for one, weight in inner.items():
                 right[one] += stiffness * weight * wanted
                 for other, other_weight in inner.items():

@@ -157,6 +157,7 @@ class Scene:
 
     held: (guide_count, cv_count) the CVs that go with the head too, or None.
     room: (guide_count, cv_count - 1) how much curls have to give, or None.
+    painted: by what settings are multiplied at each guide, or None.
     is_combed: whether guides stay no farther from colliders than they are at first.
     bowed: whether the ways within a frame are smooth, as the pipeline makes them.
     """
@@ -172,6 +173,7 @@ class Scene:
     bowed: bool = False
     force_fields: ForceFields = NO_FIELDS
     room: Any = None
+    painted: Any = None
     is_combed: bool = False
 
     def start(self) -> DynamicsState:
@@ -198,6 +200,7 @@ class Scene:
             self.force_fields,
             held=held,
             clearance=self.clearance if self.is_combed else None,
+            painted=self.painted,
         )
 
     @property

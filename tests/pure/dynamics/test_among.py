@@ -81,7 +81,8 @@ def test_as_without_a_grid(volume):
     flat = [rows.transpose(2, 1, 0).reshape(-1, 3).astype(float) for rows in (position, previous)]
     hair = Hair(flat[0], flat[0] - flat[1], turn, middle.astype(float))
     at_rest = rest.position.transpose(2, 1, 0).reshape(-1, 3).astype(float)
-    expected = feel_slowly(grid, at_rest, hair, settings, DT, strength.substeps)
+    volumes = np.full(len(at_rest), volume)
+    expected = feel_slowly(grid, at_rest, hair, volumes, DT, strength.substeps)
     for one, other in zip(found, expected, strict=True):
         one = one.transpose(2, 1, 0).reshape(-1, 3)
         assert (np.abs(other).max(axis=1) > 1e-6).mean() > 0.3  # it acts on many of them

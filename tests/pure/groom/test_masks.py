@@ -8,10 +8,20 @@ from small_wig import GUIDES, curves, sheet
 
 from hairloom.addon import pipeline
 from hairloom.addon.arrays import Floats
+from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.groom.children import make_children
 from hairloom.addon.groom.children_settings import ChildrenSettings
-from hairloom.addon.groom.masks import MASKS, NO_MASKS, Masks, mask_names
-from hairloom.addon.paint_flow import painted
+from hairloom.addon.groom.masks import (
+    NO_MASKS,
+    ImageMask,
+    Masks,
+    Places,
+    StrandMask,
+    SurfaceMask,
+    mask_names,
+    masks_of,
+)
+from hairloom.addon.paint_flow import painted, painted_guides
 from hairloom.addon.strands.kept import NOTHING_KEPT, Kept
 
 HEAD = sheet()
@@ -26,11 +36,12 @@ BOLD = ChildrenSettings(
     length=0.6,
     length_variation=0.0,
     baby_hair=0.0,
+    fly_aways=1.0,
 )
 #: those that shape what has no curls, and so keep their point counts
-STRAIGHT = [name for name in MASKS if name != "curl"]
+STRAIGHT = ["length", "clump", "frizz", "fly_aways"]
 #: what each setting is without its effect
-WITHOUT = {"clump": 0.0, "frizz": 0.0}
+WITHOUT = {"clump": 0.0, "frizz": 0.0, "fly_aways": 0.0}
 
 
 def rig_of(
@@ -41,27 +52,39 @@ def rig_of(
     )
 
 
+def on_head(name: str, weights: Floats) -> Masks:
+    return Masks({name: SurfaceMask.of_vertices(HEAD, weights)})
+
+
 def children(rig: pipeline.Rig) -> Floats:
     return rig.strands.grid[rig.own_count :]
 
 
 def test_all_that_may_be_painted_is_declared() -> None:
-    assert {name: f"{name}_mask" for name in ("length", "clump", "curl", "frizz")} == MASKS
-    named = ChildrenSettings(method="multi", clump_mask="Crown", frizz_mask="")
-    assert mask_names(named) == {"clump": "Crown"}
-    assert mask_names(ChildrenSettings(method="auto", clump_mask="Crown")) == {}
+    of_children = ("scatter", "length", "clump", "frizz", "fly_aways", "curl", "width")
+    assert masks_of(ChildrenSettings) == {name: f"{name}_mask" for name in of_children}
+    of_motion = {"gravity", "style_root", "style_tip", "style_damping", "bend", "volume"}
+    assert masks_of(DynamicsSettings).keys() == of_motion | {"simulated"}
+    named = {"clump_mask": "Crown", "frizz_mask": "", "width_mask": "Front"}
+    for method, found in (
+        ("multi", {"clump": "Crown", "width": "Front"}),
+        ("auto", {"width": "Front"}),
+        ("none", {}),
+    ):
+        settings = ChildrenSettings.from_dict({"method": method, **named}, "test")
+        assert mask_names(settings) == found
 
 
-@pytest.mark.parametrize("name", MASKS)
+@pytest.mark.parametrize("name", masks_of(ChildrenSettings))
 def test_a_mask_of_one_changes_not_a_bit(name: str) -> None:
     np.testing.assert_array_equal(
-        children(rig_of(BOLD, Masks({name: ONES}))), children(rig_of(BOLD))
+        children(rig_of(BOLD, on_head(name, ONES))), children(rig_of(BOLD))
     )
 
 
 @pytest.mark.parametrize("name", WITHOUT)
 def test_a_mask_of_zero_is_the_setting_at_zero_bit_by_bit(name: str) -> None:
-    masked = rig_of(BOLD, Masks({name: 0.0 * ONES}))
+    masked = rig_of(BOLD, on_head(name, 0.0 * ONES))
     without = rig_of(BOLD.from_dict(BOLD.as_dict() | {name: WITHOUT[name]}, "test"))
     np.testing.assert_array_equal(children(masked), children(without))
     assert not np.array_equal(children(masked), children(rig_of(BOLD)))
@@ -70,10 +93,11 @@ def test_a_mask_of_zero_is_the_setting_at_zero_bit_by_bit(name: str) -> None:
 def test_curls_are_multiplied() -> None:
     """Around straight paths: the radius is how far points are from them."""
     guides = rig_of(BOLD).grown.shapes
-    smooth = BOLD.from_dict(BOLD.as_dict() | {"frizz": 0.0, "curl": 0.02, "length": 1.0}, "test")
+    plain = {"frizz": 0.0, "fly_aways": 0.0, "curl": 0.02, "length": 1.0}
+    smooth = BOLD.from_dict(BOLD.as_dict() | plain, "test")
 
     def aside(weights: Floats) -> Floats:
-        made = make_children(guides, HEAD, smooth, masks=Masks({"curl": weights}), place="test")
+        made = make_children(guides, HEAD, smooth, masks=on_head("curl", weights), place="test")
         grid = made.strands.grid
         again = made.growth.shapes(guides.grid, np.arange(len(grid)))
         np.testing.assert_allclose(again, grid, atol=1e-6, err_msg="as a brush shapes them")
@@ -83,7 +107,7 @@ def test_curls_are_multiplied() -> None:
 
     whole, half = aside(ONES), aside(HALF)
     plain = make_children(guides, HEAD, smooth, place="test").strands
-    masked = make_children(guides, HEAD, smooth, masks=Masks({"curl": ONES}), place="test").strands
+    masked = make_children(guides, HEAD, smooth, masks=on_head("curl", ONES), place="test").strands
     np.testing.assert_array_equal(masked.points, plain.points)
     x = plain.roots[:, 0]
     assert whole.min() > 0.001
@@ -96,17 +120,17 @@ def test_lengths_are_multiplied() -> None:
     """Against the lengths of children that are not cut: a fraction of their own curve."""
     whole = rig_of(BOLD.from_dict(BOLD.as_dict() | {"length": 1.0, "frizz": 0.0}, "test"))
     straight = BOLD.from_dict(BOLD.as_dict() | {"frizz": 0.0}, "test")
-    cut = rig_of(straight, Masks({"length": 0.5 * ONES}))
+    cut = rig_of(straight, on_head("length", 0.5 * ONES))
     ratio = cut.strands.lengths()[60:] / whole.strands.lengths()[60:]
     assert ratio == pytest.approx(np.full(3000, 0.3), abs=2e-3)
-    bare = rig_of(straight, Masks({"length": 0.0 * ONES}))
+    bare = rig_of(straight, on_head("length", 0.0 * ONES))
     assert 0.0 < bare.strands.lengths()[60:].max() < 0.0003, "of 11 cm"
 
 
 @pytest.mark.parametrize("name", STRAIGHT)
 def test_half_a_mask_shapes_its_half_alone(name: str) -> None:
-    masked = rig_of(BOLD, Masks({name: HALF}))
-    none, whole = rig_of(BOLD, Masks({name: 0.0 * ONES})), rig_of(BOLD)
+    masked = rig_of(BOLD, on_head(name, HALF))
+    none, whole = rig_of(BOLD, on_head(name, 0.0 * ONES)), rig_of(BOLD)
     root = children(masked)[:, 0]
     # of one child a clump takes its middle from the other half; what lies between is mixed
     left, right = root[:, 0] < -0.04, root[:, 0] > 0.04
@@ -116,7 +140,7 @@ def test_half_a_mask_shapes_its_half_alone(name: str) -> None:
 
 
 def test_a_strong_mask_draws_no_child_beyond_its_clump() -> None:
-    strong = rig_of(BOLD, Masks({"clump": 100.0 * ONES}))
+    strong = rig_of(BOLD, on_head("clump", 100.0 * ONES))
     once = rig_of(BOLD.from_dict(BOLD.as_dict() | {"clump": 1.0}, "test"))
     tips = children(strong)[:, -1] - children(once)[:, -1]
     assert np.isfinite(tips).all() and np.abs(tips).max() < 0.05
@@ -127,7 +151,7 @@ def test_a_brush_gives_what_a_rebuild_makes_and_shapes_no_others(name: str) -> N
     """More children than one level of clumps has, so that some are drawn by some that are drawn."""
     many = BOLD.from_dict(BOLD.as_dict() | {"strand_count": 6000}, "test")
     rig = rig_of(many)
-    now, whole = painted(rig, None, Masks({name: HALF})), rig_of(many, Masks({name: HALF}))
+    now, whole = painted(rig, None, on_head(name, HALF)), rig_of(many, on_head(name, HALF))
     np.testing.assert_allclose(children(now), children(whole), atol=2e-6)
     is_same = (children(now) == children(rig)).all(axis=(1, 2))
     assert 0.3 < is_same.mean() < 0.7
@@ -149,6 +173,101 @@ def test_only_rows_that_are_painted_are_made_again() -> None:
 
     kept = Counted()
     rig_of(BOLD, NO_MASKS, kept)
-    again = rig_of(BOLD, Masks({"frizz": HALF}), kept)
+    again = rig_of(BOLD, on_head("frizz", HALF), kept)
     assert made[0] == 3000 and 1500 < made[1] < 2000
-    np.testing.assert_array_equal(children(again), children(rig_of(BOLD, Masks({"frizz": HALF}))))
+    np.testing.assert_array_equal(children(again), children(rig_of(BOLD, on_head("frizz", HALF))))
+
+
+def test_widths_are_multiplied_whatever_their_method() -> None:
+    for method in ("own", "found"):
+
+        def radius(masks: Masks, method: str = method) -> Floats:
+            rig = pipeline.prepare(
+                curves(), HEAD, GUIDES, place="a wig", children=BOLD, masks=masks, widths=method
+            )
+            return rig.strands.radius.reshape(rig.strands.strand_count, -1)[rig.own_count :, 0]
+
+        half, whole = radius(on_head("width", 0.5 * ONES)), radius(NO_MASKS)
+        np.testing.assert_allclose(half, 0.5 * whole, rtol=1e-5)
+    assert not len(rig_of(BOLD, on_head("width", HALF)).baby_hair), "fine, but no baby hair"
+    rig = rig_of(BOLD)
+    now, again = painted(rig, None, on_head("width", HALF)), rig_of(BOLD, on_head("width", HALF))
+    np.testing.assert_allclose(now.strands.radius, again.strands.radius, rtol=1e-5)
+    assert np.ptp(now.strands.radius) > 0.0
+
+
+def test_scatter_where_it_is_painted_is_that_of_the_setting() -> None:
+    wild = BOLD.from_dict(BOLD.as_dict() | {"scatter": 0.5}, "test")
+    half, whole, none = rig_of(wild, on_head("scatter", HALF)), rig_of(wild), rig_of(BOLD)
+    weights = [each.grown.growth.weights.weight for each in (half, whole, none)]
+    x = half.grown.growth.root[:, 0]
+    np.testing.assert_array_equal(weights[0][x > 0.04], weights[1][x > 0.04])
+    np.testing.assert_array_equal(weights[0][x < -0.04], weights[2][x < -0.04])
+
+
+def test_an_image_is_seen_as_bilinear_sampling_says() -> None:
+    """Against the four pixels around each place, one by one."""
+    random = np.random.default_rng(2)
+    pixels, uv = random.random((5, 7), np.float32), random.random((9, 3, 2), np.float32)
+    triangle, barycentric = random.integers(0, 9, 50), random.dirichlet(np.ones(3), 50)
+    places = Places(triangle, barycentric, np.zeros((50, 1), int), np.ones((50, 1)))
+    found = ImageMask(pixels, uv).at(places)
+    for number, value in enumerate(found):
+        x, y = barycentric[number] @ uv[triangle[number]] * (7, 5) - 0.5
+        around = 0.0
+        for column in (int(np.floor(x)), int(np.floor(x)) + 1):
+            for row in (int(np.floor(y)), int(np.floor(y)) + 1):
+                part = (1.0 - abs(x - column)) * (1.0 - abs(y - row))
+                around += part * pixels[row % 5, column % 7]
+        assert value == pytest.approx(around, abs=1e-6)
+    np.testing.assert_array_equal(ImageMask(np.ones((3, 3), np.float32), uv).at(places), 1.0)
+
+
+def test_what_is_painted_on_curves_is_mixed_as_their_points_are() -> None:
+    """The place along the curve at every point: guides have it at theirs, children half way."""
+    own = curves()
+    along = np.concatenate([np.linspace(0.0, 1.0, count) for count in own.point_counts])
+    mask = StrandMask.of_points(own, along.astype(np.float32))
+    np.testing.assert_allclose(mask.at_points(own), along, atol=1e-5)
+    guides = Places.of_strands(own, np.array([3, 5]))
+    even = np.linspace(0.0, 1.0, 9)[:, None].repeat(2, 1)
+    np.testing.assert_allclose(mask.along(guides, 9), even, atol=1e-5)
+    np.testing.assert_allclose(mask.at(guides), 0.5, atol=1e-6)
+    numbers = StrandMask(np.arange(own.strand_count, dtype=np.float32)[:, None])
+    between = Places(None, None, np.array([[2, 6]]), np.array([[0.25, 0.75]]))
+    assert numbers.at(between) == pytest.approx(5.0)
+    assert numbers.of(np.array([4, 9])).at(Places.of_strands(own, np.array([1]))) == 9.0
+
+
+def test_children_take_what_is_painted_on_their_guides() -> None:
+    """Guides of one half are painted 0: children there are those of the setting at 0."""
+    own = curves()
+    is_right = (own.roots[:, 0] > 0.0).astype(np.float32)
+    masks = Masks({"frizz": StrandMask(is_right[:, None])})
+    masked, whole = rig_of(BOLD, masks), rig_of(BOLD)
+    none = rig_of(BOLD, on_head("frizz", 0.0 * ONES))
+    guide = masked.grown.growth.weights.guide
+    are_right = is_right[masked.grown.parents][guide].all(axis=1)
+    are_left = ~is_right[masked.grown.parents][guide].any(axis=1)
+    np.testing.assert_allclose(children(masked)[are_right], children(whole)[are_right], atol=1e-7)
+    np.testing.assert_array_equal(children(masked)[are_left], children(none)[are_left])
+    np.testing.assert_allclose(
+        children(painted(rig_of(BOLD), None, masks)), children(masked), atol=2e-6
+    )
+
+
+def test_guides_of_a_rig_have_their_own_factors() -> None:
+    rig = rig_of(BOLD)
+    masks = Masks(
+        {
+            "gravity": SurfaceMask.of_vertices(HEAD, HALF),
+            "bend": StrandMask(np.arange(rig.own_count, dtype=np.float32)[:, None]),
+        }
+    )
+    found = painted_guides(rig, masks)
+    root = rig.strands.roots[rig.guides]
+    assert found.factors["gravity"].shape == (1, len(rig.guides))
+    np.testing.assert_array_equal(found.factors["gravity"][0, root[:, 0] > 0.04], 1.0)
+    np.testing.assert_array_equal(found.factors["gravity"][0, root[:, 0] < -0.04], 0.0)
+    np.testing.assert_array_equal(found.factors["bend"][0], rig.guides)
+    assert painted_guides(rig, Masks({"bend": StrandMask(np.ones((7, 1)))})) is None

@@ -91,7 +91,7 @@ def test_a_set_with_curves_is_no_struct() -> None:
     """std140 has no place for them, and nothing is dropped in silence."""
     assert "dynamics" not in STRUCTS
     for write in (lambda kind: struct_source(kind, "Block"), lambda kind: struct_values(kind())):
-        with pytest.raises(AssertionError, match="dynamics: style_along, bend_along"):
+        with pytest.raises(AssertionError, match=r"dynamics: .*style_along"):
             write(ALL_SETTINGS["dynamics"])
 
 
