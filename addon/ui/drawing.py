@@ -53,12 +53,13 @@ def draw_section(
 
 
 def draw_overlays(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
-    """What may be drawn over the view as lines, three in a row."""
+    """What may be drawn over the view as lines, three in a row; and beside the last one its map."""
     column = layout.column(align=True)
     for first in range(0, len(OVERLAYS), 3):
         row = column.row(align=True)
         for kind, _, _ in OVERLAYS[first : first + 3]:
             row.prop_enum(hair.hairloom, "shown_overlays", kind)
+    row.prop(hair.hairloom, "shown_map", text="", icon="GROUP_VERTEX")
 
 
 def _draw_curve(layout: bpy.types.UILayout, group: Any, parameter: Parameter) -> None:

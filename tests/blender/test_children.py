@@ -243,12 +243,12 @@ def test_masks_that_cannot_be_used_are_said_and_act_nowhere(hair, sphere, evalua
     before = session.rig.strands.points
     broken = sphere.data.attributes.new("Broken", "FLOAT", "POINT")
     broken.data[0].value = float("nan")
-    sphere.data.attributes.new("Colour", "FLOAT_COLOR", "POINT")
+    sphere.data.attributes.new("Numbers", "INT", "POINT")
     sphere.vertex_groups.new(name="Nowhere")
     for name, said in (
         ("Gone", "neither a vertex group nor an attribute"),
         ("Broken", "not finite"),
-        ("Colour", "FLOAT_COLOR on POINT"),
+        ("Numbers", "INT on POINT"),
     ):
         children.frizz_mask = name
         catch_up(evaluated)

@@ -197,7 +197,9 @@ def what_acts_on_it():
     bpy.context.collection.objects.link(ball)
     hair.hairloom.dynamics.wind_speed = 8.0
     without = yield from pixels_at_rest("no-overlays")
-    kinds = {"colliders", "wind", "lights", "stretch", "density"}
+    bpy.data.objects["Head"].vertex_groups.new(name="Shown")
+    hair.hairloom.shown_map = "Shown"
+    kinds = {"colliders", "wind", "lights", "stretch", "density", "paint"}
     for kind in sorted(kinds):
         hair.hairloom.shown_overlays = set()
         yield from until(lambda: changed(without, pixels("no-overlays-again")) < 1e-4, "lines stay")

@@ -20,19 +20,20 @@ from ...groom.width_settings import WidthSettings
 from ...pipeline import Pose
 from ..base.attributes import read_attribute
 from ..base.objects import matrix_of
-from ..base.vertex_weights import weight_names, weights_on
+from ..base.vertex_weights import painted_attribute, weight_names, weights_on
 from ..colliders.carriers import is_deforming, is_left_out
 from ..colliders.obstacles import shape_of, sources_of
 from ..colliders.ties import holders_of
 from ..properties.groom_settings import GroomSettings
 from ..scene.curves import COLOR_ATTRIBUTE, GROUP_ATTRIBUTES, read_curves
 from ..scene.forces import force_fields_of, gravity_of
+from ..scene.masks import image_values
 from ..scene.partings import parting_state, partings_of
 from ..scene.surfaces import read_positions
 from .simulated import SOLVER_VERSION, Hashed, hashes
 
 #: The parts of a rig hash that determine the rig; the others only matter to a bake.
-RIG_PARTS = ("hair", "head", "guides", "widths", "children", "partings", "ties", "style")
+RIG_PARTS = ("hair", "head", "guides", "widths", "children", "partings", "ties", "style", "paint")
 
 
 def groom_rig_hash(
@@ -46,11 +47,8 @@ def groom_rig_hash(
     if settings[ChildrenSettings].method != "none":
         grown["children"] = (
             settings[ChildrenSettings],
-            _weights_before_modifiers(head, settings.children_density),
-            *(
-                _weights_before_modifiers(head, name)
-                for name in mask_names(settings[ChildrenSettings]).values()
-            ),
+            *_paint(hair, head, settings.children_density),
+            *_paint(hair, head, *mask_names(settings[ChildrenSettings]).values()),
         )
     lines = _parting_shapes(hair)
     if lines:
@@ -61,8 +59,8 @@ def groom_rig_hash(
     dynamics = settings[DynamicsSettings]
     if dynamics.animated_style:
         grown["style"] = ("animated",)
-    if dynamics.simulated_mask:
-        grown["simulated"] = (_weights_before_modifiers(head, dynamics.simulated_mask),)
+    if mask_names(dynamics):
+        grown["paint"] = _paint(hair, head, *mask_names(dynamics).values())
     return hashes(
         hair=_curves_parts(hair),
         head=() if head is None else mesh_parts(head),
@@ -163,7 +161,7 @@ def _tie_shapes(hair: bpy.types.Object) -> tuple[Floats | Ints | str, ...]:
         elif obj.type == "MESH":
             parts += mesh_parts(obj)
         if obj == hair.hairloom.tip_surface and hair.hairloom.tip_group:
-            parts.append(_weights_before_modifiers(obj, hair.hairloom.tip_group))
+            parts += _paint(hair, obj, hair.hairloom.tip_group)
         if obj.animation_data is None and not len(obj.constraints):
             parts += [np.array(obj.matrix_parent_inverse), np.array(obj.matrix_basis)]
     return tuple(parts)
@@ -183,11 +181,21 @@ def frame_rate(scene: bpy.types.Scene) -> float:
     return float(scene.render.fps) / float(scene.render.fps_base)
 
 
-def _weights_before_modifiers(obj: bpy.types.Object | None, name: str) -> Floats | str:
-    """Weights of a mesh; the name alone where modifiers make them."""
-    if obj is None or name not in weight_names(obj):
-        return name
-    return weights_on(obj, obj.data, name)
+def _paint(
+    hair: bpy.types.Object, head: bpy.types.Object | None, *names: str
+) -> tuple[Floats | str, ...]:
+    """What is painted, see `masks.Canvas`; the name alone where modifiers make it."""
+
+    def values(name: str) -> Floats | str:
+        if head is not None and head.type == "MESH" and name in weight_names(head):
+            return weights_on(head, head.data, name)[0]
+        of_curves = painted_attribute(hair.data, name)
+        if of_curves is not None:
+            return of_curves[0]
+        image = bpy.data.images.get(name)
+        return name if image is None else image_values(image)
+
+    return tuple(map(values, names))
 
 
 def _curves_parts(hair: bpy.types.Object) -> tuple[Floats | Ints | str, ...]:

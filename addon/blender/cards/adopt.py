@@ -237,7 +237,8 @@ def _dangling(obj: bpy.types.Object, name: str) -> Ints | None:
             place=obj.name,
             remedy="Choose one of its vertex groups, or none",
         )
-    is_member = weights_on(obj, obj.data, name) >= _MEMBER
+    weights, _ = weights_on(obj, obj.data, name)
+    is_member = weights >= _MEMBER
     return np.where(is_member, _DANGLING, 0)
 
 

@@ -14,10 +14,10 @@ from ... import pipeline
 from ...arrays import Floats
 from ...errors import HairloomError
 from ...groom.children_settings import ChildrenSettings
-from ...groom.masks import NO_MASKS, Masks, mask_names
+from ...groom.masks import Mask, Masks, mask_names
 from ...groom.settings import GrowSettings, GuideSettings
 from ...groom.width_settings import WidthSettings
-from ...params import SettingsMap
+from ...params import Settings, SettingsMap
 from ...pipeline import Pose, Rig
 from ...shading.ambient_settings import AmbientSettings
 from ..bakes.guide_motion import BakedGuides
@@ -25,9 +25,11 @@ from ..base.report import Report
 from ..colliders.fields import solid_of
 from ..pictures.studio import Studio
 from ..properties.groom_settings import GroomSettings
-from ..scene.source import masks_on
+from ..scene.curves import read_curves
+from ..scene.masks import Canvas
 from ..sessions.prepared_groom import prepared
 from .inputs import Inputs, Sources, head_of_sources, look_of_head, read_inputs
+from .object_settings import is_groom
 
 
 @dataclass(frozen=True)
@@ -65,7 +67,7 @@ def read_rig(job: Job) -> tuple[Rig, Inputs]:
             place=inputs.groom_name,
             children=job.settings[ChildrenSettings],
             density=inputs.density,
-            masks=read_job_masks(job, inputs),
+            masks=Masks(read_job_masks(job, inputs)),
             partings=inputs.partings,
             widths=job.settings[WidthSettings].method,
             head_field=lambda: solid_of(inputs.head),
@@ -77,26 +79,26 @@ def read_rig(job: Job) -> tuple[Rig, Inputs]:
     return rig, inputs
 
 
-def read_job_masks(job: Job, inputs: Inputs) -> Masks:
-    """Those that the settings name on the head.
+def read_job_masks(
+    job: Job, inputs: Inputs, kind: type[Settings] = ChildrenSettings
+) -> dict[str, Mask]:
+    """Those that settings name, by the names of the parameters.
 
     Raises:
         HairloomError: one of them is not there, or cannot be used.
     """
-    settings = job.settings[ChildrenSettings]
-    head = bpy.data.objects.get(inputs.head_object or "")
-    names = sorted(mask_names(settings).values())
+    settings, depsgraph = job.settings[kind], bpy.context.evaluated_depsgraph_get()
+    names = mask_names(settings)
     if not names:
-        return NO_MASKS
-    if head is None:
-        raise HairloomError(
-            f"there is no mesh of the scene that could have the mask '{names[0]}'",
-            place=inputs.groom_name,
-            remedy="Name a head of the scene with --head, or set no mask",
-        )
-    masks, warnings = masks_on(head, settings, bpy.context.evaluated_depsgraph_get())
-    tell_notes(list(warnings), job.report)
-    return masks
+        return {}
+    named = bpy.data.objects.get(job.sources.groom or "")
+    hair = named if named is not None and is_groom(named) else None
+    kept = np.zeros(0, np.int32) if hair is None else read_curves(hair, depsgraph).kept
+    head = bpy.data.objects.get(inputs.head_object or "")
+    canvas = Canvas(hair, head, inputs.head, inputs.strands, kept)
+    found = {of: canvas.mask(name, depsgraph) for of, name in names.items()}
+    tell_notes(list(canvas.masks(settings, depsgraph)[1]), job.report)
+    return found
 
 
 def tell_rig(report: Report, rig: Rig, name: str) -> None:

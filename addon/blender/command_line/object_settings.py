@@ -101,7 +101,9 @@ def put_settings(
         settings = chosen.get(section)
         if group is None or (settings is None and not values):
             continue
-        own = settings_of(group, ALL_SETTINGS[section]) if settings is None else settings
+        own = settings_of(group, ALL_SETTINGS[section])
+        if settings is not None:
+            own = settings.with_masks_of(own)
         changed = type(own).from_dict(own.as_dict() | values, "--set")
         _write(group, changed)
         if section == "grow" and not grows_again:

@@ -13,10 +13,11 @@ import bpy
 import numpy as np
 
 from ...arrays import Floats
+from ...dynamics.settings import DynamicsSettings
 from ...errors import HairloomError
 from ...groom.children_settings import ChildrenSettings
-from ...groom.masks import mask_names
-from ...strands import Surface
+from ...groom.masks import Mask, StrandMask, SurfaceMask, mask_names
+from ...strands import StrandSet, Surface
 from ..bakes.guide_motion import BakedGuides
 from ..base.attributes import set_attribute
 from ..colliders.ties import copy_holders
@@ -103,10 +104,10 @@ def _scene_of(job: Job, inputs: Inputs) -> Iterator[bpy.types.Object]:
         if inputs.density is not None:
             set_attribute(head.data, _DENSITY, "POINT", inputs.density)
             hair.hairloom.children_density = _DENSITY
-        masks = read_job_masks(job, inputs)
-        names = mask_names(job.settings[ChildrenSettings])
-        for of, weights in masks.weights.items():
-            set_attribute(head.data, names[of], "POINT", weights)
+        for kind in (ChildrenSettings, DynamicsSettings):
+            names = mask_names(job.settings[kind])
+            for of, mask in read_job_masks(job, inputs, kind).items():
+                _put_mask(mask, names[of], hair, inputs.strands)
         if named is not None and is_groom(named):
             copy_holders(named, hair, head, scene, depsgraph)
             copy_partings(named, hair, head, scene, depsgraph)
@@ -120,6 +121,16 @@ def _scene_of(job: Job, inputs: Inputs) -> Iterator[bpy.types.Object]:
             bpy.data.objects.remove(obj)
         bpy.data.scenes.remove(scene)
         bpy.data.orphans_purge(do_local_ids=True, do_linked_ids=False, do_recursive=False)
+
+
+def _put_mask(mask: Mask, name: str, hair: bpy.types.Object, strands: StrandSet) -> None:
+    """Give a mask to hair of a scene of its own, on a head that `mesh_object` has made; images are
+    those of the file."""
+    if isinstance(mask, SurfaceMask):
+        set_attribute(hair.data.surface.data, name, "CORNER", mask.corners.ravel())
+    elif isinstance(mask, StrandMask):
+        values = mask.at_points(strands).astype(np.float32)
+        set_attribute(hair.data, name, "POINT", values)
 
 
 def _hair_of_open_scene(job: Job, inputs: Inputs) -> bpy.types.Object:

@@ -31,7 +31,7 @@ from ..base.objects import Handle
 from ..base.report import environment
 from ..base.suspension import suspended
 from ..scene.fin_modifier import clear, fin_modifier
-from ..scene.source import wanted_density
+from ..scene.source import check_density
 from ..sessions.fins import FinSession
 from ..sessions.session import Session
 from . import previews
@@ -133,7 +133,7 @@ class Bake:
         parts = []
         for obj, name in zip(objects, folder_names(objects), strict=True):
             if obj.type == "CURVES":
-                wanted_density(obj, bpy.context.evaluated_depsgraph_get())
+                check_density(obj, bpy.context.evaluated_depsgraph_get())
             if folder is not None:
                 obj.hairloom.bake.folder = str(folder / name if len(objects) > 1 else folder)
             own = frames_of(obj, scene) if frames is None else frames

@@ -14,6 +14,7 @@ from functools import partial
 
 import bpy
 
+from ...dynamics.settings import DynamicsSettings
 from ...groom.children_settings import ChildrenSettings
 from ...groom.masks import mask_names
 from ..bakes import playback
@@ -86,6 +87,7 @@ def updated(depsgraph: bpy.types.Depsgraph) -> None:
             or session.has_other_partings()
         ):
             session.is_stale = True
+            session.forget_shown_map()
             _read_again_soon()
         elif session.is_stale and not bpy.app.timers.is_registered(_read_again):
             _read_again_soon()  # its scene is shown again
@@ -236,7 +238,7 @@ def changes(depsgraph: bpy.types.Depsgraph) -> tuple[set[int], set[int], bool]:
         changed = update.id.original  # the evaluated copy has no session number
         if update.is_updated_geometry or update.is_updated_transform:
             moved.add(changed.session_uid)
-        if update.is_updated_geometry:
+        if update.is_updated_geometry or isinstance(changed, bpy.types.Image):
             edited.add(changed.session_uid)
         is_light = isinstance(changed, bpy.types.Object) and changed.type == "LIGHT"
         light_changed |= is_light or isinstance(changed, _LIGHTING)
@@ -253,13 +255,21 @@ def is_edited(session: Session, edited: set[int]) -> bool:
 
 
 def weights_changed(session: Session, edited: set[int]) -> bool:
-    """Whether the head's own mesh changed, and with it maybe the weights that children grow by."""
-    settings = session.settings
-    is_painted = settings.children_density or mask_names(settings[ChildrenSettings])
-    if session.head is None or not is_painted:
+    """Whether the head's own mesh or an image changed, and with it maybe what is painted there."""
+    settings, hair = session.settings, session.hair.handle.find()
+    if hair is None:
         return False
-    head = session.head.handle.find()
-    return head is not None and head.data.session_uid in edited
+    names = {
+        settings.children_density,
+        *mask_names(settings[ChildrenSettings]).values(),
+        *mask_names(settings[DynamicsSettings]).values(),
+        hair.hairloom.shown_map,
+    } - {""}
+    if session.head is None or not names:
+        return False
+    head, images = session.head.handle.find(), (bpy.data.images.get(name) for name in names)
+    painted = {image.session_uid for image in images if image is not None}
+    return head is not None and not edited.isdisjoint(painted | {head.data.session_uid})
 
 
 def occluders_changed(session: Session, changed: set[int], layer: bpy.types.ViewLayer) -> bool:

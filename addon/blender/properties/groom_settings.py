@@ -9,6 +9,7 @@ import bpy
 from ...cards.drawing_settings import CardDrawingSettings
 from ...dynamics.settings import DynamicsSettings
 from ...groom.children_settings import ChildrenSettings
+from ...groom.masks import mask_names
 from ...groom.settings import GuideSettings
 from ...groom.width_settings import WidthSettings
 from ...parameters import ALL_SETTINGS, sections_of
@@ -86,7 +87,11 @@ class GroomSettings:
 
     def acts_at_once(self, before: GroomSettings) -> bool:
         """Whether only such settings differ that need nothing to be read or made again."""
-        return (self.of_rig, self[AmbientSettings]) == (before.of_rig, before[AmbientSettings])
+        return (self.of_rig, self[AmbientSettings], mask_names(self[DynamicsSettings])) == (
+            before.of_rig,
+            before[AmbientSettings],
+            mask_names(before[DynamicsSettings]),
+        )
 
     def at_once(self, before: GroomSettings) -> GroomSettings:
         """These, but for what waits until the hair is read again."""

@@ -15,6 +15,7 @@ from .bake_group import HAIRLOOM_PG_bake
 from .card_group import HAIRLOOM_PG_card_images, HAIRLOOM_PG_card_object
 from .properties import (
     OVERRIDABLE,
+    masks_of_groom,
     property_annotations,
     property_group,
     weights_meant,
@@ -68,6 +69,11 @@ OVERLAYS = (
         "Density",
         "Two slices of the cells in which hair feels hair: green as dense as at rest, blue less, "
         "yellow and red more",
+    ),
+    (
+        "paint",
+        "Painted",
+        "Guides by what is painted beside this button: blue is 0, green a half, red 1 and more",
     ),
 )
 _DEBUG_VIEWS = (
@@ -238,9 +244,9 @@ class HAIRLOOM_PG_character(bpy.types.PropertyGroup):
         ),
         "children_density": StringProperty(
             name="Density",
-            description="Vertex group or float attribute on points of the surface that says how "
-            "densely children grow; empty: wherever guides are near",
-            search=weights_of_surface,
+            description="How densely children grow: a vertex group or an attribute of the surface, "
+            "an attribute of the curves, or an image; empty: wherever guides are near",
+            search=masks_of_groom,
             update=lambda self, _context: changed.settings(self.id_data),
             override=OVERRIDABLE,
         ),
@@ -276,6 +282,14 @@ class HAIRLOOM_PG_character(bpy.types.PropertyGroup):
             description="What acts on the hair, and what happens to it, drawn into the viewport as "
             "lines",
             default=set(),
+            update=lambda self, _context: changed.settings(self.id_data),
+            override=OVERRIDABLE,
+        ),
+        "shown_map": StringProperty(
+            name="Painted Map",
+            description="What is painted that Painted shows, by its name; empty: what a setting of "
+            "this hair is painted by",
+            search=masks_of_groom,
             update=lambda self, _context: changed.settings(self.id_data),
             override=OVERRIDABLE,
         ),

@@ -132,7 +132,7 @@ def preset_of(
 
 
 def _is_same(one: Settings, other: Settings, ignored: Container[str]) -> bool:
-    values = other.as_dict()
+    values = other.with_masks_of(one).as_dict()
     return all(name in ignored or value == values[name] for name, value in one.as_dict().items())
 
 
@@ -203,7 +203,8 @@ def named_preset(name: str) -> Preset[Any]:
 
 
 def apply(settings: Settings, hair: bpy.types.Object) -> None:
-    """Put all values of one section onto a groom or its object.
+    """Put all values of one section onto a groom or its object, which keeps its own masks where
+    these settings name none.
 
     Raises:
         HairloomError: settings that a groom does not keep, such as those for growing one.
@@ -212,6 +213,7 @@ def apply(settings: Settings, hair: bpy.types.Object) -> None:
     for owner in owners:
         group = getattr(owner, settings.section, None)
         if group is not None:
+            settings = settings.with_masks_of(settings_of(group, type(settings)))
             for name, value in settings.as_dict().items():
                 setattr(group, name, value)
             return

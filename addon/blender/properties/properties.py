@@ -19,7 +19,7 @@ from bpy.props import (
 from ...params import Parameter, Settings
 from ...params.curve import PLACES
 from ..base.objects import head_of
-from ..base.vertex_weights import weight_names
+from ..base.vertex_weights import mask_choices, weight_names
 
 type Changed = Callable[[bpy.types.ID], None]
 
@@ -91,6 +91,19 @@ def weights_of_surface(group: Any, _context: bpy.types.Context, typed: str) -> l
     return weights_meant(head, typed)
 
 
+def masks_of_groom(group: Any, _context: bpy.types.Context, typed: str) -> list[str]:
+    """All by which a setting of this hair may be painted."""
+    owner = group.id_data
+    if isinstance(owner, bpy.types.Curves):
+        hair = next((each for each in bpy.data.objects if each.data == owner), None)
+        surface = owner.surface
+    else:
+        hair, surface = owner, head_of(owner) if owner.type == "CURVES" else None
+    is_hair = hair is not None and hair.type == "CURVES"
+    names = mask_choices(hair if is_hair else None, surface)
+    return [name for name in names if typed.lower() in name.lower()]
+
+
 def weights_meant(obj: bpy.types.Object | None, typed: str) -> list[str]:
     """The weights of a mesh that what was typed may mean."""
     names = [] if obj is None or obj.type != "MESH" else weight_names(obj)
@@ -111,7 +124,7 @@ def _property(parameter: Parameter, changed: Changed | None, is_animated: bool) 
     if parameter.kind == "choice":
         return EnumProperty(items=parameter.choices, **common)
     if parameter.kind == "mask":
-        return StringProperty(search=weights_of_surface, **common | {"options": set()})
+        return StringProperty(search=masks_of_groom, **common | {"options": set()})
     common |= _ranges(parameter)
     if parameter.kind == "integer":
         return IntProperty(**common)

@@ -5,20 +5,19 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import bpy
-import numpy as np
 
 from ...arrays import Floats, Ints
 from ...errors import HairloomError
 from ...groom.children_settings import ChildrenSettings
-from ...groom.masks import LABELS, NO_MASKS, Masks, mask_names
+from ...groom.masks import Mask, Masks
 from ...groom.ties import NO_HOLDERS, Holders
 from ...strands import StrandSet, Surface
 from ...strands.clean import Cleaned
 from ...strands.colors import color_notes
 from ..base.objects import head_of
-from ..base.vertex_weights import read_weights
 from ..properties.properties import settings_of
 from .curves import read_curves
+from .masks import Canvas
 from .partings import read_partings
 from .surfaces import read_surface
 
@@ -33,7 +32,7 @@ class Source:
     dropped: reason -> number of curves that cannot be used.
     kept: (strand_count,) indices of the curves that became strands.
     density: (vertex_count,) how densely children grow on the head, or None.
-    masks: what is painted on the head of the settings of children.
+    masks: what is painted of the settings of children.
     head_warning, density_warning: a warning with its remedy, or empty. mask_warnings: such.
     color_warnings: about strands without a colour.
     holders: what holds it beside its roots, at rest.
@@ -67,16 +66,27 @@ class Source:
         return tuple(filter(None, found))
 
 
-def read_source(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Source:
+def read_source(
+    hair: bpy.types.Object,
+    depsgraph: bpy.types.Depsgraph,
+    good: dict[str, Mask] | None = None,
+) -> Source:
     """Read hair and head; without a usable head, the hair alone, with a warning.
+
+    Args:
+        good: see `Canvas`, which is filled.
 
     Raises:
         HairloomError: the object holds no hair curves, or none that can be used.
     """
     read = usable_curves(hair, depsgraph)
     head, head_warning = _read_head(hair, depsgraph)
-    density, density_warning = read_density(hair, head, depsgraph)
-    masks, mask_warnings = read_masks(hair, head, depsgraph)
+    canvas = Canvas(
+        hair, head_of(hair), head, read.strands, read.kept, {} if good is None else good
+    )
+    density, density_warning = read_density(hair, canvas, depsgraph)
+    settings = settings_of(hair.data.hairloom.children, ChildrenSettings)
+    masks, mask_warnings = canvas.masks(settings, depsgraph)
     partings, parting_warnings = read_partings(hair, depsgraph)
     return Source(
         read.strands,
@@ -95,87 +105,45 @@ def read_source(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Sourc
 
 
 def read_density(
-    hair: bpy.types.Object, head: Surface | None, depsgraph: bpy.types.Depsgraph
+    hair: bpy.types.Object, canvas: Canvas, depsgraph: bpy.types.Depsgraph
 ) -> tuple[Floats | None, str]:
     """The density of children at each vertex of the head; without usable weights children grow
     everywhere, with a warning."""
-    try:
-        return (None if head is None else wanted_density(hair, depsgraph)), ""
-    except HairloomError as error:
-        return None, str(error)
+    name = _density_name(hair)
+    if canvas.head is None or not name:
+        return None, ""
+    mask, warning = canvas.read(name, depsgraph)
+    if mask is not None and mask.is_zero:
+        return None, str(_no_density(name, canvas.surface))
+    return None if mask is None else mask.at_vertices(canvas.head, canvas.strands), warning
 
 
-def wanted_density(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Floats | None:
-    """The weights that the artist wants children to grow by, (vertex_count,); None without.
-
-    Raises:
-        HairloomError: the head has no weights of this name, or none that can be used.
+def check_density(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> None:
+    """Raises:
+    HairloomError: the head has no weights by which the artist wants children to grow, or none that
+        can be used.
     """
-    head, name = head_of(hair), hair.hairloom.children_density
-    if head is None or not name or hair.data.hairloom.children.method == "none":
-        return None
-    weights = read_weights(head, depsgraph, name)
-    if np.isfinite(weights).all() and (weights > 0.0).any():
-        return weights
-    raise HairloomError(
-        f"the weights '{name}' are zero everywhere, or not finite numbers",
-        place=head.name,
+    name = _density_name(hair)
+    if not name:
+        return
+    read, (head, _) = usable_curves(hair, depsgraph), _read_head(hair, depsgraph)
+    canvas = Canvas(hair, head_of(hair), head, read.strands, read.kept)
+    if head is not None and canvas.mask(name, depsgraph).is_zero:
+        raise _no_density(name, canvas.surface)
+
+
+def _density_name(hair: bpy.types.Object) -> str:
+    """By which children are to grow; empty where none are, or everywhere."""
+    has_children = hair.data.hairloom.children.method != "none"
+    return str(hair.hairloom.children_density) if has_children else ""
+
+
+def _no_density(name: str, head: bpy.types.Object | None) -> HairloomError:
+    return HairloomError(
+        f"the weights '{name}' are zero everywhere",
+        place="hair" if head is None else head.name,
         remedy="Paint where children should grow, or clear their Density field",
     )
-
-
-def read_masks(
-    hair: bpy.types.Object, head: Surface | None, depsgraph: bpy.types.Depsgraph
-) -> tuple[Masks, tuple[str, ...]]:
-    """The masks of its children; one that cannot be used acts nowhere, with a warning."""
-    surface, settings = head_of(hair), settings_of(hair.data.hairloom.children, ChildrenSettings)
-    if head is None or surface is None:
-        return NO_MASKS, ()
-    return masks_on(surface, settings, depsgraph)
-
-
-def masks_on(
-    head: bpy.types.Object, settings: ChildrenSettings, depsgraph: bpy.types.Depsgraph
-) -> tuple[Masks, tuple[str, ...]]:
-    """The masks that settings name on a mesh; see `read_masks`."""
-    weights, warnings = {}, []
-    for of, name in mask_names(settings).items():
-        try:
-            weights[of] = _mask(head, depsgraph, name)
-        except HairloomError as error:
-            warnings.append(str(error))
-            continue
-        if not (weights[of] > 0.0).any():
-            warnings.append(
-                f"{head.name}: the mask '{name}' is 0 everywhere, and so is {LABELS[of]}. Paint it"
-                " (Weight Paint), or clear its field"
-            )
-    return Masks(weights), tuple(warnings)
-
-
-def read_simulated(
-    hair: bpy.types.Object, head: Surface | None, depsgraph: bpy.types.Depsgraph
-) -> tuple[Floats | None, str]:
-    """How much of hair is simulated at each vertex of the head, (vertex_count,); without usable
-    weights the same everywhere, None, with a warning."""
-    surface, name = head_of(hair), hair.hairloom.dynamics.simulated_mask
-    if head is None or surface is None or not name:
-        return None, ""
-    try:
-        return np.minimum(_mask(surface, depsgraph, name), 1.0), ""
-    except HairloomError as error:
-        return None, str(error)
-
-
-def _mask(head: bpy.types.Object, depsgraph: bpy.types.Depsgraph, name: str) -> Floats:
-    weights = read_weights(head, depsgraph, name)
-    if not np.isfinite(weights).all():
-        raise HairloomError(
-            f"the mask '{name}' has values that are not finite numbers, so it is not used",
-            place=head.name,
-            remedy="Paint or compute it again, or clear its field",
-        )
-    return np.maximum(weights, 0.0)
 
 
 def own_dynamics(hair: bpy.types.Object) -> list[bpy.types.Modifier]:

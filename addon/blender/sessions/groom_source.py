@@ -11,7 +11,11 @@ import bpy
 import numpy as np
 
 from ...arrays import Floats, Ints
+from ...dynamics.painted import PaintedGuides
 from ...dynamics.settings import DynamicsSettings
+from ...groom.children_settings import ChildrenSettings
+from ...groom.masks import NO_MASKS, Mask, Masks, mask_names
+from ...paint_flow import painted_guides
 from ...pipeline import Pose, Rig
 from ...shading.ambient_settings import AmbientSettings
 from ...strands import StrandSet
@@ -26,15 +30,10 @@ from ..base.objects import Body, head_of, matrix_of
 from ..colliders.ties import Holding
 from ..properties.groom_settings import GroomSettings
 from ..scene.curves import read_curves
+from ..scene.masks import Canvas
 from ..scene.partings import is_same_state, parting_state, read_partings
 from ..scene.poses import check_finite, read_pose
-from ..scene.source import (
-    read_density,
-    read_masks,
-    read_simulated,
-    read_source,
-    usable_curves,
-)
+from ..scene.source import Source, read_density, read_source, usable_curves
 from .prepared_groom import BuildRequest, rig_of
 
 #: Points that lie nearer than this to where they were have not moved, as a part of how far they are
@@ -60,7 +59,12 @@ class GroomSource:
         head = head_of(hair)
         self.hair = Body.at_rest(hair, depsgraph)
         self._holding = Holding.of(hair, depsgraph)
-        self.source = replace(read_source(hair, depsgraph), holders=self._holding.holders)
+        self._good: dict[str, Mask] = {}
+        self._shown_map: tuple[str, Mask | None] | None = None
+        self._motion_masks = NO_MASKS
+        self._painted_guides: tuple[Ints, Masks, PaintedGuides | None] | None = None
+        source = read_source(hair, depsgraph, self._good)
+        self.source = replace(source, holders=self._holding.holders)
         self._combed = self.source.strands
         self.painted = self.source.density, self.source.masks
         uses_head = self.source.head is not None and head is not None
@@ -69,7 +73,7 @@ class GroomSource:
         self._parting_state = parting_state(hair)
         self.settings = GroomSettings.of(hair, depsgraph)
         self._kept = Kept()
-        self._read_simulated(depsgraph)
+        self._read_motion_masks(self._canvas(self.source), depsgraph)
         self._style_warning = ""
         self._styled: _Styled | None = None
         self.request = BuildRequest(
@@ -89,8 +93,10 @@ class GroomSource:
     @property
     def warnings(self) -> tuple[str, ...]:
         """What the artist should know about what was read, and about what holds the hair now."""
-        own = filter(None, (self._simulated_warning, self._style_warning))
-        return (*self.source.warnings, *self._holding.warnings, *own)
+        style = filter(None, (self._style_warning,))
+        own = self.source.warnings
+        motion = (each for each in self._motion_warnings if each not in own)
+        return (*own, *self._holding.warnings, *motion, *style)
 
     @property
     def holder_uids(self) -> frozenset[int]:
@@ -159,9 +165,10 @@ class GroomSource:
             strands = strands.with_points(before.strands.points)  # each frame has its own
         if _same(strands, before.strands, back):
             strands = before.strands
-        self._read_simulated(depsgraph)
-        density, warning = read_density(hair, before.head, depsgraph)
-        masks, mask_warnings = read_masks(hair, before.head, depsgraph)
+        canvas = self._canvas(replace(before, strands=strands, kept=read.kept))
+        self._read_motion_masks(canvas, depsgraph)
+        density, warning = read_density(hair, canvas, depsgraph)
+        masks, mask_warnings = canvas.masks(settings[ChildrenSettings], depsgraph)
         holding = Holding.of(hair, depsgraph, known.holding, back)
         partings, parting_warnings = before.partings, before.parting_warnings
         if self.has_other_partings():
@@ -174,6 +181,7 @@ class GroomSource:
             holders=holding.holders,
             strands=strands,
             dropped=read.dropped,
+            kept=read.kept,
             density=density,
             density_warning=warning,
             masks=masks,
@@ -235,10 +243,11 @@ class GroomSource:
         Raises:
             HairloomError: the hair is gone.
         """
-        hair, head, (density, masks) = self.hair.found(), self.source.head, self.painted
+        hair, (density, masks) = self.hair.found(), self.painted
+        canvas, settings = self._canvas(self.source), self.settings[ChildrenSettings]
         self.painted = (
-            read_density(hair, head, depsgraph)[0],
-            read_masks(hair, head, depsgraph)[0],
+            read_density(hair, canvas, depsgraph)[0],
+            canvas.masks(settings, depsgraph)[0],
         )
         is_same = np.array_equal(density, self.painted[0])  # type: ignore[arg-type]
         return not (is_same and masks == self.painted[1])
@@ -284,19 +293,41 @@ class GroomSource:
         self._styled = known
         return known.rig
 
-    def simulated(self, rig: Rig) -> Floats | None:
-        """How much of each guide is simulated, (guide_count,); None: all of all."""
-        factor, strands = self.settings[DynamicsSettings].simulated, rig.strands
-        if self._simulated is None or rig.head is None or strands.root_triangle is None:
-            return None if factor == 1.0 else np.full(len(rig.guides), factor, np.float32)
-        assert strands.root_barycentric is not None
-        corners = self._simulated[rig.head.triangles[strands.root_triangle[rig.guides]]]
-        painted = (corners * strands.root_barycentric[rig.guides]).sum(axis=1)
-        return np.clip(painted * factor, 0.0, 1.0).astype(np.float32)
+    def painted_guides(self, rig: Rig) -> PaintedGuides | None:
+        """By what settings of the motion are multiplied at each guide; None: nothing is painted."""
+        if not self._motion_masks:
+            return None
+        known = self._painted_guides
+        if known is None or known[0] is not rig.guides or known[1] is not self._motion_masks:
+            painted = painted_guides(rig, self._motion_masks)
+            self._painted_guides = known = rig.guides, self._motion_masks, painted
+        return known[2]
 
-    def _read_simulated(self, depsgraph: bpy.types.Depsgraph) -> None:
-        found = read_simulated(self.hair.found(), self.source.head, depsgraph)
-        self._simulated, self._simulated_warning = found
+    def shown_map(self, rig: Rig, depsgraph: bpy.types.Depsgraph) -> Floats | None:
+        """What is painted at each guide of the map that is shown, (cv_count or 1, guide_count);
+        None: there is none."""
+        name = shown_map_name(self.hair.found())
+        if self._shown_map is None or self._shown_map[0] != name:
+            mask = self._canvas(self.source).read(name, depsgraph)[0] if name else None
+            self._shown_map = name, mask
+        mask = self._shown_map[1]
+        painted = None if mask is None else painted_guides(rig, Masks({name: mask}))
+        return None if painted is None else painted.factors[name]
+
+    def forget_shown_map(self) -> None:
+        """It is to be read again."""
+        self._shown_map = None
+
+    def _canvas(self, source: Source) -> Canvas:
+        """On what it is painted."""
+        hair = self.hair.found()
+        return Canvas(hair, head_of(hair), source.head, source.strands, source.kept, self._good)
+
+    def _read_motion_masks(self, canvas: Canvas, depsgraph: bpy.types.Depsgraph) -> None:
+        settings = GroomSettings.of(self.hair.found(), depsgraph)[DynamicsSettings]
+        masks, self._motion_warnings = canvas.masks(settings, depsgraph)
+        if masks != self._motion_masks:
+            self._motion_masks = masks
 
     def rig_hash(self, depsgraph: bpy.types.Depsgraph) -> str:
         """See `simulated.Simulated`."""
@@ -309,6 +340,18 @@ class GroomSource:
         hair = self.hair.found()
         head = None if self.head is None else self.head.found()
         return groom_frame_hash(hair, head, pose, depsgraph)
+
+
+def shown_map_name(hair: bpy.types.Object) -> str:
+    """The map that the overlay shows: what is chosen, else the first that a setting names."""
+    settings = GroomSettings.of(hair)
+    named = (
+        hair.hairloom.shown_map,
+        *mask_names(settings[DynamicsSettings]).values(),
+        *mask_names(settings[ChildrenSettings]).values(),
+        settings.children_density,
+    )
+    return next(filter(None, named), "")
 
 
 def _misfit(name: str, now: StrandSet, known: StrandSet, depsgraph: bpy.types.Depsgraph) -> str:

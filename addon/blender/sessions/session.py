@@ -326,6 +326,14 @@ class Session:
         self.solver = NumpySolver.at_rest(self.rig, self._pose(depsgraph))
         self._show()
 
+    def shown_map(self, depsgraph: bpy.types.Depsgraph) -> Floats | None:
+        """See `GroomSource.shown_map`."""
+        return self._source.shown_map(self.rig, depsgraph)
+
+    def forget_shown_map(self) -> None:
+        """What is shown of it has been painted since."""
+        self._source.forget_shown_map()
+
     def take_settings(self) -> None:
         """Take over what acts at once; settings of guides, children and ambient light make the
         session stale.
@@ -482,8 +490,8 @@ class Session:
             return
         self._posed = () if self.obstacles is None else self.obstacles.move(depsgraph, duration)
         fields, self._field_notes = force_fields_of(self.hair.found(), depsgraph)
-        gravity, simulated = gravity_of(depsgraph.scene), self._source.simulated(self.rig)
-        self.solver.advance(pose, self._posed, settings, gravity, duration, fields, simulated)
+        gravity, painted = gravity_of(depsgraph.scene), self._source.painted_guides(self.rig)
+        self.solver.advance(pose, self._posed, settings, gravity, duration, fields, painted)
 
     def _go_along(self, depsgraph: bpy.types.Depsgraph, pose: Pose, duration: float) -> None:
         """A frame in which hair goes with its head as it is; see `pipeline.go_along`."""

@@ -29,7 +29,7 @@ from ...shading.lights import Light
 from ...strands.affine import moved
 from ..scene.forces import force_fields_of
 from ..sessions.session import Session
-from .motion_lines import contact_lines, density_lines, stretch_lines
+from .motion_lines import contact_lines, density_lines, painted_lines, stretch_lines
 
 #: Linear colours with alpha.
 COLORS = {
@@ -104,6 +104,8 @@ def debug_lines_of(
     if session.is_made:
         for kind, make_colored in MOTION_LINES.items():
             lines += make_colored(session) if kind in wanted else ()
+        if "paint" in wanted:
+            lines += painted_lines(session.solver.guides(), session.shown_map(depsgraph))
     return combed + tuple(
         Lines(color, points.astype(np.float32)) for color, points in lines if len(points)
     )

@@ -35,6 +35,17 @@ DENSITIES: tuple[tuple[float, Color], ...] = (
     (1.5, (1.0, 0.75, 0.1, 0.8)),
     (3.0, (1.0, 0.15, 0.1, 1.0)),
 )
+#: what is painted, in the colours of Blender's weights
+PAINTED: tuple[tuple[float, Color], ...] = (
+    (0.0, (0.0, 0.0, 1.0, 0.8)),
+    (0.125, (0.0, 0.5, 1.0, 0.8)),
+    (0.25, (0.0, 1.0, 0.9, 0.8)),
+    (0.375, (0.0, 1.0, 0.3, 0.8)),
+    (0.5, (0.3, 1.0, 0.0, 0.8)),
+    (0.625, (0.9, 1.0, 0.0, 0.8)),
+    (0.75, (1.0, 0.5, 0.0, 0.8)),
+    (0.875, (1.0, 0.0, 0.0, 0.8)),
+)
 #: Squares are smaller than their cells by this, so that neighbours do not share a line.
 _INSET = 0.06
 
@@ -88,6 +99,20 @@ def density_lines(session: Session) -> Colored:
         for color, chosen in _classes(mass[is_cut] / usual, DENSITIES):
             corners = (squares[chosen].reshape(-1, 3) - BEGIN) * grid.cell
             yield color, corners @ turn.T + middle
+
+
+def painted_lines(guides: Floats, painted: Floats | None) -> Colored:
+    """Segments of all guides by what is painted there; none where nothing is.
+
+    Args:
+        painted: (cv_count or 1, guide_count).
+    """
+    if painted is None:
+        return
+    segments = np.stack([guides[:, :-1], guides[:, 1:]], axis=2)
+    here = np.broadcast_to(painted.T, guides.shape[:2])
+    for color, chosen in _classes((here[:, :-1] + here[:, 1:]) / 2.0, PAINTED):
+        yield color, segments[chosen].reshape(-1, 3)
 
 
 def _cells(places: Floats, mass: Floats) -> tuple[Floats, Ints]:

@@ -1,0 +1,207 @@
+"""Reading what is painted of a groom's settings.
+
+A name is looked for as a vertex group and as an attribute of the surface, then as an attribute of
+the curves, then as an image, which lies on the surface's active UV map.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import bpy
+import numpy as np
+
+from ...arrays import Floats, Ints
+from ...errors import HairloomError
+from ...groom.masks import ImageMask, Mask, Masks, StrandMask, SurfaceMask, mask_names
+from ...params import Settings
+from ...strands import StrandSet, Surface
+from ..base.vertex_weights import (
+    LUMINANCE,
+    at_corners,
+    has_weights,
+    image_names,
+    mask_choices,
+    missing_weights,
+    painted_attribute,
+    weights_on,
+)
+from .curves import curve_offsets
+
+
+@dataclass(frozen=True, eq=False)
+class Canvas:
+    """On what a groom may be painted.
+
+    hair: its curves; None: they are of a file. surface: the object that it grows on, or None.
+    head: that as it was read. strands: those of the curves that are usable. kept: which these are.
+    good: every mask by its name, as it could be used last.
+    """
+
+    hair: bpy.types.Object | None
+    surface: bpy.types.Object | None
+    head: Surface | None
+    strands: StrandSet
+    kept: Ints
+    good: dict[str, Mask] = field(default_factory=dict)
+
+    def masks(
+        self, settings: Settings, depsgraph: bpy.types.Depsgraph
+    ) -> tuple[Masks, tuple[str, ...]]:
+        """Those that settings name, and what is to be said of them. One that cannot be used stays
+        as it was last; one that never could acts nowhere."""
+        named, labels = mask_names(settings), {p.name: p.label for p in settings.parameters()}
+        found, warnings = {}, []
+        read = {name: self.read(name, depsgraph) for name in sorted(set(named.values()))}
+        for of, name in named.items():
+            mask, warning = read[name]
+            if mask is not None:
+                found[of] = mask
+            if warning and warning not in warnings:
+                warnings.append(warning)
+            elif mask is not None and mask.is_zero:
+                warnings.append(
+                    f"{self._place}: the mask '{name}' is 0 everywhere, and so is {labels[of]}."
+                    " Paint it (Weight Paint), or clear its field"
+                )
+        return Masks(found), tuple(warnings)
+
+    def read(self, name: str, depsgraph: bpy.types.Depsgraph) -> tuple[Mask | None, str]:
+        """A mask, and a warning; the one that was good last where it cannot be used now."""
+        try:
+            mask = self.mask(name, depsgraph)
+        except HairloomError as error:
+            known = self.good.get(name)
+            if known is None or not self._fits(known):
+                return None, str(error)
+            return known, f"{error}. Until then it is used as it was last"
+        self.good[name] = mask
+        return mask, ""
+
+    def mask(self, name: str, depsgraph: bpy.types.Depsgraph) -> Mask:
+        """Raises:
+        HairloomError: there is none of this name, or none that can be used.
+        """
+        found = self._of_surface(name, depsgraph)
+        if found is None:
+            found = self._of_curves(name, depsgraph)
+        if found is None:
+            found = self._of_image(name)
+        if found is None:
+            raise self._missing(name)
+        return found
+
+    @property
+    def _place(self) -> str:
+        named = self.surface or self.hair
+        return "hair" if named is None else str(named.name)
+
+    def _fits(self, mask: Mask) -> bool:
+        triangles = None if self.head is None else len(self.head.triangles)
+        return mask.fits(self.strands.strand_count, triangles)
+
+    def _of_surface(self, name: str, depsgraph: bpy.types.Depsgraph) -> Mask | None:
+        surface, head = self.surface, self.head
+        if surface is None or head is None or surface.type != "MESH":
+            return None
+        evaluated = surface.evaluated_get(depsgraph)
+        mesh = evaluated.to_mesh()
+        try:
+            if not has_weights(surface, mesh, name):
+                return None
+            corners = at_corners(mesh, *weights_on(surface, mesh, name))
+        finally:
+            evaluated.to_mesh_clear()
+        if len(corners) != len(head.triangles):
+            raise HairloomError(
+                f"the mask '{name}' lies on {len(corners):,} triangles, the hair was made on "
+                f"{len(head.triangles):,}, so it is not used",
+                place=surface.name,
+                remedy="Turn modifiers on that change the mesh before the hair is shown",
+            )
+        if np.linalg.det(np.array(evaluated.matrix_world)) < 0.0:
+            corners = corners[:, ::-1]  # as triangles are, see `Surface.transformed`
+        return SurfaceMask(_usable(corners, name, surface.name))
+
+    def _of_curves(self, name: str, depsgraph: bpy.types.Depsgraph) -> Mask | None:
+        if self.hair is None:
+            return None
+        curves = self.hair.evaluated_get(depsgraph).data
+        found = painted_attribute(curves, name)
+        if found is None:
+            return None
+        values, domain = found
+        values = _usable(values, name, self.hair.name)
+        offsets, strands = curve_offsets(curves), self.strands
+        counts = np.diff(offsets)
+        is_known = self.kept.max(initial=-1) < len(counts)
+        if not (is_known and np.array_equal(counts[self.kept], strands.point_counts)):
+            raise HairloomError(
+                f"the mask '{name}' lies on other curves than those that are shown",
+                place=self.hair.name,
+                remedy="Wait until the hair is made again",
+            )
+        if domain == "CURVE":
+            return StrandMask(values[self.kept, None])
+        is_kept = np.zeros(len(counts), bool)
+        is_kept[self.kept] = True
+        return StrandMask.of_points(strands, values[np.repeat(is_kept, counts)])
+
+    def _of_image(self, name: str) -> Mask | None:
+        if name not in image_names():
+            return None
+        if self.head is None or self.head.corner_uv is None:
+            raise HairloomError(
+                f"the image '{name}' needs a surface with UVs",
+                place=self._place,
+                remedy="Unwrap it (Edit Mode, UV > Unwrap), or paint a vertex group",
+            )
+        pixels = image_values(bpy.data.images[name])
+        if not pixels.size:
+            raise HairloomError(
+                f"the image '{name}' has no pixels",
+                place=self._place,
+                remedy="Find its file (File > External Data > Find Missing Files)",
+            )
+        return ImageMask(_usable(pixels, name, self._place), self.head.corner_uv)
+
+    def _missing(self, name: str) -> HairloomError:
+        of_surface = None if self.surface is None else self.surface.data.attributes.get(name)
+        if self.surface is not None and of_surface is not None:
+            return missing_weights(self.surface, name, of_surface)
+        there = mask_choices(self.hair, self.surface)
+        return HairloomError(
+            f"it has neither a vertex group nor an attribute named '{name}', and there is no such"
+            " image",
+            place=self._place,
+            remedy=f"Use one of: {', '.join(there[:8])}"
+            if there
+            else "Paint one (Weight Paint), or leave the field empty",
+        )
+
+
+def image_values(image: bpy.types.Image) -> Floats:
+    """The pixels of an image as they are kept, by luminance, (height, width) float32."""
+    (width, height), channels = image.size, image.channels
+    pixels = np.empty(width * height * channels, np.float32)
+    image.pixels.foreach_get(pixels)
+    pixels = pixels.reshape(height, width, channels)
+    if channels < 3:
+        return np.ascontiguousarray(pixels[..., 0])
+    found: Floats = pixels[..., :3] @ LUMINANCE
+    return found
+
+
+def _usable(values: Floats, name: str, place: str) -> Floats:
+    """Not negative.
+
+    Raises:
+        HairloomError: not finite.
+    """
+    if not np.isfinite(values).all():
+        raise HairloomError(
+            f"the mask '{name}' has values that are not finite numbers, so it is not used",
+            place=place,
+            remedy="Paint or compute it again, or clear its field",
+        )
+    return np.maximum(values, np.float32(0.0))

@@ -1,0 +1,258 @@
+"""Settings that are painted, read from Blender: every kind of map, and what goes wrong with it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+import numpy as np
+import pytest
+
+from hairloom.addon.blender.bakes.groom_hashes import groom_rig_hash
+from hairloom.addon.blender.bakes.simulated import differences
+from hairloom.addon.blender.preview import previews, scene_events
+from hairloom.addon.blender.properties import presets
+from hairloom.addon.blender.properties.groom_settings import GroomSettings
+from hairloom.addon.blender.properties.properties import masks_of_groom
+from hairloom.addon.blender.scene.curves import read_curves
+from hairloom.addon.blender.viewport import motion_lines, overlay
+
+#: how far [m] from the border between the halves is far enough: the sphere's faces are coarse
+FAR = 0.05
+
+
+@pytest.fixture
+def hair(new_hair: Any, sphere: Any) -> Any:
+    hair = new_hair(sphere)
+    hair.hairloom.dynamics.device = "numpy"
+    hair.data.hairloom.children.method = "none"
+    return hair
+
+
+def is_top(sphere: Any) -> list[float]:
+    return [float(vertex.co.z > 0.0) for vertex in sphere.data.vertices]
+
+
+def paint(kind: str, hair: Any, sphere: Any) -> None:
+    """The upper half 1 and the lower 0, by the name Top."""
+    mesh, top = sphere.data, is_top(sphere)
+    if kind == "group":
+        group = sphere.vertex_groups.new(name="Top")
+        group.add(np.flatnonzero(top).tolist(), 1.0, "REPLACE")
+    elif kind == "face":
+        attribute = mesh.attributes.new("Top", "FLOAT", "FACE")
+        attribute.data.foreach_set("value", [float(each.center.z > 0.0) for each in mesh.polygons])
+    elif kind == "corner colour":
+        attribute = mesh.attributes.new("Top", "BYTE_COLOR", "CORNER")
+        for loop, element in zip(mesh.loops, attribute.data, strict=True):
+            element.color = (*[top[loop.vertex_index]] * 3, 1.0)
+    elif kind == "image":
+        layer = mesh.uv_layers.active or mesh.uv_layers.new(name="Across")
+        for loop in mesh.loops:
+            layer.uv[loop.index].vector = (0.3, 0.5 + 2.0 * mesh.vertices[loop.vertex_index].co.z)
+        image = bpy.data.images.new("Top", 4, 64)
+        pixels = np.ones((64, 4, 4), np.float32)
+        pixels[:32, :, :3] = 0.0
+        image.pixels.foreach_set(pixels.ravel())
+    else:
+        strands = read_curves(hair, bpy.context.evaluated_depsgraph_get()).strands
+        values = (strands.roots[:, 2] > 0.0).astype(np.float32)
+        if kind == "curve":
+            hair.data.attributes.new("Top", "FLOAT", "CURVE").data.foreach_set("value", values)
+        else:
+            of_points = np.repeat(values, strands.point_counts)
+            hair.data.attributes.new("Top", "FLOAT", "POINT").data.foreach_set("value", of_points)
+
+
+def started(hair: Any, evaluated: Any) -> Any:
+    bpy.context.view_layer.update()
+    return previews.start(hair, evaluated())
+
+
+def factors(session: Any) -> Any:
+    return session._source.painted_guides(session.rig).factors
+
+
+def assert_halves(session: Any, found: Any) -> None:
+    """1 above, 0 below."""
+    height = session.rig.strands.roots[session.rig.guides, 2]
+    assert (height > FAR).sum() > 3 and (height < -FAR).sum() > 3
+    np.testing.assert_allclose(found[:, height > FAR], 1.0, atol=1e-5)
+    np.testing.assert_allclose(found[:, height < -FAR], 0.0, atol=1e-5)
+
+
+def catch_up(evaluated: Any) -> None:
+    bpy.context.view_layer.update()
+    scene_events.catch_up(evaluated())
+
+
+KINDS = ("group", "face", "corner colour", "image", "curve", "point")
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_each_kind_of_map_is_what_guides_are_painted_with(
+    hair: Any, sphere: Any, evaluated: Any, kind: str
+) -> None:
+    paint(kind, hair, sphere)
+    dynamics, children = hair.hairloom.dynamics, hair.data.hairloom.children
+    assert "Top" in masks_of_groom(dynamics, bpy.context, "to")
+    dynamics.style_root_mask = "Top"
+    children.method, children.strand_count, children.width_mask = "multi", 100, "Top"
+    hair.hairloom.children_density = "Top"
+    session = started(hair, evaluated)
+    assert session.warnings == ()
+    found = factors(session)
+    assert found.keys() == {"style_root"}
+    assert found["style_root"].shape[0] == (
+        session.rig.guide_grid.shape[1] if kind == "point" else 1
+    )
+    assert_halves(session, found["style_root"])
+    growth = session.rig.grown.growth
+    assert growth.root[:, 2].min() > -FAR, "children grow above alone"
+    widths = growth.factors["width"]
+    assert (np.median(widths), widths.max()) == pytest.approx((1.0, 1.0), abs=1e-6)
+
+
+def test_what_is_painted_moves_otherwise(hair: Any, sphere: Any, evaluated: Any) -> None:
+    """Stiff above and limp below, on a head that is moved aside."""
+    scene, dynamics = bpy.context.scene, hair.hairloom.dynamics
+    scene.frame_start, scene.frame_end = 1, 8
+    for frame, x in ((1, 0.0), (5, 0.2)):
+        sphere.location.x = x
+        sphere.keyframe_insert("location", frame=frame)
+    paint("group", hair, sphere)
+    scene.frame_set(1)
+    ends = []
+    for name in ("", "Top"):
+        dynamics.style_root_mask = dynamics.style_tip_mask = name
+        session = started(hair, evaluated)
+        hair.hairloom.bake.follows = True
+        scene.frame_set(1)
+        for frame in range(2, 7):
+            scene.frame_set(frame)
+        ends.append(session.solver.guides())
+        height = session.rig.strands.roots[session.rig.guides, 2]
+        previews.stop(session)
+    apart = np.abs(ends[0] - ends[1]).max(axis=(1, 2))
+    assert apart[height > FAR].max() < 1e-5, "as everywhere where it is painted 1"
+    assert np.median(apart[height < -FAR]) > 1e-3
+
+
+def test_a_map_that_breaks_stays_as_it_was_last(hair: Any, sphere: Any, evaluated: Any) -> None:
+    paint("face", hair, sphere)
+    dynamics = hair.hairloom.dynamics
+    session = started(hair, evaluated)
+    dynamics.gravity_mask = "Top"
+    assert session.is_stale, "it is to be read"
+    catch_up(evaluated)
+    before = factors(session)["gravity"].copy()
+    assert_halves(session, before)
+    sphere.data.attributes["Top"].data[0].value = float("nan")
+    sphere.data.update_tag()
+    catch_up(evaluated)
+    (warning,) = session.warnings
+    assert warning.startswith("Head: ") and "'Top'" in warning and "as it was last" in warning
+    np.testing.assert_array_equal(factors(session)["gravity"], before)
+    dynamics.gravity_mask = "Gone"
+    catch_up(evaluated)
+    (warning,) = session.warnings
+    assert "neither a vertex group nor an attribute named 'Gone'" in warning
+    assert "Top" in warning, "those that there are"
+    assert session._source.painted_guides(session.rig) is None
+    dynamics.gravity_mask = ""
+    catch_up(evaluated)
+    assert session.warnings == () and session._source.painted_guides(session.rig) is None
+
+
+def test_a_map_of_zeros_is_said_with_what_is_to_be_done(
+    hair: Any, sphere: Any, evaluated: Any
+) -> None:
+    sphere.vertex_groups.new(name="Nothing")
+    hair.hairloom.dynamics.bend_mask = "Nothing"
+    (warning,) = started(hair, evaluated).warnings
+    assert "'Nothing' is 0 everywhere, and so is Bend Stiffness" in warning
+    assert "Paint it" in warning
+
+
+def test_an_image_is_read_again_once_it_is_painted(hair: Any, sphere: Any, evaluated: Any) -> None:
+    paint("image", hair, sphere)
+    hair.hairloom.dynamics.volume_mask = "Top"
+    image, material = bpy.data.images["Top"], bpy.data.materials.new("Skin")
+    material.node_tree.nodes.new("ShaderNodeTexImage").image = image
+    sphere.data.materials.append(material)
+    session = started(hair, evaluated)
+    image.pixels.foreach_set(np.full(64 * 4 * 4, 0.25, np.float32))
+    image.update_tag()
+    bpy.context.view_layer.update()
+    assert session.is_stale
+    catch_up(evaluated)
+    np.testing.assert_allclose(factors(session)["volume"], 0.25, atol=2e-3)
+
+
+def test_the_overlay_shows_what_is_painted_as_it_is_painted(
+    hair: Any, sphere: Any, evaluated: Any
+) -> None:
+    paint("group", hair, sphere)
+    session = started(hair, evaluated)
+    hair.hairloom.shown_overlays = {"paint"}
+    assert overlay.drawing_of(session.uid).lines == (), "nothing is chosen"
+    hair.hairloom.shown_map = "Top"
+
+    def shown() -> dict[Any, Any]:
+        return {one.color: one.points for one in overlay.drawing_of(session.uid).lines}
+
+    blue, red = motion_lines.PAINTED[0][1], motion_lines.PAINTED[-1][1]
+    root = session.solver.guides()[:, 0]
+    above, below = root[root[:, 2] > FAR], root[root[:, 2] < -FAR]
+    for roots, color in ((above, red), (below, blue)):
+        for each in roots:
+            assert (np.abs(shown()[color] - each).max(axis=1) < 1e-6).any()
+    group = sphere.vertex_groups["Top"]
+    group.add([vertex.index for vertex in sphere.data.vertices], 0.3, "REPLACE")
+    sphere.data.update_tag()
+    bpy.context.view_layer.update()
+    assert shown().keys() == {motion_lines.PAINTED[2][1]}, "with the stroke itself"
+    segments = session.solver.guides().shape
+    assert sum(map(len, shown().values())) == 2 * segments[0] * (segments[1] - 1)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_bake_is_stale_once_a_map_of_its_motion_is_painted(
+    hair: Any, sphere: Any, kind: str
+) -> None:
+    paint(kind, hair, sphere)
+    hair.hairloom.dynamics.style_damping_mask = "Top"
+    settings = GroomSettings.of(hair)
+
+    def now() -> str:
+        return groom_rig_hash(hair, sphere, settings, bpy.context.scene)
+
+    before = now()
+    assert now() == before
+    if kind == "group":
+        sphere.vertex_groups["Top"].add([0], 0.3, "REPLACE")
+    elif kind == "image":
+        bpy.data.images["Top"].pixels[5] = 0.3
+    else:
+        data = sphere.data if kind in ("face", "corner colour") else hair.data
+        element = data.attributes["Top"].data[0]
+        if kind == "corner colour":
+            element.color = (0.3, 0.3, 0.3, 1.0)
+        else:
+            element.value = 0.3
+    assert differences(before, now()) == ("paint",)
+
+
+def test_a_preset_keeps_what_is_painted_and_may_bring_names_of_its_own(hair: Any) -> None:
+    dynamics = hair.hairloom.dynamics
+    dynamics.gravity_mask = "Top"
+    shipped = presets.named_preset("dynamics/big")
+    presets.apply(shipped.settings, hair)
+    assert (dynamics.style_root, dynamics.gravity_mask) == (5.0, "Top")
+    entries = presets.shipped("dynamics")
+    found = presets.preset_of(hair, entries)
+    assert found is not None and found.name == "dynamics/big", "painted hair has it, too"
+    (kept,) = presets.kept_settings(hair, "dynamics")
+    dynamics.gravity_mask, dynamics.bend_mask = "Other", "Bent"
+    presets.apply(kept, hair)
+    assert (dynamics.gravity_mask, dynamics.bend_mask) == ("Top", "Bent")
