@@ -28,6 +28,7 @@ MENU = {
         "docs/hairstyles",
         "docs/styling",
         "docs/refinement",
+        "docs/painting",
         "docs/dynamics",
         "docs/shading",
         "docs/light_shafts",

@@ -1,4 +1,5 @@
-"""Draws the pictures of docs/styling.md: what each tool does to hair, before and after.
+"""Draws the pictures of docs/styling.md and docs/painting.md: what each tool does to hair, before
+and after.
 
 python tools/styling_pictures.py FOLDER
 """
@@ -17,6 +18,8 @@ from small_pictures import write_small
 
 WIDTH, HEIGHT, SAMPLES = 560, 600, 8
 CURVES, CHILDREN = 1200, 24_000
+#: the frame of a shake that is pictured
+SHAKEN = 8
 
 
 def of_addon(module: str) -> Any:
@@ -127,6 +130,45 @@ def flow(folder: Path) -> None:
     sheet(folder, "flow.jpg", [*pictures, picture(hair)])
 
 
+def shaken(hair: Any) -> np.ndarray:
+    """The hair in the middle of a shake of the head."""
+    scene, head = bpy.context.scene, hair.parent
+    scene.frame_start, scene.frame_end = 1, SHAKEN
+    for frame, (turn, aside) in {1: (0, 0), 5: (0.9, 0.03), 10: (-0.9, -0.03)}.items():
+        head.rotation_euler.z, head.location.x = turn, aside
+        head.keyframe_insert("rotation_euler", frame=frame)
+        head.keyframe_insert("location", frame=frame)
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    session = of_addon("blender.preview.previews").start(hair, depsgraph)
+    hair.hairloom.bake.follows = True
+    for frame in range(1, SHAKEN + 1):
+        scene.frame_set(frame)
+    shown = of_addon("blender.pictures.showing").shown_groom(hair, depsgraph)
+    image = shown.studio.picture(shown.pose, session.strands, WIDTH, HEIGHT, SAMPLES)
+    return np.asarray(image)
+
+
+def painted(folder: Path) -> None:
+    """Stiffness on one half of the head."""
+    pictures = []
+    for name in ("", "Stiff"):
+        bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+        bpy.ops.hairloom.add_hairstyle(style="long_straight", plays=False)
+        hair = bpy.context.object
+        head, dynamics, children = hair.parent, hair.hairloom.dynamics, hair.data.hairloom.children
+        children.method, children.strand_count, dynamics.device = "multi", 5000, "numpy"
+        hair.data.hairloom.guides.guide_count = 300
+        group = head.vertex_groups.new(name="Stiff")
+        for vertex in head.data.vertices:
+            group.add([vertex.index], min(max(0.5 - vertex.co.x / 0.02, 0.02), 1.0), "REPLACE")
+        dynamics.style_root, dynamics.style_tip, dynamics.bend = 9.0, 7.0, 6.0
+        if not name:
+            dynamics.style_root, dynamics.style_tip, dynamics.bend = 1.0, 0.2, 0.2
+        dynamics.style_root_mask = dynamics.style_tip_mask = dynamics.bend_mask = name
+        pictures.append(shaken(hair))
+    sheet(folder, "painted.jpg", pictures)
+
+
 def main(folder: Path) -> None:
     gpu.init()
     load_package().register()
@@ -134,6 +176,7 @@ def main(folder: Path) -> None:
     settle(folder)
     parting(folder)
     flow(folder)
+    painted(folder)
 
 
 if __name__ == "__main__":
