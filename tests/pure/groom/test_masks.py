@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from small_wig import GUIDES, curves, sheet
@@ -22,6 +24,8 @@ from hairloom.addon.groom.masks import (
     masks_of,
 )
 from hairloom.addon.paint_flow import painted, painted_guides
+from hairloom.addon.strands import StrandSet
+from hairloom.addon.strands.face import BROWS
 from hairloom.addon.strands.kept import NOTHING_KEPT, Kept
 
 HEAD = sheet()
@@ -45,10 +49,13 @@ WITHOUT = {"clump": 0.0, "frizz": 0.0, "fly_aways": 0.0}
 
 
 def rig_of(
-    settings: ChildrenSettings, masks: Masks = NO_MASKS, kept: Kept = NOTHING_KEPT
+    settings: ChildrenSettings,
+    masks: Masks = NO_MASKS,
+    kept: Kept = NOTHING_KEPT,
+    own: StrandSet | None = None,
 ) -> pipeline.Rig:
     return pipeline.prepare(
-        curves(), HEAD, GUIDES, place="a wig", children=settings, masks=masks, kept=kept
+        own or curves(), HEAD, GUIDES, place="a wig", children=settings, masks=masks, kept=kept
     )
 
 
@@ -240,20 +247,20 @@ def test_what_is_painted_on_curves_is_mixed_as_their_points_are() -> None:
 
 
 def test_children_take_what_is_painted_on_their_guides() -> None:
-    """Guides of one half are painted 0: children there are those of the setting at 0."""
-    own = curves()
-    is_right = (own.roots[:, 0] > 0.0).astype(np.float32)
-    masks = Masks({"frizz": StrandMask(is_right[:, None])})
-    masked, whole = rig_of(BOLD, masks), rig_of(BOLD)
-    none = rig_of(BOLD, on_head("frizz", 0.0 * ONES))
+    """Guides of one half are painted 0: children there are those of the setting at 0. Brows come
+    first, so that guides of children have other numbers than curves."""
+    own = replace(curves(), group=np.where(np.arange(60) < 9, BROWS, 0))
+    is_right = own.roots[:, 0] > 0.0
+    masks = Masks({"frizz": StrandMask(is_right.astype(np.float32)[:, None])})
+    masked, whole = rig_of(BOLD, masks, own=own), rig_of(BOLD, own=own)
+    none = rig_of(BOLD, on_head("frizz", 0.0 * ONES), own=own)
     guide = masked.grown.growth.weights.guide
     are_right = is_right[masked.grown.parents][guide].all(axis=1)
     are_left = ~is_right[masked.grown.parents][guide].any(axis=1)
+    assert masked.grown.parents[0] == 9 and are_right.sum() > 100 and are_left.sum() > 100
     np.testing.assert_allclose(children(masked)[are_right], children(whole)[are_right], atol=1e-7)
     np.testing.assert_array_equal(children(masked)[are_left], children(none)[are_left])
-    np.testing.assert_allclose(
-        children(painted(rig_of(BOLD), None, masks)), children(masked), atol=2e-6
-    )
+    np.testing.assert_allclose(children(painted(whole, None, masks)), children(masked), atol=2e-6)
 
 
 def test_guides_of_a_rig_have_their_own_factors() -> None:
