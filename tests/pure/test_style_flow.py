@@ -9,6 +9,7 @@ import pytest
 from small_wig import GUIDES, curves, sheet
 
 from hairloom.addon import pipeline
+from hairloom.addon.dynamics.painted import PaintedGuides
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.groom.children_settings import ChildrenSettings
 from hairloom.addon.pipeline import Pose, Rig
@@ -106,8 +107,9 @@ def test_nothing_of_it_is_simulated_at_0_and_all_of_it_at_1() -> None:
     begun, pose = pipeline.begin(rig, rig.rest_pose), pose_of(rig, matrix)
 
     def shown(simulated: np.ndarray | None) -> np.ndarray:
+        painted = None if simulated is None else PaintedGuides({"simulated": simulated[None]})
         motion = pipeline.advance(
-            rig, begun, pose, (), DynamicsSettings(), GRAVITY, 0.04, simulated=simulated
+            rig, begun, pose, (), DynamicsSettings(), GRAVITY, 0.04, painted=painted
         )
         return motion.guides
 
