@@ -12,7 +12,7 @@ from hairloom.addon.groom.children_settings import ChildrenSettings
 
 def wig() -> pipeline.Rig:
     children = ChildrenSettings(
-        method="multi", strand_count=2000, length_variation=0.0, baby_hair=0.8
+        method="multi", strand_count=500, length_variation=0.0, baby_hair=0.8
     )
     return pipeline.prepare(curves(), sheet(), GUIDES, place="a wig", children=children)
 
@@ -21,5 +21,5 @@ def short_strands(rig: pipeline.Rig) -> Bools:
     """(strand_count,) those that no setting but Baby Hair has cut."""
     length = rig.strands.lengths()
     is_short: Bools = length < 0.5 * np.median(length)
-    assert 50 < is_short.sum() < 1500
+    assert 20 < is_short.sum() < 400
     return is_short

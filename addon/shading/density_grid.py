@@ -23,6 +23,9 @@ from ..strands.vectors import dot_rows
 _SHELL_DEPTH = 2.5
 #: Sizes that cells may have, in each doubling, and cells along the side of a block.
 _SIZES, _BLOCK = 16, 16
+#: Along a typical hair there are at least this many cells, so that fur on a large body is not lost
+#: in one layer of them; but not where that makes more cells than this in all.
+_ALONG_HAIR, _MAX_CELLS = 6, 1_000_000
 #: Hair smaller than this gets cells as if it were that large [m].
 _SMALLEST_HAIR = 1.0e-9
 #: Nor may cells be smaller than this part of how far the hair is from the origin.
@@ -71,7 +74,8 @@ class Grid:
 
 
 def grid_around(strands: StrandSet, cell_count: int) -> Grid:
-    """Cells over all strands, with two empty ones on each side, at most `cell_count` without those.
+    """Cells over all strands, with two empty ones on each side: `cell_count` at most without those
+    along the longest side, or more where hair is short, see `_ALONG_HAIR`.
 
     They are cells of one of few lattices through the origin: hair that is combed keeps its own.
     """
@@ -79,10 +83,18 @@ def grid_around(strands: StrandSet, cell_count: int) -> Grid:
     farthest = float(np.maximum(np.abs(low), np.abs(high)).max())
     size = max(float((high - low).max()), _SMALLEST_HAIR, _FINEST * farthest)
     least = size / (cell_count - 1)
+    finest = (float(np.prod(np.maximum(high - low, least))) / _MAX_CELLS) ** (1.0 / 3.0)
+    least = min(least, max(_typical_reach(strands) / _ALONG_HAIR, finest, size * _FINEST))
     cell = 2.0 ** (np.ceil(np.log2(least) * _SIZES) / _SIZES)
     first = np.floor(low / cell).astype(np.int64) - 2
     last = np.floor(high / cell).astype(np.int64) + 2
     return Grid.of_cells(first, last + 1 - first, float(cell))
+
+
+def _typical_reach(strands: StrandSet) -> float:
+    """From root to tip, in a straight line [m]."""
+    ends = strands.points[strands.offsets[1:] - 1] - strands.roots
+    return float(np.median(np.sqrt(np.einsum("ij,ij->i", ends, ends))))
 
 
 def hair_depth(strands: StrandSet, grid: Grid) -> Floats:

@@ -14,7 +14,6 @@ from hairloom.addon.blender.bakes.baked_rig import RestMatrices, rig_arrays, rig
 from hairloom.addon.blender.cards.build import baked_atlas  # noqa: E402
 from hairloom.addon.card_flow import card_groom  # noqa: E402
 from hairloom.addon.cards.atlas_settings import AtlasSettings  # noqa: E402
-from hairloom.addon.cards.bake import sampled_maps  # noqa: E402
 from hairloom.addon.cards.build import uncut_cards  # noqa: E402
 from hairloom.addon.cards.settings import CardSettings  # noqa: E402
 from hairloom.addon.shading.settings import ShadingSettings, StrandSettings  # noqa: E402
@@ -26,6 +25,7 @@ def test_a_bake_knows_its_baby_hair() -> None:
     np.testing.assert_array_equal(found.baby_hair, np.flatnonzero(short_strands(rig)))
 
 
+@pytest.mark.draws
 def test_the_atlas_shows_the_strands_that_its_plan_names() -> None:
     """It is that of a groom in which no baby hair ever was."""
     rig, look, drawn = wig(), ShadingSettings(color_variation=0.0), StrandSettings()
@@ -35,9 +35,7 @@ def test_the_atlas_shows_the_strands_that_its_plan_names() -> None:
     without = replace(
         rig, strands=rig.strands.take(np.flatnonzero(~short_strands(rig))), grown=None
     )
-    found, expected = (
-        baked_atlas(each, plan, look, drawn, sampled_maps) for each in (rig, without)
-    )
-    assert (expected.alpha > 0.5).mean() > 0.01
+    found, expected = (baked_atlas(each, plan, look, drawn) for each in (rig, without))
+    assert (expected.alpha > 0.0).mean() > 0.05
     for name, values in expected.by_name.items():
         np.testing.assert_array_equal(found.by_name[name], values, name)

@@ -141,6 +141,37 @@ def test_agrees_with_rays_marched_one_by_one() -> None:
     assert np.abs(found - expected).mean() < 0.012
 
 
+def carpet(length: float) -> StrandSet:
+    """Dense upright fur on a square of 1 m, which leans so that it lies across all cells."""
+    place = np.linspace(-0.5, 0.5, 160)
+    x, y = (each.ravel() for each in np.meshgrid(place, place))
+    root = np.stack([x, y, 0.04 * x + 0.02 * y], axis=1)
+    up = np.array([-0.04, -0.02, 1.0])
+    points = root[:, None] + np.linspace(0.0, length, 6)[:, None] * up
+    count = len(root)
+    return StrandSet(
+        points.reshape(-1, 3), np.arange(count + 1) * 6, np.full(count * 6, 4e-4), np.zeros(count)
+    )
+
+
+def test_even_fur_on_a_large_body_is_shaded_evenly() -> None:
+    """Every place of it is like every other, however the cells lie."""
+    fur = carpet(0.03)
+    settings = AmbientSettings(extinction=8.0, ao_bias=1.0, upper_fraction=1.0)
+    found = ambient_occlusion(fur, fur.points, None, settings).reshape(-1, 6)
+    inner = (np.abs(fur.roots[:, :2]) < 0.35).all(axis=1)
+    tips, roots = found[inner, -1], found[inner, 0]
+    assert tips.std() < 0.1 * tips.mean()
+    assert tips.mean() > 0.7 and tips.mean() > 2.0 * roots.mean()
+
+
+def test_cells_are_fine_only_where_hair_is_short_and_never_too_many() -> None:
+    long, short, shortest = (grid_around(carpet(each), 56) for each in (0.3, 0.03, 1e-4))
+    assert long.cell > 1.0 / 56.0
+    assert 0.95 < short.cell / (0.03 / 6) < 1.05
+    assert shortest.cell < short.cell and np.prod(shortest.shape) < 1_400_000
+
+
 def test_many_directions_say_the_same_as_twenty_six() -> None:
     """The quadrature against 2,000 directions spread over the sphere (Fibonacci)."""
     strands = straight_hair(400)
