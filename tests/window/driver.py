@@ -75,19 +75,29 @@ class Timers:
         self._register(function, **settings)
 
     def pending(self) -> list[str]:
-        """Those that are still to come, but for the ticks of hair that plays, which go on."""
+        """Those that are still to come, but for the ticks of hair that plays, and the draw of views
+        that come to rest, which waits for the end of these.
+        """
         return [
             f"{each.__module__}.{each.__qualname__}"
             for each in self._seen
             if getattr(each, "__module__", "").startswith(EXTENSION)
             and bpy.app.timers.is_registered(each)
-            and not self._only_ticks(each)
+            and not self._goes_on(each)
         ]
 
     @staticmethod
-    def _only_ticks(timer: Any) -> bool:
-        jobs = of_hairloom("latest_job")
+    def _goes_on(timer: Any) -> bool:
+        jobs, is_played = of_hairloom("latest_job"), _is_played()
+        if timer is of_hairloom("views")._catch_up:
+            return is_played or "play" in jobs._steps
         return timer is jobs.take_steps and set(jobs._steps) == {"play"}
+
+
+def _is_played() -> bool:
+    """Whether Blender plays its animation in any window."""
+    windows = bpy.context.window_manager.windows
+    return any(each.screen.is_animation_playing for each in windows)
 
 
 timers = Timers()
