@@ -40,7 +40,7 @@ TURN = float(np.radians(1.5))
 #: figure -> most that it may be
 LIMITS = {
     "readbacks_per_frame": 0,
-    "playing_ratio": 1.1,
+    "playing_ratio": 1.2,
     "still_readbacks": 0,
     "still_view_ratio": 0.1,
     "orbit_solid_ratio": 0.6,
