@@ -32,7 +32,7 @@ from .strand_layout import strand_rows_size
 
 #: numbers of `demand`
 DEMANDS = 6
-#: how many times more slots are made than are needed, since a view that comes nearer soon needs more
+#: how many times more slots are made than are needed: a view that comes nearer soon needs more
 _SPARE = 1.5
 
 _TEXTURES = (("FLOAT_2D", "totals"), ("FLOAT_2D", "strand_widths"), ("FLOAT_2D", "asked"))
