@@ -60,7 +60,8 @@ class AmbientSettings(Settings):
     cell_count: int = integer(
         56,
         label="Resolution",
-        description="Cells of the grid along the longest side of the hair; short hair gets smaller ones",
+        description="Cells of the grid along the longest side of the hair; short hair gets "
+        "smaller ones",
         soft=(16, 96),
         hard=(4, 256),
     )
