@@ -113,13 +113,13 @@ def test_combed_hair_takes_groups_too(sphere):
 def test_a_group_that_cannot_be_used_is_named_and_grows_nothing(option, sphere, told):
     paint_upper_half(sphere, "Scalp")
     sphere.vertex_groups.new(name="Empty")
-    sphere.data.attributes.new("on_faces", "FLOAT", "FACE")
+    sphere.data.attributes.new("on_edges", "FLOAT", "EDGE")
     broken = sphere.data.attributes.new("broken", "FLOAT", "POINT")
     broken.data[3].value = float("nan")
     for name, message in (
         ("Scalpp", "neither a vertex group nor an attribute named 'Scalpp'.*Use one of: Scalp"),
         ("Empty", "0 on every vertex"),
-        ("on_faces", "FLOAT on FACE, not FLOAT on POINT"),
+        ("on_edges", "FLOAT on EDGE"),
         ("broken", "not a finite number"),
     ):
         with pytest.raises(RuntimeError, match=message):
@@ -143,7 +143,8 @@ def test_the_weights_of_a_mesh_are_offered_by_name(sphere):
     paint_upper_half(sphere, "Scalp")
     sphere.data.attributes.new("long", "FLOAT", "POINT")
     sphere.data.attributes.new("on_faces", "FLOAT", "FACE")
-    assert weight_names(sphere) == ["Scalp", "long"]
+    sphere.data.attributes.new("on_edges", "FLOAT", "EDGE")
+    assert weight_names(sphere) == ["Scalp", "long", "on_faces"]
 
 
 def test_growing_on_a_mesh_without_faces_is_told(sphere, told):
