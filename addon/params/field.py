@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import cache
+from inspect import get_annotations
 from typing import Any, ClassVar, Literal, Self, TypedDict, Unpack
 
 import numpy as np
@@ -154,7 +155,7 @@ class Settings:
         """Each parameter that may be painted is followed by the one that names its mask."""
         super().__init_subclass__()
         declared: dict[str, Any] = {}
-        for name, kind in vars(cls).get("__annotations__", {}).items():
+        for name, kind in get_annotations(cls).items():
             declared[name] = kind
             field = vars(cls).get(name)
             parameter = getattr(field, "metadata", {}).get(_METADATA_KEY)
