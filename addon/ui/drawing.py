@@ -13,8 +13,9 @@ from ..params import Parameter
 #: Draws one section of the panels of a groom.
 type Draw = Callable[[bpy.types.UILayout, bpy.types.Object], None]
 
-#: How much of its row a slider has that a mask stands beside.
-_BESIDE_MASK = 0.65
+#: How much of a row its label has, as in all of Blender's panels; and of the rest a slider that a
+#: mask stands beside.
+_LABEL, _BESIDE_MASK = 0.4, 0.6
 #: positions of a curve's five values
 _PLACES = ("Root", "Quarter", "Middle", "Three Quarters", "Tip")
 
@@ -46,10 +47,23 @@ def draw_section(
             _draw_curve(own, group, parameter)
             continue
         if parameter.name in masks:
-            own = own.split(factor=_BESIDE_MASK, align=True)
+            _draw_painted(own, group, parameter, masks[parameter.name])
+            continue
         own.prop(group, parameter.name, slider=parameter.kind in {"number", "integer"})
-        if parameter.name in masks:
-            own.prop(group, masks[parameter.name].name, text="", icon="GROUP_VERTEX")
+
+
+def _draw_painted(
+    layout: bpy.types.UILayout, group: Any, parameter: Parameter, mask: Parameter
+) -> None:
+    """A slider and its mask side by side, with the label where all labels are."""
+    row = layout.split(factor=_LABEL)
+    row.use_property_split = False
+    label = row.row()
+    label.alignment = "RIGHT"
+    label.label(text=parameter.label)
+    fields = row.split(factor=_BESIDE_MASK, align=True)
+    fields.prop(group, parameter.name, text="", slider=True)
+    fields.prop(group, mask.name, text="", icon="GROUP_VERTEX")
 
 
 def draw_overlays(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
