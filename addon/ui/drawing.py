@@ -13,9 +13,9 @@ from ..params import Parameter
 #: Draws one section of the panels of a groom.
 type Draw = Callable[[bpy.types.UILayout, bpy.types.Object], None]
 
-#: How much of a row its label has, as in all of Blender's panels; and of the rest a slider that a
-#: mask stands beside.
-_LABEL, _BESIDE_MASK = 0.4, 0.6
+#: How much of a row its label has, as in all of Blender's panels, which leave room for a dot at the
+#: end; and of the rest a slider that a mask stands beside.
+_LABEL, _BESIDE_MASK = 0.37, 0.5
 #: positions of a curve's five values
 _PLACES = ("Root", "Quarter", "Middle", "Three Quarters", "Tip")
 

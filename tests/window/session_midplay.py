@@ -199,7 +199,8 @@ def a_slider_is_dragged():
     yield from open_our_sidebar()
     yield
     dynamics, window = hair().hairloom.dynamics, bpy.context.window
-    x, y = yield from field(viewport(), "UI", "dynamics.gravity")
+    # left of the mask beside it
+    x, y = yield from field(viewport(), "UI", "dynamics.gravity", across=0.5)
     before, shot = dynamics.gravity, pixels("before-dragging")
     window.event_simulate("LEFTMOUSE", "PRESS", x=x, y=y)
     yield 1
