@@ -30,7 +30,7 @@ void main()
   float fragments = demanded(DEMAND_FRAGMENTS), edges = demanded(DEMAND_EDGES), room = float(capacity);
   float kept = 1.0, widest = width;
   if (fragments > room) {
-    float made_up = (room - (fragments - edges)) / edges, narrow = room / demanded(DEMAND_THICK);
+    float made_up = (room - (fragments - edges)) / max(edges, 1.0), narrow = room / demanded(DEMAND_THICK);
     kept = clamp(max(made_up, narrow), 0.0, 1.0);
     widest = made_up >= narrow ? width / kept : width * max({{thin_strand}} / half_width, 1.0);
   }

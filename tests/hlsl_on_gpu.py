@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import subprocess
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,24 @@ from hairloom.addon.shading.marschner.fibre import Fibre
 from hairloom.addon.shading.marschner.tables import marschner_tables
 
 
-def as_function(text: str) -> str:
+def probed_hlsl(hlsl: Path, text: str, sandbox: str, folder: Path) -> np.ndarray:
+    """What a fragment program in HLSL gives, see `probed`.
+
+    Args:
+        hlsl: the file that is written, where programs of the sandbox find it.
+        folder: for what comes of it.
+    """
+    hlsl.write_text(text, encoding="utf-8")
+    program = hlsl.with_suffix(".spv")
+    compile_it = ["glslangValidator", "-D", "-V", "-S", "frag", "-e", "main", "-o", str(program)]
+    compile_it += ["--auto-map-bindings", "--auto-map-locations", str(hlsl)]
+    for command in (compile_it, ["spirv-cross", "--version", "430", str(program)]):
+        done = subprocess.run([sandbox, "run", *command], capture_output=True, text=True)
+        assert done.returncode == 0, done.stdout + done.stderr
+    return probed(folder / "hlsl.glsl", _as_function(done.stdout), "at = place; main_of_hlsl()")
+
+
+def _as_function(text: str) -> str:
     """A fragment program of SPIRV-Cross with plain variables, and the textures of ours."""
     text = re.sub(r"#version.*", "", text)
     text = re.sub(r"layout\(location = \d+\) in vec2 (\w+);", r"vec2 \1;\n#define at \1", text)

@@ -32,7 +32,7 @@ from damaged_assets import (
     without_unused,
 )
 from engine_assets import OUTPUT, Asset, written_asset
-from hlsl_on_gpu import as_function, probed
+from hlsl_on_gpu import probed, probed_hlsl
 
 from hairloom.addon.cards.export_settings import CardExportSettings
 from hairloom.addon.exchange.cards.glb_file import GlbFile
@@ -338,14 +338,8 @@ def test_its_shading_is_that_of_the_other_engines(
     """HLSL by glslang and SPIRV-Cross beside the text that it was made from, both on the GPU."""
     probe = (HERE / "probe.glsl").read_text(encoding="utf-8")
     shading = hair_hlsl.SOURCE.read_text(encoding="utf-8")
-    hlsl, program = OUTPUT / "unity_probe.hlsl", OUTPUT / "unity_probe.spv"
-    hlsl.write_text(hair_hlsl.hlsl(shading + probe) + PROBE_HLSL, encoding="utf-8")
-    compile_it = ["glslangValidator", "-D", "-V", "-S", "frag", "-e", "main", "-o", str(program)]
-    compile_it += ["--auto-map-bindings", "--auto-map-locations", str(hlsl)]
-    for command in (compile_it, ["spirv-cross", "--version", "430", str(program)]):
-        done = subprocess.run([sandbox, "run", *command], capture_output=True, text=True)
-        assert done.returncode == 0, done.stdout + done.stderr
-    found = probed(tmp_path / "hlsl.glsl", as_function(done.stdout), "at = place; main_of_hlsl()")
+    text = hair_hlsl.hlsl(shading + probe) + PROBE_HLSL
+    found = probed_hlsl(OUTPUT / "unity_probe.hlsl", text, sandbox, tmp_path)
     glsl = shading + probe + PROBE_GLSL
     expected = probed(tmp_path / "glsl.glsl", glsl, "result_of_probe = probe_both(place)")
     assert np.isfinite(expected).all() and expected.std(axis=(0, 1)).min() > 0.01

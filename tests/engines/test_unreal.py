@@ -26,7 +26,7 @@ from extension_loader import REPOSITORY
 pytest.importorskip("bpy", reason="writing cards needs Blender or the bpy module")
 
 from engine_assets import OUTPUT, Asset, written_asset
-from hlsl_on_gpu import as_function, probed
+from hlsl_on_gpu import probed, probed_hlsl
 
 from hairloom.addon.cards.export_settings import CardExportSettings
 
@@ -336,7 +336,6 @@ def test_the_nodes_shade_as_the_other_engines_do(
     """Bodies of the Custom nodes by glslang and SPIRV-Cross, beside the GLSL, both on the GPU."""
     importer.main([str(asset.folder / "cards.fbx"), "/Game/Hair"])
     material, sidecar = unreal.assets["/Game/Hair/M_cards"], sidecar_of(asset.folder)
-    hlsl, program = OUTPUT / "unreal_probe.hlsl", OUTPUT / "unreal_probe.spv"
     probe = PROBE.read_text(encoding="utf-8")
     waves = probe[: probe.index("vec4 probe(")]
     shading = hair_hlsl.SOURCE.read_text(encoding="utf-8")
@@ -346,13 +345,8 @@ def test_the_nodes_shade_as_the_other_engines_do(
     others = hair_hlsl.hlsl(shading + waves)
     others = others[others.index("float probe_wave") :].removesuffix(hair_hlsl.ENDING)
     others = others.replace("hair_unit", "shading.hair_unit")
-    hlsl.write_text(struct + others + nodes_of(material), encoding="utf-8")
-    compile_it = ["glslangValidator", "-D", "-V", "-S", "frag", "-e", "main", "-o", str(program)]
-    compile_it += ["--auto-map-bindings", "--auto-map-locations", str(hlsl)]
-    for command in (compile_it, ["spirv-cross", "--version", "430", str(program)]):
-        done = subprocess.run([sandbox, "run", *command], capture_output=True, text=True)
-        assert done.returncode == 0, done.stdout + done.stderr
-    found = probed(tmp_path / "hlsl.glsl", as_function(done.stdout), "at = place; main_of_hlsl()")
+    text = struct + others + nodes_of(material)
+    found = probed_hlsl(OUTPUT / "unreal_probe.hlsl", text, sandbox, tmp_path)
     glsl = shading + waves + expected_glsl(sidecar)
     expected = probed(tmp_path / "glsl.glsl", glsl, "result_of_probe = probe_both(place)")
     assert np.isfinite(expected).all()
