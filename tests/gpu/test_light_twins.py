@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from gpu_rounding import tolerance
 
 from hairloom.addon.shading.area_lights import Panel
 from hairloom.addon.shading.lights import (
@@ -76,7 +77,8 @@ def test_twins(compute: Callable[..., np.ndarray], light: Light) -> None:
     least = 1e-2 * np.array(light.power) / (np.pi * np.sum(exact * exact, axis=1)[:, None])
     is_lit = (expected > least).all(axis=1)
     assert is_lit.sum() > 10
-    assert (np.abs(irradiance - expected) <= 1e-4 * np.maximum(expected, least)).all()
+    most = tolerance(1e-4, 1e-3)
+    assert (np.abs(irradiance - expected) <= most * np.maximum(expected, least)).all()
     # edge-on to a panel little light arrives, and rounding turns its direction
     edge_on = np.maximum(1.0, 30.0 * (least / np.maximum(expected, least)).max(axis=1))
     turned = np.abs(direction - light_at(light, exact)[0]).max(axis=1)
@@ -111,5 +113,5 @@ def test_nothing_is_infinite(compute: Callable[..., np.ndarray], light: Light) -
         expected = light_at(light, points)[0], light_irradiance(light, points)
     for direction, irradiance in (expected, computed(compute, light, points)):
         assert np.isfinite(direction).all() and np.isfinite(irradiance).all()
-        assert np.linalg.norm(direction, axis=1).max() < 1.0 + 1e-5
+        assert np.linalg.norm(direction, axis=1).max() < 1.0 + tolerance(1e-5, 1e-4)
         assert irradiance.min() >= 0.0

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from gpu_rounding import tolerance
 
 from hairloom.addon.render.strand_layout import StrandLayout
 from hairloom.addon.shading.lights import Light, kept_lights
@@ -367,7 +368,9 @@ def test_depths_of_large_meshes_are_those_of_rays(gpu_context: Any, light: Light
         assert is_hit.sum() > 300
         # a ray along the triangle's edge may miss or meet it
         differs = np.abs(found - expected) > 1e-4
-        assert differs.mean() < 0.03 and not differs[2:-2, 2:-2][inner(is_hit)[2:-2, 2:-2]].any()
+        # edges of triangles alone
+        assert differs.mean() < tolerance(0.03, 0.04)
+        assert not differs[2:-2, 2:-2][inner(is_hit)[2:-2, 2:-2]].any()
 
 
 def depths_of_rays(frame: LightFrame, corners: np.ndarray) -> np.ndarray:

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from gpu_rounding import is_same
 
 from hairloom.addon.refine.settings import DetailSettings
 from hairloom.addon.render.strand_layout import StrandLayout
@@ -115,7 +116,7 @@ def test_grooms_and_a_mesh_in_parts_are_the_same_picture(
     whole, at_once = picture(MANY)
     found, parts = picture(FEW)
     assert at_once == [1, 1] and parts[0] > 5 and parts[1] > 1
-    assert (found == whole).all()
+    assert is_same(found, whole)
     assert (whole[7:-2, 13:-7, 3] > 0.5).mean() > 0.9, "where the viewport is"
     assert (whole[..., :4] == np.float32([0.2, 0.1, 0.0, 0.3])).all(axis=-1).any(), "and only there"
 
@@ -151,7 +152,7 @@ def test_each_draw_is_whole_and_tries_first_what_the_last_one_needed(
     expected = [picture(own, groom) for groom in (shown, few)]
     own, parts = with_rows(FEW), []
     for number in (0, 0, 1, 1, 0):
-        assert (picture(own, (shown, few)[number]) == expected[number]).all()
+        assert is_same(picture(own, (shown, few)[number]), expected[number])
         parts.append(own.statistics.layers.parts)
     assert parts[0] > 5 and parts == [parts[0], parts[0], 1, 1, parts[0]]
 
@@ -200,7 +201,7 @@ def test_nearest_strands_hide_all_others_wherever_a_pixel_has_no_room(
         frame.render_image(shown, front, 2, 1, 1, passes=(frame.MeshPass(), with_rows(rows)))
         for rows in (1, MANY)
     ]
-    assert (pictures[0] == pictures[1]).all()
+    assert is_same(*pictures)
     assert pictures[0][..., 0] == pytest.approx(np.full((1, 2), 0.9), abs=2e-3)
 
 
@@ -238,7 +239,7 @@ def test_little_memory_makes_more_parts_and_not_a_crash(
     own = with_rows(MANY)
     picture = frame.render_image(shown, front, SIZE, SIZE, 1, passes=(frame.MeshPass(), own))
     assert own.statistics.layers.parts > 3
-    assert (picture == expected).all()
+    assert is_same(picture, expected)
 
 
 def test_long_lists_leave_nothing_unshaded(frame: Any, front: Any, with_rows: Any) -> None:
