@@ -1,6 +1,6 @@
 """Makes what comes from the code: tables of parameters and verbs, the figure of the flows, the
-texts to translate, the pages of the gallery and of the measured machines, the index of the
-decisions, the shading of cards in HLSL, the pictures.
+texts to translate, the page of the gallery, the index of the decisions, the shading of cards in
+HLSL, the pictures.
 
 python tools/make_docs.py [--check | --pictures]
 
@@ -19,7 +19,6 @@ import tempfile
 from pathlib import Path
 
 import decisions_index
-import figures_page
 import flow_figure
 import gallery
 import hair_hlsl
@@ -106,7 +105,6 @@ def main() -> int:
     VERBS.write_text(verb_tables(), encoding="utf-8")
     TEXTS.write_text(texts_to_translate(), encoding="utf-8")
     gallery.PAGE.write_text(gallery.page(), encoding="utf-8")
-    figures_page.PAGE.write_text(figures_page.page(), encoding="utf-8")
     decisions = decisions_index.PAGE.read_text(encoding="utf-8")
     decisions_index.PAGE.write_text(decisions_index.with_index(decisions), encoding="utf-8")
     if chosen.pictures:

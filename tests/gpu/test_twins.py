@@ -8,6 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
+from gpu_rounding import tolerance
 
 from hairloom.addon.dynamics.colliders import (
     CapsuleCollider,
@@ -321,7 +322,7 @@ def test_signed_distance(
     assert (distance < 0.0).any() and (distance > 0.04).any()
     off = np.abs(found[..., 3].ravel() - distance)
     # a field's distance is divided by its gradient's length: a driver's root is good to 1e-5
-    assert off.max() < (2e-5 if 1 in chosen else 2e-6)
+    assert off.max() < (tolerance(2e-5, 2e-4) if 1 in chosen else 2e-6)
     # at borders of cells, and where two solids are as near, rounding decides
     off = np.abs(found[..., :3].reshape(-1, 3) - outward).max(axis=1)
     assert (off > 1e-3).sum() <= 6
