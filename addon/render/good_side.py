@@ -5,6 +5,10 @@ what of the body is bare amidst the hair. Their product is largest between the f
 a head, in front of a patch of fur, and beside a beast with its head towards the eye. It is never
 large from the edge of a sheet, nor from behind a face.
 
+Where no face is seen, as of a beast in fur all over, the coat tells: it lies from the nose to the
+tail. Seen from behind it also shows the ends of its strands. These send little light to the eye,
+whatever lights there are in front, since light leaves a strand in a cone around it.
+
 Pure numpy: importable without gpu.
 """
 
@@ -27,8 +31,10 @@ _HEIGHTS = ((0.16, 1.0), (0.4, 0.92), (0.7, 0.8), (1.7, 0.6))
 #: one looks at a head from no higher than this many of these, if this much of its face is seen from
 #: its own height
 _LOW_HEIGHTS, _LEVEL_FACE = 2, 0.5
-#: a three-quarter view is turned by this from the front [rad]
-_THREE_QUARTER = float(np.radians(29.0))
+#: a three-quarter view is turned by this from the front [rad], and one nearly from the side, which
+#: is so much less good, by this: a crest, a braid and a flank are seen from there
+_THREE_QUARTER, _ASIDE = float(np.radians(29.0)), float(np.radians(67.0))
+_ASIDE_GOOD = 0.74
 #: what counts where no face is seen, as a fraction of the whole face
 _WITHOUT_FACE = 0.35
 #: a face is seen at least as large as this, as a fraction of the hair
@@ -36,7 +42,10 @@ _MIN_FACE = 0.02
 #: there is a front where the directions' goodness leans to one side by this fraction
 _MIN_LEAN = 0.06
 #: and where the directions from which a face is seen do by this
-_MIN_FACE_LEAN = 0.25
+_MIN_FACE_LEAN = 0.2
+#: a coat lies to one side where its strands lead there by this fraction of their lengths; and it is
+#: seen against its lie if that shows this fraction of the hair that the other way round does
+_MIN_LIE, _MIN_AGAINST = 0.2, 0.5
 #: how much better the front in Blender's sense, towards -Y, is than the back, and one three-quarter
 #: view than the other, where all else is equal
 _PREFERENCE = 0.04
@@ -79,21 +88,25 @@ def good_side(strands: StrandSet, body: Surface | None) -> GoodSide:
     whole = areas.max(axis=0)
     is_face = whole[1] > _MIN_FACE * whole[0]
     good = _goodness(areas, whole) * (1.0 - 0.5 * _PREFERENCE * level[:, 1])
+    front = None if is_face else seen.against_lie()
     # short hair is seen as well from behind, but a face only from its front
-    front = _leaning(good, level, _MIN_LEAN)
-    if front is None and is_face:
-        front = _leaning(areas[:, 1], level, _MIN_FACE_LEAN)
+    if front is None:
+        front = _leaning(good, level, _MIN_LEAN)
+    face = _leaning(areas[:, 1], level, _MIN_FACE_LEAN) if is_face else None
+    if face is not None and (front is None or front @ face < 0.0):
+        front = face
     if front is None:  # the best is the three-quarter view
         front = _turned(level[good.argmax()], _THREE_QUARTER)
     # in this order, so that of equals the first wins
     candidates = [
-        (_raised(_turned(front, turn), height), factor * preferred)
+        (_raised(_turned(front, turn), height), factor * preferred * aside)
         for height, factor in _HEIGHTS
-        for turn, preferred in ((-_THREE_QUARTER, 1.0 + _PREFERENCE), (_THREE_QUARTER, 1.0))
+        for away, aside in ((_THREE_QUARTER, 1.0), (_ASIDE, _ASIDE_GOOD))
+        for turn, preferred in ((-away, 1.0 + _PREFERENCE), (away, 1.0))
     ]
     asked = np.array([seen.areas(direction) for direction, _ in candidates])
     if is_face and asked[:2, 1].max() > _LEVEL_FACE * whole[1]:
-        low = 2 * _LOW_HEIGHTS  # two directions of each height
+        low = 4 * _LOW_HEIGHTS  # four directions of each height
         candidates, asked = candidates[:low], asked[:low]
     factors = np.array([factor for _, factor in candidates])
     best = (_goodness(asked, np.maximum(whole, asked.max(axis=0))) * factors).argmax()
@@ -128,11 +141,13 @@ class _Seen:
     """Points that stand for hair and body, as a picture of few cells sees them.
 
     points: (n, 3) [m] from the middle. kind: (n,) 0 body, 1 hair, 2 face. cell: its side [m].
+    lie: (3,) mean chord from root to tip, level, as a fraction of the strands' lengths.
     """
 
     points: Floats
     kind: Ints
     cell: float
+    lie: Floats
 
     @classmethod
     def of(cls, strands: StrandSet, body: Surface | None) -> _Seen:
@@ -147,7 +162,18 @@ class _Seen:
             places = _places_on(body, middle, 2.0 * radius)
             points.append(places)
             kind.append(np.where(_is_face(places, strands.roots.astype(np.float64)), 2, 0))
-        return cls(np.concatenate(points) - middle, np.concatenate(kind), 2.0 * radius / _CELLS)
+        cell = 2.0 * radius / _CELLS
+        return cls(np.concatenate(points) - middle, np.concatenate(kind), cell, _lie(grid))
+
+    def against_lie(self) -> Floats | None:
+        """The level unit direction from which hair lies away; None where it lies to no side, or is
+        seen from the other side alone, as in front of a wall."""
+        length = float(np.linalg.norm(self.lie))
+        if length < _MIN_LIE:
+            return None
+        front = -self.lie / length
+        against, along = (self.areas(_raised(each, _HEIGHTS[0][0]))[0] for each in (front, -front))
+        return front if against > _MIN_AGAINST * along else None
 
     def areas(self, direction: Floats) -> tuple[int, int]:
         """In how many cells hair is seen, and in how many the face."""
@@ -168,6 +194,13 @@ def _evenly_spaced(strands: StrandSet) -> StrandSet:
         return strands
     few = strands.take(_some(np.arange(strands.strand_count), -(-_HAIR // _CVS)))
     return resample(few, _CVS)
+
+
+def _lie(grid: Floats) -> Floats:
+    """Of strands (n, cv_count, 3): see `_Seen.lie`."""
+    chord = grid[:, -1].astype(np.float64) - grid[:, 0]
+    whole = float(np.linalg.norm(chord, axis=1).sum())
+    return chord.sum(axis=0) * (1.0, 1.0, 0.0) / max(whole, 1e-30)
 
 
 def _some[Array: (Floats, Ints)](points: Array, count: int) -> Array:

@@ -79,6 +79,24 @@ def beast() -> tuple[np.ndarray, Surface]:
     return spikes(outward * squeeze, outward, 0.04), ball(1.0, squeeze)
 
 
+def coat() -> tuple[np.ndarray, Surface]:
+    """Fur all over the same body, that lies towards its tail at +Y."""
+    outward = np.random.default_rng(5).normal(size=(3000, 3))
+    outward /= np.linalg.norm(outward, axis=1, keepdims=True)
+    squeeze = (0.5, 1.6, 0.6)
+    lies = outward + [0.0, 0.5, 0.0]
+    return spikes(outward * squeeze, lies, 0.04), ball(1.0, squeeze)
+
+
+def crest() -> tuple[np.ndarray, Surface]:
+    """A bare upright body with a crest from its brow, towards -Y, down its back, that lies back."""
+    across, around = np.random.default_rng(7).uniform((-0.75, 0.2), (0.75, 2.8), (3000, 2)).T
+    roots = np.stack([across, -np.cos(around + 0.6), np.sin(around + 0.6)], axis=1)
+    roots *= 1.0 / np.linalg.norm(roots, axis=1, keepdims=True)
+    squeeze = (0.5, 0.5, 1.0)
+    return spikes(roots * squeeze, 0.4 * roots + [0.0, 1.0, 0.0], 0.3), ball(1.0, squeeze)
+
+
 def side_of(grid: np.ndarray, body: Surface | None) -> GoodSide:
     count, cv_count = grid.shape[:2]
     points, offsets = grid.reshape(-1, 3), np.arange(count + 1) * cv_count
@@ -107,6 +125,29 @@ def test_the_front_is_found_wherever_it_is(shape, degrees: float) -> None:
     side = side_of(*turned(*shape(), degrees))
     assert away(side.front, degrees) < 12.0
     assert 15.0 < away(side.three_quarter, degrees) < 45.0
+
+
+@pytest.mark.parametrize("degrees", TURNS)
+def test_a_coat_is_seen_against_its_lie(degrees: float) -> None:
+    """Light leaves a strand in a cone around it: seen with its lie, a coat shows dark ends."""
+    side = side_of(*turned(*coat(), degrees))
+    assert away(side.front, degrees) < 12.0
+    assert 15.0 < away(side.three_quarter, degrees) < 75.0
+
+
+def test_a_coat_that_lies_to_no_side_has_a_front_all_the_same() -> None:
+    strands, body = coat()
+    outward = strands[:, 0] - strands[:, 0].mean(axis=0)
+    side = side_of(spikes(strands[:, 0], outward, 0.04), body)
+    assert np.linalg.norm(side.front) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("degrees", TURNS)
+def test_a_crest_is_seen_from_the_side_of_the_face(degrees: float) -> None:
+    """Most of it is seen from behind, and hardly any from where a face is seen best."""
+    side = side_of(*turned(*crest(), degrees))
+    assert away(side.front, degrees) < 15.0
+    assert 50.0 < away(side.three_quarter, degrees) < 80.0
 
 
 def test_a_carpet_is_seen_from_above() -> None:
