@@ -120,7 +120,7 @@ def arrow_back(room: str, target: str) -> str:
 def imports_of(file: Path, addon: Path = ADDON) -> Iterator[tuple[int, str]]:
     """(line, name) of each import; a name inside the add-on starts with a dot."""
     package = file.relative_to(addon).parent.parts
-    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+    for node in ast.walk(_tree(file)):
         if isinstance(node, ast.Import):
             yield from ((node.lineno, alias.name) for alias in node.names)
         elif isinstance(node, ast.ImportFrom) and node.level == 0:
