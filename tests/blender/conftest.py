@@ -12,6 +12,7 @@ from engine_stage import SIZE, set_world  # noqa: E402
 
 import hairloom  # noqa: E402  it is loaded by tests/conftest.py
 from hairloom.addon import registration  # noqa: E402
+from hairloom.addon.blender.sessions import solvers  # noqa: E402
 from hairloom.addon.dynamics.colliders import DistanceField  # noqa: E402
 from hairloom.addon.strands import StrandSet  # noqa: E402
 
@@ -42,6 +43,16 @@ def same_fields() -> Iterator[Any]:
 def empty_scene() -> None:
     """A file with nothing in it, and nothing to undo."""
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+
+
+@pytest.fixture(autouse=True)
+def numpy_unless_asked(request: pytest.FixtureRequest) -> Iterator[None]:
+    """Hair is simulated by numpy, but in tests that draw or ask for a GPU: software drivers take up
+    to a minute to compile the shader, and an earlier test may or may not have started the GPU."""
+    with pytest.MonkeyPatch.context() as patch:
+        if not (request.node.get_closest_marker("draws") or "gpu_context" in request.fixturenames):
+            patch.setattr(solvers, "compute_available", lambda: False)
+        yield
 
 
 _is_enabled = False

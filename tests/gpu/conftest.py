@@ -14,7 +14,8 @@ SHADERS = Path(__file__).parent / "shaders"
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
-        if item.path.is_relative_to(Path(__file__).parent):
+        is_here = item.path.is_relative_to(Path(__file__).parent)
+        if is_here and "gpu_context" in getattr(item, "fixturenames", ()):
             item.add_marker(pytest.mark.draws)
 
 
