@@ -31,8 +31,9 @@ from random_parts import random_parts
 REPOSITORY = Path(__file__).resolve().parents[1]
 OUTPUT = REPOSITORY / "out" / "window"
 INSTALLED = OUTPUT / "installed"
-#: Compiled shaders, which all sessions need: compiling them is a third of a short session.
-CACHE = OUTPUT / "cache"
+#: Compiled shaders, which all sessions need: compiling them is a third of a short session. They
+#: stay for the next run: the driver knows each by its text and by the driver's own version.
+CACHE = REPOSITORY / "out" / "shaders"
 BACKENDS = ("opengl", "vulkan")
 #: What runs in this Blender's own Python. On OpenGL `make test` has run the rest already, with
 #: Blender as a module: each test runs on each backend that concerns it, and in both Blenders.
@@ -47,9 +48,10 @@ SESSION_LIMIT_S = float(os.environ.get("HAIRLOOM_SESSION_LIMIT", "1800"))
 #: For a commit each session plays on one backend: these on Vulkan, for they look at what is drawn.
 ON_VULKAN = ("cards", "engine", "look", "shadows", "random", "still_views")
 #: What is played where all is. One makes pictures of the documentation, one waits for minutes, and
-#: five draw for minutes what shorter ones look at too: light and shadows `engine` and `shadows`,
-#: what cuts Play short `random` and `everyday`, work that is cancelled `long_work`, and the hair
-#: that is drawn from near and far `layers`.
+#: eight draw for minutes what others look at too: light and shadows `engine` and `shadows`, what
+#: cuts Play short `random` and `everyday`, work that is cancelled `long_work`, the hair that is
+#: drawn from near and far `layers`, Esc in a turntable `long_work`, the options in a file browser
+#: `import`, and what is moved by hand and undone `combing` and `growing`.
 NOT_IN_COMMITS = (
     "guide_pictures",
     "autosave",
@@ -58,6 +60,9 @@ NOT_IN_COMMITS = (
     "jobs",
     "midplay",
     "refinement",
+    "show",
+    "strand_export",
+    "ties",
 )
 #: Most of a session's time goes into drawing the window. Some need another screen than the usual
 #: one: long panels are pictured uncut, Blender's own texts and gizmos must be a small part of what
@@ -316,7 +321,8 @@ def main(arguments: list[str]) -> int:
         print(f"no such session: {', '.join(sorted(unknown))}")
         return 2
     shutil.rmtree(OUTPUT, ignore_errors=True)
-    CACHE.mkdir(parents=True)
+    OUTPUT.mkdir(parents=True)
+    CACHE.mkdir(exist_ok=True)
     tally = Tally()
     installed = install_extension(tally)
     if installed and not wanted:
