@@ -10,6 +10,17 @@ from extension_loader import REPOSITORY, load_package
 load_package()
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Of cases that are alike a commit runs the first and the last."""
+    families: dict[str, list[pytest.Item]] = {}
+    for item in items:
+        if item.get_closest_marker("alike") and not item.get_closest_marker("slow"):
+            families.setdefault(item.nodeid.partition("[")[0], []).append(item)
+    for cases in families.values():
+        for item in cases[1:-1]:
+            item.add_marker(pytest.mark.slow)
+
+
 @pytest.fixture(scope="session")
 def gpu_context() -> Any:
     """Blender's `gpu` module, ready to draw offscreen."""

@@ -511,6 +511,7 @@ def test_a_duplicate_is_baked_into_a_folder_of_its_own(swinging, tmp_path):
     }
 
 
+@pytest.mark.alike
 @pytest.mark.parametrize(
     "damage",
     ["no frame", "cut off", "another shape", "pickled", "no json", "newer", "no constants"],

@@ -141,6 +141,7 @@ def test_a_baked_frame_is_drawn(file, tmp_path):
     assert "out of date (settings)" in json.loads(report.read_text())["notes"][0]
 
 
+@pytest.mark.slow(instead="test_a_baked_frame_is_drawn")
 def test_a_picture_of_another_bake_is_not_skipped(file, tmp_path, capfd):
     assert command_line.run(["bake", "--scene", str(file), "--save"]) == 0
     arguments = ["render", "--scene", str(file), "--groom", "Hair", "--bake", "--skip-existing"]
@@ -193,6 +194,7 @@ def _half_covered_head_that_swells(new_hair, sphere):
     return hair
 
 
+@pytest.mark.slow(instead="test_a_baked_frame_is_drawn")
 def test_the_whole_of_a_deformed_head_is_drawn(new_hair, sphere, evaluated, tmp_path, monkeypatch):
     """Its drawn vertices are those that Blender evaluates, roots on them or not."""
     _half_covered_head_that_swells(new_hair, sphere)

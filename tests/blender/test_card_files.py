@@ -222,6 +222,7 @@ def test_a_failure_in_the_middle_leaves_the_old_files(
     assert f"{tmp_path / f'hair{suffix}'}: " in told and "No space left on device" in told
 
 
+@pytest.mark.slow(instead="test_a_failure_in_the_middle_leaves_the_old_files")
 @pytest.mark.skipif(not hasattr(os, "geteuid"), reason="folders have no owners here")
 def test_a_folder_that_may_not_be_written_to_keeps_its_files(
     capfd: pytest.CaptureFixture[str],
@@ -253,6 +254,7 @@ def small_disk(folder: Path, size: int) -> Iterator[Path]:
         subprocess.run(["umount", str(folder)], check=True)
 
 
+@pytest.mark.slow(instead="test_a_failure_in_the_middle_leaves_the_old_files")
 @pytest.mark.skipif(sys.platform != "linux", reason="disks are mounted as Linux does")
 @pytest.mark.parametrize("suffix", few_in_commits([".fbx", ".glb", ".obj", ".usdc"]))
 def test_a_disk_that_becomes_full_at_the_mesh_keeps_its_files(
@@ -290,6 +292,7 @@ def nobody() -> Iterator[None]:
             os.seteuid(0)
 
 
+@pytest.mark.slow(instead="test_a_failure_in_the_middle_leaves_the_old_files")
 @pytest.mark.parametrize("refused", few_in_commits([3, 1]))
 def test_a_file_that_cannot_be_replaced_leaves_all_old_files(
     tmp_path: Path, refused: int, monkeypatch: pytest.MonkeyPatch
@@ -327,6 +330,7 @@ def test_files_of_an_artist_are_kept_and_own_ones_replaced(tmp_path: Path, capfd
     assert "there already" not in capfd.readouterr().out
 
 
+@pytest.mark.slow(instead="test_files_of_an_artist_are_kept_and_own_ones_replaced")
 def test_a_picture_is_not_replaced_by_what_is_made_of_it(tmp_path: Path, capfd: Any) -> None:
     assert cards(tmp_path / "hair.glb", "--levels", "1") == 0
     base = tmp_path / "hair_base.png"
@@ -359,6 +363,7 @@ def test_a_button_writes_under_the_hairs_name(sphere: Any, tmp_path: Path) -> No
     assert [line[2:] for line in out.read_text("utf-8").splitlines() if line[:2] == "o "] == nodes
 
 
+@pytest.mark.slow(instead="test_no_folder_stays_of_an_export_that_fails")
 def test_an_export_with_a_folder_is_that_folder_and_nothing_else(
     sphere: Any, tmp_path: Path
 ) -> None:

@@ -229,6 +229,7 @@ def test_a_motion_texture_holds_the_simulated_cards(
     assert worst - 1e-6 <= error["worst"] <= 2.0 * worst if depth == "half" else not error["worst"]
 
 
+@pytest.mark.slow(instead="test_a_motion_texture_holds_the_simulated_cards")
 @pytest.mark.parametrize("file_format", few_in_commits([USD, FBX]))
 def test_texels_are_in_other_formats_too(
     motion: GuideMotion, tmp_path: Path, file_format: Any

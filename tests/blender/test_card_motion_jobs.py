@@ -84,6 +84,7 @@ def test_a_button_writes_the_bake(sphere: Any, tmp_path: Path) -> None:
         bpy.ops.hairloom.export_cards(**options, own_frames=True, first_frame=4, last_frame=20)
 
 
+@pytest.mark.alike
 @pytest.mark.usefixtures("extension")
 @pytest.mark.parametrize(
     ("kind", "amid"),

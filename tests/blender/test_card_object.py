@@ -132,6 +132,7 @@ def test_pressing_again_keeps_the_object_and_what_the_artist_added(hair):
     assert "Hair Cards LOD2" not in bpy.data.objects and len(bpy.data.meshes) == 3
 
 
+@pytest.mark.alike
 @pytest.mark.parametrize("name", ["Backup", "Hair Cards", "Zoë's"])
 @pytest.mark.parametrize("reopened", [False, True])
 def test_a_copy_of_the_cards_is_left_alone(hair, name, reopened, tmp_path):

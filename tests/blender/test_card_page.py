@@ -38,6 +38,7 @@ def asset_of(path: Path) -> dict[str, Any]:
     return asset
 
 
+@pytest.mark.slow(instead="test_a_page_is_part_of_the_set")
 def test_a_page_holds_all_that_its_sidecar_names(tmp_path: Path) -> None:
     """The same levels as the GLB beside it, the order of back faces, the head."""
     assert cards(tmp_path / "hair.glb", *BAKED, *LEVELS, "--page", "--page-texture", "512") == 0
@@ -95,6 +96,9 @@ def test_a_page_is_part_of_the_set(tmp_path: Path) -> None:
     assert (tmp_path / "other old.html").read_text("utf-8") == "mine"
 
 
+@pytest.mark.slow(
+    instead="tests/blender/test_card_files.py::test_a_failure_in_the_middle_leaves_the_old_files"
+)
 def test_what_was_there_stays_where_a_page_fails(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -435,6 +435,7 @@ def test_the_command_line_makes_children(sphere, tmp_path, capfd):
     assert "Left" in capfd.readouterr().err
 
 
+@pytest.mark.slow(instead="test_guides_come_first_and_children_after_them")
 def test_a_picture_of_children_says_what_was_drawn(sphere, tmp_path, gpu_context):
     report = tmp_path / "report.json"
     arguments = ["render", "--head", sphere.name, "--width", "96", "--height", "96"]

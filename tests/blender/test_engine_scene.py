@@ -44,6 +44,7 @@ def test_view_layers_and_holdouts(stage: Any, tmp_path: Path) -> None:
     assert covered == {"ViewLayer": (1.0, 1.0), "Second": (0.0, 1.0), "Third": (0.0, 1.0)}
 
 
+@pytest.mark.alike
 @pytest.mark.parametrize("way", ["none", "hashed", "layers"])
 def test_hair_may_be_a_hole(
     stage: Any, new_hair: Callable[..., Any], sphere: Any, tmp_path: Path, way: str

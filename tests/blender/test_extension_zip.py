@@ -102,6 +102,7 @@ def tracked(folder):
     }
 
 
+@pytest.mark.slow(instead="test_what_the_validator_does_not_check_is_right")
 def test_blender_accepts_the_repository_and_the_zips(zips):
     extension_tool("validate", REPOSITORY)
     for path in zips.values():

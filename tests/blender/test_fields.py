@@ -73,6 +73,7 @@ def test_what_cannot_be_made_is_told_each_time_it_is_asked_for():
         assert caught.value.place == name
 
 
+@pytest.mark.slow(instead="test_a_field_is_the_same_whoever_makes_it_and_is_made_once")
 def test_only_the_youngest_fields_are_kept(sphere, evaluated, extension):
     surface = surface_of(sphere, evaluated)
     first, *others = fields_wanted()

@@ -211,6 +211,7 @@ def test_modifiers_that_add_and_take_vertices_do_not_hide_the_topology() -> None
     assert np.linalg.norm(after - before, axis=1).max() < 0.004, "smoothing moves skin by so much"
 
 
+@pytest.mark.slow(instead="test_the_button_adds_to_the_selected_head_and_one_undo_takes_it_away")
 def test_landmarks_are_guessed_where_they_are_on_another_person() -> None:
     head = scan()
     made, is_sure = add_landmarks(head, depsgraph(), bpy.context.collection)
@@ -226,6 +227,7 @@ def test_landmarks_are_guessed_where_they_are_on_another_person() -> None:
     assert [obj.hairloom.landmark for obj in again] == ["nose"]
 
 
+@pytest.mark.slow(instead="test_the_button_adds_to_the_selected_head_and_one_undo_takes_it_away")
 @pytest.mark.parametrize("name", few_in_commits(["brows", "curls", "long_straight", "full_beard"]))
 def test_on_a_scan_roots_are_on_the_skin_and_no_strand_is_in_it(name: str) -> None:
     head, style = scan(), named_hairstyle(name)
@@ -282,6 +284,7 @@ def test_a_dragged_landmark_moves_the_hair_when_it_is_fitted_again() -> None:
     assert hair.data.hairloom.children.strand_count == 1234
 
 
+@pytest.mark.slow(instead="test_no_heads_empty_groups_and_empty_meshes_are_refused")
 def test_the_own_vertex_group_limits_where_hair_grows() -> None:
     human = makehuman()
     group = human.vertex_groups.new(name="mine")
@@ -336,6 +339,7 @@ def test_every_second_face_missing_is_reported() -> None:
     assert away(roots_of(made.hair)[::40], holes) < 2e-5
 
 
+@pytest.mark.slow(instead="test_half_a_head_is_refused")
 def test_landmarks_on_top_of_each_other_or_mistaken_are_refused() -> None:
     head = scan()
     add_landmarks(head, depsgraph(), bpy.context.collection)

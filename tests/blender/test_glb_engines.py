@@ -139,6 +139,7 @@ def test_panda3d_draws_what_a_slow_compositor_draws(
     assert np.abs(drawn - upside_down).mean() > 0.1
 
 
+@pytest.mark.slow(instead="test_panda3d_draws_what_a_slow_compositor_draws")
 def test_panda3d_composes_what_a_slow_compositor_composes(
     curtain: tuple[CardMesh, np.ndarray], tmp_path: Path
 ) -> None:
@@ -167,6 +168,7 @@ def test_panda3d_composes_what_a_slow_compositor_composes(
     assert off(other_order) > 0.05
 
 
+@pytest.mark.slow(instead="test_panda3d_draws_what_a_slow_compositor_draws")
 def test_panda3d_blends_in_index_order(tmp_path: Path) -> None:
     """Four sheets one behind the other, each of one colour: the blend tells the order."""
     depths = [0.3, 0.1, 0.2, 0.0]  # the viewer is at -y, so this is no depth order

@@ -124,6 +124,7 @@ def test_hair_covers_what_it_covers_in_cycles_and_nothing_else_changes(
     np.testing.assert_array_equal(ours[free], without[free])
 
 
+@pytest.mark.slow(instead="test_hair_covers_what_it_covers_in_cycles_and_nothing_else_changes")
 def test_hair_behind_a_mesh_is_hidden_at_its_very_edge(
     cycles: Any, hairy: Any, tmp_path: Path
 ) -> None:
@@ -231,6 +232,7 @@ def test_hairlooms_own_engine_draws_hair_once(
     np.testing.assert_array_equal(rendered(tmp_path), alone)
 
 
+@pytest.mark.slow(instead="test_an_artists_compositor_is_extended_and_given_back")
 @pytest.mark.parametrize("wrong", few_in_commits(["compositing", "muted", "unlinked", "gone"], 2))
 def test_where_the_hair_cannot_be_laid_over_blender_draws_it(
     cycles: Any, hairy: Any, tmp_path: Path, wrong: str, capsys: Any
@@ -302,6 +304,7 @@ def test_a_hair_scene_goes_with_the_scene_whose_hair_it_draws(cycles: Any, tmp_p
     assert hair not in bpy.data.scenes
 
 
+@pytest.mark.slow(instead="test_hair_covers_what_it_covers_in_cycles_and_nothing_else_changes")
 @pytest.mark.parametrize("is_baked", few_in_commits([True, False]))
 def test_moving_hair_is_blurred_and_baked_as_by_our_own_engine(
     cycles: Any, hairy: Any, sphere: Any, tmp_path: Path, is_baked: bool

@@ -49,6 +49,9 @@ def test_the_page_has_three_of_three_steps_each_and_their_pictures():
         assert (PAGE.parent / "images" / f"from_nothing_{name}.jpg").is_file()
 
 
+@pytest.mark.slow(
+    instead="tests/blender/test_mirror.py::test_on_a_symmetric_head_only_signs_change"
+)
 def test_the_bob_is_alike_on_both_sides_and_ends_at_the_chin():
     walk = Walk("bob")
     walk.step()

@@ -76,6 +76,7 @@ def everything() -> set[str]:
     return {each.name for kind in kinds for each in kind}
 
 
+@pytest.mark.alike
 @pytest.mark.parametrize("name", few_in_commits(ON_HEADS, 8))
 def test_each_style_that_ships_is_curves_on_the_scalp_with_its_settings(
     name: str, head: bpy.types.Object
@@ -148,6 +149,7 @@ def test_fur_grows_on_the_selected_mesh_in_one_step() -> None:
     assert everything() == before
 
 
+@pytest.mark.slow(instead="test_from_nothing_there_is_a_head_with_brows_and_lashes")
 @pytest.mark.usefixtures("few")
 def test_brows_from_nothing_come_once() -> None:
     bpy.ops.hairloom.add_hairstyle(style="brows", plays=False)
@@ -185,6 +187,7 @@ def test_a_moved_turned_and_larger_head_has_the_same_hair(head: bpy.types.Object
     assert np.abs(after - expected).max() < 1e-4
 
 
+@pytest.mark.slow(instead="test_a_moved_turned_and_larger_head_has_the_same_hair")
 def test_curls_of_a_giant_are_as_much_larger(head: bpy.types.Object) -> None:
     style = named_hairstyle("curls")
     before = read_curves(added(style, head), depsgraph()).strands
@@ -205,6 +208,9 @@ def test_from_nothing_there_is_a_head_with_brows_and_lashes() -> None:
     assert sum(is_bust(obj) for obj in bpy.data.objects) == 1
 
 
+@pytest.mark.slow(
+    instead="tests/blender/test_foreign_heads.py::test_the_button_adds_to_the_selected_head_and_one_undo_takes_it_away"
+)
 @pytest.mark.usefixtures("few")
 def test_one_undo_takes_it_all_away(head: bpy.types.Object) -> None:
     bpy.ops.ed.undo_push(message="before")
@@ -233,6 +239,7 @@ def test_empty_masks_are_refused(head: bpy.types.Object) -> None:
     refused(style, head, "neither a vertex group nor an attribute")
 
 
+@pytest.mark.slow(instead="test_what_modifiers_make_is_what_is_simulated_and_muting_takes_it_away")
 def test_nodes_that_are_replaced_renamed_or_not_there(
     head: bpy.types.Object, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:

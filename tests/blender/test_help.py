@@ -39,6 +39,7 @@ def found(name: str) -> str | None:
     return address
 
 
+@pytest.mark.slow(instead="test_f1_finds_a_page_for_all_that_we_have")
 def test_every_page_and_heading_is_in_the_zip(pages: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(ours, "HELP", pages)
     _, entries = ours.manual_map()
@@ -47,6 +48,7 @@ def test_every_page_and_heading_is_in_the_zip(pages: Path, monkeypatch: pytest.M
     assert not is_there(ours.address("dynamics#nowhere")), "the check finds everything"
 
 
+@pytest.mark.slow(instead="test_f1_finds_a_page_for_all_that_we_have")
 def test_the_pages_need_nothing_that_was_left_out(pages: Path) -> None:
     for page in pages.rglob("*.html"):
         text = page.read_text("utf-8")

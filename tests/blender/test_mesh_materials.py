@@ -168,6 +168,7 @@ def of_cycles(material: bpy.types.Material, sun: np.ndarray, folder: Path) -> np
     return np.array(image.pixels[:]).reshape(SIZE, SIZE, 4)
 
 
+@pytest.mark.alike
 @pytest.mark.usefixtures("gpu_context")
 @pytest.mark.parametrize(
     ("bump", "level", "roughness"),

@@ -39,6 +39,7 @@ def automatic() -> Iterator[None]:
     capabilities.choose_image_atomics("automatic")
 
 
+@pytest.mark.slow(instead="test_the_preview_is_drawn_without_atomics")
 def test_a_render_is_calm_without_atomics(
     stage: Any, new_hair: Callable[..., Any], sphere: Any, tmp_path: Path
 ) -> None:
@@ -58,6 +59,7 @@ def test_a_render_is_calm_without_atomics(
     assert pictures[1, "never"].mean() == pytest.approx(wanted.mean(), rel=0.01)
 
 
+@pytest.mark.slow(instead="test_the_preview_is_drawn_without_atomics")
 def test_a_render_shares_what_was_drawn_elsewhere(
     stage: Any, new_hair: Callable[..., Any], sphere: Any, tmp_path: Path
 ) -> None:

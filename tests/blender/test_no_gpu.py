@@ -61,6 +61,7 @@ def without_gpu(work: str, *arguments: str) -> subprocess.CompletedProcess[str]:
     )
 
 
+@pytest.mark.slow(instead="test_verbs_that_draw_say_so_and_write_nothing")
 def test_the_engine_says_so() -> None:
     done = without_gpu(ENGINE)
     assert done.returncode == 0, done.stderr

@@ -84,6 +84,7 @@ def test_what_is_written_has_the_same_shade(hair, other):
     np.testing.assert_allclose(found, middle, atol=1e-6)
 
 
+@pytest.mark.slow(instead="test_they_shade_what_is_made_and_only_while_they_are_seen")
 def test_grooms_without_cards_shade_by_their_strands(hair, new_hair, sphere):
     alone = openness(card_objects(hair)[0])
     strands = new_hair(sphere)
@@ -150,6 +151,7 @@ def test_the_preview_follows_other_hair(shaded, evaluated):
     assert shown(session).mean() > near.mean() + 0.02
 
 
+@pytest.mark.alike
 @pytest.mark.parametrize("way", ["hidden", "left out of renders and views", "deleted"])
 def test_the_preview_follows_other_hair_that_goes_and_comes(shaded, evaluated, way):
     session, strands = shaded

@@ -96,6 +96,7 @@ def test_they_cover_suzanne_within_the_stated_error(monkey):
     assert gap.max() < 0.05 * size
 
 
+@pytest.mark.alike
 @pytest.mark.parametrize("scale", [(2, 2, 2), (1, 3, 0.5), (-1, 1, 1)])
 def test_radii_are_metres_whatever_the_scale_of_the_mesh(monkey, scale):
     monkey.scale, monkey.location, monkey.rotation_euler.z = scale, (1, 2, 3), 0.4
@@ -134,6 +135,7 @@ def test_they_follow_the_object(monkey):
     np.testing.assert_allclose(sizes, radii * 2.0, rtol=1e-4)
 
 
+@pytest.mark.slow(instead="test_they_follow_the_object")
 def test_where_vertices_cannot_carry_them_they_follow_the_object_with_a_warning(monkey, capfd):
     monkey.modifiers.new("Mirror", "MIRROR").use_axis[1] = True
     fit(10)
@@ -162,6 +164,7 @@ def test_the_hair_of_the_mesh_uses_them(new_hair, sphere):
     np.testing.assert_allclose(np.sort(posed.collider.radii), np.sort(balls(sphere)[1]), rtol=1e-5)
 
 
+@pytest.mark.slow(instead="test_the_hair_of_the_mesh_uses_them")
 def test_colliders_that_the_artist_has_chosen_stay(new_hair, sphere):
     sphere.scale.z = 3.0  # one ball would do for a sphere
     hair = new_hair(sphere)
@@ -173,6 +176,7 @@ def test_colliders_that_the_artist_has_chosen_stay(new_hair, sphere):
     assert len([obj for obj in own.all_objects if obj.type == "EMPTY"]) == 6
 
 
+@pytest.mark.slow(instead="test_removing_and_deleting")
 def test_fitting_again_takes_the_place_of_the_last_and_leaves_other_objects(monkey):
     fit(10)
     (collection,) = spheres.fitted_collections(monkey)

@@ -193,6 +193,7 @@ def test_keyframes_and_drivers_act_in_preview_and_engine(new_hair, sphere, evalu
     assert (found.strand_settings.fullness, found.shading.ambient) == (3.0, 0.75)
 
 
+@pytest.mark.slow(instead="test_keyframes_and_drivers_act_in_preview_and_engine")
 @pytest.mark.parametrize("is_previewed", few_in_commits([True, False]))
 def test_a_rendered_animation_has_the_settings_of_each_frame(
     is_previewed, stage, new_hair, sphere, evaluated, monkeypatch, tmp_path
@@ -310,6 +311,7 @@ def test_hair_of_an_override_is_tied_by_the_button_and_stays_tied(override, tmp_
     assert held_strands(hair, hair.parent) == count
 
 
+@pytest.mark.slow(instead="test_an_override_is_baked_and_shown_in_renders")
 def test_ties_of_a_library_hold_hair_of_its_override(library):
     bpy.ops.wm.open_mainfile(filepath=library)
     ties = bpy.data.collections.new("Ties")

@@ -87,6 +87,7 @@ def cancelled(operator: type[Any], stage: str, **values: Any) -> None:
     steps.close()
 
 
+@pytest.mark.alike
 @pytest.mark.usefixtures("extension")
 @pytest.mark.parametrize("stage", ["Painting the skin", "Placing Buzz Cut", "Growing brows"])
 def test_a_hairstyle_that_is_cancelled_leaves_nothing(stage: str) -> None:

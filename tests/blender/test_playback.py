@@ -129,6 +129,7 @@ def test_a_render_shows_the_baked_hair_of_its_frame(engine, scene, tmp_path):
         assert shows(pictures[frame], strands[other]) < 0.3
 
 
+@pytest.mark.slow(instead="test_a_render_shows_the_baked_hair_of_its_frame")
 def test_a_fresh_process_renders_the_bake_of_a_saved_file(scene, tmp_path):
     bpy.data.objects["Hair"].hairloom.bake.folder = "//bake"
     file = tmp_path / "wig.blend"

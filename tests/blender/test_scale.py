@@ -77,6 +77,9 @@ def told(
 
 
 # powers of two: on a sphere, whose triangles are alike, rounding decides where children come first
+@pytest.mark.slow(
+    instead="tests/pure/groom/test_children.py::test_children_are_the_same_at_any_scale"
+)
 @pytest.mark.parametrize("scale", few_in_commits([2.0**-10, 2.0**10]))
 def test_a_scene_of_another_size_moves_and_warns_the_same(
     sphere: Any, new_hair: Callable[..., Any], evaluated: Callable[[], Any], scale: float

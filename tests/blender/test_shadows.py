@@ -72,6 +72,7 @@ def of_form(form: str, **more: Any) -> VolumeSettings:
     return VolumeSettings(shadows=form, **{**settings, **more})
 
 
+@pytest.mark.alike
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("extinction", [1.0, 3.0])
 def test_hair_behind_hair_has_the_light_that_is_left(
@@ -144,6 +145,7 @@ def ends() -> Iterator[tuple[str, Any]]:
             yield from ((parameter.name, value) for value in parameter.hard_range)
 
 
+@pytest.mark.alike
 @pytest.mark.parametrize(("name", "value"), list(ends()))
 @pytest.mark.parametrize("model", few_in_commits(["marschner", "kajiya_kay"]))
 def test_no_end_of_a_range_draws_anything_but_numbers(

@@ -207,6 +207,7 @@ def test_cancel_shows_strands_in_place_of_cards_that_are_being_built(in_window):
     assert drawn(session).cards is None and drawn(session).strand_count == 60
 
 
+@pytest.mark.slow(instead="test_in_a_window_old_cards_stay_until_others_are_built")
 def test_cards_of_the_rig_before_stay_until_those_of_other_hair_are_built(in_window, evaluated):
     """They do not ride on guides that they are not tied to, but are drawn as is set now."""
     hair, _, session = in_window
@@ -233,6 +234,7 @@ def test_cards_of_the_rig_before_stay_until_those_of_other_hair_are_built(in_win
     )
 
 
+@pytest.mark.slow(instead="test_cards_that_cannot_be_made_leave_strands_and_say_why")
 def test_cards_that_can_be_made_again_warn_of_nothing(preview):
     hair, _, session = preview
     groom = hair.data.hairloom

@@ -100,6 +100,7 @@ def test_both_agree_on_a_shaken_head(
     assert np.abs(compute.guides() - numpy.guides()).max() < 1.0e-6
 
 
+@pytest.mark.slow(instead="test_both_agree_on_a_shaken_head")
 @pytest.mark.usefixtures("gpu_context")
 def test_coils_bounce_alike_and_keep_their_lengths() -> None:
     """A row of them hangs from what is thrown up and down, and then held still."""

@@ -96,6 +96,7 @@ def test_a_video_shows_the_pictures_as_they_are(tmp_path: Path) -> None:
     assert found == pytest.approx(colors[0], abs=0.03)
 
 
+@pytest.mark.slow(instead="test_one_press_gives_pictures_and_a_video")
 def test_after_a_whole_turn_it_is_the_same_picture(table: Turntable) -> None:
     first, last = table.picture(0), table.picture(SMALL.frames)
     assert np.array_equal(first, last)
@@ -222,6 +223,7 @@ def test_a_video_on_a_full_disk_is_none(tmp_path: Path, part: float) -> None:
         assert not video.is_whole(cut)
 
 
+@pytest.mark.slow(instead="test_what_fails_leaves_nothing")
 def test_without_a_writer_of_videos_the_pictures_stay(
     table: Turntable, monkeypatch: pytest.MonkeyPatch
 ) -> None:

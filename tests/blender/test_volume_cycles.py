@@ -76,6 +76,7 @@ def drawn(
     return picture
 
 
+@pytest.mark.alike
 @pytest.mark.parametrize("skin", SKINS.values(), ids=SKINS)
 @pytest.mark.parametrize("case", CASES.values(), ids=CASES)
 def test_blond_hair_has_the_light_of_path_tracing(case: tuple[int, int, float], skin: Any) -> None:

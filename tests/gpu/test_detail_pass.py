@@ -174,7 +174,7 @@ def test_stations_are_those_of_the_cpu(
         assert np.abs(beyond).max() <= 1e-5 * length[strand]
 
 
-@pytest.mark.parametrize("seen", ["whole", "inside"])
+@pytest.mark.parametrize("seen", few_in_commits(["whole", "inside"]))
 def test_the_picture_is_that_of_sixty_four_pieces(frame: Any, seen: str) -> None:
     """Strands are where they should be within half a pixel, none broken.
 

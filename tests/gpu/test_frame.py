@@ -117,6 +117,7 @@ def hairy_sphere(frame: Any, **shading: float) -> Any:
     )
 
 
+@pytest.mark.alike
 @pytest.mark.parametrize("shift", [0.3, 0.15, 0.0, -0.15, -0.3])
 def test_positive_shift_moves_the_highlight_to_the_tips(frame: Any, shift: float) -> None:
     """Roots are at the top, tips at the bottom: the band must sink by atan(shift)."""

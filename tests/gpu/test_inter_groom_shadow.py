@@ -82,6 +82,7 @@ def test_a_mesh_has_the_shadow_of_all_grooms(gpu_context: Any) -> None:
     assert lit == pytest.approx(expected, rel=0.04)
 
 
+@pytest.mark.alike
 @pytest.mark.parametrize("transparency", ["none", "hashed", "layers"])
 @pytest.mark.parametrize("model", ["kajiya_kay", "marschner"])
 def test_hair_has_the_shadow_of_other_grooms(

@@ -19,6 +19,7 @@ def rig_of(strands: StrandSet, settings: ChildrenSettings) -> pipeline.Rig:
     return pipeline.prepare(strands, sheet(), GUIDES, place="a wig", children=settings)
 
 
+@pytest.mark.alike
 @pytest.mark.parametrize("method", ["none", "multi", "single"])
 @pytest.mark.parametrize("clump", [0.0, 0.8])
 def test_it_is_what_a_rebuild_makes(method: str, clump: float) -> None:

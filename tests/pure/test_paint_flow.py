@@ -41,6 +41,7 @@ def shapes(rig: pipeline.Rig) -> dict[bytes, Floats]:
     return {strand[0].tobytes(): strand for strand in grid}
 
 
+@pytest.mark.alike
 @pytest.mark.parametrize("method", ["multi", "single"])
 @pytest.mark.parametrize("density", [dab(0.2), dab(3.0), None], ids=["less", "more", "anywhere"])
 def test_it_is_what_a_rebuild_makes(method: str, density: Floats | None) -> None:

@@ -65,6 +65,7 @@ def painted(stroke: int) -> np.ndarray:
 PAINTED = ("frizz", "length", "clump", "width", "scatter", "fly_aways")
 
 
+@pytest.mark.alike
 @pytest.mark.parametrize("does", [combed, painted])
 @pytest.mark.parametrize("guides", few_in_commits([30, 100]))
 @pytest.mark.parametrize(

@@ -20,6 +20,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_site(folder)
 
 
+@pytest.mark.slow(instead="test_a_link_that_leads_nowhere_ends_it")
 def test_each_page_of_the_repository_is_a_page(site: Path) -> None:
     pages = {page.relative_to(REPOSITORY) for page in (REPOSITORY / "docs").rglob("*.md")}
     assert len(pages) > 20
@@ -27,6 +28,7 @@ def test_each_page_of_the_repository_is_a_page(site: Path) -> None:
         assert (site / page.with_suffix(".html")).is_file(), page
 
 
+@pytest.mark.slow(instead="test_a_link_that_leads_nowhere_ends_it")
 def test_it_can_be_read_from_a_folder_without_a_network(site: Path) -> None:
     assert (site / "searchindex.js").stat().st_size > 10_000
     for page in site.rglob("*.html"):
@@ -39,6 +41,7 @@ def test_it_can_be_read_from_a_folder_without_a_network(site: Path) -> None:
             assert target.exists(), f"{page.name} loads {source}, which is not there"
 
 
+@pytest.mark.slow(instead="test_a_link_that_leads_nowhere_ends_it")
 def test_it_knows_all_versions_and_begins_with_the_newest(site: Path) -> None:
     assert (
         site.parent / "versions.js"

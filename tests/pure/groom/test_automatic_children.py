@@ -94,6 +94,7 @@ def test_the_same_light_is_blocked_with_and_without() -> None:
     assert blocked[1] == pytest.approx(blocked[0], rel=0.1)  # children are a little shorter
 
 
+@pytest.mark.slow(instead="test_few_strands_get_the_children_that_cover_the_body")
 @pytest.mark.parametrize("across", [60, 120])
 def test_long_hair_gets_strands_of_a_few_hairs(across: int) -> None:
     """They cover the body, but would look like noodles from near."""
@@ -144,6 +145,9 @@ def test_own_strands_come_first_and_stay() -> None:
     np.testing.assert_array_equal(again.strands.points, rig.strands.points)
 
 
+@pytest.mark.slow(
+    instead="tests/pure/groom/test_children.py::test_children_are_the_same_at_any_scale"
+)
 @pytest.mark.parametrize("factor", few_in_commits([1e-3, 1e3]))
 def test_no_unit_of_length_is_assumed(factor: float) -> None:
     one = rig_of(fur(32, 0.05), sheet())

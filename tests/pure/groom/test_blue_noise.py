@@ -72,6 +72,7 @@ def test_roots_have_names_of_their_own(egg: Surface) -> None:
     assert not np.isin(spread(egg, 5000, None, 2).key, spread(egg, 5000, None, 1).key).any()
 
 
+@pytest.mark.alike
 @pytest.mark.parametrize("factor", [1e-3, 1.0 / 1024.0, 1.7, 1e3, 1024.0])
 def test_another_size_hardly_changes_the_roots(egg: Surface, factor: float) -> None:
     """Rounding differs there, and none at all between sizes whose ratio is a power of two."""

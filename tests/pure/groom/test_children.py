@@ -39,6 +39,7 @@ def groomed(egg: Surface) -> StrandSet:
 # --- order ---------------------------------------------------------------------------------------
 
 
+@pytest.mark.alike
 @pytest.mark.parametrize(
     ("way", "is_painted"), [("multi", False), ("multi", True), ("single", False)]
 )
@@ -494,6 +495,7 @@ def first_guides(count: int) -> Callable[[Surface], StrandSet]:
     return lambda surface: spread_guides(surface, count)
 
 
+@pytest.mark.alike
 @pytest.mark.parametrize("way", ["multi", "single"])
 @pytest.mark.parametrize(
     ("guides", "told"),

@@ -41,6 +41,7 @@ def width(strands: StrandSet) -> float:
     return widths.median
 
 
+@pytest.mark.slow(instead="test_widths_that_cannot_be_hair_are_found")
 def test_all_hairs_of_a_head_are_hairs() -> None:
     all_of_them = with_widths(head_of_hair(120_000))[1]
     assert all_of_them.median == pytest.approx(8e-5, rel=0.05)
@@ -48,6 +49,7 @@ def test_all_hairs_of_a_head_are_hairs() -> None:
     assert with_widths(head_of_hair(12_000))[1].hairs == pytest.approx(10.0, rel=0.05)
 
 
+@pytest.mark.alike
 @pytest.mark.parametrize("factor", [1e-3, 0.05, 1e3])
 def test_no_unit_of_length_is_assumed(factor: float) -> None:
     one, other = head_of_hair(3000), head_of_hair(3000, factor)
@@ -85,6 +87,7 @@ def test_own_widths_are_kept_where_they_can_be_hair() -> None:
         assert with_widths(own, method)[1].is_found == is_found
 
 
+@pytest.mark.alike
 @pytest.mark.parametrize(("radius", "why"), [(4e-6, "bald"), (0.5, "bury"), (5e-3, "bury")])
 def test_widths_that_cannot_be_hair_are_found(radius: float, why: str) -> None:
     strands = head_of_hair(10_000, has_widths=True)

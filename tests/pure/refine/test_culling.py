@@ -44,6 +44,7 @@ def seen_past(points: Floats, ball: Floats, eye: Floats) -> np.ndarray:
     return np.linalg.norm(to_center - along[:, None] * way, axis=1) > ball[3]
 
 
+@pytest.mark.alike
 @pytest.mark.parametrize("name", PROJECTIONS)
 @pytest.mark.parametrize("eye", [(0.0, -3.0, 0.4), (2.0, 0.5, -0.3), (0.0, -0.75, 0.1)])
 def test_nothing_of_a_hidden_strand_is_seen(

@@ -97,6 +97,7 @@ SHAPES: list[Callable[[np.random.Generator, Floats, int], Floats]] = [
 ]
 
 
+@pytest.mark.alike
 @pytest.mark.parametrize("shape", SHAPES)
 @pytest.mark.parametrize("name", PROJECTIONS)
 def test_the_line_is_everywhere_within_the_error_of_the_exact_curve(

@@ -118,6 +118,7 @@ def test_the_size_in_the_picture() -> None:
     assert thinning(bounds, 100.0, 4e-5, 1.0, inside, settings) == Thinning()
 
 
+@pytest.mark.alike
 @pytest.mark.parametrize("height", [150, 75, 38])
 def test_the_groom_covers_as_much_when_it_is_thinned(shared_data: Path, height: int) -> None:
     path = shared_data / "sintel" / "SintelHairOriginal-sintel_hair.16points.tfx"

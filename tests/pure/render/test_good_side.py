@@ -119,6 +119,7 @@ def away(direction: np.ndarray, degrees: float) -> float:
     return abs(float(np.degrees((angle + np.pi) % (2.0 * np.pi) - np.pi)))
 
 
+@pytest.mark.alike
 @pytest.mark.parametrize("shape", [head, cropped, sheet, beast])
 @pytest.mark.parametrize("degrees", TURNS)
 def test_the_front_is_found_wherever_it_is(shape, degrees: float) -> None:

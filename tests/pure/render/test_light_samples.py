@@ -30,6 +30,7 @@ def arriving(light: Light) -> np.ndarray:
     return towards * irradiance[:, :1]
 
 
+@pytest.mark.alike
 @pytest.mark.parametrize("name", LIGHTS)
 def test_the_mean_of_all_points_is_the_whole_light(name: str) -> None:
     light = LIGHTS[name]

@@ -91,6 +91,7 @@ PANELS = {
 }
 
 
+@pytest.mark.alike
 @pytest.mark.parametrize("light", PANELS.values(), ids=PANELS)
 def test_area_light_sends_its_whole_power_to_its_front(light: Light) -> None:
     """Summed over a plane before it, and over a far hemisphere; none behind."""

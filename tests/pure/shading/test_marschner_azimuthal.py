@@ -59,6 +59,7 @@ def test_energies_agree_with_the_rays(theta: float) -> None:
     assert rest == pytest.approx(traced[3:].sum(axis=0), rel=2e-3, abs=2e-5)
 
 
+@pytest.mark.alike
 @pytest.mark.parametrize("index", [1.0, 1.01, 1.3, 1.55, 2.0, 4.0])
 @pytest.mark.parametrize("eccentricity", [1.0, 0.85, 2.0])
 def test_white_furnace_around_the_fibre(index: float, eccentricity: float) -> None:

@@ -175,6 +175,7 @@ def ends() -> list[tuple[str, object]]:
     return found
 
 
+@pytest.mark.alike
 @pytest.mark.parametrize(("name", "value"), ends())
 def test_no_end_of_a_range_gives_anything_but_numbers(name: str, value: object) -> None:
     for pigment in ("color", "melanin", "absorption"):

@@ -34,6 +34,7 @@ def test_reciprocity(fibre: Fibre) -> None:
     assert there == pytest.approx(back, rel=1e-6, abs=1e-12)
 
 
+@pytest.mark.alike
 @pytest.mark.parametrize(
     "change",
     [

@@ -83,6 +83,7 @@ def test_the_longitudinal_table_is_within_half_a_percent_of_each_peak() -> None:
     assert found[:, 3] == pytest.approx(np.cos(0.5 * (theta[1] - theta[0])), abs=1e-4)
 
 
+@pytest.mark.alike
 @pytest.mark.parametrize("absorption", HAIRS.values(), ids=HAIRS.keys())
 @pytest.mark.parametrize("shape", SHAPES)
 def test_looked_up_s_is_within_half_a_percent_of_its_peak(shape: Fibre, absorption: Floats) -> None:
@@ -175,6 +176,7 @@ def test_prefiltering_comes_closer_to_the_mean_over_a_pixel() -> None:
     assert errors[1] < 0.25 * errors[0]
 
 
+@pytest.mark.alike
 @pytest.mark.parametrize(
     "change",
     [

@@ -140,6 +140,7 @@ def test_reach_keeps_near_answers_and_tells_far_ones_apart() -> None:
     assert short.distance[~is_near].min() > 0.25
 
 
+@pytest.mark.alike
 @pytest.mark.parametrize(("spread", "shift"), [(0.01, 0.0), (0.2, 0.0), (0.02, 3.0), (3.0, 0.0)])
 @pytest.mark.parametrize("reach", [np.inf, 0.3])
 def test_points_that_lie_together_agree_with_all_triangles(

@@ -40,6 +40,7 @@ def test_what_is_the_same_everywhere_stays(two_islands: Surface) -> None:
     assert both_sides(found, layout)[0] == pytest.approx(0.3, abs=1e-12)
 
 
+@pytest.mark.alike
 @pytest.mark.parametrize("stretched", [(1.0, 1.0), (1.0, 0.5), (0.25, 1.0)])
 def test_light_gets_as_far_in_metres_however_the_map_is_stretched(
     square: Callable[..., Surface], stretched: tuple[float, float]
@@ -60,6 +61,7 @@ def test_light_gets_as_far_in_metres_however_the_map_is_stretched(
         assert np.sqrt(variance) == pytest.approx(softness * np.sqrt(0.91), rel=0.03)
 
 
+@pytest.mark.slow(instead="test_no_seam_is_seen")
 def test_light_goes_on_across_a_seam(two_islands: Surface, square: Callable[..., Surface]) -> None:
     """An edge of shadow beside the seam is as soft as on a plane that was not cut."""
     whole = square()
@@ -80,6 +82,7 @@ def test_light_goes_on_across_a_seam(two_islands: Surface, square: Callable[...,
     assert 0.2 < np.interp(0.1, x[np.argsort(x)], cut[np.argsort(x)]) < 0.9
 
 
+@pytest.mark.alike
 @pytest.mark.parametrize("softness", [0.001, 0.004, 0.01])
 def test_no_seam_is_seen(two_islands: Surface, softness: float) -> None:
     """Stripes of shadow that cross the seam slantwise, with the hardest edges there are."""
