@@ -545,7 +545,7 @@ def test_frames_shorter_than_a_substep(make_pass: Any) -> None:
 
 
 def test_twice_the_same_to_the_last_bit(make_pass: Any) -> None:
-    scene = Scene({"wind_speed": 3.0}, on_head=(ball_field(0.095),), standing=(IN_THE_WAY,))
+    scene = replace(SHORT_AT_COLLIDERS["head and ball, 8 CVs"], values={"wind_speed": 3.0})
     passes = [make_pass(scene.start()) for _ in range(2)]
     for drive in scene.drives(0.3):
         for dynamics in passes:
