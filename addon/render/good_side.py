@@ -32,9 +32,9 @@ _HEIGHTS = ((0.16, 1.0), (0.4, 0.92), (0.7, 0.8), (1.7, 0.6))
 #: its own height
 _LOW_HEIGHTS, _LEVEL_FACE = 2, 0.5
 #: a three-quarter view is turned by this from the front [rad], and one nearly from the side, which
-#: is so much less good, by this: a crest, a braid and a flank are seen from there
+#: is so much less good, by this: a crest and a braid are seen from there
 _THREE_QUARTER, _ASIDE = float(np.radians(29.0)), float(np.radians(67.0))
-_ASIDE_GOOD = 0.74
+_TURNS = ((_THREE_QUARTER, 1.0), (_ASIDE, 0.74))
 #: what counts where no face is seen, as a fraction of the whole face
 _WITHOUT_FACE = 0.35
 #: a face is seen at least as large as this, as a fraction of the hair
@@ -89,6 +89,8 @@ def good_side(strands: StrandSet, body: Surface | None) -> GoodSide:
     is_face = whole[1] > _MIN_FACE * whole[0]
     good = _goodness(areas, whole) * (1.0 - 0.5 * _PREFERENCE * level[:, 1])
     front = None if is_face else seen.against_lie()
+    # beside a coat one looks at ends again
+    turns = ((_THREE_QUARTER, 1.0),) if front is not None else _TURNS
     # short hair is seen as well from behind, but a face only from its front
     if front is None:
         front = _leaning(good, level, _MIN_LEAN)
@@ -101,12 +103,12 @@ def good_side(strands: StrandSet, body: Surface | None) -> GoodSide:
     candidates = [
         (_raised(_turned(front, turn), height), factor * preferred * aside)
         for height, factor in _HEIGHTS
-        for away, aside in ((_THREE_QUARTER, 1.0), (_ASIDE, _ASIDE_GOOD))
+        for away, aside in turns
         for turn, preferred in ((-away, 1.0 + _PREFERENCE), (away, 1.0))
     ]
     asked = np.array([seen.areas(direction) for direction, _ in candidates])
     if is_face and asked[:2, 1].max() > _LEVEL_FACE * whole[1]:
-        low = 4 * _LOW_HEIGHTS  # four directions of each height
+        low = 2 * len(turns) * _LOW_HEIGHTS  # to both sides
         candidates, asked = candidates[:low], asked[:low]
     factors = np.array([factor for _, factor in candidates])
     best = (_goodness(asked, np.maximum(whole, asked.max(axis=0))) * factors).argmax()
