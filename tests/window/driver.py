@@ -23,6 +23,8 @@ import screen
 from view_mark import ViewMark
 
 TICK_S = 0.05
+#: How long Blender sleeps when it has nothing to do; it does not where events are simulated.
+SLEEP_S = 0.005
 #: A machine may be as slow as it likes: only what never comes fails.
 PATIENCE_S = 180.0
 EXTENSION = "bl_ext.user_default.hairloom"
@@ -132,6 +134,13 @@ def play(steps: Iterator[float | None], *, anti_aliasing: bool = False) -> None:
     bpy.context.preferences.system.viewport_aa = "8" if anti_aliasing else "OFF"
     faulthandler.enable()  # of a crash the log tells the lines of Python as well
     bpy.app.timers.register(tick, first_interval=1.0, persistent=True)
+    bpy.app.timers.register(_sleep, persistent=True)
+
+
+def _sleep() -> float:
+    """Once in each turn of Blender's loop, which else keeps a processor busy while it waits."""
+    time.sleep(SLEEP_S)
+    return 0.0
 
 
 def _ticks(steps: Iterator[float | None]) -> Iterator[float]:

@@ -1,4 +1,4 @@
-"""What is on the X screen: read through Xlib itself, at once and whole."""
+"""What is on the X screen: read through Xlib itself, at once."""
 
 import ctypes
 import struct
@@ -34,11 +34,20 @@ def _connect() -> tuple[Any, Any]:
 _x, _display = _connect()
 
 
+def size() -> tuple[int, int]:
+    """Width and height in pixels."""
+    return _x.XDisplayWidth(_display, 0), _x.XDisplayHeight(_display, 0)
+
+
 def pixels() -> np.ndarray:
     """(height, width, 3), uint8, top row first."""
-    width, height = _x.XDisplayWidth(_display, 0), _x.XDisplayHeight(_display, 0)
+    return part(0, 0, *size())
+
+
+def part(left: int, top: int, width: int, height: int) -> np.ndarray:
+    """As `pixels`, of a rectangle within the screen: reading all of it takes as long as drawing."""
     root = ctypes.c_ulong(_x.XDefaultRootWindow(_display))
-    found = _x.XGetImage(_display, root, 0, 0, width, height, _ALL_PLANES, _Z_PIXMAP)
+    found = _x.XGetImage(_display, root, left, top, width, height, _ALL_PLANES, _Z_PIXMAP)
     image = found.contents
     assert image.bits_per_pixel == 32, f"a screen of {image.bits_per_pixel} bits a pixel"
     raw = ctypes.string_at(image.data, image.bytes_per_line * height)

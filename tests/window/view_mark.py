@@ -34,8 +34,7 @@ class ViewMark:
 
     def is_shown(self) -> bool:
         """Whether all 3D views that can be seen show that drawing."""
-        shown = screen.pixels()
-        if not all(self._is_marked(shown, window, region) for window, region in _views()):
+        if not all(self._is_marked(window, region) for window, region in _views()):
             return False
         self._is_wanted = False
         return True
@@ -56,13 +55,16 @@ class ViewMark:
     def _bits(self) -> list[bool]:
         return [bool(self._number >> bit & 1) for bit in range(BITS)]
 
-    def _is_marked(self, shown: np.ndarray, window: Any, region: Any) -> bool:
+    def _is_marked(self, window: Any, region: Any) -> bool:
+        width, height = screen.size()
         column = window.x + region.x + LEFT + SIDE // 2
-        low = window.y + region.y + int(LOW * region.height) + SIDE // 2
-        rows = len(shown) - 1 - low - SIDE * np.arange(BITS)
-        if not (0 <= column < shown.shape[1] and rows.min() >= 0 and rows.max() < len(shown)):
+        lowest = height - 1 - (window.y + region.y + int(LOW * region.height) + SIDE // 2)
+        rows = SIDE * (BITS - 1) + 1
+        highest = lowest - rows + 1
+        if not (0 <= column < width and highest >= 0 and lowest < height):
             return True  # beyond the screen
-        return (shown[rows, column, 1] > 127).tolist() == self._bits()
+        shown = screen.part(column, highest, 1, rows)
+        return (shown[::-SIDE, 0, 1] > 127).tolist() == self._bits()
 
     def _draw(self) -> None:
         if not self._is_wanted:
