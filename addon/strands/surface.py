@@ -72,26 +72,7 @@ class Surface:
         Vertices at one place share theirs, so that seams of UVs are not seen, but where they face
         apart, as at hard edges and on sheets with two sides.
         """
-        corners, normals = self.corners, self.triangle_normals()
-        total = np.zeros_like(self.positions)
-        for corner in range(3):
-            one = unit(corners[:, (corner + 1) % 3] - corners[:, corner])
-            two = unit(corners[:, (corner + 2) % 3] - corners[:, corner])
-            angle = np.arccos(np.clip(np.einsum("ij,ij->i", one, two), -1.0, 1.0))
-            np.add.at(total, self.triangles[:, corner], normals * angle[:, None])
-        return self._shared(total)
-
-    def _shared(self, total: Floats) -> Floats:
-        """Unit normals, (vertex_count, 3), of sums of normals around each vertex."""
-        own, place = unit(total), self.once(_places)
-        count = int(place.max(initial=-1)) + 1
-        if count == len(own):
-            return own
-        of_place = np.zeros((count, 3), np.float32)
-        np.add.at(of_place, place, total)
-        shared = unit(of_place)[place]
-        is_smooth = np.einsum("ij,ij->i", own, shared) > _SMOOTH
-        return np.where(is_smooth[:, None], shared, own)
+        return self.once(_vertex_normals)
 
     def bounds(self) -> tuple[Floats, Floats]:
         """Lowest and highest corner, each (3,) [m]."""
@@ -129,6 +110,33 @@ class Surface:
             return replace(self, positions=positions)
         uv = None if self.corner_uv is None else self.corner_uv[:, ::-1]
         return replace(self, positions=positions, triangles=self.triangles[:, ::-1], corner_uv=uv)
+
+
+def _vertex_normals(surface: Surface) -> Floats:
+    """See `Surface.vertex_normals`: many ask for them, of one head."""
+    corners, normals = surface.corners, surface.triangle_normals()
+    total = np.zeros_like(surface.positions)
+    for corner in range(3):
+        one = unit(corners[:, (corner + 1) % 3] - corners[:, corner])
+        two = unit(corners[:, (corner + 2) % 3] - corners[:, corner])
+        angle = np.arccos(np.clip(np.einsum("ij,ij->i", one, two), -1.0, 1.0))
+        np.add.at(total, surface.triangles[:, corner], normals * angle[:, None])
+    shared = _shared(surface, total)
+    shared.flags.writeable = False
+    return shared
+
+
+def _shared(surface: Surface, total: Floats) -> Floats:
+    """Unit normals, (vertex_count, 3), of sums of normals around each vertex."""
+    own, place = unit(total), surface.once(_places)
+    count = int(place.max(initial=-1)) + 1
+    if count == len(own):
+        return own
+    of_place = np.zeros((count, 3), np.float32)
+    np.add.at(of_place, place, total)
+    shared = unit(of_place)[place]
+    is_smooth = np.einsum("ij,ij->i", own, shared) > _SMOOTH
+    return np.where(is_smooth[:, None], shared, own)
 
 
 def _places(surface: Surface) -> Ints:
