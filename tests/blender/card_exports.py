@@ -26,6 +26,7 @@ SMALL = (
     *("--set", "card_occlusion.rays=16", "--set", "cards.source=guides"),
     *("--set", "cards.order_by=distance"),
     *("--set", "atlas.source=made"),
+    *("--set", "card_texture.height=64", "--set", "card_texture.variant_width=32"),
 )
 BAKED = (
     *(
