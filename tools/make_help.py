@@ -3,22 +3,51 @@
 `make zip` puts them into the extension, so that they are there without a network, and of the
 version that is installed. Without pictures they take one megabyte of the zip, with them fourteen.
 
+Sphinx takes ten seconds, so what is there stays until something has changed that it is made from.
+
     python tools/make_help.py
 """
 
 from __future__ import annotations
 
+import hashlib
 import re
 import shutil
 import tempfile
 from pathlib import Path
 
-from make_site import REPOSITORY, write_site
+from make_site import PAGES, REPOSITORY, write_site
 
 HELP = REPOSITORY / "help"
+#: of what they were made: a checksum
+MADE_OF = REPOSITORY / "out" / "help.sum"
 #: of the site, what reading does not need
 _LEFT_OUT = shutil.ignore_patterns("_images", "_sources", "_downloads", "images", "*.inv", "*.map")
 _PICTURE = re.compile(r"<a [^>]*image-reference[^>]*>\s*<img [^>]*>\s*</a>|<img [^>]*>")
+
+
+def made_of(repository: Path = REPOSITORY) -> str:
+    """A checksum of all files that the pages are made of, and of the tools that make them."""
+    own = ("tools/make_help.py", "tools/make_site.py", "requirements.lock", "blender_manifest.toml")
+    files = [repository / name for name in (*PAGES, *own)]
+    for folder in ("docs", "tools/site"):
+        files += [f for f in (repository / folder).rglob("*") if f.is_file() and f.suffix != ".pyc"]
+    checksum = hashlib.sha256()
+    for file in sorted(files):
+        content = file.read_bytes()
+        checksum.update(f"{file.relative_to(repository)} {len(content)} ".encode() + content)
+    return checksum.hexdigest()
+
+
+def fresh_help() -> None:
+    """See that those of this state of the repository are there."""
+    now = made_of()
+    if HELP.is_dir() and MADE_OF.is_file() and MADE_OF.read_text() == now:
+        return
+    MADE_OF.unlink(missing_ok=True)  # should it be interrupted
+    write_help()
+    MADE_OF.parent.mkdir(exist_ok=True)
+    MADE_OF.write_text(now)
 
 
 def write_help(folder: Path = HELP) -> Path:
@@ -33,4 +62,5 @@ def write_help(folder: Path = HELP) -> Path:
 
 
 if __name__ == "__main__":
-    print(write_help())
+    fresh_help()
+    print(HELP)

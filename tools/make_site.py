@@ -19,7 +19,7 @@ from pathlib import Path
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 #: what becomes pages, beside all of docs
-_PAGES = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "gpu_shaders/README.md")
+PAGES = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "gpu_shaders/README.md")
 #: the menu: for whom, and what
 MENU = {
     "Artists": (
@@ -98,10 +98,10 @@ def write_site(site: Path, repository: Path = REPOSITORY) -> Path:
 def _gather(repository: Path, pages: Path) -> None:
     """Copy what becomes pages, the first of them with the menu."""
     shutil.copytree(repository / "docs", pages / "docs")
-    for page in _PAGES:
+    for page in PAGES:
         (pages / page).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(repository / page, pages / page)
-    with (pages / _PAGES[0]).open("a", encoding="utf-8") as first:
+    with (pages / PAGES[0]).open("a", encoding="utf-8") as first:
         for title, names in MENU.items():
             lines = ("```{toctree}", ":hidden:", f":caption: {title}", "", *names, "```")
             first.write("\n" + "\n".join(lines) + "\n")

@@ -20,7 +20,7 @@ from importlib.machinery import SourceFileLoader
 from pathlib import Path
 from typing import Any
 
-from make_help import write_help
+from make_help import fresh_help
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 MANIFEST = "blender_manifest.toml"
@@ -93,7 +93,7 @@ def write_zip(whole: Path, folder: Path, system: str, python: tuple[int, int]) -
 
 def main(folder: Path) -> int:
     folder.mkdir(parents=True, exist_ok=True)
-    write_help()  # which is packed
+    fresh_help()  # which is packed
     with tempfile.TemporaryDirectory() as temporary:
         command = [sys.executable, extension_tool(), "build", "--source-dir", REPOSITORY]
         done = subprocess.run([*map(str, command), "--output-dir", temporary])

@@ -26,6 +26,43 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return make_help.write_help(tmp_path_factory.mktemp("help") / "help")
 
 
+def test_pages_are_made_again_when_what_they_are_made_of_changes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made: list[str] = []
+    state = {"sum": "one"}
+    monkeypatch.setattr(make_help, "HELP", tmp_path / "help")
+    monkeypatch.setattr(make_help, "MADE_OF", tmp_path / "out" / "help.sum")
+    monkeypatch.setattr(make_help, "made_of", lambda: state["sum"])
+
+    def write() -> None:
+        made.append(state["sum"])
+        (tmp_path / "help").mkdir(exist_ok=True)
+
+    monkeypatch.setattr(make_help, "write_help", write)
+    for state["sum"] in ("one", "one", "two", "two"):
+        make_help.fresh_help()
+    assert made == ["one", "two"]
+    (tmp_path / "help").rmdir()
+    make_help.fresh_help()
+    assert made == ["one", "two", "two"]
+
+
+def test_every_page_and_the_tools_count_for_the_checksum(tmp_path: Path) -> None:
+    names = (*make_help.PAGES, "docs/dev/page.md", "docs/picture.png", "tools/site/conf.py")
+    names += ("tools/make_help.py", "tools/make_site.py")
+    names += ("requirements.lock", "blender_manifest.toml")
+    for name in names:
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text("as it was")
+    before = make_help.made_of(tmp_path)
+    assert make_help.made_of(tmp_path) == before
+    for name in names:
+        (tmp_path / name).write_text("changed")
+        assert make_help.made_of(tmp_path) != before, name
+        (tmp_path / name).write_text("as it was")
+
+
 def is_there(address: str) -> bool:
     """Whether a page has this heading."""
     parts = urlparse(address)
