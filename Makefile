@@ -25,11 +25,15 @@ lint: setup
 TESTS = tests/blender tests/gpu tests/pure
 PYTEST = $(PYTHON) -m pytest -q -n 2 --dist worksteal
 
+# To show the values of an assert, pytest rewrites all tests, which takes each process as long as a
+# hundred tests. So only what has failed is run with it, a second time; it has failed all the same.
 tests-of-a-commit: setup
-	$(PYTEST) -m "not slow" $(TESTS)
+	$(PYTEST) -m "not slow" --assert=plain $(TESTS) || \
+	    { $(PYTHON) -m pytest -q -m "not slow" --last-failed --last-failed-no-failures=none $(TESTS); false; }
 
+# Side by side, as mypy keeps one processor busy and the longest tests come first.
 test: setup ## lint, types, and the tests that a commit has to pass and that need no window
-	@$(PYTHON) tools/timings.py test_minutes $(MAKE) --no-print-directory lint tests-of-a-commit
+	@$(PYTHON) tools/timings.py test_minutes $(MAKE) --no-print-directory -j 2 lint tests-of-a-commit
 
 test-ui: zip ## the same in a Blender with a window, OpenGL and Vulkan; SESSIONS="session_x" for some
 	tools/window_blender install

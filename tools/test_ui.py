@@ -64,11 +64,12 @@ NOT_IN_COMMITS = (
     "strand_export",
     "ties",
 )
-#: Most of a session's time goes into drawing the window. Some need another screen than the usual
-#: one: long panels are pictured uncut, Blender's own texts and gizmos must be a small part of what
-#: is compared, and random actions need not look closely.
-_LARGE = "1600x1000x24"
-SCREENS = {
+#: Most of a session's time goes into drawing the window, by the number of its pixels. Those that a
+#: commit runs have a small screen where that is enough. Some need a large one: long panels are
+#: pictured uncut, and Blender's own texts and gizmos must be a small part of what is compared.
+_LARGE, _SMALL = "1600x1000x24", "1024x700x24"
+_ON_SMALL = ("cards", "combing", "first_minutes", "layers", "look", "motion", "shadows", "views")
+SCREENS = {f"session_{name}": _SMALL for name in _ON_SMALL} | {
     "session_engine": _LARGE,
     "session_everyday": _LARGE,
     "session_guide_pictures": "1600x1500x24",
@@ -207,6 +208,8 @@ def run_tests(backend: str, chosen: tuple[str, ...], tally: Tally) -> None:
     log, report = OUTPUT / f"tests-{backend}.log", OUTPUT / f"tests-{backend}.xml"
     arguments = ["--factory-startup", "--gpu-backend", backend, "--python-exit-code", "1"]
     arguments += ["--python", "tests/run_in_blender.py", "--", f"--junitxml={report}"]
+    # as in the Makefile: rewriting all tests takes longer than most of them
+    arguments += ["--assert=plain", "--showlocals"]
     arguments += chosen
     kept = {"HAIRLOOM_PICTURES": str(OUTPUT)}
     for packages in INSTALLED.glob("extensions/.local/lib/python*/site-packages"):
