@@ -68,7 +68,10 @@ NOT_IN_COMMITS = (
 #: commit runs have a small screen where that is enough. Some need a large one: long panels are
 #: pictured uncut, and Blender's own texts and gizmos must be a small part of what is compared.
 _LARGE, _SMALL = "1600x1000x24", "1024x700x24"
-_ON_SMALL = ("cards", "combing", "first_minutes", "layers", "look", "motion", "shadows", "views")
+_ON_SMALL = (
+    *("cards", "combing", "first_minutes", "growing", "hair_scene", "import", "layers"),
+    *("long_work", "look", "motion", "selection", "shadows", "views"),
+)
 SCREENS = {f"session_{name}": _SMALL for name in _ON_SMALL} | {
     "session_engine": _LARGE,
     "session_everyday": _LARGE,
