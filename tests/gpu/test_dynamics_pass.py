@@ -336,6 +336,8 @@ LONG_AT_COLLIDERS = (
 SHORT_AT_COLLIDERS = {
     f"{name}, 8 CVs": replace(AT_COLLIDERS[name], cv_count=8) for name in LONG_AT_COLLIDERS
 }
+#: What is wrong with meshes, "plate and finger, 8 CVs" shows as well.
+SLOW_AT_COLLIDERS = ("64 CVs", "ball", "combed", "mesh field")
 SLOW_IN_AIR = ("64 CVs", "32 CVs", "blended and held", "half the force fields in wind")
 
 
@@ -378,7 +380,7 @@ def test_equals_numpy_in_air(make_pass: Any, scene: Scene) -> None:
 
 @pytest.mark.parametrize(
     "scene",
-    few_by_name(AT_COLLIDERS | SHORT_AT_COLLIDERS, *LONG_AT_COLLIDERS, "64 CVs", "ball", "combed"),
+    few_by_name(AT_COLLIDERS | SHORT_AT_COLLIDERS, *LONG_AT_COLLIDERS, *SLOW_AT_COLLIDERS),
 )
 def test_equals_numpy_at_colliders(make_pass: Any, scene: Scene) -> None:
     assert_equal(scene, make_pass, TOUCHING)
