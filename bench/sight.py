@@ -1,9 +1,11 @@
 """First sight: what grooms that nobody here made look like with no setting changed.
 
-See `_sight_missing`, `_sight_cover` and `_sight_pictures` for what is compared with what.
+What is compared with what: see `_sight_missing`, `_sight_cover`, `_sight_pictures` and
+`_sight_patches`.
 
 make bench NAME=sight               some twenty minutes
-tools/bench.py sight cover          one part: missing, lost, cover, scale, count or cycles
+tools/bench.py sight cover          one part: missing, lost, cover, scale, count, cycles or
+                                    patches
 """
 
 from __future__ import annotations
@@ -16,6 +18,7 @@ from _report import start, tell
 from _sight_cover import cover
 from _sight_grooms import GROOMS, lost_curves
 from _sight_missing import missing_percent
+from _sight_patches import patch_figures
 from _sight_pictures import count_figures, cycles_figures, scale_flip
 
 REFERENCE = "hashed strands, which keep no lists; strands as wide as they are apart; Cycles"
@@ -57,6 +60,7 @@ PARTS: dict[str, Callable[[], dict[str, Any]]] = {
     "scale": lambda: {"scale_flip": max(scale_flip(GROOMS[n](), n) for n in ("sintel", "bear"))},
     "count": count_figures,
     "cycles": cycles_figures,
+    "patches": patch_figures,
 }
 
 
