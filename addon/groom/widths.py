@@ -12,6 +12,7 @@ Physical Behavior of Human Hair, chapter 9). Any groom is given the cover that t
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Self
 
 import numpy as np
@@ -21,7 +22,7 @@ from ..strands import StrandSet
 from ..strands.face import is_face_hair
 from ..strands.kept import NOTHING_KEPT, Kept
 from ..strands.nearest import nearest_points
-from .hairline import nearness_to_border
+from .hairline import AROUND, nearness_by
 
 #: of a head: how many hairs, and the width of one in terms of the root of the area they grow on.
 _HAIRS, _HAIR = 120_000, 0.08 / 245.0
@@ -225,18 +226,17 @@ class _Hair:
         wanted = np.linspace(0, last, min(len(number), _SAMPLES)).astype(np.int64)
         chosen = np.unique(np.searchsorted(number, wanted))
 
-        def spacing(at: Ints, where: str) -> Floats:
-            return _spacing(strands.points[at], chosen, kept, f"{name}, {where}")
+        def measured(at: Ints, where: str) -> _Measured:
+            return _Measured(strands.points[at], chosen, kept, f"{name}, {where}")
 
-        roots = strands.roots
-        border = nearness_to_border(roots[chosen], roots, kept, f"{name}, border")
-        border = _spread(border, roots, chosen, kept, f"{name}, border of all")
-
-        length = strands.lengths()
         first, last = strands.offsets[:-1], strands.offsets[1:] - 1
-        at_roots = spacing(first, "roots")
+        roots = measured(first, "roots")
+        border = roots.spread(roots.border())
+        length = strands.lengths()
+        at_roots = roots.spacing()
         # the hair of a ponytail or a mohawk is wider apart further out
-        beyond = np.maximum(spacing((first + last) // 2, "middles"), spacing(last, "tips"))
+        middles, tips = measured((first + last) // 2, "middles"), measured(last, "tips")
+        beyond = np.maximum(middles.spacing(), tips.spacing())
         apart = np.maximum(at_roots, beyond)
         typical = np.clip(length, *np.percentile(length, (25, 95)))
         # where most roots coincide, as in tufts, they do not tell how the hair is spread
@@ -325,33 +325,57 @@ def _evened(spacing: Floats) -> Floats:
     return evened
 
 
-def _spacing(places: Floats, chosen: Ints, kept: Kept, name: str) -> Floats:
-    """How far strands are from their neighbours at these places of theirs, (strand_count,) [m].
-
-    It is the side of the square that a strand has for itself if its neighbours are spread evenly.
+class _Measured:
+    """Places of strands (strand_count, 3) [m], some of which are measured.
 
     Args:
-        chosen: the strands that are measured; others are as far apart as the nearest of these.
-        kept: see `Kept.nearest`.
+        chosen: those that are; what they are the others get from the nearest of these.
+        kept, name: see `Kept.nearest`.
     """
-    neighbours = min(_NEIGHBOURS, len(places) - 1)
-    if not neighbours:
-        return np.zeros(len(places))
-    measured = places[chosen]
-    reach = kept.nearest(f"{name}, reach", measured, places, neighbours + 1)[1][:, -1]
-    count = min(_NEIGHBOURS, len(chosen))
-    around, _ = kept.nearest(f"{name}, around", measured, measured, count)
-    spacing = np.median((np.sqrt(np.pi / neighbours) * reach)[around], axis=1)
-    return _spread(spacing, places, chosen, kept, f"{name}, all")
 
+    def __init__(self, places: Floats, chosen: Ints, kept: Kept, name: str) -> None:
+        self._places, self._chosen, self._kept, self._name = places, chosen, kept, name
+        self._found: tuple[Ints, Floats] | None = None
 
-def _spread(values: Floats, places: Floats, chosen: Ints, kept: Kept, name: str) -> Floats:
-    """Values of the chosen places, at all places those of the nearest of these."""
-    if len(chosen) == len(places):
-        return values
-    near, _ = kept.nearest(name, places, places[chosen], 1)
-    spread: Floats = values[near[:, 0]]
-    return spread
+    def border(self) -> Floats:
+        """How near those that are measured are to where the hair ends, see `nearness_to_border`."""
+        return nearness_by(self._places[self._chosen], self._places, *self._around(AROUND))
+
+    def spacing(self) -> Floats:
+        """How far strands are from their neighbours here, (strand_count,) [m].
+
+        It is the side of the square that a strand has for itself if its neighbours are spread
+        evenly.
+        """
+        neighbours = min(_NEIGHBOURS, len(self._places) - 1)
+        if not neighbours:
+            return np.zeros(len(self._places))
+        measured = self._places[self._chosen]
+        reach = self._around(neighbours + 1)[1][:, neighbours]
+        count = min(_NEIGHBOURS, len(self._chosen))
+        around, _ = self._kept.nearest(f"{self._name}, around", measured, measured, count)
+        return self.spread(np.median((np.sqrt(np.pi / neighbours) * reach)[around], axis=1))
+
+    def spread(self, values: Floats) -> Floats:
+        """Values of the chosen strands, of all strands those of the nearest of these."""
+        if len(self._chosen) == len(self._places):
+            return values
+        spread: Floats = values[self._nearest]
+        return spread
+
+    def _around(self, count: int) -> tuple[Ints, Floats]:
+        """The nearest places of those that are measured, at least as many if there are."""
+        if self._found is None or self._found[0].shape[1] < min(count, len(self._places)):
+            measured = self._places[self._chosen]
+            self._found = self._kept.nearest(f"{self._name}, reach", measured, self._places, count)
+        return self._found
+
+    @cached_property
+    def _nearest(self) -> Ints:
+        """Of those that are measured, for each place."""
+        measured = self._places[self._chosen]
+        near, _ = self._kept.nearest(f"{self._name}, all", self._places, measured, 1)
+        return near[:, 0]
 
 
 def _is_row(roots: Floats) -> bool:

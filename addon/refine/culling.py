@@ -136,7 +136,7 @@ def occluder_spheres_of(surface: Surface, count: int = 8, roots: Floats | None =
     Args:
         roots: (n, 3), same space; only balls about where they are, so none in feet and hands.
     """
-    surface = _capped(surface)
+    surface = surface.once(_capped)
     if not len(surface.triangles):
         return np.zeros((0, 4), np.float32)
     low, high = _box(surface, roots)

@@ -27,21 +27,29 @@ def nearest_points(places: Floats, among: Floats, count: int) -> tuple[Ints, Flo
     kept = min(count, len(among))
     index = np.zeros((len(places), kept), np.int64)
     distance = np.zeros((len(places), kept))
-    # as they are, so that an answer does not depend on what else is asked, nor by rounding
-    place, point = np.asarray(places, np.float64), np.asarray(among, np.float64)
+    # as they are, so that an answer does not depend on what else is asked, nor by rounding; by
+    # axes, as numpy is slow at rows of three
+    place, point = (
+        np.ascontiguousarray(np.asarray(each).T, np.float64) for each in (places, among)
+    )
+    # memory that is asked for anew takes as long as what is done in it
+    memory = np.empty((2, max(_TABLE, len(among))))
     parts: list[tuple[Ints, Ints]] = []
     if len(places):
         parts.append((np.arange(len(places)), np.arange(len(among))))
     while parts:
         own, possible = parts.pop()
-        low, high = place[own].min(axis=0), place[own].max(axis=0)
-        possible = _possible(point, possible, kept, (low + high) / 2.0, (high - low) / 2.0)
+        here = place.take(own, axis=1)
+        low, high = here.min(axis=1), here.max(axis=1)
+        possible, there = _possible(
+            point, possible, kept, (low + high) / 2.0, (high - low) / 2.0, memory
+        )
         if len(own) > 1 and len(own) * len(possible) > _TABLE:
-            halves = place[own, (high - low).argmax()].argpartition(len(own) // 2)
-            parts += [(own[half], possible) for half in np.array_split(halves, 2)]
+            halves = own[here[(high - low).argmax()].argpartition(len(own) // 2)]
+            middle = (len(halves) + 1) // 2
+            parts += [(half, possible) for half in (halves[:middle], halves[middle:])]
             continue
-        gaps = (place[own, axis, None] - point[possible, axis] for axis in range(3))
-        squared = sum(gap * gap for gap in gaps)
+        squared = _squared(here, there, memory)
         rows = np.arange(len(own))
         for rank in range(kept):
             best = squared.argmin(axis=1)
@@ -51,9 +59,27 @@ def nearest_points(places: Floats, among: Floats, count: int) -> tuple[Ints, Flo
     return index, distance
 
 
-def _possible(point: Floats, chosen: Ints, kept: int, center: Floats, half: Floats) -> Ints:
-    """Which of the chosen points may be among the `kept` nearest of any place in this box."""
-    offset = point[chosen] - center
-    away = np.sqrt(np.einsum("ij,ij->i", offset, offset))
-    reach = np.partition(away, kept - 1)[kept - 1] + 2.0 * np.sqrt((half**2).sum())
-    return chosen[away <= reach * (1.0 + 1e-9) + 1e-300]
+def _squared(places: Floats, points: Floats, memory: Floats) -> Floats:
+    """Squared distances of places (3, n) to points (3, m), (n, m), in this memory."""
+    shape = places.shape[1], points.shape[1]
+    gap, squared = (each[: shape[0] * shape[1]].reshape(shape) for each in memory)
+    for axis in range(3):
+        target = gap if axis else squared
+        np.subtract(places[axis, :, None], points[axis], out=target)
+        target *= target
+        if axis:
+            squared += gap
+    return squared
+
+
+def _possible(
+    point: Floats, chosen: Ints, kept: int, center: Floats, half: Floats, memory: Floats
+) -> tuple[Ints, Floats]:
+    """Which of the chosen points may be among the `kept` nearest of any place in this box, and
+    where they are, (3, n)."""
+    there = point.take(chosen, axis=1)
+    squared = _squared(center[:, None], there, memory)[0]
+    nearest = np.sqrt(np.partition(squared, kept - 1)[kept - 1])
+    reach = (nearest + 2.0 * np.sqrt((half**2).sum())) * (1.0 + 1e-9) + 1e-300
+    is_near = np.sqrt(squared, out=squared) <= reach
+    return chosen[is_near], there.compress(is_near, axis=1)

@@ -78,12 +78,9 @@ def _at(uv: Floats, surface: Surface) -> tuple[Ints, Floats]:
         raise HairloomError(
             "this mesh has no UVs", place="head", remedy="Use the built-in head with its UV map"
         )
-    flat = np.zeros((3 * len(surface.triangles), 3), np.float32)
-    flat[:, :2] = surface.corner_uv.reshape(-1, 2)
     places = np.zeros((len(uv), 3), np.float32)
     places[:, :2] = uv
-    search = ClosestPointSearch(Surface(flat, np.arange(len(flat)).reshape(-1, 3)))
-    found = search.closest(places)
+    found = surface.once(_search_of_map).closest(places)
     if len(uv) and found.distance.max() > _OFF_THE_MAP:
         raise HairloomError(
             "its UV map has no face where hair is to grow",
@@ -91,6 +88,14 @@ def _at(uv: Floats, surface: Surface) -> tuple[Ints, Floats]:
             remedy="Use the built-in head with its own UV map",
         )
     return found.triangle, found.barycentric
+
+
+def _search_of_map(surface: Surface) -> ClosestPointSearch:
+    """Through the surface's UV map, in a plane."""
+    assert surface.corner_uv is not None
+    flat = np.zeros((3 * len(surface.triangles), 3), np.float32)
+    flat[:, :2] = surface.corner_uv.reshape(-1, 2)
+    return ClosestPointSearch(Surface(flat, np.arange(len(flat)).reshape(-1, 3)))
 
 
 def _frames(surface: Surface, triangle: Ints, barycentric: Floats) -> tuple[Floats, Floats]:

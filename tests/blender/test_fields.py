@@ -12,6 +12,7 @@ from waiting import until
 from hairloom.addon.blender.colliders import fields
 from hairloom.addon.blender.preview import previews, scene_events
 from hairloom.addon.blender.preview.phases import Phase
+from hairloom.addon.blender.scene.built_in_head import built_in_head
 from hairloom.addon.blender.scene.surfaces import read_surface
 from hairloom.addon.dynamics.colliders import DistanceField
 from hairloom.addon.dynamics.settings import DynamicsSettings
@@ -200,3 +201,31 @@ def test_blenders_playback_waits_and_takes_over(new_hair, sphere, evaluated, ext
     assert session.is_playing and previews.previews[session.uid].phase is not Phase.WAITING
     previews.advance(evaluated(), FRAME)
     scene_events.clear()
+
+
+def test_the_field_of_the_built_in_head_ships(monkeypatch):
+    def made(*_, **__):
+        raise AssertionError("it is made anew")
+
+    monkeypatch.setattr(DistanceField, "from_surface", made)
+    surface, settings = built_in_head().surface, DynamicsSettings()
+    found = fields.field_of(surface, settings, place="Head")
+    assert found.surface is surface
+    for other, finer in ((moved(surface), settings), (surface, COARSE)):
+        with pytest.raises(AssertionError, match="anew"):
+            fields.field_of(other, finer, place="Head")
+
+
+@pytest.mark.slow(instead="test_the_field_of_the_built_in_head_ships")
+def test_the_field_that_ships_is_the_one_that_would_be_made(same_fields):
+    surface, settings = built_in_head().surface, DynamicsSettings()
+    ships = fields.field_of(surface, settings, place="Head")
+    made = same_fields(surface, settings)
+    assert ships.cell == made.cell
+    np.testing.assert_array_equal(ships.low, made.low)
+    # another processor rounds in another way
+    np.testing.assert_allclose(ships.values, made.values, rtol=0.0, atol=1e-7)
+
+
+def moved(surface):
+    return Surface(surface.positions + np.float32(0.001), surface.triangles)

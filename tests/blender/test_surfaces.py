@@ -1,5 +1,7 @@
 """Meshes as surfaces in world space."""
 
+import weakref
+
 import bpy
 import numpy as np
 import pytest
@@ -83,3 +85,24 @@ def test_what_cannot_be_used_is_named_with_a_remedy(cube, evaluated):
             read_surface(obj, evaluated(), need_uv=True, place=f"place of {obj.name}")
         assert raised.value.place == f"place of {obj.name}"
     assert read_surface(cube, evaluated(), need_uv=False, place="cube").corner_uv is None
+
+
+def test_a_mesh_that_is_read_again_is_the_same_surface_until_it_changes(cube, evaluated):
+    first = read_surface(cube, evaluated(), need_uv=False, place="cube")
+    assert read_surface(cube, evaluated(), need_uv=False, place="cube") is first
+    cube.data.vertices[0].co.x += 0.001
+    cube.data.update_tag()
+    other = read_surface(cube, evaluated(), need_uv=False, place="cube")
+    assert other is not first and not np.array_equal(other.positions, first.positions)
+    cube.data.vertices[0].co.x -= 0.001
+    cube.data.uv_layers.active.uv[0].vector = (0.25, 0.75)
+    cube.data.update_tag()
+    again = read_surface(cube, evaluated(), need_uv=False, place="cube")
+    assert again is not first and not np.array_equal(again.corner_uv, first.corner_uv)
+
+
+def test_a_surface_that_nobody_has_any_more_is_let_go(cube, evaluated):
+    first = weakref.ref(read_surface(cube, evaluated(), need_uv=False, place="cube"))
+    cube.scale.x = 2.0
+    read_surface(cube, evaluated(), need_uv=False, place="cube")
+    assert first() is None

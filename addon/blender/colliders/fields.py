@@ -2,7 +2,7 @@
 
 A field depends only on the mesh and its resolution, so it is found again by their hash: in the next
 preview, by the next groom on the same head, by a bake. It is the same to the bit, whichever thread
-builds it.
+builds it. That of the built-in head ships.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from ...dynamics.settings import DynamicsSettings
 from ...errors import HairloomError
 from ...strands import Surface
 from ..base.thread_work import ThreadWork
+from .bust_field import shipped_field
 
 #: Fields that are kept though nothing may collide with them any more, 6 MB each by default.
 KEPT = 8
@@ -40,10 +41,10 @@ def field_of(
         HairloomError: see `DistanceField.from_surface`.
         NotMadeYetError: it is being made, and nobody waits.
     """
-    key = _key(surface, settings)
+    key = field_key(surface, settings)
     work = _works.pop(key, None)
     if work is None:
-        work = ThreadWork(lambda _: DistanceField.from_surface(surface, settings), "distance field")
+        work = ThreadWork(lambda _: _made(surface, settings, key), "distance field")
     _works[key] = work  # now the youngest
     if blocking:
         work.wait()
@@ -86,7 +87,12 @@ def forget() -> None:
     _works.clear()
 
 
-def _key(surface: Surface, settings: DynamicsSettings) -> str:
+def _made(surface: Surface, settings: DynamicsSettings, key: str) -> DistanceField:
+    return shipped_field(surface, key) or DistanceField.from_surface(surface, settings)
+
+
+def field_key(surface: Surface, settings: DynamicsSettings) -> str:
+    """What a field depends on."""
     state = hashlib.blake2b(digest_size=16)
     for array in (surface.positions, surface.triangles):
         state.update(f"{array.dtype} {array.shape}".encode())

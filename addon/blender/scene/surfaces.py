@@ -1,7 +1,12 @@
-"""Meshes that hair grows from or collides with: evaluated mesh to a `Surface` in world space."""
+"""Meshes that hair grows from or collides with: evaluated mesh to a `Surface` in world space.
+
+A mesh that is read again, by another groom or after an edit elsewhere, gives the same surface while
+it is in use, with all that has been found on it: its search trees, the balls within it.
+"""
 
 from __future__ import annotations
 
+import weakref
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -11,6 +16,10 @@ import numpy as np
 from ...arrays import Floats, Ints
 from ...errors import HairloomError
 from ...strands import Surface
+
+#: surfaces that somebody may have, and the last one that was read
+_in_use: list[weakref.ref[Surface]] = []
+_last: list[Surface] = []
 
 
 def read_surface(
@@ -41,7 +50,30 @@ def read_surface(
                 remedy="Unwrap it (Edit Mode, UV > Unwrap), or leave out --strict",
             )
         surface = Surface(_positions(mesh), triangles, corner_uv)
-    return surface.transformed(np.array(obj.evaluated_get(depsgraph).matrix_world))
+    return _known(surface.transformed(np.array(obj.evaluated_get(depsgraph).matrix_world)))
+
+
+def _known(surface: Surface) -> Surface:
+    """The surface that is in use already if it is the same."""
+    in_use = [(one, one()) for one in _in_use]
+    _in_use[:] = [one for one, there in in_use if there is not None]
+    for _, there in in_use:
+        if there is not None and _is_same(surface, there):
+            _last[:] = [there]
+            return there
+    _in_use.append(weakref.ref(surface))
+    _last[:] = [surface]
+    return surface
+
+
+def _is_same(one: Surface, other: Surface) -> bool:
+    if (one.corner_uv is None) != (other.corner_uv is None):
+        return False
+    return (
+        np.array_equal(one.positions, other.positions)
+        and np.array_equal(one.triangles, other.triangles)
+        and (one.corner_uv is None or np.array_equal(one.corner_uv, other.corner_uv))  # type: ignore[arg-type]
+    )
 
 
 def uv_map_note(obj: bpy.types.Object) -> str:

@@ -19,7 +19,7 @@ from ...errors import HairloomError
 from ...groom.grow import grow, scalp_density
 from ...groom.settings import GrowSettings
 from ...groom.widths import with_widths
-from ...strands import StrandSet, Surface
+from ...strands import StrandSet
 from ..base.attributes import read_attribute
 from ..base.objects import head_of
 from ..base.parts import Part, Parts, at_once
@@ -31,8 +31,6 @@ from ..scene.surfaces import read_surface
 
 #: what hair has as it grows; Blender's own names of what is selected or hidden begin with a dot
 _OWN_ATTRIBUTES = ("position", "radius", "surface_uv_coordinate")
-#: The mesh that hair grew on last: growing again finds there what was searched.
-_last_surface: list[Surface] = []
 
 
 def grow_on(
@@ -161,7 +159,7 @@ def _grown(
     Args:
         before: the curves that these replace, whose widths they keep.
     """
-    surface = _known(read_surface(head, depsgraph, need_uv=False, place=head.name))
+    surface = read_surface(head, depsgraph, need_uv=False, place=head.name)
     density = read_weights(head, depsgraph, density_group) if density_group else None
     length = read_weights(head, depsgraph, length_group) if length_group else None
     radius: Floats | None = None if before is None else read_attribute(before, "radius", "POINT")
@@ -181,19 +179,6 @@ def _with_widths(strands: StrandSet, radius: Floats | None, offsets: Ints) -> St
     if radius is not None and np.array_equal(offsets, strands.offsets):
         return replace(strands, radius=radius, has_widths=True)
     return with_widths(strands, "found")[0]
-
-
-def _known(surface: Surface) -> Surface:
-    """The surface that hair grew on last if this is the same."""
-    if not any(_is_same(surface, last) for last in _last_surface):
-        _last_surface[:] = [surface]
-    return _last_surface[0]
-
-
-def _is_same(one: Surface, other: Surface) -> bool:
-    return np.array_equal(one.positions, other.positions) and np.array_equal(
-        one.triangles, other.triangles
-    )
 
 
 def _other_attributes(curves: bpy.types.Curves) -> tuple[str, ...]:
