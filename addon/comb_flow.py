@@ -41,28 +41,36 @@ def combed(rig: Rig, curves: StrandSet, number: Ints, *, is_animated: bool = Fal
         guide_grid[guides] = center_lines(moved, cv_count).grid
     grown, own = rig.grown, rig.own_count
     if grown is not None and own is not None:
-        grown, touched = _grown(grown, strands.with_points(points.copy()), number)
+        grown, touched = _grown(grown, strands, points, number)
         if len(touched):
             put_children(points, strands.offsets, grown, touched, own)
     return replace(rig, strands=replace(strands, points=points), guide_grid=guide_grid, grown=grown)
 
 
-def _grown(grown: Grown, strands: StrandSet, number: Ints) -> tuple[Grown, Ints]:
+def _grown(grown: Grown, strands: StrandSet, points: Floats, number: Ints) -> tuple[Grown, Ints]:
     """The children's parents as they are now, and which of the rig's children they shape again.
 
     Args:
-        strands: of the rig, of which those of these numbers have moved.
+        strands: of the rig. points: theirs now; those of strands of these numbers have moved.
     """
     is_moved = np.isin(grown.parents, number)
     parents = np.flatnonzero(is_moved)
     if not len(parents):
         return grown, parents
     grid = grown.shapes.grid.copy()
-    moved = strands.take(grown.parents[parents])
+    moved = _taken(strands, points, grown.parents[parents])
     grid[parents] = resample(moved, grid.shape[1]).grid
     shapes = replace(grown.shapes, points=grid.reshape(-1, 3))
     touched = np.flatnonzero(grown.growth.touched(is_moved)[grown.kept])
     return replace(grown, shapes=shapes), touched
+
+
+def _taken(strands: StrandSet, points: Floats, chosen: Ints) -> StrandSet:
+    """Some of the strands, with these points of all, without making a set of all."""
+    counts = strands.point_counts[chosen]
+    offsets = np.concatenate([[0], np.cumsum(counts)])
+    picked = np.arange(offsets[-1]) + np.repeat(strands.offsets[chosen] - offsets[:-1], counts)
+    return strands.take(chosen).with_points(points[picked])
 
 
 def put_children(points: Floats, offsets: Ints, grown: Grown, chosen: Ints, own: int) -> None:

@@ -153,7 +153,7 @@ class _Guided:
         assert triangle is not None and barycentric is not None
         root = np.einsum("nk,nkj->nj", barycentric, surface.corners[triangle].astype(np.float64))
         place, first = np.unique(root, axis=0, return_index=True)
-        normal = surface.triangle_normals()[triangle[first]]
+        normal = surface.once(Surface.triangle_normals)[triangle[first]]
         if len(place) == 1:
             tuft = _TUFT * float(guides.lengths().mean())
             return cls(place, normal, np.array([max(tuft, 1e-6)]), is_painted)

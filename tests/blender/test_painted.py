@@ -10,6 +10,7 @@ import pytest
 
 from hairloom.addon.blender.bakes.groom_hashes import groom_rig_hash
 from hairloom.addon.blender.bakes.simulated import differences
+from hairloom.addon.blender.base.vertex_weights import Memberships, read_weights
 from hairloom.addon.blender.preview import previews, scene_events
 from hairloom.addon.blender.properties import presets
 from hairloom.addon.blender.properties.groom_settings import GroomSettings
@@ -256,3 +257,42 @@ def test_a_preset_keeps_what_is_painted_and_may_bring_names_of_its_own(hair: Any
     dynamics.gravity_mask, dynamics.bend_mask = "Other", "Bent"
     presets.apply(kept, hair)
     assert (dynamics.gravity_mask, dynamics.bend_mask) == ("Top", "Bent")
+
+
+def test_a_dab_reads_the_vertex_groups_once_for_children_and_overlay(
+    hair: Any, sphere: Any, evaluated: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    every = [vertex.index for vertex in sphere.data.vertices]
+    for name in ("Top", "Long", "Clumped"):
+        sphere.vertex_groups.new(name=name).add(every, 0.9, "REPLACE")
+    children = hair.data.hairloom.children
+    children.method, children.strand_count, hair.hairloom.children_density = "multi", 100, "Top"
+    children.length_mask, children.clump_mask, children.clump = "Long", "Clumped", 0.5
+    session = started(hair, evaluated)
+    hair.hairloom.shown_overlays, hair.hairloom.shown_map = {"paint"}, "Long"
+    catch_up(evaluated)
+    read, of = [], Memberships.of
+    monkeypatch.setattr(Memberships, "of", lambda mesh: read.append(mesh) or of(mesh))
+    for name, weight in (("Long", 0.5), ("Top", 0.2), ("Long", 0.3)):
+        length = session.rig.strands.lengths()
+        sphere.vertex_groups[name].add(every[: len(every) // 2], weight, "REPLACE")
+        sphere.data.update_tag()
+        read.clear()
+        bpy.context.view_layer.update()
+        shown = session.shown_map(evaluated())
+        assert len(read) == 1
+        assert name != "Long" or np.isclose(shown, weight).any(), "the overlay is of this dab"
+        assert name != "Long" or (session.rig.strands.lengths() != length).any()
+
+
+def test_weights_are_those_that_each_vertex_has(sphere: Any, evaluated: Any) -> None:
+    random, count = np.random.default_rng(2), len(sphere.data.vertices)
+    wanted = {}
+    for name in ("One", "Two", "Three"):
+        group, weights = sphere.vertex_groups.new(name=name), np.zeros(count)
+        for vertex in random.permutation(count)[: count // 2].tolist():
+            weights[vertex] = random.uniform()
+            group.add([vertex], float(weights[vertex]), "REPLACE")
+        wanted[name] = weights
+    for name, weights in wanted.items():
+        np.testing.assert_allclose(read_weights(sphere, evaluated(), name), weights, atol=1e-7)

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import Self
+
 import bpy
 import numpy as np
 
@@ -67,7 +70,7 @@ def read_weights(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, name: st
         values, domain = weights_on(obj, mesh, name)
         if domain == "POINT":
             return values
-        corners, triangles = at_corners(mesh, values, domain), _corners(mesh, "vertices")
+        corners, triangles = at_corners(mesh, values, domain), triangle_corners(mesh, "vertices")
         count = len(mesh.vertices)
     finally:
         evaluated.to_mesh_clear()
@@ -91,7 +94,7 @@ def weights_on(obj: bpy.types.Object, mesh: bpy.types.Mesh, name: str) -> tuple[
     """
     group = obj.vertex_groups.get(name)
     if group is not None:
-        return _group_weights(mesh, group.index), "POINT"
+        return Memberships.of(mesh).weights(group.index), "POINT"
     found = painted_attribute(mesh, name)
     if found is None:
         raise missing_weights(obj, name, mesh.attributes.get(name))
@@ -115,16 +118,16 @@ def painted_attribute(
 def at_corners(mesh: bpy.types.Mesh, values: Floats, domain: str) -> Floats:
     """Values at the corners of the mesh's triangles, (triangle_count, 3)."""
     if domain == "POINT":
-        return values[_corners(mesh, "vertices")]
+        return values[triangle_corners(mesh, "vertices")]
     if domain == "CORNER":
-        return values[_corners(mesh, "loops")]
+        return values[triangle_corners(mesh, "loops")]
     mesh.calc_loop_triangles()
     faces = np.empty(len(mesh.loop_triangles), np.int32)
     mesh.loop_triangles.foreach_get("polygon_index", faces)
     return np.repeat(values[faces][:, None], 3, axis=1)
 
 
-def _corners(mesh: bpy.types.Mesh, of: str) -> Ints:
+def triangle_corners(mesh: bpy.types.Mesh, of: str) -> Ints:
     """Vertices or loops of the mesh's triangles, (triangle_count, 3)."""
     mesh.calc_loop_triangles()
     numbers = np.empty((len(mesh.loop_triangles), 3), np.int32)
@@ -140,13 +143,38 @@ def set_group(obj: bpy.types.Object, name: str, weights: Floats) -> None:
         group.add(np.flatnonzero(steps == step).tolist(), float(step) / 255.0, "REPLACE")
 
 
-def _group_weights(mesh: bpy.types.Mesh, index: int) -> Floats:
-    weights = np.zeros(len(mesh.vertices), np.float32)
-    for vertex in mesh.vertices:  # Blender gives the weights of groups in no faster way
-        for member in vertex.groups:
-            if member.group == index:
-                weights[vertex.index] = member.weight
-    return weights
+@dataclass(frozen=True)
+class Memberships:
+    """What all vertices of a mesh have in all vertex groups: it takes as long to read as one group.
+
+    vertex, group: (n,). weight: (n,) float32. vertex_count: of the mesh.
+    """
+
+    vertex: Ints
+    group: Ints
+    weight: Floats
+    vertex_count: int
+
+    @classmethod
+    def of(cls, mesh: bpy.types.Mesh) -> Self:
+        counts: list[int] = []
+        groups: list[int] = []
+        weights: list[float] = []
+        for vertex in mesh.vertices:  # Blender gives the weights of groups in no faster way
+            members = vertex.groups
+            counts.append(len(members))
+            for member in members:
+                groups.append(member.group)
+                weights.append(member.weight)
+        vertex = np.repeat(np.arange(len(counts)), counts)
+        return cls(vertex, np.array(groups, int), np.array(weights, np.float32), len(counts))
+
+    def weights(self, index: int) -> Floats:
+        """Those in one group, (vertex_count,) float32; 0 where a vertex is not in it."""
+        found = np.zeros(self.vertex_count, np.float32)
+        is_in = self.group == index
+        found[self.vertex[is_in]] = self.weight[is_in]
+        return found
 
 
 def _is_weight(attribute: bpy.types.Attribute) -> bool:

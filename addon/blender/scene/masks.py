@@ -7,6 +7,7 @@ the curves, then as an image, which lies on the surface's active UV map.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Self
 
 import bpy
 import numpy as np
@@ -18,15 +19,38 @@ from ...params import Settings
 from ...strands import StrandSet, Surface
 from ..base.vertex_weights import (
     LUMINANCE,
+    Memberships,
     at_corners,
     has_weights,
     image_names,
     mask_choices,
     missing_weights,
     painted_attribute,
+    triangle_corners,
     weights_on,
 )
 from .curves import curve_offsets
+
+
+@dataclass(frozen=True)
+class _Groups:
+    """The vertex groups of a surface. corners: (triangle_count, 3) vertices of its triangles."""
+
+    members: Memberships
+    corners: Ints
+
+    @classmethod
+    def of(cls, evaluated: bpy.types.Object) -> Self:
+        mesh = evaluated.to_mesh()
+        try:
+            return cls(Memberships.of(mesh), triangle_corners(mesh, "vertices"))
+        finally:
+            evaluated.to_mesh_clear()
+
+    def at_corners(self, index: int) -> Floats:
+        """The weights in one group, (triangle_count, 3)."""
+        corners: Floats = self.members.weights(index)[self.corners]
+        return corners
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,6 +60,8 @@ class Canvas:
     hair: its curves; None: they are of a file. surface: the object that it grows on, or None.
     head: that as it was read. strands: those of the curves that are usable. kept: which these are.
     good: every mask by its name, as it could be used last.
+
+    It is of one moment: vertex groups are read once, and shown as they were then.
     """
 
     hair: bpy.types.Object | None
@@ -44,6 +70,7 @@ class Canvas:
     strands: StrandSet
     kept: Ints
     good: dict[str, Mask] = field(default_factory=dict)
+    _groups: list[_Groups] = field(default_factory=list, init=False)
 
     def masks(
         self, settings: Settings, depsgraph: bpy.types.Depsgraph
@@ -105,13 +132,19 @@ class Canvas:
         if surface is None or head is None or surface.type != "MESH":
             return None
         evaluated = surface.evaluated_get(depsgraph)
-        mesh = evaluated.to_mesh()
-        try:
-            if not has_weights(surface, mesh, name):
-                return None
-            corners = at_corners(mesh, *weights_on(surface, mesh, name))
-        finally:
-            evaluated.to_mesh_clear()
+        group = surface.vertex_groups.get(name)
+        if group is not None:
+            if not self._groups:
+                self._groups.append(_Groups.of(evaluated))
+            corners = self._groups[0].at_corners(group.index)
+        else:
+            mesh = evaluated.to_mesh()
+            try:
+                if not has_weights(surface, mesh, name):
+                    return None
+                corners = at_corners(mesh, *weights_on(surface, mesh, name))
+            finally:
+                evaluated.to_mesh_clear()
         if len(corners) != len(head.triangles):
             raise HairloomError(
                 f"the mask '{name}' lies on {len(corners):,} triangles, the hair was made on "

@@ -61,6 +61,7 @@ class GroomSource:
         self._holding = Holding.of(hair, depsgraph)
         self._good: dict[str, Mask] = {}
         self._shown_map: tuple[str, Mask | None] | None = None
+        self._brushed: Canvas | None = None
         self._motion_masks = NO_MASKS
         self._painted_guides: tuple[Ints, Masks, PaintedGuides | None] | None = None
         source = read_source(hair, depsgraph, self._good)
@@ -245,6 +246,7 @@ class GroomSource:
         """
         hair, (density, masks) = self.hair.found(), self.painted
         canvas, settings = self._canvas(self.source), self.settings[ChildrenSettings]
+        self._brushed = canvas  # which the overlay looks at before anything else is painted
         self.painted = (
             read_density(hair, canvas, depsgraph)[0],
             canvas.masks(settings, depsgraph)[0],
@@ -255,6 +257,7 @@ class GroomSource:
     def accept(self, request: BuildRequest) -> None:
         """Its hair is shown from now on; what acts at once is as it is set now."""
         self.source, self._holding = request.source, request.holding
+        self._brushed = None
         self._combed = self.source.strands
         self.painted = self.source.density, self.source.masks
         self.settings = GroomSettings.of(self.hair.found()).at_once(request.settings)
@@ -308,7 +311,8 @@ class GroomSource:
         None: there is none."""
         name = shown_map_name(self.hair.found())
         if self._shown_map is None or self._shown_map[0] != name:
-            mask = self._canvas(self.source).read(name, depsgraph)[0] if name else None
+            canvas = self._brushed or self._canvas(self.source)
+            mask = canvas.read(name, depsgraph)[0] if name else None
             self._shown_map = name, mask
         mask = self._shown_map[1]
         painted = None if mask is None else painted_guides(rig, Masks({name: mask}))
@@ -316,7 +320,7 @@ class GroomSource:
 
     def forget_shown_map(self) -> None:
         """It is to be read again."""
-        self._shown_map = None
+        self._shown_map = self._brushed = None
 
     def _canvas(self, source: Source) -> Canvas:
         """On what it is painted."""
