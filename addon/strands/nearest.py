@@ -32,7 +32,7 @@ def nearest_points(places: Floats, among: Floats, count: int) -> tuple[Ints, Flo
     place, point = (
         np.ascontiguousarray(np.asarray(each).T, np.float64) for each in (places, among)
     )
-    # memory that is asked for anew takes as long as what is done in it
+    # memory that is asked for again takes as long as what is done in it
     memory = np.empty((2, max(_TABLE, len(among))))
     parts: list[tuple[Ints, Ints]] = []
     if len(places):

@@ -205,14 +205,14 @@ def test_blenders_playback_waits_and_takes_over(new_hair, sphere, evaluated, ext
 
 def test_the_field_of_the_built_in_head_ships(monkeypatch):
     def made(*_, **__):
-        raise AssertionError("it is made anew")
+        raise AssertionError("it is made again")
 
     monkeypatch.setattr(DistanceField, "from_surface", made)
     surface, settings = built_in_head().surface, DynamicsSettings()
     found = fields.field_of(surface, settings, place="Head")
     assert found.surface is surface
     for other, finer in ((moved(surface), settings), (surface, COARSE)):
-        with pytest.raises(AssertionError, match="anew"):
+        with pytest.raises(AssertionError, match="made again"):
             fields.field_of(other, finer, place="Head")
 
 
