@@ -122,18 +122,41 @@ void find_fall(int guide)
   }
 }
 
+// Where a CV was, so that its speed is what drag leaves of it.
+vec3 slowed(vec3 here, vec3 before, vec3 air_displacement)
+{
+  return frame.drag > 0.0 ? braked(here, before, frame.drag, air_displacement) : before;
+}
+
+#ifdef HAS_FORCE_FIELDS
+vec3 blown[FREE_SIZE];  // [m] by which force fields move each free CV in a substep
+
+void feel_fields(vec3 air_displacement)
+{
+  int i = 0;
+  do {
+    vec3 here = picked(position, i + 2);
+    vec3 before = slowed(here, picked(previous, i + 2), air_displacement);
+    vec3 along = picked(position, min(i + 3, CV_COUNT - 1)) - picked(position, i + 1);
+    vec3 felt = blown_by_fields(here, before, field_direction(along));
+    for (int k = 0; k < FREE; k++) {
+      blown[k] = k == i ? felt : blown[k];
+    }
+    i++;
+  } while (i < FREE);
+}
+#endif
+
 void predict(vec4 moment, vec3 air_displacement)
 {
+#ifdef HAS_FORCE_FIELDS
+  feel_fields(air_displacement);
+#endif
   for (int i = 0; i < FREE; i++) {
     vec3 here = position[i + 2];
-    vec3 before = previous[i + 2];
-    if (frame.drag > 0.0) {
-      before = braked(here, before, frame.drag, air_displacement);
-    }
+    vec3 before = slowed(here, previous[i + 2], air_displacement);
 #ifdef HAS_FORCE_FIELDS
-    vec3 root_side = i == 0 ? position[1] : previous[i + 1];  // where it was, as of all others
-    vec3 tip_side = position[min(i + 3, CV_COUNT - 1)];
-    before -= blown_by_fields(here, before, field_direction(tip_side - root_side));
+    before -= blown[i];
 #endif
     vec3 impulse = style_displacement[i + 2] * moment.z + style_curvature[i + 2] * moment.w;
     impulse = impulse * own_carried + fall[i] + air_displacement * own_air;

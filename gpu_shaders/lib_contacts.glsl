@@ -142,39 +142,36 @@ float slack_of(float kept)
   return max(kept * {{may_miss}}, 2.0 * SKIN);
 }
 
-// Put a contact of free CV i where there is room; else in place of the less pressing one of the
-// two, in the order of the colliders.
-void add_contact(int i, vec4 new_plane, vec4 new_origin)
+// Where a contact goes: x into the first slot; y into the second one, z which moves to the first. The
+// less pressing of two makes room, in the order of the colliders; `first`, `second` and `gap` are how
+// far [m] the point is below the planes of the two and of the new one. Without branches: compilers
+// keep each once for every CV.
+bvec3 slots_of(bool is_met, bool is_empty, float first, float second, float gap)
+{
+  bool is_pressing = is_met && !is_empty && gap > min(first, second);
+  return bvec3(is_met && is_empty, is_pressing, is_pressing && first < second);
+}
+
+// Put a contact of free CV i where there is room.
+void add_contact(int i, bool is_met, vec4 new_plane, vec4 new_origin)
 {
 #if CONTACT_SLOTS == 1
-  plane[0][i] = new_plane;
-  origin[0][i] = new_origin;
+  plane[0][i] = is_met ? new_plane : plane[0][i];
+  origin[0][i] = is_met ? new_origin : origin[0][i];
 #else
   vec4 here = vec4(-position[i + 2], 1.0);
-  float first = dot(plane[0][i], here);
-  float second = dot(plane[1][i], here);
-  if (plane[0][i].w == NO_PLANE) {
-    plane[0][i] = new_plane;
-    origin[0][i] = new_origin;
-  }
-  else if (dot(new_plane, here) > min(first, second)) {
-    if (first < second) {
-      plane[0][i] = plane[1][i];
-      origin[0][i] = origin[1][i];
-    }
-    plane[1][i] = new_plane;
-    origin[1][i] = new_origin;
-  }
+  bool is_empty = plane[0][i].w == NO_PLANE;
+  bvec3 goes = slots_of(is_met, is_empty, dot(plane[0][i], here), dot(plane[1][i], here), dot(new_plane, here));
+  plane[0][i] = goes.x ? new_plane : (goes.z ? plane[1][i] : plane[0][i]);
+  origin[0][i] = goes.x ? new_origin : (goes.z ? origin[1][i] : origin[0][i]);
+  plane[1][i] = goes.y ? new_plane : plane[1][i];
+  origin[1][i] = goes.y ? new_origin : origin[1][i];
 #endif
 }
 
-void find_contacts_with(Posed posed)
+// distance_to of many points, each round solid fetched once.
+void distances_to(Posed posed, vec4 local[FREE_SIZE], out Found found[FREE_SIZE])
 {
-  Found found[FREE_SIZE];
-  vec4 local[FREE_SIZE];
-  for (int i = 0; i < FREE; i++) {
-    local[i] = vec4(moved(posed.inverse, vec4(position[i + 2], 1.0)), 1.0);
-  }
 #ifdef HAS_ROUNDS
   vec4 nearest[FREE_SIZE];  // xyz from the axis, w radius
   float least[FREE_SIZE];
@@ -207,35 +204,56 @@ void find_contacts_with(Posed posed)
 #endif
   }
 #endif
+}
+
+void find_contacts_with(Posed posed)
+{
+  Found found[FREE_SIZE];
+  vec4 local[FREE_SIZE];
+  for (int i = 0; i < FREE; i++) {
+    local[i] = vec4(moved(posed.inverse, vec4(position[i + 2], 1.0)), 1.0);
+  }
+  distances_to(posed, local, found);
+  vec4 surface[FREE_SIZE];  // see Met: xyz the normal, w where the surface is
+  float was[FREE_SIZE];
+  bool is_near[FREE_SIZE];
+  bool is_fast[FREE_SIZE];
   for (int i = 0; i < FREE; i++) {
     vec4 unscaled = world_normal(posed, found[i].gradient);
     vec3 normal = unscaled.xyz;
     float away = found[i].distance * unscaled.w;
-    vec3 from = previous[i + 2] + moved(posed.change, local[i]);
-    vec3 path = position[i + 2] - from;
-    float height = dot(normal, position[i + 2]);
-    float surface = height - away;
-    float was = away - dot(normal, path);
+    vec3 path = position[i + 2] - previous[i + 2] - moved(posed.change, local[i]);
+    surface[i] = vec4(normal, dot(normal, position[i + 2]) - away);
+    was[i] = away - dot(normal, path);
     float beyond = frame.reach;
 #ifdef HAS_SHARP
     beyond += posed.sweep.y > 0.0 ? length(path) : 0.0;
 #endif
-    if (away < radius[i] + beyond) {
+    is_near[i] = away < radius[i] + beyond;
+    is_fast[i] = is_near[i] && dot(path, path) > posed.sweep.x;
+  }
 #ifdef HAS_FOLLOWED
-      if (dot(path, path) > posed.sweep.x) {
-        Met met = followed(posed, position[i + 2], previous[i + 2], radius[i]);
-        normal = met.normal;
-        surface = met.surface;
-        was = met.was;
-        height = dot(normal, position[i + 2]);
+  int fast = next_of(is_fast, -1);
+  if (fast < FREE) {
+    do {
+      vec3 here = picked(position, fast + 2);
+      Met met = followed(posed, here, picked(previous, fast + 2), picked(radius, fast));
+      for (int i = 0; i < FREE; i++) {
+        surface[i] = i == fast ? vec4(met.normal, met.surface) : surface[i];
+        was[i] = i == fast ? met.was : was[i];
       }
+      fast = next_of(is_fast, fast);
+    } while (fast < FREE);
+  }
 #endif
-      float reached = was + frame.led_out + posed.sweep.w;
-      float offset = surface + min(radius[i], reached);
-      if (posed.sweep.y <= 0.0 || offset - height > -frame.reach) {
-        add_contact(i, vec4(normal, offset), vec4(from, reached >= radius[i] ? SKIN : NO_PLANE));
-      }
-    }
+  for (int i = 0; i < FREE; i++) {
+    float reached = was[i] + frame.led_out + posed.sweep.w;
+    float offset = surface[i].w + min(radius[i], reached);
+    float gap = offset - dot(surface[i].xyz, position[i + 2]);
+    bool is_met = is_near[i] && (posed.sweep.y <= 0.0 || gap > -frame.reach);
+    vec3 from = previous[i + 2] + moved(posed.change, local[i]);
+    float counts = reached >= radius[i] ? SKIN : NO_PLANE;
+    add_contact(i, is_met, vec4(surface[i].xyz, offset), vec4(from, counts));
   }
 }
 
@@ -273,75 +291,99 @@ vec2 weights_of(int i, float along)
   return vec2(lower / scale, min(along / scale, {{max_weight}}));
 }
 
-// As add_contact, for segment i.
-void add_between(int i, vec4 new_plane, vec4 new_origin, float along)
+// [m] that a point of segment i is below a plane.
+float gap_between(int i, vec4 surface, float along)
 {
-  int slot = 0;
-#if CONTACT_SLOTS > 1
-  if (between_plane[0][i].w != NO_PLANE) {
-    float gaps[2];
-    for (int k = 0; k < 2; k++) {
-      vec3 point = between(position[i + 1], position[i + 2], between_along[k][i]);
-      gaps[k] = dot(between_plane[k][i], vec4(-point, 1.0));
-    }
-    vec3 new_point = between(position[i + 1], position[i + 2], along);
-    if (dot(new_plane, vec4(-new_point, 1.0)) <= min(gaps[0], gaps[1])) {
-      return;
-    }
-    if (gaps[0] < gaps[1]) {
-      between_plane[0][i] = between_plane[1][i];
-      between_origin[0][i] = between_origin[1][i];
-      between_along[0][i] = between_along[1][i];
-    }
-    slot = 1;
-  }
-#endif
-  between_plane[slot][i] = new_plane;
-  between_origin[slot][i] = new_origin;
-  between_along[slot][i] = along;
+  return dot(surface, vec4(-between(position[i + 1], position[i + 2], along), 1.0));
 }
 
-// Of some points of each segment the one that is deepest below its plane.
+// As add_contact, for segment i.
+void add_between(int i, bool is_met, vec4 new_plane, vec4 new_origin, float along)
+{
+#if CONTACT_SLOTS == 1
+  between_plane[0][i] = is_met ? new_plane : between_plane[0][i];
+  between_origin[0][i] = is_met ? new_origin : between_origin[0][i];
+  between_along[0][i] = is_met ? along : between_along[0][i];
+#else
+  float first = gap_between(i, between_plane[0][i], between_along[0][i]);
+  float second = gap_between(i, between_plane[1][i], between_along[1][i]);
+  bool is_empty = between_plane[0][i].w == NO_PLANE;
+  bvec3 goes = slots_of(is_met, is_empty, first, second, gap_between(i, new_plane, along));
+  between_plane[0][i] = goes.x ? new_plane : (goes.z ? between_plane[1][i] : between_plane[0][i]);
+  between_origin[0][i] = goes.x ? new_origin : (goes.z ? between_origin[1][i] : between_origin[0][i]);
+  between_along[0][i] = goes.x ? along : (goes.z ? between_along[1][i] : between_along[0][i]);
+  between_plane[1][i] = goes.y ? new_plane : between_plane[1][i];
+  between_origin[1][i] = goes.y ? new_origin : between_origin[1][i];
+  between_along[1][i] = goes.y ? along : between_along[1][i];
+#endif
+}
+
+struct Deepest {
+  vec4 plane;
+  vec4 origin;
+  float along;  // 0: none is near
+};
+
+// Of some points of a segment the one that is deepest below its plane.
+Deepest deepest_between(Posed posed, int i)
+{
+  vec3 lower = picked(position, i + 1);
+  vec3 upper = picked(position, i + 2);
+  vec3 lower_before = picked(previous, i + 1);
+  vec3 upper_before = picked(previous, i + 2);
+  float own_radius = picked(radius, i);
+  vec3 kept = between_kept(i);
+  float least = -frame.reach;
+  Deepest deepest = Deepest(vec4(0.0), vec4(0.0), 0.0);
+  for (int k = 0; k < {{between_count}}; k++) {
+    float along = float(k + 1) / float({{between_count}} + 1);
+    vec3 here = between(lower, upper, along);
+    vec3 before = between(lower_before, upper_before, along);
+    Met met = followed(posed, here, before, own_radius);
+    float reached = met.was + frame.led_out + posed.sweep.w;
+    float offset = met.surface + min(kept[k], reached);
+    float gap = offset - dot(met.normal, here);
+    if (gap > least) {
+      vec3 from = before + moved(posed.change, vec4(moved(posed.inverse, vec4(here, 1.0)), 1.0));
+      least = gap;
+      deepest = Deepest(vec4(met.normal, offset), vec4(from, reached >= kept[k] ? SKIN : NO_PLANE), along);
+    }
+  }
+  return deepest;
+}
+
 void find_between_with(Posed posed)
 {
+  Found found[FREE_SIZE];
+  vec4 local[FREE_SIZE];
   for (int i = 0; i < FREE; i++) {
-    if (held_at(i)) {
-      continue;
-    }
-    vec3 lower = position[i + 1];
-    vec3 upper = position[i + 2];
-    vec3 middle = 0.5 * (lower + upper);
-    vec3 local = moved(posed.inverse, vec4(middle, 1.0));
-    vec3 path = middle - 0.5 * (previous[i + 1] + previous[i + 2]) - moved(posed.change, vec4(local, 1.0));
-    Found found = distance_to(posed.own, posed.low_cell, local);
-    float away = found.distance * world_normal(posed, found.gradient).w;
-    if (away >= radius[i] + frame.reach + 0.5 * length(upper - lower) + length(path)) {
-      continue;
-    }
-    vec3 kept = between_kept(i);
-    float deepest = -frame.reach;
-    vec4 plane_there = vec4(0.0);
-    vec4 origin_there = vec4(0.0);
-    float along_there = 0.0;
-    for (int k = 0; k < {{between_count}}; k++) {
-      float along = float(k + 1) / float({{between_count}} + 1);
-      vec3 here = between(lower, upper, along);
-      vec3 before = between(previous[i + 1], previous[i + 2], along);
-      Met met = followed(posed, here, before, radius[i]);
-      float reached = met.was + frame.led_out + posed.sweep.w;
-      float offset = met.surface + min(kept[k], reached);
-      float gap = offset - dot(met.normal, here);
-      if (gap > deepest) {
-        vec3 from = before + moved(posed.change, vec4(moved(posed.inverse, vec4(here, 1.0)), 1.0));
-        deepest = gap;
-        plane_there = vec4(met.normal, offset);
-        origin_there = vec4(from, reached >= kept[k] ? SKIN : NO_PLANE);
-        along_there = along;
+    local[i] = vec4(moved(posed.inverse, vec4(0.5 * (position[i + 1] + position[i + 2]), 1.0)), 1.0);
+  }
+  distances_to(posed, local, found);
+  bool is_near[FREE_SIZE];
+  Deepest deepest[FREE_SIZE];
+  for (int i = 0; i < FREE; i++) {
+    vec3 before = 0.5 * (previous[i + 1] + previous[i + 2]) + moved(posed.change, local[i]);
+    vec3 path = 0.5 * (position[i + 1] + position[i + 2]) - before;
+    float far = radius[i] + frame.reach + 0.5 * length(position[i + 2] - position[i + 1]) + length(path);
+    is_near[i] = found[i].distance * world_normal(posed, found[i].gradient).w < far && !held_at(i);
+    deepest[i] = Deepest(vec4(0.0), vec4(0.0), 0.0);
+  }
+  int near = next_of(is_near, -1);
+  if (near < FREE) {
+    do {
+      Deepest there = deepest_between(posed, near);
+      for (int i = 0; i < FREE; i++) {
+        deepest[i].plane = i == near ? there.plane : deepest[i].plane;
+        deepest[i].origin = i == near ? there.origin : deepest[i].origin;
+        deepest[i].along = i == near ? there.along : deepest[i].along;
       }
-    }
-    if (along_there > 0.0) {
-      add_between(i, plane_there, origin_there, along_there);
-    }
+      near = next_of(is_near, near);
+    } while (near < FREE);
+  }
+  for (int i = 0; i < FREE; i++) {
+    bool is_met = deepest[i].along > 0.0;
+    add_between(i, is_met, deepest[i].plane, deepest[i].origin, deepest[i].along);
   }
 }
 #endif
@@ -421,9 +463,8 @@ void push_between(float friction)
       position[i + 2] += (there - here) * weights.y;
       bool touches = gap > -between_origin[slot][i].w && between_pushed[slot][i] > 0.0;
       between_normal[i] = touches ? normal : between_normal[i];
-      if (touches && weights.x > 0.0) {
-        between_normal[max(i - 1, 0)] = normal;
-      }
+      int below = max(i - 1, 0);
+      between_normal[below] = touches && weights.x > 0.0 ? normal : between_normal[below];
       lower = upper;
     }
   }
@@ -467,8 +508,7 @@ bool is_deep()
       float gap = dot(plane[slot][i], vec4(-position[i + 2], 1.0));
       found = found || (origin[slot][i].w != NO_PLANE && gap > slack_of(radius[i]));
 #ifdef HAS_SHARP
-      vec3 here = between(position[i + 1], position[i + 2], between_along[slot][i]);
-      gap = dot(between_plane[slot][i], vec4(-here, 1.0));
+      gap = gap_between(i, between_plane[slot][i], between_along[slot][i]);
       if (between_origin[slot][i].w != NO_PLANE && gap > 2.0 * SKIN) {
         int k = int(between_along[slot][i] * float({{between_count}} + 1) - 0.5);
         found = found || gap > slack_of(between_kept(i)[k]);

@@ -1,5 +1,7 @@
 // One guide in motion, as a compute shader holds it: each array has one entry a CV, a free CV or a
-// segment, all loops have constant bounds, so that compilers keep arrays in registers.
+// segment, all loops have constant bounds, so that compilers keep arrays in registers. Mesa unrolls a
+// loop of any length where its count is that of an array in it: one of FREE rounds needs an array of
+// FREE_SIZE, or with 32 CVs it takes minutes to compile.
 //
 // Twin of addon/dynamics/state.py. Defines: CV_COUNT, at least 2; HAS_HELD, where CVs are held by
 // ties; HAS_SPRINGS, where curls give. Holds no resources.
@@ -42,4 +44,35 @@ float length_of(vec3 vector)
 vec3 unit_of(vec3 vector)
 {
   return vector / length_of(vector);
+}
+
+// What a list holds at an index that compilers do not know; an array asked like that would lie in
+// memory. With next_of it lets code that is long or branches be in a program once, not once for each
+// CV, which drivers take a minute to compile.
+vec3 picked(vec3 list[CV_COUNT], int index)
+{
+  vec3 found = list[0];
+  for (int k = 1; k < CV_COUNT; k++) {
+    found = k == index ? list[k] : found;
+  }
+  return found;
+}
+
+float picked(float list[FREE_SIZE], int index)
+{
+  float found = list[0];
+  for (int k = 1; k < FREE; k++) {
+    found = k == index ? list[k] : found;
+  }
+  return found;
+}
+
+// The first free CV or segment behind another that is due, FREE for none.
+int next_of(bool is_due[FREE_SIZE], int index)
+{
+  int next = FREE;
+  for (int k = FREE - 1; k >= 0; k--) {
+    next = is_due[k] && k > index ? k : next;
+  }
+  return next;
 }
