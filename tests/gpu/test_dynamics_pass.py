@@ -335,8 +335,7 @@ LONG_AT_COLLIDERS = (
 SHORT_AT_COLLIDERS = {
     f"{name}, 8 CVs": replace(AT_COLLIDERS[name], cv_count=8) for name in LONG_AT_COLLIDERS
 }
-#: What is wrong with meshes, "plate and finger, 8 CVs" shows as well.
-SLOW_AT_COLLIDERS = ("64 CVs", "ball", "combed", "mesh field")
+SLOW_AT_COLLIDERS = ("64 CVs", "ball", "combed")
 SLOW_IN_AIR = ("64 CVs", "32 CVs", "blended and held", "half the force fields in wind")
 
 
