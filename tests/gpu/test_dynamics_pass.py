@@ -323,7 +323,7 @@ AT_COLLIDERS = {
     "2 CVs": Scene(cv_count=2, on_head=(BALL,)),
 }
 UNTOUCHED = [AT_COLLIDERS["out of reach"], AT_COLLIDERS["2 CVs"]]
-#: Of these a commit has 8 CVs: software drivers compile their programs three times as fast as with 16.
+#: Of these a commit has 8 CVs, whose programs compile three times as fast as with 16.
 LONG_AT_COLLIDERS = (
     "capsule",
     "finger",
