@@ -46,7 +46,8 @@ def settle_hair(
 ) -> Generator[float, None, Outcome]:
     """Let hair fall in the present pose of its body; yields how much is done, 0 to 1.
 
-    Nothing changes before the end.
+    Nothing changes before the end. Hair that has settled, and has not been combed since, falls from
+    its combed shape again, so that other settings can be tried.
 
     Raises:
         HairloomError: no hair that can be used, it is linked from another file, its roots are away
@@ -54,7 +55,7 @@ def settle_hair(
     """
     check_own(hair)
     source = GroomSource(hair, depsgraph)
-    own = read_own_curves(hair, depsgraph)
+    own = read_own_curves(hair, depsgraph, COMBED.before(hair))
     guides = settle_flow.guides_that_fall(own.strands, source.settings[GuideSettings])
     read = source.source
     rig = pipeline.prepare(
