@@ -26,6 +26,7 @@ from typing import Any
 
 import numpy as np
 
+from ..arrays import Ints
 from ..errors import HairloomError
 from ..params import Settings
 from ..strands.rooted_shapes import RootedShapes
@@ -54,7 +55,7 @@ _UNREADABLE = (
 #: array of the file -> its type and dimensions
 _ARRAYS = {
     "root_uv": (np.float32, 2),
-    "steps": (np.int16, 2),
+    "steps": (np.uint8, 3),
     "counts": (np.int32, 1),
     "group": (np.int32, 1),
 }
@@ -173,18 +174,29 @@ def _packed(guides: RootedShapes, place: str) -> bytes:
     np.savez_compressed(
         content,
         root_uv=guides.root_uv.astype(np.float32),
-        steps=_changes(steps.astype(np.int16)),
+        steps=_packed_steps(steps.astype(np.int16)),
         counts=np.diff(guides.offsets).astype(np.int32),
         group=guides.group.astype(np.int32),
     )
     return content.getvalue()
 
 
-def _changes(steps: Any) -> Any:
-    """From each point to the next, which pack better than places; they wrap around."""
-    changes = steps.copy()
-    changes[1:] -= steps[:-1]
-    return changes
+def _packed_steps(steps: Ints) -> Ints:
+    """Bytes (2, 3, point_count) of the ways from each of point_count points to the next.
+
+    Low bytes first, then high ones, by axes. Ways, which wrap around, pack better than places, a
+    quarter better where bytes that are alike lie side by side.
+    """
+    ways = steps.copy()
+    ways[1:] -= steps[:-1]
+    pairs = np.ascontiguousarray(ways.T, "<i2").view(np.uint8).reshape(3, -1, 2)
+    return np.ascontiguousarray(pairs.transpose(2, 0, 1))
+
+
+def _unpacked_steps(packed: Ints) -> Ints:
+    pairs = np.ascontiguousarray(packed.transpose(1, 2, 0))
+    ways = pairs.view("<i2")[..., 0].T
+    return np.cumsum(ways, axis=0, dtype=np.int16)
 
 
 def _text(path: Path) -> dict[str, Any]:
@@ -239,13 +251,13 @@ def _guides(path: Path) -> RootedShapes:
         count > 0
         and arrays["root_uv"].shape == (count, 2)
         and arrays["group"].shape == (count,)
-        and arrays["steps"].shape == (counts.sum(dtype=np.int64), 3)
+        and arrays["steps"].shape == (2, 3, counts.sum(dtype=np.int64))
         and bool((counts >= 2).all())
         and bool(np.isfinite(arrays["root_uv"]).all())
     )
     if not fits:
         raise _damaged("the guides of this style do not fit each other", place)
-    places = np.cumsum(arrays["steps"], axis=0, dtype=np.int16)
+    places = _unpacked_steps(arrays["steps"])
     return RootedShapes(
         arrays["root_uv"],
         np.concatenate([[0], np.cumsum(counts)]).astype(np.int32),
