@@ -182,21 +182,20 @@ def _packed(guides: RootedShapes, place: str) -> bytes:
 
 
 def _packed_steps(steps: Ints) -> Ints:
-    """Bytes (2, 3, point_count) of the ways from each of point_count points to the next.
+    """Bytes (2, 3, point_count) of what leads from each of point_count points to the next.
 
-    Low bytes first, then high ones, by axes. Ways, which wrap around, pack better than places, a
-    quarter better where bytes that are alike lie side by side.
+    Low bytes first, then high ones, by axes. Differences, which wrap around, pack better than
+    places, a quarter better where bytes that are alike lie side by side.
     """
-    ways = steps.copy()
-    ways[1:] -= steps[:-1]
-    pairs = np.ascontiguousarray(ways.T, "<i2").view(np.uint8).reshape(3, -1, 2)
+    change = steps.copy()
+    change[1:] -= steps[:-1]
+    pairs = np.ascontiguousarray(change.T, "<i2").view(np.uint8).reshape(3, -1, 2)
     return np.ascontiguousarray(pairs.transpose(2, 0, 1))
 
 
 def _unpacked_steps(packed: Ints) -> Ints:
     pairs = np.ascontiguousarray(packed.transpose(1, 2, 0))
-    ways = pairs.view("<i2")[..., 0].T
-    return np.cumsum(ways, axis=0, dtype=np.int16)
+    return np.cumsum(pairs.view("<i2")[..., 0].T, axis=0, dtype=np.int16)
 
 
 def _text(path: Path) -> dict[str, Any]:
