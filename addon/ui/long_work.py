@@ -244,6 +244,7 @@ def in_parts[Result](parts: Parts[Result]) -> Steps[Result]:
             except StopIteration as end:
                 result: Result = end.value
                 return result
+            yield Progress(part.title)  # once at least, however soon it is done
             try:
                 made = yield from threaded(_beside(part))
             except Exception as error:  # it belongs where the work waits for the part
@@ -253,11 +254,9 @@ def in_parts[Result](parts: Parts[Result]) -> Steps[Result]:
 
 
 def _beside(part: Part) -> ThreadWork[Any]:
-    def work(thread: ThreadWork[Any]) -> Any:
-        thread.report(part.title)
-        return part.work()
-
-    return ThreadWork(work, "Hairloom part")
+    work = ThreadWork(lambda _: part.work(), "Hairloom part")
+    work.stage = part.title
+    return work
 
 
 def stop() -> None:
