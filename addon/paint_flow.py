@@ -1,4 +1,5 @@
-"""The flow of hair under a brush on its density and its masks: children come and go at once.
+"""The flow of hair under a brush on its density and its masks: children come and go at once. And
+of the colours that are painted.
 
 Children that the new density does not want make room for those that it wants now: these get their
 points, as many as they were, and shapes as all children grow, in the clumps of their neighbours.
@@ -20,9 +21,12 @@ from .comb_flow import put_children
 from .dynamics.painted import PaintedGuides
 from .groom.child_roots import ChildRoots, child_roots
 from .groom.masks import NO_MASKS, Masks, Places
+from .groom.painted_color import PaintedColor
 from .groom.roots import RootFrames, root_frames
 from .pipeline import Grown, Rig
-from .strands import Surface
+from .shading.drawn_strands import look_color, natural_strands
+from .shading.settings import ShadingSettings
+from .strands import StrandSet, Surface
 from .strands.kept import same_rows
 
 
@@ -55,6 +59,44 @@ def painted(rig: Rig, density: Floats | None, masks: Masks = NO_MASKS) -> Rig:
     kept[gone] = come
     grown = replace(grown, kept=kept)
     return replace(_moved(rig, roots, grown, own + gone, number, come), grown=grown)
+
+
+def colored(rig: Rig, painted: PaintedColor | None, look: ShadingSettings) -> Rig:
+    """The rig in the colours that are painted, see `with_colors`."""
+    strands = with_colors(rig.strands, painted, look)
+    return rig if strands is rig.strands else replace(rig, strands=strands)
+
+
+def with_colors(
+    strands: StrandSet, painted: PaintedColor | None, look: ShadingSettings
+) -> StrandSet:
+    """Strands in the colours that are painted at their roots, all along; where these are
+    transparent in their own, or in the look's.
+
+    Args:
+        strands: bound to the surface, but for hair without one.
+        painted: None: nothing that can be used.
+    """
+    if not look.color_map:
+        return strands
+    own = strands.color if look.color_source == "own" else None
+    triangle, barycentric = strands.root_triangle, strands.root_barycentric
+    if painted is None or triangle is None or not painted.triangle_count > triangle.max(initial=-1):
+        return strands if own is strands.color else replace(strands, color=own)
+    assert barycentric is not None, "bound strands have both"
+    found = painted.at(triangle, barycentric).astype(np.float32)
+    found[natural_strands(strands.group, look)] = 0.0
+    if own is None and not found[:, 3].any():
+        return replace(strands, color=None)
+    under = np.full((len(found), 3), np.float32(np.nan)) if own is None else own
+    if own is not None:  # which may differ along strands
+        found = np.repeat(found, strands.point_counts, axis=0)
+    opacity = found[:, 3:]
+    under = np.where(np.isnan(under) & (opacity > 0.0), look_color(look).astype(np.float32), under)
+    color = found[:, :3] + (np.float32(1.0) - opacity) * under
+    if own is None:
+        color = np.repeat(color, strands.point_counts, axis=0)
+    return replace(strands, color=color)
 
 
 def _grown(roots: ChildRoots, head: Surface, grown: Grown) -> tuple[Ints, Grown]:

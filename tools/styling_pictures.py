@@ -169,6 +169,47 @@ def painted(folder: Path) -> None:
     sheet(folder, "painted.jpg", pictures)
 
 
+def colored(folder: Path) -> None:
+    """Highlights on the head, and lighter tips over them."""
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    bpy.ops.hairloom.add_hairstyle(style="long_straight", plays=False)
+    hair = bpy.context.object
+    head, look = hair.parent, hair.data.hairloom.shading
+    look.pigment, look.base_color = "color", (0.045, 0.02, 0.01)
+    pictures = [picture(hair)]
+    paint_highlights(head.data)
+    look.color_map = "Highlights"
+    pictures.append(picture(hair))
+    look.tip_tint, look.tip_color = 0.85, (0.5, 0.3, 0.12)
+    look.tint_start, look.tint_end = 0.3, 0.95
+    pictures.append(picture(hair))
+    sheet(folder, "painted_colors.jpg", pictures)
+
+
+def paint_highlights(mesh: Any, size: int = 512, samples: int = 4_000_000) -> None:
+    """An image with blond locks on nothing, from the front to the back, as one paints it."""
+    random = np.random.default_rng(1)
+    mesh.calc_loop_triangles()
+    corners = np.array([each.loops[:] for each in mesh.loop_triangles])
+    uv = np.array([each.vector for each in mesh.uv_layers.active.uv])[corners]
+    place = np.array([each.co for each in mesh.vertices])[
+        np.array([each.vertices[:] for each in mesh.loop_triangles])
+    ]
+    across = np.abs(np.linalg.det(uv[:, 1:] - uv[:, :1]))
+    triangle = random.choice(len(uv), samples, p=across / across.sum())
+    weight = random.dirichlet((1.0, 1.0, 1.0), samples)
+    at = np.einsum("nk,nkj->nj", weight, uv[triangle])
+    x, y, z = np.einsum("nk,nkj->nj", weight, place[triangle]).T
+    locks = np.sin(620.0 * y + 2.0 * np.sin(90.0 * z) + np.sign(x)) + np.sin(230.0 * (y + z))
+    pixels = np.zeros((size, size, 4), np.float32)
+    pixels[..., :3] = 0.78, 0.57, 0.36  # sRGB
+    column, row = np.clip((at * size).astype(int), 0, size - 1).T
+    pixels[row, column, 3] = np.clip(locks - 0.2, 0.0, 0.9)
+    image = bpy.data.images.new("Highlights", size, size, alpha=True)
+    image.pixels.foreach_set(pixels.ravel())
+    image.update()
+
+
 def main(folder: Path) -> None:
     gpu.init()
     load_package().register()
@@ -177,6 +218,7 @@ def main(folder: Path) -> None:
     parting(folder)
     flow(folder)
     painted(folder)
+    colored(folder)
 
 
 if __name__ == "__main__":

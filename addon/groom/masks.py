@@ -7,7 +7,7 @@ Any of them says how much it is at `Places`: at the roots of guides as of childr
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from types import SimpleNamespace
 from typing import Self
@@ -144,19 +144,7 @@ class ImageMask(Mask):
         return self._at(np.einsum("nk,nkj->nj", barycentric, self.corner_uv[triangle]))
 
     def _at(self, uv: Floats) -> Floats:
-        """Between the middles of the four nearest pixels; the image begins again at its edges."""
-        height, width = self.pixels.shape
-        place = uv.astype(np.float64) * (width, height) - 0.5
-        corner = np.floor(place).astype(np.int64)
-        x, y = (place - corner).T
-        (left, low), (right, high) = (
-            (corner % (width, height)).T,
-            ((corner + 1) % (width, height)).T,
-        )
-        below = self.pixels[low, left] * (1.0 - x) + self.pixels[low, right] * x
-        above = self.pixels[high, left] * (1.0 - x) + self.pixels[high, right] * x
-        found: Floats = below + y * (above - below)
-        return found
+        return between_pixels(self.pixels, uv)
 
     def fits(self, strand_count: int, triangle_count: int | None) -> bool:
         return len(self.corner_uv) == triangle_count
@@ -224,6 +212,27 @@ class StrandMask(Mask):
         low, high = self.grid[rows, left], self.grid[rows, left + 1]
         found: Floats = low + (place - left) * (high - low)
         return found
+
+
+def between_pixels(
+    pixels: Floats, uv: Floats, meant: Callable[[Floats], Floats] = lambda stored: stored
+) -> Floats:
+    """Between the middles of the four nearest pixels, (n, ...); the image begins again at its
+    edges.
+
+    Args:
+        pixels: (height, width, ...). uv: (n, 2).
+        meant: gives what stored pixels mean, (n, ...).
+    """
+    height, width = pixels.shape[:2]
+    place = uv.astype(np.float64) * (width, height) - 0.5
+    corner = np.floor(place).astype(np.int64)
+    x, y = (place - corner).T.reshape(2, -1, *(1,) * (pixels.ndim - 2))
+    (left, low), (right, high) = (corner % (width, height)).T, ((corner + 1) % (width, height)).T
+    below = meant(pixels[low, left]) * (1.0 - x) + meant(pixels[low, right]) * x
+    above = meant(pixels[high, left]) * (1.0 - x) + meant(pixels[high, right]) * x
+    found: Floats = below + y * (above - below)
+    return found
 
 
 def _mean_at_vertices(surface: Surface, corners: Floats) -> Floats:

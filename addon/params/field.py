@@ -17,7 +17,9 @@ from ..arrays import Floats
 from ..errors import HairloomError
 from .curve import PLACES, Curve
 
-Kind = Literal["number", "integer", "toggle", "color", "choice", "curve", "mask"]
+Kind = Literal["number", "integer", "toggle", "color", "choice", "curve", "mask", "map"]
+#: Kinds that name what an artist has painted.
+NAMING: tuple[Kind, ...] = ("mask", "map")
 #: length [m], angle [rad], time [s], rate [1/s], speed [m/s], factor [0..1], acceleration [m/s^2]
 Unit = Literal[
     "none",
@@ -89,7 +91,7 @@ class Parameter:
             if value not in [identifier for identifier, _, _ in self.choices]:
                 raise ValueError("that is not one of its choices")
             return str(value)
-        if self.kind == "mask":
+        if self.kind in NAMING:
             if not isinstance(value, str):
                 raise TypeError("it must be a name")
             return value
@@ -118,6 +120,8 @@ class Parameter:
             return "Use one of " + ", ".join(identifier for identifier, _, _ in self.choices)
         if self.kind == "mask":
             return "Use the name of a vertex group, of an attribute or of an image"
+        if self.kind == "map":
+            return "Use the name of a colour attribute of the surface, or of an image"
         if self.hard_range:
             low, high = self.hard_range
             return f"Use a value from {low:g} to {high:g} (default {self.default})"
@@ -196,9 +200,9 @@ class Settings:
         return np.clip(getattr(self, name) * factor, *(parameter.hard_range or (None, None)))
 
     def with_masks_of(self, other: Self) -> Self:
-        """The same with the masks of others where these name none: what is painted on one head is
-        not the matter of a preset."""
-        names = [each.name for each in self.parameters() if each.kind == "mask"]
+        """The same with the masks and maps of others where these name none: what is painted on one
+        head is not the matter of a preset."""
+        names = [each.name for each in self.parameters() if each.kind in NAMING]
         return dataclasses.replace(
             self, **{name: getattr(self, name) or getattr(other, name) for name in names}
         )
@@ -361,6 +365,14 @@ def curve(
             "", "curve", tuple(default), label, description, source, "none", hard, hard, **drawn
         )
     )
+
+
+def color_map(
+    *, label: str, description: str, source: str = "Hairloom", **drawn: Unpack[_Drawn]
+) -> Any:
+    """Declare the name of colours that are painted: they take the place of a colour, where a mask
+    multiplies a number."""
+    return _declare(Parameter("", "map", "", label, description, source, **drawn))
 
 
 def mask_of(name: str) -> str:

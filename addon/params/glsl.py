@@ -16,7 +16,7 @@ _SCALAR_TYPES = {"number": "float", "integer": "int", "toggle": "int", "choice":
 def struct_source(settings: type[Settings], struct_name: str) -> str:
     """GLSL declaration of the struct, one member a parameter, in declaration order."""
     _check_kinds(settings)
-    members = [f"  {_SCALAR_TYPES.get(p.kind, 'vec3')} {p.name};" for p in settings.parameters()]
+    members = [f"  {_SCALAR_TYPES.get(p.kind, 'vec3')} {p.name};" for p in _members(settings)]
     return "\n".join([f"struct {struct_name} {{", *members, "};", ""])
 
 
@@ -24,7 +24,7 @@ def struct_values(settings: Settings) -> np.ndarray:
     """The values as std140 bytes, (n,) float32; integers are stored by their bit pattern."""
     _check_kinds(type(settings))
     words: list[float | np.int32] = []
-    for parameter in settings.parameters():
+    for parameter in _members(type(settings)):
         value = getattr(settings, parameter.name)
         if parameter.kind == "color":
             words.extend([0.0] * (-len(words) % 4))
@@ -40,6 +40,11 @@ def struct_values(settings: Settings) -> np.ndarray:
         else:
             packed[index] = word
     return packed
+
+
+def _members(settings: type[Settings]) -> list[Parameter]:
+    """All but the names of painted colours, which strands have in place of the struct's."""
+    return [each for each in settings.parameters() if each.kind != "map"]
 
 
 def _check_kinds(settings: type[Settings]) -> None:

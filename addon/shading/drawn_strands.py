@@ -39,8 +39,9 @@ def drawn_radius(radius: Floats, settings: StrandSettings, along: Floats | None 
 
 
 def drawn_color(color: Floats | None, shading: ShadingSettings) -> Floats | None:
-    """Strands' own colours where they are drawn in them; None where in the look's."""
-    return color if shading.color_source == "own" else None
+    """Strands' own colours where they are drawn in them; None where in the look's. Painted ones are
+    the strands' own, see `paint_flow.with_colors`."""
+    return color if shading.color_source == "own" or shading.color_map else None
 
 
 def own_colors(color: Floats | None, group: Ints | None, shading: ShadingSettings) -> Floats | None:

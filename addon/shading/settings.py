@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from ..params import Settings, both, choice, color, either, number, when
+from ..params import Settings, both, choice, color, color_map, either, number, when
 from .kajiya_kay_settings import KajiyaKaySettings
 from .marschner.settings import MarschnerSettings
 
@@ -62,6 +62,12 @@ class SharedSettings(Settings):
         label="Colour Source",
         description="Where the colour comes from; strands that have none of their own have the "
         "look's",
+    )
+    color_map: str = color_map(
+        label="Colour Map",
+        description="Colours that are painted on the surface: a colour attribute, or an image on "
+        "its UVs. Each strand has the colour at its root; where it is transparent, that of Colour "
+        "Source. Empty: nothing is painted",
     )
     pigment: str = choice(
         "color",

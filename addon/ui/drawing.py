@@ -49,7 +49,9 @@ def draw_section(
         if parameter.name in masks:
             _draw_painted(own, group, parameter, masks[parameter.name])
             continue
-        own.prop(group, parameter.name, slider=parameter.kind in {"number", "integer"})
+        icon = "GROUP_VCOL" if parameter.kind == "map" else "NONE"
+        is_number = parameter.kind in {"number", "integer"}
+        own.prop(group, parameter.name, slider=is_number, icon=icon)
 
 
 def _draw_painted(

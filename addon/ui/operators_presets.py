@@ -22,6 +22,7 @@ from ..blender.properties.presets import (
 )
 from ..blender.properties.properties import settings_of
 from ..blender.scene.hair_material import has_look_material, put_look_material
+from ..blender.scene.painted_colors import colors_of_curves
 from ..blender.scene.principled import has_principled_hair, look_from_material
 from .preset_chooser import KIND
 from .reports import reporting
@@ -206,7 +207,10 @@ class HAIRLOOM_OT_look_to_material(bpy.types.Operator):
 
 def _put_material(hair: bpy.types.Object) -> tuple[bpy.types.Material, tuple[str, ...]]:
     group = hair.data.hairloom.shading
-    return put_look_material(hair.data, settings_of(group, group.settings))
+    look = settings_of(group, group.settings)
+    painted, notes = colors_of_curves(hair, look, bpy.context.evaluated_depsgraph_get())
+    material, more = put_look_material(hair.data, look, painted=painted)
+    return material, (*notes, *more)
 
 
 CLASSES = (

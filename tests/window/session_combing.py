@@ -1,5 +1,6 @@
 """Combing under the preview: in Sculpt Mode the brush is dragged over a head of hair, and the whole
 style follows, with guides as thin lines instead of Blender's thick curves; Ctrl-Z puts it back.
+And painting: in Vertex Paint hair takes the colour of its head.
 """
 
 import sys
@@ -43,6 +44,7 @@ def steps():
     yield from sculpt(hair)
     yield from comb(hair)
     yield from undo(hair)
+    yield from paint(session().hair.found())  # which Ctrl-Z has replaced
     assert "Traceback" not in log.added(), "something has raised"
 
 
@@ -149,6 +151,46 @@ def undo(hair):
     bpy.ops.object.mode_set(mode="OBJECT")
     yield
     assert not of_hairloom("overlay").drawing_of(session().uid).lines
+
+
+def paint(hair):
+    """The brush is dragged over the head: strands there have its colour while the button is down,
+    within half a second."""
+    head, window = hair.parent, bpy.context.window
+    colors = head.data.color_attributes.new("Paint", "BYTE_COLOR", "CORNER")
+    colors.data.foreach_set("color", np.tile(np.float32([0.2, 0.9, 0.2, 1.0]), len(colors.data)))
+    hair.data.hairloom.shading.color_map = "Paint"
+    yield from settled()
+    assert np.ptp(drawn_colors(), axis=0).max() == 0.0, "green all over"
+    select(head)
+    bpy.ops.object.mode_set(mode="VERTEX_PAINT")
+    yield
+    shot, (x, y) = pixels("unpainted"), in_front()
+    window.event_simulate("MOUSEMOVE", "NOTHING", x=x, y=y)
+    yield 1
+    window.event_simulate("LEFTMOUSE", "PRESS", x=x, y=y)
+    began = time.monotonic()
+    for along in range(5, 80, 5):
+        window.event_simulate("MOUSEMOVE", "NOTHING", x=x + along, y=y)
+        yield 1
+        if np.ptp(drawn_colors(), axis=0).max() > 0.0:
+            break
+    took = time.monotonic() - began
+    print(f"strands had the colour of the brush after {took:.2f} s, {along} pixels along")
+    assert np.ptp(drawn_colors(), axis=0).max() > 0.0, "hair does not follow the brush"
+    window.event_simulate("LEFTMOUSE", "RELEASE", x=x + 80, y=y)
+    yield 1
+    yield from settled()
+    yield
+    follows = changed(shot, pixels("painted"))
+    assert follows > 0.0005, f"the picture stands still: {follows:.5f} of it has changed"
+    bpy.ops.object.mode_set(mode="OBJECT")
+    yield
+
+
+def drawn_colors():
+    """Of all points, as they are drawn."""
+    return of_hairloom("overlay").drawing_of(session().uid).snapshot.color
 
 
 driver.play(steps())

@@ -7,11 +7,13 @@ from __future__ import annotations
 
 import bpy
 
+from ...paint_flow import with_colors
 from ...shading.settings import ShadingSettings
 from ..base.attributes import read_attribute, set_attribute
 from ..properties.properties import settings_of
 from ..scene.curves import set_colors
 from ..scene.hair_material import put_look_material
+from ..scene.painted_colors import read_colors
 from . import playback
 from .baked_rig import BakedRig
 from .cache import Cache
@@ -109,7 +111,10 @@ def _fill(
     depsgraph: bpy.types.Depsgraph,
 ) -> None:
     """The bake's strands at rest, with the look of the hair."""
-    strands = rig.rig.strands
+    look = settings_of(hair.data.hairloom.shading, ShadingSettings)
+    head = rig.rig.head
+    colors, _ = read_colors(hair, depsgraph, None if head is None else len(head.triangles))
+    strands = with_colors(rig.rig.strands, colors, look)
     if len(curves.curves):
         curves.remove_curves()
     curves.add_curves(strands.point_counts.tolist())
@@ -127,7 +132,7 @@ def _fill(
     for material in hair.data.materials:
         curves.materials.append(material)
     if not len(curves.materials):
-        put_look_material(curves, settings_of(hair.data.hairloom.shading, ShadingSettings))
+        put_look_material(curves, look)
 
 
 def _are_poly(curves: bpy.types.Curves) -> bool:

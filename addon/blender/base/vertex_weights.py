@@ -49,6 +49,23 @@ def mask_choices(hair: bpy.types.Object | None, surface: bpy.types.Object | None
     return list(dict.fromkeys([*names, *image_names()]))
 
 
+def color_choices(surface: bpy.types.Object | None) -> list[str]:
+    """The names of all that hair may be coloured by: colours of the surface it grows on, images."""
+    names: list[str] = []
+    if surface is not None and surface.type == "MESH":
+        names += color_names(surface.data)
+    return list(dict.fromkeys([*names, *image_names()]))
+
+
+def color_names(data: bpy.types.Mesh) -> list[str]:
+    """The attributes of a mesh that are colours."""
+    return [each.name for each in data.attributes if is_color(each)]
+
+
+def is_color(attribute: bpy.types.Attribute) -> bool:
+    return attribute.domain in _DOMAINS and attribute.data_type in _COLORS
+
+
 def read_weights(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, name: str) -> Floats:
     """Weight of each vertex of the evaluated mesh, (vertex_count,) float32.
 

@@ -30,6 +30,7 @@ from ...cards.settings import CardSettings
 from ...cards.steps import map_progress, result_of
 from ...errors import HairloomError
 from ...exchange.textures.card_textures import of_one_size
+from ...paint_flow import colored
 from ...params import SettingsMap
 from ...pipeline import Pose, Rig
 from ...render.atlas_pass import baked_maps, baking
@@ -54,6 +55,7 @@ from ..base.outcome import notes_of
 from ..base.thread_work import ThreadWork
 from ..colliders.rigs import rig_from
 from ..properties.groom_settings import GroomSettings
+from ..scene.painted_colors import read_colors
 from ..scene.source import read_source
 from .occluders import Occluders, read_occluders
 from .textures import chosen_pictures
@@ -98,8 +100,12 @@ def read_inputs(
     dropped: dict[str, int] = {}
     if rig is None:
         source = read_source(hair, depsgraph)
-        rig = rig_from(source, settings, place=hair.name)
+        rig, colors = rig_from(source, settings, place=hair.name), source.colors
         notes, dropped = source.warnings, source.dropped
+    else:
+        triangle_count = None if rig.head is None else len(rig.head.triangles)
+        colors, notes = read_colors(hair, depsgraph, triangle_count)
+    rig = colored(rig, colors, settings[ShadingSettings])
     pictures, problems = chosen_pictures(hair.data.hairloom.card_images)
     occluders = read_occluders(settings[CardOcclusionSettings], hair)
     inputs = CardInputs(rig, settings, pictures, occluders)
@@ -116,7 +122,7 @@ def cards_key(groom: GroomSettings) -> Hashable:
     look = groom[ShadingSettings]
     return (
         groom.sections.only(*kinds, StrandSettings, AmbientSettings),
-        (look.model, look.color_source, look.color_variation, look.grey_fraction),
+        (look.model, look.color_source, look.color_variation, look.grey_fraction, look.color_map),
         (look.brow_source, look.brow_color),
         groom.card_pictures,
     )

@@ -90,7 +90,7 @@ _RAMP_SIZE = 256
 #: of Marschner's model alone, though both models share the panel that they are drawn in
 _PIGMENT = {"pigment", "melanin", "redness", "absorption"}
 #: of strands alone: a material of cards has what they do in its textures
-_OF_STRANDS = {"model", "color_source", "brow_source", "brow_color"}
+_OF_STRANDS = {"model", "color_source", "color_map", "brow_source", "brow_color"}
 _OF_KIND = {"color": "scene-linear Rec. 709", "choice": "name", "toggle": "true or false"}
 
 #: What is being done, and which fraction of it is done; None where that is unknown.

@@ -33,7 +33,7 @@ from .job_options import (
     frames_of_option,
     parameters_of,
 )
-from .job_steps import Job, motion_of, read_hair, read_rig, tell_notes
+from .job_steps import Job, job_colors, motion_of, read_hair, read_rig, tell_notes
 from .object_settings import named_grooms, put_settings
 from .places import check_not_read
 from .verb import Verb
@@ -112,7 +112,7 @@ def _of_rig(
             )
         rig, inputs = read_rig(job)
         own = _groom(rig, inputs)
-        groom = hair_of_rig(rig, own, needs, look).groom
+        groom = hair_of_rig(rig, own, needs, look, job_colors(job, rig)).groom
         return StrandExport(groom, settings, kind, inputs.dropped)
     at = frames if job.options.frame is None else range(job.options.frame, job.options.frame + 1)
     motion = motion_of(job, at)
@@ -125,7 +125,8 @@ def _of_rig(
     if frames is None:
         _, points = motion.strands(motion.frames[0])
         groom = replace(groom, strands=rig.strands.with_points(points.reshape(-1, 3)))
-    moving = BakedMotion(hair_of_rig(rig, groom, needs, look), motion.cache)
+    colors = job_colors(job, rig)
+    moving = BakedMotion(hair_of_rig(rig, groom, needs, look, colors), motion.cache)
     plan = StrandExport(moving.out.groom, settings, kind, frames=frames)
     if frames is not None:
         plan.moving, plan.rate = (moving,), moving.rate

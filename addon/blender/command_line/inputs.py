@@ -95,7 +95,7 @@ def read_inputs(sources: Sources, grow_settings: GrowSettings) -> Inputs:
     Raises:
         HairloomError: naming the file or object that cannot be used, and what to do.
     """
-    head_name = sources.head or _surface_name(sources.groom)
+    head_name = named_head(sources)
     head, said = _read_head(head_name, sources)
     if sources.groom is not None:
         strands, dropped, groom, notes = _read_groom(sources.groom, sources)
@@ -149,7 +149,7 @@ def _grown(
 
 def look_of_head(sources: Sources, head: Surface | None) -> HeadLook | None:
     """How this head, or that of a bake, is drawn; see `head_look`."""
-    return head_look(sources.head or _surface_name(sources.groom), head, sources.skin)
+    return head_look(named_head(sources), head, sources.skin)
 
 
 def _read_head(name: str | None, sources: Sources) -> tuple[Surface | None, tuple[str, ...]]:
@@ -177,10 +177,15 @@ def _read_head(name: str | None, sources: Sources) -> tuple[Surface | None, tupl
 def head_of_sources(sources: Sources) -> Surface | None:
     """The head that is named, or that hair curves of the scene name; the built-in one where neither
     hair nor head is; None without one."""
-    name = sources.head or _surface_name(sources.groom)
+    name = named_head(sources)
     if name is None and sources.groom is None:
         return built_in_head().surface
     return None if name is None else _read_mesh(name, sources)[0]
+
+
+def named_head(sources: Sources) -> str | None:
+    """The head that is named, or that hair curves of the scene name."""
+    return sources.head or _surface_name(sources.groom)
 
 
 def _partings(groom: str | None) -> tuple[Floats | None, tuple[str, ...]]:

@@ -15,11 +15,14 @@ from ...arrays import Floats
 from ...errors import HairloomError
 from ...groom.children_settings import ChildrenSettings
 from ...groom.masks import Mask, Masks, mask_names
+from ...groom.painted_color import PaintedColor
 from ...groom.settings import GrowSettings, GuideSettings
 from ...groom.width_settings import WidthSettings
+from ...paint_flow import colored
 from ...params import Settings, SettingsMap
 from ...pipeline import Pose, Rig
 from ...shading.ambient_settings import AmbientSettings
+from ...shading.settings import ShadingSettings
 from ..bakes.guide_motion import BakedGuides
 from ..base.report import Report
 from ..colliders.fields import solid_of
@@ -27,8 +30,9 @@ from ..pictures.studio import Studio
 from ..properties.groom_settings import GroomSettings
 from ..scene.curves import read_curves
 from ..scene.masks import Canvas
+from ..scene.painted_colors import painted_colors
 from ..sessions.prepared_groom import prepared
-from .inputs import Inputs, Sources, head_of_sources, look_of_head, read_inputs
+from .inputs import Inputs, Sources, head_of_sources, look_of_head, named_head, read_inputs
 from .object_settings import is_groom
 
 
@@ -76,7 +80,27 @@ def read_rig(job: Job) -> tuple[Rig, Inputs]:
     for line in filter(None, (rig.children_line, rig.widths.line, rig.guides_line)):
         print(f"{line}.", flush=True)
     tell_rig(report, rig, inputs.groom_name)
-    return rig, inputs
+    return colored_rig(job, rig), inputs
+
+
+def colored_rig(job: Job, rig: Rig) -> Rig:
+    """The same in the colours that are painted under it; raises as `job_colors`."""
+    return colored(rig, job_colors(job, rig), job.settings[ShadingSettings])
+
+
+def job_colors(job: Job, rig: Rig) -> PaintedColor | None:
+    """What is painted under this hair; None where nothing is to be.
+
+    Raises:
+        HairloomError: it is not there, or cannot be used.
+    """
+    name, place = job.settings[ShadingSettings].color_map, job.sources.groom or "hair"
+    if not name:
+        return None
+    surface = bpy.data.objects.get(named_head(job.sources) or "")
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    count = None if rig.head is None else len(rig.head.triangles)
+    return painted_colors(surface, name, depsgraph, count, place=place)
 
 
 def read_job_masks(
@@ -176,6 +200,7 @@ def motion_of(job: Job, frames: range | None = None) -> BakedGuides:
                 remedy="Name the baked hair of the scene with --groom, or a folder with --bake",
             )
         motion = BakedGuides.of(hair, frames)
+    motion = replace(motion, rig=colored_rig(job, motion.rig))
     job.report.add_input(motion.cache.folder)
     tell_notes(list(motion.notes), job.report)
     tell_rig(job.report, motion.rig, motion.cache.facts.owner)

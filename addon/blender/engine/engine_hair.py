@@ -17,11 +17,14 @@ import numpy as np
 from ...arrays import Floats
 from ...cards.follow import moved_mesh
 from ...cards.occlusion_settings import CardOcclusionSettings
+from ...groom.painted_color import PaintedColor
+from ...paint_flow import colored
 from ...pipeline import Rig
 from ...render.snapshot import Snapshot
 from ...shading.ambient_settings import AmbientSettings
 from ...shading.settings import ShadingSettings
 from ...strands.affine import moved
+from ...strands.colors import same_colors
 from ..bakes import playback
 from ..bakes.baked_rig import BakedRig
 from ..bakes.cache import Cache
@@ -33,6 +36,7 @@ from ..cards.occluders import Occluders, read_occluders
 from ..cards.show import as_shown
 from ..cards.textures import chosen_pictures
 from ..properties.groom_settings import GroomSettings
+from ..scene.painted_colors import read_colors
 from ..sessions.groom_source import GroomSource
 from ..sessions.prepared_groom import prepared, rig_of
 from ..sessions.snapshots import snapshot_of, with_all_strands, with_settings
@@ -51,9 +55,19 @@ class _Made:
     snapshot: Snapshot
     is_baked: bool
     _cards: list[tuple[Hashable, BuiltCards, Occluders]] = field(default_factory=list)
+    _colored: list[Rig] = field(default_factory=list)
+
+    def colored(self, colors: PaintedColor | None, look: ShadingSettings) -> Rig:
+        """In what is painted under it; the same object where that looks as it did last."""
+        rig = colored(self.rig, colors, look)
+        for known in self._colored:
+            if same_colors(known.strands.color, rig.strands.color):
+                return known
+        self._colored[:] = [rig]
+        return rig
 
     def cards(
-        self, owner: bpy.types.Object, settings: GroomSettings, others: Occluders
+        self, owner: bpy.types.Object, rig: Rig, settings: GroomSettings, others: Occluders
     ) -> BuiltCards:
         """Its cards; those of the last settings and other hair are kept, to the last colour.
 
@@ -63,10 +77,10 @@ class _Made:
         key = cards_key(settings), settings[ShadingSettings]
         for known, built, before in self._cards:
             is_lit_alike = others.uids == before.uids if self.is_baked else others.is_like(before)
-            if known == key and is_lit_alike:
+            if known == key and built.rig is rig and is_lit_alike:
                 return built
         pictures, _ = chosen_pictures(owner.data.hairloom.card_images)
-        built = BuiltCards.now(CardInputs(self.rig, settings.sections, pictures, others))
+        built = BuiltCards.now(CardInputs(rig, settings.sections, pictures, others))
         self._cards[:] = [(key, built, others)]
         return built
 
@@ -158,16 +172,20 @@ def read_groom(
     # A copy stays as it is beyond the baked frames; curves of the artist's go on by themselves.
     if cache is not None and (owner != hair or _shows_bake(owner, cache, scene.frame_current)):
         strands = playback.strands_in(cache, scene.frame_current, scene.frame_subframe)
-        made = _of_bake(owner, playback.rig_in(cache), settings, blocking=blocking)
+        baked = playback.rig_in(cache)
+        made = _of_bake(owner, baked, settings, blocking=blocking)
+        head = baked.rig.head
+        colors, _ = read_colors(owner, depsgraph, None if head is None else len(head.triangles))
         pose = playback.pose_in(cache, scene.frame_current, scene.frame_subframe)
         guides = playback.guides_in(cache, scene.frame_current, scene.frame_subframe)
     else:
-        made = _of_curves(owner, settings, depsgraph, blocking=blocking)
+        made, colors = _of_curves(owner, settings, depsgraph, blocking=blocking)
         strands, pose, guides = made.snapshot.points, made.rig.rest_pose, made.rig.guide_grid
-    snapshot = replace(made.snapshot, points=strands)
+    rig = made.colored(colors, settings[ShadingSettings])
+    snapshot = replace(made.snapshot, points=strands, color=rig.strands.color)
     if settings.shows_cards:
         others = read_occluders(settings[CardOcclusionSettings], owner, depsgraph, pose.matrix)
-        built = made.cards(owner, settings, others)
+        built = made.cards(owner, rig, settings, others)
         cards = built.at(pose, guides, settings.sections)
         snapshot = as_shown(replace(snapshot, cards=cards))
     return with_all_strands(with_settings(snapshot, settings))
@@ -236,7 +254,7 @@ def _of_curves(
     depsgraph: bpy.types.Depsgraph,
     *,
     blocking: bool,
-) -> _Made:
+) -> tuple[_Made, PaintedColor | None]:
     request = GroomSource(hair, depsgraph).request
     source = request.source
     made_from = (
@@ -251,9 +269,10 @@ def _of_curves(
         settings.of_rig,
         settings[AmbientSettings],
     )
-    return _made(
+    made = _made(
         hair, made_from, settings, lambda: rig_of(request), is_baked=False, blocking=blocking
     )
+    return made, source.colors
 
 
 def _made(

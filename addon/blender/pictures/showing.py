@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import bpy
 
 from ...arrays import Floats
 from ...exchange.files.names import no_device
+from ...paint_flow import colored
 from ...pipeline import Pose
 from ...shading.ambient_settings import AmbientSettings
+from ...shading.settings import ShadingSettings
 from ..base.objects import head_of
 from ..cards.textures import chosen_pictures
 from ..preview import previews
@@ -48,12 +50,15 @@ def shown_groom(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Shown
         previews.finish(session, depsgraph)
         session = previews.session_of(hair)
     if isinstance(session, Session):
-        studio = _studio(hair, session.groom, session.settings)
+        look, groom = session.settings[ShadingSettings], session.groom
+        groom = replace(groom, rig=colored(groom.rig, session.source.colors, look))
+        studio = _studio(hair, groom, session.settings)
         solver = session.solver
         guides = solver.guides()
         return ShownGroom(studio, solver.pose, session.strands, guides, studio.warnings)
     request = GroomSource(hair, depsgraph).request
-    rig, settings = rig_of(request), request.settings
+    settings, colors = request.settings, request.source.colors
+    rig = colored(rig_of(request), colors, settings[ShadingSettings])
     studio = _studio(hair, prepared(rig, settings[AmbientSettings]), settings)
     notes = (*request.source.warnings, *rig.notes, *studio.warnings)
     return ShownGroom(studio, rig.rest_pose, rig.strands.points, rig.guide_grid, notes)

@@ -17,6 +17,7 @@ import bpy
 from ...dynamics.settings import DynamicsSettings
 from ...groom.children_settings import ChildrenSettings
 from ...groom.masks import mask_names
+from ...shading.settings import ShadingSettings
 from ..bakes import playback
 from ..base import latest_job
 from ..base.originals import refresh_views
@@ -28,6 +29,8 @@ from . import previews as registry
 from .phases import Event, Phase
 from .preview import Preview
 from .previews import attempt, previews
+
+type _Brush = Callable[[bpy.types.Depsgraph], None]
 
 #: Edits come in bursts, as brush strokes do: read again when this long [s] nothing came.
 SETTLING_TIME = 0.1
@@ -95,7 +98,10 @@ def updated(depsgraph: bpy.types.Depsgraph) -> None:
             _shade_again_soon(preview)
         follows = preview.phase is not Phase.FREE and is_among(session, moved)
         brushes = [session.comb] * is_combed + [session.paint] * is_painted
-        update = partial(_update, preview, session, depsgraph, follows, light_changed, brushes)
+        colors = [session.color] * is_painted
+        update = partial(
+            _update, preview, session, depsgraph, follows, light_changed, brushes, colors
+        )
         attempt(preview, depsgraph, update)
 
 
@@ -105,11 +111,13 @@ def _update(
     depsgraph: bpy.types.Depsgraph,
     follows: bool,
     light_changed: bool,
-    brushes: Sequence[Callable[[bpy.types.Depsgraph], None]],
+    brushes: Sequence[_Brush],
+    colors: Sequence[_Brush],
 ) -> None:
+    """Follow brushes, those of shape where hair is at rest."""
     if light_changed:
         session.light(depsgraph)
-    for brush in brushes if preview.phase is Phase.REST else ():
+    for brush in (*colors, *(brushes if preview.phase is Phase.REST else ())):
         brush(depsgraph)
     if follows:
         preview.keep_or_rest(depsgraph)
@@ -181,6 +189,7 @@ def follow_undo() -> None:
         if preview.phase is Phase.REST:
             attempt(preview, depsgraph, partial(session.comb, depsgraph))
             attempt(preview, depsgraph, partial(session.paint, depsgraph))
+        attempt(preview, depsgraph, partial(session.color, depsgraph))
 
 
 def _read_again_soon() -> None:
@@ -263,6 +272,7 @@ def weights_changed(session: Session, edited: set[int]) -> bool:
         settings.children_density,
         *mask_names(settings[ChildrenSettings]).values(),
         *mask_names(settings[DynamicsSettings]).values(),
+        settings[ShadingSettings].color_map,
         hair.hairloom.shown_map,
     } - {""}
     if session.head is None or not names:

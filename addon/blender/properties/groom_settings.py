@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import bpy
 
@@ -15,6 +16,7 @@ from ...groom.width_settings import WidthSettings
 from ...parameters import ALL_SETTINGS, sections_of
 from ...params import Owner, Settings, SettingsMap
 from ...shading.ambient_settings import AmbientSettings
+from ...shading.settings import ShadingSettings
 from .card_group import picture_names
 from .properties import settings_of
 
@@ -87,11 +89,13 @@ class GroomSettings:
 
     def acts_at_once(self, before: GroomSettings) -> bool:
         """Whether only such settings differ that need nothing to be read or made again."""
-        return (self.of_rig, self[AmbientSettings], mask_names(self[DynamicsSettings])) == (
-            before.of_rig,
-            before[AmbientSettings],
-            mask_names(before[DynamicsSettings]),
-        )
+        return self._read == before._read
+
+    @property
+    def _read(self) -> tuple[Any, ...]:
+        """What decides what is read and made."""
+        names = mask_names(self[DynamicsSettings]), self[ShadingSettings].color_map
+        return self.of_rig, self[AmbientSettings], names
 
     def at_once(self, before: GroomSettings) -> GroomSettings:
         """These, but for what waits until the hair is read again."""

@@ -19,7 +19,7 @@ from bpy.props import (
 from ...params import Parameter, Settings
 from ...params.curve import PLACES
 from ..base.objects import head_of
-from ..base.vertex_weights import mask_choices, weight_names
+from ..base.vertex_weights import color_choices, mask_choices, weight_names
 
 type Changed = Callable[[bpy.types.ID], None]
 
@@ -104,6 +104,18 @@ def masks_of_groom(group: Any, _context: bpy.types.Context, typed: str) -> list[
     return [name for name in names if typed.lower() in name.lower()]
 
 
+def colors_of_groom(group: Any, _context: bpy.types.Context, typed: str) -> list[str]:
+    """All in which this hair may be painted."""
+    owner = group.id_data
+    hair = next((each for each in bpy.data.objects if each.data == owner), None)
+    surface = None if hair is None else head_of(hair)
+    return [name for name in color_choices(surface) if typed.lower() in name.lower()]
+
+
+#: kind of a parameter that names what is painted -> what there is
+_SEARCHED = {"mask": masks_of_groom, "map": colors_of_groom}
+
+
 def weights_meant(obj: bpy.types.Object | None, typed: str) -> list[str]:
     """The weights of a mesh that what was typed may mean."""
     names = [] if obj is None or obj.type != "MESH" else weight_names(obj)
@@ -123,8 +135,9 @@ def _property(parameter: Parameter, changed: Changed | None, is_animated: bool) 
         return BoolProperty(**common)
     if parameter.kind == "choice":
         return EnumProperty(items=parameter.choices, **common)
-    if parameter.kind == "mask":
-        return StringProperty(search=masks_of_groom, **common | {"options": set()})
+    if parameter.kind in _SEARCHED:
+        search = _SEARCHED[parameter.kind]
+        return StringProperty(search=search, **common | {"options": set()})
     common |= _ranges(parameter)
     if parameter.kind == "integer":
         return IntProperty(**common)

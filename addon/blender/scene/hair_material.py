@@ -11,6 +11,7 @@ from typing import Any
 
 import bpy
 
+from ...arrays import Floats
 from ...shading.drawn_strands import look_color
 from ...shading.marschner.look import GREY_LEFT, root_absorption, tip_absorption
 from ...shading.marschner.pigment import color_exponent
@@ -34,7 +35,11 @@ def has_look_material(curves: bpy.types.Curves) -> bool:
 
 
 def put_look_material(
-    curves: bpy.types.Curves, shading: ShadingSettings, *, are_final: bool = False
+    curves: bpy.types.Curves,
+    shading: ShadingSettings,
+    *,
+    are_final: bool = False,
+    painted: Floats | None = None,
 ) -> tuple[bpy.types.Material, tuple[str, ...]]:
     """Give hair curves a material of a look; one that it has of an earlier look is written again.
 
@@ -42,12 +47,18 @@ def put_look_material(
 
     Args:
         are_final: whether the curves' own colours hold all that the look does to colours.
+        painted: (curve_count, 4), see `painted_colors.colors_of_curves`, in place of their own.
 
     Returns:
         the material, and notes on what of the look it does not have.
     """
-    has_colors = shading.color_source == "own" and COLOR_ATTRIBUTE in curves.attributes
-    if has_colors:
+    has_own = COLOR_ATTRIBUTE in curves.attributes and bool(
+        shading.color_source == "own" or shading.color_map
+    )
+    has_colors = painted is not None or has_own
+    if painted is not None:
+        set_attribute(curves, MATERIAL_COLOR, "CURVE", painted)
+    elif has_own:
         _copy_colors(curves)
     slots, material = curves.materials, _own_material(curves)
     if material is None:

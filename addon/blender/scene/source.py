@@ -10,6 +10,7 @@ from ...arrays import Floats, Ints
 from ...errors import HairloomError
 from ...groom.children_settings import ChildrenSettings
 from ...groom.masks import Mask, Masks
+from ...groom.painted_color import PaintedColor
 from ...groom.ties import NO_HOLDERS, Holders
 from ...strands import StrandSet, Surface
 from ...strands.clean import Cleaned
@@ -18,6 +19,7 @@ from ..base.objects import head_of
 from ..properties.properties import settings_of
 from .curves import read_curves
 from .masks import Canvas
+from .painted_colors import read_colors
 from .partings import read_partings
 from .surfaces import read_surface
 
@@ -34,7 +36,8 @@ class Source:
     density: (vertex_count,) how densely children grow on the head, or None.
     masks: what is painted of the settings of children.
     head_warning, density_warning: a warning with its remedy, or empty. mask_warnings: such.
-    color_warnings: about strands without a colour.
+    colors: what is painted under it, or None.
+    color_warnings: about that, and about strands without a colour.
     holders: what holds it beside its roots, at rest.
     partings: the straight pieces of its partings, (n, 2, 3) [m] world space; None: there are none.
     parting_warnings: about objects that cannot be partings.
@@ -49,6 +52,7 @@ class Source:
     head_warning: str = ""
     density_warning: str = ""
     mask_warnings: tuple[str, ...] = ()
+    colors: PaintedColor | None = None
     color_warnings: tuple[str, ...] = ()
     holders: Holders = NO_HOLDERS
     partings: Floats | None = None
@@ -87,6 +91,7 @@ def read_source(
     density, density_warning = read_density(hair, canvas, depsgraph)
     settings = settings_of(hair.data.hairloom.children, ChildrenSettings)
     masks, mask_warnings = canvas.masks(settings, depsgraph)
+    colors, color_warnings = read_source_colors(hair, read.strands, head, depsgraph)
     partings, parting_warnings = read_partings(hair, depsgraph)
     return Source(
         read.strands,
@@ -98,10 +103,22 @@ def read_source(
         head_warning,
         density_warning,
         mask_warnings,
-        color_notes(hair.name, read.strands),
+        colors,
+        color_warnings,
         partings=partings if len(partings) else None,
         parting_warnings=parting_warnings,
     )
+
+
+def read_source_colors(
+    hair: bpy.types.Object,
+    strands: StrandSet,
+    head: Surface | None,
+    depsgraph: bpy.types.Depsgraph,
+) -> tuple[PaintedColor | None, tuple[str, ...]]:
+    """What is painted under hair, and all that is to be said of its colours."""
+    found, problems = read_colors(hair, depsgraph, None if head is None else len(head.triangles))
+    return found, (*problems, *color_notes(hair.name, strands))
 
 
 def read_density(

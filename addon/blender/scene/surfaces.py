@@ -34,7 +34,7 @@ def read_surface(
     Raises:
         HairloomError: not a mesh, no faces, or no UVs where they are needed.
     """
-    with _evaluated_mesh(obj, depsgraph, place) as mesh:
+    with evaluated_mesh(obj, depsgraph, place) as mesh:
         mesh.calc_loop_triangles()
         triangles = np.empty((len(mesh.loop_triangles), 3), np.int32)
         mesh.loop_triangles.foreach_get("vertices", triangles.ravel())
@@ -93,7 +93,7 @@ def read_positions(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, *, pla
     Raises:
         HairloomError: not a mesh.
     """
-    with _evaluated_mesh(obj, depsgraph, place) as mesh:
+    with evaluated_mesh(obj, depsgraph, place) as mesh:
         positions = _positions(mesh)
     matrix = np.array(obj.evaluated_get(depsgraph).matrix_world, np.float32)
     return positions @ matrix[:3, :3].T + matrix[:3, 3]
@@ -105,7 +105,7 @@ def read_material_slots(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -
     Raises:
         HairloomError: not a mesh.
     """
-    with _evaluated_mesh(obj, depsgraph, obj.name) as mesh:
+    with evaluated_mesh(obj, depsgraph, obj.name) as mesh:
         mesh.calc_loop_triangles()
         slots = np.empty(len(mesh.loop_triangles), np.int32)
         mesh.loop_triangles.foreach_get("material_index", slots)
@@ -113,7 +113,7 @@ def read_material_slots(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -
 
 
 @contextmanager
-def _evaluated_mesh(
+def evaluated_mesh(
     obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, place: str
 ) -> Iterator[bpy.types.Mesh]:
     """The evaluated mesh, even in Edit Mode; it is freed at the end of the block."""

@@ -18,10 +18,11 @@ from ...groom.masks import NO_MASKS, Mask, Masks, mask_names
 from ...paint_flow import painted_guides
 from ...pipeline import Pose, Rig
 from ...shading.ambient_settings import AmbientSettings
+from ...shading.settings import ShadingSettings
 from ...strands import StrandSet
 from ...strands.affine import moved
 from ...strands.clean import Cleaned
-from ...strands.colors import color_notes
+from ...strands.colors import same_colors
 from ...strands.kept import Kept
 from ...style_flow import at_rest, styled
 from ..bakes.baked_rig import BakedRig, RestMatrices
@@ -33,7 +34,13 @@ from ..scene.curves import read_curves
 from ..scene.masks import Canvas
 from ..scene.partings import is_same_state, parting_state, read_partings
 from ..scene.poses import check_finite, read_pose
-from ..scene.source import Source, read_density, read_source, usable_curves
+from ..scene.source import (
+    Source,
+    read_density,
+    read_source,
+    read_source_colors,
+    usable_curves,
+)
 from .prepared_groom import BuildRequest, rig_of
 
 #: Points that lie nearer than this to where they were have not moved, as a part of how far they are
@@ -170,6 +177,7 @@ class GroomSource:
         self._read_motion_masks(canvas, depsgraph)
         density, warning = read_density(hair, canvas, depsgraph)
         masks, mask_warnings = canvas.masks(settings[ChildrenSettings], depsgraph)
+        colors, color_warnings = read_source_colors(hair, strands, before.head, depsgraph)
         holding = Holding.of(hair, depsgraph, known.holding, back)
         partings, parting_warnings = before.partings, before.parting_warnings
         if self.has_other_partings():
@@ -187,7 +195,8 @@ class GroomSource:
             density_warning=warning,
             masks=masks,
             mask_warnings=mask_warnings,
-            color_warnings=color_notes(hair.name, strands),
+            colors=colors,
+            color_warnings=color_warnings,
             partings=partings,
             parting_warnings=parting_warnings,
         )
@@ -201,8 +210,11 @@ class GroomSource:
                 dropped=read.dropped,
                 density_warning=warning,
                 mask_warnings=mask_warnings,
+                colors=colors,
+                color_warnings=color_warnings,
                 parting_warnings=parting_warnings,
             )
+            self.request = replace(known, settings=settings)
             return None
         self.request = request
         return request
@@ -253,6 +265,19 @@ class GroomSource:
         )
         is_same = np.array_equal(density, self.painted[0])  # type: ignore[arg-type]
         return not (is_same and masks == self.painted[1])
+
+    def read_colors(self, depsgraph: bpy.types.Depsgraph) -> bool:
+        """Read what is painted under the hair that is shown; whether anything is to be.
+
+        Raises:
+            HairloomError: the hair is gone.
+        """
+        hair, shown = self.hair.found(), self.source
+        if not self.settings[ShadingSettings].color_map:
+            return False
+        colors, warnings = read_source_colors(hair, shown.strands, shown.head, depsgraph)
+        self.source = replace(shown, colors=colors, color_warnings=warnings)
+        return True
 
     def accept(self, request: BuildRequest) -> None:
         """Its hair is shown from now on; what acts at once is as it is set now."""
@@ -392,7 +417,7 @@ def _same(one: StrandSet, other: StrandSet, back: Floats) -> bool:
         and _same_places(one, other, back)
         and np.allclose(one.radius, other.radius, rtol=1e-5)
         and np.array_equal(one.group, other.group)
-        and _same_colors(one.color, other.color)
+        and same_colors(one.color, other.color)
     )
 
 
@@ -400,9 +425,3 @@ def _same_places(one: StrandSet, other: StrandSet, back: Floats) -> bool:
     """Whether the points of two readings are the same, but for rounding on the way `back`."""
     farthest = max(np.abs(one.points).max(initial=0.0), np.abs(back[:3, 3]).max())
     return np.allclose(one.points, other.points, rtol=0.0, atol=_ROUNDING * farthest)
-
-
-def _same_colors(one: Floats | None, other: Floats | None) -> bool:
-    if one is None or other is None:
-        return one is other
-    return np.array_equal(one, other, equal_nan=True)

@@ -237,7 +237,7 @@ class Session:
             self.solver = solver_of(groom.rig, self.settings[DynamicsSettings].device, motion)
             self._styled = None
             self._take_style(depsgraph)
-        self.picture.take_groom(groom, self.settings)
+        self.picture.take_groom(groom, self.settings, self.source.colors)
         self.light(depsgraph)
         if is_same or goes_on:
             self._show()
@@ -254,6 +254,7 @@ class Session:
         if made is not None:
             self._take(*made, self.groom, depsgraph)
             self.comb(depsgraph)  # a brush has gone on meanwhile
+            self.color(depsgraph)
             self.paint(depsgraph)
 
     def finish(self, depsgraph: bpy.types.Depsgraph) -> None:
@@ -282,6 +283,7 @@ class Session:
             groom = build(request, self._made, is_drawn=self._is_drawn)
             self._take(request, groom, self.groom, depsgraph)
             return
+        self._color()
         self.take_settings()
         if request is not None:
             self._begin()
@@ -309,6 +311,20 @@ class Session:
         self.solver = NumpySolver.at_rest(self.rig, self._pose(depsgraph))
         self._show()
 
+    def color(self, depsgraph: bpy.types.Depsgraph) -> None:
+        """Have hair follow the colours that a brush has painted; its cards wait for `read_again`.
+
+        Raises:
+            HairloomError: the hair is gone.
+        """
+        if self.is_made and self._source.read_colors(depsgraph):
+            self._color()
+            self._show()
+
+    def _color(self) -> None:
+        """Draw what is painted under the strands, as it was read last."""
+        self.picture.take_colors(self.rig, self.source.colors, self.settings)
+
     def paint(self, depsgraph: bpy.types.Depsgraph) -> None:
         """Have children at rest follow what a brush has painted, as far as that is done at once;
         `read_again` is to come. Hair that is held, and that of bakes, waits for it.
@@ -324,6 +340,7 @@ class Session:
             return
         self.groom = replace(self.groom, rig=painted(self.rig, *self._source.painted))
         self.solver = NumpySolver.at_rest(self.rig, self._pose(depsgraph))
+        self._color()  # children stand elsewhere
         self._show()
 
     def shown_map(self, depsgraph: bpy.types.Depsgraph) -> Floats | None:

@@ -10,6 +10,9 @@ from typing import Any
 import bpy
 import numpy as np
 
+from ...arrays import Floats
+from ...groom.painted_color import PaintedColor
+from ...paint_flow import with_colors
 from ...pipeline import Pose, Rig, strand_seeds
 from ...refine.settings import DetailSettings
 from ...render.hair_ball import HairBall
@@ -22,6 +25,7 @@ from ...shading.volume.settings import VolumeSettings
 from ...shading.volume.shadow_lights import shadow_warnings
 from ...strands import Surface
 from ...strands.arc_length import uneven_along
+from ...strands.colors import same_colors
 from ..cards.show import ShownCards
 from ..properties.groom_settings import GroomSettings
 from ..scene.lights import (
@@ -100,6 +104,8 @@ class GroomPicture:
         self._is_drawn = is_drawn
         self._ball = HairBall()
         self._groom: PreparedGroom | None = None
+        self._colors: PaintedColor | None = None
+        self._of_cards: tuple[Rig, Rig] | None = None
         self._light_warnings: tuple[str, ...] = ()
         self.cards = ShownCards(hair, arrived)
 
@@ -116,15 +122,32 @@ class GroomPicture:
         lights = snapshot.lights if scene_lights_are_shown() else ()
         return shadow_warnings(lights, self._ball.of(snapshot), snapshot.volume)
 
-    def take_groom(self, groom: PreparedGroom, settings: GroomSettings) -> None:
-        """All that depends on the strands, at rest and without light."""
+    def take_groom(
+        self, groom: PreparedGroom, settings: GroomSettings, colors: PaintedColor | None
+    ) -> None:
+        """All that depends on the strands, at rest and without light.
+
+        Args:
+            colors: what is painted under them.
+        """
         self._groom = groom
-        snapshot = snapshot_of(groom)
-        self.snapshot = with_settings(snapshot, settings)
+        self.snapshot = with_settings(snapshot_of(groom), settings)
+        self.take_colors(groom.rig, colors, settings)
         self._want_cards(groom.rig, settings)
+
+    def take_colors(self, rig: Rig, colors: PaintedColor | None, settings: GroomSettings) -> None:
+        """The same strands, of this rig, with other colours painted under them; their cards wait
+        until settings are taken over."""
+        self._colors = colors
+        found = with_colors(rig.strands, colors, settings[ShadingSettings]).color
+        if not same_colors(found, self.snapshot.color):
+            self.snapshot = replace(self.snapshot, color=found)
 
     def take_settings(self, rig: Rig, was: GroomSettings, now: GroomSettings) -> bool:
         """Take over what acts at once; whether hair has to be shown again where it is."""
+        looks = was[ShadingSettings], now[ShadingSettings]
+        if looks[0] != looks[1] and any(look.color_map for look in looks):
+            self.take_colors(rig, self._colors, now)
         self.snapshot = with_settings(self.snapshot, now)
         if not shapes_alike(was[ShadingSettings], now[ShadingSettings]) and not bpy.app.background:
             self.snapshot = with_tables(self.snapshot, PREVIEW_SIZE)
@@ -140,7 +163,8 @@ class GroomPicture:
         if not (self._is_drawn and is_whole and settings.shows_cards):
             self.cards.forget()
             return self.snapshot.cards is not None
-        self.cards.want(rig, settings)
+        self._of_cards = rig, _with_color(rig, self.snapshot.color)
+        self.cards.want(self._of_cards[1], settings)
         return True
 
     @property
@@ -151,6 +175,11 @@ class GroomPicture:
     def refine(self) -> None:
         """Shade by tables of full size again."""
         self.snapshot = with_tables(self.snapshot, DEFAULT_SIZE)
+
+    def _painted(self, rig: Rig) -> Rig:
+        """The rig as its cards were asked for."""
+        known = self._of_cards
+        return known[1] if known is not None and known[0] is rig else rig
 
     def light(self, depsgraph: bpy.types.Depsgraph) -> None:
         """Take over the scene's lights and world."""
@@ -173,8 +202,13 @@ class GroomPicture:
             solver.shown(self.snapshot),
             occluder_spheres=spheres,
             casters=_casters(rig, pose, settings),
-            cards=self.cards.now(rig, pose, solver.guides, settings.sections),
+            cards=self.cards.now(self._painted(rig), pose, solver.guides, settings.sections),
         )
+
+
+def _with_color(rig: Rig, color: Floats | None) -> Rig:
+    strands = rig.strands
+    return rig if strands.color is color else replace(rig, strands=replace(strands, color=color))
 
 
 def _casters(rig: Rig, pose: Pose, settings: GroomSettings) -> tuple[Surface, ...]:

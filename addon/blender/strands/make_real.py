@@ -12,6 +12,7 @@ import numpy as np
 from ...cards.drawing_settings import CardDrawingSettings
 from ...groom.children_settings import ChildrenSettings
 from ...groom.width_settings import WidthSettings
+from ...paint_flow import with_colors
 from ...parameters import ALL_SETTINGS, sections_of
 from ...pipeline import Rig, strand_seeds
 from ...shading.drawn_strands import drawn_radius, strand_colors
@@ -84,13 +85,13 @@ def _drawn(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Parts[_Dra
         "Making strands",
         lambda: rig_from(source, settings.sections, place=name),
     )
-    strands = yield Part("Colouring strands", lambda: _coloured(rig, settings))
+    strands = yield Part("Colouring strands", lambda: _coloured(rig, source, settings))
     return _Drawn(source, settings, rig, strands)
 
 
-def _coloured(rig: Rig, settings: GroomSettings) -> StrandSet:
+def _coloured(rig: Rig, source: Source, settings: GroomSettings) -> StrandSet:
     """With the widths and colours that they are drawn with."""
-    strands = rig.strands
+    strands = with_colors(rig.strands, source.colors, settings[ShadingSettings])
     place, counts = along(strands.points, strands.offsets), strands.point_counts
     color = strand_colors(
         np.repeat(strand_seeds(rig), counts),
@@ -124,6 +125,7 @@ def real_look(shading: ShadingSettings) -> ShadingSettings:
     return replace(
         shading,
         color_source="own",
+        color_map="",
         brow_source="look",
         color_variation=0.0,
         grey_fraction=0.0,

@@ -11,9 +11,11 @@ import numpy as np
 
 from ...arrays import Floats, Ints
 from ...exchange.groom import Groom, points_of, with_guide_copies
+from ...groom.painted_color import PaintedColor
 from ...groom.roots import bind_roots
 from ...groom.weights import guide_weights
 from ...groom.widths import as_wide, with_widths
+from ...paint_flow import with_colors
 from ...pipeline import Rig
 from ...shading.drawn_strands import look_color, own_colors
 from ...shading.settings import ShadingSettings
@@ -26,6 +28,7 @@ from ..base.outcome import notes_of
 from ..colliders.rigs import rig_of
 from ..properties.groom_settings import GroomSettings
 from ..scene.groom_attributes import group_names, stored_groom
+from ..scene.painted_colors import read_colors
 from ..scene.source import Source, read_source, usable_curves
 
 _OF_GUIDES = ("is_guide", "closest_guides", "guide_weights")
@@ -81,18 +84,22 @@ def still_hair(
     source = read_source(hair, depsgraph)
     rig = rig_of(hair, source) if hair.data.hairloom.children.method != "none" else None
     if rig is not None and rig.own_count is not None:
-        groom = Groom(rig.strands, hair.name, group_names=group_names(hair))
+        strands = with_colors(rig.strands, source.colors, _look(hair))
+        groom = Groom(strands, hair.name, group_names=group_names(hair))
         out = replace(_out(groom, rig, request, _look(hair)), has_children=True)
         return _with_notes(hair, source, out, rig)
     said = _without_empty_marks(stored_groom(hair, depsgraph, source.kept))
     if request.guides and "is_guide" not in said:
         rig = rig or rig_of(hair, source)
         strands = _as_wide_as_drawn(hair, source.strands)
-        groom = Groom(_bound_as(strands, rig.strands), hair.name, **said)
+        strands = with_colors(_bound_as(strands, rig.strands), source.colors, _look(hair))
+        groom = Groom(strands, hair.name, **said)
         return _with_notes(hair, source, _out(groom, rig, request, _look(hair)), rig)
     strands = _as_wide_as_drawn(hair, source.strands)
-    if source.head is not None and (request.roots or strands.root_uv is None):
+    needs_roots = request.roots or strands.root_uv is None or source.colors is not None
+    if source.head is not None and needs_roots:
         strands = bind_roots(strands, source.head, place=hair.name).strands
+    strands = with_colors(strands, source.colors, _look(hair))
     groom = Groom(strands, hair.name, **said)
     if request.guides and groom.closest_guides is None:
         groom = _weighed(groom, hair.data.hairloom.guides.cv_count)
@@ -115,21 +122,31 @@ def baked_hair(
     notes: tuple[str, ...] = ()
     if rig.strands.root_uv is None and rig.head is not None:
         notes = (f"{hair.name}: its bake has no root UVs. Bake again to have them in the file.",)
-    groom = Groom(rig.strands, hair.name, **({"group_names": group_names(hair)} | said))
+    triangle_count = None if rig.head is None else len(rig.head.triangles)
+    colors, problems = read_colors(hair, depsgraph, triangle_count)
+    notes += problems
+    strands = with_colors(rig.strands, colors, _look(hair))
+    groom = Groom(strands, hair.name, **({"group_names": group_names(hair)} | said))
     has_marks = groom.is_guide is not None
     out = _out(groom, None if has_marks else rig, request, _look(hair))
     return replace(out, notes=notes)
 
 
 def hair_of_rig(
-    rig: Rig, groom: Groom, request: ExportRequest, look: ShadingSettings
+    rig: Rig,
+    groom: Groom,
+    request: ExportRequest,
+    look: ShadingSettings,
+    colors: PaintedColor | None = None,
 ) -> ExportStrands:
     """Hair of the command line.
 
     Args:
         groom: the rig's strands, or the same with other points.
+        colors: what is painted under them.
     """
-    bound = replace(groom, strands=_bound_as(groom.strands, rig.strands))
+    strands = with_colors(_bound_as(groom.strands, rig.strands), colors, look)
+    bound = replace(groom, strands=strands)
     if groom.is_guide is not None and not groom.is_guide.any():
         bound = replace(bound, is_guide=None, closest_guides=None, guide_weights=None)
     return _out(bound, rig if bound.is_guide is None else None, request, look)

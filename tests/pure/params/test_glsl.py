@@ -100,6 +100,9 @@ def test_every_parameter_set_reads_back(kind: type[Settings]) -> None:
     found = read_back(kind())
     for parameter in kind.parameters():
         value = parameter.default
+        if parameter.kind == "map":
+            assert parameter.name not in found, "the name of what is painted"
+            continue
         if parameter.kind == "choice":
             value = [identifier for identifier, _, _ in parameter.choices].index(value)
         if parameter.kind == "toggle":

@@ -1,0 +1,218 @@
+"""Reading the colours that are painted under hair.
+
+A name is looked for as a colour attribute of the surface, then as an image, which lies on the
+surface's active UV map.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+
+import bpy
+import numpy as np
+
+from ...arrays import Floats
+from ...errors import HairloomError
+from ...exchange.textures.srgb import srgb_decoded
+from ...groom.painted_color import ImageColor, PaintedColor, SurfaceColor
+from ...groom.roots import bind_roots
+from ...paint_flow import with_colors
+from ...shading.settings import ShadingSettings
+from ..base.attributes import read_attribute
+from ..base.objects import head_of
+from ..base.vertex_weights import at_corners, color_choices, image_names, is_color
+from .curves import read_own_curves
+from .surfaces import evaluated_mesh, read_corner_uv, read_surface
+
+#: Colour spaces of images whose pixels Blender keeps as they are in scene-linear Rec. 709.
+_LINEAR = ("Linear Rec.709", "Non-Color")
+
+
+def read_colors(
+    hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph, triangle_count: int | None
+) -> tuple[PaintedColor | None, tuple[str, ...]]:
+    """What the hair's look names, None where it names nothing or nothing that can be used; and what
+    is to be said of it.
+
+    Args:
+        triangle_count: of the surface that the hair was made on; None: there is none.
+    """
+    name = hair.data.hairloom.shading.color_map
+    if not name:
+        return None, ()
+    try:
+        found = painted_colors(head_of(hair), name, depsgraph, triangle_count, place=hair.name)
+    except HairloomError as error:
+        return None, (f"{error}. Until then it has the look's colour",)
+    return found, ()
+
+
+def painted_colors(
+    surface: bpy.types.Object | None,
+    name: str,
+    depsgraph: bpy.types.Depsgraph,
+    triangle_count: int | None,
+    *,
+    place: str,
+) -> PaintedColor:
+    """The colours of this name.
+
+    Args:
+        surface: an object; None: the hair has none in this scene.
+        place: names the hair in messages.
+
+    Raises:
+        HairloomError: there are none, or none that can be used.
+    """
+    if surface is None or triangle_count is None:
+        raise HairloomError(
+            f"the colour map '{name}' lies on a surface, and it has none",
+            place=place,
+            remedy="Set Surface in its Data properties, or clear Colour Map",
+        )
+    with evaluated_mesh(surface, depsgraph, surface.name) as mesh:
+        mesh.calc_loop_triangles()
+        found = _of_attribute(mesh, name, surface.name) or _of_image(mesh, name, surface.name)
+        there = len(mesh.loop_triangles)
+    if found is None:
+        raise _missing(surface, name)
+    if there != triangle_count:
+        raise HairloomError(
+            f"the colour map '{name}' lies on {there:,} triangles, the hair was made on "
+            f"{triangle_count:,}",
+            place=surface.name,
+            remedy="Turn modifiers on that change the mesh before the hair is shown",
+        )
+    if np.linalg.det(np.array(surface.evaluated_get(depsgraph).matrix_world)) < 0.0:
+        return found.mirrored()  # as triangles are, see `Surface.transformed`
+    return found
+
+
+def colors_of_curves(
+    hair: bpy.types.Object, look: ShadingSettings, depsgraph: bpy.types.Depsgraph
+) -> tuple[Floats | None, tuple[str, ...]]:
+    """What is painted under each curve before all modifiers, which hand it on to those that they
+    add, (curve_count, 4), -1 where it has the look's; None where nothing is. And what is to be said
+    of it.
+
+    Raises:
+        HairloomError: the curves are of another scale than their surface.
+    """
+    surface = head_of(hair)
+    if not look.color_map or surface is None or surface.type != "MESH":
+        return None, read_colors(hair, depsgraph, None)[1]
+    head = read_surface(surface, depsgraph, need_uv=False, place=surface.name)
+    painted, notes = read_colors(hair, depsgraph, len(head.triangles))
+    if painted is None:
+        return None, notes
+    own = read_own_curves(hair, depsgraph)
+    strands = with_colors(bind_roots(own.strands, head, place=hair.name).strands, painted, look)
+    found = np.full((len(hair.data.curves), 4), -1.0, np.float32)
+    found[:, 3] = 1.0
+    if strands.color is not None:
+        found[own.kept, :3] = np.nan_to_num(strands.color[strands.offsets[:-1]], nan=-1.0)
+    return found, notes
+
+
+def _of_attribute(mesh: bpy.types.Mesh, name: str, place: str) -> SurfaceColor | None:
+    attribute = mesh.attributes.get(name)
+    if attribute is None or not is_color(attribute):
+        return None
+    values = _usable(read_attribute(mesh, name, attribute.domain, 4), name, place)
+    return SurfaceColor(at_corners(mesh, _multiplied(values), attribute.domain))
+
+
+def _of_image(mesh: bpy.types.Mesh, name: str, place: str) -> ImageColor | None:
+    if name not in image_names():
+        return None
+    corner_uv = read_corner_uv(mesh)
+    if corner_uv is None:
+        raise HairloomError(
+            f"the image '{name}' needs a surface with UVs",
+            place=place,
+            remedy="Unwrap it (Edit Mode, UV > Unwrap), or paint a colour attribute",
+        )
+    image = bpy.data.images[name]
+    (width, height), channels = image.size, image.channels  # loads it
+    if not (width and height and image.has_data):
+        raise HairloomError(
+            f"the image '{name}' has no pixels",
+            place=place,
+            remedy="Find its file (File > External Data > Find Missing Files)",
+        )
+    meant = _meaning(image, place)
+    pixels = np.empty(width * height * channels, np.float32)
+    image.pixels.foreach_get(pixels)
+    if image.is_float:  # all others are whole numbers
+        pixels = _usable(pixels, name, place)
+    return ImageColor(pixels.reshape(height, width, channels), meant, corner_uv)
+
+
+def _meaning(image: bpy.types.Image, place: str) -> Callable[[Floats], Floats]:
+    """What its pixels mean; those of floats are scene-linear and multiplied by opacity, whatever
+    its colour space, others are as the file has them."""
+    space, has_opacity = image.colorspace_settings.name, image.alpha_mode in ("STRAIGHT", "PREMUL")
+    if image.source == "TILED" and len(image.tiles) > 1:
+        raise HairloomError(
+            f"the image '{image.name}' has several tiles, and hair has one for all of its surface",
+            place=place,
+            remedy="Use an image of one tile, or a colour attribute",
+        )
+    if image.is_float:
+        return partial(_whole, has_opacity=has_opacity)
+    if space != "sRGB" and space not in _LINEAR:
+        raise HairloomError(
+            f"the image '{image.name}' is in the colour space '{space}', which hair does not know",
+            place=place,
+            remedy="Set its Color Space to sRGB (Image Editor > Sidebar > Image)",
+        )
+    return partial(_decoded, is_coded=space == "sRGB", has_opacity=has_opacity)
+
+
+def _decoded(stored: Floats, *, is_coded: bool, has_opacity: bool) -> Floats:
+    whole = _whole(stored, has_opacity=has_opacity)
+    if is_coded:
+        whole[:, :3] = srgb_decoded(whole[:, :3])
+    return _multiplied(whole)
+
+
+def _whole(stored: Floats, *, has_opacity: bool) -> Floats:
+    """Pixels (n, k) as colours with an opacity, (n, 4)."""
+    whole = np.ones((len(stored), 4), np.float32)
+    whole[:, :3] = stored[:, :3] if stored.shape[1] >= 3 else stored[:, :1]
+    if has_opacity and stored.shape[1] == 4:
+        whole[:, 3] = np.minimum(stored[:, 3], 1.0)
+    return whole
+
+
+def _multiplied(values: Floats) -> Floats:
+    """Colours times their opacity, (n, 4)."""
+    opacity = np.minimum(values[:, 3:], np.float32(1.0))
+    return np.concatenate([values[:, :3] * opacity, opacity], axis=1)
+
+
+def _usable(values: Floats, name: str, place: str) -> Floats:
+    """Not negative.
+
+    Raises:
+        HairloomError: not finite.
+    """
+    if not np.isfinite(values).all():
+        raise HairloomError(
+            f"the colour map '{name}' has values that are not finite numbers",
+            place=place,
+            remedy="Paint or compute it again, or clear Colour Map",
+        )
+    return np.maximum(values, np.float32(0.0))
+
+
+def _missing(surface: bpy.types.Object, name: str) -> HairloomError:
+    there = ", ".join(color_choices(surface)[:8])
+    return HairloomError(
+        f"it has no colour attribute named '{name}', and there is no such image",
+        place=surface.name,
+        remedy=f"Use one of: {there}"
+        if there
+        else "Add one (Data > Color Attributes) and paint it (Vertex Paint), or clear Colour Map",
+    )

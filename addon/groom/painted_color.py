@@ -1,0 +1,77 @@
+"""Colours that are painted on the surface under hair, where its strands stand.
+
+They are scene-linear and multiplied by their opacity, so that what is painted on nothing has no
+dark border; so they are mixed between corners of triangles and between pixels.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..arrays import Floats, Ints
+from .masks import between_pixels
+
+
+@dataclass(frozen=True, eq=False)
+class PaintedColor:
+    """What was painted, not negative and finite."""
+
+    def at(self, triangle: Ints, barycentric: Floats) -> Floats:
+        """Red, green, blue and opacity, (n, 4), where roots (n,), (n, 3) are."""
+        raise NotImplementedError
+
+    @property
+    def triangle_count(self) -> int:
+        """Of the surface that it is painted on."""
+        raise NotImplementedError
+
+    def mirrored(self) -> PaintedColor:
+        """The same on triangles whose corners are in the other order."""
+        raise NotImplementedError
+
+
+@dataclass(frozen=True, eq=False)
+class SurfaceColor(PaintedColor):
+    """corners: (triangle_count, 3, 4) float32, at the corners of the surface's triangles."""
+
+    corners: Floats
+
+    def at(self, triangle: Ints, barycentric: Floats) -> Floats:
+        a, b, c = self.corners[triangle].astype(np.float64).transpose(1, 0, 2)
+        # so that it is exactly the same where it is painted evenly
+        found: Floats = a + barycentric[:, 1:2] * (b - a) + barycentric[:, 2:3] * (c - a)
+        return found
+
+    @property
+    def triangle_count(self) -> int:
+        return len(self.corners)
+
+    def mirrored(self) -> SurfaceColor:
+        return SurfaceColor(self.corners[:, ::-1])
+
+
+@dataclass(frozen=True, eq=False)
+class ImageColor(PaintedColor):
+    """pixels: (height, width, k) float32 as they are stored, the lowest row first.
+    meant: what such pixels (n, k) mean, (n, 4). corner_uv: (triangle_count, 3, 2).
+
+    Few of many pixels are asked for, so that a large image can be followed under a brush.
+    """
+
+    pixels: Floats
+    meant: Callable[[Floats], Floats]
+    corner_uv: Floats
+
+    def at(self, triangle: Ints, barycentric: Floats) -> Floats:
+        uv = np.einsum("nk,nkj->nj", barycentric, self.corner_uv[triangle])
+        return between_pixels(self.pixels, uv, self.meant)
+
+    @property
+    def triangle_count(self) -> int:
+        return len(self.corner_uv)
+
+    def mirrored(self) -> ImageColor:
+        return replace(self, corner_uv=self.corner_uv[:, ::-1])
