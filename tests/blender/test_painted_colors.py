@@ -10,11 +10,13 @@ import bpy
 import numpy as np
 import pytest
 
+from hairloom.addon.blender.command_line import command_line
 from hairloom.addon.blender.engine.engine_hair import read_groom
 from hairloom.addon.blender.preview import previews, scene_events
 from hairloom.addon.blender.properties.properties import colors_of_groom
 from hairloom.addon.blender.strands.read_hair import ExportRequest, still_hair
 from hairloom.addon.blender.viewport import overlay
+from hairloom.addon.exchange.hair_file import read_hair_file
 
 RED, BLUE = (0.8, 0.02, 0.03, 1.0), (0.01, 0.05, 0.6, 1.0)
 #: name of what is painted
@@ -319,6 +321,19 @@ def test_real_hair_and_materials_have_what_is_painted(
     starts = [each.first_point_index for each in real.data.curves]
     roots = np.array([real.data.points[each].position for each in starts])
     assert_halves(colors("color", real.data)[starts], roots)
+
+
+def test_a_verb_writes_what_is_painted(
+    hair: Any, sphere: Any, evaluated: Any, tmp_path: Path
+) -> None:
+    paint_halves(sphere)
+    made = tmp_path / "hair.hair"
+    asked = ["export", "--groom", "Hair", "--set", f"shading.color_map={MAP}"]
+    assert command_line.run([*asked, "--output", str(made)]) == 0
+    strands = read_hair_file(made).strands
+    assert_halves(strands.color[strands.offsets[:-1]], strands.roots)
+    asked[-1] = "shading.color_map=Gone"
+    assert command_line.run([*asked, "--output", str(tmp_path / "no.hair")]) != 0
 
 
 @pytest.mark.draws
