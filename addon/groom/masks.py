@@ -150,6 +150,10 @@ class ImageMask(Mask):
         return len(self.corner_uv) == triangle_count
 
     def at_vertices(self, surface: Surface, strands: StrandSet) -> Floats:
+        return self.on(surface)
+
+    def on(self, surface: Surface) -> Floats:
+        """How much it is at each vertex, (vertex_count,)."""
         corners = self._at(self.corner_uv.reshape(-1, 2)).reshape(-1, 3)
         return _mean_at_vertices(surface, corners)
 

@@ -7,15 +7,13 @@ from typing import Any
 import bpy
 from bpy.props import StringProperty
 
-from ..blender.base.vertex_weights import weight_names
 from ..blender.properties.groups import operator_properties
+from ..blender.properties.properties import maps_meant
 from .selection import ground_mesh
 
 
 def names_of_weights(_operator: Any, context: bpy.types.Context, typed: str) -> list[str]:
-    mesh = ground_mesh(context)
-    names = [] if mesh is None else weight_names(mesh)
-    return [name for name in names if typed.lower() in name.lower()]
+    return maps_meant(ground_mesh(context), typed)
 
 
 #: for the `__annotations__` of an operator
@@ -23,14 +21,14 @@ GROW_PROPERTIES: dict[str, Any] = {
     **operator_properties("grow"),
     "density_group": StringProperty(
         name="Density",
-        description="Vertex group or float attribute on points that sets how densely hair "
-        "grows. If empty, combed hair grows on the scalp, other hair everywhere",
+        description="Vertex group, attribute of the surface, or image on its UVs that sets how "
+        "densely hair grows. If empty, combed hair grows on the scalp, other hair everywhere",
         search=names_of_weights,
     ),
     "length_group": StringProperty(
         name="Length Factor",
-        description="Vertex group or float attribute on points that the length is multiplied "
-        "by. If empty, all hair has the same length",
+        description="Vertex group, attribute of the surface, or image on its UVs that the "
+        "length is multiplied by. If empty, all hair has the same length",
         search=names_of_weights,
     ),
 }

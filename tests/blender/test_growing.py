@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from hairloom.addon.blender.preview import previews, scene_events
-from hairloom.addon.blender.properties.properties import settings_of
+from hairloom.addon.blender.properties.properties import settings_of, weights_of_surface
 from hairloom.addon.blender.scene.curves import curve_points, put_points, read_curves
 from hairloom.addon.blender.strands.growing import has_grown, is_behind, losses
 from hairloom.addon.groom.grow import grow, scalp_density
@@ -126,6 +126,31 @@ def test_weights_come_from_a_group_and_a_problem_is_told_and_goes(grown, sphere)
     assert np.array_equal(curve_points(grown.data)[:: FEW["cv_count"]], roots), "it is half done"
     own.density_group = ""
     assert own.problem == "" and curve_points(grown.data)[:, 2].min() < 0.03
+
+
+def test_an_image_says_where_and_how_long_hair_grows(grown, sphere):
+    """Dark below and a half above; of another name than a vertex group, which comes first."""
+    layer, vertices = sphere.data.uv_layers.active, sphere.data.vertices
+    for loop in sphere.data.loops:
+        layer.uv[loop.index].vector = (0.5, 0.5 + 2.0 * vertices[loop.vertex_index].co.z)
+    image = bpy.data.images.new("Top", 4, 64)
+    pixels = np.zeros((64, 4, 4), np.float32)
+    pixels[32:, :, :3] = 0.5
+    image.pixels.foreach_set(pixels.ravel())
+    own = grown.data.hairloom.grow
+    assert "Top" in weights_of_surface(own, bpy.context, "to")
+    whole = lengths(grown)
+    own.density_group = "Top"
+    assert own.problem == "" and curve_points(grown.data)[:: FEW["cv_count"], 2].min() > -0.03
+    own.density_group, own.length_group = "", "Top"
+    above = curve_points(grown.data)[:: FEW["cv_count"], 2] > 0.03
+    assert lengths(grown)[above] == pytest.approx(0.5 * whole[above], rel=0.1)
+    sphere.vertex_groups.new(name="Top").add(range(len(vertices)), 1.0, "REPLACE")
+    own.length_group = ""
+    own.length_group = "Top"
+    assert lengths(grown) == pytest.approx(whole, rel=0.02)
+    own.length_group = "Gone"
+    assert "neither a vertex group nor an attribute" in own.problem
 
 
 def test_undo_takes_setting_and_hair_back_together(grown):

@@ -26,6 +26,7 @@ from ..base.vertex_weights import read_weights
 from ..scene.built_in_head import HeadLook, built_in_head
 from ..scene.curves import read_curves
 from ..scene.head_look import head_look
+from ..scene.masks import read_map
 from ..scene.mesh_files import read_mesh_file
 from ..scene.partings import read_partings
 from ..scene.surfaces import read_surface, uv_map_note
@@ -208,7 +209,7 @@ def _weights(group: str, head_name: str | None) -> Floats | None:
             place=group,
             remedy="Name one with --head OBJECT, or leave the group out",
         )
-    return read_weights(head, bpy.context.evaluated_depsgraph_get(), group)
+    return read_map(head, bpy.context.evaluated_depsgraph_get(), group)
 
 
 def _surface_name(groom: str | None) -> str | None:

@@ -128,7 +128,7 @@ SECTION_GROUPS["grow"] = property_group(ALL_SETTINGS["grow"], changed.grow, is_a
 SECTION_GROUPS["grow"].__annotations__ |= {
     "density_group": StringProperty(
         name="Density",
-        description="Vertex group or float attribute on points of the surface that sets how "
+        description="Vertex group, attribute of the surface, or image on its UVs that sets how "
         "densely hair grows. If empty, combed hair grows on the scalp, other hair everywhere",
         search=weights_of_surface,
         options=set(),
@@ -136,8 +136,8 @@ SECTION_GROUPS["grow"].__annotations__ |= {
     ),
     "length_group": StringProperty(
         name="Length Factor",
-        description="Vertex group or float attribute on points of the surface that the length is "
-        "multiplied by. If empty, all hair has the same length",
+        description="Vertex group, attribute of the surface, or image on its UVs that the "
+        "length is multiplied by. If empty, all hair has the same length",
         search=weights_of_surface,
         options=set(),
         update=_grow_changed,

@@ -82,13 +82,13 @@ def settings_of[S: Settings](group: Any, settings: type[S]) -> S:
 
 
 def weights_of_surface(group: Any, _context: bpy.types.Context, typed: str) -> list[str]:
-    """The weights on the surface of this hair, by which it and its children may grow."""
+    """What is painted on the surface of this hair, by which it may grow."""
     owner, head = group.id_data, None
     if isinstance(owner, bpy.types.Curves):
         head = owner.surface
     elif owner.type == "CURVES":
         head = head_of(owner)
-    return weights_meant(head, typed)
+    return maps_meant(head, typed)
 
 
 def masks_of_groom(group: Any, _context: bpy.types.Context, typed: str) -> list[str]:
@@ -114,6 +114,11 @@ def colors_of_groom(group: Any, _context: bpy.types.Context, typed: str) -> list
 
 #: kind of a parameter that names what is painted -> what there is
 _SEARCHED = {"mask": masks_of_groom, "map": colors_of_groom}
+
+
+def maps_meant(obj: bpy.types.Object | None, typed: str) -> list[str]:
+    """The weights of a mesh, and the images, that what was typed may mean."""
+    return [name for name in mask_choices(None, obj) if typed.lower() in name.lower()]
 
 
 def weights_meant(obj: bpy.types.Object | None, typed: str) -> list[str]:

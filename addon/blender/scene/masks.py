@@ -26,10 +26,12 @@ from ..base.vertex_weights import (
     mask_choices,
     missing_weights,
     painted_attribute,
+    read_weights,
     triangle_corners,
     weights_on,
 )
 from .curves import curve_offsets
+from .surfaces import evaluated_mesh, read_surface
 
 
 @dataclass(frozen=True)
@@ -180,23 +182,8 @@ class Canvas:
         is_kept[self.kept] = True
         return StrandMask.of_points(strands, values[np.repeat(is_kept, counts)])
 
-    def _of_image(self, name: str) -> Mask | None:
-        if name not in image_names():
-            return None
-        if self.head is None or self.head.corner_uv is None:
-            raise HairloomError(
-                f"the image '{name}' needs a surface with UVs",
-                place=self._place,
-                remedy="Unwrap it (Edit Mode, UV > Unwrap), or paint a vertex group",
-            )
-        pixels = image_values(bpy.data.images[name])
-        if not pixels.size:
-            raise HairloomError(
-                f"the image '{name}' has no pixels",
-                place=self._place,
-                remedy="Find its file (File > External Data > Find Missing Files)",
-            )
-        return ImageMask(_usable(pixels, name, self._place), self.head.corner_uv)
+    def _of_image(self, name: str) -> ImageMask | None:
+        return image_mask(name, self.head, self._place) if name in image_names() else None
 
     def _missing(self, name: str) -> HairloomError:
         of_surface = None if self.surface is None else self.surface.data.attributes.get(name)
@@ -211,6 +198,48 @@ class Canvas:
             if there
             else "Paint one (Weight Paint), or leave the field empty",
         )
+
+
+def read_map(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, name: str) -> Floats:
+    """As `read_weights`; where the mesh has none of this name but there is such an image, what that
+    is at the vertices.
+
+    Raises:
+        HairloomError: not a mesh, or nothing of this name that can be used.
+    """
+    if name not in image_names() or obj.type != "MESH":
+        return read_weights(obj, depsgraph, name)
+    with evaluated_mesh(obj, depsgraph, obj.name) as mesh:
+        has_own = has_weights(obj, mesh, name)
+    if has_own:
+        return read_weights(obj, depsgraph, name)
+    head = read_surface(obj, depsgraph, need_uv=False, place=obj.name)
+    return image_mask(name, head, obj.name).on(head).astype(np.float32)
+
+
+def image_mask(name: str, head: Surface | None, place: str) -> ImageMask:
+    """An image on the UVs of a surface.
+
+    Args:
+        place: names the surface in messages.
+
+    Raises:
+        HairloomError: there are no UVs, or no pixels that can be used.
+    """
+    if head is None or head.corner_uv is None:
+        raise HairloomError(
+            f"the image '{name}' needs a surface with UVs",
+            place=place,
+            remedy="Unwrap it (Edit Mode, UV > Unwrap), or paint a vertex group",
+        )
+    pixels = image_values(bpy.data.images[name])
+    if not pixels.size:
+        raise HairloomError(
+            f"the image '{name}' has no pixels",
+            place=place,
+            remedy="Find its file (File > External Data > Find Missing Files)",
+        )
+    return ImageMask(_usable(pixels, name, place), head.corner_uv)
 
 
 def image_values(image: bpy.types.Image) -> Floats:

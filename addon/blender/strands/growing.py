@@ -23,10 +23,10 @@ from ...strands import StrandSet
 from ..base.attributes import read_attribute
 from ..base.objects import head_of
 from ..base.parts import Part, Parts, at_once
-from ..base.vertex_weights import read_weights
 from ..properties import changed
 from ..properties.properties import settings_of
 from ..scene.curves import curve_offsets, curve_points, fill_curves, write_curves
+from ..scene.masks import read_map
 from ..scene.surfaces import read_surface
 
 #: what hair has as it grows; Blender's own names of what is selected or hidden begin with a dot
@@ -46,7 +46,7 @@ def grow_on(
 
     Args:
         values: an operator or group with the properties of GrowSettings.
-        density_group, length_group: vertex groups or float attributes on points, by name. Without
+        density_group, length_group: vertex groups, attributes or images, by name. Without
             a density combed hair grows on the scalp of an upright head, hair along the normals
             everywhere; without a length all is as long as the settings say.
 
@@ -160,8 +160,8 @@ def _grown(
         before: the curves that these replace, whose widths they keep.
     """
     surface = read_surface(head, depsgraph, need_uv=False, place=head.name)
-    density = read_weights(head, depsgraph, density_group) if density_group else None
-    length = read_weights(head, depsgraph, length_group) if length_group else None
+    density = read_map(head, depsgraph, density_group) if density_group else None
+    length = read_map(head, depsgraph, length_group) if length_group else None
     radius: Floats | None = None if before is None else read_attribute(before, "radius", "POINT")
     offsets = np.zeros(1, np.int32) if before is None else curve_offsets(before)
 
