@@ -60,9 +60,12 @@ from .refine.ride import Riders, ride
 from .refine.thinning import even_ranks
 from .shading.ambient import ambient_occlusion, openness, skin_occlusion
 from .shading.ambient_settings import AmbientSettings
+from .shading.drawn_strands import drawn_radius
+from .shading.settings import StrandSettings
+from .shading.skin_seen import skin_seen
 from .shading.strand_noise import SEED_LIMIT
 from .strands import StrandSet, Surface
-from .strands.arc_length import typical
+from .strands.arc_length import along, typical
 from .strands.center_lines import center_lines, curl_room
 from .strands.face import is_face_hair
 from .strands.frames import strand_tangents, volume_normals
@@ -73,6 +76,8 @@ from .strands.resample import resample
 from .strands.root_motions import RootMotions
 from .strands.vectors import dot
 
+#: See `strand_axes`: three times (point_count, 3).
+type StrandAxes = tuple[Floats, Floats, Floats]
 #: Guides, about, that tell whether their head has jumped.
 JUMP_GUIDES = 64
 #: Of children that cannot be led out of the head, the part from which on a note says so.
@@ -866,22 +871,51 @@ def rest_occlusion(rig: Rig, settings: AmbientSettings, points: Floats | None = 
     )
 
 
-def rest_openness(rig: Rig, settings: AmbientSettings) -> Floats:
-    """How open every point is by direction at rest, (point_count, 4), see `ambient.openness`: the
-    mean, and a vector along the strand, along its normal of the hair's volume, and across both.
-
-    It turns with the strand, so it holds while hair moves as far as occlusion does.
-    """
-    strands, extinction = rig.strands, rig.widths.extinction
-    found = openness(strands, strands.points, rig.head, extinction, settings.cell_count)
-    if not strands.strand_count:
-        return found
+def strand_axes(strands: StrandSet) -> StrandAxes:
+    """Along the strand, along its normal of the hair's volume, and across both, at each point."""
     tangent = strand_tangents(strands.points, strands.offsets)
     center = strands.roots.mean(axis=0, dtype=np.float64).astype(np.float32)
     normal = volume_normals(strands.points, tangent, center)
-    axes = tangent, normal, np.cross(tangent, normal)
-    found[:, 1:] = np.stack([dot(found[:, 1:], axis) for axis in axes], axis=-1)
+    return tangent, normal, np.cross(tangent, normal)
+
+
+def rest_openness(rig: Rig, settings: AmbientSettings, axes: StrandAxes | None = None) -> Floats:
+    """How open every point is by direction at rest, (point_count, 4), see `ambient.openness`: the
+    mean, and a vector by the strand's axes.
+
+    It turns with the strand, so it holds while hair moves as far as occlusion does.
+
+    Args:
+        axes: `strand_axes` of the strands.
+    """
+    strands, extinction = rig.strands, rig.widths.extinction
+    found = openness(strands, strands.points, rig.head, extinction, settings.cell_count)
+    if strands.strand_count:
+        found[:, 1:] = _by_axes(found[:, 1:], axes or strand_axes(strands))
     return found
+
+
+def rest_skin_seen(rig: Rig, axes: StrandAxes | None = None) -> Floats | None:
+    """The skin that every point sees at rest, (point_count, 8): the received, beneath and depth of
+    `skin_seen.SkinSeen`, vectors by the strand's axes. None without a head.
+
+    Args:
+        axes: `strand_axes` of the strands.
+    """
+    strands = rig.strands
+    if rig.head is None or not strands.strand_count:
+        return None
+    axes = axes or strand_axes(strands)
+    fraction = along(strands.points, strands.offsets)
+    radius = drawn_radius(strands.radius, StrandSettings(), fraction).astype(np.float32)
+    seen = skin_seen(replace(strands, radius=radius), rig.head, rig.widths.extinction)
+    received, beneath = (_by_axes(each, axes) for each in (seen.received[:, 1:], seen.beneath))
+    parts = seen.received[:, :1], received, beneath, seen.depth[:, None]
+    return np.concatenate(parts, axis=1, dtype=np.float32)
+
+
+def _by_axes(vectors: Floats, axes: StrandAxes) -> Floats:
+    return np.stack([dot(vectors, axis) for axis in axes], axis=-1)
 
 
 def head_occlusion(rig: Rig, settings: AmbientSettings) -> Floats | None:

@@ -60,6 +60,7 @@ void main()
   vec3 hair = card_base(along, shading) * base;
 #  endif
 
+  SkinSeen seen = plane_beneath(normal);
   vec3 radiance = vec3(0.0);
 #  if WORLD
   vec4 openness = openness_by_occlusion(card_occlusion, normal);
@@ -71,7 +72,8 @@ void main()
                                             shift_noise,
                                             sparkle_noise,
                                             hair,
-                                            absorption);
+                                            absorption,
+                                            seen);
 #  endif
   for (int index = 0; index < int(lights.ambient_and_count.w); index++) {
     vec3 to_light, irradiance;
@@ -93,7 +95,8 @@ void main()
                                         hair,
                                         absorption,
                                         level,
-                                        path);
+                                        path,
+                                        seen);
   }
   float covered = is_opaque == 1 ? 1.0 : alpha;
 #  if CLIPPED

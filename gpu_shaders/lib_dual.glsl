@@ -6,6 +6,7 @@
 //
 // Colours are columns: a mat3x4 has for each of red, green and blue the four lobes.
 #include "lib_marschner.glsl"
+#include "lib_skin_seen.glsl"
 
 const float DUAL_SMALLEST = 1.0e-6;
 const float DUAL_MAX = 0.999, DUAL_MAX_KEPT = 0.9999;
@@ -128,6 +129,18 @@ vec3 off_the_skin(float phi,
   return lit * exp(-strands * (1.0 - a_f)) * onward;
 }
 
+// What comes off skin farther away and from a strand to the eye. outward: cosine between the eye and
+// the normal of the hair's volume.
+vec3 off_far_skin(
+    float outward, mat3x4 forward, mat3x4 backward, vec3 to_light, SkinSeen seen, vec3 skin)
+{
+  vec3 a_f = sum_of_lobes(forward), a_b = sum_of_lobes(backward);
+  vec3 taken = sqrt(max((1.0 - a_f) * (1.0 - a_f) - a_b * a_b, 0.0));
+  vec3 onward = 0.5 * (a_f * (1.0 + outward) + a_b * (1.0 - outward));
+  vec3 lit = 2.0 / ANGLE_PI * skin * far_light(seen.received, to_light);
+  return lit * through_hair(seen.depth, taken) * onward;
+}
+
 // What one light sends to the eye from a strand among others: as marschner_light, of which it has
 // all but the colour that replaces light from strand to strand.
 vec3 scattering_light(sampler3D longitudinal,
@@ -148,7 +161,8 @@ vec3 scattering_light(sampler3D longitudinal,
                       float tau,
                       float beyond,
                       float density,
-                      vec3 skin)
+                      vec3 skin,
+                      SkinSeen seen)
 {
   vec3 angles = strand_angles(tangent, normal, to_light, to_eye, shift_noise, shading);
   vec3 single = single_scattering(
@@ -160,7 +174,8 @@ vec3 scattering_light(sampler3D longitudinal,
   float passed = tau < 0.0 ? -log(max(straight, DUAL_MIN_LIGHT)) : tau;
   vec3 scattered = dual_scattering(
       single, angles, forward, backward, passed, beyond, fibre, density);
-  float facing = dot(normal, to_light);
+  float facing = dot(seen.beneath, to_light);
   return scattered * cos(angles.x) +
-         off_the_skin(angles.z, forward, backward, passed, beyond, facing, skin);
+         off_the_skin(angles.z, forward, backward, passed, beyond, facing, skin) +
+         off_far_skin(dot(normal, to_eye), forward, backward, to_light, seen, skin);
 }

@@ -8,6 +8,7 @@
 #  include "lib_marschner.glsl"
 #endif
 #include "lib_shadows.glsl"
+#include "lib_skin_seen.glsl"
 #if SCATTERING
 #  include "lib_dual.glsl"
 #endif
@@ -22,7 +23,8 @@ vec3 hair_light(vec3 tangent,
                 vec3 hair,
                 vec3 absorption,
                 float level,
-                vec3 path)
+                vec3 path,
+                SkinSeen seen)
 {
 #if SCATTERING
   return scattering_light(longitudinal,
@@ -43,7 +45,8 @@ vec3 hair_light(vec3 tangent,
                           path.x,
                           path.y,
                           scatter_density,
-                          skin_color);
+                          skin_color,
+                          seen);
 #elif MARSCHNER
   return marschner_light(longitudinal,
                          azimuthal,
@@ -78,7 +81,8 @@ vec3 hair_ambient(float occlusion,
                   float shift_noise,
                   float sparkle_noise,
                   vec3 hair,
-                  vec3 absorption)
+                  vec3 absorption,
+                  SkinSeen seen)
 {
 #  if !MARSCHNER
   return occlusion * hair * matt_light(lights, normal);
@@ -97,7 +101,8 @@ vec3 hair_ambient(float occlusion,
                                                           hair,
                                                           absorption,
                                                           level,
-                                                          path);
+                                                          path,
+                                                          seen);
   }
   return radiance;
 #  endif

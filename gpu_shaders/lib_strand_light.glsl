@@ -29,6 +29,13 @@ float strand_level(
 }
 #endif
 
+// A vector by its parts along the strand, along its normal of the hair's volume, and across both.
+vec3 from_axes(vec3 parts, vec3 tangent, vec3 normal)
+{
+  return tangent * parts.x + normal * parts.y + cross(tangent, normal) * parts.z;
+}
+
+// openness, seen: with vectors by the strand's axes.
 vec3 strand_radiance(vec3 point,
                      vec3 tangent,
                      vec3 bend,
@@ -38,6 +45,7 @@ vec3 strand_radiance(vec3 point,
                      vec4 openness,
                      vec4 between,
                      vec4 own,
+                     SkinSeen seen,
                      uint seed)
 {
   vec3 normal = strand_normal(point, tangent, volume_center);
@@ -68,11 +76,17 @@ vec3 strand_radiance(vec3 point,
   vec3 hair = strand_base(tinted, color_noise, grey_noise, shading, root);
 #endif
 
+#ifdef SKIN_SEEN
+  seen.received.yzw = from_axes(seen.received.yzw, tangent, normal);
+  seen.beneath = from_axes(seen.beneath, tangent, normal);
+#else
+  seen = plane_beneath(normal);
+#endif
+
   vec3 radiance = vec3(0.0);
 #if WORLD
 #  ifdef OPENNESS
-  vec3 bent = tangent * openness.y + normal * openness.z + cross(tangent, normal) * openness.w;
-  openness = vec4(openness.x, bent);
+  openness.yzw = from_axes(openness.yzw, tangent, normal);
 #  else
   openness = openness_by_occlusion(occlusion, unit_or(point - volume_center, normal));
 #  endif
@@ -84,7 +98,8 @@ vec3 strand_radiance(vec3 point,
                                             shift_noise,
                                             sparkle_noise,
                                             hair,
-                                            absorption);
+                                            absorption,
+                                            seen);
 #endif
   for (int index = 0; index < int(lights.ambient_and_count.w); index++) {
     vec3 to_light, irradiance;
@@ -107,7 +122,8 @@ vec3 strand_radiance(vec3 point,
                                         hair,
                                         absorption,
                                         level,
-                                        path);
+                                        path,
+                                        seen);
   }
   return radiance;
 }

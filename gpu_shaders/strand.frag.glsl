@@ -55,6 +55,10 @@ void main()
 #  ifdef OPENNESS
   openness = strand_openness;
 #  endif
+  SkinSeen seen = plane_beneath(vec3(0.0));
+#  ifdef SKIN_SEEN
+  seen = SkinSeen(strand_received, strand_beneath.xyz, strand_beneath.w);
+#  endif
   vec3 radiance = strand_radiance(strand_point,
                                   tangent,
                                   vec3(0.0),
@@ -64,6 +68,7 @@ void main()
                                   openness,
                                   between,
                                   own,
+                                  seen,
                                   seed);
 #endif
   color = vec4(output_encoded(radiance, output_encoding), 1.0);

@@ -92,6 +92,12 @@ void main()
   strand_openness =
       mix(texelFetch(cv_openness, root_side, 0), texelFetch(cv_openness, tip_side, 0), u);
 #  endif
+#  ifdef SKIN_SEEN
+  strand_received =
+      mix(texelFetch(cv_received, root_side, 0), texelFetch(cv_received, tip_side, 0), u);
+  strand_beneath =
+      mix(texelFetch(cv_beneath, root_side, 0), texelFetch(cv_beneath, tip_side, 0), u);
+#  endif
 #  ifdef OWN_COLOR
   strand_own_color =
       mix(texelFetch(cv_colors, root_side, 0), texelFetch(cv_colors, tip_side, 0), u);

@@ -36,6 +36,7 @@ _OF_POINTS = {
     "along": (),
     "occlusion": (),
     "openness": (4,),
+    "skin_seen": (8,),
     "color": (3,),
 }
 SKIN: Color = (0.55, 0.38, 0.31)
@@ -171,6 +172,8 @@ class Snapshot:
     occlusion: (point_count,) ambient light that arrives, 0 to 1; None is 1 everywhere.
     openness: (point_count, 4), how much of the world's light comes straight to each point, by
         direction, see pipeline.rest_openness; None is what occlusion and the hair's volume say.
+    skin_seen: (point_count, 8), the skin that each point sees, see pipeline.rest_skin_seen; None is
+        skin right beneath, as under hair on a plane.
     color: (point_count, 3) scene-linear, the strands' own; None is the look's, and so is NaN, all
         along a strand. Counts where the look wants it, see drawn_strands.drawn_color.
     seed: (strand_count,) whole numbers below 2^24, which the noise of a strand depends on; None is
@@ -201,6 +204,7 @@ class Snapshot:
     radius: Floats
     occlusion: Floats | None = None
     openness: Floats | None = None
+    skin_seen: Floats | None = None
     seed: Ints | None = None
     meshes: tuple[MeshSnapshot, ...] = ()
     lights: tuple[Light, ...] = ()
@@ -237,6 +241,7 @@ class Snapshot:
             "along": points,
             "occlusion": points,
             "openness": (*points, 4),
+            "skin_seen": (*points, 8),
             "color": (*points, 3),
             "seed": strands,
             "guide": strands,

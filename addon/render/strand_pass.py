@@ -23,6 +23,7 @@ from typing import Any
 
 import numpy as np
 
+from ..arrays import Floats
 from ..params.glsl import struct_values
 from ..shading.drawn_strands import drawn_color, natural_strands, own_colors
 from ..shading.lights import Light, kept_lights
@@ -49,7 +50,7 @@ from .snapshot import Snapshot
 from .strand_curves import curves_feature, spans_texture
 from .strand_drawing import StrandDrawing
 from .strand_layers import LAYERS_OF_PIXELS, LayersDrawn
-from .strand_layout import strand_rows
+from .strand_layout import StrandLayout, strand_rows
 from .textures import drawing_state, texture_from
 from .view_block import lights_feature, view_feature
 
@@ -330,6 +331,8 @@ class StrandPass:
         yield maps.feature
         if is_marschner and snapshot.volume.scattering:
             yield scattering_feature(snapshot)
+            if "cv_received" in self._textures:
+                yield self._skin_feature()
         if others:
             yield self._inter_groom_feature(others, len(snapshot.lights))
 
@@ -362,6 +365,16 @@ class StrandPass:
             textures={"cv_openness": ("FLOAT_2D", self._textures["cv_openness"])},
             varyings=(("smooth", "VEC4", "strand_openness"),),
             defines={"OPENNESS": 1},
+        )
+
+    def _skin_feature(self) -> ShaderFeature:
+        """What a program has that knows what skin strands see."""
+        names = "received", "beneath"
+        return ShaderFeature(
+            name="skin",
+            textures={f"cv_{name}": ("FLOAT_2D", self._textures[f"cv_{name}"]) for name in names},
+            varyings=tuple(("smooth", "VEC4", f"strand_{name}") for name in names),
+            defines={"SKIN_SEEN": 1},
         )
 
     def _debug_feature(self, debug_view: str) -> ShaderFeature:
@@ -400,12 +413,24 @@ class StrandPass:
         if not snapshot.has_world or look.model != "marschner" or openness is None:
             self._drop("cv_openness")
         else:
-            pixels = partial(layout.pixels, openness)
-            self._take("cv_openness", (openness, layout), lambda: texture_from(pixels(), "RGBA16F"))
+            make = partial(_half_texture, layout, openness)
+            self._take("cv_openness", (openness, layout), make)
+        self._upload_skin(snapshot)
         if snapshot.debug_view in NUMBERED_VIEWS:
             numbers = getattr(snapshot, snapshot.debug_view)
             shown = (numbers, layout)
             self._take("debug_numbers", shown, lambda: _numbers_texture(snapshot))
+
+    def _upload_skin(self, snapshot: Snapshot) -> None:
+        """Only light from strand to strand asks for it."""
+        seen, layout = snapshot.skin_seen, snapshot.layout
+        is_wanted = snapshot.shading.model == "marschner" and snapshot.volume.scattering
+        for name, part in (("cv_received", slice(4)), ("cv_beneath", slice(4, 8))):
+            if seen is None or not is_wanted:
+                self._drop(name)
+            else:
+                make = partial(_half_texture, layout, seen[:, part])
+                self._take(name, (seen, layout), make)
 
     def _take(self, name: str, sources: tuple[Any, ...], make: Callable[[], Any]) -> bool:
         """Make a texture again if a source is another object than before; tuples count by value."""
@@ -437,6 +462,11 @@ def calm_draws(settings: StrandSettings, samples: int) -> int:
     """
     is_noisy = drawn_transparency(settings) != settings.transparency
     return -(-CALM_SAMPLES // samples**2) if is_noisy else 1
+
+
+def _half_texture(layout: StrandLayout, values: Floats) -> Any:
+    """Of four numbers a point, (point_count, 4), to half precision."""
+    return texture_from(layout.pixels(values), "RGBA16F")
 
 
 def _points_texture(snapshot: Snapshot) -> Any:

@@ -126,12 +126,12 @@ def depth_towards(depth: Floats, step: Step, own: float = 0.5) -> Floats:
         layers = layers[::-1]
     beyond = np.zeros(layers.shape, np.float32)
     for index in range(1, len(layers)):
-        _add_shifted(beyond[index], beyond[index - 1] + layers[index - 1], others)
+        add_shifted(beyond[index], beyond[index - 1] + layers[index - 1], others)
     crossed = (beyond + np.float32(own) * layers) * np.float32(np.linalg.norm(step))
     return np.moveaxis(crossed[::-1] if step[axis] > 0 else crossed, 0, axis)
 
 
-def _add_shifted(target: Floats, source: Floats, step: list[int]) -> None:
+def add_shifted(target: Floats, source: Floats, step: list[int]) -> None:
     """target[i, j] += source[i + step[0], j + step[1]] where that exists."""
     to, at = [], []
     for size, shift in zip(target.shape, step, strict=True):

@@ -9,6 +9,7 @@ half below its surface, so that hair at its root is not shut in by the cell that
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 from typing import Self
 
@@ -143,7 +144,7 @@ def body_depth(body: Surface, grid: Grid) -> Floats:
     shell, is_inside = _inset(body, grid)
     corners = shell[body.triangles[is_inside[body.triangles].all(axis=1)]]
     high = grid.low + grid.cell * np.array(grid.shape)
-    points = _samples(corners, grid.cell, grid.low, high)
+    points = small_triangles(corners, grid.cell, grid.low, high).mean(axis=1)
     coordinates = np.floor((points - grid.low) / grid.cell).astype(np.int64)
     is_near = ((coordinates >= 0) & (coordinates < grid.shape)).all(axis=1)
     depth[tuple(coordinates[is_near].T)] = _OPAQUE
@@ -198,6 +199,25 @@ def sample(values: Floats, coordinates: Floats) -> Floats:
     return _between(near, far, inside[0])
 
 
+def rows_at(rows: Floats, shape: tuple[int, int, int], coordinates: Floats) -> Floats:
+    """As `sample`, of grids side by side: (cells, k) at (n, 3) coordinates, (n, k)."""
+    # by axes, as numpy is slow at rows of three
+    inside = np.ascontiguousarray(coordinates.T, np.float32)
+    for place, count in zip(inside, shape, strict=True):
+        np.clip(place, 0.0, count - 1, out=place)
+    cell = np.minimum(inside.astype(np.int32), np.array(shape, np.int32)[:, None] - 2)
+    inside -= cell
+    index = (cell[0] * shape[1] + cell[1]) * shape[2] + cell[2]
+    sides = 1.0 - inside, inside
+    result = np.zeros((len(coordinates), rows.shape[1]), np.float32)
+    for x, y, z in itertools.product((0, 1), repeat=3):
+        weight = sides[x][0] * sides[y][1] * sides[z][2]
+        part = rows.take(index + ((x * shape[1] + y) * shape[2] + z), axis=0)
+        part *= weight[:, None]
+        result += part
+    return result
+
+
 def _between(one: Floats, other: Floats, part: Floats) -> Floats:
     """On the way from values to others, in place of the first."""
     other -= one
@@ -235,19 +255,19 @@ def _thickened(values: Floats) -> Floats:
     return result
 
 
-def _samples(corners: Floats, spacing: float, low: Floats, high: Floats) -> Floats:
-    """Points on triangles (t, 3, 3) about a spacing apart, (n, 3), near the box only.
+def small_triangles(corners: Floats, size: float, low: Floats, high: Floats) -> Floats:
+    """Triangles (t, 3, 3) cut up until no edge is longer than size, (n, 3, 3), near the box only.
 
     Triangles are quartered until they are small; what leaves the box is dropped on the way, so
     that a floor of two large triangles costs no more than the hair above it.
     """
-    found: list[Floats] = [np.zeros((0, 3))]
+    found: list[Floats] = [np.zeros((0, 3, 3))]
     while len(corners):
         is_near = (corners.max(axis=1) >= low) & (corners.min(axis=1) <= high)
         corners = corners[is_near.all(axis=1)]
         edges = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
-        is_small = edges.max(axis=1) <= spacing
-        found.append(corners[is_small].mean(axis=1))
+        is_small = edges.max(axis=1) <= size
+        found.append(corners[is_small])
         a, b, c = np.moveaxis(corners[~is_small], 1, 0)
         ab, bc, ca = (a + b) / 2, (b + c) / 2, (c + a) / 2
         quarters = ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))

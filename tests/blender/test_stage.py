@@ -202,6 +202,16 @@ def test_a_film_that_this_blender_does_not_have_is_told(
         shown(np.ones((4, 4, 4)), tmp_path / "a.png", view="agx")
 
 
+@pytest.mark.usefixtures("gpu_context")
+def test_skin_that_hair_sees_lights_it(head: Surface) -> None:
+    """Blond hair beside the same hair that takes what lies beneath it for a plane."""
+    rig = pipeline.prepare(half_a_head(head), head, GuideSettings(), place="hair")
+    groom = prepared(rig, AmbientSettings())
+    settings = GroomSettings().with_settings(named_preset("looks/blond").settings)
+    both = [still(Studio(each, settings)) for each in (groom, replace(groom, skin_seen=None))]
+    assert (np.abs(both[0] - both[1]).max(axis=-1) > 1e-2).mean() > 0.05
+
+
 @pytest.mark.slow
 @pytest.mark.usefixtures("gpu_context", "extension")
 def test_hardly_any_hair_is_burnt(tmp_path: Path) -> None:

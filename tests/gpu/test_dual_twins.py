@@ -12,6 +12,7 @@ from hairloom.addon.shading.kajiya_kay import strand_normal
 from hairloom.addon.shading.marschner.look import fibre_of, pack_fibre, root_absorption
 from hairloom.addon.shading.marschner.tables import PREVIEW_SIZE, marschner_tables
 from hairloom.addon.shading.settings import ShadingSettings
+from hairloom.addon.shading.skin_seen import SkinSeen
 from hairloom.addon.shading.volume.dual import (
     dual_scattering,
     fractions,
@@ -93,10 +94,15 @@ def test_scattering_light(compute: Callable[..., np.ndarray], settings: ShadingS
     lanes = random.random((4, *SHAPE)) * np.array([1.0, 1.0, 8.0, 4.0])[:, None, None]
     lanes[3] -= 1.0
     packed = np.concatenate([ways, lanes[..., None]], axis=-1).astype(np.float32)
+    received = random.normal(scale=0.2, size=(*SHAPE, 4)).astype(np.float32)
+    received[..., 0] = np.abs(received[..., 0])
+    beneath = random.normal(scale=0.5, size=(*SHAPE, 4)).astype(np.float32)
+    beneath[..., 3] = random.uniform(0.0, 100.0, SHAPE) * (random.random(SHAPE) < 0.7)
     found = compute(
         "scattering_light.glsl",
         (SHAPE[1], SHAPE[0]),
         textures=dict(zip(("tangents", "normals", "lights", "eyes"), packed, strict=True))
+        | {"received": received, "beneath": beneath}
         | {"longitudinal": tables.longitudinal, "azimuthal": tables.azimuthal}
         | {"paths": tables.paths, "forward": table.forward, "backward": table.backward},
         blocks={
@@ -119,6 +125,7 @@ def test_scattering_light(compute: Callable[..., np.ndarray], settings: ShadingS
         np.array([0.6, 0.4, 0.3]),
         tau=exact[3, ..., 3],
         beyond=exact[2, ..., 3],
+        seen=SkinSeen(received, beneath[..., 3], beneath[..., :3]),
     )
     assert (np.abs(found - expected) <= 0.01 * expected + 1e-4).mean() > 0.99
     assert np.abs(found - expected).max() <= 0.02 * expected.max()

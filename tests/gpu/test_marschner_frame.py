@@ -22,7 +22,9 @@ from hairloom.addon.shading.marschner import tables as tables_module
 from hairloom.addon.shading.marschner.look import (
     fibre_of,
     marschner_light,
+    root_absorption,
     strand_absorption,
+    strand_angles,
 )
 from hairloom.addon.shading.marschner.tables import (
     PREVIEW_SIZE,
@@ -31,8 +33,11 @@ from hairloom.addon.shading.marschner.tables import (
     table_level,
 )
 from hairloom.addon.shading.settings import ShadingSettings, StrandSettings
+from hairloom.addon.shading.skin_seen import SkinSeen
 from hairloom.addon.shading.strand_noise import strand_noise
+from hairloom.addon.shading.volume.dual import fractions, fractions_at, off_far_skin
 from hairloom.addon.shading.volume.settings import VolumeSettings
+from hairloom.addon.strands import Surface
 
 pytestmark = pytest.mark.usefixtures("gpu_context")
 
@@ -40,6 +45,11 @@ RIBBON = StrandSettings(fullness=1.0, tip_width=1.0, minimum_width=0.0)
 WHITE = (1.0, 1.0, 1.0)
 
 
+EYE, CENTER = np.array([0.05, -0.6, 0.2]), np.array([0.0, 0.5, -0.3], np.float32)
+LAMPS = (
+    Light.sun((0.2, 0.7, -1.0), (1.0, 0.9, 0.8), 3.0),
+    Light.point((0.1, 0.5, 0.2), (0.5, 0.7, 1.0), 8.0),
+)
 BLOND = ShadingSettings(model="marschner", pigment="melanin", melanin=0.25)
 LOOKS = {
     "brown": ShadingSettings(model="marschner", noise_cells=7.0),
@@ -56,57 +66,40 @@ def test_a_pixel_has_the_colour_of_the_reference(
     frame: Any, shading: ShadingSettings, size: int
 ) -> None:
     """Broad straight ribbons under a sun before and a lamp behind them, the whole fragment."""
-    ends = np.array([[-0.1, 0.0, 0.0], [0.1, 0.0, 0.02]])
-    # side by side, and turned, so that some stand in a highlight
-    strands = np.stack(
-        [
-            ends + [0.0, 0.0, 0.05 * place] + [[0.0, 0.0, 0.0], [0.0, 0.04 * place, 0.0]]
-            for place in range(-3, 4)
-        ]
-    ).astype(np.float32)
+    strands = ribbons()
     seeds = np.arange(7) * 1009 + 12
-    lights = (
-        Light.sun((0.2, 0.7, -1.0), (1.0, 0.9, 0.8), 3.0),
-        Light.point((0.1, 0.5, 0.2), (0.5, 0.7, 1.0), 8.0),
-    )
-    center, ambient = np.array([0.0, 0.5, -0.3], np.float32), (0.1, 0.2, 0.3)
+    ambient = (0.1, 0.2, 0.3)
     snapshot = frame.Snapshot(
         strands,
         np.full(strands.shape[:2], 0.012, np.float32),
         np.broadcast_to(np.float32([0.4, 0.8]), strands.shape[:2]),
         seed=seeds,
-        lights=lights,
+        lights=LAMPS,
         ambient=ambient,
         shading=shading,
         strand_settings=RIBBON,
         volume=VolumeSettings(shadows="none"),
-        volume_center=center,
+        volume_center=CENTER,
         table_size=size,
     )
-    eye = np.array([0.05, -0.6, 0.2])
-    camera = frame.Camera(frame.look_at(eye, (0, 0, 0)), frame.perspective(0.9, 1.0, 0.1, 5.0))
+    camera = before_ribbons(frame)
     picture = frame.render_image(snapshot, camera, 601, 601, 1)
 
     tables = marschner_tables(fibre_of(shading), size)
-    chord = (strands[:, 1:] - strands[:, :1]).astype(np.float64)
-    column, row, along = seen_pixels(strands[:, :1], chord, camera.projection @ camera.view, 601)
-    point = strands[:, :1] + along[..., None] * chord
-    tangent = chord / np.linalg.norm(chord, axis=-1, keepdims=True) + np.zeros((7, 9, 3))
-    normal = strand_normal(point, tangent, center)
-    to_eye = (eye - point) / np.linalg.norm(eye - point, axis=-1, keepdims=True)
+    column, row, along, point, tangent, normal, to_eye = on_ribbons(strands, camera)
     cells = along * shading.noise_cells
     shift, sparkle = (strand_noise(seeds[:, None], channel, cells) for channel in (0, 1))
     own = [strand_noise(seeds[:, None], channel, np.zeros((7, 9))) for channel in (2, 3)]
     absorption = strand_absorption(shading, along, *own)
     occlusion = 0.4 + 0.4 * along
     expected = np.zeros((7, 9, 3))
-    for lamp in lights:
+    for lamp in LAMPS:
         to_light, irradiance = light_at(lamp, point)
         expected += irradiance * marschner_light(
             tables, tangent, normal, to_light, to_eye, shift, sparkle, absorption, shading
         )
     expected *= occlusion[..., None]
-    away = (point - center) / np.linalg.norm(point - center, axis=-1, keepdims=True)
+    away = (point - CENTER) / np.linalg.norm(point - CENTER, axis=-1, keepdims=True)
     expected += hair_ambient(
         Environment(ambient),
         openness_by_occlusion(occlusion, away),
@@ -127,6 +120,93 @@ def test_a_pixel_has_the_colour_of_the_reference(
     found = picture[row, column]
     assert (found[..., 3] == 1.0).all()
     assert np.abs(found[..., :3] / expected - 1.0).max() < tolerance(2e-3, 4e-3)
+
+
+#: as pipeline.rest_skin_seen has it: received, beneath, depth
+SEEN = np.float32([0.6, 0.15, -0.8, 0.4, 0.1, 0.5, -0.2, 4.0])
+PLAIN = replace(
+    ShadingSettings(model="marschner", pigment="melanin", melanin=0.4),
+    color_variation=0.0,
+    shift_noise=0.0,
+    sparkle=0.0,
+    grey_fraction=0.0,
+    tip_tint=0.0,
+)
+
+
+@pytest.mark.parametrize("transparency", ["none", "layers"])
+def test_strands_gain_the_light_of_the_reference(frame: Any, transparency: str) -> None:
+    """Broad straight ribbons under a sun and a lamp, with and without far skin."""
+    strands = ribbons()
+    corner = Surface(np.float32([[9, 9, 9], [9, 9, 9.1], [9, 9.1, 9]]), np.array([[0, 1, 2]]))
+    with_skin = frame.Snapshot(
+        strands,
+        np.full(strands.shape[:2], 0.012, np.float32),
+        lights=LAMPS,
+        ambient=(0.0, 0.0, 0.0),
+        shading=PLAIN,
+        strand_settings=replace(RIBBON, transparency=transparency),
+        volume=VolumeSettings(),
+        volume_center=CENTER,
+        table_size=PREVIEW_SIZE,
+        casters=(corner,),
+        skin_seen=np.tile(SEEN, (14, 1)),
+    )
+    nothing_far = np.tile(SEEN * [0, 0, 0, 0, 1, 1, 1, 1], (14, 1)).astype(np.float32)
+    camera = before_ribbons(frame)
+    pictures = [
+        frame.render_image(each, camera, 601, 601, 1)
+        for each in (with_skin, replace(with_skin, skin_seen=nothing_far))
+    ]
+
+    column, row, _, point, tangent, normal, to_eye = on_ribbons(strands, camera)
+    axes = np.stack([tangent, normal, np.cross(tangent, normal)], axis=-2)
+    received, beneath = (SEEN[first : first + 3] @ axes for first in (1, 4))
+    mean = np.full((7, 9, 1), SEEN[0])
+    seen = SkinSeen(np.concatenate([mean, received], axis=-1), np.full((7, 9), SEEN[7]), beneath)
+    sides = fractions(marschner_tables(fibre_of(PLAIN), PREVIEW_SIZE))
+    outward = np.sum(normal * to_eye, axis=-1)
+    expected = np.zeros((7, 9, 3))
+    for lamp in LAMPS:
+        to_light, irradiance = light_at(lamp, point)
+        towards = to_light + np.zeros((7, 9, 3))
+        theta_i, theta_r, _ = strand_angles(
+            tangent, normal, towards, to_eye, np.full((7, 9), 0.5), PLAIN
+        )
+        lobes = (
+            fractions_at(side, np.cos(0.5 * (theta_r - theta_i)), root_absorption(PLAIN))
+            for side in (sides.forward, sides.backward)
+        )
+        skin = np.array(with_skin.skin_color)
+        expected += irradiance * off_far_skin(outward, *lobes, towards, seen, skin)
+    found = (pictures[0] - pictures[1])[row, column, :3]
+    assert expected.max() > 0.05
+    assert np.abs(found / expected - 1.0).max() < tolerance(5e-3, 1e-2)
+
+
+def ribbons() -> np.ndarray:
+    """Broad and straight, side by side, and turned, so that some stand in a highlight."""
+    ends = np.array([[-0.1, 0.0, 0.0], [0.1, 0.0, 0.02]])
+    each = [
+        ends + [0.0, 0.0, 0.05 * place] + [[0.0, 0.0, 0.0], [0.0, 0.04 * place, 0.0]]
+        for place in range(-3, 4)
+    ]
+    return np.stack(each).astype(np.float32)
+
+
+def before_ribbons(frame: Any) -> Any:
+    return frame.Camera(frame.look_at(EYE, (0, 0, 0)), frame.perspective(0.9, 1.0, 0.1, 5.0))
+
+
+def on_ribbons(strands: np.ndarray, camera: Any) -> tuple[np.ndarray, ...]:
+    """Nine pixels along each: column, row, how far along, point, tangent, normal and to the eye."""
+    chord = (strands[:, 1:] - strands[:, :1]).astype(np.float64)
+    column, row, along = seen_pixels(strands[:, :1], chord, camera.projection @ camera.view, 601)
+    point = strands[:, :1] + along[..., None] * chord
+    tangent = chord / np.linalg.norm(chord, axis=-1, keepdims=True) + np.zeros((7, 9, 3))
+    normal = strand_normal(point, tangent, CENTER)
+    to_eye = (EYE - point) / np.linalg.norm(EYE - point, axis=-1, keepdims=True)
+    return column, row, along, point, tangent, normal, to_eye
 
 
 def seen_pixels(

@@ -51,6 +51,7 @@ def without_strands(snapshot: Snapshot) -> Snapshot:
         device_points=None,
         occlusion=None,
         openness=None,
+        skin_seen=None,
         seed=None,
         guide=None,
         group=None,

@@ -80,6 +80,7 @@ class PreparedGroom:
     occluders: spheres in the head that hide hair; None where it has none, or they were left out.
     is_placeholder: whether these are a few of its strands only, which are not seen.
     openness: (point_count, 4), see `pipeline.rest_openness`; None where it was left out.
+    skin_seen: (point_count, 8), see `pipeline.rest_skin_seen`; None without a head, or left out.
     """
 
     rig: Rig
@@ -89,6 +90,7 @@ class PreparedGroom:
     occluders: OccluderSpheres | None = None
     is_placeholder: bool = False
     openness: Floats | None = None
+    skin_seen: Floats | None = None
 
     @cached_property
     def used(self) -> Ints:
@@ -189,10 +191,12 @@ def _drawn(
     if known is not None and not _same_hair(known.rig, rig):
         known = None
     if known is not None and known.occlusion is not None and known.ambient == ambient:
-        occlusion, openness = known.occlusion, known.openness
+        occlusion, openness, seen = known.occlusion, known.openness, known.skin_seen
     else:
         occlusion = pipeline.rest_occlusion(rig, ambient)
-        openness = pipeline.rest_openness(rig, ambient)
+        axes = pipeline.strand_axes(rig.strands)
+        openness = pipeline.rest_openness(rig, ambient, axes)
+        seen = pipeline.rest_skin_seen(rig, axes)
     report("what the head hides")
     occluders = None if known is None else known.occluders
     if occluders is None and rig.head is not None and with_occluders:
@@ -200,7 +204,8 @@ def _drawn(
         corners = np.stack([roots.min(axis=0), roots.max(axis=0)])
         occluders = rig.head.latest(OccluderSpheres, corners)
     rank = pipeline.strand_ranks(rig)
-    return PreparedGroom(rig, ambient, occlusion, rank, occluders, openness=openness)
+    shown = PreparedGroom(rig, ambient, occlusion, rank, occluders)
+    return replace(shown, openness=openness, skin_seen=seen)
 
 
 def placeholder(request: BuildRequest) -> PreparedGroom:

@@ -49,6 +49,7 @@ def snapshot_of(groom: PreparedGroom) -> Snapshot:
         along=uneven_along(strands.points, strands.offsets),
         occlusion=groom.occlusion,
         openness=groom.openness,
+        skin_seen=groom.skin_seen,
         guide=np.ascontiguousarray(groom.rig.weights.guide[:, 0]),
         group=strands.group,
         rank=groom.rank,

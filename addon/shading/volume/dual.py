@@ -14,7 +14,8 @@ What we do otherwise:
     Lobes around the fibre are held by two numbers each, what they send on and what they send back,
         in place of tables of every azimuth: light from half a circle blurs the rest away.
     Behind the hair lies skin: what passes all strands comes back off it, see off_the_skin. Of blond
-        hair as thick as a groom's strands make it, that is nearly half of the light.
+        hair as thick as a groom's strands make it, that is nearly half of the light. Skin farther
+        away lights hair too, see off_far_skin.
 
 Colours are absorption, so that a strand's own colour may differ from root to tip: see shares().
 """
@@ -37,6 +38,7 @@ from ..marschner.look import (
 )
 from ..marschner.tables import MarschnerTables, bilinear, kept_light
 from ..settings import ShadingSettings
+from ..skin_seen import SkinSeen, far_light, plane_beneath, through_hair
 
 #: strands that are taken to lie behind a place where nothing is known of it
 UNKNOWN_BEYOND = 4.0
@@ -287,6 +289,33 @@ def off_the_skin(
     return lit * np.exp(-strands * (1.0 - a_f)) * onward
 
 
+def off_far_skin(
+    outward: Floats,
+    forward: Floats,
+    backward: Floats,
+    to_light: Floats,
+    seen: SkinSeen,
+    skin: Floats,
+) -> Floats:
+    """What comes off skin farther away and from a strand to the eye, (..., 3): times irradiance it
+    is radiance.
+
+    As `off_the_skin`, from as much of half of all directions as is skin. On its way light is sent
+    to and fro by strands, so that it is less by sqrt((1 - a_f)^2 - a_b^2) at each (Kubelka and Munk
+    1931).
+
+    Args:
+        outward: cosine between the eye and the normal of the hair's volume, (...).
+        forward, backward: shares at this theta_d by colour and lobe, (..., 3, 4).
+    """
+    a_f, a_b = forward.sum(axis=-1), backward.sum(axis=-1)
+    taken = np.sqrt(np.maximum((1.0 - a_f) ** 2 - a_b**2, 0.0))
+    cosine = outward[..., None]
+    onward = 0.5 * (a_f * (1.0 + cosine) + a_b * (1.0 - cosine))
+    lit = 2.0 / np.pi * skin * far_light(seen.received, to_light)[..., None]
+    return lit * through_hair(seen.depth[..., None], taken) * onward
+
+
 def scattering_light(
     tables: MarschnerTables,
     sides: Fractions,
@@ -303,6 +332,7 @@ def scattering_light(
     level: Floats | float = 0.0,
     tau: Floats | float = -1.0,
     beyond: Floats | float = UNKNOWN_BEYOND,
+    seen: SkinSeen | None = None,
 ) -> Floats:
     """What one light sends to the eye from a strand among others, (..., 3).
 
@@ -311,7 +341,9 @@ def scattering_light(
 
     Args:
         density: d_f and d_b of Zinke et al. 2008.
-        skin: (3,), albedo of what lies behind the hair; the volume's normal stands for its own.
+        skin: (3,), albedo of what lies behind the hair.
+        seen: what skin the strand sees; None is what lies right beneath, and the volume's normal
+            stands for its own.
     """
     angles = strand_angles(tangent, normal, to_light, to_eye, shift_noise, shading)
     single = single_scattering(tables, angles, sparkle_noise, absorption, shading, level)
@@ -335,7 +367,11 @@ def scattering_light(
         fibre_of(shading),
         density,
     )
-    facing = np.sum(normal * to_light, axis=-1)
-    return scattered * np.cos(theta_i)[..., None] + off_the_skin(
-        phi, forward, backward, passed_by, np.asarray(beyond), facing, skin
+    seen = seen or plane_beneath(normal)
+    facing = np.sum(seen.beneath * to_light, axis=-1)
+    outward = np.sum(normal * to_eye, axis=-1)
+    return (
+        scattered * np.cos(theta_i)[..., None]
+        + off_the_skin(phi, forward, backward, passed_by, np.asarray(beyond), facing, skin)
+        + off_far_skin(outward, forward, backward, to_light, seen, skin)
     )

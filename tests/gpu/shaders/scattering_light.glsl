@@ -1,4 +1,5 @@
-// In w: of tangents the shift noise, of normals the sparkle noise, of lights tau beyond, of eyes tau.
+// In w: of tangents the shift noise, of normals the sparkle noise, of lights tau beyond, of eyes tau, of beneath the
+// depth.
 #include "lib_dual.glsl"
 
 void main()
@@ -9,6 +10,8 @@ void main()
   }
   vec4 tangent = texelFetch(tangents, at, 0), normal = texelFetch(normals, at, 0);
   vec4 to_light = texelFetch(lights, at, 0), to_eye = texelFetch(eyes, at, 0);
+  vec4 below = texelFetch(beneath, at, 0);
+  SkinSeen seen = SkinSeen(texelFetch(received, at, 0), below.xyz, below.w);
   vec3 light = scattering_light(longitudinal,
                                 azimuthal,
                                 paths,
@@ -27,6 +30,7 @@ void main()
                                 to_eye.w,
                                 to_light.w,
                                 0.7,
-                                vec3(0.6, 0.4, 0.3));
+                                vec3(0.6, 0.4, 0.3),
+                                seen);
   imageStore(result, at, vec4(light, 0.0));
 }

@@ -1,0 +1,31 @@
+// The skin that a place of hair sees. Twin of addon/shading/skin_seen.py: same names; what the terms
+// mean is written there. Holds no resources.
+
+// received: light off far skin, its mean over directions of the light and a vector; beneath: the mean
+// normal of the skin right beneath; depth: of the hair that stands before far skin.
+struct SkinSeen {
+  vec4 received;
+  vec3 beneath;
+  float depth;
+};
+
+// Skin right beneath alone, as of hair on a plane.
+SkinSeen plane_beneath(vec3 normal)
+{
+  return SkinSeen(vec4(0.0), normal, 0.0);
+}
+
+// Part of a light that comes off far skin through clear hair.
+float far_light(vec4 received, vec3 to_light)
+{
+  float size = length(received.yzw);
+  float even = max(1.0 - 0.5 * size / max(received.x, 1.0e-6), 0.0);
+  float facing = max(dot(received.yzw, to_light), 0.0) / max(size, 1.0e-6);
+  return received.x * (even + (1.0 - even) * 4.0 * facing);
+}
+
+// What hair with gaps lets through, by the part that strands take of the light that they meet.
+vec3 through_hair(float depth, vec3 taken)
+{
+  return pow(1.0 + {{gaps}} * depth * taken, vec3(-1.0 / {{gaps}}));
+}

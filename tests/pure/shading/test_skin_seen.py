@@ -1,0 +1,198 @@
+"""Skin that hair sees, against rays that are counted and means that are known."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hairloom.addon import pipeline
+from hairloom.addon.groom.settings import GuideSettings
+from hairloom.addon.shading.skin_seen import (
+    GAPS,
+    SkinSeen,
+    far_light,
+    plane_beneath,
+    skin_seen,
+    through_hair,
+)
+from hairloom.addon.strands import StrandSet, Surface
+from hairloom.addon.strands.join import joined
+
+RADIUS = 0.1
+
+
+def ball(radius: float = RADIUS, rings: int = 48) -> Surface:
+    """A ball around the origin, faces outwards."""
+    polar, round_ = np.meshgrid(
+        np.linspace(0.0, np.pi, rings + 1),
+        np.linspace(0.0, 2.0 * np.pi, 2 * rings + 1),
+        indexing="ij",
+    )
+    positions = radius * np.stack(
+        [
+            np.sin(polar) * np.cos(round_),
+            np.sin(polar) * np.sin(round_),
+            np.cos(polar) + 0.0 * round_,
+        ],
+        axis=-1,
+    )
+    index = np.arange(positions.shape[0] * positions.shape[1]).reshape(positions.shape[:2])
+    a, b, c, d = index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]
+    triangles = np.concatenate(
+        [np.stack([a, b, c], -1).reshape(-1, 3), np.stack([a, c, d], -1).reshape(-1, 3)]
+    )
+    return Surface(positions.reshape(-1, 3).astype(np.float32), triangles.astype(np.int32))
+
+
+def hair(points: np.ndarray, radius: float) -> StrandSet:
+    """Strands through points (n, cvs, 3)."""
+    count, cvs = points.shape[:2]
+    return StrandSet(
+        points.reshape(-1, 3).astype(np.float32),
+        np.arange(0, count * cvs + 1, cvs),
+        np.full(count * cvs, radius, np.float32),
+        np.zeros(count, np.int32),
+    )
+
+
+def spikes(count: int = 40, length: float = 0.12) -> StrandSet:
+    """Straight out of the ball, too thin to be in any light's way."""
+    random = np.random.default_rng(3)
+    out = random.normal(size=(count, 1, 3))
+    out /= np.linalg.norm(out, axis=-1, keepdims=True)
+    return hair(out * (RADIUS + length * np.linspace(0.0, 1.0, 7)[None, :, None]), 1e-9)
+
+
+def light_of_ball(points: np.ndarray, to_light: np.ndarray) -> np.ndarray:
+    """The light that comes to points off a white ball lit by one sun, its mean over all directions
+    over that of a surface which faces the sun: by rays, without any grid.
+    """
+    random = np.random.default_rng(5)
+    ways = random.normal(size=(4000, 3))
+    ways /= np.linalg.norm(ways, axis=-1, keepdims=True)
+    found = []
+    for point in points:
+        middle = ways @ point
+        inner = middle**2 - (point @ point - RADIUS**2)
+        is_met = (inner > 0.0) & (middle < 0.0)
+        away = -middle - np.sqrt(np.maximum(inner, 0.0))
+        normal = (point + away[:, None] * ways) / RADIUS
+        found.append(np.where(is_met, np.maximum(normal @ to_light, 0.0), 0.0).mean())
+    return np.array(found)
+
+
+def test_light_off_a_ball_is_that_of_rays() -> None:
+    strands = spikes()
+    seen = skin_seen(strands, ball(), 1.0)
+    # in cells a ball is half a cell larger; farther away, 26 directions hit one or do not
+    away = np.linalg.norm(strands.points, axis=1) / RADIUS
+    some = (away > 1.35) & (away < 1.9)
+    sun = np.array([0.6, 0.0, 0.8])
+    found, expected = far_light(seen.received, sun)[some], light_of_ball(strands.points[some], sun)
+    assert found.mean() == pytest.approx(expected.mean(), rel=0.25)
+    assert np.corrcoef(found, expected)[0, 1] > 0.95
+    assert np.abs(found - expected).mean() < 0.4 * expected.mean()
+
+
+def test_what_lies_right_beneath_is_not_far() -> None:
+    """Next to the ball all skin is beneath, and its normal is the ball's; away from it none is."""
+    strands = spikes()
+    seen = skin_seen(strands, ball(), 1.0)
+    height = np.linalg.norm(strands.points, axis=1) - RADIUS
+    out = strands.points / np.linalg.norm(strands.points, axis=1, keepdims=True)
+    at_root, far = height < 1e-3, height > 0.035
+    facing = np.sum(seen.beneath * out, axis=1)
+    assert facing[at_root].min() > 0.7
+    assert facing[at_root].max() < 1.1
+    assert np.abs(seen.beneath[far]).max() < 0.05
+    assert seen.received[at_root, 0].max() < 0.3 * seen.received[far & (height < 0.05), 0].max()
+
+
+def test_hair_in_the_way_is_counted_on_both_ways() -> None:
+    """Light goes to the ball through a cloud around it, and back: each time, in all directions that
+    there are, through one to one and a half of its depth straight out.
+    """
+    random = np.random.default_rng(8)
+    low, high, half, width = 1.3 * RADIUS, 1.8 * RADIUS, 0.01, 3e-4
+    out, across = random.normal(size=(2, 6000, 3))
+    out /= np.linalg.norm(out, axis=-1, keepdims=True)
+    across = np.cross(out, across)
+    across /= np.linalg.norm(across, axis=-1, keepdims=True)
+    middle = out * random.uniform(low, high, (6000, 1))
+    cloud = hair(np.stack([middle - half * across, middle + half * across], axis=1), width)
+    outside = 2.0 * RADIUS * out[:50]
+    behind = hair(np.stack([outside, outside + 1e-3 * across[:50]], axis=1), 1e-9)
+    seen = skin_seen(joined(cloud, behind), ball(), 1.0)
+    area = 6000 * 2.0 * width * 2.0 * half * np.pi / 4.0
+    depth = area / (4.0 / 3.0 * np.pi * (high**3 - low**3)) * (high - low)
+    assert 2.0 * depth < np.median(seen.depth[-100:]) < 3.0 * depth
+
+
+def test_gaps_let_through_what_a_spread_of_depths_does() -> None:
+    """The mean of exp(-x tau) over a gamma distribution with a variance of GAPS times its mean."""
+    random = np.random.default_rng(2)
+    for mean in (0.3, 3.0):
+        depths = random.gamma(mean / GAPS, GAPS, 400_000)
+        for taken in (0.1, 1.0):
+            expected = np.exp(-taken * depths).mean() ** (1.0 / mean)
+            found = through_hair(np.array(1.0), np.array(taken))
+            assert found == pytest.approx(expected, abs=3e-3)
+
+
+def test_light_off_one_normal_is_that_of_a_matt_surface() -> None:
+    """q0 and q of a cosine give the cosine back, and those of light from everywhere its mean."""
+    random = np.random.default_rng(4)
+    lights = random.normal(size=(500, 3))
+    lights /= np.linalg.norm(lights, axis=-1, keepdims=True)
+    normal = np.array([0.0, 0.6, 0.8])
+    one = far_light(0.5 * np.array([0.25, *(0.5 * normal)]) * np.ones((500, 1)), lights)
+    np.testing.assert_allclose(one, 0.5 * np.maximum(lights @ normal, 0.0), atol=1e-9)
+    even = far_light(np.array([0.3, 0.0, 0.0, 0.0]) * np.ones((500, 1)), lights)
+    np.testing.assert_allclose(even, 0.3, atol=1e-9)
+
+
+def test_what_strands_see_turns_with_them() -> None:
+    """By the axes of the strand, a quarter of a turn around the head is none."""
+    strands, head = spikes(), ball()
+    turn = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    turned = replace(strands, points=strands.points @ turn.T)
+    turned_head = replace(head, positions=head.positions @ turn.T)
+    one, other = (
+        pipeline.rest_skin_seen(pipeline.prepare(hair, surface, GuideSettings(), place="hair"))
+        for hair, surface in ((strands, head), (turned, turned_head))
+    )
+    assert one is not None
+    assert other is not None
+    # depth is of hardly any hair
+    np.testing.assert_allclose(other[:, :7], one[:, :7], atol=0.02)
+    assert one[:, 4].max() > 0.7, "spikes run along the normal of what lies beneath"
+
+
+@pytest.mark.parametrize("factor", [1e-3, 1e3])
+def test_scale_does_not_matter(factor: float) -> None:
+    strands, head = spikes(), ball()
+    thick = replace(strands, radius=np.full_like(strands.radius, 2e-3))
+    larger = replace(
+        thick, points=thick.points * np.float32(factor), radius=thick.radius * np.float32(factor)
+    )
+    big_head = replace(head, positions=head.positions * np.float32(factor))
+    one, other = skin_seen(thick, head, 1.0), skin_seen(larger, big_head, 1.0)
+    for name in ("received", "depth", "beneath"):
+        np.testing.assert_allclose(getattr(other, name), getattr(one, name), rtol=0.05, atol=2e-2)
+
+
+@pytest.mark.parametrize(
+    "points", [np.zeros((1, 2, 3)), np.ones((3, 2, 3))], ids=["no length", "one place"]
+)
+def test_hair_without_any_size(points: np.ndarray) -> None:
+    seen = skin_seen(hair(points, 1e-4), ball(), 1.0)
+    assert all(np.isfinite(each).all() for each in (seen.received, seen.depth, seen.beneath))
+
+
+def test_a_plane_alone_is_as_before() -> None:
+    normal = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
+    seen: SkinSeen = plane_beneath(normal)
+    assert not far_light(seen.received, normal).any()
+    np.testing.assert_array_equal(seen.beneath, normal)
