@@ -35,9 +35,9 @@ GAPS = 1.5
 #: Part of its light that hair takes where its depth is found: blond hair takes a third.
 _PART = 0.25
 #: Less than this of light does not count.
-_LEAST_PASSED = 0.03
+_MIN_PASSED = 0.03
 #: A cell is skin that holds this part of a side's area of it.
-_LEAST_SKIN = 0.1
+_MIN_SKIN = 0.1
 _OPAQUE = 30.0
 #: Part of a cell that light crosses to its middle.
 _OWN = 0.5
@@ -77,7 +77,7 @@ def skin_seen(strands: StrandSet, skin: Surface, extinction: float) -> SkinSeen:
     rows = np.ascontiguousarray(rows.reshape(len(rows), -1).T)
     found = rows_at(rows, grid.shape, grid.coordinates(strands.points))
     found = found[:, :-1] / np.maximum(found[:, -1:], 1.0e-3)
-    passed = np.clip(found[:, 4] / np.maximum(found[:, 0], _SMALLEST), _LEAST_PASSED, 1.0)
+    passed = np.clip(found[:, 4] / np.maximum(found[:, 0], _SMALLEST), _MIN_PASSED, 1.0)
     depth = (passed**-GAPS - 1.0) / (GAPS * _PART)
     return SkinSeen(found[:, :4], depth, found[:, 5:])
 
@@ -130,7 +130,7 @@ def _skin_cells(skin: Surface, grid: Grid) -> tuple[Floats, Bools]:
     count = int(np.prod(grid.shape))
     total = np.bincount(index, np.linalg.norm(area, axis=1), count)
     normal = np.stack([np.bincount(index, part, count) for part in area.T])
-    is_skin = total > _LEAST_SKIN
+    is_skin = total > _MIN_SKIN
     unit = normal * is_skin / np.maximum(np.linalg.norm(normal, axis=0), _SMALLEST)
     return unit.astype(np.float32).reshape(3, *grid.shape), is_skin.reshape(grid.shape)
 
