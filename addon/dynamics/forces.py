@@ -31,14 +31,17 @@ class Damped:
     air: Any
 
     @classmethod
-    def of(cls, settings: DynamicsSettings, dt: float, swing: Any = None) -> Damped:
+    def of(
+        cls, settings: DynamicsSettings, dt: float, swing: Any = None, air: Any = None
+    ) -> Damped:
         """Args:
-        swing: the rate of swing damping; None: that of the settings.
+        swing, air: the rates of swing and air damping; None: those of the settings.
         """
         swing = np.float64(settings.style_damping) if swing is None else swing
-        both = settings.damping + swing
+        air = settings.damping if air is None else air
+        both = air + swing
         kept, whole = np.exp(-both * dt), np.where(both > 0.0, both, 1.0)
-        return cls(kept, (1.0 - kept) * swing / whole, (1.0 - kept) * settings.damping / whole)
+        return cls(kept, (1.0 - kept) * swing / whole, (1.0 - kept) * air / whole)
 
 
 def brake(position: Floats, previous: Floats, drag: float, air_displacement: Floats | None) -> None:

@@ -4,11 +4,28 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 from ..params import Settings, integer, number
 
 #: keyframes may turn the wind round and round: sixteen turns [rad]
 _MAX_TURNED = math.radians(16.0 * 360.0)
+
+
+def air_damping(*, is_painted: bool) -> Any:
+    """Declares it; hair may be painted, cloth may not."""
+    return number(
+        0.5,
+        label="Air Damping",
+        description="Rate at which still air or water slows motion down, and at which wind "
+        "carries it along",
+        soft=(0.0, 10.0),
+        hard=(0.0, 1000.0),
+        unit="rate",
+        source="Jakobsen 2001",
+        panel="Medium & Wind",
+        is_painted=is_painted,
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,17 +41,7 @@ class MotionSettings(Settings):
         source="Archimedes",
         panel="Medium & Wind",
     )
-    damping: float = number(
-        0.5,
-        label="Air Damping",
-        description="Rate at which still air or water slows motion down, and at which wind "
-        "carries it along",
-        soft=(0.0, 10.0),
-        hard=(0.0, 1000.0),
-        unit="rate",
-        source="Jakobsen 2001",
-        panel="Medium & Wind",
-    )
+    damping: float = air_damping(is_painted=False)
     drag: float = number(
         0.0,
         label="Drag",

@@ -94,7 +94,8 @@ def painted_frame(
         whole = getattr(settings, name)
         return rows(painted.of_guides(settings, name) / whole if whole else 1.0)
 
-    damped = Damped.of(settings, dt, painted.of_guides(settings, "style_damping"))
+    rates = (painted.of_guides(settings, name) for name in ("style_damping", "damping"))
+    damped = Damped.of(settings, dt, *rates)
     root, tip, bend = (
         painted.along(settings, name) for name in ("style_root", "style_tip", "bend")
     )

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 from ..params import choice, curve, integer, number, toggle
-from .motion_settings import MotionSettings
+from .motion_settings import MotionSettings, air_damping
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -21,6 +21,8 @@ class DynamicsSettings(MotionSettings):
     title = "Dynamics"
     owner = "character"
     panels = ("Style", "Medium & Wind", "Lengths", "Collisions", "Shot")
+
+    damping: float = air_damping(is_painted=True)
 
     device: str = choice(
         "automatic",

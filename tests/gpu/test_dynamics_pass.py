@@ -194,7 +194,7 @@ class Scene:
         if not self.is_painted:
             return None
         random = np.random.default_rng(3)
-        names = ("gravity", "style_root", "style_tip", "style_damping", "bend", "volume")
+        names = ("gravity", "style_root", "style_tip", "style_damping", "bend", "volume", "damping")
         rows = {name: self.cv_count if name in ("style_root", "bend") else 1 for name in names}
         return PaintedGuides(
             {name: random.uniform(0.3, 1.7, (rows[name], self.guide_count)) for name in names}
@@ -274,7 +274,7 @@ IN_AIR = {
     "curls": Scene({"curl_stretch": 0.6, "sag_compensation": 0.6, **LOOSE}, is_curled=True),
     "held curls": Scene({"curl_bounce": 5.0, **LOOSE}, is_held=True, is_curled=True),
     "painted": Scene(
-        LIMP | {"damping": 3.0, "wind_speed": 4.0, **LOOSE}, is_painted=True, is_curled=True
+        LIMP | {"damping": 1.5, "wind_speed": 4.0, **LOOSE}, is_painted=True, is_curled=True
     ),
     "curls with relaxation": Scene({"length_solver": "relaxation"}, is_curled=True),
     "relaxation": Scene({"length_solver": "relaxation"}),

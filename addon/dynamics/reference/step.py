@@ -30,7 +30,7 @@ from .force_fields import blown_slowly
 from .shape import frames, hold, jacobian_of
 
 #: What each guide has a number of its own of.
-_PAINTED = ("gravity", "style_damping", "volume")
+_PAINTED = ("gravity", "damping", "style_damping", "volume")
 
 
 def advance_slowly(

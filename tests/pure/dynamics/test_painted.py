@@ -16,7 +16,7 @@ from hairloom.addon.errors import HairloomError
 
 #: [m] of float32 against float64 in 0.2 s, see test_reference
 CLOSE = 2e-4
-NAMES = ("gravity", "style_root", "style_tip", "style_damping", "bend", "volume")
+NAMES = ("gravity", "damping", "style_root", "style_tip", "style_damping", "bend", "volume")
 VALUES = {
     "length_tolerance": 0.0001,
     "volume": 0.5,
