@@ -41,18 +41,28 @@ def led_out_at_rest(
     along = reached(strands.points, offsets)
     wanted = np.minimum(kept, LIFT * along).astype(np.float32)
     wanted[offsets[:-1]] = -np.inf
-    wanted[beside_meshes(points, distance, posed, kept)] = -np.inf
+    beside = beside_meshes(points, distance, posed, kept)
+    wanted[beside] = -np.inf
     clearance = Clearance(kept, wanted, np.zeros(strands.strand_count, np.int32))
     carry = partial(_as_they_are, strands.points)
     lead_out(points, carry, offsets, posed, clearance)
     led = replace(strands, points=points)
-    return led, ~are_inside(led, head, DEEP * kept)
+    outside = beside[(points[beside] == strands.points[beside]).all(axis=1)]
+    return led, ~are_inside(led, head, DEEP * kept, outside)
 
 
-def are_inside(strands: StrandSet, head: DistanceField, deep: float) -> Bools:
-    """Which strands (strand_count,) have a point in the head itself that is deeper than this."""
+def are_inside(
+    strands: StrandSet, head: DistanceField, deep: float, outside: Ints | None = None
+) -> Bools:
+    """Which strands (strand_count,) have a point in the head itself that is deeper than this.
+
+    Args:
+        outside: points that are known not to be in it; None: none is.
+    """
     posed = (PosedCollider(head, np.eye(4), np.eye(4)),)
     distance, _ = signed_distance(strands.points, posed, deep)
+    if outside is not None:
+        distance[outside] = np.inf
     inside = _inside(strands.points, head, distance, deep)
     found = np.zeros(strands.strand_count, bool)
     found[np.searchsorted(strands.offsets, inside, side="right") - 1] = True

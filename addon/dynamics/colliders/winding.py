@@ -18,25 +18,25 @@ import numpy as np
 from ...arrays import Floats, Ints
 from ...strands import Surface
 from ...strands.triangle_tree import TriangleTree, build_tree
-from ...strands.vectors import dot
+from ...strands.vectors import cross_rows, dot_rows
 
 #: A group of triangles is far at this many times its own radius from its centre.
 FAR = 2.5
-#: Points that walk down the tree together.
-_CHUNK = 4096
+#: Points that walk down the tree together: what is asked of them stays in the cache.
+_CHUNK = 512
 
 
 @dataclass(frozen=True)
 class _Dipoles:
     """What the triangles below each node of one level come to, seen from afar.
 
-    center: (node_count, 3) [m], weighted by area. moment: (node_count, 3) [m^2], the sum of area
-    times normal. radius: (node_count,) [m], around the centre.
+    center: (3, node_count) [m], weighted by area. moment: (3, node_count) [m^2], the sum of area
+    times normal. reach: (node_count,) [m^2], squared, around the centre; beyond it they are far.
     """
 
     center: Floats
     moment: Floats
-    radius: Floats
+    reach: Floats
 
 
 def winding_number(points: Floats, surface: Surface) -> Floats:
@@ -52,45 +52,59 @@ def winding_number(points: Floats, surface: Surface) -> Floats:
 
 
 def _prepared(surface: Surface) -> tuple[list[_Dipoles], Ints, Floats]:
-    """What all points need of it: dipoles, leaves and corners."""
+    """What all points need of it: dipoles, leaves, and corners (3, 3, triangle_count) by axes."""
     corners = surface.corners.astype(np.float64)
     tree = build_tree(corners)
     leaves = _without_repeats(tree.leaf_triangles)
-    return _dipoles(tree, leaves, corners), leaves, corners
+    rows = np.ascontiguousarray(corners.transpose(1, 2, 0))
+    return _dipoles(tree, leaves, corners), leaves, rows
 
 
 def _solid_angle(points: Floats, dipoles: list[_Dipoles], leaves: Ints, corners: Floats) -> Floats:
-    """Sum over all triangles, walking down from the root to what is near each point."""
-    total = np.zeros(len(points))
+    """Sum over all triangles, walking down from the root to what is near each point.
+
+    Args:
+        points: (n, 3). corners: (3, 3, triangle_count), by corner and axis.
+    """
+    # by axes, as numpy is slow at rows of three
+    place, total = np.ascontiguousarray(points.T), np.zeros(len(points))
     point, node = np.arange(len(points)), np.zeros(len(points), np.int64)
     for level, group in enumerate(dipoles):
-        away = group.center[node] - points[point]
-        squared = np.einsum("ij,ij->i", away, away)
-        is_far = squared > (FAR * group.radius[node]) ** 2
-        flux = np.einsum("ij,ij->i", group.moment[node[is_far]], away[is_far])
-        total += np.bincount(point[is_far], flux / squared[is_far] ** 1.5, len(points))
-        point, node = point[~is_far], node[~is_far]
+        away = group.center.take(node, axis=1)
+        away -= place.take(point, axis=1)
+        squared = dot_rows(away, away)
+        is_near = squared <= group.reach.take(node)
+        far = np.flatnonzero(~is_near)
+        flux = dot_rows(group.moment.take(node.take(far), axis=1), away.take(far, axis=1))
+        squared = squared.take(far)
+        flux /= squared * np.sqrt(squared)
+        total += np.bincount(point.take(far), flux, len(points))
+        point, node = point[is_near], node[is_near]
         if level + 1 < len(dipoles):
             point, node = np.repeat(point, 2), np.repeat(2 * node, 2)
             node[1::2] += 1
     for triangle in leaves.T:
         chosen = triangle[node]
-        exists = chosen >= 0
-        angle = triangle_angle(points[point[exists]], corners[chosen[exists]])
-        total += np.bincount(point[exists], angle, len(points))
+        exists = np.flatnonzero(chosen >= 0)
+        of_point = point.take(exists)
+        angle = triangle_angle(
+            place.take(of_point, axis=1), corners.take(chosen.take(exists), axis=2)
+        )
+        total += np.bincount(of_point, angle, len(points))
     return total
 
 
 def triangle_angle(points: Floats, corners: Floats) -> Floats:
-    """Signed solid angle (n,) of triangle (n, 3, 3) from point (n, 3), pair by pair.
+    """Signed solid angle (n,) of triangle (3, 3, n), by corner and axis, from point (3, n), pair by
+    pair.
 
     tan(angle / 2) = a.(b x c) / (|a||b||c| + (a.b)|c| + (b.c)|a| + (c.a)|b|)
     (Van Oosterom and Strackee 1983)
     """
-    a, b, c = np.moveaxis(corners - points[:, None], 1, 0)
-    la, lb, lc = (np.sqrt(dot(v, v)) for v in (a, b, c))
-    below = la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb
-    return 2.0 * np.arctan2(dot(a, np.cross(b, c)), below)
+    a, b, c = corners - points
+    la, lb, lc = (np.sqrt(dot_rows(v, v)) for v in (a, b, c))
+    below = la * lb * lc + dot_rows(a, b) * lc + dot_rows(b, c) * la + dot_rows(c, a) * lb
+    return 2.0 * np.arctan2(dot_rows(a, cross_rows(b, c)), below)
 
 
 def _without_repeats(leaves: Ints) -> Ints:
@@ -116,5 +130,7 @@ def _dipoles(tree: TriangleTree, leaves: Ints, corners: Floats) -> list[_Dipoles
         middle = np.einsum("nm,nmk->nk", fraction, center[members]) / fraction.sum(axis=1)[:, None]
         reach = np.maximum(high - middle, middle - low)  # to the box's farthest corner
         radius = np.linalg.norm(reach, axis=1)
-        levels.append(_Dipoles(middle, moment[members].sum(axis=1), radius))
+        total = moment[members].sum(axis=1)
+        rows = (np.ascontiguousarray(each.T) for each in (middle, total))
+        levels.append(_Dipoles(*rows, (FAR * radius) ** 2))
     return levels
