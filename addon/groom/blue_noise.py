@@ -61,7 +61,8 @@ def spread_roots(pieces: Pieces, count: int, seed: int, whole: Pieces | None = N
         level += 1
     batch = 0
     while len(roots) < count:
-        roots = roots.and_also(target.samples(_PLAIN / target.part, named(seed, 1, 0, batch)))
+        plain = target.samples(_PLAIN / target.part, named(seed, 1, 0, batch))
+        roots = roots.and_also(_shuffled(plain))
         batch += 1
     return roots.take(np.arange(count))
 
@@ -107,7 +108,7 @@ class _Target:
         return float(self.mass.sum()) / self.part
 
     def samples(self, count: float, stream: Ints) -> Samples:
-        """Random points by area x density, in random order: `count` on the whole surface.
+        """Random points by area x density: `count` on the whole surface; see `_shuffled`.
 
         A density linear between corners is the sum of three that fall from 1 at a corner to 0;
         points of such a one are spacings of three random cuts, two of them joined
@@ -119,19 +120,24 @@ class _Target:
         piece = np.repeat(np.arange(len(counts)), counts)
         number = np.arange(len(piece)) - np.repeat(np.cumsum(counts) - counts, counts)
         key = named(piece_key[piece], 1 + number)
-        order = np.argsort(uniform(key, 4))
-        piece, key = piece[order], key[order]
-        density = self.density[piece]
+        density = self.density.take(piece, axis=0)
         reached = np.cumsum(density, axis=1)
         corner = (uniform(key, 0)[:, None] * reached[:, 2:] >= reached[:, :2]).sum(axis=1)
-        _, middle, last_cut = np.sort([uniform(key, cut) for cut in (1, 2, 3)], axis=0)
+        one, two, three = (uniform(key, cut) for cut in (1, 2, 3))
+        low, high = np.minimum(one, two), np.maximum(one, two)
+        middle, last_cut = np.maximum(low, np.minimum(high, three)), np.maximum(high, three)
         rows, barycentric = np.arange(len(piece)), np.empty((len(piece), 3))
         barycentric[rows, corner] = middle
         barycentric[rows, (corner + 1) % 3] = last_cut - middle
         barycentric[rows, (corner + 2) % 3] = 1.0 - last_cut
-        point = np.einsum("nk,nkj->nj", barycentric, self.corners[piece])
+        point = np.einsum("nk,nkj->nj", barycentric, self.corners.take(piece, axis=0))
         reach = np.maximum(np.einsum("nk,nk->n", barycentric, density), _THINNEST) ** -0.5
         return Samples(piece, barycentric, point, reach, key)
+
+
+def _shuffled(samples: Samples) -> Samples:
+    """In random order, each at its own place among others."""
+    return samples.take(np.argsort(uniform(samples.key, 4)))
 
 
 def _filled(
@@ -149,7 +155,7 @@ def _filled(
         samples = target.samples(dart_count, named(seed, 0, level, batch))
         samples = samples.take(~old.covers(samples))
         new = SampleCells(roots.take(np.arange(before, len(roots))), radius)
-        samples = samples.take(~new.covers(samples))
+        samples = _shuffled(samples.take(~new.covers(samples)))
         roots = roots.and_also(samples.take(first_come(samples, radius)))
     here = wanted * target.part
     return roots, here >= _FIRST_SURE and len(roots) - before < _FULL * here
