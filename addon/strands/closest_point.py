@@ -22,7 +22,7 @@ from .triangle_distance import TriangleForms
 from .triangle_tree import TriangleTree, build_tree
 
 #: Points searched at once: their pairs with boxes stay in the processor's cache.
-_CHUNK = 4096
+_CHUNK = 1024
 #: Pairs of points and boxes held at once; more than this halves the chunk.
 _PAIR_LIMIT = 2_000_000
 #: Pairs of points and their cluster's triangles looked at at once.
@@ -188,7 +188,7 @@ class ClosestPointSearch:
             for near, leaf, _ in self._near_leaves(middle[part], within[part] ** 2):
                 near, triangle = _each(near, self._tree.leaf_triangles[leaf])
                 cluster = near + start
-                far = np.sqrt(self._forms.squared_distance(middle[cluster], triangle))
+                far = np.sqrt(self._forms.squared_distance(middle.take(cluster, axis=0), triangle))
                 is_near = (far <= within[cluster]) & (triangle != nearest[cluster])
                 found.append((cluster[is_near], triangle[is_near], far[is_near]))
         cluster, triangle, far = (np.concatenate(each) for each in zip(*found, strict=True))
@@ -226,7 +226,7 @@ class ClosestPointSearch:
         point, triangle = point[is_near], triangle[is_near]
         if not len(point):
             return
-        distance = self._forms.squared_distance(points[point], triangle)
+        distance = self._forms.squared_distance(points.take(point, axis=0), triangle)
         first = np.flatnonzero(np.diff(point, prepend=-1))
         seen = point[first]
         best.distance[seen] = np.minimum(best.distance[seen], np.minimum.reduceat(distance, first))
@@ -237,13 +237,14 @@ class ClosestPointSearch:
         """Which pairs are worth measuring: those whose triangle's box is nearer than the best."""
         gap = np.zeros(len(point))
         for axis in range(3):
-            here = points[point, axis]
+            here = points[:, axis].take(point)
             outside = np.maximum(
-                self._low[axis, triangle] - here, here - self._high[axis, triangle]
+                self._low[axis].take(triangle) - here, here - self._high[axis].take(triangle)
             )
             np.maximum(outside, 0.0, out=outside)
-            gap += outside * outside
-        return np.asarray(gap <= best.distance[point])
+            outside *= outside
+            gap += outside
+        return np.asarray(gap <= best.distance.take(point))
 
 
 def search_of(surface: Surface) -> ClosestPointSearch:

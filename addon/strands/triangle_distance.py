@@ -49,7 +49,7 @@ class TriangleForms:
         found = np.empty((3, len(triangle)))
         for start in range(0, len(triangle), _AT_ONCE):
             part = slice(start, start + _AT_ONCE)
-            ax, ay, az, bx, by, bz, cx, cy, cz, *form = self._rows[:, triangle[part]]
+            ax, ay, az, bx, by, bz, cx, cy, cz, *form = self._rows.take(triangle[part], axis=1)
             x, y, z = points[part].T
             x, y, z = x - ax, y - ay, z - az
             along_ab, along_ac = bx * x + by * y + bz * z, cx * x + cy * y + cz * z

@@ -6,11 +6,13 @@ level n is a box around its fraction of the triangles; node i has the children 2
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..arrays import Floats, Ints
+from .vectors import dot_rows
 
 #: Triangles in a leaf; fewer cost more box tests, more cost more exact tests.
 LEAF_SIZE = 4
@@ -21,7 +23,7 @@ _BOX_WEIGHT = 4.0
 
 @dataclass(frozen=True)
 class TriangleTree:
-    """levels: for each level (low, high), each (2^level, 3) float64, corners of the boxes.
+    """levels: for each level (low, high), each (3, 2^level) float64, corners of the boxes.
     leaf_triangles: (leaf_count, LEAF_SIZE) indices; the last leaves may repeat a triangle.
     """
 
@@ -34,12 +36,13 @@ class TriangleTree:
         Boxes of children overlap, and a point in both is at distance 0 from both: so the distance
         to the middle of a box counts beside that to the box.
         """
-        node = np.zeros(len(points), np.int64)
+        # by axes, as numpy is slow at rows of three
+        place, node = np.ascontiguousarray(points.T), np.zeros(len(points), np.int64)
         for low, high in self.levels[1:]:
             middle = (low + high) / 2.0
             left, right = (
-                _BOX_WEIGHT * _squared_distance(points, low[child], high[child])
-                + _squared_distance(points, middle[child], middle[child])
+                _BOX_WEIGHT * _squared_distance(place, *_chosen(child, low, high))
+                + _squared_distance(place, *_chosen(child, middle, middle))
                 for child in (2 * node, 2 * node + 1)
             )
             node = 2 * node + (right < left)
@@ -53,14 +56,15 @@ class TriangleTree:
 
         None where that takes more than `limit` pairs at once: ask again with fewer points.
         """
+        place = np.ascontiguousarray(points.T)
         point, node = np.arange(len(points)), np.zeros(len(points), np.int64)
         distance: Floats = np.zeros(len(points))
         for low, high in self.levels[1:]:
             point, node = np.repeat(point, 2), np.repeat(2 * node, 2)
             node[1::2] += 1
-            distance = _squared_distance(points[point], low[node], high[node])
-            is_near = distance < squared_reach[point]
-            point, node, distance = point[is_near], node[is_near], distance[is_near]
+            distance = _squared_distance(*_chosen(point, place), *_chosen(node, low, high))
+            near = np.flatnonzero(distance < squared_reach.take(point))
+            point, node, distance = point.take(near), node.take(near), distance.take(near)
             if len(point) > limit:
                 return None
         return point, node, distance
@@ -79,7 +83,8 @@ def build_tree(corners: Floats) -> TriangleTree:
     levels = []
     for level in range(depth + 1):
         shape = (1 << level, -1, 3)
-        levels.append((low.reshape(shape).min(axis=1), high.reshape(shape).max(axis=1)))
+        lowest, highest = low.reshape(shape).min(axis=1), high.reshape(shape).max(axis=1)
+        levels.append((np.ascontiguousarray(lowest.T), np.ascontiguousarray(highest.T)))
     return TriangleTree(tuple(levels), order.reshape(-1, LEAF_SIZE))
 
 
@@ -94,8 +99,15 @@ def _median_order(centers: Floats, order: Ints, depth: int) -> Ints:
     return order
 
 
+def _chosen(columns: Ints, *tables: Floats) -> Iterator[Floats]:
+    """These columns of each table (3, n)."""
+    return (table.take(columns, axis=1) for table in tables)
+
+
 def _squared_distance(points: Floats, low: Floats, high: Floats) -> Floats:
-    """From points to boxes, pair by pair, (n,)."""
-    outside = np.maximum(low - points, points - high)
+    """From points to boxes, pair by pair, (n,), of columns (3, n)."""
+    outside = low - points
+    points = points - high
+    np.maximum(outside, points, out=outside)
     np.maximum(outside, 0.0, out=outside)
-    return np.einsum("ij,ij->i", outside, outside)
+    return dot_rows(outside, outside)

@@ -128,7 +128,7 @@ def _dipoles(tree: TriangleTree, leaves: Ints, corners: Floats) -> list[_Dipoles
         members = leaves.reshape(1 << level, -1)
         fraction = weight[members]
         middle = np.einsum("nm,nmk->nk", fraction, center[members]) / fraction.sum(axis=1)[:, None]
-        reach = np.maximum(high - middle, middle - low)  # to the box's farthest corner
+        reach = np.maximum(high.T - middle, middle - low.T)  # to the box's farthest corner
         radius = np.linalg.norm(reach, axis=1)
         total = moment[members].sum(axis=1)
         center_rows, moment_rows = (np.ascontiguousarray(each.T) for each in (middle, total))
