@@ -76,8 +76,8 @@ from .strands.resample import resample
 from .strands.root_motions import RootMotions
 from .strands.vectors import dot
 
-#: See `strand_axes`: three times (point_count, 3).
-type StrandAxes = tuple[Floats, Floats, Floats]
+#: Three directions at each point, three times (point_count, 3), see `strand_axes`.
+type Axes = tuple[Floats, Floats, Floats]
 #: Guides, about, that tell whether their head has jumped.
 JUMP_GUIDES = 64
 #: Of children that cannot be led out of the head, the part from which on a note says so.
@@ -871,7 +871,7 @@ def rest_occlusion(rig: Rig, settings: AmbientSettings, points: Floats | None = 
     )
 
 
-def strand_axes(strands: StrandSet) -> StrandAxes:
+def strand_axes(strands: StrandSet) -> Axes:
     """Along the strand, along its normal of the hair's volume, and across both, at each point."""
     tangent = strand_tangents(strands.points, strands.offsets)
     center = strands.roots.mean(axis=0, dtype=np.float64).astype(np.float32)
@@ -879,7 +879,7 @@ def strand_axes(strands: StrandSet) -> StrandAxes:
     return tangent, normal, np.cross(tangent, normal)
 
 
-def rest_openness(rig: Rig, settings: AmbientSettings, axes: StrandAxes | None = None) -> Floats:
+def rest_openness(rig: Rig, settings: AmbientSettings, axes: Axes | None = None) -> Floats:
     """How open every point is by direction at rest, (point_count, 4), see `ambient.openness`: the
     mean, and a vector by the strand's axes.
 
@@ -895,26 +895,24 @@ def rest_openness(rig: Rig, settings: AmbientSettings, axes: StrandAxes | None =
     return found
 
 
-def rest_skin_seen(rig: Rig, axes: StrandAxes | None = None) -> Floats | None:
-    """The skin that every point sees at rest, (point_count, 8): the received, beneath and depth of
-    `skin_seen.SkinSeen`, vectors by the strand's axes. None without a head.
-
-    Args:
-        axes: `strand_axes` of the strands.
+def rest_skin_seen(rig: Rig, points: Floats, axes: Axes) -> Floats | None:
+    """The skin that points (n, 3) see at rest, those of the strands or of cards in their place,
+    (n, 8): the received, beneath and depth of `skin_seen.SkinSeen`, vectors by the axes at each
+    point. None without a head.
     """
     strands = rig.strands
     if rig.head is None or not strands.strand_count:
         return None
-    axes = axes or strand_axes(strands)
     fraction = along(strands.points, strands.offsets)
     radius = drawn_radius(strands.radius, StrandSettings(), fraction).astype(np.float32)
-    seen = skin_seen(replace(strands, radius=radius), rig.head, rig.widths.extinction)
+    drawn = replace(strands, radius=radius)
+    seen = skin_seen(drawn, points, rig.head, rig.widths.extinction)
     received, beneath = (_by_axes(each, axes) for each in (seen.received[:, 1:], seen.beneath))
     parts = seen.received[:, :1], received, beneath, seen.depth[:, None]
     return np.concatenate(parts, axis=1, dtype=np.float32)
 
 
-def _by_axes(vectors: Floats, axes: StrandAxes) -> Floats:
+def _by_axes(vectors: Floats, axes: Axes) -> Floats:
     return np.stack([dot(vectors, axis) for axis in axes], axis=-1)
 
 

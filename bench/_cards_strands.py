@@ -8,6 +8,7 @@ With deep shadows each has those of its own hair; without, what comes of ambient
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 from _cards_groom import SETTINGS, sintel_rig
@@ -99,6 +100,7 @@ def _cards(rig: Rig, made: MappedCards, look: str, width: float) -> CardSnapshot
         build.backs[0],
         thickness=area.shadow_area(settings[StrandSettings]) / shadow,
         is_view_compensated=maps.is_view_compensated,
+        skin_seen=pipeline.rest_skin_seen(rig, mesh.positions, mesh.axes),
     )
 
 
@@ -116,12 +118,18 @@ def _strands(rig: Rig, look: str, width: float, occlusion: np.ndarray) -> Snapsh
         radius=strands.radius,
         layout=StrandLayout(strands.offsets),
         occlusion=occlusion,
+        skin_seen=_skin_seen(rig),
         meshes=(replace(MeshSnapshot.of(rig.head), is_holdout=True),),
         lights=(Light.sun(SUN, (1.0, 1.0, 1.0), STRENGTH),),
         ambient=WORLD,
         shading=_look(look),
         strand_settings=StrandSettings(fullness=width),
     )
+
+
+@lru_cache(maxsize=1)
+def _skin_seen(rig: Rig) -> np.ndarray | None:
+    return pipeline.rest_skin_seen(rig, rig.strands.points, pipeline.strand_axes(rig.strands))
 
 
 def _as_cards(hair: Snapshot, cards: CardSnapshot) -> Snapshot:

@@ -60,7 +60,7 @@ void main()
   vec3 hair = card_base(along, shading) * base;
 #  endif
 
-  SkinSeen seen = plane_beneath(normal);
+  SkinSeen seen = SkinSeen(card_received, card_beneath.xyz, card_beneath.w);
   vec3 radiance = vec3(0.0);
 #  if WORLD
   vec4 openness = openness_by_occlusion(card_occlusion, normal);

@@ -1,5 +1,6 @@
 // Cards, vertex stage. Both the pass that primes the depth and those that shade run this, and a
 // later one meets depths that are EQUAL only where the same place comes out to the bit: `precise`.
+#include "lib_skin_seen.glsl"
 
 void main()
 {
@@ -10,6 +11,12 @@ void main()
   card_tangent = tangent;
   card_occlusion = occlusion;
   card_along = along;
+  // CardMesh.axes
+  vec3 across = cross(tangent, normal);
+  across /= max(length(across), 1.0e-12);
+  vec3 ahead = cross(normal, across);
+  card_received = vec4(received.x, from_axes(received.yzw, ahead, normal));
+  card_beneath = vec4(from_axes(beneath.xyz, ahead, normal), beneath.w);
 #endif
   precise vec4 place = view.view_projection * vec4(position, 1.0);
   gl_Position = place;

@@ -24,8 +24,15 @@ float far_light(vec4 received, vec3 to_light)
   return received.x * (even + (1.0 - even) * 4.0 * facing);
 }
 
-// What hair with gaps lets through, by the part that strands take of the light that they meet.
+// What hair with gaps lets through, by the part that strands take of the light that they meet. At the
+// edge of a card the depth may be that beyond its vertices.
 vec3 through_hair(float depth, vec3 taken)
 {
-  return pow(1.0 + {{gaps}} * depth * taken, vec3(-1.0 / {{gaps}}));
+  return pow(1.0 + {{gaps}} * max(depth, 0.0) * taken, vec3(-1.0 / {{gaps}}));
+}
+
+// A vector by its parts along a strand or card, along its normal, and across both.
+vec3 from_axes(vec3 parts, vec3 tangent, vec3 normal)
+{
+  return tangent * parts.x + normal * parts.y + cross(tangent, normal) * parts.z;
 }

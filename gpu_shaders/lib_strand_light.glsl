@@ -29,12 +29,6 @@ float strand_level(
 }
 #endif
 
-// A vector by its parts along the strand, along its normal of the hair's volume, and across both.
-vec3 from_axes(vec3 parts, vec3 tangent, vec3 normal)
-{
-  return tangent * parts.x + normal * parts.y + cross(tangent, normal) * parts.z;
-}
-
 // openness, seen: with vectors by the strand's axes.
 vec3 strand_radiance(vec3 point,
                      vec3 tangent,

@@ -12,6 +12,9 @@ from ..arrays import Floats, Ints
 from ..errors import HairloomError
 from .atlas_grid import AtlasGrid
 
+#: A vector shorter than this has no direction.
+_SMALLEST = 1.0e-12
+
 #: What a mesh knows of each vertex, and of each card.
 OF_VERTICES = ("positions", "uv", "along", "normal", "tangent", "occlusion")
 OF_CARDS = ("group", "layer", "tile")
@@ -80,6 +83,16 @@ class CardMesh:
             if value.ndim != 1 or len(value) < needed:
                 raise _broken(f"{name} has shape {value.shape} for {needed} cards")
             object.__setattr__(self, name, value)
+
+    @property
+    def axes(self) -> tuple[Floats, Floats, Floats]:
+        """At each vertex: along the card, its normal, and across both. The first is at a right
+        angle to the normal, which the tangent need not be. As in card.vert.glsl.
+        """
+        across = np.cross(self.tangent, self.normal)
+        length = np.linalg.norm(across, axis=1, keepdims=True)
+        across /= np.maximum(length, _SMALLEST)
+        return np.cross(self.normal, across), self.normal, across
 
     @property
     def card_count(self) -> int:

@@ -14,8 +14,13 @@ from ..cards.sort import order_from
 from . import gpu_objects
 from .card_snapshot import CardSnapshot
 
-#: vertex attribute of a CardMesh -> its length
-ATTRIBUTES = {"position": 3, "normal": 3, "tangent": 3, "uv": 2, "occlusion": 1, "along": 1}
+#: vertex attribute of a CardMesh -> its length; the last two of CardSnapshot.skin_seen
+ATTRIBUTES = {
+    **{"position": 3, "normal": 3, "tangent": 3, "uv": 2, "occlusion": 1, "along": 1},
+    **{"received": 4, "beneath": 4},
+}
+#: by CardMesh.axes: skin right beneath, as on a plane
+_PLANE = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0], np.float32)
 
 
 @dataclass(eq=False)
@@ -45,7 +50,7 @@ class CardBatches:
 
     def static(self, cards: CardSnapshot) -> Any:
         """All triangles in the order of the mesh."""
-        self._upload(cards.mesh)
+        self._upload(cards)
         return self._batch("static", cards.mesh.triangles)
 
     def of(self, cards: CardSnapshot, eye: Floats) -> dict[str, Any]:
@@ -55,17 +60,18 @@ class CardBatches:
             eye: (4,) homogeneous, see Camera.eye.
         """
         if cards.drawing.order == "view":
-            batch = self._sorted(cards.mesh, eye)
+            batch = self._sorted(cards, eye)
             return {"front": batch, "back": batch}
         front = self.static(cards)
         if cards.back_triangles is None:
             return {"front": front, "back": front}
         return {"front": front, "back": self._batch("back", cards.back_triangles)}
 
-    def _sorted(self, mesh: CardMesh, eye: Floats) -> Any:
+    def _sorted(self, cards: CardSnapshot, eye: Floats) -> Any:
         """For this eye; nothing goes up where the order is that of the draw before."""
+        mesh = cards.mesh
         is_same = self._mesh is mesh and self._eye is not None and (self._eye == eye).all()
-        self._upload(mesh)
+        self._upload(cards)
         if not is_same or "view" not in self._orders:
             triangles, known = mesh.triangles[order_from(mesh, eye)], self._orders.get("view")
             if known is not None and np.array_equal(known.triangles, triangles):
@@ -74,9 +80,9 @@ class CardBatches:
             return self._batch("view", triangles)
         return self._batch("view", self._orders["view"].triangles)
 
-    def _upload(self, mesh: CardMesh) -> None:
-        if self._mesh is not mesh:
-            self._vertices, self._mesh = _vertices(mesh), mesh
+    def _upload(self, cards: CardSnapshot) -> None:
+        if self._mesh is not cards.mesh:
+            self._vertices, self._mesh = _vertices(cards), cards.mesh
             for order in self._orders.values():
                 order.batch = None
 
@@ -91,7 +97,10 @@ class CardBatches:
         return order.batch
 
 
-def _vertices(mesh: CardMesh) -> Any:
+def _vertices(cards: CardSnapshot) -> Any:
+    mesh, seen = cards.mesh, cards.skin_seen
+    if seen is None:
+        seen = np.broadcast_to(_PLANE, (len(mesh.positions), 8))
     layout = gpu.types.GPUVertFormat()
     for name, length in ATTRIBUTES.items():
         layout.attr_add(id=name, comp_type="F32", len=length, fetch_mode="FLOAT")
@@ -100,6 +109,8 @@ def _vertices(mesh: CardMesh) -> Any:
         "position": mesh.positions,
         "occlusion": mesh.occlusion[:, None],
         "along": mesh.along[:, None],
+        "received": np.ascontiguousarray(seen[:, :4]),
+        "beneath": np.ascontiguousarray(seen[:, 4:]),
     }
     for name in ATTRIBUTES:  # a CardMesh holds contiguous float32, as attr_fill needs it
         vertices.attr_fill(name, values[name] if name in values else getattr(mesh, name))

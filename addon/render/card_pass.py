@@ -81,6 +81,7 @@ _SHADED_RECIPE = ShaderRecipe(
         ("smooth", "VEC3", "card_tangent"),
         ("smooth", "FLOAT", "card_occlusion"),
         ("smooth", "FLOAT", "card_along"),
+        *(("smooth", "VEC4", f"card_{name}") for name in ("received", "beneath")),
     ),
     outputs=(("VEC4", "color"),),
     defines=(

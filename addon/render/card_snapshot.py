@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
-from ..arrays import Ints
+from ..arrays import Floats, Ints
 from ..cards.card_mesh import CardMesh
 from ..cards.drawing_settings import CardDrawingSettings
 from ..shading.textures import HairTextures
@@ -23,6 +23,8 @@ class CardSnapshot:
     thickness: of the hair that alpha stands for in shadows, see shading/volume/card_opacity.py.
     base_color: that the base texture is a factor of, where it is not the look's: of strands that
         have colours of their own.
+    skin_seen: (vertex_count, 8), the skin that each vertex sees, by
+        `mesh.axes`, see pipeline.rest_skin_seen; None is skin right beneath, as on a plane.
     device: the card_textures.CardTextures that all who draw these cards share; None: each its own.
 
     Mesh and textures are uploaded again only when they are other objects than before; triangles
@@ -37,4 +39,5 @@ class CardSnapshot:
     thickness: float = 1.0
     is_view_compensated: bool = False
     base_color: tuple[float, float, float] | None = None
+    skin_seen: Floats | None = None
     device: Any = None

@@ -59,10 +59,11 @@ class SkinSeen:
     beneath: Floats
 
 
-def skin_seen(strands: StrandSet, skin: Surface, extinction: float) -> SkinSeen:
-    """Of all points of the strands, which have the widths with which they are drawn.
+def skin_seen(strands: StrandSet, points: Floats, skin: Surface, extinction: float) -> SkinSeen:
+    """What points (n, 3) among strands see, of the strands or of cards in their place.
 
     Args:
+        strands: with the widths with which they are drawn.
         extinction: how much more light a strand takes than its width does.
     """
     grid = _grid_beyond(strands)
@@ -75,7 +76,7 @@ def skin_seen(strands: StrandSet, skin: Surface, extinction: float) -> SkinSeen:
     known = ~is_inside
     rows = np.concatenate([cells * known, known[None]], dtype=np.float32)
     rows = np.ascontiguousarray(rows.reshape(len(rows), -1).T)
-    found = rows_at(rows, grid.shape, grid.coordinates(strands.points))
+    found = rows_at(rows, grid.shape, grid.coordinates(points))
     found = found[:, :-1] / np.maximum(found[:, -1:], 1.0e-3)
     passed = np.clip(found[:, 4] / np.maximum(found[:, 0], _SMALLEST), _MIN_PASSED, 1.0)
     depth = (passed**-GAPS - 1.0) / (GAPS * _PART)

@@ -10,10 +10,15 @@ import numpy as np
 import pytest
 from flat_cards import camera, mesh_of, snapshot_of
 
+from hairloom.addon.render.snapshot import SKIN
 from hairloom.addon.shading.lights import Light
+from hairloom.addon.shading.marschner.look import fibre_of, root_absorption, strand_angles
+from hairloom.addon.shading.marschner.tables import PREVIEW_SIZE, marschner_tables
 from hairloom.addon.shading.settings import ShadingSettings
+from hairloom.addon.shading.skin_seen import SkinSeen
 from hairloom.addon.shading.textures import HairTextures
 from hairloom.addon.shading.volume.card_opacity import MAX_ALPHA
+from hairloom.addon.shading.volume.dual import fractions, fractions_at, off_far_skin
 from hairloom.addon.shading.volume.settings import VolumeSettings
 from hairloom.addon.strands import Surface
 
@@ -185,6 +190,42 @@ def test_light_from_strand_to_strand_brightens_light_cards_and_not_black(frame: 
         )
         gain.append(among - alone)
     assert gain[0] > 0.02 and abs(gain[1]) < 0.02 * gain[0]
+
+
+def test_cards_gain_the_light_off_far_skin_of_the_reference(frame: Any) -> None:
+    """With a tangent that is at no right angle to the normal, which counts by CardMesh.axes."""
+    bent = {**card(1.0, 0.0, 0.0), "tangent": np.repeat([[0.0, 0.6, -0.8]], 4, axis=0)}
+    mesh, textures = mesh_of(bent), textures_of([1.0, 1.0])
+    look = dataclasses.replace(
+        PLAIN, model="marschner", pigment="melanin", melanin=0.3, grey_fraction=0.0, tip_tint=0.0
+    )
+    received, depth = np.array([0.6, 0.15, 0.8, 0.4]), 2.0
+    seen = np.tile(np.float32([*received, 0.0, 0.5, 0.1, depth]), (4, 1))
+    options: dict[str, Any] = {
+        "casters": (Surface(np.float32([[9, 9, 9], [9, 9, 8], [9, 8, 9]]), np.array([[0, 1, 2]])),),
+        "shading": look,
+        "table_size": PREVIEW_SIZE,
+    }
+    volume = dataclasses.replace(of_form("deep"), scattering=True)
+    lit, unlit = (
+        drawn(frame, mesh, textures, volume, cards={"skin_seen": each}, **options)
+        for each in (seen, seen * np.float32([0, 0, 0, 0, 1, 1, 1, 1]))
+    )
+    axes = np.array([each[0] for each in mesh.axes], np.float64)
+    world = SkinSeen(np.array([received[0], *(received[1:] @ axes)]), np.array(depth), np.zeros(3))
+    tangent, normal = mesh.tangent[0].astype(np.float64), mesh.normal[0].astype(np.float64)
+    toward = np.array([0.0, -1.0, 0.0])
+    eye = np.array([0.0, 1.0, 0.0])
+    theta_i, theta_r, _ = strand_angles(tangent, normal, toward, eye, np.array(0.5), look)
+    sides = fractions(marschner_tables(fibre_of(look), PREVIEW_SIZE))
+    lobes = (
+        fractions_at(side, np.cos(0.5 * (theta_r - theta_i)), root_absorption(look))
+        for side in (sides.forward, sides.backward)
+    )
+    expected = 3.0 * off_far_skin(np.array(normal @ eye), *lobes, toward, world, np.array(SKIN))
+    found = (lit - unlit)[SIZE // 2, SIZE // 2, :3]
+    assert expected.max() > 0.01
+    np.testing.assert_allclose(found, expected, rtol=0.01)
 
 
 def test_maps_are_drawn_again_only_when_something_changed(frame: Any) -> None:

@@ -32,7 +32,7 @@ from ...errors import HairloomError
 from ...exchange.textures.card_textures import of_one_size
 from ...paint_flow import colored
 from ...params import SettingsMap
-from ...pipeline import Pose, Rig
+from ...pipeline import Pose, Rig, rest_skin_seen
 from ...render.atlas_pass import baked_maps, baking
 from ...render.card_snapshot import CardSnapshot
 from ...render.card_textures import CardTextures, packed_textures
@@ -335,6 +335,7 @@ class BuiltCards:
                 build.backs[0],
                 is_view_compensated=maps.is_view_compensated,
                 base_color=maps.base_color,
+                skin_seen=rest_skin_seen(rig, mesh.positions, mesh.axes),
             ),
             StrandArea.of(strands),
             card_shadow_area(mesh.positions, mesh.triangles, mesh.uv, textures.alpha),

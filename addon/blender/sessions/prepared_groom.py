@@ -196,7 +196,7 @@ def _drawn(
         occlusion = pipeline.rest_occlusion(rig, ambient)
         axes = pipeline.strand_axes(rig.strands)
         openness = pipeline.rest_openness(rig, ambient, axes)
-        seen = pipeline.rest_skin_seen(rig, axes)
+        seen = pipeline.rest_skin_seen(rig, rig.strands.points, axes)
     report("what the head hides")
     occluders = None if known is None else known.occluders
     if occluders is None and rig.head is not None and with_occluders:
