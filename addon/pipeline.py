@@ -65,7 +65,7 @@ from .shading.settings import StrandSettings
 from .shading.skin_seen import skin_seen
 from .shading.strand_noise import SEED_LIMIT
 from .strands import StrandSet, Surface
-from .strands.arc_length import along, typical
+from .strands.arc_length import even, typical
 from .strands.center_lines import center_lines, curl_room
 from .strands.face import is_face_hair
 from .strands.frames import strand_tangents, volume_normals
@@ -78,6 +78,8 @@ from .strands.vectors import dot
 
 #: Three directions at each point, three times (point_count, 3), see `strand_axes`.
 type Axes = tuple[Floats, Floats, Floats]
+#: Strands, about, that stand in the way of light off far skin for all.
+SHADING_STRANDS = 6000
 #: Guides, about, that tell whether their head has jumped.
 JUMP_GUIDES = 64
 #: Of children that cannot be led out of the head, the part from which on a note says so.
@@ -903,10 +905,12 @@ def rest_skin_seen(rig: Rig, points: Floats, axes: Axes) -> Floats | None:
     strands = rig.strands
     if rig.head is None or not strands.strand_count:
         return None
-    fraction = along(strands.points, strands.offsets)
-    radius = drawn_radius(strands.radius, StrandSettings(), fraction).astype(np.float32)
-    drawn = replace(strands, radius=radius)
-    seen = skin_seen(drawn, points, rig.head, rig.widths.extinction)
+    # coarse cells do not tell each strand from the next
+    step = -(-strands.strand_count // SHADING_STRANDS)
+    some = strands.take(np.arange(0, strands.strand_count, step))
+    radius = drawn_radius(some.radius, StrandSettings(), even(some.offsets))
+    some = replace(some, radius=radius.astype(np.float32))
+    seen = skin_seen(some, points, rig.head, step * rig.widths.extinction)
     received, beneath = (_by_axes(each, axes) for each in (seen.received[:, 1:], seen.beneath))
     parts = seen.received[:, :1], received, beneath, seen.depth[:, None]
     return np.concatenate(parts, axis=1, dtype=np.float32)
