@@ -11,6 +11,7 @@ import pytest
 from gpu_rounding import is_same
 
 from hairloom.addon.params import Settings
+from hairloom.addon.params.field import NAMING
 from hairloom.addon.shading.kajiya_kay_settings import KajiyaKaySettings
 from hairloom.addon.shading.lights import Light
 from hairloom.addon.shading.marschner.settings import MarschnerSettings
@@ -54,8 +55,10 @@ OWN = {
 
 
 def ends(settings: Settings) -> Iterator[tuple[str, Any]]:
-    """Each parameter's name with each of its extreme values."""
+    """Each parameter's name with each of its extreme values; names have none."""
     for parameter in settings.parameters():
+        if parameter.kind in NAMING:
+            continue
         if parameter.kind == "choice":
             values: list[Any] = [identifier for identifier, _, _ in parameter.choices]
         else:
