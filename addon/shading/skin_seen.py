@@ -197,10 +197,10 @@ def _came(source: Floats, through: Floats, step: Step) -> Floats:
     sources, passing = (np.ascontiguousarray(each) for each in layers)
     came = np.zeros_like(sources)
     for index in range(1, len(came)):
-        before, gone = came[index - 1], passing[index - 1]
+        before, left = came[index - 1], passing[index - 1]
         sent = sources[index - 1].copy()
-        sent[:4] += gone[0] * before[:4]
-        sent[4] += gone[1] * before[4]
+        sent[:4] += left[0] * before[:4]
+        sent[4] += left[1] * before[4]
         add_shifted(came[index], sent, others)
     return np.moveaxis(came[::-1] if step[axis] > 0 else came, 0, axis + 1)
 
