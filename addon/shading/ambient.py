@@ -48,7 +48,7 @@ def ambient_occlusion(
     grid = grid_around(strands, settings.cell_count)
     depth = _depth(strands, body, grid, settings.extinction)
     open_sky = sky_openness(depth, settings.upper_fraction)
-    seen = sample(open_sky, grid.coordinates(points)) / settings.ao_bias
+    (seen,) = sample(open_sky[None], grid.coordinates(points)) / settings.ao_bias
     return (1.0 - settings.strength * (1.0 - np.minimum(seen, 1.0))).astype(np.float32)
 
 
@@ -73,8 +73,7 @@ def openness(
         direction = 3.0 * np.array(step) / np.linalg.norm(step)
         for moment, part in zip(moments[1:], direction, strict=True):
             moment += np.float32(part) * through
-    places = grid.coordinates(points)
-    return np.stack([sample(moment, places) for moment in moments], axis=-1)
+    return np.ascontiguousarray(sample(moments, grid.coordinates(points)).T)
 
 
 def _depth(strands: StrandSet, body: Surface | None, grid: Grid, extinction: float) -> Floats:

@@ -9,7 +9,6 @@ half below its surface, so that hair at its root is not shut in by the cell that
 
 from __future__ import annotations
 
-import itertools
 from dataclasses import dataclass
 from typing import Self
 
@@ -181,29 +180,12 @@ def _is_below(points: Floats, body: Surface, depth: float) -> Bools:
     return result
 
 
-def sample(values: Floats, coordinates: Floats) -> Floats:
-    """Trilinear look-up in a grid, (n,) float32; outside of it, its border's value."""
-    # by axes, as numpy is slow at rows of three
-    inside = np.ascontiguousarray(coordinates.T, np.float32)
-    for place, count in zip(inside, values.shape, strict=True):
-        np.clip(place, 0.0, count - 1, out=place)
-    cell = np.minimum(inside.astype(np.int32), np.array(values.shape, np.int32)[:, None] - 2)
-    inside -= cell
-    along_x, along_y = values.shape[1] * values.shape[2], values.shape[2]
-    flat, index = values.ravel(), cell[0] * along_x + cell[1] * along_y + cell[2]
-
-    def along_z(corner: int) -> Floats:
-        low = flat.take(index + corner)
-        return _between(low, flat.take(index + (corner + 1)), inside[2])
-
-    near = _between(along_z(0), along_z(along_y), inside[1])
-    far = _between(along_z(along_x), along_z(along_x + along_y), inside[1])
-    return _between(near, far, inside[0])
-
-
-def rows_at(rows: Floats, shape: tuple[int, int, int], coordinates: Floats) -> Floats:
-    """As `sample`, of grids side by side: (cells, k) at (n, 3) coordinates, (n, k)."""
-    result = np.zeros((len(coordinates), rows.shape[1]), np.float32)
+def sample(grids: Floats, coordinates: Floats) -> Floats:
+    """Trilinear look-up at (n, 3) in grids (k, x, y, z), (k, n) float32; outside of them, their
+    border's values."""
+    found = np.empty((len(grids), len(coordinates)), np.float32)
+    shape, flat = grids.shape[1:], grids.reshape(len(grids), -1)
+    along_x, along_y = shape[1] * shape[2], shape[2]
     for first in range(0, len(coordinates), _LOOK_UPS):
         some = slice(first, first + _LOOK_UPS)
         # by axes, as numpy is slow at rows of three
@@ -212,13 +194,15 @@ def rows_at(rows: Floats, shape: tuple[int, int, int], coordinates: Floats) -> F
             np.clip(place, 0.0, count - 1, out=place)
         cell = np.minimum(inside.astype(np.int32), np.array(shape, np.int32)[:, None] - 2)
         inside -= cell
-        index = (cell[0] * shape[1] + cell[1]) * shape[2] + cell[2]
-        sides = 1.0 - inside, inside
-        for x, y, z in itertools.product((0, 1), repeat=3):
-            part = rows.take(index + ((x * shape[1] + y) * shape[2] + z), axis=0)
-            part *= (sides[x][0] * sides[y][1] * sides[z][2])[:, None]
-            result[some] += part
-    return result
+        low = (cell[0] * along_x + cell[1] * along_y + cell[2]).astype(np.int64)
+        corners = [low + (along_x * x + along_y * y) for x in (0, 1) for y in (0, 1)]
+        ends = [(corner, corner + 1) for corner in corners]
+        for grid, target in zip(flat, found, strict=True):
+            edges = [_between(grid.take(one), grid.take(other), inside[2]) for one, other in ends]
+            near = _between(edges[0], edges[1], inside[1])
+            far = _between(edges[2], edges[3], inside[1])
+            target[some] = _between(near, far, inside[0])
+    return found
 
 
 def _between(one: Floats, other: Floats, part: Floats) -> Floats:

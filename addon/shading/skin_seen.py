@@ -24,7 +24,7 @@ import numpy as np
 from ..arrays import Bools, Floats
 from ..strands import StrandSet, Surface
 from .ambient import Step, add_shifted, depth_towards, sky_directions
-from .density_grid import Grid, hair_depth, rows_at, small_triangles
+from .density_grid import Grid, hair_depth, sample, small_triangles
 
 #: Cells along the longest side of the grid.
 _CELLS = 44
@@ -74,13 +74,12 @@ def skin_seen(strands: StrandSet, points: Floats, skin: Surface, extinction: flo
     cells = np.concatenate(_spread(hair, sent, normal, is_skin))
     # those within the body know of nothing, and those beside fill them
     known = ~is_inside
-    rows = np.concatenate([cells * known, known[None]], dtype=np.float32)
-    rows = np.ascontiguousarray(rows.reshape(len(rows), -1).T)
-    found = rows_at(rows, grid.shape, grid.coordinates(points))
-    found = found[:, :-1] / np.maximum(found[:, -1:], 1.0e-3)
-    passed = np.clip(found[:, 4] / np.maximum(found[:, 0], _SMALLEST), _MIN_PASSED, 1.0)
+    whole = np.concatenate([cells * known, known[None]], dtype=np.float32)
+    found = sample(whole, grid.coordinates(points))
+    found = found[:-1] / np.maximum(found[-1], 1.0e-3)
+    passed = np.clip(found[4] / np.maximum(found[0], _SMALLEST), _MIN_PASSED, 1.0)
     depth = (passed**-GAPS - 1.0) / (GAPS * _PART)
-    return SkinSeen(found[:, :4], depth, found[:, 5:])
+    return SkinSeen(found[:4].T, depth, found[5:].T)
 
 
 def through_hair(depth: Floats, taken: Floats) -> Floats:

@@ -411,7 +411,7 @@ def a_number(sphere: Any) -> None:
         (a_number, "no colour attribute named 'Ombre'", "Use one of: There"),
         (no_uvs, "needs a surface with UVs", "Unwrap it"),
         (no_pixels, "has no pixels", "Find its file"),
-        (not_finite, "not finite numbers", "clear Colour Map"),
+        (not_finite, "not finite numbers", "clear its field"),
         (unknown_space, "colour space 'ACEScg'", "sRGB"),
     ],
 )

@@ -156,7 +156,7 @@ class Canvas:
             )
         if np.linalg.det(np.array(evaluated.matrix_world)) < 0.0:
             corners = corners[:, ::-1]  # as triangles are, see `Surface.transformed`
-        return SurfaceMask(_usable(corners, name, surface.name))
+        return SurfaceMask(usable(corners, name, surface.name))
 
     def _of_curves(self, name: str, depsgraph: bpy.types.Depsgraph) -> Mask | None:
         if self.hair is None:
@@ -166,7 +166,7 @@ class Canvas:
         if found is None:
             return None
         values, domain = found
-        values = _usable(values, name, self.hair.name)
+        values = usable(values, name, self.hair.name)
         offsets, strands = curve_offsets(curves), self.strands
         counts = np.diff(offsets)
         is_known = self.kept.max(initial=-1) < len(counts)
@@ -226,20 +226,37 @@ def image_mask(name: str, head: Surface | None, place: str) -> ImageMask:
     Raises:
         HairloomError: there are no UVs, or no pixels that can be used.
     """
-    if head is None or head.corner_uv is None:
+    corner_uv = None if head is None else head.corner_uv
+    image = usable_image(name, corner_uv, place, instead="a vertex group")
+    assert corner_uv is not None
+    return ImageMask(usable(image_values(image), name, place), corner_uv)
+
+
+def usable_image(
+    name: str, corner_uv: Floats | None, place: str, *, instead: str
+) -> bpy.types.Image:
+    """An image with pixels, for a surface with UVs.
+
+    Args:
+        place: names the surface in messages. instead: what else may be painted.
+
+    Raises:
+        HairloomError: there are no UVs, or no pixels.
+    """
+    if corner_uv is None:
         raise HairloomError(
             f"the image '{name}' needs a surface with UVs",
             place=place,
-            remedy="Unwrap it (Edit Mode, UV > Unwrap), or paint a vertex group",
+            remedy=f"Unwrap it (Edit Mode, UV > Unwrap), or paint {instead}",
         )
-    pixels = image_values(bpy.data.images[name])
-    if not pixels.size:
+    image = bpy.data.images[name]
+    if not (all(image.size) and image.has_data):  # asking for the size loads it
         raise HairloomError(
             f"the image '{name}' has no pixels",
             place=place,
             remedy="Find its file (File > External Data > Find Missing Files)",
         )
-    return ImageMask(_usable(pixels, name, place), head.corner_uv)
+    return image
 
 
 def image_values(image: bpy.types.Image) -> Floats:
@@ -254,7 +271,7 @@ def image_values(image: bpy.types.Image) -> Floats:
     return found
 
 
-def _usable(values: Floats, name: str, place: str) -> Floats:
+def usable(values: Floats, name: str, place: str) -> Floats:
     """Not negative.
 
     Raises:
@@ -262,7 +279,7 @@ def _usable(values: Floats, name: str, place: str) -> Floats:
     """
     if not np.isfinite(values).all():
         raise HairloomError(
-            f"the mask '{name}' has values that are not finite numbers, so it is not used",
+            f"'{name}' has values that are not finite numbers, so it is not used",
             place=place,
             remedy="Paint or compute it again, or clear its field",
         )

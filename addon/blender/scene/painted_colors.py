@@ -23,6 +23,7 @@ from ..base.attributes import read_attribute
 from ..base.objects import head_of
 from ..base.vertex_weights import at_corners, color_choices, image_names, is_color
 from .curves import read_own_curves
+from .masks import usable, usable_image
 from .surfaces import evaluated_mesh, read_corner_uv, read_surface
 
 #: Colour spaces of images whose pixels Blender keeps as they are in scene-linear Rec. 709.
@@ -119,7 +120,7 @@ def _of_attribute(mesh: bpy.types.Mesh, name: str, place: str) -> SurfaceColor |
     attribute = mesh.attributes.get(name)
     if attribute is None or not is_color(attribute):
         return None
-    values = _usable(read_attribute(mesh, name, attribute.domain, 4), name, place)
+    values = usable(read_attribute(mesh, name, attribute.domain, 4), name, place)
     return SurfaceColor(at_corners(mesh, _multiplied(values), attribute.domain))
 
 
@@ -127,25 +128,14 @@ def _of_image(mesh: bpy.types.Mesh, name: str, place: str) -> ImageColor | None:
     if name not in image_names():
         return None
     corner_uv = read_corner_uv(mesh)
-    if corner_uv is None:
-        raise HairloomError(
-            f"the image '{name}' needs a surface with UVs",
-            place=place,
-            remedy="Unwrap it (Edit Mode, UV > Unwrap), or paint a colour attribute",
-        )
-    image = bpy.data.images[name]
-    (width, height), channels = image.size, image.channels  # loads it
-    if not (width and height and image.has_data):
-        raise HairloomError(
-            f"the image '{name}' has no pixels",
-            place=place,
-            remedy="Find its file (File > External Data > Find Missing Files)",
-        )
+    image = usable_image(name, corner_uv, place, instead="a colour attribute")
+    assert corner_uv is not None
+    (width, height), channels = image.size, image.channels
     meant = _meaning(image, place)
     pixels = np.empty(width * height * channels, np.float32)
     image.pixels.foreach_get(pixels)
     if image.is_float:  # all others are whole numbers
-        pixels = _usable(pixels, name, place)
+        pixels = usable(pixels, name, place)
     return ImageColor(pixels.reshape(height, width, channels), meant, corner_uv)
 
 
@@ -190,21 +180,6 @@ def _multiplied(values: Floats) -> Floats:
     """Colours times their opacity, (n, 4)."""
     opacity = np.minimum(values[:, 3:], np.float32(1.0))
     return np.concatenate([values[:, :3] * opacity, opacity], axis=1)
-
-
-def _usable(values: Floats, name: str, place: str) -> Floats:
-    """Not negative.
-
-    Raises:
-        HairloomError: not finite.
-    """
-    if not np.isfinite(values).all():
-        raise HairloomError(
-            f"the colour map '{name}' has values that are not finite numbers",
-            place=place,
-            remedy="Paint or compute it again, or clear Colour Map",
-        )
-    return np.maximum(values, np.float32(0.0))
 
 
 def _missing(surface: bpy.types.Object, name: str) -> HairloomError:

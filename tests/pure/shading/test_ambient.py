@@ -108,9 +108,9 @@ def test_hair_lies_in_the_cells_that_it_passes() -> None:
     grid = grid_around(strands, 50)
     depth = hair_depth(strands, grid)
     along = np.linspace(0.01, 0.09, 20)[:, None] * [0.0, 0.0, 1.0]
-    assert sample(depth, grid.coordinates(along)).min() > 0.0
+    assert sample(depth[None], grid.coordinates(along)).min() > 0.0
     between = np.linspace(0.2, 0.8, 20)[:, None] * np.ones(3)
-    assert sample(depth, grid.coordinates(between)).max() == 0.0
+    assert sample(depth[None], grid.coordinates(between)).max() == 0.0
 
 
 def marched(depth: Floats, start: Floats, direction: Floats) -> float:
@@ -119,7 +119,7 @@ def marched(depth: Floats, start: Floats, direction: Floats) -> float:
     distance = step * (np.arange(int(2.0 * max(depth.shape) / step)) + 0.5)
     ray = start + distance[:, None] * direction
     is_inside = ((ray >= 0) & (ray <= np.array(depth.shape) - 1)).all(axis=1)
-    return float(sample(depth, ray[is_inside].astype(np.float32)).sum() * step)
+    return float(sample(depth[None], ray[is_inside].astype(np.float32)).sum() * step)
 
 
 def test_agrees_with_rays_marched_one_by_one() -> None:
