@@ -103,10 +103,31 @@ def test_what_lies_right_beneath_is_not_far() -> None:
     out = strands.points / np.linalg.norm(strands.points, axis=1, keepdims=True)
     at_root, far = height < 1e-3, height > 0.035
     facing = np.sum(seen.beneath * out, axis=1)
-    assert facing[at_root].min() > 0.7
+    assert facing[at_root].min() > 0.85
     assert facing[at_root].max() < 1.1
     assert np.abs(seen.beneath[far]).max() < 0.05
     assert seen.received[at_root, 0].max() < 0.3 * seen.received[far & (height < 0.05), 0].max()
+
+
+def test_a_root_a_little_below_the_skin_sees_it() -> None:
+    """Cells within the body, which lie around it, know of nothing."""
+    strands = spikes()
+    out = strands.roots / np.linalg.norm(strands.roots, axis=1, keepdims=True)
+    seen = skin_seen(strands, (RADIUS - 0.005) * out, ball(), 1.0)
+    assert np.sum(seen.beneath * out, axis=1).min() > 0.9
+
+
+def test_no_light_comes_off_skin_within_a_body() -> None:
+    """A ball within a larger one is lit by nothing."""
+    strands, one, around = spikes(), ball(), ball(2.6 * RADIUS)
+    both = Surface(
+        np.concatenate([one.positions, around.positions]),
+        np.concatenate([one.triangles, around.triangles + len(one.positions)]),
+    )
+    alone, shut_in = (
+        skin_seen(strands, strands.points, skin, 1.0).received[:, 0].mean() for skin in (one, both)
+    )
+    assert shut_in < 0.05 * alone
 
 
 def test_hair_in_the_way_is_counted_on_both_ways() -> None:
