@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 from ..params import Settings, choice, toggle, when
 
+_ARE_DRAWN = when("card_drawing.shown_as", "cards", lack="no cards drawn")
+
 
 @dataclass(frozen=True, kw_only=True)
 class CardDrawingSettings(Settings):
@@ -39,7 +41,7 @@ class CardDrawingSettings(Settings):
         description="Number of passes in which cards are drawn",
         source="Scheuermann 2004, optimized scheme and its fall-back",
         panel="Drawing",
-        active_when=when("card_drawing.shown_as", "cards"),
+        active_when=_ARE_DRAWN,
     )
     order: str = choice(
         "static",
@@ -55,7 +57,7 @@ class CardDrawingSettings(Settings):
         description="Order in which cards are drawn",
         source="Scheuermann 2004, rendering with approximate depth sorting",
         panel="Drawing",
-        active_when=when("card_drawing.shown_as", "cards"),
+        active_when=_ARE_DRAWN,
     )
     skip_clear: bool = toggle(
         True,
@@ -63,6 +65,6 @@ class CardDrawingSettings(Settings):
         description="Test alpha in the last pass, so that transparent pixels hide nothing; "
         "without it, the pass is as in the paper and faster on some GPUs",
         panel="Drawing",
-        active_when=when("card_drawing.shown_as", "cards"),
+        active_when=_ARE_DRAWN,
         shown_when=when("card_drawing.passes", "four"),
     )

@@ -9,7 +9,10 @@ from ..params import Settings, choice, curve, either, integer, number, when
 
 _NALU = "Nguyen and Donnelly 2005, GPU Gems 2, chapter 23"
 _TARIQ = "Tariq 2008, Real-time hair rendering on the GPU"
-_PARTS = either(when("children.method", "multi", "auto"), when("children.clump"))
+_HAS_CLUMPS = when("children.clump", lack="needs Clump")
+_HAS_FRIZZ = when("children.frizz", lack="needs Frizz")
+_HAS_CURL = when("children.curl", lack="needs Curl")
+_PARTS = either(_HAS_CLUMPS, when("children.method", "multi", "auto"))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -100,7 +103,7 @@ class ChildrenSettings(Settings):
         description="Fraction of Clump along the strand, from root to tip",
         hard=(0.0, 1.0),
         shown_when=when("children.method", "multi", "single"),
-        active_when=when("children.clump"),
+        active_when=_HAS_CLUMPS,
     )
     clump_size: int = integer(
         12,
@@ -109,7 +112,7 @@ class ChildrenSettings(Settings):
         soft=(1, 100),
         hard=(1, 100_000),
         shown_when=when("children.method", "multi", "single"),
-        active_when=when("children.clump"),
+        active_when=_HAS_CLUMPS,
     )
     frizz: float = number(
         0.004,
@@ -127,7 +130,7 @@ class ChildrenSettings(Settings):
         description="Fraction of Frizz along the strand, from root to tip",
         hard=(0.0, 1.0),
         shown_when=when("children.method", "multi", "single"),
-        active_when=when("children.frizz"),
+        active_when=_HAS_FRIZZ,
     )
     frizz_length: float = number(
         0.12,
@@ -136,7 +139,7 @@ class ChildrenSettings(Settings):
         soft=(0.02, 1.0),
         hard=(0.001, 100.0),
         shown_when=when("children.method", "multi", "single"),
-        active_when=when("children.frizz"),
+        active_when=_HAS_FRIZZ,
     )
     fly_aways: float = number(
         0.0,
@@ -177,7 +180,7 @@ class ChildrenSettings(Settings):
         soft=(0.02, 1.0),
         hard=(0.001, 100.0),
         shown_when=when("children.method", "multi", "single"),
-        active_when=when("children.curl"),
+        active_when=_HAS_CURL,
     )
     curl_along: tuple[float, float, float, float, float] = curve(
         (0.0, 0.5, 0.9, 1.0, 1.0),
@@ -185,7 +188,7 @@ class ChildrenSettings(Settings):
         description="Fraction of Curl along the strand, from root to tip",
         hard=(0.0, 1.0),
         shown_when=when("children.method", "multi", "single"),
-        active_when=when("children.curl"),
+        active_when=_HAS_CURL,
     )
     width: float = number(
         1.0,

@@ -37,12 +37,24 @@ Range = tuple[float, float]
 #: What keeps a set of parameters: the groom (Blender's Curves), the character (the Object), the
 #: scene, or nothing: a job's are those of one operator or one call of a verb.
 Owner = Literal["groom", "character", "scene", "job"]
-#: Asked with what holds all sections of the same owner: a property group, or anything like it.
-Condition = Callable[[Any], bool]
+#: What holds all sections of the same owner: a property group, or anything like it.
+Sections = Any
 
 _METADATA_KEY = "parameter"
 #: A name that is as much like one that was mistyped, from 0 to 1, may be the one that was meant.
 _NEAR = 0.5
+
+
+@dataclass(frozen=True)
+class Condition:
+    """Whether something holds of settings; and, where it does not, what a field that waits for it
+    says on its face, such as "needs Clump"."""
+
+    holds: Callable[[Sections], bool]
+    lack: Callable[[Sections], str]
+
+    def __call__(self, sections: Sections) -> bool:
+        return self.holds(sections)
 
 
 @dataclass(frozen=True)
@@ -52,7 +64,8 @@ class Parameter:
     `soft_range` is what a slider offers, `hard_range` what a value may be; both inclusive.
     `source` names the paper or equation, or says "Hairloom".
     `panel` is the panel below that of the section in which it is drawn; none: in that one itself.
-    It is drawn where `shown_when` holds, and greyed out where `active_when` does not.
+    It is drawn where `shown_when` holds, and greyed out where `active_when` does not, which says
+    why.
     `is_painted`: a mask may multiply it, which follows it by itself, see `Settings`.
     `of` is the parameter beside which a mask is drawn, and which it multiplies.
     """
@@ -231,23 +244,27 @@ class Settings:
         return cls(**{name: declared[name].checked(v, place) for name, v in values.items()})
 
 
-def when(parameter: str, *values: Any) -> Condition:
+def when(parameter: str, *values: Any, lack: str = "") -> Condition:
     """Whether a parameter, as "section.name", has one of these values; without any: it is not 0."""
     section, _, name = parameter.partition(".")
 
-    def holds(sections: Any) -> bool:
+    def holds(sections: Sections) -> bool:
         value = getattr(getattr(sections, section), name)
         return value in values if values else bool(value)
 
-    return holds
+    return Condition(holds, lambda _: lack)
 
 
 def both(one: Condition, other: Condition) -> Condition:
-    return lambda sections: one(sections) and other(sections)
+    return Condition(
+        lambda sections: one(sections) and other(sections),
+        lambda sections: (other if one(sections) else one).lack(sections),
+    )
 
 
 def either(one: Condition, other: Condition) -> Condition:
-    return lambda sections: one(sections) or other(sections)
+    """Where neither holds, the first says what is lacking."""
+    return Condition(lambda sections: one(sections) or other(sections), one.lack)
 
 
 class _Drawn(TypedDict, total=False):

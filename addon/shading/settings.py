@@ -40,6 +40,7 @@ TRANSPARENCIES = (
     ("hashed", "Hashed", "Stochastic coverage: needs little memory, but is noisy"),
     ("none", "None", "Opaque strands with hard edges, no thinner than the minimum width"),
 )
+_HAS_TIPS = when("shading.tip_tint", lack="needs Tip Tint")
 _IS_MARSCHNER = when("shading.model", "marschner")
 _HAS_MELANIN = both(_IS_MARSCHNER, when("shading.pigment", "melanin"))
 _HAS_ABSORPTION = both(_IS_MARSCHNER, when("shading.pigment", "absorption"))
@@ -125,7 +126,7 @@ class SharedSettings(Settings):
         label="Tip Colour",
         description="Colour of the tips, blended in by Tip Tint",
         panel="Tips & Brows",
-        active_when=when("shading.tip_tint"),
+        active_when=_HAS_TIPS,
     )
     tint_start: float = number(
         0.3,
@@ -135,7 +136,7 @@ class SharedSettings(Settings):
         hard=(0.0, 1.0),
         unit="factor",
         panel="Tips & Brows",
-        active_when=when("shading.tip_tint"),
+        active_when=_HAS_TIPS,
     )
     tint_end: float = number(
         0.9,
@@ -145,7 +146,7 @@ class SharedSettings(Settings):
         hard=(0.0, 1.0),
         unit="factor",
         panel="Tips & Brows",
-        active_when=when("shading.tip_tint"),
+        active_when=_HAS_TIPS,
     )
     brow_source: str = choice(
         "look",
@@ -159,7 +160,7 @@ class SharedSettings(Settings):
         label="Brow Colour",
         description="Colour of natural brows and lashes that have none of their own",
         panel="Tips & Brows",
-        active_when=when("shading.brow_source", "natural"),
+        active_when=when("shading.brow_source", "natural", lack="as the hair"),
     )
     color_variation: float = number(
         0.3,

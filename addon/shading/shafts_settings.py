@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from ..params import Settings, color, integer, number, toggle, when
 
+_IS_ON = when("shafts.use_shafts", lack="switched off")
 _NGUYEN = "Nguyen and Donnelly 2005, hair of Nalu"
 
 
@@ -34,7 +35,7 @@ class ShaftSettings(Settings):
         soft=(0.0, 1.0),
         hard=(0.0, 1000.0),
         source=_NGUYEN,
-        active_when=when("shafts.use_shafts"),
+        active_when=_IS_ON,
     )
     length: float = number(
         math.radians(10.0),
@@ -45,7 +46,7 @@ class ShaftSettings(Settings):
         hard=(0.0, math.radians(86.0)),
         unit="angle",
         source=_NGUYEN,
-        active_when=when("shafts.use_shafts"),
+        active_when=_IS_ON,
     )
     samples: int = integer(
         256,
@@ -54,11 +55,11 @@ class ShaftSettings(Settings):
         soft=(32, 512),
         hard=(2, 4096),
         source=_NGUYEN,
-        active_when=when("shafts.use_shafts"),
+        active_when=_IS_ON,
     )
     tint: tuple[float, float, float] = color(
         (1.0, 1.0, 1.0),
         label="Tint",
         description="Colour of the haze, multiplied by that of the light",
-        active_when=when("shafts.use_shafts"),
+        active_when=_IS_ON,
     )

@@ -41,16 +41,20 @@ def draw_section(
         is_elsewhere = parameter.name in leave_out or parameter.kind == "mask"
         if parameter.panel != panel or is_elsewhere or not is_shown:
             continue
-        own = column.column()
-        own.active = parameter.active_when is None or parameter.active_when(sections)
+        own, condition = column.column(), parameter.active_when
+        lack = "" if condition is None or condition(sections) else condition.lack(sections)
+        own.active = not lack
         if parameter.kind == "curve":
-            _draw_curve(own, group, parameter)
+            _draw_curve(own, group, parameter, lack)
             continue
         if parameter.name in masks:
             _draw_painted(own, group, parameter, masks[parameter.name])
             continue
         icon = "GROUP_VCOL" if parameter.kind == "map" else "NONE"
         is_number = parameter.kind in {"number", "integer"}
+        if lack:
+            draw_idle(own, group, parameter.name, lack)
+            continue
         own.prop(group, parameter.name, slider=is_number, icon=icon)
 
 
@@ -68,6 +72,50 @@ def _draw_painted(
     fields.prop(group, mask.name, text="", icon="GROUP_VERTEX")
 
 
+def draw_idle(layout: bpy.types.UILayout, group: Any, name: str, lack: str) -> None:
+    """A field that does not act now, as high as if it did: it says why, and can be set all the
+    same."""
+    layout.active = False
+    known = group.bl_rna.properties[name]
+    row = layout.split(factor=_LABEL)
+    row.use_property_split = False
+    label = row.row()
+    label.alignment = "RIGHT"
+    label.label(text=known.name)
+    has_place = known.type in {"INT", "FLOAT", "BOOLEAN"} and not known.array_length
+    field = row.row(align=True)
+    field.prop(group, name, text=lack if has_place else "", slider=known.type in {"INT", "FLOAT"})
+    if not has_place:
+        field.label(text=lack)
+
+
+def draw_button(
+    layout: bpy.types.UILayout,
+    operator: str,
+    idle: str = "",
+    text: str | None = None,
+    *,
+    anywhere: bool = False,
+    **how: Any,
+) -> Any:
+    """A button that says on its face why it is greyed out, not only to a mouse that waits.
+
+    Args:
+        operator: such as "hairloom.settle".
+        idle: its text where it can do nothing; in other modes it says that these are why.
+        anywhere: it is for all modes.
+        how: as `UILayout.operator` takes it.
+    """
+    if not getattr(bpy.ops.hairloom, operator.partition(".")[2]).poll():
+        is_mode = bpy.context.mode != "OBJECT" and not anywhere
+        text = "Object Mode Only" if is_mode else idle or text
+    return (
+        layout.operator(operator, **how)
+        if text is None
+        else layout.operator(operator, text=text, **how)
+    )
+
+
 def draw_overlays(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
     """What may be drawn over the view as lines, three in a row; and beside the last one its map."""
     column = layout.column(align=True)
@@ -78,9 +126,9 @@ def draw_overlays(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
     row.prop(hair.hairloom, "shown_map", text="", icon="GROUP_VERTEX")
 
 
-def _draw_curve(layout: bpy.types.UILayout, group: Any, parameter: Parameter) -> None:
+def _draw_curve(layout: bpy.types.UILayout, group: Any, parameter: Parameter, lack: str) -> None:
     """Five sliders, from root to tip."""
-    layout.label(text=parameter.label)
+    layout.label(text=f"{parameter.label}: {lack}" if lack else parameter.label)
     sliders = layout.column(align=True)
     for index, place in enumerate(_PLACES):
         sliders.prop(group, parameter.name, index=index, text=place, slider=True)

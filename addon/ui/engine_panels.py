@@ -8,6 +8,7 @@ import bpy
 
 from ..blender.engine import hair_scene
 from ..blender.viewport.overlay import ENGINE
+from .drawing import draw_idle
 from .messages import draw_message
 
 #: panels for every engine that does not bring its own
@@ -121,9 +122,10 @@ class HAIRLOOM_PT_hair_scene(bpy.types.Panel):
         column = layout.column()
         column.active = settings.use_hair_scene
         column.prop(settings.picture, "samples", text="Samples")
-        row = column.row()
-        row.active = context.scene.render.use_motion_blur
-        row.prop(settings.picture, "motion_steps", text="Motion Steps")
+        if context.scene.render.use_motion_blur:
+            column.prop(settings.picture, "motion_steps", text="Motion Steps")
+        else:
+            draw_idle(column.row(), settings.picture, "motion_steps", "no Motion Blur")
         problem = hair_scene.problem_of(context.scene) if settings.use_hair_scene else ""
         if problem:
             draw_message(layout, context, f"Blender draws the hair. {problem}", "ERROR")

@@ -92,7 +92,9 @@ class HAIRLOOM_OT_sort_cards(LongWork, bpy.types.Operator):
         layout.prop(self, "direction")
         layout.prop(self, "use_occlusion")
         column = layout.column()
-        column.active = self.use_occlusion
+        if not self.use_occlusion:
+            column.active = False
+            column.label(text="Without Ambient Occlusion:", icon="BLANK1")
         column.prop_search(self, "alpha", bpy.data, "images")
         for parameter in CardOcclusionSettings.parameters():
             column.prop(self, parameter.name)

@@ -14,6 +14,7 @@ from ..blender.scene.fin_modifier import fin_modifier
 from ..blender.sessions.measures import table_of
 from ..errors import HairloomError
 from . import long_work
+from .drawing import draw_idle
 from .long_work import LongWork, Steps, counted, draw_progress
 from .operators_measure import draw_figures
 from .reports import reporting
@@ -93,9 +94,11 @@ def draw_bake(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
     layout.prop(bake, "folder")
     layout.prop(bake, "use_own_range")
     column = layout.column(align=True)
-    column.active = bake.use_own_range
-    column.prop(bake, "first")
-    column.prop(bake, "last")
+    for name in ("first", "last"):
+        if bake.use_own_range:
+            column.prop(bake, name)
+        else:
+            draw_idle(column, bake, name, "as the scene")
     if obj.type == "CURVES":
         layout.prop(bake, "in_renders")
     if not draw_progress(layout, HAIRLOOM_OT_bake):
@@ -111,8 +114,10 @@ def _draw_state(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
     except HairloomError as error:
         cache, problem = None, error.problem
     shown = layout.column()
-    shown.active = cache is not None
-    shown.prop(obj.hairloom.bake, "is_shown")
+    if cache is None:
+        draw_idle(shown, obj.hairloom.bake, "is_shown", "not baked")
+    else:
+        shown.prop(obj.hairloom.bake, "is_shown")
     facts = None if cache is None else cache.facts
     if facts is None:
         layout.label(text=problem or "Not baked", icon="ERROR" if problem else "BLANK1")

@@ -21,6 +21,7 @@ from ..blender.properties.properties import settings_of
 from ..cards.export_settings import CardExportSettings
 from ..errors import HairloomError
 from ..exchange.cards.card_formats import FORMATS, GLB, SUFFIXES
+from .drawing import draw_idle
 from .long_work import LongWork, Progress, Steps, threaded
 from .messages import draw_lines
 from .reports import tell
@@ -169,7 +170,9 @@ class HAIRLOOM_OT_export_cards(LongWork, ExportHelper, bpy.types.Operator):
 
     def _draw_page(self, layout: bpy.types.UILayout) -> None:
         page = layout.column()
-        page.active = self.format == GLB.name
+        if self.format != GLB.name:
+            draw_idle(page, self, "page", "only with .glb")
+            return
         page.prop(self, "page")
         for name in ("page_texture", "page_head") if self.page else ():
             page.prop(self, name)

@@ -10,6 +10,7 @@ from ..blender.base.outcome import Outcome
 from ..blender.cards.build import order_line
 from ..blender.cards.object import CardObjectJob, card_objects
 from ..cards.settings import CardSettings
+from .drawing import draw_button
 from .long_work import LongWork, Progress, Steps, draw_progress, threaded
 from .reports import tell
 from .selection import chosen_hair, needs_hair
@@ -53,7 +54,7 @@ def draw_made_cards(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
     objects = card_objects(hair)
     if not draw_progress(layout, HAIRLOOM_OT_make_cards):
         text = "Make Cards Again" if objects else "Make Cards"
-        layout.operator("hairloom.make_cards", text=text, icon="MESH_GRID")
+        draw_button(layout, "hairloom.make_cards", text=text, icon="MESH_GRID")
     finest = objects[0] if objects else None
     made = finest and finest.hairloom.card_object
     column = layout.column(align=True)

@@ -15,7 +15,7 @@ from ..blender.scene.fin_modifier import (
     is_shown,
     remove_modifier,
 )
-from .drawing import draw_section
+from .drawing import draw_button, draw_section
 from .messages import draw_message
 from .reports import reporting, waiting
 from .selection import active_mesh
@@ -131,7 +131,7 @@ def draw_fin(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
     row = layout.row(align=True)
     text, icon = ("Stop Preview", "HIDE_OFF") if session else ("Preview", "HIDE_ON")
     row.operator("hairloom.fin_preview", text=text, icon=icon, depress=session is not None)
-    row.operator("hairloom.fin_reset", text="Reset", icon="FILE_REFRESH")
+    draw_button(row, "hairloom.fin_reset", "At Rest", "Reset", anywhere=True, icon="FILE_REFRESH")
     row.operator("hairloom.fin_remove", text="", icon="TRASH")
     for warning in session.warnings if session is not None else ():
         draw_message(layout, bpy.context, warning, "ERROR")

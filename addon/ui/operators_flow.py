@@ -13,6 +13,7 @@ from ..blender.scene.own_collections import put_into, take_out
 from ..blender.scene.strokes import KIND, SETTING, strokes_of
 from ..blender.sessions.flow import BEFORE_FLOW, comb_flow, take_flow_back
 from ..groom.flow_settings import FlowSettings
+from .drawing import draw_button
 from .operators_start import in_object_mode
 from .reports import reporting, tell, waiting
 from .selection import chosen_hair, needs_hair
@@ -125,10 +126,10 @@ def draw_flow(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
         row = column.row(align=True)
         row.label(text=obj.name, icon="CURVE_PATH")
         row.operator("hairloom.remove_stroke", text="", icon="X").stroke = obj.name
-    column.operator("hairloom.add_stroke", icon="CURVE_PATH")
+    draw_button(column, "hairloom.add_stroke", icon="CURVE_PATH")
     row = column.row(align=True)
-    row.operator("hairloom.comb_flow", icon="FORCE_CURVE")
-    row.operator("hairloom.take_flow_back", icon="LOOP_BACK")
+    draw_button(row, "hairloom.comb_flow", "No Strokes Yet", icon="FORCE_CURVE")
+    draw_button(row, "hairloom.take_flow_back", "Not Combed", icon="LOOP_BACK")
 
 
 CLASSES = (

@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 
 from ..blender.strands.growing import grow_again, grow_on, has_grown, is_behind, losses
-from .drawing import draw_section
+from .drawing import draw_button, draw_section
 from .grow_options import GROW_PROPERTIES, draw_where_settings_are
 from .long_work import LongWork, Steps, draw_progress, in_parts
 from .messages import draw_message
@@ -76,7 +76,7 @@ def draw_grow(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
     if not draw_progress(lines, HAIRLOOM_OT_grow_again):
         button = lines.row()
         button.active = bool(lost)
-        button.operator("hairloom.grow_again", icon="FILE_REFRESH")
+        draw_button(button, "hairloom.grow_again", icon="FILE_REFRESH")
     groom = curves.hairloom
     if groom.grow.problem:
         draw_message(layout, bpy.context, groom.grow.problem, "ERROR")

@@ -10,6 +10,7 @@ from ..blender.base.redraw import redraw_panels
 from ..blender.preview import previews
 from ..blender.sessions.measures import table_of
 from ..blender.sessions.session import Session
+from .drawing import draw_button
 from .reports import reporting
 from .selection import chosen_hair, needs_hair
 
@@ -48,10 +49,13 @@ def _simulated(hair: Iterable[bpy.types.Object]) -> Iterable[Session]:
 
 def draw_measure(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
     """Draw the button, and what was measured last; greyed out once the hair has moved on."""
-    layout.operator("hairloom.measure", icon="DRIVER_DISTANCE")
     session = previews.session_of(hair)
+    is_old = session is not None and session.figures and not session.are_figures_current
+    text = "Measure: It Has Moved on" if is_old else None
+    idle, icon = "Measure: Press Play First", "DRIVER_DISTANCE"
+    draw_button(layout, "hairloom.measure", idle, text, anywhere=True, icon=icon)
     lines = layout.column(align=True)
-    lines.active = session is not None and session.are_figures_current
+    lines.active = not is_old
     draw_figures(lines, table_of(None if session is None else session.figures))
 
 

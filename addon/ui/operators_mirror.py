@@ -8,6 +8,7 @@ from ..blender.properties.groups import operator_properties
 from ..blender.properties.properties import settings_of
 from ..blender.sessions.mirroring import mirror_hair
 from ..groom.mirror_settings import MirrorSettings
+from .drawing import draw_button
 from .operators_start import in_object_mode
 from .reports import reporting, tell, waiting
 from .selection import chosen_hair, needs_hair
@@ -44,7 +45,7 @@ def draw_mirror(layout: bpy.types.UILayout) -> None:
         ("positive", "Mirror +X to -X", "TRIA_LEFT"),
         ("negative", "Mirror -X to +X", "TRIA_RIGHT"),
     ):
-        button = row.operator("hairloom.mirror_hair", text=text, icon=icon)
+        button = draw_button(row, "hairloom.mirror_hair", text=text, icon=icon)
         button.side, button.axis = side, "x"
 
 

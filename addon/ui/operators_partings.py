@@ -12,6 +12,7 @@ from ..blender.scene import partings
 from ..blender.scene.drawn_lines import chosen_or_new_lines
 from ..blender.sessions.parting import comb_parting
 from ..groom.parting_settings import PartingSettings
+from .drawing import draw_button
 from .operators_start import in_object_mode
 from .reports import reporting, tell, waiting
 from .selection import chosen_hair, needs_hair
@@ -96,8 +97,8 @@ def draw_partings(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
         row = column.row(align=True)
         row.label(text=obj.name, icon="CURVE_DATA")
         row.operator("hairloom.remove_parting", text="", icon="X").line = obj.name
-    column.operator("hairloom.add_parting", icon="CURVE_DATA")
-    column.operator("hairloom.comb_parting", icon="ARROW_LEFTRIGHT")
+    draw_button(column, "hairloom.add_parting", icon="CURVE_DATA")
+    draw_button(column, "hairloom.comb_parting", "No Partings Yet", icon="ARROW_LEFTRIGHT")
 
 
 CLASSES = (HAIRLOOM_OT_add_parting, HAIRLOOM_OT_remove_parting, HAIRLOOM_OT_comb_parting)

@@ -9,6 +9,7 @@ from ..blender.properties.groups import operator_properties
 from ..blender.properties.properties import settings_of
 from ..blender.sessions.settling import back_to_combed, is_settled, settle_hair
 from ..dynamics.settle_settings import SettleSettings
+from .drawing import draw_button
 from .long_work import LongWork, Progress, Steps, as_progress, draw_progress
 from .operators_start import in_object_mode
 from .reports import reporting, tell
@@ -66,8 +67,8 @@ def draw_settle(layout: bpy.types.UILayout) -> None:
     if draw_progress(layout, HAIRLOOM_OT_settle):
         return
     row = layout.row(align=True)
-    row.operator("hairloom.settle", icon="SORT_ASC")
-    row.operator("hairloom.back_to_combed", icon="LOOP_BACK")
+    draw_button(row, "hairloom.settle", icon="SORT_ASC")
+    draw_button(row, "hairloom.back_to_combed", "Not Settled", icon="LOOP_BACK")
 
 
 CLASSES = (HAIRLOOM_OT_settle, HAIRLOOM_OT_back_to_combed)

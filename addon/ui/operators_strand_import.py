@@ -29,6 +29,7 @@ from ..blender.strands.import_groom import (
     read_in_thread,
     settle_ground,
 )
+from .drawing import draw_idle
 from .long_work import LongWork, Steps, threaded
 from .reports import tell
 from .selection import active_mesh, ground_mesh, make_active
@@ -134,12 +135,15 @@ class HAIRLOOM_OT_import_strands(LongWork, ImportHelper, bpy.types.Operator):
         layout.prop(self, "scale")
         layout.prop(self, "guides")
         mesh = ground_mesh(context)  # while it is adjusted what came in is active
-        row = layout.row(heading="" if mesh is None else mesh.name)
-        row.enabled = mesh is not None
-        row.prop(self, "onto_mesh")
+        if mesh is None:
+            draw_idle(layout.row(), self, "onto_mesh", "no mesh is active")
+        else:
+            layout.row(heading=mesh.name).prop(self, "onto_mesh")
         row = layout.row()
-        row.enabled = mesh is not None and self.onto_mesh
-        row.prop(self, "head_scale")
+        if mesh is None or not self.onto_mesh:
+            draw_idle(row, self, "head_scale", "not onto a mesh")
+        else:
+            row.prop(self, "head_scale")
 
     def _paths(self) -> list[Path]:
         """Several files chosen or dropped, else the one of `filepath`."""

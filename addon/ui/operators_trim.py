@@ -9,6 +9,7 @@ from ..blender.base.outcome import report
 from ..blender.scene.own_collections import put_into, take_out
 from ..blender.scene.trim_shapes import KIND, SETTING, may_trim, read_shape, trim_shapes_of
 from ..blender.sessions.trimming import BEFORE_TRIM, take_trim_back, trim_to_shapes
+from .drawing import draw_button
 from .operators_start import in_object_mode
 from .reports import reporting, tell, waiting
 from .selection import chosen_hair, needs_hair
@@ -111,8 +112,8 @@ def draw_trim(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
         row.label(text=obj.name, icon="EMPTY_AXIS" if obj.type == "EMPTY" else "MESH_DATA")
         row.operator("hairloom.remove_trim_shape", text="", icon="X").shape = obj.name
     row = column.row(align=True)
-    row.operator("hairloom.trim_to_shape", icon="MOD_BOOLEAN")
-    row.operator("hairloom.take_trim_back", icon="LOOP_BACK")
+    draw_button(row, "hairloom.trim_to_shape", "Select a Shape", icon="MOD_BOOLEAN")
+    draw_button(row, "hairloom.take_trim_back", "Not Trimmed", icon="LOOP_BACK")
 
 
 CLASSES = (

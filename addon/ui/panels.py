@@ -10,7 +10,7 @@ import bpy
 from ..blender.preview import previews
 from ..blender.scene.particle_hair import hair_systems
 from ..blender.setup.foreign_heads import may_be_head
-from .drawing import Draw, draw_overlays
+from .drawing import Draw, draw_button, draw_overlays
 from .help import draw_help
 from .long_work import draw_progress
 from .operators_adopted import draw_sort
@@ -34,7 +34,9 @@ def draw_preview(layout: bpy.types.UILayout, context: bpy.types.Context) -> None
     column = layout.column(align=True)
     column.scale_y = 1.3
     text, icon = ("Stop Preview", "HIDE_OFF") if session else ("Preview", "HIDE_ON")
-    column.operator("hairloom.preview", text=text, icon=icon, depress=session is not None)
+    idle = "Preview: Select Hair First"
+    is_on = session is not None
+    draw_button(column, "hairloom.preview", idle, text, anywhere=True, icon=icon, depress=is_on)
     playing, paused = previews.is_playing(), previews.is_paused()
     row = column.row(align=True)
     text, icon = ("Stop", "SNAP_FACE") if playing else ("Play", "PLAY")
@@ -50,12 +52,13 @@ def draw_preview(layout: bpy.types.UILayout, context: bpy.types.Context) -> None
         return
     draw_state(layout, session)
     draw_problems_row(layout, hair, session)
-    layout.operator("hairloom.use_groom", icon="OUTLINER_OB_CURVES")
+    idle = "Uses Hairloom" if session is not None else ""
+    draw_button(layout, "hairloom.use_groom", idle, icon="OUTLINER_OB_CURVES")
     if hair.hairloom.hairstyle:
         row = layout.row(align=True)
-        row.operator("hairloom.place_landmarks", text="Landmarks", icon="EMPTY_AXIS")
+        draw_button(row, "hairloom.place_landmarks", text="Landmarks", icon="EMPTY_AXIS")
         if not draw_progress(row, HAIRLOOM_OT_fit_again):
-            row.operator("hairloom.fit_again", icon="FILE_REFRESH")
+            draw_button(row, "hairloom.fit_again", icon="FILE_REFRESH")
     parts = layout.split(factor=NAMES)
     parts.label(text="Colour By")
     row = parts.row(align=True)

@@ -11,7 +11,7 @@ from ..blender.preview import previews
 from ..parameters import ALL_SETTINGS
 from ..params import Owner
 from .card_sections import CARD_SECTIONS, draw_cards
-from .drawing import Draw, draw_section
+from .drawing import Draw, draw_button, draw_section
 from .long_work import draw_progress
 from .messages import draw_lines
 from .operators_bake import draw_bake
@@ -111,7 +111,7 @@ def draw_volume(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
     draw_preset_row(layout, hair, "volume")
     draw_section(layout, hair.data.hairloom, "volume")
     if hair.data.hairloom.volume.shadows != "none":
-        layout.operator("hairloom.show_slices")
+        draw_button(layout, "hairloom.show_slices", "Opacity Map: Preview First", anywhere=True)
 
 
 def draw_skin(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
@@ -119,7 +119,8 @@ def draw_skin(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
     _panel("skin")(layout, hair)
     column = layout.column()
     column.active = groom.skin.soft_shadow and groom.volume.shadows != "none"
-    column.operator("hairloom.show_skin_shadow")
+    idle, text = "Skin Shadow: Preview First", None if column.active else "Hair Has No Skin Shadow"
+    draw_button(column, "hairloom.show_skin_shadow", text or idle, text, anywhere=True)
 
 
 def draw_medium(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
@@ -164,8 +165,9 @@ def draw_export(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
     layout.menu("HAIRLOOM_MT_export_strands", icon="EXPORT")
     layout.operator("hairloom.check_export", icon="CHECKMARK")
     if not draw_progress(layout, HAIRLOOM_OT_make_real):
-        layout.operator("hairloom.make_real", icon="OUTLINER_OB_CURVES")
-    layout.operator("hairloom.show_reports", icon="TEXT")
+        draw_button(layout, "hairloom.make_real", icon="OUTLINER_OB_CURVES")
+    idle = "No Reports Yet"
+    draw_button(layout, "hairloom.show_reports", idle, anywhere=True, icon="TEXT")
 
 
 #: those below Look that have nothing to show in another model

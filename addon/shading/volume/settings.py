@@ -15,8 +15,8 @@ SHADOWS = (
     ("slices", "Opacity Slices", "Evenly spaced slices through the hair"),
     ("none", "None", "Ambient occlusion replaces shadows"),
 )
-_CAN_SCATTER = when("shading.model", "marschner")
-_SCATTERS = both(_CAN_SCATTER, when("volume.scattering"))
+_CAN_SCATTER = when("shading.model", "marschner", lack="needs Marschner")
+_SCATTERS = both(_CAN_SCATTER, when("volume.scattering", lack="needs Scattering"))
 
 
 @dataclass(frozen=True, kw_only=True)

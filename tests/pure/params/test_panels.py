@@ -29,3 +29,42 @@ def test_conditions_ask_for_values_or_for_what_is_not_0() -> None:
     assert either(fixed, tilted)(sections) and not both(fixed, tilted)(sections)
     sections.tilt.angle = 0.5
     assert both(fixed, tilted)(sections)
+
+
+def variants(changed: str) -> list[SimpleNamespace]:
+    """The defaults, and these with each switch, choice or number of this section set otherwise."""
+    found = [DEFAULTS]
+    for parameter in ALL_SETTINGS[changed].parameters():
+        others: tuple[object, ...] = tuple(name for name, _, _ in parameter.choices)
+        if parameter.kind == "toggle":
+            others = (True, False)
+        if parameter.kind in {"number", "integer"} and parameter.hard_range:
+            others = parameter.hard_range
+        for other in others:
+            sections = SimpleNamespace(**vars(DEFAULTS))
+            values = {**vars(getattr(DEFAULTS, changed)), parameter.name: other}
+            setattr(sections, changed, SimpleNamespace(**values))
+            found.append(sections)
+    return found
+
+
+def test_what_does_not_act_says_why() -> None:
+    sections = [each for section in ALL_SETTINGS for each in variants(section)]
+    idle = set()
+    for section, kind in ALL_SETTINGS.items():
+        for parameter in kind.parameters():
+            condition = parameter.active_when
+            for each in sections:
+                if condition is not None and not condition(each):
+                    assert condition.lack(each), f"{section}.{parameter.name}"
+                    idle.add((section, parameter.name))
+    assert ("children", "clump_size") in idle and ("skin", "softness") in idle and len(idle) > 20
+
+
+def test_what_lacks_is_the_first_that_does() -> None:
+    sections = SimpleNamespace(tilt=SimpleNamespace(mode="free", angle=0.0))
+    fixed, tilted = when("tilt.mode", "fixed", lack="free"), when("tilt.angle", lack="level")
+    assert both(fixed, tilted).lack(sections) == "free"
+    assert either(tilted, fixed).lack(sections) == "level"
+    sections.tilt.mode = "fixed"
+    assert both(fixed, tilted).lack(sections) == "level"
