@@ -11,15 +11,16 @@ from ..blender.colliders import spheres
 from ..blender.colliders.spheres import FittedSpheres, SphereFitSettings
 from ..blender.properties.groups import operator_properties
 from ..blender.properties.properties import settings_of
-from .reports import reporting, waiting
+from .drawing import draw_button
+from .long_work import LongWork, Steps, draw_progress, in_parts
 from .selection import active_mesh, chosen_hair
 
 _MILLIMETRES = 1000.0
 
 
-class HAIRLOOM_OT_fit_spheres(bpy.types.Operator):
+class HAIRLOOM_OT_fit_spheres(LongWork, bpy.types.Operator):
     """Fit spheres to the active mesh, or to the mesh that the active hair grows on. They follow it
-    even if an armature deforms it, and are faster to collide with than a mesh"""
+    even if an armature deforms it, and are faster to collide with than a mesh. Esc cancels"""
 
     bl_idname = "hairloom.fit_spheres"
     bl_label = "Fit Spheres"
@@ -36,20 +37,18 @@ class HAIRLOOM_OT_fit_spheres(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return _has_mesh(cls, context)
+        return cls.is_free() and _has_mesh(cls, context)
 
-    @reporting
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def steps(self, context: bpy.types.Context) -> Steps[None]:
         mesh = _mesh(context)
         assert mesh is not None
-        with waiting(context):
-            fitted = spheres.fit_spheres_to(mesh, context, settings_of(self, SphereFitSettings))
+        fitting = spheres.fit_spheres_to(mesh, context, settings_of(self, SphereFitSettings))
+        fitted = yield from in_parts(fitting)
         for hair in spheres.grown_on(mesh, context.view_layer):
             spheres.use_spheres(hair, fitted.collection)
         if self.replace_mesh:
             mesh.hairloom.collider_shape = "none"
         self._tell(mesh, fitted)
-        return {"FINISHED"}
 
     def _tell(self, mesh: bpy.types.Object, fitted: FittedSpheres) -> None:
         error, count = fitted.fit.error, len(fitted.fit.radii)
@@ -104,8 +103,10 @@ def draw_colliders(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
     solid = hair.hairloom.collider or (head_of(hair) if hair.type == "CURVES" else None)
     if solid is not None:
         column.prop(solid.hairloom, "collider_shape", text=f"{solid.name} As")
+    if draw_progress(layout, HAIRLOOM_OT_fit_spheres):
+        return
     row = layout.row(align=True)
-    row.operator("hairloom.fit_spheres", icon="META_BALL")
+    draw_button(row, "hairloom.fit_spheres", icon="META_BALL")
     row.operator("hairloom.remove_spheres", text="", icon="X")
 
 

@@ -6,6 +6,7 @@ import bpy
 from bpy.props import StringProperty
 
 from ..blender.base.outcome import report
+from ..blender.base.parts import together
 from ..blender.properties.groups import operator_properties
 from ..blender.properties.properties import settings_of
 from ..blender.scene.drawn_lines import chosen_or_new_lines
@@ -14,8 +15,9 @@ from ..blender.scene.strokes import KIND, SETTING, strokes_of
 from ..blender.sessions.flow import BEFORE_FLOW, comb_flow, take_flow_back
 from ..groom.flow_settings import FlowSettings
 from .drawing import draw_button
+from .long_work import LongWork, Steps, draw_progress, in_parts
 from .operators_start import in_object_mode
-from .reports import reporting, tell, waiting
+from .reports import reporting, tell
 from .selection import chosen_hair, needs_hair
 
 
@@ -65,9 +67,9 @@ class HAIRLOOM_OT_remove_stroke(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class HAIRLOOM_OT_comb_flow(bpy.types.Operator):
+class HAIRLOOM_OT_comb_flow(LongWork, bpy.types.Operator):
     """Comb the selected hair along its strokes, from their first points to their last. Pressed
-    again, it begins from the shape before"""
+    again, it begins from the shape before. Esc cancels"""
 
     bl_idname = "hairloom.comb_flow"
     bl_label = "Comb Along Flow"
@@ -77,21 +79,19 @@ class HAIRLOOM_OT_comb_flow(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if not (in_object_mode(cls, context) and needs_hair(cls, context)):
+        if not (cls.is_free() and in_object_mode(cls, context) and needs_hair(cls, context)):
             return False
         if any(map(strokes_of, chosen_hair(context))):
             return True
         cls.poll_message_set("The selected hair has no strokes: press Add Stroke first")
         return False
 
-    @reporting
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        settings = settings_of(self, FlowSettings)
-        with waiting(context):
-            for hair in filter(strokes_of, chosen_hair(context)):
-                depsgraph = context.evaluated_depsgraph_get()
-                tell(self, comb_flow(hair, depsgraph, settings))
-        return {"FINISHED"}
+    def steps(self, context: bpy.types.Context) -> Steps[None]:
+        settings, depsgraph = settings_of(self, FlowSettings), context.evaluated_depsgraph_get()
+        grooms = filter(strokes_of, chosen_hair(context))
+        works = (comb_flow(hair, depsgraph, settings) for hair in grooms)
+        for outcome in (yield from in_parts(together(works))):
+            tell(self, outcome)
 
 
 class HAIRLOOM_OT_take_flow_back(bpy.types.Operator):
@@ -127,6 +127,8 @@ def draw_flow(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
         row.label(text=obj.name, icon="CURVE_PATH")
         row.operator("hairloom.remove_stroke", text="", icon="X").stroke = obj.name
     draw_button(column, "hairloom.add_stroke", icon="CURVE_PATH")
+    if draw_progress(column, HAIRLOOM_OT_comb_flow):
+        return
     row = column.row(align=True)
     draw_button(row, "hairloom.comb_flow", "No Strokes Yet", icon="FORCE_CURVE")
     draw_button(row, "hairloom.take_flow_back", "Not Combed", icon="LOOP_BACK")

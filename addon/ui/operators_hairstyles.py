@@ -27,7 +27,6 @@ from .grow_options import names_of_weights
 from .long_work import LongWork, Progress, Steps, in_parts
 from .operators_start import beginning, in_object_mode
 from .preferences import preferences
-from .reports import reporting, waiting
 from .selection import chosen_hair, ground_mesh
 
 #: pictures: how many side by side, how large, and the width of the page at UI scale 1
@@ -110,7 +109,7 @@ class HAIRLOOM_OT_add_hairstyle(LongWork, bpy.types.Operator):
         return next((obj for obj in objects_in(context.view_layer) if is_bust(obj)), None)
 
 
-class HAIRLOOM_OT_place_landmarks(bpy.types.Operator):
+class HAIRLOOM_OT_place_landmarks(LongWork, bpy.types.Operator):
     """Guess where crown, ears, nose and other landmarks of the selected head are, and mark them by
     objects that can be moved. Hairstyles that are added, or fitted again, go by them"""
 
@@ -120,27 +119,24 @@ class HAIRLOOM_OT_place_landmarks(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if not in_object_mode(cls, context):
+        if not (cls.is_free() and in_object_mode(cls, context)):
             return False
         if ground_mesh(context) is not None:
             return True
         cls.poll_message_set("Select a head")
         return False
 
-    @reporting
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def steps(self, context: bpy.types.Context) -> Steps[None]:
         head = ground_mesh(context)
         assert head is not None, "poll has looked"
-        with waiting(context):
-            depsgraph = context.evaluated_depsgraph_get()
-            made, is_sure = add_landmarks(head, depsgraph, context.collection)
+        adding = add_landmarks(head, context.evaluated_depsgraph_get(), context.collection)
+        made, is_sure = yield from in_parts(adding)
         if is_sure:
             report(self, "INFO", f"{head.name}: placed {len(made)} landmarks it lacked")
         else:
             report(
                 self, "WARNING", f"{head.name}: it is unlike a head: drag all landmarks yourself"
             )
-        return {"FINISHED"}
 
 
 class HAIRLOOM_OT_fit_again(LongWork, bpy.types.Operator):

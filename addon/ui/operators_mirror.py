@@ -4,20 +4,22 @@ from __future__ import annotations
 
 import bpy
 
+from ..blender.base.parts import together
 from ..blender.properties.groups import operator_properties
 from ..blender.properties.properties import settings_of
 from ..blender.sessions.mirroring import mirror_hair
 from ..groom.mirror_settings import MirrorSettings
 from .drawing import draw_button
+from .long_work import LongWork, Steps, draw_progress, in_parts
 from .operators_start import in_object_mode
-from .reports import reporting, tell, waiting
+from .reports import tell
 from .selection import chosen_hair, needs_hair
 
 
-class HAIRLOOM_OT_mirror_hair(bpy.types.Operator):
+class HAIRLOOM_OT_mirror_hair(LongWork, bpy.types.Operator):
     """Mirror the curves of one side of the surface to the other, whose curves they replace. Roots
     go to the surface; widths, colors and other attributes are those of the curves that are
-    mirrored"""
+    mirrored. Esc cancels"""
 
     bl_idname = "hairloom.mirror_hair"
     bl_label = "Mirror Hair"
@@ -27,19 +29,19 @@ class HAIRLOOM_OT_mirror_hair(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return in_object_mode(cls, context) and needs_hair(cls, context)
+        return cls.is_free() and in_object_mode(cls, context) and needs_hair(cls, context)
 
-    @reporting
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        settings = settings_of(self, MirrorSettings)
-        with waiting(context):
-            for hair in chosen_hair(context):
-                tell(self, mirror_hair(hair, context.evaluated_depsgraph_get(), settings))
-        return {"FINISHED"}
+    def steps(self, context: bpy.types.Context) -> Steps[None]:
+        settings, depsgraph = settings_of(self, MirrorSettings), context.evaluated_depsgraph_get()
+        works = (mirror_hair(hair, depsgraph, settings) for hair in chosen_hair(context))
+        for outcome in (yield from in_parts(together(works))):
+            tell(self, outcome)
 
 
 def draw_mirror(layout: bpy.types.UILayout) -> None:
     """Draw a button for each side."""
+    if draw_progress(layout, HAIRLOOM_OT_mirror_hair):
+        return
     row = layout.row(align=True)
     for side, text, icon in (
         ("positive", "Mirror +X to -X", "TRIA_LEFT"),

@@ -6,6 +6,7 @@ import bpy
 from bpy.props import StringProperty
 
 from ..blender.base.outcome import report
+from ..blender.base.parts import together
 from ..blender.properties.groups import operator_properties
 from ..blender.properties.properties import settings_of
 from ..blender.scene import partings
@@ -13,8 +14,9 @@ from ..blender.scene.drawn_lines import chosen_or_new_lines
 from ..blender.sessions.parting import comb_parting
 from ..groom.parting_settings import PartingSettings
 from .drawing import draw_button
+from .long_work import LongWork, Steps, draw_progress, in_parts
 from .operators_start import in_object_mode
-from .reports import reporting, tell, waiting
+from .reports import reporting, tell
 from .selection import chosen_hair, needs_hair
 
 
@@ -61,8 +63,8 @@ class HAIRLOOM_OT_remove_parting(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class HAIRLOOM_OT_comb_parting(bpy.types.Operator):
-    """Comb the roots of the selected hair away from its partings, to both sides"""
+class HAIRLOOM_OT_comb_parting(LongWork, bpy.types.Operator):
+    """Comb the roots of the selected hair away from its partings, to both sides. Esc cancels"""
 
     bl_idname = "hairloom.comb_parting"
     bl_label = "Comb from Partings"
@@ -72,21 +74,19 @@ class HAIRLOOM_OT_comb_parting(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if not (in_object_mode(cls, context) and needs_hair(cls, context)):
+        if not (cls.is_free() and in_object_mode(cls, context) and needs_hair(cls, context)):
             return False
         if any(map(partings.partings_of, chosen_hair(context))):
             return True
         cls.poll_message_set("The selected hair has no partings: press Add Parting first")
         return False
 
-    @reporting
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        settings = settings_of(self, PartingSettings)
-        with waiting(context):
-            for hair in filter(partings.partings_of, chosen_hair(context)):
-                depsgraph = context.evaluated_depsgraph_get()
-                tell(self, comb_parting(hair, depsgraph, settings))
-        return {"FINISHED"}
+    def steps(self, context: bpy.types.Context) -> Steps[None]:
+        settings, depsgraph = settings_of(self, PartingSettings), context.evaluated_depsgraph_get()
+        grooms = filter(partings.partings_of, chosen_hair(context))
+        works = (comb_parting(hair, depsgraph, settings) for hair in grooms)
+        for outcome in (yield from in_parts(together(works))):
+            tell(self, outcome)
 
 
 def draw_partings(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
@@ -98,7 +98,8 @@ def draw_partings(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
         row.label(text=obj.name, icon="CURVE_DATA")
         row.operator("hairloom.remove_parting", text="", icon="X").line = obj.name
     draw_button(column, "hairloom.add_parting", icon="CURVE_DATA")
-    draw_button(column, "hairloom.comb_parting", "No Partings Yet", icon="ARROW_LEFTRIGHT")
+    if not draw_progress(column, HAIRLOOM_OT_comb_parting):
+        draw_button(column, "hairloom.comb_parting", "No Partings Yet", icon="ARROW_LEFTRIGHT")
 
 
 CLASSES = (HAIRLOOM_OT_add_parting, HAIRLOOM_OT_remove_parting, HAIRLOOM_OT_comb_parting)

@@ -11,6 +11,7 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty
 
 from ..blender.base.outcome import report
+from ..blender.base.parts import at_once
 from ..blender.preview import previews
 from ..blender.scene.bust_skin import TONES
 from ..blender.scene.particle_hair import convert_particle_hair, hair_systems
@@ -21,7 +22,7 @@ from .grow_options import GROW_PROPERTIES, draw_where_settings_are
 from .long_work import LongWork, Progress, Steps, in_parts
 from .operators_preview import start_preview
 from .preferences import NEW_GROOM, chosen_presets, preferences
-from .reports import reporting, waiting
+from .reports import reporting
 from .selection import active_mesh, chosen_hair, ground_mesh, make_active, needs_hair
 
 _NO_MESH = "Select the mesh to grow hair on, or add a sample: Add > Curve > Hairloom Sample Scene"
@@ -114,45 +115,48 @@ class HAIRLOOM_OT_sample_scene(LongWork, bpy.types.Operator):
                 bpy.ops.screen.animation_play()
 
 
-class HAIRLOOM_OT_use_groom(bpy.types.Operator):
+class HAIRLOOM_OT_use_groom(LongWork, bpy.types.Operator):
     """Preview the selected hair with Hairloom. Turns off Blender's Hair Dynamics, grows hair if
-    there are no curves, and adds a look if there is none"""
+    there are no curves, and adds a look if there is none. Esc cancels"""
 
     bl_idname = "hairloom.use_groom"
     bl_label = "Use Hairloom"
     bl_options = {"REGISTER", "UNDO"}
+    unharmed = "hair that was done by then stays so"
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if not in_object_mode(cls, context):
+        if not (cls.is_free() and in_object_mode(cls, context)):
             return False
         if any(previews.session_of(hair) is None for hair in chosen_hair(context)):
             return True
         cls.poll_message_set("Select hair curves that Hairloom does not preview yet")
         return False
 
-    @reporting
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        chosen, taken = preferences(context), []
-        with waiting(context):
-            for hair in chosen_hair(context):
-                name, depsgraph = hair.name, context.evaluated_depsgraph_get()
-                try:
-                    ready, done = take_over(hair, depsgraph, chosen_presets(chosen))
-                except HairloomError as error:  # the others are taken all the same
-                    report(self, "ERROR", error)
-                    continue
-                for one in done:
-                    report(self, "INFO", f"{name}: {one}")
-                taken.append(ready)
-            if taken:
-                begin(self, context, taken, plays=chosen.plays)
-        return {"FINISHED"} if taken else {"CANCELLED"}
+    def steps(self, context: bpy.types.Context) -> Steps[None]:
+        chosen, taken, problems = preferences(context), [], []
+        for hair in chosen_hair(context):
+            yield Progress("Reading the hair")
+            name, depsgraph = hair.name, context.evaluated_depsgraph_get()
+            taking = take_over(hair, depsgraph, chosen_presets(chosen))
+            try:
+                ready, done = yield from in_parts(taking)
+            except HairloomError as error:  # the others are taken all the same
+                problems.append(error)
+                continue
+            for one in done:
+                report(self, "INFO", f"{name}: {one}")
+            taken.append(ready)
+        for problem in problems[not taken :]:
+            report(self, "ERROR", problem)
+        if not taken:
+            raise problems[0]
+        yield from beginning(self, context, taken, plays=chosen.plays)
 
 
-class HAIRLOOM_OT_convert_particles(bpy.types.Operator):
+class HAIRLOOM_OT_convert_particles(LongWork, bpy.types.Operator):
     """Convert the particle hair of the active mesh to hair curves attached to it, and preview them.
-    The particles are hidden, not deleted"""
+    The particles are hidden, not deleted. Esc cancels"""
 
     bl_idname = "hairloom.convert_particles"
     bl_label = "Convert Particle Hair"
@@ -160,7 +164,7 @@ class HAIRLOOM_OT_convert_particles(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if not in_object_mode(cls, context):
+        if not (cls.is_free() and in_object_mode(cls, context)):
             return False
         mesh = active_mesh(context)
         if mesh is not None and hair_systems(mesh):
@@ -168,20 +172,18 @@ class HAIRLOOM_OT_convert_particles(bpy.types.Operator):
         cls.poll_message_set("The active mesh has no particle hair")
         return False
 
-    @reporting
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def steps(self, context: bpy.types.Context) -> Steps[None]:
         chosen, mesh = preferences(context), active_mesh(context)
         assert mesh is not None, "poll has looked"
-        with waiting(context):
-            made = convert_particle_hair(context, mesh)
-            for hair in made:
-                depsgraph = context.evaluated_depsgraph_get()
-                _, done = take_over(hair, depsgraph, chosen_presets(chosen))
-                for one in done:
-                    report(self, "INFO", f"{hair.name}: {one}")
-            begin(self, context, made, plays=chosen.plays)
+        yield Progress("Reading the particles")
+        made = yield from in_parts(convert_particle_hair(context, mesh))
+        for hair in made:
+            depsgraph = context.evaluated_depsgraph_get()
+            _, done = at_once(take_over(hair, depsgraph, chosen_presets(chosen)))
+            for one in done:
+                report(self, "INFO", f"{hair.name}: {one}")
         report(self, "INFO", f"{mesh.name}: its particle hair is hidden, curves took its place")
-        return {"FINISHED"}
+        yield from beginning(self, context, made, plays=chosen.plays)
 
 
 class HAIRLOOM_OT_show_settings(bpy.types.Operator):

@@ -6,46 +6,48 @@ import bpy
 from bpy.props import StringProperty
 
 from ..blender.base.outcome import report
+from ..blender.base.parts import together
 from ..blender.scene.own_collections import put_into, take_out
 from ..blender.scene.trim_shapes import KIND, SETTING, may_trim, read_shape, trim_shapes_of
 from ..blender.sessions.trimming import BEFORE_TRIM, take_trim_back, trim_to_shapes
 from .drawing import draw_button
+from .long_work import LongWork, Steps, draw_progress, in_parts
 from .operators_start import in_object_mode
-from .reports import reporting, tell, waiting
+from .reports import reporting, tell
 from .selection import chosen_hair, needs_hair
 
 
-class HAIRLOOM_OT_trim_to_shape(bpy.types.Operator):
+class HAIRLOOM_OT_trim_to_shape(LongWork, bpy.types.Operator):
     """Cut the selected hair where it leaves a closed mesh, or passes a plane: an Empty (across its
     Z axis) or a flat mesh. Meshes and Empties that are selected beside the hair become its shapes.
-    Pressed again, it begins from the lengths before"""
+    Pressed again, it begins from the lengths before. Esc cancels"""
 
     bl_idname = "hairloom.trim_to_shape"
     bl_label = "Trim to Shape"
     bl_options = {"REGISTER", "UNDO"}
+    unharmed = "the hair is as long as before"
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if not (in_object_mode(cls, context) and needs_hair(cls, context)):
+        if not (cls.is_free() and in_object_mode(cls, context) and needs_hair(cls, context)):
             return False
         if any(trim_shapes_of(hair) or _chosen(hair, context) for hair in chosen_hair(context)):
             return True
         cls.poll_message_set("Select a closed mesh, a flat mesh or an Empty beside the hair")
         return False
 
-    @reporting
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        depsgraph = context.evaluated_depsgraph_get()
-        with waiting(context):
-            for hair in chosen_hair(context):
-                chosen = _chosen(hair, context)
-                for obj in chosen:
-                    read_shape(obj, depsgraph)
-                if chosen:
-                    put_into(hair, SETTING, KIND, chosen, context.scene)
-                if trim_shapes_of(hair):
-                    tell(self, trim_to_shapes(hair, depsgraph))
-        return {"FINISHED"}
+    def steps(self, context: bpy.types.Context) -> Steps[None]:
+        depsgraph, works = context.evaluated_depsgraph_get(), []
+        for hair in chosen_hair(context):
+            chosen = _chosen(hair, context)
+            for obj in chosen:
+                read_shape(obj, depsgraph)
+            if chosen:
+                put_into(hair, SETTING, KIND, chosen, context.scene)
+            if trim_shapes_of(hair):
+                works.append(trim_to_shapes(hair, depsgraph))
+        for outcome in (yield from in_parts(together(works))):
+            tell(self, outcome)
 
 
 class HAIRLOOM_OT_remove_trim_shape(bpy.types.Operator):
@@ -111,6 +113,8 @@ def draw_trim(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
         row = column.row(align=True)
         row.label(text=obj.name, icon="EMPTY_AXIS" if obj.type == "EMPTY" else "MESH_DATA")
         row.operator("hairloom.remove_trim_shape", text="", icon="X").shape = obj.name
+    if draw_progress(column, HAIRLOOM_OT_trim_to_shape):
+        return
     row = column.row(align=True)
     draw_button(row, "hairloom.trim_to_shape", "Select a Shape", icon="MOD_BOOLEAN")
     draw_button(row, "hairloom.take_trim_back", "Not Trimmed", icon="LOOP_BACK")

@@ -14,8 +14,17 @@ from .drawing import Draw, draw_button, draw_overlays
 from .help import draw_help
 from .long_work import draw_progress
 from .operators_adopted import draw_sort
-from .operators_hairstyles import HAIRLOOM_OT_add_hairstyle, HAIRLOOM_OT_fit_again
-from .operators_start import HAIRLOOM_OT_add_groom, HAIRLOOM_OT_sample_scene
+from .operators_hairstyles import (
+    HAIRLOOM_OT_add_hairstyle,
+    HAIRLOOM_OT_fit_again,
+    HAIRLOOM_OT_place_landmarks,
+)
+from .operators_start import (
+    HAIRLOOM_OT_add_groom,
+    HAIRLOOM_OT_convert_particles,
+    HAIRLOOM_OT_sample_scene,
+    HAIRLOOM_OT_use_groom,
+)
 from .sections import SECTIONS, SESSION_SECTIONS, SUB_SECTIONS, SWITCHES
 from .selection import active_mesh, chosen_hair
 from .state import NAMES, draw_notice, draw_problems_row, draw_state
@@ -53,10 +62,12 @@ def draw_preview(layout: bpy.types.UILayout, context: bpy.types.Context) -> None
     draw_state(layout, session)
     draw_problems_row(layout, hair, session)
     idle = "Uses Hairloom" if session is not None else ""
-    draw_button(layout, "hairloom.use_groom", idle, icon="OUTLINER_OB_CURVES")
+    if not draw_progress(layout, HAIRLOOM_OT_use_groom):
+        draw_button(layout, "hairloom.use_groom", idle, icon="OUTLINER_OB_CURVES")
     if hair.hairloom.hairstyle:
         row = layout.row(align=True)
-        draw_button(row, "hairloom.place_landmarks", text="Landmarks", icon="EMPTY_AXIS")
+        if not draw_progress(row, HAIRLOOM_OT_place_landmarks):
+            draw_button(row, "hairloom.place_landmarks", text="Landmarks", icon="EMPTY_AXIS")
         if not draw_progress(row, HAIRLOOM_OT_fit_again):
             draw_button(row, "hairloom.fit_again", icon="FILE_REFRESH")
     parts = layout.split(factor=NAMES)
@@ -77,9 +88,11 @@ def draw_start(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     if not draw_progress(column, HAIRLOOM_OT_add_hairstyle):
         column.operator("hairloom.choose_hairstyle", icon="USER")
     mesh = active_mesh(context)
-    if mesh is not None and may_be_head(mesh):
+    is_head = mesh is not None and may_be_head(mesh)
+    if is_head and not draw_progress(column, HAIRLOOM_OT_place_landmarks):
         column.operator("hairloom.place_landmarks", icon="EMPTY_AXIS")
-    if mesh is not None and hair_systems(mesh):
+    has_particles = mesh is not None and hair_systems(mesh)
+    if has_particles and not draw_progress(column, HAIRLOOM_OT_convert_particles):
         column.operator("hairloom.convert_particles", icon="PARTICLES")
     if not draw_progress(column, HAIRLOOM_OT_sample_scene):
         column.operator("hairloom.sample_scene", text="Sample Scene", icon="SCENE_DATA")

@@ -214,7 +214,7 @@ def test_modifiers_that_add_and_take_vertices_do_not_hide_the_topology() -> None
 @pytest.mark.slow(instead="test_the_button_adds_to_the_selected_head_and_one_undo_takes_it_away")
 def test_landmarks_are_guessed_where_they_are_on_another_person() -> None:
     head = scan()
-    made, is_sure = add_landmarks(head, depsgraph(), bpy.context.collection)
+    made, is_sure = at_once(add_landmarks(head, depsgraph(), bpy.context.collection))
     assert is_sure and len(made) == len(LANDMARKS) and all(obj.parent == head for obj in made)
     depsgraph()
     for name, obj in landmarks_of(head).items():
@@ -223,7 +223,7 @@ def test_landmarks_are_guessed_where_they_are_on_another_person() -> None:
         assert gap < 0.009, name
     # others are not added again, and one that was deleted is
     bpy.data.objects.remove(landmarks_of(head)["nose"])
-    again, _ = add_landmarks(head, depsgraph(), bpy.context.collection)
+    again, _ = at_once(add_landmarks(head, depsgraph(), bpy.context.collection))
     assert [obj.hairloom.landmark for obj in again] == ["nose"]
 
 
@@ -342,7 +342,7 @@ def test_every_second_face_missing_is_reported() -> None:
 @pytest.mark.slow(instead="test_half_a_head_is_refused")
 def test_landmarks_on_top_of_each_other_or_mistaken_are_refused() -> None:
     head = scan()
-    add_landmarks(head, depsgraph(), bpy.context.collection)
+    at_once(add_landmarks(head, depsgraph(), bpy.context.collection))
     depsgraph()
     marks = landmarks_of(head)
     place = marks["crown"].location.copy()

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from grids import grid_of
 
+from hairloom.addon.blender.base.parts import at_once
 from hairloom.addon.blender.preview import previews, scene_events
 from hairloom.addon.blender.properties.presets import named_preset
 from hairloom.addon.blender.scene import particle_hair
@@ -267,7 +268,9 @@ def with_principled_hair(hair):
 def test_hair_that_nobody_dressed_has_the_look_of_its_material(new_hair, sphere, evaluated):
     hair = new_hair(sphere)
     with_principled_hair(hair)
-    _, done = starting.take_over(hair, evaluated(), chosen_presets(preferences(bpy.context)))
+    _, done = at_once(
+        starting.take_over(hair, evaluated(), chosen_presets(preferences(bpy.context)))
+    )
     assert done == ("took its look from the material 'Auburn'",)
     shading = hair.data.hairloom.shading
     assert (shading.model, shading.color_source) == ("marschner", "own")
@@ -278,14 +281,16 @@ def test_a_look_that_was_set_stays_whatever_the_material(new_hair, sphere, evalu
     hair = new_hair(sphere)
     with_principled_hair(hair)
     hair.data.hairloom.shading.tip_tint = 0.5
-    _, done = starting.take_over(hair, evaluated(), chosen_presets(preferences(bpy.context)))
+    _, done = at_once(
+        starting.take_over(hair, evaluated(), chosen_presets(preferences(bpy.context)))
+    )
     shading = hair.data.hairloom.shading
     assert done == () and shading.base_color[:] == pytest.approx(ShadingSettings().base_color)
 
 
 def test_hair_with_colours_of_its_own_keeps_them_as_it_is_dressed(new_hair, sphere, evaluated):
     hair = new_hair(sphere)
-    starting.take_over(hair, evaluated(), chosen_presets(preferences(bpy.context)))
+    at_once(starting.take_over(hair, evaluated(), chosen_presets(preferences(bpy.context))))
     assert hair.data.hairloom.shading.color_source == "own"
     bpy.ops.hairloom.apply_preset(name="looks/blond")
     assert hair.data.hairloom.shading.color_source == "look", "a look that was chosen is seen"

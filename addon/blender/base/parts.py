@@ -9,7 +9,7 @@ has made, and writes it into the scene. Who calls it decides where the parts are
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import contextmanager
 from functools import partial
 from typing import Any, NamedTuple
@@ -40,6 +40,22 @@ def at_once[Result](parts: Parts[Result]) -> Result:
             step = partial(parts.send, part.work())
         except Exception as error:
             step = partial(parts.throw, error)
+
+
+def together[Result](works: Iterable[Parts[Result]]) -> Parts[list[Result]]:
+    """Works of one part each, such as one for each hair: all that may fail or be cancelled is done
+    before any of them writes."""
+    begun, results = [], list[Result]()
+    for work in works:
+        begun.append((work, (yield next(work))))
+    for work, made in begun:
+        try:
+            work.send(made)
+        except StopIteration as end:
+            results.append(end.value)
+        else:
+            raise AssertionError("it has more than one part")
+    return results
 
 
 @contextmanager

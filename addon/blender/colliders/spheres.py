@@ -8,6 +8,7 @@ be parents, the object is.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import bpy
 import numpy as np
@@ -17,6 +18,7 @@ from ...arrays import Floats, Ints
 from ...dynamics.fitting.settings import SphereFitSettings
 from ...dynamics.fitting.sphere_fit import SphereFit, fit_spheres
 from ..base.objects import head_of, objects_in
+from ..base.parts import Part, Parts
 from ..scene.surfaces import read_positions, read_surface
 
 __all__ = [
@@ -50,7 +52,7 @@ def fit_spheres_to(
     mesh: bpy.types.Object,
     context: bpy.types.Context,
     settings: SphereFitSettings,
-) -> FittedSpheres:
+) -> Parts[FittedSpheres]:
     """Replace the spheres of this mesh, fitted to its present pose.
 
     Raises:
@@ -58,7 +60,7 @@ def fit_spheres_to(
     """
     depsgraph = context.evaluated_depsgraph_get()
     surface = read_surface(mesh, depsgraph, need_uv=False, place=mesh.name)
-    fit = fit_spheres(surface, settings, place=mesh.name)
+    fit = yield Part("Fitting spheres", partial(fit_spheres, surface, settings, place=mesh.name))
     carrying = _vertices_now(mesh, depsgraph)
     collection = _emptied_collection(mesh, context.scene)
     empties = []

@@ -6,11 +6,14 @@ Blender's own conversion copies positions only: no surface, no parent, no root U
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import bpy
 
 from ...errors import HairloomError
 from ...groom.roots import bind_roots
+from ...strands import StrandSet, Surface
+from ..base.parts import Part, Parts
 from .curves import read_curves, write_curves
 from .surfaces import read_surface
 
@@ -22,28 +25,30 @@ def hair_systems(mesh: bpy.types.Object) -> list[bpy.types.ParticleSystem]:
 
 def convert_particle_hair(
     context: bpy.types.Context, mesh: bpy.types.Object
-) -> list[bpy.types.Object]:
+) -> Parts[list[bpy.types.Object]]:
     """Hair curves that replace a mesh's particle hair, which is hidden, not deleted.
 
     Raises:
         HairloomError: it has no particle hair, or none that Blender can convert.
     """
-    systems, made = hair_systems(mesh), []
-    for system in systems:
-        mesh.particle_systems.active_index = list(mesh.particle_systems).index(system)
-        name = f"{mesh.name} {system.name}"
-        with context.temp_override(object=mesh, active_object=mesh):
-            bpy.ops.curves.convert_from_particle_system()
-        converted = context.view_layer.objects.active
-        if converted is mesh or converted is None or converted.type != "CURVES":
-            continue
-        made.append(_on_its_mesh(context, converted, mesh, name))
+    read = []
+    for name in [system.name for system in hair_systems(mesh)]:
+        found = _read(context, mesh, name)
+        if found is not None:
+            strands, surface, collection = found
+            place = f"{mesh.name} {name}"
+            work = partial(bind_roots, strands, surface, place=place)
+            bound = yield Part(f"Converting {strands.strand_count:,} strands", work)
+            read.append((name, place, bound.strands, collection))
+    made = []
+    for name, place, strands, collection in read:
+        system = mesh.particle_systems[name]
+        made.append(write_curves(place, strands, mesh, collection))
         slot = system.settings.material - 1  # counted from 1, even where the mesh has none
         if slot < len(mesh.material_slots):
             made[-1].data.materials.append(mesh.material_slots[slot].material)
         modifier = next(m for m in mesh.modifiers if getattr(m, "particle_system", None) == system)
         modifier.show_viewport = modifier.show_render = False
-        context.view_layer.objects.active = mesh
     if not made:
         raise HairloomError(
             "it has no particle hair that can be converted",
@@ -53,18 +58,22 @@ def convert_particle_hair(
     return made
 
 
-def _on_its_mesh(
-    context: bpy.types.Context,
-    converted: bpy.types.Object,
-    mesh: bpy.types.Object,
-    name: str,
-) -> bpy.types.Object:
-    """The same strands, attached to the mesh; the object that Blender made is removed."""
+def _read(
+    context: bpy.types.Context, mesh: bpy.types.Object, name: str
+) -> tuple[StrandSet, Surface, bpy.types.Collection] | None:
+    """The strands of a particle system, as Blender converts them, what they grow on, and where
+    Blender puts them; the object that it makes is removed. None where it makes none."""
+    mesh.particle_systems.active_index = mesh.particle_systems.find(name)
+    with context.temp_override(object=mesh, active_object=mesh):
+        bpy.ops.curves.convert_from_particle_system()
+    converted = context.view_layer.objects.active
+    if converted is mesh or converted is None or converted.type != "CURVES":
+        return None
     depsgraph = context.evaluated_depsgraph_get()
-    strands = read_curves(converted, depsgraph).strands
+    strands = replace(read_curves(converted, depsgraph).strands, root_uv=None)
     surface = read_surface(mesh, depsgraph, need_uv=False, place=mesh.name)
-    bound = bind_roots(replace(strands, root_uv=None), surface, place=name).strands
     collection, curves = converted.users_collection[0], converted.data
     bpy.data.objects.remove(converted)
     bpy.data.hair_curves.remove(curves)
-    return write_curves(name, bound, mesh, collection)
+    context.view_layer.objects.active = mesh
+    return strands, surface, collection

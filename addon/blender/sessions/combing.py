@@ -14,8 +14,10 @@ from ...groom.roots import bind_roots
 from ...refine.lead_out_at_rest import led_out_at_rest
 from ...strands import StrandSet, Surface
 from ..base.objects import head_of
+from ..base.parts import Part, Parts
 from ..colliders.fields import solid_of
 from ..scene.curves import read_own_curves, write_own_curves
+from ..scene.kept_shape import KeptShape
 from ..scene.surfaces import read_surface
 
 
@@ -61,26 +63,39 @@ def comb(
     depsgraph: bpy.types.Depsgraph,
     points_of: Callable[[StrandSet], Floats],
     begin: Floats | None = None,
-) -> Combed:
+    *,
+    kept_as: KeptShape | None = None,
+) -> Parts[Combed]:
     """Give the hair's curves other points; those that change are led out of the surface.
 
     Args:
         points_of: strands that are bound to the surface, world space -> their points.
         begin: (point_count, 3) object space, the points to begin with; None: as they are.
+        kept_as: what keeps the shape that they have before.
 
     Raises:
         HairloomError: no curves that can be used.
     """
     own = read_own_curves(hair, depsgraph, begin)
-    bound = bind_roots(own.strands, surface, place=hair.name).strands
-    points = points_of(bound)
-    is_changed = np.zeros(bound.strand_count, bool)
-    other = np.flatnonzero((points != bound.points).any(axis=1))
-    is_changed[np.searchsorted(bound.offsets, other, side="right") - 1] = True
-    changed, solid = np.flatnonzero(is_changed), solid_of(surface)
-    if solid is not None and len(changed):
-        some = replace(bound, points=points.copy()).take(changed)
-        led, _ = led_out_at_rest(some, solid, float(np.median(bound.lengths())))
-        points[np.repeat(is_changed, bound.point_counts)] = led.points
+    place, count = hair.name, own.strands.strand_count
+
+    def work() -> tuple[Floats, int]:
+        bound = bind_roots(own.strands, surface, place=place).strands
+        points = points_of(bound)
+        is_changed = np.zeros(count, bool)
+        other = np.flatnonzero((points != bound.points).any(axis=1))
+        is_changed[np.searchsorted(bound.offsets, other, side="right") - 1] = True
+        changed, solid = np.flatnonzero(is_changed), solid_of(surface)
+        if solid is not None and len(changed):
+            some = replace(bound, points=points.copy()).take(changed)
+            led, _ = led_out_at_rest(some, solid, float(np.median(bound.lengths())))
+            points[np.repeat(is_changed, bound.point_counts)] = led.points
+        return points, len(changed)
+
+    points, changed = yield Part(f"Combing {count:,} curves", work)
+    if kept_as is not None:
+        kept_as.keep(hair)
     write_own_curves(hair, own, points, depsgraph)
-    return Combed(len(changed), bound.strand_count, own.dropped)
+    if kept_as is not None:
+        kept_as.seal(hair)
+    return Combed(changed, count, own.dropped)

@@ -8,6 +8,7 @@ from ...errors import HairloomError
 from ...groom.flow import combed_along
 from ...groom.flow_settings import FlowSettings
 from ..base.outcome import Outcome
+from ..base.parts import Parts
 from ..scene.kept_shape import KeptShape
 from ..scene.strokes import read_strokes
 from .combing import check_own, comb, surface_to_comb_on
@@ -17,7 +18,7 @@ BEFORE_FLOW = KeptShape("hairloom_before_flow", "hairloom_flowed")
 
 def comb_flow(
     hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph, settings: FlowSettings
-) -> Outcome:
+) -> Parts[Outcome]:
     """Let the curves of this hair follow its strokes, before their modifiers. Hair that nothing
     else has changed since it was combed so begins again from its shape before.
 
@@ -34,16 +35,14 @@ def comb_flow(
             place=hair.name,
             remedy="Draw a curve on the surface and press Add Stroke",
         )
-    before = BEFORE_FLOW.before(hair)
-    BEFORE_FLOW.keep(hair)
-    done = comb(
+    done = yield from comb(
         hair,
         surface,
         depsgraph,
         lambda bound: combed_along(bound, lines, surface, settings),
-        before,
+        BEFORE_FLOW.before(hair),
+        kept_as=BEFORE_FLOW,
     )
-    BEFORE_FLOW.seal(hair)
     result = f"{hair.name}: {done.changed:,} of {done.all:,} curves follow its strokes"
     return Outcome(result, done.dropped, unusable)
 

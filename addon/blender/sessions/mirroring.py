@@ -15,6 +15,7 @@ from ...strands.affine import moved
 from ..base.attributes import copy_elements, read_attribute, set_attribute
 from ..base.objects import head_of, matrix_of
 from ..base.outcome import Outcome
+from ..base.parts import Part, Parts
 from ..colliders.fields import solid_of
 from ..scene.curves import curve_offsets, curve_points, put_points, read_own_curves
 from ..scene.groom_attributes import CLOSEST_GUIDES, STRAND_ID
@@ -33,7 +34,7 @@ _PLACES = (
 
 def mirror_hair(
     hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph, settings: MirrorSettings
-) -> Outcome:
+) -> Parts[Outcome]:
     """Replace the curves of one side by those of the other, before their modifiers. Curves in the
     middle stay.
 
@@ -55,7 +56,10 @@ def mirror_hair(
         )
     source = np.flatnonzero(side > 0)
     across = reflection(frame, settings.axis)
-    made = _led_out(mirrored(own.strands.take(source), surface, across), surface)
+    made = yield Part(
+        f"Mirroring {len(source):,} curves",
+        lambda: _led_out(mirrored(own.strands.take(source), surface, across), surface),
+    )
     replaced = own.kept[side < 0]
     hair_frame = matrix_of(hair, depsgraph)
     to_own = np.linalg.inv(hair_frame)

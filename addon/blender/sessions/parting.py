@@ -8,13 +8,14 @@ from ...errors import HairloomError
 from ...groom.parting_settings import PartingSettings
 from ...groom.partings import Partings, combed_away
 from ..base.outcome import Outcome
+from ..base.parts import Parts
 from ..scene.partings import read_partings
 from .combing import comb, surface_to_comb_on
 
 
 def comb_parting(
     hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph, settings: PartingSettings
-) -> Outcome:
+) -> Parts[Outcome]:
     """Let the curves of this hair lean away from its partings, before their modifiers.
 
     Raises:
@@ -31,7 +32,7 @@ def comb_parting(
             remedy="Draw a curve on the surface and press Add Parting",
         )
     partings = Partings.of(lines, surface)
-    done = comb(
+    done = yield from comb(
         hair, surface, depsgraph, lambda bound: combed_away(bound, partings, surface, settings)
     )
     result = f"{hair.name}: {done.changed:,} of {done.all:,} curves lean from its partings"

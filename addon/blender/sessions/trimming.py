@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import bpy
 
 from ...errors import HairloomError
 from ...groom.trim import trimmed
 from ..base.outcome import Outcome
+from ..base.parts import Part, Parts
 from ..scene.curves import read_own_curves, write_own_curves
 from ..scene.kept_shape import KeptShape
 from ..scene.trim_shapes import read_shapes, trim_shapes_of
@@ -15,7 +18,7 @@ from .combing import check_own
 BEFORE_TRIM = KeptShape("hairloom_before_trim", "hairloom_trimmed")
 
 
-def trim_to_shapes(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Outcome:
+def trim_to_shapes(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Parts[Outcome]:
     """End the curves of this hair where they leave its trim shapes, before their modifiers. Hair
     that nothing else has changed since it was trimmed begins again from its shape before.
 
@@ -32,7 +35,8 @@ def trim_to_shapes(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Ou
             remedy="Select a closed mesh, a flat one or an Empty beside the hair",
         )
     own = read_own_curves(hair, depsgraph, BEFORE_TRIM.before(hair))
-    cut = trimmed(own.strands, shapes)
+    title = f"Trimming {own.strands.strand_count:,} curves"
+    cut = yield Part(title, partial(trimmed, own.strands, shapes))
     BEFORE_TRIM.keep(hair)
     write_own_curves(hair, own, cut.points, depsgraph)
     BEFORE_TRIM.seal(hair)

@@ -23,6 +23,7 @@ from ...groom.head_fit import (
 )
 from ...strands import StrandSet, Surface
 from ...strands.rooted_shapes import RootedShapes
+from ..base.parts import Part, Parts
 from ..scene.built_in_head import built_in_head
 from ..scene.bust_data import SKIN, load_bust
 from ..scene.surfaces import read_positions, read_surface
@@ -273,7 +274,7 @@ def landmarks_of(head: bpy.types.Object) -> dict[str, bpy.types.Object]:
 
 def add_landmarks(
     head: bpy.types.Object, depsgraph: bpy.types.Depsgraph, collection: bpy.types.Collection
-) -> tuple[list[bpy.types.Object], bool]:
+) -> Parts[tuple[list[bpy.types.Object], bool]]:
     """Empties where landmarks may be, for those that a head lacks; and whether the mesh is like a
     head, so that the guess may be good.
 
@@ -281,7 +282,9 @@ def add_landmarks(
         HairloomError: it has no faces.
     """
     surface = read_surface(head, depsgraph, need_uv=False, place=head.name)
-    guess, is_sure = guess_landmarks(fit_model(), surface)
+    guess, is_sure = yield Part(
+        "Looking for landmarks", lambda: guess_landmarks(fit_model(), surface)
+    )
     return put_landmarks(head, guess, collection), is_sure
 
 

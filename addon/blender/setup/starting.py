@@ -12,7 +12,7 @@ from ...errors import HairloomError
 from ...groom.settings import GrowSettings
 from ...shading.settings import ShadingSettings
 from ..base.objects import head_of
-from ..base.parts import Parts, at_once
+from ..base.parts import Parts
 from ..properties.presets import apply, named_preset
 from ..properties.properties import settings_of
 from ..scene.curves import read_curves
@@ -123,7 +123,7 @@ def dress(hair: bpy.types.Object, presets: tuple[str, ...]) -> None:
 
 def take_over(
     hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph, presets: tuple[str, ...]
-) -> tuple[bpy.types.Object, tuple[str, ...]]:
+) -> Parts[tuple[bpy.types.Object, tuple[str, ...]]]:
     """Prepare Blender's hair curves for Hairloom; returns the groom, and what was done.
 
     Blender's Hair Dynamics is muted. Empty hair is replaced by a groom that is grown.
@@ -136,7 +136,7 @@ def take_over(
     """
     done, factor = [], 1.0
     if not len(hair.data.curves) and not read_curves(hair, depsgraph).strands.strand_count:
-        hair, factor = _grown_in_place(hair, depsgraph)
+        hair, factor = yield from _grown_in_place(hair, depsgraph)
         done.append("grew hair, since there was none")
     elif mute_own_dynamics(hair):
         done.append("turned off Blender's Hair Dynamics")
@@ -164,7 +164,7 @@ def is_untouched(hair: bpy.types.Object) -> bool:
 
 def _grown_in_place(
     hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph
-) -> tuple[bpy.types.Object, float]:
+) -> Parts[tuple[bpy.types.Object, float]]:
     """A groom with the name and the collections of empty hair, which it replaces; and how much
     larger than a human head its head is.
     """
@@ -178,7 +178,7 @@ def _grown_in_place(
     factor = fitting_factor(head, depsgraph)
     settings = fitted(GrowSettings(), factor)
     name, collections = hair.name, list(hair.users_collection)
-    grown = at_once(grow_on(head, depsgraph, collections[0], settings))
+    grown = yield from grow_on(head, depsgraph, collections[0], settings)
     for collection in collections[1:]:
         collection.objects.link(grown)
     curves = hair.data

@@ -1,0 +1,136 @@
+"""Trim, Flow, Mirror and their like say what they make, and leave no trace when cancelled.
+
+Each is stopped while its first part is on its way, as Esc does it in the window.
+"""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import bpy
+import numpy as np
+import pytest
+
+from hairloom.addon.blender.base.parts import Part, at_once, together
+from hairloom.addon.blender.scene.curves import curve_points
+from hairloom.addon.ui import (
+    operators_colliders,
+    operators_flow,
+    operators_hairstyles,
+    operators_mirror,
+    operators_partings,
+    operators_start,
+    operators_trim,
+)
+from hairloom.addon.ui.long_work import LongWork
+
+pytestmark = pytest.mark.usefixtures("extension")
+
+
+@pytest.fixture
+def hair(sphere):
+    bpy.ops.hairloom.grow(strand_count=40, length=0.1, cv_count=8)
+    return bpy.context.object
+
+
+def chosen(hair, *others):
+    for obj in bpy.context.selected_objects:
+        obj.select_set(False)
+    for obj in (*others, hair):
+        obj.select_set(True)
+    bpy.context.view_layer.objects.active = hair
+
+
+def with_plane(hair):
+    bpy.ops.object.empty_add()
+    chosen(hair, bpy.context.object)
+
+
+def with_stroke(hair):
+    bpy.ops.hairloom.add_stroke()
+    chosen(hair)
+
+
+def with_parting(hair):
+    bpy.ops.hairloom.add_parting()
+    chosen(hair)
+
+
+JOBS = {
+    "trim": (operators_trim.HAIRLOOM_OT_trim_to_shape, with_plane, "Trimming"),
+    "flow": (operators_flow.HAIRLOOM_OT_comb_flow, with_stroke, "Combing 40 curves"),
+    "parting": (operators_partings.HAIRLOOM_OT_comb_parting, with_parting, "Combing 40 curves"),
+    "mirror": (operators_mirror.HAIRLOOM_OT_mirror_hair, chosen, "Mirroring"),
+    "spheres": (operators_colliders.HAIRLOOM_OT_fit_spheres, chosen, "Fitting spheres"),
+    "landmarks": (
+        operators_hairstyles.HAIRLOOM_OT_place_landmarks,
+        chosen,
+        "Looking for landmarks",
+    ),
+    "take_over": (operators_start.HAIRLOOM_OT_use_groom, chosen, "Reading the hair"),
+}
+
+
+def stand_in(kind):
+    """An operator with its defaults, which steps can be asked of without Blender's own call."""
+    values = {
+        name: own.keywords.get("default")
+        for name, own in getattr(kind, "__annotations__", {}).items()
+        if hasattr(own, "keywords")
+    }
+    said = []
+    return SimpleNamespace(
+        **values,
+        said=said,
+        bl_idname=kind.bl_idname,
+        bl_label=kind.bl_label,
+        report=lambda levels, text: said.append(text),
+    )
+
+
+@pytest.mark.parametrize("job", JOBS)
+def test_it_says_what_it_makes_and_leaves_nothing_when_it_is_cancelled(job, hair):
+    kind, prepare, text = JOBS[job]
+    assert issubclass(kind, LongWork) and kind.poll(bpy.context) is not None
+    prepare(hair)
+    before, objects = curve_points(hair.data).copy(), len(bpy.data.objects)
+    steps = kind.steps(stand_in(kind), bpy.context)
+    assert next(steps).text.startswith(text)
+    steps.close()
+    assert np.array_equal(curve_points(hair.data), before)
+    assert len(bpy.data.objects) == objects
+    assert not hair.data.attributes.get("hairloom_before_flow")
+    assert not hair.data.attributes.get("hairloom_before_trim")
+
+
+def test_of_many_hairs_all_is_made_before_any_is_written():
+    log = []
+
+    def work(name):
+        made = yield Part(name, lambda: log.append(f"made {name}") or name)
+        log.append(f"wrote {made}")
+        return made.upper()
+
+    assert at_once(together([work("a"), work("b")])) == ["A", "B"]
+    assert log == ["made a", "made b", "wrote a", "wrote b"]
+
+
+def test_where_one_of_many_fails_none_is_written():
+    log = []
+
+    def work(name):
+        made = yield Part(name, lambda: 1 // (name != "b"))
+        log.append(made)
+
+    with pytest.raises(ZeroDivisionError):
+        at_once(together([work("a"), work("b")]))
+    assert log == []
+
+
+def test_a_work_of_two_parts_is_none_of_these():
+    def work():
+        yield Part("one", int)
+        yield Part("two", int)
+
+    with pytest.raises(AssertionError, match="more than one part"):
+        at_once(together([work()]))
