@@ -14,12 +14,14 @@ from .blender.command_line.command_line import run
 from .blender.engine import engine, hair_scene
 from .blender.preview import handlers, scene_events
 from .blender.properties import groups, previews
+from .blender.scene import look_materials
 from .blender.strands import growing
 from .ui import (
     engine_panels,
     help,
     long_work,
     menus,
+    object_lists,
     operators_adopted,
     operators_bake,
     operators_card_export,
@@ -83,6 +85,7 @@ CLASSES: tuple[type[Any], ...] = (
     *operators_show.CLASSES,
     *operators_slices.CLASSES,
     *preset_chooser.CLASSES,
+    *object_lists.CLASSES,
     *operators_fix.CLASSES,
     *operators_reports.CLASSES,
     *help.CLASSES,
@@ -141,12 +144,14 @@ def _steps() -> tuple[Step, ...]:
         (previews.register, previews.unregister),
         (operators_preview.register, operators_preview.unregister),
         (preset_chooser.register, preset_chooser.unregister),
+        (object_lists.register, object_lists.unregister),
         (menus.register, menus.unregister),
         (help.register, help.unregister),
         (translations.register, translations.unregister),
         (operators_adopted.register, operators_adopted.unregister),
         (handlers.register, handlers.unregister),
         (growing.register, growing.unregister),
+        (look_materials.register, look_materials.unregister),
         (hair_scene.register, hair_scene.unregister),
         (_register_command, _unregister_command),
     )

@@ -9,6 +9,7 @@ import bpy
 from ..blender.engine import hair_scene
 from ..blender.viewport.overlay import ENGINE
 from .drawing import draw_idle
+from .help import WithHelp
 from .messages import draw_message
 
 #: panels for every engine that does not bring its own
@@ -26,10 +27,11 @@ _FIT = frozenset(
 _served: list[type[Any]] = []
 
 
-class _RenderPanel(bpy.types.Panel):
+class _RenderPanel(WithHelp, bpy.types.Panel):
     bl_space_type = "PROPERTIES"
     bl_region_type = "WINDOW"
     bl_context = "render"
+    helped = "picture"
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -54,6 +56,7 @@ class HAIRLOOM_PT_engine_mesh_shadows(_RenderPanel):
     """Shadows that meshes cast"""
 
     bl_label = "Mesh Shadows"
+    helped = "mesh_shadows"
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw_header(self, context: bpy.types.Context) -> None:
@@ -99,10 +102,11 @@ class HAIRLOOM_PT_engine_film(_RenderPanel):
         layout.prop(render, "film_transparent", text="Transparent")
 
 
-class HAIRLOOM_PT_hair_scene(bpy.types.Panel):
+class HAIRLOOM_PT_hair_scene(WithHelp, bpy.types.Panel):
     """Hair drawn by Hairloom over the pictures of this engine"""
 
     bl_label = "Hairloom Hair"
+    helped = "hair_scene"
     bl_space_type = "PROPERTIES"
     bl_region_type = "WINDOW"
     bl_context = "render"
@@ -131,10 +135,11 @@ class HAIRLOOM_PT_hair_scene(bpy.types.Panel):
             draw_message(layout, context, f"Blender draws the hair. {problem}", "ERROR")
 
 
-class HAIRLOOM_PT_engine_passes(bpy.types.Panel):
+class HAIRLOOM_PT_engine_passes(WithHelp, bpy.types.Panel):
     """Passes rendered besides the image"""
 
     bl_label = "Data"
+    helped = "passes"
     bl_space_type = "PROPERTIES"
     bl_region_type = "WINDOW"
     bl_context = "view_layer"

@@ -67,6 +67,8 @@ PAGES = {
     "export": "user_guide#export-and-import",
     "picture": "engine#samples",
     "mesh_shadows": "engine#shadows-of-meshes-on-meshes",
+    "hair_scene": "engine#hair-over-eevee-and-cycles",
+    "passes": "engine#passes",
     "stage": "user_guide#show-and-export",
 }
 #: part of an operator's name -> a section, or a page; the first that fits counts
@@ -153,6 +155,18 @@ def draw_help(layout: bpy.types.UILayout, section: str) -> None:
     """A question mark, for the header of a panel."""
     button: Any = layout.operator("hairloom.help", text="", icon="QUESTION", emboss=False)
     button.page = page_of(section)
+
+
+class WithHelp:
+    """Base of a panel, before bpy.types.Panel: it has a question mark in its header.
+
+    helped: the section that its page is about.
+    """
+
+    helped = ""
+
+    def draw_header_preset(self: Any, _context: bpy.types.Context) -> None:
+        draw_help(self.layout, self.helped)
 
 
 CLASSES = (HAIRLOOM_OT_help,)

@@ -15,6 +15,7 @@ from ..blender.sessions.measures import table_of
 from ..errors import HairloomError
 from . import long_work
 from .drawing import draw_idle
+from .help import WithHelp
 from .long_work import LongWork, Steps, counted, draw_progress
 from .operators_measure import draw_figures
 from .reports import reporting
@@ -134,7 +135,8 @@ def _draw_state(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
     layout.label(text=text, icon="ERROR" if changed else "BLANK1")
 
 
-class _FinBake:
+class _FinBake(WithHelp):
+    helped = "bake"
     bl_label = "Bake"
     bl_options: ClassVar[set[str]] = {"DEFAULT_CLOSED"}
 

@@ -12,6 +12,7 @@ from ..blender.colliders.spheres import FittedSpheres, SphereFitSettings
 from ..blender.properties.groups import operator_properties
 from ..blender.properties.properties import settings_of
 from .drawing import draw_button
+from .help import WithHelp
 from .long_work import LongWork, Steps, draw_progress, in_parts
 from .selection import active_mesh, chosen_hair
 
@@ -110,10 +111,11 @@ def draw_colliders(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
     row.operator("hairloom.remove_spheres", text="", icon="X")
 
 
-class HAIRLOOM_PT_collider(bpy.types.Panel):
+class HAIRLOOM_PT_collider(WithHelp, bpy.types.Panel):
     """How this object collides with hair that has it among its colliders"""
 
     bl_label = "Hairloom Collider"
+    helped = "collisions"
     bl_space_type = "PROPERTIES"
     bl_region_type = "WINDOW"
     bl_context = "physics"

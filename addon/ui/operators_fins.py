@@ -16,6 +16,7 @@ from ..blender.scene.fin_modifier import (
     remove_modifier,
 )
 from .drawing import draw_button, draw_section
+from .help import WithHelp
 from .messages import draw_message
 from .reports import reporting, waiting
 from .selection import active_mesh
@@ -157,10 +158,11 @@ def draw_switch(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
         layout.prop(obj.hairloom.fin, "enabled", text="")
 
 
-class HAIRLOOM_PT_fin(bpy.types.Panel):
+class HAIRLOOM_PT_fin(WithHelp, bpy.types.Panel):
     """A mesh that moves as cloth"""
 
     bl_label = "Hairloom Cloth"
+    helped = "fin"
     bl_space_type = "PROPERTIES"
     bl_region_type = "WINDOW"
     bl_context = "physics"
@@ -179,10 +181,11 @@ class HAIRLOOM_PT_fin(bpy.types.Panel):
         draw_fin(self.layout, context.object)
 
 
-class HAIRLOOM_PT_sidebar_fin(bpy.types.Panel):
+class HAIRLOOM_PT_sidebar_fin(WithHelp, bpy.types.Panel):
     """A mesh that moves as cloth"""
 
     bl_label = "Cloth"
+    helped = "fin"
     bl_parent_id = "HAIRLOOM_PT_sidebar"
     bl_space_type = "VIEW_3D"
     bl_region_type = "UI"

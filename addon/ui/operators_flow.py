@@ -16,6 +16,7 @@ from ..blender.sessions.flow import BEFORE_FLOW, comb_flow, take_flow_back
 from ..groom.flow_settings import FlowSettings
 from .drawing import draw_button
 from .long_work import LongWork, Steps, draw_progress, in_parts
+from .object_lists import draw_objects
 from .operators_start import in_object_mode
 from .reports import reporting, tell
 from .selection import chosen_hair, needs_hair
@@ -121,11 +122,7 @@ class HAIRLOOM_OT_take_flow_back(bpy.types.Operator):
 def draw_flow(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
     """Draw what the hair is combed along."""
     column = layout.column()
-    column.prop(hair.hairloom, SETTING)
-    for obj in strokes_of(hair):
-        row = column.row(align=True)
-        row.label(text=obj.name, icon="CURVE_PATH")
-        row.operator("hairloom.remove_stroke", text="", icon="X").stroke = obj.name
+    draw_objects(column, hair, SETTING)
     draw_button(column, "hairloom.add_stroke", icon="CURVE_PATH")
     if draw_progress(column, HAIRLOOM_OT_comb_flow):
         return

@@ -15,6 +15,7 @@ from ..blender.sessions.parting import comb_parting
 from ..groom.parting_settings import PartingSettings
 from .drawing import draw_button
 from .long_work import LongWork, Steps, draw_progress, in_parts
+from .object_lists import draw_objects
 from .operators_start import in_object_mode
 from .reports import reporting, tell
 from .selection import chosen_hair, needs_hair
@@ -92,11 +93,7 @@ class HAIRLOOM_OT_comb_parting(LongWork, bpy.types.Operator):
 def draw_partings(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
     """Draw what parts the hair."""
     column = layout.column()
-    column.prop(hair.hairloom, "parting_collection")
-    for obj in partings.partings_of(hair):
-        row = column.row(align=True)
-        row.label(text=obj.name, icon="CURVE_DATA")
-        row.operator("hairloom.remove_parting", text="", icon="X").line = obj.name
+    draw_objects(column, hair, "parting_collection")
     draw_button(column, "hairloom.add_parting", icon="CURVE_DATA")
     if not draw_progress(column, HAIRLOOM_OT_comb_parting):
         draw_button(column, "hairloom.comb_parting", "No Partings Yet", icon="ARROW_LEFTRIGHT")

@@ -21,8 +21,8 @@ from ..blender.properties.presets import (
     save_own,
 )
 from ..blender.properties.properties import settings_of
-from ..blender.scene.hair_material import has_look_material, put_look_material
-from ..blender.scene.painted_colors import colors_of_curves
+from ..blender.scene.hair_material import has_look_material
+from ..blender.scene.look_materials import put_look
 from ..blender.scene.principled import has_principled_hair, look_from_material
 from .preset_chooser import KIND
 from .reports import reporting
@@ -59,7 +59,7 @@ def _apply(all_settings: Iterable[Any], context: bpy.types.Context) -> None:
         for settings in all_settings:
             apply(settings, hair)
         if has_look_material(hair.data):
-            _put_material(hair)
+            put_look(hair)
 
 
 class HAIRLOOM_OT_add_preset(bpy.types.Operator, ImportHelper):
@@ -198,19 +198,11 @@ class HAIRLOOM_OT_look_to_material(bpy.types.Operator):
     @reporting
     def execute(self, context: bpy.types.Context) -> set[str]:
         for hair in chosen_hair(context):
-            material, notes = _put_material(hair)
+            material, notes = put_look(hair)
             report(self, "INFO", f"{hair.name} has the material '{material.name}'")
             for note in notes:
                 report(self, "WARNING", f"{hair.name}: {note}")
         return {"FINISHED"}
-
-
-def _put_material(hair: bpy.types.Object) -> tuple[bpy.types.Material, tuple[str, ...]]:
-    group = hair.data.hairloom.shading
-    look = settings_of(group, group.settings)
-    painted, notes = colors_of_curves(hair, look, bpy.context.evaluated_depsgraph_get())
-    material, more = put_look_material(hair.data, look, painted=painted)
-    return material, (*notes, *more)
 
 
 CLASSES = (

@@ -9,6 +9,7 @@ from ..blender.base.objects import head_of
 from ..blender.base.outcome import report
 from ..blender.colliders import ties
 from .drawing import draw_section
+from .object_lists import draw_objects
 from .reports import reporting
 from .selection import chosen_hair, needs_hair
 
@@ -64,13 +65,8 @@ class HAIRLOOM_OT_remove_hair_tie(bpy.types.Operator):
 
 def draw_ties(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
     """Draw what holds hair beside its roots."""
-    column = layout.column()
-    column.prop(hair.hairloom, "tie_collection")
-    for obj in ties.ties_of(hair):
-        row = column.row(align=True)
-        row.label(text=obj.name, icon="MESH_CIRCLE")
-        row.operator("hairloom.remove_hair_tie", text="", icon="X").tie = obj.name
-    column.operator("hairloom.add_hair_tie", icon="MESH_CIRCLE")
+    draw_objects(layout, hair, "tie_collection")
+    layout.operator("hairloom.add_hair_tie", icon="MESH_CIRCLE")
     layout.column().prop(hair.hairloom, "tip_surface")
     if hair.hairloom.tip_surface is not None:
         layout.column().prop(hair.hairloom, "tip_group")

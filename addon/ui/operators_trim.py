@@ -12,6 +12,7 @@ from ..blender.scene.trim_shapes import KIND, SETTING, may_trim, read_shape, tri
 from ..blender.sessions.trimming import BEFORE_TRIM, take_trim_back, trim_to_shapes
 from .drawing import draw_button
 from .long_work import LongWork, Steps, draw_progress, in_parts
+from .object_lists import draw_objects
 from .operators_start import in_object_mode
 from .reports import reporting, tell
 from .selection import chosen_hair, needs_hair
@@ -108,11 +109,7 @@ def _chosen(hair: bpy.types.Object, context: bpy.types.Context) -> list[bpy.type
 def draw_trim(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
     """Draw what the hair is trimmed to."""
     column = layout.column()
-    column.prop(hair.hairloom, SETTING)
-    for obj in trim_shapes_of(hair):
-        row = column.row(align=True)
-        row.label(text=obj.name, icon="EMPTY_AXIS" if obj.type == "EMPTY" else "MESH_DATA")
-        row.operator("hairloom.remove_trim_shape", text="", icon="X").shape = obj.name
+    draw_objects(column, hair, SETTING)
     if draw_progress(column, HAIRLOOM_OT_trim_to_shape):
         return
     row = column.row(align=True)

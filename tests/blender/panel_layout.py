@@ -65,6 +65,9 @@ class Layout:
     def template_ID(self, *_: Any, text: str = "", **__: Any) -> None:
         self._element(text)
 
+    def template_list(self, *_: Any, rows: int = 5, **__: Any) -> None:
+        self.parts.append(rows + 0.5)
+
     def template_icon_view(self, *_: Any, scale: float = 1.0, **__: Any) -> None:
         self.parts.append(scale)
 

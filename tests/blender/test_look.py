@@ -106,7 +106,8 @@ def drawn_in_look(hair: Any) -> tuple[list[str], set[str]]:
     class Layout:
         """Takes what a layout is asked for, and notes the properties of shading."""
 
-        active = True
+        def __init__(self, *, active: bool = True) -> None:
+            self.active = active
 
         def prop(self, group: Any, name: str, **_: Any) -> None:
             assert group == hair.data.hairloom.shading
@@ -115,7 +116,7 @@ def drawn_in_look(hair: Any) -> tuple[list[str], set[str]]:
                 grey.add(name)
 
         def __getattr__(self, name: str) -> Any:
-            return lambda *_, **__: Layout()
+            return lambda *_, **__: Layout(active=self.active)
 
     for draw in (sections.draw_look, *(draw for _, _, draw in sections.SUB_SECTIONS["look"])):
         draw(Layout(), hair)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
 import bpy
 
@@ -16,6 +17,8 @@ _listeners: dict[str, list[Listener]] = {
     "bake": [],
     "hair_scene": [],
 }
+#: kinds and data-blocks of changes that wait for the end of `together`; None outside of it
+_held: list[tuple[str, bpy.types.ID]] | None = None
 
 
 def subscribe(kind: str, listener: Listener) -> None:
@@ -52,6 +55,26 @@ def hair_scene(owner: bpy.types.ID) -> None:
     _call("hair_scene", owner)
 
 
+@contextmanager
+def together() -> Iterator[None]:
+    """Many properties that are set inside count as one change, at the end."""
+    global _held
+    if _held is not None:
+        yield
+        return
+    _held = []
+    try:
+        yield
+    finally:
+        held, _held = _held, None
+        for kind, owner in held:
+            _call(kind, owner)
+
+
 def _call(kind: str, owner: bpy.types.ID) -> None:
+    if _held is not None:
+        if (kind, owner) not in _held:
+            _held.append((kind, owner))
+        return
     for listener in _listeners[kind]:
         listener(owner)

@@ -21,7 +21,7 @@ from ...exchange.files.atomic import write_text_atomic
 from ...parameters import ALL_SETTINGS
 from ...params import Settings
 from ...params.preset import Preset, preset_as_dict, read_any_preset
-from . import previews
+from . import changed, previews
 from .properties import settings_of
 
 PRESET_FOLDER = Path(__file__).resolve().parents[3] / "presets"
@@ -214,8 +214,9 @@ def apply(settings: Settings, hair: bpy.types.Object) -> None:
         group = getattr(owner, settings.section, None)
         if group is not None:
             settings = settings.with_masks_of(settings_of(group, type(settings)))
-            for name, value in settings.as_dict().items():
-                setattr(group, name, value)
+            with changed.together():
+                for name, value in settings.as_dict().items():
+                    setattr(group, name, value)
             return
     kept = [name for name in ALL_SETTINGS if any(hasattr(owner, name) for owner in owners)]
     raise HairloomError(

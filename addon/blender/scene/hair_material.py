@@ -6,6 +6,7 @@ tips and the differences between strands, are nodes before its colour.
 
 from __future__ import annotations
 
+import hashlib
 from dataclasses import dataclass
 from typing import Any
 
@@ -26,12 +27,14 @@ from .principled import INPUTS
 MATERIAL_COLOR = "hair_color"
 #: property that marks a material of ours
 _MARK = "hairloom_look"
+#: which look it has, and which nodes it was given for it
+_LOOK, _NODES = "hairloom_look_settings", "hairloom_look_nodes"
 _ACROSS, _DOWN = 190.0, 180.0
 
 
 def has_look_material(curves: bpy.types.Curves) -> bool:
     """Whether hair curves have a material that `put_look_material` would write again."""
-    return _own_material(curves) is not None
+    return look_material(curves) is not None
 
 
 def put_look_material(
@@ -60,7 +63,7 @@ def put_look_material(
         set_attribute(curves, MATERIAL_COLOR, "CURVE", painted)
     elif has_own:
         _copy_colors(curves)
-    slots, material = curves.materials, _own_material(curves)
+    slots, material = curves.materials, look_material(curves)
     if material is None:
         material = bpy.data.materials.new(f"{curves.name} Look")
         material[_MARK] = True
@@ -68,10 +71,43 @@ def put_look_material(
             slots[0] = material
         else:
             slots.append(material)
-    return material, _write(material, shading, has_colors=has_colors, are_final=are_final)
+    notes = _write(material, shading, has_colors=has_colors, are_final=are_final)
+    if not are_final:
+        material[_LOOK], material[_NODES] = _digest(shading), _digest(_nodes(material))
+    return material, notes
 
 
-def _own_material(curves: bpy.types.Curves) -> bpy.types.Material | None:
+def is_behind(material: bpy.types.Material, look: ShadingSettings) -> bool:
+    """Whether it was made of another look, and is still as it was made: with nodes that an artist
+    has changed it is the artist's own."""
+    known = material.get(_LOOK)
+    return known not in (None, _digest(look)) and material[_NODES] == _digest(_nodes(material))
+
+
+def _nodes(material: bpy.types.Material) -> list[object]:
+    """All that one can change of them but their places."""
+    found: list[object] = []
+    for node in material.node_tree.nodes:
+        found.append((node.bl_idname, getattr(node, "parametrization", ""), node.mute))
+        for socket in node.inputs:
+            value = getattr(socket, "default_value", None)
+            found.append(value if isinstance(value, float | int | str) else repr(_plain(value)))
+    for link in material.node_tree.links:
+        ends = (link.from_node.name, link.from_socket.identifier)
+        found.append((*ends, link.to_node.name, link.to_socket.identifier))
+    return found
+
+
+def _plain(value: Any) -> list[float]:
+    return [float(each) for each in value] if hasattr(value, "__len__") else []
+
+
+def _digest(value: object) -> str:
+    return hashlib.blake2b(repr(value).encode(), digest_size=8).hexdigest()
+
+
+def look_material(curves: bpy.types.Curves) -> bpy.types.Material | None:
+    """The material of an earlier look that the curves have."""
     marked = (each for each in curves.materials if each is not None and _MARK in each)
     return next((each for each in marked if each.is_editable and each.users == 1), None)
 

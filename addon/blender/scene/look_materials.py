@@ -1,0 +1,80 @@
+"""Materials of looks follow their looks, until an artist changes their nodes."""
+
+from __future__ import annotations
+
+import bpy
+
+from ...errors import HairloomError
+from ...shading.settings import ShadingSettings
+from ..properties import changed
+from ..properties.properties import settings_of
+from .hair_material import is_behind, look_material, put_look_material
+from .painted_colors import colors_of_curves
+
+#: how long painted colours wait for further edits [s]
+_PAUSE = 0.3
+
+#: session numbers of curves whose material waits
+_deferred: set[int] = set()
+
+
+def put_look(hair: bpy.types.Object) -> tuple[bpy.types.Material, tuple[str, ...]]:
+    """Give hair the material of its look, and keep what it was given; and what is to be said of it.
+
+    Raises:
+        HairloomError: see `colors_of_curves`.
+    """
+    look = _look_of(hair.data)
+    painted, notes = colors_of_curves(hair, look, bpy.context.evaluated_depsgraph_get())
+    material, more = put_look_material(hair.data, look, painted=painted)
+    return material, (*notes, *more)
+
+
+def follow(owner: bpy.types.ID) -> None:
+    """A setting was edited: where the look is another one now, its material gets it."""
+    if not isinstance(owner, bpy.types.Curves) or not owner.is_editable:
+        return
+    material = look_material(owner)
+    look = _look_of(owner)
+    if material is None or not is_behind(material, look):
+        return
+    if look.color_map and not bpy.app.background:  # which takes long to look up
+        _deferred.add(owner.session_uid)
+        if not bpy.app.timers.is_registered(_follow_deferred):
+            bpy.app.timers.register(_follow_deferred, first_interval=_PAUSE)
+        return
+    _put_again(owner)
+
+
+def _follow_deferred() -> None:
+    """A timer of Blender's."""
+    for curves in [each for each in bpy.data.hair_curves if each.session_uid in _deferred]:
+        _put_again(curves)
+    _deferred.clear()
+
+
+def _put_again(owner: bpy.types.Curves) -> None:
+    hair = next((obj for obj in bpy.data.objects if obj.data == owner), None)
+    try:
+        if hair is not None:
+            put_look(hair)
+    except HairloomError:  # what is painted cannot be read; the preview says so
+        return
+
+
+def _look_of(curves: bpy.types.Curves) -> ShadingSettings:
+    return settings_of(curves.hairloom.shading, ShadingSettings)
+
+
+LISTENER = ("settings", follow)
+
+
+def register() -> None:
+    changed.subscribe(*LISTENER)
+
+
+def unregister() -> None:
+    changed.unsubscribe(*LISTENER)
+    _deferred.clear()
+    if bpy.app.timers.is_registered(_follow_deferred):
+        bpy.app.timers.unregister(_follow_deferred)

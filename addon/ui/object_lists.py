@@ -1,0 +1,87 @@
+"""Lists of objects that act on hair: its ties, partings, strokes and trim shapes.
+
+Each is as high for one as for thirty, scrolls, and finds names.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import bpy
+from bpy.props import IntProperty, PointerProperty
+
+#: rows of a list
+ROWS = 3
+
+
+class _Kind(NamedTuple):
+    """icon: of a row. remove: what takes an object out. named: its property that names it."""
+
+    icon: str
+    remove: str
+    named: str
+
+
+#: setting of the hair that names the collection -> what its list has
+KINDS = {
+    "tie_collection": _Kind("MESH_CIRCLE", "hairloom.remove_hair_tie", "tie"),
+    "parting_collection": _Kind("CURVE_DATA", "hairloom.remove_parting", "line"),
+    "stroke_collection": _Kind("CURVE_PATH", "hairloom.remove_stroke", "stroke"),
+    "trim_collection": _Kind("MOD_BOOLEAN", "hairloom.remove_trim_shape", "shape"),
+}
+
+
+class HAIRLOOM_UL_objects(bpy.types.UIList):
+    """Objects that act on hair, each with the button that takes it out"""
+
+    def draw_item(
+        self,
+        _context: bpy.types.Context,
+        layout: bpy.types.UILayout,
+        _collection: bpy.types.Collection,
+        obj: bpy.types.Object,
+        _icon: int,
+        _active: Any,
+        _active_name: str,
+    ) -> None:
+        kind = KINDS[self.list_id]
+        layout.prop(obj, "name", text="", emboss=False, icon=kind.icon)
+        button = layout.operator(kind.remove, text="", icon="X", emboss=False)
+        setattr(button, kind.named, obj.name)
+
+
+class HAIRLOOM_PG_list_rows(bpy.types.PropertyGroup):
+    """Which row of each list is the active one, which no file keeps."""
+
+    __annotations__ = {
+        setting: IntProperty(name="Row", description="The row that was clicked last")
+        for setting in KINDS
+    }
+
+
+def draw_objects(layout: bpy.types.UILayout, hair: bpy.types.Object, setting: str) -> None:
+    """The collection that this setting names, and what is in it."""
+    column = layout.column()
+    column.prop(hair.hairloom, setting)
+    collection = getattr(hair.hairloom, setting)
+    if collection is None:
+        return
+    rows = bpy.context.window_manager.hairloom_list_rows
+    how = {"rows": ROWS, "maxrows": ROWS}
+    column.template_list(
+        HAIRLOOM_UL_objects.__name__, setting, collection, "all_objects", rows, setting, **how
+    )
+
+
+CLASSES: tuple[type[Any], ...] = (HAIRLOOM_UL_objects, HAIRLOOM_PG_list_rows)
+
+
+def register() -> None:
+    """After CLASSES are registered."""
+    bpy.types.WindowManager.hairloom_list_rows = PointerProperty(
+        type=HAIRLOOM_PG_list_rows, name="Rows", description="Rows of lists that were clicked last"
+    )
+
+
+def unregister() -> None:
+    del bpy.types.WindowManager.hairloom_list_rows
