@@ -58,7 +58,7 @@ from .refine.lead_out import (
 from .refine.lead_out_at_rest import led_out_at_rest
 from .refine.ride import Riders, ride
 from .refine.thinning import even_ranks
-from .shading.ambient import ambient_occlusion, openness, skin_occlusion
+from .shading.ambient import HairCells, ambient_occlusion, openness, skin_occlusion
 from .shading.ambient_settings import AmbientSettings
 from .shading.drawn_strands import drawn_radius
 from .shading.settings import StrandSettings
@@ -68,14 +68,16 @@ from .strands import StrandSet, Surface
 from .strands.arc_length import even, typical
 from .strands.center_lines import center_lines, curl_room
 from .strands.face import is_face_hair
-from .strands.frames import strand_tangents, volume_normals
+from .strands.frames import strand_tangents, volume_normal_rows
 from .strands.join import joined
 from .strands.kept import NOTHING_KEPT, Kept
 from .strands.needed_points import LOST, MAX_POINTS, with_needed_points, with_own_points
 from .strands.resample import resample
 from .strands.root_motions import RootMotions
-from .strands.vectors import dot
+from .strands.vectors import cross_rows, dot_rows
 
+#: Points whose directions are found at once: they stay in the cache.
+AT_ONCE = 1 << 14
 #: Three directions at each point, three times (point_count, 3), see `strand_axes`.
 type Axes = tuple[Floats, Floats, Floats]
 #: Strands, about, that stand in the way of light off far skin for all.
@@ -861,27 +863,56 @@ def held_strands(rig: Rig, pose: Pose, points: Floats) -> Floats:
     return points
 
 
-def rest_occlusion(rig: Rig, settings: AmbientSettings, points: Floats | None = None) -> Floats:
+def shade_cells(rig: Rig, settings: AmbientSettings) -> HairCells | None:
+    """What shades at rest, for occlusion and openness; None without strands."""
+    if not rig.strands.strand_count:
+        return None
+    return HairCells.of(rig.strands, rig.head, settings.cell_count)
+
+
+def rest_occlusion(
+    rig: Rig,
+    settings: AmbientSettings,
+    points: Floats | None = None,
+    *,
+    cells: HairCells | None = None,
+) -> Floats:
     """Ambient occlusion of every point at rest, (point_count,), 1 where nothing shades.
 
     Args:
         points: (n, 3) [m] on the same strands; None is their own.
+        cells: see `shade_cells`; None: they are found here.
     """
     strands, settings = rig.strands, _ambient(rig, settings)
     return ambient_occlusion(
-        strands, strands.points if points is None else points, rig.head, settings
+        strands, strands.points if points is None else points, rig.head, settings, cells
     )
 
 
 def strand_axes(strands: StrandSet) -> Axes:
     """Along the strand, along its normal of the hair's volume, and across both, at each point."""
-    tangent = strand_tangents(strands.points, strands.offsets)
-    center = strands.roots.mean(axis=0, dtype=np.float64).astype(np.float32)
-    normal = volume_normals(strands.points, tangent, center)
-    return tangent, normal, np.cross(tangent, normal)
+    axes = np.empty((3, 3, strands.point_count), np.float32)
+    count = max(strands.strand_count, 1)
+    center = strands.roots.sum(axis=0, dtype=np.float64)[:, None] / count
+    step = max(AT_ONCE * count // max(strands.point_count, 1), 1)
+    for first in range(0, strands.strand_count, step):
+        offsets = strands.offsets[first : first + step + 1]
+        some = slice(offsets[0], offsets[-1])
+        points = np.ascontiguousarray(strands.points[some].T)
+        tangent = strand_tangents(points, offsets - offsets[0])
+        normal = volume_normal_rows(points - center.astype(np.float32), tangent)
+        for axis, rows in zip(axes, (tangent, normal, cross_rows(tangent, normal)), strict=True):
+            axis[:, some] = rows
+    tangent, normal, across = axes
+    return tangent.T, normal.T, across.T
 
 
-def rest_openness(rig: Rig, settings: AmbientSettings, axes: Axes | None = None) -> Floats:
+def rest_openness(
+    rig: Rig,
+    settings: AmbientSettings,
+    axes: Axes | None = None,
+    cells: HairCells | None = None,
+) -> Floats:
     """How open every point is by direction at rest, (point_count, 4), see `ambient.openness`: the
     mean, and a vector by the strand's axes.
 
@@ -889,9 +920,10 @@ def rest_openness(rig: Rig, settings: AmbientSettings, axes: Axes | None = None)
 
     Args:
         axes: `strand_axes` of the strands.
+        cells: see `rest_occlusion`.
     """
     strands, extinction = rig.strands, rig.widths.extinction
-    found = openness(strands, strands.points, rig.head, extinction, settings.cell_count)
+    found = openness(strands, strands.points, rig.head, extinction, settings.cell_count, cells)
     if strands.strand_count:
         found[:, 1:] = _by_axes(found[:, 1:], axes or strand_axes(strands))
     return found
@@ -917,7 +949,14 @@ def rest_skin_seen(rig: Rig, points: Floats, axes: Axes) -> Floats | None:
 
 
 def _by_axes(vectors: Floats, axes: Axes) -> Floats:
-    return np.stack([dot(vectors, axis) for axis in axes], axis=-1)
+    """Vectors (n, 3) along each of the axes, (n, 3) float32."""
+    found = np.empty((len(vectors), 3), np.float32)
+    for first in range(0, len(vectors), AT_ONCE):
+        some = slice(first, first + AT_ONCE)
+        rows = np.ascontiguousarray(vectors[some].T)
+        for column, axis in zip(found.T, axes, strict=True):
+            column[some] = dot_rows(rows, axis[some].T)
+    return found
 
 
 def head_occlusion(rig: Rig, settings: AmbientSettings) -> Floats | None:

@@ -13,12 +13,13 @@ Limitations: nothing outside of the hair's bounding box shades; detail below a c
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
-from dataclasses import replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 
-from ..arrays import Floats
+from ..arrays import Floats, Ints
 from ..strands import StrandSet, Surface
 from .ambient_settings import AmbientSettings
 from .density_grid import Grid, body_depth, grid_around, hair_depth, sample
@@ -33,8 +34,38 @@ _DIRECTION_WEIGHTS = {1: 1 / 21, 2: 4 / 105, 3: 9 / 280}
 _SKIN_CLEARANCE = 0.5
 
 
+@dataclass(frozen=True, eq=False)
+class HairCells:
+    """What light meets: the optical depth of hair across each cell, as wide as its strands are, and
+    of the body, None without one."""
+
+    grid: Grid
+    hair: Floats
+    body: Floats | None
+
+    @classmethod
+    def of(cls, strands: StrandSet, body: Surface | None, cell_count: int) -> Self:
+        """Args: see ambient_occlusion."""
+        grid = grid_around(strands, cell_count)
+        hair = hair_depth(strands, grid)
+        if body is None:
+            return cls(grid, hair, None)
+        whole = grid.in_blocks()
+        of_body = body.latest(_body_depth, whole.low, whole.cell, whole.shape)
+        return cls(grid, hair, grid.part(of_body, whole))
+
+    def depth(self, extinction: float) -> Floats:
+        """Of hair and body."""
+        depth = self.hair * np.float32(extinction)
+        return depth if self.body is None else np.maximum(depth, self.body)
+
+
 def ambient_occlusion(
-    strands: StrandSet, points: Floats, body: Surface | None, settings: AmbientSettings
+    strands: StrandSet,
+    points: Floats,
+    body: Surface | None,
+    settings: AmbientSettings,
+    cells: HairCells | None = None,
 ) -> Floats:
     """How open each point is, (n,) float32: 1 at the outside of the hair, 0 where no light comes.
 
@@ -42,18 +73,24 @@ def ambient_occlusion(
         strands: the hair that shades, world space.
         points: (n, 3) [m], world space; CVs of the same hair or any others.
         body: what else shades, world space, or None.
+        cells: of these strands and this body, if they are known.
     """
     if not strands.strand_count or not len(points):
         return np.ones(len(points), np.float32)
-    grid = grid_around(strands, settings.cell_count)
-    depth = _depth(strands, body, grid, settings.extinction)
-    open_sky = sky_openness(depth, settings.upper_fraction)
-    (seen,) = sample(open_sky[None], grid.coordinates(points)) / settings.ao_bias
+    cells = cells or HairCells.of(strands, body, settings.cell_count)
+    open_sky = sky_openness(cells.depth(settings.extinction), settings.upper_fraction)
+    (seen,) = sample(open_sky[None], cells.grid.coordinates(points))
+    seen /= np.float32(settings.ao_bias)
     return (1.0 - settings.strength * (1.0 - np.minimum(seen, 1.0))).astype(np.float32)
 
 
 def openness(
-    strands: StrandSet, points: Floats, body: Surface | None, extinction: float, cell_count: int
+    strands: StrandSet,
+    points: Floats,
+    body: Surface | None,
+    extinction: float,
+    cell_count: int,
+    cells: HairCells | None = None,
 ) -> Floats:
     """The fraction of the light from each direction w that comes straight to each point, as
     q0 + q . w, (n, 4) float32: the mean over all directions, and a vector in world space.
@@ -64,26 +101,11 @@ def openness(
     """
     if not strands.strand_count or not len(points):
         return np.tile(np.array([1.0, 0.0, 0.0, 0.0], np.float32), (len(points), 1))
-    grid = grid_around(strands, cell_count)
-    depth = _depth(strands, body, grid, extinction)
-    moments = np.zeros((4, *depth.shape), np.float32)
-    for step, weight in sky_directions(0.0):
-        through = weight * np.exp(-depth_towards(depth, step, own=0.0))
-        moments[0] += through
-        direction = 3.0 * np.array(step) / np.linalg.norm(step)
-        for moment, part in zip(moments[1:], direction, strict=True):
-            moment += np.float32(part) * through
-    return np.ascontiguousarray(sample(moments, grid.coordinates(points)).T)
-
-
-def _depth(strands: StrandSet, body: Surface | None, grid: Grid, extinction: float) -> Floats:
-    """Optical depth of hair and body across each cell."""
-    depth = hair_depth(strands, grid) * np.float32(extinction)
-    if body is None:
-        return depth
-    whole = grid.in_blocks()
-    of_body = body.latest(_body_depth, whole.low, whole.cell, whole.shape)
-    return np.maximum(depth, grid.part(of_body, whole))
+    cells = cells or HairCells.of(strands, body, cell_count)
+    steps, weights = zip(*sky_directions(0.0), strict=True)
+    moments = np.array(weights) * with_mean(unit_steps(steps))
+    light = summed_light(cells.depth(extinction), steps, moments, own=0.0)
+    return np.ascontiguousarray(sample(light, cells.grid.coordinates(points)).T)
 
 
 def _body_depth(body: Surface, low: Floats, cell: float, shape: tuple[int, int, int]) -> Floats:
@@ -93,9 +115,8 @@ def _body_depth(body: Surface, low: Floats, cell: float, shape: tuple[int, int, 
 
 def sky_openness(depth: Floats, upper_fraction: float) -> Floats:
     """Mean transmittance of the sky's light at the centre of each cell, of depth's shape."""
-    total = np.zeros_like(depth)
-    for direction, weight in sky_directions(upper_fraction):
-        total += weight * np.exp(-depth_towards(depth, direction))
+    steps, weights = zip(*sky_directions(upper_fraction), strict=True)
+    (total,) = summed_light(depth, steps, np.array(weights)[None])
     return total
 
 
@@ -112,22 +133,76 @@ def sky_directions(upper_fraction: float) -> Iterator[tuple[Step, float]]:
     return ((step, float(weight)) for step, weight in zip(steps, fraction, strict=True) if weight)
 
 
-def depth_towards(depth: Floats, step: Step, own: float = 0.5) -> Floats:
-    """Optical depth from each cell out of the grid along one of 26 directions.
+def unit_steps(steps: Sequence[Step]) -> Floats:
+    """Their directions, rows (3, step_count)."""
+    rows = np.array(steps, np.float64).T
+    result: Floats = rows / np.linalg.norm(rows, axis=0)
+    return result
 
-    A part of the own cell, from its centre half, then every cell on the way, each crossed over the
-    length of the step.
+
+def with_mean(directions: Floats) -> Floats:
+    """What sums light of directions, rows (3, n), to q0 and q of a mean and a vector, (4, n)."""
+    return np.concatenate([np.ones((1, directions.shape[1])), 3.0 * directions])
+
+
+def summed_light(depth: Floats, steps: Sequence[Step], weights: Floats, own: float = 0.5) -> Floats:
+    """Weighted sums over some of the 26 directions of the part of light that comes from there to
+    each cell, (k, *depth.shape) float32.
+
+    Args:
+        weights: (k, step_count).
+        own: see depth_towards.
     """
-    axis = int(np.argmax(np.abs(step)))
-    others = [step[other] for other in range(3) if other != axis]
-    layers = np.moveaxis(depth, axis, 0)
-    if step[axis] > 0:
-        layers = layers[::-1]
-    beyond = np.zeros(layers.shape, np.float32)
-    for index in range(1, len(layers)):
-        add_shifted(beyond[index], beyond[index - 1] + layers[index - 1], others)
-    crossed = (beyond + np.float32(own) * layers) * np.float32(np.linalg.norm(step))
-    return np.moveaxis(crossed[::-1] if step[axis] > 0 else crossed, 0, axis)
+    total = np.zeros((len(weights), *depth.shape), np.float32)
+    weights = weights.astype(np.float32)
+    for some, layer, crossed in _layers(depth[None], steps, own):
+        through = np.exp(np.negative(crossed, out=crossed), out=crossed)
+        total[:, *layer] += np.tensordot(weights[:, some], through, axes=1)
+    return total
+
+
+def depth_towards(depth: Floats, steps: Sequence[Step], own: float = 0.5) -> Floats:
+    """Optical depth from each cell out of the grid along some of the 26 directions,
+    (step_count, *grid) float32: a part of the own cell, from its centre half, then every cell on
+    the way, each crossed over the length of the step.
+
+    Args:
+        depth: of cells, (step_count, *grid), or (1, *grid) where all directions have the same.
+    """
+    found = np.empty((len(steps), *depth.shape[1:]), np.float32)
+    for some, layer, crossed in _layers(depth, steps, own):
+        found[some, *layer] = crossed
+    return found
+
+
+#: Of a grid, all cells but along one axis.
+type Layer = tuple[int | slice, ...]
+
+
+def _layers(
+    depth: Floats, steps: Sequence[Step], own: float
+) -> Iterator[tuple[Ints, Layer, Floats]]:
+    """Numbers of some steps, a layer of cells across their longest axis, and what light along these
+    crosses to its cells, (k, cells, cells), see depth_towards: a layer after the other, which stay
+    in the cache.
+    """
+    along = np.abs(steps).argmax(axis=1)
+    for axis, side in itertools.product(range(3), (-1, 1)):
+        some = np.flatnonzero((along == axis) & (np.array(steps)[:, axis] == side))
+        own_depth = depth if len(depth) == 1 else depth[some]
+        layers = np.ascontiguousarray(np.moveaxis(own_depth, axis + 1, 0))
+        length = np.linalg.norm(np.take(steps, some, axis=0), axis=1)[:, None, None]
+        others = np.delete(np.take(steps, some, axis=0), axis, axis=1).tolist()
+        before, beyond = np.zeros((2, len(some), *layers.shape[2:]), np.float32)
+        for number in range(len(layers))[::-side] if len(some) else ():
+            crossed = before + np.float32(own) * layers[number]
+            crossed *= length.astype(np.float32)
+            yield some, (*[slice(None)] * axis, number), crossed
+            before += layers[number]
+            beyond[:] = 0.0
+            for target, source, step in zip(beyond, before, others, strict=True):
+                add_shifted(target, source, step)
+            before, beyond = beyond, before
 
 
 def add_shifted(target: Floats, source: Floats, step: list[int]) -> None:

@@ -23,7 +23,7 @@ import numpy as np
 
 from ..arrays import Bools, Floats
 from ..strands import StrandSet, Surface
-from .ambient import Step, add_shifted, depth_towards, sky_directions
+from .ambient import Step, add_shifted, depth_towards, sky_directions, unit_steps, with_mean
 from .density_grid import Grid, hair_depth, sample, small_triangles
 
 #: Cells along the longest side of the grid.
@@ -147,17 +147,22 @@ def _inside(normal: Floats, is_skin: Bools) -> Bools:
 def _sent(hair: Floats, normal: Floats, is_skin: Bools, is_inside: Bools) -> Floats:
     """What skin sends back of light from all around: as `SkinSeen.received`, through clear hair,
     and its mean through a part of the hair, (5, *shape)."""
-    body = np.float32(_OPAQUE) * is_inside
+    steps, weights = zip(*sky_directions(0.0), strict=True)
+    directions = unit_steps(steps).astype(np.float32)
+    skin = np.flatnonzero(is_skin)
+    facing = np.maximum(directions.T @ normal.reshape(3, -1)[:, skin], 0.0)
+    facing *= np.array(weights, np.float32)[:, None]
+    body = np.float32(_OPAQUE) * is_inside[None]
+    both = np.stack([body[0] + _gappy(hair, step) for step in steps])
     sent = np.zeros((5, *hair.shape), np.float32)
-    for step, weight in sky_directions(0.0):
-        facing = np.float32(weight) * np.maximum(np.tensordot(_unit(step), normal, 1), 0.0)
-        clear = facing * np.exp(-depth_towards(body, step, own=0.0))
-        sent[0] += clear
-        for moment, part in zip(sent[1:4], 3.0 * _unit(step), strict=True):
-            moment += part * clear
-        some = depth_towards(body + _gappy(hair, step), step, own=0.0)
-        sent[4] += facing * np.exp(-some)
-    return sent * is_skin
+    flat = sent.reshape(5, -1)
+    clear, some = (
+        facing * np.exp(-depth_towards(each, steps, own=0.0).reshape(len(steps), -1)[:, skin])
+        for each in (body, both)
+    )
+    flat[:4, skin] = with_mean(directions) @ clear
+    flat[4, skin] = some.sum(axis=0)
+    return sent
 
 
 def _spread(hair: Floats, sent: Floats, normal: Floats, is_skin: Bools) -> tuple[Floats, Floats]:

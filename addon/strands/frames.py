@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from ..arrays import Floats, Ints
-from .vectors import unit_or
+from .vectors import dot_rows, unit_or
 
-_SMALLEST = 1.0e-6
+#: Of a normal, squared; and what is no longer than this has no direction [m].
+_SMALLEST, _SHORTEST = 1.0e-6, np.float32(1.0e-6)
 
 
 def tangents(grid: Floats) -> Floats:
@@ -28,13 +29,14 @@ def tangents(grid: Floats) -> Floats:
 
 
 def strand_tangents(points: Floats, offsets: Ints) -> Floats:
-    """Unit tangents from root to tip, (point_count, 3), of strands that lie one after the other."""
+    """Unit tangents from root to tip, rows (3, point_count) as the points are, of strands that lie
+    one after the other."""
     edge = np.zeros_like(points)
-    edge[:-1] = points[1:] - points[:-1]
-    edge[offsets[1:] - 1] = 0.0
+    np.subtract(points[:, 1:], points[:, :-1], out=edge[:, :-1])
+    edge[:, offsets[1:] - 1] = 0.0
     both = edge.copy()
-    both[1:] += edge[:-1]
-    return unit_or(both, np.array([0.0, 0.0, 1.0]))
+    both[:, 1:] += edge[:, :-1]
+    return _unit_or_up(both)
 
 
 def transported_normals(tangent: Floats, root_normal: Floats) -> Floats:
@@ -69,11 +71,34 @@ def volume_normals(point: Floats, tangent: Floats, center: Floats) -> Floats:
     Args:
         point: (..., 3) [m]. tangent: (..., 3) unit vectors. center: (3,) [m].
     """
-    outward = unit_or(point - center, np.array([0.0, 0.0, 1.0]))
-    across = outward - tangent * np.sum(outward * tangent, axis=-1, keepdims=True)
-    axis = np.eye(3)[np.abs(tangent).argmin(axis=-1)]
-    is_long = np.sum(across * across, axis=-1, keepdims=True) > _SMALLEST
-    return unit_or(np.where(is_long, across, np.cross(tangent, axis)), axis)
+    away, along = np.broadcast_arrays(point - center, tangent)
+    rows = (np.ascontiguousarray(each.reshape(-1, 3).T) for each in (away, along))
+    return np.ascontiguousarray(volume_normal_rows(*rows).T).reshape(away.shape)
+
+
+def volume_normal_rows(away: Floats, tangent: Floats) -> Floats:
+    """`volume_normals` of rows (3, n), `away` from the centre."""
+    outward = _unit_or_up(away)
+    across: Floats = outward - tangent * dot_rows(outward, tangent)
+    squared = dot_rows(across, across)
+    unclear = squared <= _SMALLEST
+    if unclear.any():
+        own = tangent[:, unclear].T
+        axis = np.eye(3)[np.abs(own).argmin(axis=-1)]
+        across[:, unclear] = unit_or(np.cross(own, axis), axis).T
+        squared[unclear] = 1.0
+    across /= np.sqrt(squared)
+    return across
+
+
+def _unit_or_up(rows: Floats) -> Floats:
+    """Rows (3, n) of length 1; what has no length points up."""
+    length = np.sqrt(dot_rows(rows, rows))
+    found: Floats = rows / np.maximum(length, _SHORTEST)
+    is_short = length <= _SHORTEST
+    if is_short.any():
+        found[:, is_short] = np.array([[0.0], [0.0], [1.0]])
+    return found
 
 
 def _perpendicular(vector: Floats, tangent: Floats) -> Floats:

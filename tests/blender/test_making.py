@@ -43,9 +43,9 @@ def gate(in_window, monkeypatch):
     """Holds hair back until it is opened."""
     opened, occlusion = threading.Event(), pipeline.rest_occlusion
 
-    def wait_and_make(*arguments):
+    def wait_and_make(*arguments, **named):
         assert opened.wait(60.0)
-        return occlusion(*arguments)
+        return occlusion(*arguments, **named)
 
     monkeypatch.setattr(pipeline, "rest_occlusion", wait_and_make)
     yield opened

@@ -193,9 +193,9 @@ def _drawn(
     if known is not None and known.occlusion is not None and known.ambient == ambient:
         occlusion, openness, seen = known.occlusion, known.openness, known.skin_seen
     else:
-        occlusion = pipeline.rest_occlusion(rig, ambient)
-        axes = pipeline.strand_axes(rig.strands)
-        openness = pipeline.rest_openness(rig, ambient, axes)
+        cells, axes = pipeline.shade_cells(rig, ambient), pipeline.strand_axes(rig.strands)
+        occlusion = pipeline.rest_occlusion(rig, ambient, cells=cells)
+        openness = pipeline.rest_openness(rig, ambient, axes, cells)
         seen = pipeline.rest_skin_seen(rig, rig.strands.points, axes)
     report("what the head hides")
     occluders = None if known is None else known.occluders

@@ -8,12 +8,14 @@ import pytest
 from hairloom.addon.arrays import Floats
 from hairloom.addon.shading.ambient import (
     AmbientSettings,
+    HairCells,
     ambient_occlusion,
     depth_towards,
     openness,
     skin_occlusion,
     sky_directions,
     sky_openness,
+    summed_light,
 )
 from hairloom.addon.shading.density_grid import (
     body_depth,
@@ -66,7 +68,7 @@ def test_the_sky_is_whole_and_its_directions_integrate_polynomials() -> None:
 @pytest.mark.parametrize("step", [step for step, _ in sky_directions(0.0)])
 def test_running_sums_agree_with_walking_cell_by_cell(step: tuple[int, int, int]) -> None:
     depth = np.random.default_rng(2).random((5, 7, 6)).astype(np.float32)
-    found = depth_towards(depth, step)
+    (found,) = depth_towards(depth[None], [step])
     for start in [(0, 0, 0), (4, 6, 5), (2, 3, 3), (1, 5, 2), (3, 0, 4)]:
         expected, here = 0.5 * depth[start], np.array(start) + step
         while ((here >= 0) & (here < depth.shape)).all():
@@ -312,3 +314,32 @@ def test_skin_is_dark_only_under_the_hair() -> None:
     assert light[height > 0.05].mean() < light[height < -0.05].mean() - 0.2
     more = skin_occlusion(upper, skin, AmbientSettings(scalp_extinction=100.0))
     assert more[height > 0.05].mean() < light[height > 0.05].mean()
+
+
+def test_sums_of_light_are_those_of_each_direction() -> None:
+    """Weighted, and added up; also where each direction has cells of its own."""
+    random = np.random.default_rng(6)
+    depth = random.random((5, 7, 6)).astype(np.float32)
+    steps = [step for step, _ in sky_directions(0.0)][3::2]
+    weights = random.normal(size=(3, len(steps)))
+    through = np.exp(-depth_towards(depth[None], steps, own=0.0))
+    np.testing.assert_allclose(
+        summed_light(depth, steps, weights, own=0.0), np.tensordot(weights, through, 1), atol=1e-5
+    )
+    factor = 1.0 + np.arange(len(steps), dtype=np.float32)[:, None, None, None]
+    np.testing.assert_allclose(
+        depth_towards(factor * depth, steps), factor * depth_towards(depth[None], steps), rtol=1e-5
+    )
+
+
+def test_cells_that_are_known_change_nothing() -> None:
+    strands, settings = hair_on_ball(), AmbientSettings(extinction=2.0)
+    cells = HairCells.of(strands, ball(0.08), settings.cell_count)
+    arguments = strands, strands.points[::50], ball(0.08)
+    np.testing.assert_array_equal(
+        ambient_occlusion(*arguments, settings, cells), ambient_occlusion(*arguments, settings)
+    )
+    np.testing.assert_array_equal(
+        openness(*arguments, 2.0, settings.cell_count, cells),
+        openness(*arguments, 2.0, settings.cell_count),
+    )
