@@ -14,6 +14,7 @@ import hairloom  # noqa: E402  it is loaded by tests/conftest.py
 from hairloom.addon import registration  # noqa: E402
 from hairloom.addon.blender.sessions import solvers  # noqa: E402
 from hairloom.addon.dynamics.colliders import DistanceField  # noqa: E402
+from hairloom.addon.shading import density_grid, skin_seen  # noqa: E402
 from hairloom.addon.strands import StrandSet  # noqa: E402
 
 
@@ -52,6 +53,17 @@ def numpy_unless_asked(request: pytest.FixtureRequest) -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         if not (request.node.get_closest_marker("draws") or "gpu_context" in request.fixturenames):
             patch.setattr(solvers, "compute_available", lambda: False)
+        yield
+
+
+@pytest.fixture(autouse=True)
+def coarse_light(request: pytest.FixtureRequest) -> Iterator[None]:
+    """Where nothing is drawn, light within hair is found in fewer cells: it is most of the time
+    that a few strands take to prepare. Those in tests/pure show what it is."""
+    with pytest.MonkeyPatch.context() as patch:
+        if not request.node.get_closest_marker("draws"):
+            patch.setattr(density_grid, "_MAX_CELLS", 4_000)
+            patch.setattr(skin_seen, "_CELLS", 12)
         yield
 
 

@@ -25,6 +25,7 @@ from ..colliders.carriers import is_deforming, is_left_out
 from ..colliders.obstacles import shape_of, sources_of
 from ..colliders.ties import holders_of
 from ..properties.groom_settings import GroomSettings
+from ..properties.properties import settings_of
 from ..scene.curves import COLOR_ATTRIBUTE, GROUP_ATTRIBUTES, read_curves
 from ..scene.forces import force_fields_of, gravity_of
 from ..scene.masks import image_values
@@ -110,8 +111,8 @@ def settings_part(hair: bpy.types.Object) -> str:
 
 
 def _dynamics(hair: bpy.types.Object) -> DynamicsSettings:
-    """All forms of the solver give the same motion."""
-    return replace(GroomSettings.of(hair)[DynamicsSettings], device="automatic")
+    """Those alone, as each frame asks for them. All forms of the solver give the same motion."""
+    return replace(settings_of(hair.hairloom.dynamics, DynamicsSettings), device="automatic")
 
 
 def collider_places(
