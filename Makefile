@@ -23,10 +23,13 @@ lint: setup
 
 # What draws comes first: its tests are the longest, and none is to be left over at the end.
 TESTS = tests/blender tests/gpu tests/pure
-PYTEST = $(PYTHON) -m pytest -q -n 2 --dist worksteal
+# One thread each: those of OpenBLAS wait for each other by spinning, on processors that are taken.
+PYTEST = OPENBLAS_NUM_THREADS=1 $(PYTHON) -m pytest -q -n 2 --dist worksteal
 
 # To show the values of an assert, pytest rewrites all tests, which takes each process as long as a
 # hundred tests. So only what has failed is run with it, a second time; it has failed all the same.
+# A commit compiles shaders without LLVM's optimization, which takes longer than what they are to do.
+tests-of-a-commit: export GALLIVM_PERF = nopt
 tests-of-a-commit: setup
 	$(PYTEST) -m "not slow" --assert=plain $(TESTS) || \
 	    { $(PYTHON) -m pytest -q -m "not slow" --last-failed --last-failed-no-failures=none $(TESTS); false; }

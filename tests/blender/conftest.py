@@ -58,10 +58,12 @@ def numpy_unless_asked(request: pytest.FixtureRequest) -> Iterator[None]:
 
 @pytest.fixture(autouse=True)
 def coarse_light(request: pytest.FixtureRequest) -> Iterator[None]:
-    """Where nothing is drawn, light within hair is found in fewer cells: it is most of the time
-    that a few strands take to prepare. Those in tests/pure show what it is."""
+    """Where nothing is drawn, or its light is not looked at, light within hair is found in fewer
+    cells: it is most of the time that a few strands take to prepare. Those in tests/pure show what
+    it is."""
+    draws = request.node.get_closest_marker("draws")
     with pytest.MonkeyPatch.context() as patch:
-        if not request.node.get_closest_marker("draws"):
+        if draws is None or not draws.kwargs.get("light", True):
             patch.setattr(density_grid, "_MAX_CELLS", 4_000)
             patch.setattr(skin_seen, "_CELLS", 12)
         yield

@@ -23,7 +23,7 @@ from hairloom.addon.strands.strand_set import StrandSet
 sys.path.append(str(Path(__file__).parents[2] / "bench"))
 from _moving_curves import apart, lose_curves, move_by_nodes
 
-pytestmark = pytest.mark.draws
+pytestmark = pytest.mark.draws(light=False)
 LAST = 8
 
 

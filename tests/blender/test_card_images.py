@@ -18,7 +18,7 @@ from hairloom.addon.blender.command_line import command_line  # noqa: E402
 from hairloom.addon.errors import HairloomError  # noqa: E402
 from hairloom.addon.shading.textures import TEXTURES  # noqa: E402
 
-pytestmark = pytest.mark.draws
+pytestmark = pytest.mark.draws(light=False)
 
 SHAPE = (6, 8)
 

@@ -19,7 +19,7 @@ from hairloom.addon.render.camera import frame_camera
 from hairloom.addon.render.strand_pass import Statistics, StrandPass
 from hairloom.addon.strands import Surface
 
-pytestmark = pytest.mark.draws
+pytestmark = pytest.mark.draws(light=False)
 
 
 @pytest.fixture

@@ -22,7 +22,7 @@ from hairloom.addon.dynamics.colliders import (
     SphereSetCollider,
 )
 
-pytestmark = pytest.mark.draws
+pytestmark = pytest.mark.draws(light=False)
 
 
 @pytest.fixture

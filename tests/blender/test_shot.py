@@ -9,7 +9,7 @@ from hairloom.addon.blender.bakes.cache import Cache
 from hairloom.addon.blender.command_line import command_line
 from hairloom.addon.blender.preview import previews
 
-pytestmark = pytest.mark.draws
+pytestmark = pytest.mark.draws(light=False)
 SOFT = {"style_root": 1.0, "style_tip": 0.2, "sag_compensation": 0.0}
 
 

@@ -13,7 +13,7 @@ from hairloom.addon.blender.engine.engine_hair import read_groom  # noqa: E402
 from hairloom.addon.blender.preview import previews, scene_events  # noqa: E402
 from hairloom.addon.blender.viewport import overlay  # noqa: E402
 
-pytestmark = pytest.mark.draws
+pytestmark = pytest.mark.draws(light=False)
 
 
 @pytest.fixture

@@ -29,7 +29,7 @@ from hairloom.addon.pipeline import Pose, Rig
 from hairloom.addon.render.snapshot import Snapshot
 from hairloom.addon.strands import StrandSet
 
-pytestmark = pytest.mark.draws
+pytestmark = pytest.mark.draws(light=False)
 
 RATE = 30.0
 #: With local shape a few guides in a hundred are so ill-conditioned that numpy, too, drifts away

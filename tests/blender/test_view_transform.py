@@ -27,7 +27,7 @@ from hairloom.addon.errors import HairloomError
 from hairloom.addon.render.display import Display, DisplayTable, table_radiances
 from hairloom.addon.shading.stage_settings import StageSettings
 
-pytestmark = pytest.mark.draws
+pytestmark = pytest.mark.draws(light=False)
 
 
 @pytest.fixture(autouse=True)

@@ -398,7 +398,7 @@ def test_hidden_strands_change_no_pixel(frame: Any, mode: str, seen: str) -> Non
     for culling in ("none", "hidden"):
         passes = frame.MeshPass(), frame.StrandPass()
         snapshot = head_of_hair(frame, dataclasses.replace(BARE, mode=mode, culling=culling))
-        pictures.append(frame.render_image(snapshot, camera, 480, 360, 2, passes=passes))
+        pictures.append(frame.render_image(snapshot, camera, 240, 180, 2, passes=passes))
         strands.append(passes[1].statistics.strands)
     assert (pictures[0] == pictures[1]).all()
     assert strands[0] == 4000 and strands[1] < 3800

@@ -408,6 +408,9 @@ def test_missing_files_and_folders_are_told(tmp_path: Path) -> None:
         read_groom_alembic(tmp_path / "none.abc")
 
 
+@pytest.mark.slow(
+    instead="tests/pure/exchange/test_fuzz.py::test_damage_to_what_libraries_parse_is_told_too"
+)
 def test_damaged_files_are_told_or_read(tmp_path: Path) -> None:
     """A sample of what was done with thousands: cut files, and bytes by chance among the last."""
     path = tmp_path / "a.abc"
