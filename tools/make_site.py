@@ -17,6 +17,8 @@ import tempfile
 import tomllib
 from pathlib import Path
 
+from guide_steps import TUTORIALS
+
 REPOSITORY = Path(__file__).resolve().parents[1]
 #: what becomes pages, beside all of docs
 PAGES = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "gpu_shaders/README.md")
@@ -24,6 +26,8 @@ PAGES = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "gpu_shaders/README.md"
 MENU = {
     "Artists": (
         "docs/quick_start",
+        "docs/tutorials/README",
+        *(f"docs/tutorials/{name}" for name in TUTORIALS),
         "docs/user_guide",
         "docs/hairstyles",
         "docs/styling",

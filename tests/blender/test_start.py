@@ -126,6 +126,8 @@ def test_the_sample_scene_is_a_scene_of_its_own_that_moves():
     assert scene != before and [obj.name for obj in before.objects] == ["Cube"]
     assert scene.render.engine == "HAIRLOOM" and scene.camera is not None
     assert sum(obj.type == "LIGHT" for obj in scene.objects) == 3
+    # as its fields show lengths of hair: "6 mm", where a new scene of Blender's has "0.006 m"
+    assert scene.unit_settings.length_unit == "ADAPTIVE"
     (session,) = previews.sessions()
     assert session.warnings == () and session.head is not None
     first = grid_of(session)

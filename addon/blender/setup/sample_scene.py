@@ -65,6 +65,7 @@ def _scene_with_head(skin: str) -> tuple[bpy.types.Scene, bpy.types.Object]:
     scene.render.engine = ENGINE
     scene.render.resolution_x, scene.render.resolution_y = 800, 800
     scene.world = _world()
+    scene.unit_settings.length_unit = "ADAPTIVE"  # hair has millimetres
     collection = scene.collection
     head = bust_object("Head", skin)
     head.rotation_mode = "XYZ"
