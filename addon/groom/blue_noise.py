@@ -16,12 +16,14 @@ than their roots share the room.
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..arrays import Floats, Ints
 from ..errors import HairloomError
+from ..strands.side_by_side import even_parts, side_by_side
 from .counter_random import named, uniform
 from .dart_throwing import SampleCells, Samples, first_come
 from .triangle_subdivision import Pieces
@@ -38,6 +40,8 @@ _SAMPLES, _BATCHES = 3.0, 3
 _FULL, _FIRST_SURE = 0.02, 500.0
 #: Where hair grows more thinly than this part of the densest place, distances grow no more.
 _THINNEST = 2.0**-12
+#: A thread has about this many darts at the least.
+_OF_THREAD = 4096
 #: Plain roots drawn at once where the surface is full.
 _PLAIN = 65_536
 
@@ -114,12 +118,20 @@ class _Target:
         points of such a one are spacings of three random cuts, two of them joined
         (Devroye 1986, chapter V.2: Dirichlet with 2, 1, 1).
         """
-        piece_key = named(self.key, stream)
-        wanted = self.mass * (count / self.whole_mass)
+        least = int(_OF_THREAD * len(self.mass) / max(count * self.part, 1.0)) + 1
+        parts = even_parts(len(self.mass), least)
+        found = side_by_side(lambda some: self._samples(count, stream, some), parts)
+        return functools.reduce(Samples.and_also, found)
+
+    def _samples(self, count: float, stream: Ints, some: slice) -> Samples:
+        """Those on some of the pieces."""
+        piece_key = named(self.key[some], stream)
+        wanted = self.mass[some] * (count / self.whole_mass)
         counts = np.floor(wanted + uniform(piece_key, 0)).astype(np.int64)
         piece = np.repeat(np.arange(len(counts)), counts)
         number = np.arange(len(piece)) - np.repeat(np.cumsum(counts) - counts, counts)
         key = named(piece_key[piece], 1 + number)
+        piece += some.start
         density = self.density.take(piece, axis=0)
         reached = np.cumsum(density, axis=1)
         corner = (uniform(key, 0)[:, None] * reached[:, 2:] >= reached[:, :2]).sum(axis=1)

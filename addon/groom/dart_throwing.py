@@ -7,7 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays import Bools, Floats, Ints
+from ..strands.side_by_side import even_parts, side_by_side
 from ..strands.vectors import dot_rows
+
+#: A thread has at least this many darts.
+_OF_THREAD = 4096
 
 
 @dataclass(frozen=True)
@@ -84,6 +88,14 @@ class SampleCells:
 
     def covers(self, samples: Samples) -> Bools:
         """Whether a point lies too near to each of the darts, (n,)."""
+        parts = even_parts(len(samples), _OF_THREAD)
+        if len(parts) == 1:
+            return self._covers(samples)
+        rows = np.arange(len(samples))
+        found = side_by_side(lambda some: self._covers(samples.take(rows[some])), parts)
+        return np.concatenate(found)
+
+    def _covers(self, samples: Samples) -> Bools:
         covered = np.zeros(len(samples), bool)
         place = np.ascontiguousarray(samples.point.T)
         for octave in self._octaves:

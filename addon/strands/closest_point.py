@@ -17,6 +17,7 @@ import numpy as np
 from ..arrays import Bools, Floats, Ints
 from ..errors import HairloomError
 from .point_clusters import PointClusters, clustered
+from .side_by_side import side_by_side
 from .surface import Surface
 from .triangle_distance import TriangleForms
 from .triangle_tree import TriangleTree, build_tree
@@ -141,8 +142,8 @@ class ClosestPointSearch:
 
     def _search_all(self, points: Floats, reach: float) -> Ints:
         """The nearest triangle of each point, each for itself."""
-        starts = range(0, len(points), _CHUNK)
-        found = [self._search(points[i : i + _CHUNK], reach) for i in starts]
+        chunks = (points[i : i + _CHUNK] for i in range(0, len(points), _CHUNK))
+        found = side_by_side(lambda chunk: self._search(chunk, reach), chunks)
         return np.concatenate([np.zeros(0, np.int64), *found])
 
     def _search(self, points: Floats, reach: float) -> Ints:

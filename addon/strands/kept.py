@@ -16,10 +16,14 @@ import numpy as np
 
 from ..arrays import Floats, Ints
 from .nearest import nearest_points
+from .side_by_side import even_parts, side_by_side
 
 #: What the numbers of a row are multiplied by to find it: odd, so that rows that differ in one
 #: number alone never look alike.
 _FACTORS = np.random.default_rng(7).integers(0, 1 << 63, 1 << 13, np.uint64) * 2 + 1
+
+#: A thread has at least this many rows to make something of.
+_OF_THREAD = 2048
 
 type Rows = tuple[Any, ...]
 
@@ -45,14 +49,15 @@ class Kept:
         Args:
             fixed: all else that it depends on, which is compared.
             rows: arrays (n, ...) of which each row of the answer depends on the same row alone.
-            make: arrays (k, ...) of some rows (k,), which are not to be changed afterwards.
+            make: arrays (k, ...) of some rows (k,), which are not to be changed afterwards; is
+                called from several threads.
         """
         if self._forgets:
-            return make(np.arange(len(rows[0])))
+            return _made(make, np.arange(len(rows[0])))
         bits = np.concatenate([_bits(each) for each in rows], axis=1)
         last = self._rows.get(name)
         if last is None or last.fixed != fixed or last.bits.shape[1] != bits.shape[1]:
-            made = make(np.arange(len(bits)))
+            made = _made(make, np.arange(len(bits)))
         else:
             made = last.made_of(bits, make)
         self._rows[name] = _MadeRows(fixed, bits, made)
@@ -91,7 +96,7 @@ class _MadeRows:
             return self.made
         result = tuple(each[found] for each in self.made)
         if len(missing):
-            for whole, part in zip(result, make(missing), strict=True):
+            for whole, part in zip(result, _made(make, missing), strict=True):
                 whole[missing] = part
         return result
 
@@ -125,6 +130,14 @@ class _Nearest:
             stale[rest] = gap[:, 0] <= distance[rest, -1]
         index[stale], distance[stale] = nearest_points(places[stale], among, self.count)
         return index, distance
+
+
+def _made(make: Callable[[Ints], Rows], rows: Ints) -> Rows:
+    """What is made of these rows, in several threads."""
+    parts = side_by_side(lambda some: make(rows[some]), even_parts(len(rows), _OF_THREAD))
+    if len(parts) == 1:
+        return parts[0]
+    return tuple(np.concatenate(each) for each in zip(*parts, strict=True))
 
 
 def same_rows(rows: Any, among: Any) -> Ints:

@@ -5,9 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from ..arrays import Floats, Ints
+from .side_by_side import THREADS, side_by_side
 
 #: Distances measured at once: few enough for the cache, many enough for numpy.
 _TABLE = 65_536
+#: Places of which a part goes to another thread.
+_MANY = 4096
 
 
 def nearest_points(places: Floats, among: Floats, count: int) -> tuple[Ints, Floats]:
@@ -32,11 +35,19 @@ def nearest_points(places: Floats, among: Floats, count: int) -> tuple[Ints, Flo
     place, point = (
         np.ascontiguousarray(np.asarray(each).T, np.float64) for each in (places, among)
     )
+    begin: list[Ints] = [np.arange(len(places))] if len(places) else []
+    while len(begin) < THREADS and len(places) > _MANY:
+        begin = [half for own in begin for half in _halves(own, place.take(own, axis=1))]
+    side_by_side(lambda own: _search(own, place, point, index, distance), begin)
+    return index, distance
+
+
+def _search(own: Ints, place: Floats, point: Floats, index: Ints, distance: Floats) -> None:
+    """The answer for some places, see `nearest_points`, in rows."""
+    kept = index.shape[1]
     # memory that is asked for again takes as long as what is done in it
-    memory = np.empty((2, max(_TABLE, len(among))))
-    parts: list[tuple[Ints, Ints]] = []
-    if len(places):
-        parts.append((np.arange(len(places)), np.arange(len(among))))
+    memory = np.empty((2, max(_TABLE, point.shape[1])))
+    parts: list[tuple[Ints, Ints]] = [(own, np.arange(point.shape[1]))]
     while parts:
         own, possible = parts.pop()
         here = place.take(own, axis=1)
@@ -45,9 +56,7 @@ def nearest_points(places: Floats, among: Floats, count: int) -> tuple[Ints, Flo
             point, possible, kept, (low + high) / 2.0, (high - low) / 2.0, memory
         )
         if len(own) > 1 and len(own) * len(possible) > _TABLE:
-            halves = own[here[(high - low).argmax()].argpartition(len(own) // 2)]
-            middle = (len(halves) + 1) // 2
-            parts += [(half, possible) for half in (halves[:middle], halves[middle:])]
+            parts += [(half, possible) for half in _halves(own, here)]
             continue
         squared = _squared(here, there, memory)
         rows = np.arange(len(own))
@@ -56,7 +65,14 @@ def nearest_points(places: Floats, among: Floats, count: int) -> tuple[Ints, Flo
             index[own, rank] = possible[best]
             distance[own, rank] = np.sqrt(squared[rows, best])
             squared[rows, best] = np.inf
-    return index, distance
+
+
+def _halves(own: Ints, here: Floats) -> tuple[Ints, Ints]:
+    """Some places, which lie here, (3, n), in two halves along their longest side."""
+    along = here[np.ptp(here, axis=1).argmax()]
+    halves = own[along.argpartition(len(own) // 2)]
+    middle = (len(halves) + 1) // 2
+    return halves[:middle], halves[middle:]
 
 
 def _squared(places: Floats, points: Floats, memory: Floats) -> Floats:

@@ -175,7 +175,7 @@ def prepared(
     with ThreadPoolExecutor(1) as beside:
         # here, as the window's first frame would wait for it; numpy leaves room for both
         riders = beside.submit(lambda: rig.riders)
-        groom = _drawn(rig, ambient, known, with_occluders, report)
+        groom = _drawn(rig, ambient, known, with_occluders, report, beside)
         riders.result()
     return groom
 
@@ -186,17 +186,20 @@ def _drawn(
     known: PreparedGroom | None,
     with_occluders: bool,
     report: Report,
+    beside: ThreadPoolExecutor,
 ) -> PreparedGroom:
-    """As `prepared`, without what moves it."""
+    """As `prepared`, without what moves it; light off the skin is found beside the rest."""
     if known is not None and not _same_hair(known.rig, rig):
         known = None
+    seen = None
     if known is not None and known.occlusion is not None and known.ambient == ambient:
-        occlusion, openness, seen = known.occlusion, known.openness, known.skin_seen
+        occlusion, openness, found = known.occlusion, known.openness, known.skin_seen
     else:
-        cells, axes = pipeline.shade_cells(rig, ambient), pipeline.strand_axes(rig.strands)
+        axes = pipeline.strand_axes(rig.strands)
+        seen = beside.submit(pipeline.rest_skin_seen, rig, rig.strands.points, axes)
+        cells = pipeline.shade_cells(rig, ambient)
         occlusion = pipeline.rest_occlusion(rig, ambient, cells=cells)
         openness = pipeline.rest_openness(rig, ambient, axes, cells)
-        seen = pipeline.rest_skin_seen(rig, rig.strands.points, axes)
     report("what the head hides")
     occluders = None if known is None else known.occluders
     if occluders is None and rig.head is not None and with_occluders:
@@ -204,8 +207,9 @@ def _drawn(
         corners = np.stack([roots.min(axis=0), roots.max(axis=0)])
         occluders = rig.head.latest(OccluderSpheres, corners)
     rank = pipeline.strand_ranks(rig)
+    found = seen.result() if seen else found
     shown = PreparedGroom(rig, ambient, occlusion, rank, occluders)
-    return replace(shown, openness=openness, skin_seen=seen)
+    return replace(shown, openness=openness, skin_seen=found)
 
 
 def placeholder(request: BuildRequest) -> PreparedGroom:

@@ -1,0 +1,26 @@
+"""Work in several threads: numpy lets the others go on while it counts."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable
+from concurrent.futures import ThreadPoolExecutor
+from itertools import pairwise
+
+THREADS = min(4, os.cpu_count() or 1)
+
+
+def side_by_side[T, R](make: Callable[[T], R], parts: Iterable[T]) -> list[R]:
+    """What `make` makes of each part, in the order of these; it may not depend on other parts."""
+    waiting = list(parts)
+    if len(waiting) < 2 or THREADS < 2:
+        return [make(part) for part in waiting]
+    with ThreadPoolExecutor(THREADS) as threads:
+        return list(threads.map(make, waiting))
+
+
+def even_parts(count: int, least: int) -> list[slice]:
+    """One part of `count` rows for each thread, none with fewer than `least` if there are more."""
+    number = max(min(THREADS, count // least), 1)
+    bounds = [count * i // number for i in range(number + 1)]
+    return [slice(*ends) for ends in pairwise(bounds)]
