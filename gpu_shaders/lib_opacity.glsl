@@ -89,19 +89,34 @@ float start_depth(uint kept)
   return min(float(kept) / {{start_scale}}, 1.0);
 }
 
-// Thickness of the hair between its first and its last depth in what was kept, but for sheets; where
-// the last one is not known, all of depth.
-float kept_thickness(uint first, uint last)
-{
-  float end = 1.0 - start_depth(last);
-  return last > uint({{start_scale}}) ? 1.0 : max(end - start_depth(first), {{min_thickness}});
-}
+// Where deep layers start, and how thick they are together: planes over a block of texels. x in its
+// middle, yz how much it changes from texel to texel.
+struct LayerSpan {
+  vec2 middle;
+  vec3 start;
+  vec3 thickness;
+};
 
-// Of a texel's deep layers: x where they start, y one over how thick they are together.
-vec2 layer_span(usampler2D starts, ivec2 texel, int map, int resolution)
+LayerSpan layer_span(sampler2D spans, ivec2 texel, int map, int resolution)
 {
   int side = resolution / {{start_texels}};
-  ivec2 at = texel / {{start_texels}} + ivec2(0, map * side);
-  uint first = texelFetch(starts, at, 0).x, last = texelFetch(starts, at + ivec2(side, 0), 0).x;
-  return vec2(start_depth(first), 1.0 / kept_thickness(first, last));
+  ivec2 block = texel / {{start_texels}}, at = block + ivec2(0, map * side);
+  return LayerSpan((vec2(block) + 0.5) * float({{start_texels}}),
+                   texelFetch(spans, at, 0).xyz,
+                   texelFetch(spans, at + ivec2(side, 0), 0).xyz);
+}
+
+// x where layers start at a place [texels], y one over how thick they are.
+vec2 layers_at(LayerSpan span, vec2 place)
+{
+  vec3 weights = vec3(1.0, place - span.middle);
+  return vec2(dot(span.start, weights),
+              1.0 / max(dot(span.thickness, weights), {{min_thickness}}));
+}
+
+// At which fraction of the layers a depth at a place [texels] lies.
+float layer_fraction(LayerSpan span, vec2 place, float depth)
+{
+  vec2 layers = layers_at(span, place);
+  return (depth - layers.x) * layers.y;
 }

@@ -1,7 +1,7 @@
 // What light meets on its way from a light to a place, and beyond, from the maps.
 //
 // Twin of look_up in addon/shading/volume/opacity.py. Reads the block `opacity`, the texture arrays
-// `opacity_0` to `opacity_5`, as many as SLOTS says, `opacity_meshes`, and `opacity_starts` where
+// `opacity_0` to `opacity_5`, as many as SLOTS says, `opacity_meshes`, and `opacity_spans` where
 // layers are DEEP.
 //
 // Texel t of a map lies in array t % SLOTS, since one framebuffer cannot hold several layers of one
@@ -97,8 +97,10 @@ vec3 light_path(int light, vec3 point)
     ivec2 middle = (2 * texel + 1) * mesh_side / (2 * opacity.resolution);
     float mesh = texelFetch(opacity_meshes, ivec3(middle, map), 0).x;
     // each texel's layers start elsewhere, so that its own tau is found before they are blended
-    vec2 span = layer_span(opacity_starts, texel, map, opacity.resolution);
-    tau += weight * summed_layers(map, place.xy, texel, (vec2(depth, mesh) - span.x) * span.y);
+    LayerSpan span = layer_span(opacity_spans, texel, map, opacity.resolution);
+    vec2 depths = vec2(layer_fraction(span, scaled + 0.5, depth),
+                       layer_fraction(span, vec2(texel) + 0.5, mesh));
+    tau += weight * summed_layers(map, place.xy, texel, depths);
   }
 #else
   tau = summed_layers(map, place.xy, ivec2(0), vec2(depth, meshes.y));

@@ -1,9 +1,9 @@
 // Points of strands at which opacity maps keep the depths of the first and the last hair: a few of each
 // segment, at least one in each texel of `starts` that it meets.
 //
-// Reads the block `opacity` and the integer `light_index`.
+// Reads the block `opacity`, the integer `light_index` and the texture array `opacity_meshes`.
 #include "lib_strand_texel.glsl"
-#include "lib_opacity.glsl"
+#include "lib_opacity_hidden.glsl"
 
 // Texels of `starts` along one side of a map.
 int starts_side()

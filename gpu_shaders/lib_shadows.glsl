@@ -74,15 +74,45 @@ vec3 light_left(vec3 path, vec3 forward)
   return path.z * exp(-max(path.x, 0.0) * (1.0 - forward));
 }
 
+#if SHADOWS
+// How much of a strand or card at a point counts towards tau there, since tau grows evenly through the
+// layer in which it lies. Twin of own_fraction in addon/shading/volume/opacity.py.
+float own_fraction(int light, vec3 point)
+{
+  vec3 place = map_place(opacity, light, point);
+  float depth = min(place.z, 1.0), bias = opacity.bias;
+#  if DEEP
+  ivec2 texel_at = clamp(ivec2(place.xy * float(opacity.resolution)), 0, opacity.resolution - 1);
+  LayerSpan span = layer_span(
+      opacity_spans, texel_at, int(opacity.light[light].x), opacity.resolution);
+  vec2 layers = layers_at(span, place.xy * float(opacity.resolution));
+  depth = min((depth - layers.x) * layers.y, 1.0);
+  bias *= layers.y;
+#  endif
+  float before = 0.0;
+  for (int texel = 0; texel < opacity.layer_texels; texel++) {
+    for (int lane = 0; lane < 4; lane++) {
+      float end = opacity.ends[texel][lane];
+      if (depth <= end) {
+        return clamp((depth - bias - before) / (end - before), 0.0, 1.0);
+      }
+      before = end;
+    }
+  }
+  return 0.0;
+}
+#endif
+
 // As shadow_path, for a place of a strand of this radius [m] and opacity, which is in the maps as
-// well: it does not lie behind itself.
+// well: it is not in its own way, nor behind itself.
 vec3 shadow_path_to_strand(int index, vec3 point, vec3 tangent, float radius, float hides)
 {
   vec3 path = shadow_path(index, point);
 #if SHADOWS
   if (path.x >= 0.0) {
-    float own = hides * own_depth_at(opacity, index, point, tangent, radius);
-    path.y = max(path.y - opacity.extinction * own, 0.0);
+    float own = opacity.extinction * hides * own_depth_at(opacity, index, point, tangent, radius);
+    float fraction = own_fraction(index, point);
+    path.xy = max(path.xy - own * vec2(fraction, 1.0 - fraction), 0.0);
   }
 #endif
   return path;

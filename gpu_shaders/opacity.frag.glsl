@@ -7,11 +7,15 @@
 #ifdef CARDS
 #  include "lib_card_opacity.glsl"
 #  include "lib_card_texture.glsl"
+#  include "lib_opacity_hidden.glsl"
 #endif
 
 void main()
 {
 #ifdef CARDS
+  if (is_hidden_from_texels(vec3(gl_FragCoord.xy / float(opacity.resolution), strand_depth))) {
+    discard;
+  }
   vec4 steps = vec4(dFdx(card_uv), dFdy(card_uv));
   float alpha = card_texel(alpha_texture, card_uv, steps, atlas_tiles).x;
   float strand_weight = card_thickness * card_optical_depth(alpha);
@@ -22,10 +26,10 @@ void main()
 #endif
   float behind = strand_depth;
 #if DEEP
-  vec2 span = layer_span(
-      opacity_starts, ivec2(gl_FragCoord.xy), map_index, opacity.resolution);
+  LayerSpan span = layer_span(
+      opacity_spans, ivec2(gl_FragCoord.xy), map_index, opacity.resolution);
   // what was not met by the points that fill `starts` counts to the last layer
-  behind = min((behind - span.x) * span.y, 1.0);
+  behind = min(layer_fraction(span, gl_FragCoord.xy, behind), 1.0);
 #endif
   layers_0 = strand_weight * adds_to(behind, opacity.ends[first_texel]);
 #if TARGETS > 1

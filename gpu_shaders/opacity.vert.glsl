@@ -3,7 +3,7 @@
 // onto it. What a mesh hides from the light has no width: light does not come there anyway. UNEVEN:
 // points say how far along their strand they are; else they are evenly spaced.
 #include "lib_strand_texel.glsl"
-#include "lib_opacity.glsl"
+#include "lib_opacity_hidden.glsl"
 
 vec4 map_position(vec3 point)
 {
@@ -14,21 +14,10 @@ vec4 map_position(vec3 point)
               (2.0 * depth - 1.0) * w, w);
 }
 
-// Whether the first mesh hides a place of the map, and what is this far around it, from the light.
-bool is_hidden(vec4 clip, float around)
+// Place in the map, xy in 0..1, and depth.
+vec3 place_of(vec4 clip)
 {
-  int side = textureSize(opacity_meshes, 0).x, map = int(opacity.light[light_index].x);
-  float w = max(clip.w, 1.0e-6);
-  float depth = depth_before_meshes(opacity, 0.5 * clip.z / w + 0.5);
-  vec2 place = 0.5 * clip.xy / w + 0.5;
-  for (int corner = 0; corner < 4; corner++) {
-    vec2 aside = around * (2.0 * vec2(corner & 1, corner >> 1) - 1.0);
-    ivec2 texel = clamp(ivec2((place + aside) * float(side)), ivec2(0), ivec2(side - 1));
-    if (depth <= texelFetch(opacity_meshes, ivec3(texel, map), 0).x) {
-      return false;
-    }
-  }
-  return true;
+  return 0.5 * clip.xyz / max(clip.w, 1.0e-6) + 0.5;
 }
 
 void main()
@@ -58,7 +47,8 @@ void main()
   float drawn = max(half_width, 0.5);
   // a look-up blends over a texel to each side of what a strand covers
   float around = (drawn + 1.0) / texels;
-  bool hidden = is_hidden(clip, around) && is_hidden(from, around) && is_hidden(to, around);
+  bool hidden = is_hidden(place_of(clip), around) && is_hidden(place_of(from), around) &&
+                is_hidden(place_of(to), around);
 
   strand_weight = strand_step * strands.opacity * half_width / drawn;
   strand_depth = 0.5 * clip.z / clip.w + 0.5;

@@ -14,7 +14,7 @@ void main()
   StartSegment segment = start_segment(root_side, tip_side);
   int most = min(segment.count, points_across), i = 1 + gl_VertexID % points_across;
   vec3 place = mix(segment.from, segment.to, float(i) / float(max(most, 1)));
-  bool is_there = point <= last && i <= most;
+  bool is_there = point <= last && i <= most && !is_hidden_from_texels(place);
   // in the middle of its texel: drivers move points by a little, which might be into the next one
   float side = float(starts_side());
   vec3 middle = vec3((floor(place.xy * side) + 0.5) / side, clamp(place.z, 0.0, 1.0));

@@ -29,6 +29,9 @@ void main()
   vec3 tip_side = texelFetch(cv_points, span_texel(span, at.x), 0).xyz;
   StartSegment segment = start_segment(root_side, tip_side);
   for (int i = 1; i <= segment.count; i++) {
-    keep_first_and_last(mix(segment.from, segment.to, float(i) / float(segment.count)));
+    vec3 place = mix(segment.from, segment.to, float(i) / float(segment.count));
+    if (!is_hidden_from_texels(place)) {
+      keep_first_and_last(place);
+    }
   }
 }

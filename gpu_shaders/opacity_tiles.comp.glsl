@@ -41,7 +41,8 @@ float shown(int tile, ivec2 texel)
 {
 #if DEEP
   if (tile == 0) {
-    return 1.0 - layer_span(opacity_starts, texel, map_index, opacity.resolution).x;
+    LayerSpan span = layer_span(opacity_spans, texel, map_index, opacity.resolution);
+    return 1.0 - layers_at(span, vec2(texel) + 0.5).x;
   }
 #endif
   int layer = tile - DEEP;

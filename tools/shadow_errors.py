@@ -15,6 +15,7 @@ from hairloom.addon.shading.volume.light_frame import ball_around, light_frame
 from hairloom.addon.shading.volume.map_size import START_TEXELS
 from hairloom.addon.shading.volume.opacity import (
     Coverage,
+    LayerSpans,
     coverage,
     layer_ends,
     layer_weights,
@@ -26,22 +27,29 @@ RESOLUTION, POINTS = 512, 10_000
 SLICES, LAYERS = (4, 8, 16, 64, 255), (4, 8, 16)
 
 
+def slice_spans(resolution: int) -> LayerSpans:
+    """Of slices: all of depth, in each texel."""
+    all_of_it = np.tile([1.0, 0.0, 0.0], (resolution, resolution, 1))
+    return LayerSpans(0.0 * all_of_it, all_of_it, 1)
+
+
 @dataclass(frozen=True)
 class Places:
     """Random places of strands, what was counted there, and what maps are made of."""
 
     exact: Coverage
     texel: np.ndarray
+    place: np.ndarray
     depth: np.ndarray
     counted: np.ndarray
 
     def error(self, settings: VolumeSettings, ends: np.ndarray) -> float:
         """With layers that end there; spans as coarse as the shader has them."""
-        starts, thickness = np.zeros(RESOLUTION**2), np.ones(RESOLUTION**2)
+        spans = slice_spans(RESOLUTION)
         if settings.shadows == "deep":
-            starts, thickness = self.exact.span(START_TEXELS)
-        behind = (self.depth - starts[self.texel]) / thickness[self.texel]
-        layers = self.exact.layers(ends, starts, thickness)[self.texel]
+            spans = self.exact.spans(START_TEXELS)
+        behind = spans.fraction(*np.divmod(self.texel, RESOLUTION), self.place, self.depth)
+        layers = self.exact.layers(ends, spans)[self.texel]
         return self.error_of((layers * layer_weights(behind, ends)).sum(axis=1))
 
     def error_of(self, tau: np.ndarray) -> float:
@@ -79,6 +87,7 @@ def _places(strands: np.ndarray, radius: float, sun: Light) -> Places:
     points = strands.reshape(-1, 3)
     chosen = np.random.default_rng(1).integers(len(points), size=POINTS)
     place, depth = frame.places(points[chosen])
-    column, row = np.floor(place * RESOLUTION).astype(np.int64).T
+    place *= RESOLUTION
+    column, row = np.floor(place).astype(np.int64).T
     texel, depth = row * RESOLUTION + column, depth - VolumeSettings().bias
-    return Places(exact, texel, depth, transmittance(exact.optical_depth(texel, depth), 1.0))
+    return Places(exact, texel, place, depth, transmittance(exact.optical_depth(texel, depth), 1.0))

@@ -76,7 +76,7 @@ class _Cards:
             defines={"VIEW_COMPENSATED": int(self.is_view_compensated)},
         )
 
-    def draw_layers(self, features: Sequence[ShaderFeature], meshes: ShaderFeature) -> None:
+    def draw_layers(self, features: Sequence[ShaderFeature]) -> None:
         shader = bound(
             _LAYERS_RECIPE,
             [*features, self.feature],
@@ -89,7 +89,7 @@ class _Cards:
         """Depths of the first and the last card."""
 
         def draw() -> None:
-            features, numbers = [place, self.feature], {"min_alpha": MIN_ALPHA}
+            features, numbers = [place, maps.mesh_feature, self.feature], {"min_alpha": MIN_ALPHA}
             shader = bound(_DEPTH_RECIPE, features, self.blocks, numbers=numbers)
             self.batch.draw(shader.shader)
 

@@ -1,17 +1,20 @@
 """The lights' opacity maps: how much hair lies between each light and every place.
 
     starts  R32UI: depths of the first and the last hair, where layers are deep
+    spans   RGBA32F: where layers start and how thick they are, with how both go on from block to
+            block
     meshes  depth array: of the first mesh
     slots   RGBA32F arrays, as many as a framebuffer is given at once, at most six: four layers a
             texel
 
-Each light that throws shadows has a map: in `starts` one square above the other, the last hair's
-to the right of the first one's; in the slots as many layers of an array as it takes passes to draw
-all its texels, texel t in slot t % slots.
+Each light that throws shadows has a map: in `starts` and `spans` one square above the other, the
+last hair's, or thickness, to the right of the first one's; in the slots as many layers of an array
+as it takes passes to draw all its texels, texel t in slot t % slots.
 
-Drawn are first the depths of meshes, then where deep layers start and end, then the sums of the
-layers by additive blending. What has not changed since the last draw is not drawn again, so that a
-moving camera costs nothing. Lights that are attached to a view which moves lag a little behind it.
+Drawn are first the depths of meshes; then where deep layers start and end, but for hair that meshes
+hide; then the sums of the layers by additive blending. What has not changed since the last draw is
+not drawn again, so that a moving camera costs nothing. Lights that are attached to a view which
+moves lag a little behind it.
 """
 
 from __future__ import annotations
@@ -41,6 +44,14 @@ from .textures import drawing_into, drawing_state
 _NOTHING = (0.0, 0.0, 0.0, 0.0)
 #: while a view turns, shadows lag behind its lights by about this angle, and never by more [rad]
 _LAG, _MAX_LAG = float(np.radians(8.0)), float(np.radians(20.0))
+_SPANS_RECIPE = ShaderRecipe(
+    name="opacity_spans",
+    compute="opacity_spans.comp.glsl",
+    structs=("struct_opacity.glsl",),
+    textures=(("UINT_2D", "starts"),),
+    images=(("RGBA32F", "spans"),),
+    integers=("map_index", "side"),
+)
 _NO_STARTS_RECIPE = ShaderRecipe(
     name="opacity_no_starts",
     compute="opacity_no_starts.comp.glsl",
@@ -58,11 +69,17 @@ class OpacityMaps:
     slots: tuple[Any, ...]
     meshes: Any
     starts: Any = None
+    spans: Any = None
 
     @property
     def passes(self) -> int:
         """How many layers of each slot a map has: one a pass that draws it."""
         return self.size.passes
+
+    @property
+    def mesh_feature(self) -> ShaderFeature:
+        """What a program has that leaves out hair behind meshes, whose depths are drawn by then."""
+        return ShaderFeature(textures={"opacity_meshes": ("DEPTH_2D_ARRAY", self.meshes)})
 
     @property
     def feature(self) -> ShaderFeature:
@@ -72,7 +89,7 @@ class OpacityMaps:
         named["opacity_meshes"] = ("DEPTH_2D_ARRAY", self.meshes)
         is_deep = self.starts is not None
         if is_deep:
-            named["opacity_starts"] = ("UINT_2D", self.starts)
+            named |= self.span_feature.textures
         return ShaderFeature(
             name=f"{len(self.slots)}_{'deep' if is_deep else 'slices'}",
             blocks={"opacity": ("Opacity", self.values)},
@@ -84,6 +101,25 @@ class OpacityMaps:
                 "PASSES": self.passes,
             },
         )
+
+    @property
+    def span_feature(self) -> ShaderFeature:
+        """What a program has that knows where deep layers start and end."""
+        return ShaderFeature(
+            name="deep", textures={"opacity_spans": ("FLOAT_2D", self.spans)}, defines={"DEEP": 1}
+        )
+
+    def find_spans(self, number: int) -> None:
+        """Of the first and the last hair that the light of this map meets."""
+        side = self.size.side // START_TEXELS
+        shader = program(_SPANS_RECIPE)
+        shader.bind(
+            textures={"starts": self.starts},
+            images={"spans": self.spans},
+            integers={"map_index": number, "side": side},
+        )
+        gpu.compute.dispatch(shader.shader, -(-side // 8), -(-side // 8), 1)
+        gpu.shader.unbind()
 
     def forget_starts(self, number: int) -> None:
         """As if the light of this map had met no hair."""
@@ -107,7 +143,8 @@ def new_maps(values: Floats, size: MapSize) -> OpacityMaps:
         return OpacityMaps(values, size, arrays, meshes)
     side = size.side // START_TEXELS
     starts = gpu_objects.texture((2 * side, side * size.map_count), format="R32UI")
-    return OpacityMaps(values, size, arrays, meshes, starts)
+    spans = gpu_objects.texture((2 * side, side * size.map_count), format="RGBA32F")
+    return OpacityMaps(values, size, arrays, meshes, starts, spans)
 
 
 class HairInMaps(Protocol):
@@ -124,12 +161,8 @@ class HairInMaps(Protocol):
             number: of the map. place: the block of the maps, and which light it is.
         """
 
-    def draw_layers(self, features: Sequence[ShaderFeature], meshes: ShaderFeature) -> None:
-        """Draw all hair into the bound framebuffer, by a program with these features.
-
-        Args:
-            meshes: the depths of the first mesh, for hair that leaves out what is behind it.
-        """
+    def draw_layers(self, features: Sequence[ShaderFeature]) -> None:
+        """Draw all hair into the bound framebuffer, by a program with these features."""
 
 
 class OpacityDrawing:
@@ -245,19 +278,12 @@ def _draw_map(maps: OpacityMaps, number: int, light: int, hair: HairInMaps) -> N
     place = ShaderFeature(
         blocks={"opacity": ("Opacity", maps.values)}, integers={"light_index": light}
     )
-    meshes = ShaderFeature(textures={"opacity_meshes": ("DEPTH_2D_ARRAY", maps.meshes)})
-    features = [place]
+    features = [place, maps.mesh_feature]
     if maps.starts is not None:
         maps.forget_starts(number)
         hair.draw_starts(maps, number, place)
-        features.append(
-            ShaderFeature(
-                name="deep",
-                textures={"opacity_starts": ("UINT_2D", maps.starts)},
-                integers={"map_index": number},
-                defines={"DEEP": 1},
-            )
-        )
+        maps.find_spans(number)
+        features += [maps.span_feature, ShaderFeature(integers={"map_index": number})]
     slots = len(maps.slots)
     for turn in range(maps.passes):
         layer = number * maps.passes + turn
@@ -275,7 +301,7 @@ def _draw_map(maps: OpacityMaps, number: int, light: int, hair: HairInMaps) -> N
             drawing_state(depth_test="NONE", depth_write=False, blend="ADDITIVE_PREMULT"),
         ):
             target.clear(color=_NOTHING)
-            hair.draw_layers([*features, texels], meshes)
+            hair.draw_layers([*features, texels])
 
 
 def pack_opacity(

@@ -114,14 +114,16 @@ class _Strands:
             self._find_starts(maps, number, place)
         else:
             side = maps.size.side // START_TEXELS
-            draw_starts(maps, number, side, lambda: self._draw_points(side, place))
+            draw_starts(maps, number, side, lambda: self._draw_points(maps, side, place))
 
-    def _draw_points(self, side: int, place: ShaderFeature) -> None:
+    def _draw_points(self, maps: OpacityMaps, side: int, place: ShaderFeature) -> None:
         """What may be the first or the last hair of a texel: two points a texel, along strands as
         long as the map is broad.
         """
         integers = {"first_instance": 0, "points_across": 0}
-        shader = bound(_DEPTH_RECIPE, [place, self.curves], self.blocks, integers=integers).shader
+        shader = bound(
+            _DEPTH_RECIPE, [place, maps.mesh_feature, self.curves], self.blocks, integers=integers
+        ).shader
         for drawn in self.casting.classes:
             across = max(-(-2 * side // drawn.capacity), _FEWEST_POINTS)
             shader.uniform_int("first_instance", drawn.first)
@@ -134,7 +136,7 @@ class _Strands:
         integers = {"map_index": number, "drawn_count": 0, "first_instance": 0}
         shader = bound(
             _STARTS_RECIPE,
-            [place, self.curves],
+            [place, maps.mesh_feature, self.curves],
             self.blocks,
             images={"starts": maps.starts},
             integers=integers,
@@ -146,11 +148,11 @@ class _Strands:
             gpu.compute.dispatch(shader.shader, -(-cvs // 8), -(-drawn.count // 8), 1)
         gpu.shader.unbind()
 
-    def draw_layers(self, features: Sequence[ShaderFeature], meshes: ShaderFeature) -> None:
+    def draw_layers(self, features: Sequence[ShaderFeature]) -> None:
         casting = self.casting
         shader = bound(
             _LAYERS_RECIPE,
-            [*features, meshes, self.curves, self.settings],
+            [*features, self.curves, self.settings],
             self.blocks,
             integers={"first_instance": 0},
             numbers={"strand_step": casting.layout.strand_count / casting.count},

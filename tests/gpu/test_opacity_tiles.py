@@ -80,7 +80,9 @@ def test_deep_layers_have_their_starts_before_them() -> None:
     starts = tile(picture, 0, 3, 64)
     kept = np.asarray(maps.starts.read()).reshape(16, 32)[:, :16]
     kept = np.minimum(kept / float(1 << 24), 1.0)
-    assert np.allclose(starts, 1.0 - np.kron(kept, np.ones((4, 4))), atol=1e-5)
+    # planes: the mean of a block is what its middle has
+    means = starts.reshape(16, 4, 16, 4).mean(axis=(1, 3))
+    assert np.allclose(means, 1.0 - kept, atol=1e-5)
     light = [tile(picture, number, 3, 64).mean() for number in range(1, 9)]
     assert (np.diff(light) <= 1e-6).all() and light[-1] < 0.9
 

@@ -137,19 +137,3 @@ def _coarser(alpha: Floats, axis: int) -> Floats:
     sums = np.add.reduceat(alpha, starts, axis=axis, dtype=np.float32)
     means: Floats = sums / (texels[:, None] if axis == 0 else texels)
     return means
-
-
-def own_fraction(depth: Floats, bias: float, ends: Floats) -> Floats:
-    """How much of a card counts towards tau at the card itself, (...).
-
-    It is part of the sum of the layer in which it lies, and tau grows evenly through that. A card
-    has all its hair in one place, where this matters, unlike strands.
-
-    Args:
-        depth, bias: of the card behind the start of the layers, (...), and how close in front of
-            it nothing counts, in fractions of how thick they are together.
-        ends: of the layers, (n,).
-    """
-    layer = np.minimum(np.searchsorted(ends, depth), len(ends) - 1)
-    start = np.concatenate([[0.0], ends[:-1]])[layer]
-    return np.clip((depth - bias - start) / (ends[layer] - start), 0.0, 1.0)

@@ -26,8 +26,9 @@ MEMORY_LIMIT = 512 * 2**20
 START_TEXELS = 4
 #: colour slots that a framebuffer has
 MAX_SLOTS = 6
-#: sums of four layers in float32; the depth of the first mesh; first and last hair in every block
-_LAYERS_BYTES, _MESH_BYTES, _SPAN_BYTES = 16, 4, 8
+#: sums of four layers in float32; the depth of the first mesh; first and last hair in every block,
+#: and the planes through them
+_LAYERS_BYTES, _MESH_BYTES, _SPAN_BYTES = 16, 4, 8 + 32
 #: texels across the spacing of strands that stand for more than themselves, and across all hair
 _TEXELS_APART, _FEWEST_TEXELS = 2.0, 16
 #: [texels] of a texture on every GPU that Blender supports

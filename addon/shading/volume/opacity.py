@@ -13,6 +13,10 @@ There are two ways to lay the layers, both given by where they end:
             few of them serve a thin fringe and a whole head alike.
 Slices are deep layers that start at 0 and end at 1 everywhere, so that one shader draws both.
 
+First and last hair are known for blocks of texels. From block to block they go on as planes: with
+one depth a block, hair that light grazes would be lit on one side of it and dark on the other. What
+a mesh hides from the light is in no layer, so that the hair before a head has all of them.
+
 All depths are those of light_frame.py, 0 to 1 through the ball. Between the ends of two layers
 tau is taken as linear. Reference of gpu_shaders/lib_opacity.glsl.
 """
@@ -81,49 +85,111 @@ def transmittance(
     return np.exp(-extinction * optical_depth * (1.0 - forward))
 
 
+@dataclass(frozen=True)
+class LayerSpans:
+    """Where deep layers start, and how thick they are together: planes over blocks of texels.
+
+    start, thickness: (side, side, 3) in the middle of a block, and how much it changes from one
+        texel to the next one on the right, and to the one above.
+    block: texels along a side of one.
+    """
+
+    start: Floats
+    thickness: Floats
+    block: int
+
+    @classmethod
+    def between(cls, first: Floats, last: Floats, block: int) -> LayerSpans:
+        """From the first hair to the last one.
+
+        Args:
+            first, last: (side, side) depth of it in each block; where there is none, first lies
+                behind last, and layers start at 1 and are 1 thick.
+        """
+        is_bare = last < first
+        planes = (_plane(np.where(is_bare, np.nan, each), block) for each in (first, last))
+        start, end = (np.where(is_bare[..., None], 0.0, each) for each in planes)
+        start[is_bare, 0], end[is_bare, 0] = 1.0, 2.0
+        return cls(start, end - start, block)
+
+    def at(self, row: Ints, column: Ints, place: Floats) -> tuple[Floats, Floats]:
+        """Where the layers of texels start and how thick they are at a place, (...) each.
+
+        Args:
+            row, column: (...) of the texels. place: (..., 2) column and row in texels, in them or
+                near: planes go on beyond their blocks.
+        """
+        row, column = row // self.block, column // self.block
+        aside = place - (np.stack([column, row], axis=-1) + 0.5) * self.block
+        weights = np.concatenate([np.ones_like(aside[..., :1]), aside], axis=-1)
+        start, thickness = (
+            (plane[row, column] * weights).sum(axis=-1) for plane in (self.start, self.thickness)
+        )
+        return start, np.maximum(thickness, MIN_THICKNESS)
+
+    def fraction(self, row: Ints, column: Ints, place: Floats, depth: Floats) -> Floats:
+        """At which fraction of the layers of texels a depth at a place lies, see `at`."""
+        start, thickness = self.at(row, column, place)
+        return (depth - start) / thickness
+
+
+def _plane(depth: Floats, block: int) -> Floats:
+    """See LayerSpans, (side, side, 3). depth: (side, side), nan where there is no hair.
+
+    From block to block it changes as it does on that side where it does so less, and not at all
+    towards a block that has no hair, or where it is the first or the last of its neighbours: a lock
+    before the others is no slope (van Leer 1979, the minmod limiter).
+    """
+    planes = [depth]
+    for axis in (1, 0):
+        steps = np.diff(depth, axis=axis, prepend=np.nan, append=np.nan)
+        before, after = (np.delete(steps, end, axis=axis) for end in (-1, 0))
+        is_slope = before * after > 0.0  # nan is not
+        smaller = np.where(np.abs(before) < np.abs(after), before, after)
+        planes.append(np.where(is_slope, smaller, 0.0) / block)
+    return np.stack(planes, axis=-1)
+
+
 def look_up(
     layers: Floats,
-    starts: Floats,
+    spans: LayerSpans,
     meshes: Floats,
     ends: Floats,
     places: Floats,
     depth: Floats,
     bias: float,
-    thickness: Floats | None = None,
 ) -> tuple[Floats, Floats, Floats]:
     """What light meets on its way, blended between the four texels around each place of a map.
 
     Args:
         layers: (resolution, resolution, n) sums, row by row.
-        starts: (resolution, resolution) depth at which each texel's layers start.
+        spans: of these texels.
         meshes: (side, side) depth of the first mesh, 1 where there is none; in texels of their own.
         ends: (n,).
         places: (m, 2) in 0..1. depth: (m,).
         bias: strands this close in front do not count, nor do meshes, but for them it is at least
             MIN_MESH_BIAS.
-        thickness: (resolution, resolution) of each texel's layers together; None is 1.
 
     Returns:
         tau up to each place, tau from there on to the first mesh, and the fraction of the light
         that no mesh is in the way of; each (m,).
     """
     resolution = len(layers)
-    thick = np.ones_like(starts) if thickness is None else thickness
     inside = np.minimum(depth, 1.0) - bias
     before_meshes = np.minimum(depth, 1.0) - max(bias, MIN_MESH_BIAS)
     tau, beyond, lit = np.zeros((3, len(places)))
     for row, column, weight in _corners(places, len(meshes)):
         lit += weight * (before_meshes <= meshes[row, column])
     for row, column, weight in _corners(places, resolution):
-        sums, start = layers[row, column], starts[row, column]
+        sums = layers[row, column]
         middle_row, middle_column = (
             (2 * each + 1) * len(meshes) // (2 * resolution) for each in (row, column)
         )
         mesh = meshes[middle_row, middle_column]
-        size = thick[row, column]
-        weights = layer_weights((inside - start) / size, ends)
+        middle = np.stack([column, row], axis=-1) + 0.5
+        weights = layer_weights(spans.fraction(row, column, places * resolution, inside), ends)
         tau += weight * np.einsum("mn,mn->m", sums, weights)
-        weights = layer_weights((mesh - start) / size, ends)
+        weights = layer_weights(spans.fraction(row, column, middle, mesh), ends)
         beyond += weight * np.einsum("mn,mn->m", sums, weights)
     is_inside = ((places >= 0.0) & (places <= 1.0)).all(axis=1)
     tau, beyond = np.where(is_inside, tau, 0.0), np.where(is_inside, beyond, 0.0)
@@ -167,17 +233,33 @@ def own_depth(half_width: Floats) -> Floats:
     return half_width / drawn * met * (2.0 - met)
 
 
+def own_fraction(depth: Floats, bias: float, ends: Floats) -> Floats:
+    """How much of a strand or a card counts towards tau at itself, (...).
+
+    It is part of the sum of the layer in which it lies, and tau grows evenly through that.
+
+    Args:
+        depth, bias: of it behind the start of the layers, (...), and how close in front of
+            it nothing counts, in fractions of how thick they are together.
+        ends: of the layers, (n,).
+    """
+    layer = np.minimum(np.searchsorted(ends, depth), len(ends) - 1)
+    start = np.concatenate([[0.0], ends[:-1]])[layer]
+    return np.clip((depth - bias - start) / (ends[layer] - start), 0.0, 1.0)
+
+
 @dataclass(frozen=True)
 class Coverage:
     """Strands as a light sees them, in pieces smaller than a texel.
 
     texel: (n,) number of the texel, row by row; only pieces inside of the map.
-    depth: (n,) of each piece's middle.
+    place: (n, 2) of each piece's middle, in texels. depth: (n,) of it.
     covered: (n,) fraction of the texel's area.
     """
 
     resolution: int
     texel: Ints
+    place: Floats
     depth: Floats
     covered: Floats
 
@@ -190,27 +272,22 @@ class Coverage:
         upto = np.searchsorted(key, texel + np.clip(depth, 0.0, 1.0 - 1e-9))
         return summed[upto] - summed[before]
 
-    def span(self, block: int = 1) -> tuple[Floats, Floats]:
-        """Where each texel's deep layers start, and how thick they are, (resolution^2,) each.
-
-        From the first to the last piece in its block of that many texels each way; 1 and 1 where
-        there is none.
+    def spans(self, block: int = 1) -> LayerSpans:
+        """Where deep layers start and end: at the first and the last piece in blocks of as many
+        texels each way.
         """
         side = self.resolution // block
         row, column = np.divmod(self.texel, self.resolution)
         of_piece = row // block * side + column // block
-        first, last = np.ones(side**2), np.full(side**2, -1.0)
+        first, last = np.full((2, side**2), np.inf) * [[1.0], [-1.0]]
         np.minimum.at(first, of_piece, self.depth)
         np.maximum.at(last, of_piece, self.depth)
-        thickness = np.where(last < 0.0, 1.0, np.maximum(last - first, MIN_THICKNESS))
-        blown_up = (found.reshape(side, side) for found in (first, thickness))
-        starts, thick = (np.kron(found, np.ones((block, block))).ravel() for found in blown_up)
-        return starts, thick
+        return LayerSpans.between(first.reshape(side, side), last.reshape(side, side), block)
 
-    def layers(self, ends: Floats, starts: Floats, thickness: Floats | None = None) -> Floats:
+    def layers(self, ends: Floats, spans: LayerSpans) -> Floats:
         """What a map holds, (resolution^2, layer_count)."""
-        thick = np.ones_like(starts) if thickness is None else thickness
-        behind = np.minimum((self.depth - starts[self.texel]) / thick[self.texel], 1.0)
+        row, column = np.divmod(self.texel, self.resolution)
+        behind = np.minimum(spans.fraction(row, column, self.place, self.depth), 1.0)
         # of the layers that a piece adds to, the first; the others have it by summing up
         first = self.texel * len(ends) + np.searchsorted(ends, behind)
         held = np.bincount(first, self.covered, self.resolution**2 * len(ends))
@@ -248,4 +325,5 @@ def coverage(
     column, row = np.floor(place * resolution).astype(np.int64).T
     is_inside = (column >= 0) & (column < resolution) & (row >= 0) & (row < resolution)
     texel = (row * resolution + column)[is_inside]
-    return Coverage(resolution, texel, depth[is_inside], covered[is_inside])
+    place = place[is_inside] * resolution
+    return Coverage(resolution, texel, place, depth[is_inside], covered[is_inside])

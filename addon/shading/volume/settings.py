@@ -82,7 +82,7 @@ class VolumeSettings(Settings):
         shown_when=when("volume.shadows", "deep"),
     )
     bias: float = number(
-        0.003,
+        0.001,
         label="Bias",
         description="Minimum distance at which strands shade each other, as a fraction of the "
         "hair's size",

@@ -13,10 +13,14 @@ from hairloom.addon.shading.volume.card_opacity import (
     among_strands,
     card_optical_depth,
     card_shadow_area,
-    own_fraction,
     view_compensated_depth,
 )
-from hairloom.addon.shading.volume.opacity import adds_to, layer_ends, layer_weights
+from hairloom.addon.shading.volume.opacity import (
+    adds_to,
+    layer_ends,
+    layer_weights,
+    own_fraction,
+)
 from hairloom.addon.shading.volume.settings import VolumeSettings
 from hairloom.addon.strands import StrandSet
 

@@ -49,7 +49,8 @@ def test_a_small_gpu_sets_the_side() -> None:
 
 def test_bytes_are_those_of_the_textures() -> None:
     size = asked_size(VolumeSettings(shadows="deep", layers=8, resolution=512), 2)
-    assert size.bytes == 512**2 * 2 * (2 * 16 + 4) + (256 * 256) * 4
+    starts, spans = 256 * 256 * 4, 256 * 256 * 16
+    assert size.bytes == 512**2 * 2 * (2 * 16 + 4) + starts + spans
 
 
 def test_without_shadows_there_is_nothing_to_tell() -> None:

@@ -1,0 +1,56 @@
+// Opacity maps: how the layers of blocks of texels go on from one to the next, one invocation a block. It
+// reads from `starts` the first and the last hair of its block and of the four beside it.
+//
+// Twin of LayerSpans.between in addon/shading/volume/opacity.py. `spans` lies as `starts`: where layers
+// start on the left, how thick they are on the right.
+#include "lib_opacity.glsl"
+
+// Depth of the first or the last hair of a block, if there is any.
+struct Kept {
+  float depth;
+  bool is_there;
+};
+
+Kept kept_at(ivec2 block, bool is_last)
+{
+  if (any(lessThan(block, ivec2(0))) || any(greaterThanEqual(block, ivec2(side)))) {
+    return Kept(0.0, false);
+  }
+  ivec2 at = block + ivec2(is_last ? side : 0, map_index * side);
+  uint kept = texelFetch(starts, at, 0).x;
+  float depth = start_depth(kept);
+  return Kept(is_last ? 1.0 - depth : depth, kept <= uint({{start_scale}}));
+}
+
+// As depth changes on that side of a block where it does so less; 0 where it rises on the one and falls
+// on the other, or where one of them has no hair.
+float slope(Kept before, Kept here, Kept after)
+{
+  float down = here.depth - before.depth, up = after.depth - here.depth;
+  bool is_slope = before.is_there && after.is_there && down * up > 0.0;
+  return is_slope ? (abs(down) < abs(up) ? down : up) / float({{start_texels}}) : 0.0;
+}
+
+vec3 plane_over(ivec2 block, bool is_last)
+{
+  Kept here = kept_at(block, is_last);
+  Kept left = kept_at(block - ivec2(1, 0), is_last), right = kept_at(block + ivec2(1, 0), is_last);
+  Kept below = kept_at(block - ivec2(0, 1), is_last), above = kept_at(block + ivec2(0, 1), is_last);
+  return vec3(here.depth, slope(left, here, right), slope(below, here, above));
+}
+
+void main()
+{
+  ivec2 block = ivec2(gl_GlobalInvocationID.xy);
+  if (block.x >= side || block.y >= side) {
+    return;
+  }
+  vec3 start = vec3(1.0, 0.0, 0.0), thickness = vec3(1.0, 0.0, 0.0);
+  if (kept_at(block, false).is_there) {
+    start = plane_over(block, false);
+    thickness = plane_over(block, true) - start;
+  }
+  ivec2 at = block + ivec2(0, map_index * side);
+  imageStore(spans, at, vec4(start, 0.0));
+  imageStore(spans, at + ivec2(side, 0), vec4(thickness, 0.0));
+}
