@@ -13,9 +13,6 @@
 void main()
 {
 #ifdef CARDS
-  if (is_hidden_from_texels(vec3(gl_FragCoord.xy / float(opacity.resolution), strand_depth))) {
-    discard;
-  }
   vec4 steps = vec4(dFdx(card_uv), dFdy(card_uv));
   float alpha = card_texel(alpha_texture, card_uv, steps, atlas_tiles).x;
   float strand_weight = card_thickness * card_optical_depth(alpha);
@@ -23,6 +20,10 @@ void main()
   vec3 across = cross(dFdx(card_point), dFdy(card_point));
   strand_weight *= view_compensated_depth(across, normalize(card_tangent), normalize(light_direction));
 #  endif
+  // last, since what is discarded gives those beside it no derivatives
+  if (is_hidden_from_texels(vec3(gl_FragCoord.xy / float(opacity.resolution), strand_depth))) {
+    discard;
+  }
 #endif
   float behind = strand_depth;
 #if DEEP
