@@ -15,7 +15,7 @@ SkinSeen plane_beneath(vec3 normal)
   return SkinSeen(vec4(0.0), normal, 0.0);
 }
 
-// Part of a light that comes off far skin through clear hair.
+// Part of a light that comes off far skin through hair that takes a certain part of it.
 float far_light(vec4 received, vec3 to_light)
 {
   float size = length(received.yzw);
@@ -24,11 +24,12 @@ float far_light(vec4 received, vec3 to_light)
   return received.x * (even + (1.0 - even) * 4.0 * facing);
 }
 
-// What hair with gaps lets through, by the part that strands take of the light that they meet. At the
-// edge of a card the depth may be that beyond its vertices.
+// What hair with gaps lets through, by the part that strands take of the light that they meet, over what
+// it lets through in `received`. At the edge of a card the depth may be that beyond its vertices.
 vec3 through_hair(float depth, vec3 taken)
 {
-  return pow(1.0 + {{gaps}} * max(depth, 0.0) * taken, vec3(-1.0 / {{gaps}}));
+  float gaps = {{gaps}} * max(depth, 0.0);
+  return pow((1.0 + gaps * taken) / (1.0 + gaps * {{part}}), vec3(-1.0 / {{gaps}}));
 }
 
 // A vector by its parts along a strand or card, along its normal, and across both.

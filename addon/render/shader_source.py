@@ -40,7 +40,7 @@ from ..shading.lights import HARMONIC_COUNT, LIGHT_CAPACITY
 from ..shading.microfacet import MIN_ROUGHNESS
 from ..shading.skin.diffusion import KERNEL_REACH, KERNEL_TAPS, SKIN_LIGHTS
 from ..shading.skin.layout import CLOSING
-from ..shading.skin_seen import GAPS
+from ..shading.skin_seen import GAPS, PART
 from ..shading.volume.card_opacity import MAX_ALPHA, MEAN_TURN, MIN_FACING, MIN_TAU
 from ..shading.volume.dual import MIDPOINT, UNKNOWN_BEYOND
 from ..shading.volume.map_size import START_TEXELS
@@ -164,6 +164,7 @@ CONSTANTS: Mapping[str, str] = MappingProxyType(
         "tile_gap": str(TILE_GAP),
         "midpoint_absorption": repr(MIDPOINT),
         "gaps": repr(GAPS),
+        "part": repr(PART),
         "max_alpha": repr(MAX_ALPHA),
         "unknown_beyond": repr(UNKNOWN_BEYOND),
         "start_scale": repr(START_SCALE),

@@ -4,13 +4,14 @@ such as the face beside which hair hangs.
 Of far skin each point of hair has four numbers: how much light of a direction w comes to it, as
 q0 + q . w on average over all w (precomputed radiance transfer: Sloan, Kautz and Snyder 2002), with
 skin lit where it faces w. The hair becomes a coarse grid of optical depths, and skin the cells that
-its surface crosses. What these send back goes through the hair, cell by cell, in the 26 directions
-of `ambient.sky_directions`.
+its surface crosses. Light goes to these and back through the hair, cell by cell, in the 26
+directions of `ambient.sky_directions`. The four numbers are of hair whose strands take a part of
+what they meet; a depth says how much less or more other hair lets through.
 
 Hair of a cell lies in clumps, between which light passes: of a mean depth tau not exp(-tau) comes
 through but (1 + g tau)^(-1/g), the mean over depths of a gamma distribution with a variance of
-g tau. Rays that begin at strands of four grooms and are cut by strands, against grids of 24 to 64
-cells, have g of 1.2 to 2.4.
+g tau. A g of 0.4 comes closest to Cycles, see docs/dev/shading.md: hair that hangs as a curtain has
+hardly any gaps, and cells that are thicker than it is show them where there are none.
 
 Limitation: no light goes from skin to skin.
 """
@@ -31,9 +32,9 @@ _CELLS = 44
 #: How far it reaches beyond the hair on each side, as a fraction of the hair's longest side.
 _BEYOND = 0.25
 #: Variance of the optical depth of hair within a cell, over its mean.
-GAPS = 1.5
-#: Part of its light that hair takes where its depth is found: blond hair takes a third.
-_PART = 0.25
+GAPS = 0.4
+#: Part of its light that hair takes where light through it is found: blond hair takes a third.
+PART = 0.25
 #: Less than this of light does not count.
 _MIN_PASSED = 0.03
 #: A cell is skin that holds this part of a side's area of it.
@@ -48,9 +49,9 @@ _SMALLEST = 1.0e-9
 class SkinSeen:
     """The skin that places of hair see, world space.
 
-    received: (..., 4), light off far skin through clear hair: the mean over its directions,
-        and a vector. 1 is light from all around, off white skin that faces its light.
-    depth: (...), optical, of the hair that far skin lies behind, see `through_hair`.
+    received: (..., 4), light off far skin through hair whose strands take PART: the mean over its
+        directions, and a vector. 1 is light from all around, off white skin that faces its light.
+    depth: (...), optical, of the hair on the way, see `through_hair`.
     beneath: (..., 3), the mean normal of the skin right beneath; its length says how much there is.
     """
 
@@ -77,14 +78,15 @@ def skin_seen(strands: StrandSet, points: Floats, skin: Surface, extinction: flo
     whole = np.concatenate([cells * known, known[None]], dtype=np.float32)
     found = sample(whole, grid.coordinates(points))
     found = found[:-1] / np.maximum(found[-1], 1.0e-3)
-    passed = np.clip(found[4] / np.maximum(found[0], _SMALLEST), _MIN_PASSED, 1.0)
-    depth = (passed**-GAPS - 1.0) / (GAPS * _PART)
+    passed = np.clip(found[0] / np.maximum(found[4], _SMALLEST), _MIN_PASSED, 1.0)
+    depth = (passed**-GAPS - 1.0) / (GAPS * PART)
     return SkinSeen(found[:4].T, depth, found[5:].T)
 
 
 def through_hair(depth: Floats, taken: Floats) -> Floats:
-    """What hair with gaps lets through, if strands take this part of the light that they meet."""
-    result: Floats = (1.0 + GAPS * depth * taken) ** (-1.0 / GAPS)
+    """What hair with gaps lets through if strands take this part of the light that they meet, as a
+    factor of what it lets through where they take PART."""
+    result: Floats = ((1.0 + GAPS * depth * taken) / (1.0 + GAPS * depth * PART)) ** (-1.0 / GAPS)
     return result
 
 
@@ -95,8 +97,8 @@ def plane_beneath(normal: Floats) -> SkinSeen:
 
 
 def far_light(received: Floats, to_light: Floats) -> Floats:
-    """What of a light comes off far skin through clear hair, (...): the part of that from a light
-    in the direction of `received`, with the rest from everywhere.
+    """What of a light comes off far skin through hair that takes PART, (...): the part of that from
+    a light in the direction of `received`, with the rest from everywhere.
     """
     mean, bent = received[..., 0], received[..., 1:]
     size = np.linalg.norm(bent, axis=-1)
@@ -145,8 +147,8 @@ def _inside(normal: Floats, is_skin: Bools) -> Bools:
 
 
 def _sent(hair: Floats, normal: Floats, is_skin: Bools, is_inside: Bools) -> Floats:
-    """What skin sends back of light from all around: as `SkinSeen.received`, through clear hair,
-    and its mean through a part of the hair, (5, *shape)."""
+    """What skin sends back of light from all around: as `SkinSeen.received`, and its mean without
+    any hair in the way, (5, *shape)."""
     steps, weights = zip(*sky_directions(0.0), strict=True)
     directions = unit_steps(steps).astype(np.float32)
     skin = np.flatnonzero(is_skin)
@@ -160,8 +162,8 @@ def _sent(hair: Floats, normal: Floats, is_skin: Bools, is_inside: Bools) -> Flo
         facing * np.exp(-depth_towards(each, steps, own=0.0).reshape(len(steps), -1)[:, skin])
         for each in (body, both)
     )
-    flat[:4, skin] = with_mean(directions) @ clear
-    flat[4, skin] = some.sum(axis=0)
+    flat[:4, skin] = with_mean(directions) @ some
+    flat[4, skin] = clear.sum(axis=0)
     return sent
 
 
@@ -175,10 +177,10 @@ def _spread(hair: Floats, sent: Floats, normal: Floats, is_skin: Bools) -> tuple
         # of skin one sees what faces the way from which one comes
         is_seen = is_skin & (np.tensordot(_unit(step), normal, 1) < 0.0)
         depth = _length(step) * _gappy(hair, step)
-        through = np.stack([is_free, is_free * np.exp(-depth)])
+        through = np.stack([is_free * np.exp(-depth), is_free])
         came = _came(sent * is_seen, through, step)
         came -= _shifted(sent * is_seen, step)
-        came[4] *= np.exp(-_OWN * depth)
+        came[:4] *= np.exp(-_OWN * depth)
         far += np.float32(weight) * came * ~is_seen
         # light from half of all directions is whole
         front = normal * is_seen
@@ -210,9 +212,9 @@ def _came(source: Floats, through: Floats, step: Step) -> Floats:
 
 
 def _gappy(hair: Floats, step: Step) -> Floats:
-    """Optical depth per length of _PART of the hair, with its gaps, for light along a step."""
+    """Optical depth per length of PART of the hair, with its gaps, for light along a step."""
     gaps = np.float32(GAPS * _length(step))
-    result: Floats = np.log1p(gaps * np.float32(_PART) * hair) / gaps
+    result: Floats = np.log1p(gaps * np.float32(PART) * hair) / gaps
     return result
 
 

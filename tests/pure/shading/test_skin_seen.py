@@ -11,6 +11,7 @@ from hairloom.addon import pipeline
 from hairloom.addon.groom.settings import GuideSettings
 from hairloom.addon.shading.skin_seen import (
     GAPS,
+    PART,
     SkinSeen,
     far_light,
     plane_beneath,
@@ -130,35 +131,68 @@ def test_no_light_comes_off_skin_within_a_body() -> None:
     assert shut_in < 0.05 * alone
 
 
+def cloud(count: int, low: float, high: float) -> tuple[StrandSet, float]:
+    """Short strands around the ball, evenly between two radii, and their depth straight out."""
+    random = np.random.default_rng(8)
+    half, width = 0.01, 3e-4
+    out, across = random.normal(size=(2, count, 3))
+    out /= np.linalg.norm(out, axis=-1, keepdims=True)
+    across = np.cross(out, across)
+    across /= np.linalg.norm(across, axis=-1, keepdims=True)
+    middle = out * random.uniform(low, high, (count, 1))
+    area = count * 2.0 * width * 2.0 * half * np.pi / 4.0
+    depth = area / (4.0 / 3.0 * np.pi * (high**3 - low**3)) * (high - low)
+    return hair(np.stack([middle - half * across, middle + half * across], axis=1), width), depth
+
+
+def outside_of(strands: StrandSet) -> StrandSet:
+    """Short strands farther out than others, too thin to be in any light's way."""
+    out = strands.points[::2] / np.linalg.norm(strands.points[::2], axis=-1, keepdims=True)
+    outside = 2.0 * RADIUS * out[:400]
+    return hair(np.stack([outside, 1.005 * outside], axis=1), 1e-9)
+
+
 def test_hair_in_the_way_is_counted_on_both_ways() -> None:
     """Light goes to the ball through a cloud around it, and back: each time, in all directions that
     there are, through one to one and a half of its depth straight out.
     """
-    random = np.random.default_rng(8)
-    low, high, half, width = 1.3 * RADIUS, 1.8 * RADIUS, 0.01, 3e-4
-    out, across = random.normal(size=(2, 6000, 3))
-    out /= np.linalg.norm(out, axis=-1, keepdims=True)
-    across = np.cross(out, across)
-    across /= np.linalg.norm(across, axis=-1, keepdims=True)
-    middle = out * random.uniform(low, high, (6000, 1))
-    cloud = hair(np.stack([middle - half * across, middle + half * across], axis=1), width)
-    outside = 2.0 * RADIUS * out[:50]
-    behind = hair(np.stack([outside, outside + 1e-3 * across[:50]], axis=1), 1e-9)
-    seen = skin_seen(cloud, behind.points, ball(), 1.0)
-    area = 6000 * 2.0 * width * 2.0 * half * np.pi / 4.0
-    depth = area / (4.0 / 3.0 * np.pi * (high**3 - low**3)) * (high - low)
+    strands, depth = cloud(6000, 1.3 * RADIUS, 1.8 * RADIUS)
+    seen = skin_seen(strands, outside_of(strands).points, ball(), 1.0)
     assert 2.0 * depth < np.median(seen.depth) < 3.0 * depth
 
 
+def test_hair_on_the_side_of_the_light_shades_the_skin() -> None:
+    """Beside a ball with hair on its right, light from the left comes off it, and from the right
+    hardly any; without the hair both do alike."""
+    around, depth = cloud(60_000, 1.15 * RADIUS, 1.5 * RADIUS)
+    middle = around.points[::2]
+    is_right = middle[:, 0] > 0.25 * np.linalg.norm(middle, axis=1)
+    points = outside_of(around).points
+    ways = points / np.linalg.norm(points, axis=1, keepdims=True)
+    beside = points[np.abs(ways[:, 0]) < 0.1]
+    thin = replace(around, radius=np.full_like(around.radius, 1e-9))
+    assert depth > 2.0
+
+    def light(strands: StrandSet, side: float) -> float:
+        seen = skin_seen(strands, beside, ball(), 1.0)
+        return float(far_light(seen.received, np.array([side, 0.0, 0.0])).mean())
+
+    right = around.take(np.flatnonzero(is_right))
+    assert light(thin, 1.0) == pytest.approx(light(thin, -1.0), rel=0.25)
+    assert light(right, -1.0) > 0.6 * light(thin, -1.0)
+    assert light(right, 1.0) < 0.4 * light(right, -1.0)
+
+
 def test_gaps_let_through_what_a_spread_of_depths_does() -> None:
-    """The mean of exp(-x tau) over a gamma distribution with a variance of GAPS times its mean."""
+    """The mean of exp(-x tau) over a gamma distribution with a variance of GAPS times its mean,
+    over that where strands take PART.
+    """
     random = np.random.default_rng(2)
-    for mean in (0.3, 3.0):
-        depths = random.gamma(mean / GAPS, GAPS, 400_000)
-        for taken in (0.1, 1.0):
-            expected = np.exp(-taken * depths).mean() ** (1.0 / mean)
-            found = through_hair(np.array(1.0), np.array(taken))
-            assert found == pytest.approx(expected, abs=3e-3)
+    depths = random.gamma(1.0 / GAPS, GAPS, 400_000)
+    for taken in (0.1, 1.0):
+        expected = np.exp(-taken * depths).mean() / np.exp(-PART * depths).mean()
+        found = through_hair(np.array(1.0), np.array(taken))
+        assert found == pytest.approx(expected, rel=5e-3)
 
 
 def test_light_off_one_normal_is_that_of_a_matt_surface() -> None:
