@@ -80,6 +80,12 @@ class CardExportSettings(Settings):
                 "them",
             ),
             (
+                "springs",
+                "Springs",
+                "GLB: chains of joints that the engine's own physics moves (VRMC_springBone), "
+                "fitted to the bake",
+            ),
+            (
                 "texture",
                 "Vertex Textures",
                 "GLB, FBX, USD: where each vertex is in each frame, for a vertex shader; exact",
@@ -133,4 +139,11 @@ class CardExportSettings(Settings):
         soft=(0.01, 10.0),
         hard=(0.01, 100.0),
         unit="percent",
+    )
+    spring_joints: int = integer(
+        120,
+        label="Spring Joints",
+        description="Maximum number of joints that springs move; as few as do nearly as well",
+        soft=(10, 250),
+        hard=(5, 1024),
     )

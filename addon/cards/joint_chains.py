@@ -104,21 +104,29 @@ def rest_joints(lines: Floats, chains: Chains, joints: int) -> Floats:
     Args:
         lines: (n, row_count, 3) places along each card, root to tip [m].
     """
-    count = chains.count
-    members = np.bincount(chains.own, minlength=count)[:, None, None]
-    middle = np.zeros((count, *lines.shape[1:]))
-    np.add.at(middle, chains.own, lines)
-    middle /= members
-    at = np.linspace(0.0, middle.shape[1] - 1.0, joints)
-    before = np.minimum(at.astype(int), middle.shape[1] - 2)
-    fraction = (at - before)[:, None]
-    rest = np.tile(np.eye(4), (count, joints, 1, 1))
-    rest[..., :3, 3] = middle[:, before] * (1.0 - fraction) + middle[:, before + 1] * fraction
-    rest[..., :3, :3] = _turned_to(np.gradient(rest[..., :3, 3], axis=1))
+    places = middle_lines(lines, chains, joints)
+    rest = np.tile(np.eye(4), (chains.count, joints, 1, 1))
+    rest[..., :3, 3] = places
+    rest[..., :3, :3] = turned_to(np.gradient(places, axis=1))
     return rest
 
 
-def _turned_to(direction: Floats) -> Floats:
+def middle_lines(lines: Floats, chains: Chains, joints: int) -> Floats:
+    """Places evenly along the middle of each chain's cards, (chains, joints, ...).
+
+    Args:
+        lines: (n, row_count, ...) of each card, root to tip.
+    """
+    is_member = (chains.own == np.arange(chains.count)[:, None]).astype(np.float64)
+    middle = np.tensordot(is_member / is_member.sum(axis=1, keepdims=True), lines, 1)
+    at = np.linspace(0.0, middle.shape[1] - 1.0, joints)
+    before = np.minimum(at.astype(int), middle.shape[1] - 2)
+    fraction = (at - before).reshape(-1, *[1] * (middle.ndim - 2))
+    places: Floats = middle[:, before] * (1.0 - fraction) + middle[:, before + 1] * fraction
+    return places
+
+
+def turned_to(direction: Floats) -> Floats:
     """The least turns (..., 3, 3) that take y to these ways; Rodrigues' formula."""
     length = np.linalg.norm(direction, axis=-1, keepdims=True)
     y = np.array([0.0, 1.0, 0.0])

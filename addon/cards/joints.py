@@ -274,11 +274,11 @@ def _card_places(mesh: CardMesh, finest: CardMesh) -> Ints:
     return np.searchsorted(np.unique(finest.card), card_of_vertex(mesh))
 
 
-def joint_names(rig: JointRig) -> Sequence[str]:
+def joint_names(chains: int, joints: int) -> Sequence[str]:
     """Such as chain_03_joint_02, chain after chain."""
-    width = max(2, len(str(rig.chains - 1)))
+    width = max(2, len(str(chains - 1)))
     return [
         f"chain_{chain:0{width}}_joint_{joint:02}"
-        for chain in range(rig.chains)
-        for joint in range(rig.joints)
+        for chain in range(chains)
+        for joint in range(joints)
     ]

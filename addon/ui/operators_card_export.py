@@ -27,6 +27,12 @@ from .messages import draw_lines
 from .reports import tell
 from .selection import chosen_hair, needs_hair
 
+#: Motion -> the options that belong to it.
+_OF_MOTION = {
+    "joints": ("motion_space", "chains", "joints", "joint_error"),
+    "springs": ("spring_joints",),
+    "texture": ("motion_space", "motion_depth"),
+}
 _FORMATS = [(each.name, each.entry, each.about) for each in FORMATS]
 
 
@@ -184,8 +190,7 @@ class HAIRLOOM_OT_export_cards(LongWork, ExportHelper, bpy.types.Operator):
         ends.active = self.own_frames
         ends.prop(self, "first_frame", text="")
         ends.prop(self, "last_frame", text="")
-        of_joints = ("chains", "joints", "joint_error")
-        for name in ("motion_space", *(of_joints if self.motion == "joints" else ["motion_depth"])):
+        for name in _OF_MOTION[self.motion]:
             layout.prop(self, name)
         for note in self.stale:
             draw_lines(layout.column(align=True), context, note, "ERROR")

@@ -16,6 +16,7 @@ from ...arrays import Floats, Ints
 from ...cards.build import CardBuild
 from ...cards.card_mesh import CardMesh
 from ...cards.export_settings import CardExportSettings
+from ...cards.joints import CardTracks
 from ...cards.settings import CardSettings
 from ...cards.steps import map_progress, result_of
 from ...cards.vertex_animation import motion_layout
@@ -57,10 +58,12 @@ from .build import (
 from .exporters import CardLook, check_cards, check_exporter, level_names, write_card_mesh
 from .motion import (
     JointMotion,
+    SpringMotion,
     TextureMotion,
     check_motion,
     joint_motion_steps,
     moved_cards,
+    spring_motion_steps,
 )
 from .page import PAGE_AT_REST, check_page, write_page
 from .textures import (
@@ -244,23 +247,32 @@ class _Writer:
             return self._write(levels, backs)
         if self.output.settings.motion == "texture":
             return (yield from self._write_with_texture(levels, backs, motion))
-        return (yield from self._write_with_joints(levels, backs, motion))
+        return (yield from self._write_with_skeleton(levels, backs, motion))
 
-    def _write_with_joints(
+    def _write_with_skeleton(
         self, levels: Sequence[CardMesh], backs: Sequence[Ints], motion: GuideMotion
     ) -> FileSteps[tuple[str, ...]]:
         settings = self.output.settings
         with self.stage("move cards"):
             steps = moved_cards(motion, levels, space="head", with_directions=False)
             moved = yield from map_progress(steps, lambda fraction: ("Moving the cards", fraction))
-        with self.stage("fit joints"):
-            joints: JointMotion = yield from map_progress(
-                joint_motion_steps(moved.tracks, settings),
-                lambda fraction: ("Fitting joints", fraction),
+        kind = settings.motion
+        with self.stage(f"fit {kind}"):
+            skeleton = yield from map_progress(
+                self._fitting(moved.tracks, motion.rig.head),
+                lambda fraction: (f"Fitting {kind}", fraction),
             )
-        self.motion = joints.facts
+        self.motion = skeleton.facts
         yield "Writing", None
-        return (*joints.notes, *self._write(levels, backs, joints=joints))
+        return (*skeleton.notes, *self._write(levels, backs, skeleton=skeleton))
+
+    def _fitting(
+        self, tracks: CardTracks, head: Surface | None
+    ) -> Generator[float, None, JointMotion | SpringMotion]:
+        settings = self.output.settings
+        if settings.motion == "springs":
+            return spring_motion_steps(tracks, settings, head, str(self.path))
+        return joint_motion_steps(tracks, settings)
 
     def _write_with_texture(
         self, levels: Sequence[CardMesh], backs: Sequence[Ints], motion: GuideMotion
@@ -286,7 +298,7 @@ class _Writer:
         levels: Sequence[CardMesh],
         backs: Sequence[Ints],
         texels: Sequence[Floats] = (),
-        joints: JointMotion | None = None,
+        skeleton: JointMotion | SpringMotion | None = None,
     ) -> tuple[str, ...]:
         """Textures, mesh, indices, and the sidecar last; what the artist should know."""
         path, build, maps = self.path, self.made.build, self.made.maps
@@ -312,8 +324,8 @@ class _Writer:
                 portable=not settings.attributes,
                 texels=texels,
             )
-            if joints is not None:
-                joints.complete(path, nodes)
+            if skeleton is not None:
+                skeleton.complete(path, nodes)
             notes = self._complete(levels, nodes)
         indices = None
         if settings.index_buffer:
@@ -341,7 +353,7 @@ class _Writer:
             with self.stage("write page"):
                 head = self.head if settings.page_head else None
                 write_page(path, self._name, sidecar, self.made, shading, backs, head, settings)
-            if self.motion.get("kind") == "texture":
+            if self.motion.get("kind") in ("texture", "springs"):
                 notes += (PAGE_AT_REST,)
         path.with_name(path.stem + SUFFIX).write_text(sidecar_text(sidecar), encoding="utf-8")
         return notes
@@ -497,11 +509,12 @@ def _motion_line(written: WrittenCards) -> str:
             f"; motion textures of {motion['width']} x {motion['height']} texels, which round by "
             f"{motion['error']['worst'] / length * 100.0:.2g}% of the hair's length at most"
         )
+    by = ", moved by springs" if motion["kind"] == "springs" else ""
     usual, most, worst = (
         motion["error"][name] / length for name in ("root_mean_square", "percentile_99", "worst")
     )
     return (
-        f"; {motion['chains']} chains of {motion['joints_in_chain']} joints, off by {usual:.1%} of "
-        f"the hair's length (root mean square; 99% by less than {most:.1%}, the worst by "
-        f"{worst:.1%})"
+        f"; {motion['chains']} chains of {motion['joints_in_chain']} joints{by}, off by "
+        f"{usual:.1%} of the hair's length (root mean square; 99% by less than {most:.1%}, "
+        f"the worst by {worst:.1%})"
     )

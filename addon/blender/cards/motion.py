@@ -1,4 +1,4 @@
-"""Cards in motion: from a bake to joints or textures beside the mesh."""
+"""Cards in motion: from a bake to joints, springs or textures beside the mesh."""
 
 from __future__ import annotations
 
@@ -16,6 +16,8 @@ from ...cards.export_settings import CardExportSettings
 from ...cards.joint_keys import between_keys, chain_keys, keys_of
 from ...cards.joint_solve import rigid_fits
 from ...cards.joints import CardTracks, FitError, joint_steps, keyed_error
+from ...cards.spring_bones import Balls
+from ...cards.spring_chains import spring_steps
 from ...cards.steps import result_of
 from ...cards.vertex_animation import (
     MotionLayout,
@@ -24,15 +26,22 @@ from ...cards.vertex_animation import (
     rounding,
     vertex_texels,
 )
+from ...dynamics.fitting.settings import SphereFitSettings
+from ...dynamics.fitting.sphere_fit import fit_spheres
 from ...errors import HairloomError
 from ...exchange.cards.card_formats import GLB, OBJ, CardFormat
 from ...exchange.cards.glb_skin import Skeleton, with_skeleton
-from ...exchange.cards.sidecar_motion import joint_motion, texture_motion
+from ...exchange.cards.glb_springs import SpringSkeleton, with_springs
+from ...exchange.cards.sidecar_motion import joint_motion, spring_motion, texture_motion
+from ...strands import Surface
 from ..bakes.guide_motion import GuideMotion
 from ..base.images import write_texture
 
 #: Fraction of the error by which joints may be off between keys.
 _KEY_FRACTION = 0.5
+#: Balls that stand for the head, and the error that is worth a word, of the hair's length.
+HEAD_BALLS = 12
+SPRING_ERROR = 0.1
 #: Motion of one frame says nothing.
 _FEWEST_FRAMES = 2
 
@@ -58,9 +67,9 @@ def check_motion(
         raise HairloomError(
             "one frame is no motion", place="frame range", remedy="Choose two frames or more"
         )
-    if settings.motion == "joints" and file_format != GLB:
+    if settings.motion in ("joints", "springs") and file_format != GLB:
         raise HairloomError(
-            f"joints are written to GLB, not to {file_format.title}",
+            f"{settings.motion} are written to GLB, not to {file_format.title}",
             place="motion",
             remedy="Choose glTF (.glb), or a vertex texture",
         )
@@ -173,6 +182,56 @@ def joint_motion_steps(
     skeleton = Skeleton(rig, keys, tracks.root, root_keys, tracks.frame_rate)
     yield 1.0
     return JointMotion(tracks, skeleton, error, settings)
+
+
+@dataclass(frozen=True, eq=False)
+class SpringMotion:
+    """Springs that are ready to be written, and how near they come. notes: what the artist should
+    know.
+    """
+
+    tracks: CardTracks
+    skeleton: SpringSkeleton
+    notes: tuple[str, ...]
+
+    @property
+    def facts(self) -> dict[str, Any]:
+        return spring_motion(self.tracks, self.skeleton, self.skeleton.rig.error)
+
+    def complete(self, path: Path, nodes: Sequence[str]) -> None:
+        """Put joints and springs into the GLB that lies there."""
+        data = path.read_bytes()
+        levels = self.tracks.levels
+        path.write_bytes(with_springs(data, nodes, levels, self.skeleton, path.name))
+
+
+def spring_motion_steps(
+    tracks: CardTracks, settings: CardExportSettings, head: Surface | None, place: str
+) -> Generator[float, None, SpringMotion]:
+    """Fit springs; yields the fraction that is done."""
+    balls, notes = _head_balls(head, place)
+    rig = yield from spring_steps(tracks, settings.spring_joints, balls)
+    skeleton = SpringSkeleton(rig, tracks.root)
+    most = rig.error.most / tracks.hair_length
+    if most > SPRING_ERROR:
+        notes += (
+            f"Springs are off by up to {most:.0%} of the hair's length (99% of all vertices): an "
+            "engine moves this hair otherwise than the bake. Allow more spring joints, or choose "
+            "joints.",
+        )
+    return SpringMotion(tracks, skeleton, notes)
+
+
+def _head_balls(head: Surface | None, place: str) -> tuple[Balls, tuple[str, ...]]:
+    """What springs keep out of, and what the artist should know where there is nothing."""
+    nothing = Balls.of(np.empty((0, 3)), np.empty(0))
+    if head is None:
+        return nothing, ("Hair without a head has nothing that springs keep out of.",)
+    try:
+        fit = fit_spheres(head, SphereFitSettings(sphere_count=HEAD_BALLS), place=place)
+    except HairloomError as error:
+        return nothing, (f"{error} Until then springs keep out of nothing.",)
+    return Balls.of(fit.centers, fit.radii), ()
 
 
 @dataclass(frozen=True, eq=False)

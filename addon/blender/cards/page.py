@@ -23,8 +23,8 @@ from .build import CardMaps, MappedCards
 from .textures import look_tables, png_of
 
 PAGE_AT_REST = (
-    "The web page shows the hair at rest, since it plays no vertex textures. Choose Joints for one "
-    "that moves."
+    "The web page shows the hair at rest, since it plays no vertex textures and no springs. "
+    "Choose Joints for one that moves."
 )
 #: Texture -> what the page calls it, in the order in which it shows them.
 _TITLES = {

@@ -102,7 +102,7 @@ def _moving(job: Job, settings: CardExportSettings) -> tuple[Rig, GuideMotion | 
         raise HairloomError(
             "a bake and frames are for cards in motion",
             place="--frames" if options.bake is None else "--bake",
-            remedy="Add --motion joints, or --motion texture",
+            remedy="Add --motion joints, springs or texture",
         )
     return read_rig(job)[0], None
 

@@ -60,15 +60,41 @@ def with_skeleton(
         HairloomError: its vertices are not those of the levels.
     """
     file = GlbFile.of(data, place)
-    joints = _add_joints(file, skeleton)
-    skin = _add_skin(file, skeleton, joints)
-    for node, mesh, weights in zip(nodes, levels, skeleton.rig.skins, strict=True):
-        number = file.node(node)
-        _add_weights(file, number, mesh, weights, place)
-        file.content["nodes"][number]["skin"] = skin
-    _add_to_scene(file, [file.node(node) for node in nodes], joints[0])
+    rig = skeleton.rig
+    joints = add_skinned(file, nodes, levels, rig.rest, skeleton.root, rig.skins, place)
     _add_animation(file, skeleton, joints)
     return file.data()
+
+
+def add_skinned(
+    file: GlbFile,
+    nodes: Sequence[str],
+    levels: Sequence[CardMesh],
+    rest: Floats,
+    root: Floats,
+    skins: Sequence[Skin],
+    place: str,
+) -> list[int]:
+    """Put joints at rest, and the meshes' weights, into a file.
+
+    Args:
+        rest: (chains, joints, 4, 4) rigid [m]. root: (3,) [m].
+        skins: of each level; the joint after all chains is the root.
+
+    Returns:
+        The nodes of all joints, the root first, then chain after chain.
+
+    Raises:
+        HairloomError: the file's vertices are not those of the levels.
+    """
+    joints = _add_joints(file, rest, root)
+    skin = _add_skin(file, rest, root, joints)
+    for node, mesh, weights in zip(nodes, levels, skins, strict=True):
+        number = file.node(node)
+        _add_weights(file, number, mesh, weights, len(joints), place)
+        file.content["nodes"][number]["skin"] = skin
+    _add_to_scene(file, [file.node(node) for node in nodes], joints[0])
+    return joints
 
 
 def vertices_of(file: GlbFile, primitive: dict[str, Any], mesh: CardMesh, place: str) -> Ints:
@@ -95,13 +121,15 @@ def vertices_of(file: GlbFile, primitive: dict[str, Any], mesh: CardMesh, place:
     )
 
 
-def _add_weights(file: GlbFile, node: int, mesh: CardMesh, skin: Skin, place: str) -> None:
+def _add_weights(
+    file: GlbFile, node: int, mesh: CardMesh, skin: Skin, joint_count: int, place: str
+) -> None:
     (primitive,) = file.content["meshes"][file.content["nodes"][node]["mesh"]]["primitives"]
     owner = vertices_of(file, primitive, mesh, place)
     weight = np.where(skin.weight < _MIN_WEIGHT, 0.0, skin.weight)
     weight = (weight / weight.sum(axis=1, keepdims=True)).astype(np.float32)
     # the root is joint 0, and what has no weight names no joint
-    joint = np.where(weight > 0.0, skin.joint + 1, 0)
+    joint = np.where(weight > 0.0, (skin.joint + 1) % joint_count, 0)
     is_small = joint.max(initial=0) < 256
     numbers: Ints = joint[owner].astype(np.uint8) if is_small else joint[owner].astype(np.uint16)
     attributes = primitive["attributes"]
@@ -109,16 +137,16 @@ def _add_weights(file: GlbFile, node: int, mesh: CardMesh, skin: Skin, place: st
     attributes["WEIGHTS_0"] = file.add(weight[owner], "VEC4", target=_OF_VERTICES)
 
 
-def _add_joints(file: GlbFile, skeleton: Skeleton) -> list[int]:
+def _add_joints(file: GlbFile, rest: Floats, root: Floats) -> list[int]:
     """Nodes of all joints, the root first; numbers."""
-    root = {"name": ROOT_JOINT, "translation": _vector(skeleton.root), "children": []}
-    numbers = [file.append("nodes", root)]
-    names = iter(joint_names(skeleton.rig))
+    first = {"name": ROOT_JOINT, "translation": _vector(root), "children": []}
+    numbers = [file.append("nodes", first)]
+    names = iter(joint_names(*rest.shape[:2]))
     at_root = np.eye(4)
-    at_root[:3, 3] = skeleton.root
-    for chain in skeleton.rig.rest:
+    at_root[:3, 3] = root
+    for chain in rest:
         parents = [at_root, *chain[:-1]]
-        owner: dict[str, Any] = root
+        owner: dict[str, Any] = first
         for parent, own in zip(parents, chain, strict=True):
             local = beside_parent(parent, own)
             node = {
@@ -132,9 +160,9 @@ def _add_joints(file: GlbFile, skeleton: Skeleton) -> list[int]:
     return numbers
 
 
-def _add_skin(file: GlbFile, skeleton: Skeleton, joints: list[int]) -> int:
-    rest = np.concatenate([np.eye(4)[None], skeleton.rig.rest.reshape(-1, 4, 4)])
-    rest[0, :3, 3] = skeleton.root
+def _add_skin(file: GlbFile, chains: Floats, root: Floats, joints: list[int]) -> int:
+    rest = np.concatenate([np.eye(4)[None], chains.reshape(-1, 4, 4)])
+    rest[0, :3, 3] = root
     axes = np.eye(4)
     axes[:3, :3] = _AXES
     inverse = np.linalg.inv(axes @ rest @ axes.T)

@@ -13,6 +13,7 @@ from ..textures.mip_maps import mip_levels
 from ..textures.srgb import srgb_decoded, srgb_encoded
 from .glb_file import GlbFile
 from .glb_plain import LOD
+from .glb_springs import SPRINGS
 
 #: Steps of a rounded number: of the largest extent for positions, else of 1. None can be seen: they
 #: are a fifth of a degree, and a sixteenth of a texel of 1,024.
@@ -24,8 +25,8 @@ _STORED = {"base": 4, "alpha": 4, "tangent": 4, "normal": 8, "shift": 4, "noise"
 
 
 def small_glb(data: bytes, place: str) -> bytes:
-    """The same meshes, joints and motion without material; vertices are rounded, so that they can
-    be compressed."""
+    """The same meshes, joints and motion without material and springs; vertices are rounded, so
+    that they can be compressed."""
     file = GlbFile.of(data, place)
     attributes = [
         (name, number)
@@ -43,6 +44,7 @@ def small_glb(data: bytes, place: str) -> bytes:
             primitive.pop("material", None)
     for kind in ("materials", "textures", "images", "samplers"):
         file.content.pop(kind, None)
+    file.content.get("extensions", {}).pop(SPRINGS, None)
     used = file.content.pop("extensionsUsed", [])
     if LOD in used:
         file.content["extensionsUsed"] = [LOD]

@@ -9,9 +9,11 @@ import numpy as np
 
 from ...arrays import Floats
 from ...cards.joints import CardTracks, FitError
+from ...cards.spring_bones import DOWN, STEP_RATE
 from ...cards.vertex_animation import MotionLayout
 from .card_formats import GLB, CardFormat
 from .glb_skin import ANIMATION, ROOT_JOINT, Skeleton
+from .glb_springs import SPRINGS, SpringSkeleton, collider_list, spring_list
 
 #: format -> where the texel of each vertex is
 TEXEL_ATTRIBUTES = {"glb": "TEXCOORD_2", "fbx": "LayerElementUV 2", "usd": "primvars:st2"}
@@ -34,6 +36,38 @@ _HOW_TO_PLAY = (
     "linear blend skinning; rotations between keys by slerp, translations straight. Keys that this "
     "reproduces are left out"
 )
+
+_HOW_TO_SPRING = (
+    "attach root_joint to the head. Step each chain step_rate times a second, from root to tip. A"
+    " bone's tail is the next joint: tail += (tail - tail before) * (1 - drag) + (way of the bone"
+    " at rest, turned with its parent, of unit length) * stiffness / step_rate + "
+    "gravity_direction * gravity / step_rate; put it back to the bone's length; for each collider"
+    " of the chain that is nearer than radius + hit_radius, push it out and put it back to the "
+    "bone's length again; turn the bone by the least turn that points it at its tail"
+)
+
+
+def spring_motion(tracks: CardTracks, skeleton: SpringSkeleton, error: FitError) -> dict[str, Any]:
+    """Of a GLB with springs."""
+    rig = skeleton.rig
+    chains, joints = rig.chains.rest.shape[:2]
+    return {
+        "kind": "springs",
+        **_common(tracks, "head"),
+        "extension": SPRINGS,
+        "root_joint": ROOT_JOINT,
+        "root_place": GLB.placed(skeleton.root).tolist(),
+        "chains": chains,
+        "joints_in_chain": joints,
+        "joints": chains * joints + 1,
+        "influences": rig.skins[0].joint.shape[1],
+        "step_rate": STEP_RATE,
+        "gravity_direction": GLB.placed(DOWN).tolist(),
+        "colliders": collider_list(rig.chains.balls, skeleton.root),
+        "springs": spring_list(rig),
+        "error": _error(error, tracks, GLB.units_per_metre),
+        "how": _HOW_TO_SPRING,
+    }
 
 
 def joint_motion(

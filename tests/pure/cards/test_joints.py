@@ -211,7 +211,7 @@ def test_joints_lie_along_their_chain_at_rest() -> None:
     np.testing.assert_allclose(
         rig.rest[..., :3, 1], np.tile([0.0, 0.0, -1.0], (4, 4, 1)), atol=0.02
     )
-    assert joint_names(rig)[:5] == [
+    assert joint_names(rig.chains, rig.joints)[:5] == [
         "chain_00_joint_00",
         "chain_00_joint_01",
         "chain_00_joint_02",

@@ -1,0 +1,243 @@
+"""Chains of joints that springs turn, as engines with VRMC_springBone move them.
+
+The algorithm is that of the specification (VRM Consortium, VRMC_springBone 1.0, "SpringBone
+Algorithm"): a bone's tail goes on by inertia (Verlet 1967), is drawn towards its way at rest and by
+gravity, is put back to the bone's length, and out of colliders; the bone then turns by the least
+turn that points it at its tail. Bones do not stretch, and a chain's first joint rides on the head.
+
+Limitation, of the specification itself: stiffness and gravity are of one step, and inertia keeps a
+fraction of the way of one step, so the motion depends on the rate of steps. Values are fitted for
+`STEP_RATE`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import Bools, Floats, Ints
+from .joint_keys import matrices, quaternions, slerp
+
+#: Steps [1/s] that the values are for: engines step once a frame.
+STEP_RATE = 60.0
+DOWN = np.array([0.0, 0.0, -1.0])
+#: Added to 1 + cos between two directions, which is 0 where the second is the first reversed.
+_REVERSED = 1.0e-9
+#: Lengths [m] below this are none.
+_SHORTEST = 1.0e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Balls:
+    """Balls and capsules that ride with the head, in the space of the chains at rest.
+
+    center, tail: (n, 3) [m] the ends of a capsule's axis; of a ball the same. radius: (n,) [m].
+    """
+
+    center: Floats
+    tail: Floats
+    radius: Floats
+
+    @classmethod
+    def of(cls, center: Floats, radius: Floats) -> Balls:
+        """Balls."""
+        center = np.asarray(center, np.float64).reshape(-1, 3)
+        return cls(center, center, np.asarray(radius, np.float64).reshape(-1))
+
+    def nearest(self, points: Floats) -> tuple[Floats, Floats]:
+        """Of points (..., 3), the place on each axis that is nearest, (..., n, 3), and the distance
+        from the ball around it (..., n) [m].
+        """
+        axis = self.tail - self.center
+        square = np.maximum((axis * axis).sum(axis=1), _SHORTEST**2)
+        away = points[..., None, :] - self.center
+        fraction = np.clip((away * axis).sum(axis=-1) / square, 0.0, 1.0)
+        place = self.center + fraction[..., None] * axis
+        distance = np.linalg.norm(points[..., None, :] - place, axis=-1) - self.radius
+        return place, distance
+
+
+@dataclass(frozen=True, eq=False)
+class SpringValues:
+    """What moves each bone, (chains, bones) each, in the words and units of VRMC_springBone.
+
+    stiffness, gravity: [m/s] that a tail is drawn in a second. drag: 0 to 1, the fraction of a
+    tail's way in a step that the next one loses. hit_radius: [m].
+    """
+
+    stiffness: Floats
+    drag: Floats
+    gravity: Floats
+    hit_radius: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class SpringChains:
+    """Chains at rest, and what they keep out of.
+
+    rest: (chains, joints, 4, 4) rigid [m]; y points to the next joint, the last one ends the chain.
+    balls: of all chains. hits: (chains, n) which of them a chain keeps out of.
+    """
+
+    rest: Floats
+    balls: Balls
+    hits: Bools
+
+    @property
+    def lengths(self) -> Floats:
+        """Of the bones, (chains, joints - 1) [m]."""
+        lengths: Floats = np.linalg.norm(np.diff(self.rest[..., :3, 3], axis=1), axis=-1)
+        return lengths
+
+    def take(self, chains: Ints) -> SpringChains:
+        """Some of them, also several times."""
+        return SpringChains(self.rest[chains], self.balls, self.hits[chains])
+
+
+def stepped(carrier: Floats, frame_rate: float, step_rate: float = STEP_RATE) -> Floats:
+    """Rigid motion (frame_count, 4, 4) at each step instead of at each frame, (step_count, 4, 4).
+
+    Between frames it turns evenly and moves straight.
+    """
+    last = len(carrier) - 1
+    at = np.arange(round(last * step_rate / frame_rate) + 1) * frame_rate / step_rate
+    before = np.minimum(at.astype(np.int64), max(last - 1, 0))
+    after, fraction = np.minimum(before + 1, last), np.minimum(at - before, 1.0)[:, None]
+    turns = quaternions(carrier[:, :3, :3])
+    steps: Floats = np.tile(np.eye(4), (len(at), 1, 1))
+    steps[:, :3, :3] = matrices(slerp(turns[before], turns[after], fraction))
+    places = carrier[:, :3, 3]
+    steps[:, :3, 3] = places[before] * (1.0 - fraction) + places[after] * fraction
+    return steps
+
+
+def at_frames(values: Floats, frame_count: int, frame_rate: float) -> Floats:
+    """Values of steps (step_count, ...) at the frames, mixed straight between two steps."""
+    at = np.minimum(np.arange(frame_count) * STEP_RATE / frame_rate, len(values) - 1)
+    before = np.minimum(at.astype(np.int64), max(len(values) - 2, 0))
+    fraction = (at - before).reshape(-1, *[1] * (values.ndim - 1))
+    mixed: Floats = values[before] * (1.0 - fraction)
+    mixed += values[np.minimum(before + 1, len(values) - 1)] * fraction
+    return mixed
+
+
+def sprung(chains: SpringChains, values: SpringValues, carrier: Floats) -> Floats:
+    """Where springs have the joints in each step, in the space of the head.
+
+    Args:
+        carrier: (step_count, 4, 4) rigid, the head's; one step is 1 / `STEP_RATE`.
+
+    Returns:
+        Places (step_count, chains, joints, 3) [m]; the chains begin at rest.
+    """
+    count, joints = chains.rest.shape[:2]
+    lengths, beside = chains.lengths, _beside_parents(chains.rest)
+    step = 1.0 / STEP_RATE
+    places = np.empty((len(carrier), count, joints, 3))
+    first = chains.rest[..., :3, 3] @ carrier[0, :3, :3].T + carrier[0, :3, 3]
+    tail, before = first[:, 1:].copy(), first[:, 1:].copy()
+    for number, head in enumerate(carrier):
+        turn = np.broadcast_to(head[:3, :3], (count, 3, 3))
+        place = chains.rest[:, 0, :3, 3] @ head[:3, :3].T + head[:3, 3]
+        moved = [place]
+        for bone in range(joints - 1):
+            at_rest = turn @ beside[:, bone]
+            goal = at_rest[..., 1]
+            now = tail[:, bone]
+            onward = (now - before[:, bone]) * (1.0 - values.drag[:, bone, None])
+            pull = goal * values.stiffness[:, bone, None] + DOWN * values.gravity[:, bone, None]
+            length = lengths[:, bone, None]
+            after = _held(now + onward + pull * step, place, length)
+            _push_out(after, place, length, chains, values.hit_radius[:, bone], head)
+            before[:, bone], tail[:, bone] = now, after
+            turn = turned_by(goal, (after - place) / length) @ at_rest
+            place = after
+            moved.append(place)
+        places[number] = (np.stack(moved, axis=1) - head[:3, 3]) @ head[:3, :3]
+    return places
+
+
+def turns_to(rest: Floats, places: Floats) -> Floats:
+    """How joints turn that point at these places, each by the least turn from the one before.
+
+    Args:
+        rest: (chains, joints, 4, 4). places: (frame_count, chains, joints, 3).
+
+    Returns:
+        (frame_count, chains, joints, 3, 3); the last joint turns with the one before.
+    """
+    beside = _beside_parents(rest)
+    directions = _unit(np.diff(places, axis=2))
+    turn = np.broadcast_to(np.eye(3), (*places.shape[:2], 3, 3))
+    turns = []
+    for bone in range(rest.shape[1] - 1):
+        at_rest = turn @ beside[:, bone]
+        turn = turned_by(at_rest[..., 1], directions[:, :, bone]) @ at_rest
+        turns.append(turn)
+    return np.stack([*turns, turn], axis=2)
+
+
+def chained(rest: Floats, targets: Floats) -> Floats:
+    """The places nearest to targets (..., chains, joints, 3), joint by joint, that bones of the
+    same lengths reach.
+    """
+    lengths = np.linalg.norm(np.diff(rest[..., :3, 3], axis=1), axis=-1)
+    places = [np.broadcast_to(rest[:, 0, :3, 3], targets.shape[:-2] + (3,))]
+    for bone in range(rest.shape[1] - 1):
+        places.append(_held(targets[..., bone + 1, :], places[-1], lengths[:, bone, None]))
+    return np.stack(places, axis=-2)
+
+
+def turned_by(one: Floats, other: Floats) -> Floats:
+    """The least turns (..., 3, 3) that take unit vectors to others; Rodrigues' formula."""
+    axis, cosine = np.cross(one, other), (one * other).sum(axis=-1)
+    cross = np.zeros((*axis.shape, 3))
+    cross[..., 0, 1], cross[..., 1, 0] = -axis[..., 2], axis[..., 2]
+    cross[..., 0, 2], cross[..., 2, 0] = axis[..., 1], -axis[..., 1]
+    cross[..., 1, 2], cross[..., 2, 1] = -axis[..., 0], axis[..., 0]
+    fraction = 1.0 / np.maximum(1.0 + cosine, _REVERSED)
+    turn: Floats = np.eye(3) + cross + cross @ cross * fraction[..., None, None]
+    return turn
+
+
+def _push_out(
+    tail: Floats, place: Floats, length: Floats, chains: SpringChains, reach: Floats, head: Floats
+) -> None:
+    """Tails (chains, 3) out of what they hit, ball after ball, in place."""
+    balls = chains.balls
+    if not len(balls.radius):
+        return
+    local = (tail - head[:3, 3]) @ head[:3, :3]
+    near = (balls.nearest(local)[1] < reach[:, None]) & chains.hits
+    rows = np.flatnonzero(near.any(axis=1))
+    if not len(rows):
+        return
+    own, root = local[rows], (place[rows] - head[:3, 3]) @ head[:3, :3]
+    for number in range(len(balls.radius)):
+        one = Balls(*(each[number][None] for each in (balls.center, balls.tail, balls.radius)))
+        axis, distance = one.nearest(own)
+        miss = distance[:, 0] - reach[rows]
+        hit = np.flatnonzero((miss < 0.0) & chains.hits[rows, number])
+        pushed = own[hit] - _unit(own[hit] - axis[hit, 0]) * miss[hit, None]
+        own[hit] = _held(pushed, root[hit], length[rows][hit])
+    tail[rows] = own @ head[:3, :3].T + head[:3, 3]
+
+
+def _beside_parents(rest: Floats) -> Floats:
+    """How joints at rest are turned beside the one before, (chains, joints, 3, 3)."""
+    turn = rest[..., :3, :3]
+    beside: Floats = turn.copy()
+    beside[:, 1:] = turn[:, :-1].swapaxes(-1, -2) @ turn[:, 1:]
+    return beside
+
+
+def _held(tail: Floats, place: Floats, length: Floats) -> Floats:
+    """On the way from the place, at this length (..., 1) from it."""
+    return place + _unit(tail - place) * length
+
+
+def _unit(vectors: Floats) -> Floats:
+    length = np.sqrt((vectors * vectors).sum(axis=-1, keepdims=True))
+    unit: Floats = vectors / np.maximum(length, _SHORTEST)
+    return unit

@@ -1,0 +1,246 @@
+"""A skeleton that springs move: few chains, whose first joints ride on the head.
+
+Cards that move alike share a chain, as those of baked joints do (`joint_chains`), but bones turn
+only: a vertex is weighted to two neighbouring bones of its own chain, one of another one, and the
+head. Chains are added while they bring something.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..arrays import Floats, Ints
+from .card_mesh import CardMesh
+from .follow import card_lines
+from .joint_chains import Chains, card_chains, middle_lines, turned_to
+from .joint_solve import INFLUENCES, Skin, best_weights, skinned
+from .joints import CardTracks, FitError, joint_moves
+from .sort import card_of_vertex
+from .spring_bones import (
+    Balls,
+    SpringChains,
+    SpringValues,
+    at_frames,
+    chained,
+    sprung,
+    stepped,
+    turns_to,
+)
+from .spring_fit import spring_fit
+
+#: Joints in a chain that are tried, and chains, the fewest first.
+_JOINTS = (2, 3, 4, 5, 7)
+_CHAINS = (1, 2, 4, 8, 12, 16, 24, 32, 48, 64, 96, 128)
+#: Chains go on being added while a step takes at least this fraction of the error away.
+_WORTH = 0.03
+#: Frames and vertices that skins are learnt from, and vertices that are placed at once.
+_LEARNT_FRAMES = 24
+_LEARNT_VERTICES = 4000
+_VERTICES_AT_ONCE = 4096
+#: The most that a bone keeps away from what it hits, a fraction of its length.
+_HIT_FRACTION = 0.1
+#: How far into a ball a bone's tail may lie at rest and still keep out of it, of its length.
+_NEAR = 1.0e-3
+
+
+@dataclass(frozen=True, eq=False)
+class SpringRig:
+    """Chains, what moves them, and what they move, in the space of `CardTracks`.
+
+    skins: of each level; a joint's number is chain * joints + number in the chain, and the root,
+        which rides on the head, comes after them.
+    joint_error: root mean square distance of each chain's joints from the simulation [m].
+    error: of all vertices, driven by springs, from the simulation.
+    """
+
+    chains: SpringChains
+    values: SpringValues
+    skins: tuple[Skin, ...]
+    joint_error: Floats
+    error: FitError
+
+
+@dataclass(frozen=True, eq=False)
+class _Choice:
+    """Chains of cards and their joints. places: (frame_count, chains, joints, 3) as simulated."""
+
+    groups: Chains
+    rest: Floats
+    places: Floats
+    joints: int
+
+
+def spring_steps(tracks: CardTracks, most: int, balls: Balls) -> Generator[float, None, SpringRig]:
+    """The fewest joints that move the cards nearly as well as `most` would.
+
+    Args:
+        most: joints, with the root that carries all chains.
+        balls: what chains keep out of.
+
+    Yields the fraction that is done.
+    """
+    learnt = _Learnt.of(tracks)
+    yield 0.1
+    best, least = None, np.inf
+    for joints in _JOINTS:
+        before = np.inf
+        for count in _CHAINS:
+            if count > 1 and count * joints + 1 > most:
+                count = (most - 1) // joints
+            choice = learnt.choice(count, joints)
+            error = learnt.error(choice)
+            if error > before * (1.0 - _WORTH):
+                break
+            before = error
+            if error < least * (1.0 - _WORTH):
+                best, least = choice, error
+            if (count + 1) * joints + 1 > most:
+                break
+        yield 0.1 + 0.3 * joints / _JOINTS[-1]
+    assert best is not None, "one chain is always tried"
+    chains, hit_radius = _colliding(best.rest, balls)
+    fit = spring_fit(chains, best.places, tracks.carrier, tracks.frame_rate, hit_radius)
+    found = yield from _part(fit, 0.4, 0.9)
+    steps = stepped(tracks.carrier, tracks.frame_rate)
+    moved = at_frames(sprung(chains, found.values, steps), tracks.frame_count, tracks.frame_rate)
+    skins = tuple(learnt.skin(mesh, now, best, moved) for mesh, now in learnt.levels)
+    miss = spring_error(tracks, chains.rest, moved, skins)
+    yield 1.0
+    return SpringRig(chains, found.values, skins, found.error, miss)
+
+
+def spring_error(
+    tracks: CardTracks, rest: Floats, places: Floats, skins: tuple[Skin, ...]
+) -> FitError:
+    """How far the cards are from the simulation with joints in these places.
+
+    Args:
+        places: (frame_count, chains, joints, 3) [m].
+    """
+    moves = _moves(rest, places)
+    distances = []
+    for mesh, moved, skin in zip(tracks.levels, tracks.moved, skins, strict=True):
+        for begin in range(0, len(moved), _VERTICES_AT_ONCE):
+            part = slice(begin, begin + _VERTICES_AT_ONCE)
+            points = mesh.positions[part].astype(np.float64)
+            miss = skinned(points, Skin(skin.joint[part], skin.weight[part]), *moves) - moved[part]
+            distances.append(np.sqrt((miss * miss).sum(axis=-1)).astype(np.float32).ravel())
+    return FitError.of(distances)
+
+
+def _moves(rest: Floats, places: Floats) -> tuple[Floats, Floats]:
+    """Of all joints, and of the root, which stays."""
+    turns = turns_to(rest, places).transpose(1, 2, 0, 3, 4)
+    turn, shift = joint_moves(rest, turns, places.transpose(1, 2, 0, 3))
+    still: Floats = np.tile(np.eye(3), (1, len(places), 1, 1))
+    return np.concatenate([turn, still]), np.concatenate([shift, np.zeros_like(shift[:1])])
+
+
+@dataclass(frozen=True, eq=False)
+class _Learnt:
+    """The lines of cards in all frames, and some vertices of the finest level in some."""
+
+    tracks: CardTracks
+    lines: Floats
+    moved_lines: Floats
+    picked: Ints
+    frames: Ints
+
+    @classmethod
+    def of(cls, tracks: CardTracks) -> _Learnt:
+        mesh, moved = tracks.levels[0], tracks.moved[0]
+        _, lines = card_lines(mesh)
+        every = [
+            card_lines(replace(mesh, positions=moved[:, frame]))[1]
+            for frame in range(tracks.frame_count)
+        ]
+        few = min(tracks.frame_count, _LEARNT_FRAMES)
+        frames = np.linspace(0, tracks.frame_count - 1, few).round().astype(int)
+        count = min(len(mesh.positions), _LEARNT_VERTICES)
+        picked = np.sort(np.random.default_rng(0).permutation(len(mesh.positions))[:count])
+        moved_lines = np.stack(every, axis=2).astype(np.float64)
+        return cls(tracks, lines.astype(np.float64), moved_lines, picked, frames)
+
+    @property
+    def levels(self) -> list[tuple[CardMesh, Floats]]:
+        return list(zip(self.tracks.levels, self.tracks.moved, strict=True))
+
+    def choice(self, count: int, joints: int) -> _Choice:
+        groups = card_chains(self.lines, self.moved_lines[:, :, self.frames], count)
+        places = middle_lines(self.lines, groups, joints)
+        rest = np.tile(np.eye(4), (*places.shape[:2], 1, 1))
+        rest[..., :3, 3] = places
+        directions = np.diff(places, axis=1)
+        rest[..., :3, :3] = turned_to(np.concatenate([directions, directions[:, -1:]], axis=1))
+        moved = middle_lines(self.moved_lines, groups, joints).transpose(2, 0, 1, 3)
+        return _Choice(groups, rest, moved, joints)
+
+    def error(self, choice: _Choice) -> float:
+        """Of the learnt vertices if joints are where they are simulated, root mean square [m]."""
+        mesh, moved = self.levels[0]
+        points = mesh.positions[self.picked].astype(np.float64)
+        targets = moved[self.picked][:, self.frames].astype(np.float64)
+        moves = _moves(choice.rest, chained(choice.rest, choice.places[self.frames]))
+        skin = best_weights(points, targets, self._first(mesh, self.picked, choice), *moves)
+        miss = skinned(points, skin, *moves) - targets
+        return float(np.sqrt((miss * miss).sum(axis=-1).mean()))
+
+    def skin(self, mesh: CardMesh, moved: Floats, choice: _Choice, places: Floats) -> Skin:
+        """The weights of all vertices of a level with joints in these places, heaviest first."""
+        moves = _moves(choice.rest, places[self.frames])
+        parts = []
+        for begin in range(0, len(moved), _VERTICES_AT_ONCE):
+            part = np.arange(begin, min(begin + _VERTICES_AT_ONCE, len(moved)))
+            points = mesh.positions[part].astype(np.float64)
+            targets = moved[part][:, self.frames].astype(np.float64)
+            parts.append(best_weights(points, targets, self._first(mesh, part, choice), *moves))
+        joint = np.concatenate([each.joint for each in parts])
+        weight = np.concatenate([each.weight for each in parts])
+        order = np.argsort(-weight, axis=1, kind="stable")
+        return Skin(np.take_along_axis(joint, order, 1), np.take_along_axis(weight, order, 1))
+
+    def _first(self, mesh: CardMesh, vertices: Ints, choice: _Choice) -> Skin:
+        """Each vertex on its bone and a little on the nearer neighbour."""
+        used = np.unique(self.tracks.levels[0].card)
+        card = np.searchsorted(used, card_of_vertex(mesh)[vertices])
+        bones = choice.joints - 1
+        at = np.clip(mesh.along[vertices].astype(np.float64), 0.0, 1.0) * bones
+        bone = np.minimum(at.astype(np.int64), bones - 1)
+        fraction = at - bone
+        beside = np.where(fraction < 0.5, bone - 1, bone + 1)
+        is_end = (beside < 0) | (beside >= bones)
+        beside = np.clip(np.where(is_end, 2 * bone - beside, beside), 0, bones - 1)
+        own, other = choice.groups.own[card], choice.groups.other[card]
+        weight = np.zeros((len(card), INFLUENCES))
+        weight[:, 1] = np.where(is_end, 0.0, np.abs(fraction - 0.5))
+        weight[:, 0] = 1.0 - weight[:, 1]
+        root = np.full(len(card), choice.groups.count * choice.joints)
+        own, other = own * choice.joints, other * choice.joints
+        return Skin(np.stack([own + bone, own + beside, other + bone, root], axis=1), weight)
+
+
+def _colliding(rest: Floats, balls: Balls) -> tuple[SpringChains, Floats]:
+    """Which balls each chain keeps out of, those that it is outside of at rest, and how far each
+    bone keeps away, (chains, bones) [m]: no more than it does at rest.
+    """
+    tails = rest[:, 1:, :3, 3]
+    lengths = np.linalg.norm(np.diff(rest[..., :3, 3], axis=1), axis=-1)
+    distance = balls.nearest(tails)[1] + _NEAR * lengths[..., None]
+    hits = (distance > 0.0).all(axis=1) if len(balls.radius) else np.zeros((len(rest), 0), bool)
+    free = np.where(hits[:, None], distance, np.inf).min(axis=2, initial=np.inf)
+    radius = np.clip(np.minimum(free - 2.0 * _NEAR * lengths, _HIT_FRACTION * lengths), 0.0, None)
+    return SpringChains(rest, balls, hits), radius
+
+
+def _part[Result](
+    steps: Generator[float, None, Result], begin: float, end: float
+) -> Generator[float, None, Result]:
+    try:
+        while True:
+            yield begin + (end - begin) * next(steps)
+    except StopIteration as stop:
+        result: Result = stop.value
+        return result

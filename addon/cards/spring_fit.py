@@ -1,0 +1,92 @@
+"""Stiffness, drag and gravity of each chain, so that springs move it as it was simulated.
+
+Differential evolution (Storn and Price 1997), of all chains at once and each by itself: the worth
+of a chain's values is how far its joints are from the simulation's, and no chain moves another one.
+Nothing is random: the same motion gives the same values.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import Floats
+from .spring_bones import STEP_RATE, SpringChains, SpringValues, at_frames, sprung, stepped
+
+#: Sets of values that are tried at a time, and how often.
+_POPULATION, _ROUNDS = 20, 30
+#: Steps of motion that are learnt from: those at its beginning.
+_LEARNT_STEPS = 360
+#: Weight of the difference of two sets, and how often a value is taken from the new set.
+_AMPLIFIED, _CROSSED = 0.7, 0.8
+#: What is searched, lowest and highest: the fraction of its way back that a bone goes in a step, as
+#: a power of 10, at the root and at the tip; drag at the root and at the tip; the fraction of its
+#: length that gravity draws it in a step, as a root, for small ones matter most. With some drag all
+#: swinging ends.
+_LOW = np.array([-2.5, -2.5, 0.01, 0.01, 0.0])
+_HIGH = np.array([0.5, 0.5, 1.0, 1.0, 0.4])
+
+
+@dataclass(frozen=True, eq=False)
+class SpringFit:
+    """values, and the root mean square distance of each chain's joints from the simulation [m]."""
+
+    values: SpringValues
+    error: Floats
+
+
+def spring_fit(
+    chains: SpringChains,
+    targets: Floats,
+    carrier: Floats,
+    frame_rate: float,
+    hit_radius: Floats,
+) -> Generator[float, None, SpringFit]:
+    """The values that bring joints nearest to targets; yields the fraction that is done.
+
+    Args:
+        targets: (frame_count, chains, joints, 3) [m], in the space of the head.
+        carrier: (frame_count, 4, 4) of the head.
+    """
+    count = len(chains.rest)
+    frames = max(min(len(carrier), round(_LEARNT_STEPS * frame_rate / STEP_RATE)), 2)
+    targets, steps = targets[:frames], stepped(carrier[:frames], frame_rate)
+    random = np.random.default_rng(0)
+
+    def tried(sets: Floats) -> Floats:
+        """Squared error of sets (k, chains, 5), (k, chains)."""
+        own = np.tile(np.arange(count), len(sets))
+        values = _values(chains.take(own), sets.reshape(-1, len(_LOW)), hit_radius[own])
+        places = at_frames(sprung(chains.take(own), values, steps), frames, frame_rate)
+        places = places.reshape(frames, len(sets), count, -1, 3)
+        miss = places - targets[:, None]
+        error: Floats = (miss * miss).sum(axis=-1).mean(axis=(0, 3))
+        return error
+
+    sets = _LOW + (_HIGH - _LOW) * random.random((_POPULATION, count, len(_LOW)))
+    errors = tried(sets)
+    for number in range(_ROUNDS):
+        yield number / _ROUNDS
+        best = np.take_along_axis(sets, errors.argmin(axis=0)[None, :, None], axis=0)
+        one, other = (sets[random.permutation(_POPULATION)] for _ in range(2))
+        trial = sets + _AMPLIFIED * (best - sets) + _AMPLIFIED * (one - other)
+        trial = np.where(random.random(sets.shape) < _CROSSED, trial, sets)
+        trial = np.clip(trial, _LOW, _HIGH)
+        found = tried(trial)
+        better = found < errors
+        sets, errors = np.where(better[..., None], trial, sets), np.where(better, found, errors)
+    best = np.take_along_axis(sets, errors.argmin(axis=0)[None, :, None], axis=0)[0]
+    return SpringFit(_values(chains, best, hit_radius), np.sqrt(errors.min(axis=0)))
+
+
+def _values(chains: SpringChains, sets: Floats, hit_radius: Floats) -> SpringValues:
+    """Of sets (chains, 5), in the words of `_LOW`."""
+    lengths = chains.lengths
+    along = np.linspace(0.0, 1.0, lengths.shape[1])
+    back = sets[:, 0, None] * (1.0 - along) + sets[:, 1, None] * along
+    drag = sets[:, 2, None] * (1.0 - along) + sets[:, 3, None] * along
+    stiffness = 10.0**back * lengths * STEP_RATE
+    gravity = np.square(sets[:, 4, None]) * lengths * STEP_RATE
+    return SpringValues(stiffness, drag, gravity, hit_radius)
