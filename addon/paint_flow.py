@@ -24,10 +24,14 @@ from .groom.masks import NO_MASKS, Masks, Places
 from .groom.painted_color import PaintedColor
 from .groom.roots import RootFrames, root_frames
 from .pipeline import Grown, Rig
+from .shading.coat import coated_color
 from .shading.drawn_strands import look_color, natural_strands
 from .shading.settings import ShadingSettings
 from .strands import StrandSet, Surface
 from .strands.kept import same_rows
+
+#: Less opaque paint counts as if it were so opaque where its colour is found.
+_FAINTEST = 1.0e-6
 
 
 def painted(rig: Rig, density: Floats | None, masks: Masks = NO_MASKS) -> Rig:
@@ -77,14 +81,18 @@ def with_colors(
         strands: bound to the surface, but for hair without one.
         painted: None: nothing that can be used.
     """
-    if not look.color_map:
-        return strands
     own = strands.color if look.color_source == "own" else None
+    if own is not None:
+        own = coated_color(own, look)
+    if not look.color_map:
+        is_as_it_is = own is None or own is strands.color
+        return strands if is_as_it_is else replace(strands, color=own)
     triangle, barycentric = strands.root_triangle, strands.root_barycentric
     if painted is None or triangle is None or not painted.triangle_count > triangle.max(initial=-1):
         return strands if own is strands.color else replace(strands, color=own)
     assert barycentric is not None, "bound strands have both"
     found = painted.at(triangle, barycentric).astype(np.float32)
+    found[:, :3] = _coated(found, look)
     found[natural_strands(strands.group, look)] = 0.0
     if own is None and not found[:, 3].any():
         return replace(strands, color=None)
@@ -97,6 +105,12 @@ def with_colors(
     if own is None:
         color = np.repeat(color, strands.point_counts, axis=0)
     return replace(strands, color=color)
+
+
+def _coated(painted: Floats, look: ShadingSettings) -> Floats:
+    """Of premultiplied colours (n, 4), the colours in the look's water and dust."""
+    opacity = painted[:, 3:]
+    return opacity * coated_color(painted[:, :3] / np.maximum(opacity, _FAINTEST), look)
 
 
 def _grown(roots: ChildRoots, head: Surface, grown: Grown) -> tuple[Ints, Grown]:

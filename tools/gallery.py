@@ -27,7 +27,7 @@ PICTURES = REPOSITORY / "docs" / "images" / "gallery"
 PRESETS, STYLES = REPOSITORY / "presets", REPOSITORY / "hairstyles"
 HEADLESS, BEAR = "tools/headless.py", "tools/gallery.py --bear"
 SIZE = "--width 360 --height 360 --samples 2"
-COLUMNS = 3
+COLUMNS, COATED = 3, "--style long_wavy"
 HEADING = """# Gallery
 
 Made by `make gallery` from the commands shown here. Do not edit this page. Each command can be
@@ -123,6 +123,20 @@ SECTIONS = (
         "Looks",
         "The [looks](shading.md) that ship, on the same hair in the same light.",
         of_presets("looks", "--preset looks/{}"),
+    ),
+    Section(
+        "Water and dust",
+        "A hairstyle [wet and dusty](shading.md#water-and-dust).",
+        (
+            Picture("water_half", "Half wet", f"{COATED} --set shading.wetness=0.5"),
+            Picture("water_soaked", "Soaked", f"{COATED} --set shading.wetness=1"),
+            Picture("dust_dry", "Dusty", f"{COATED} --set shading.dust=0.6"),
+            Picture(
+                "dust_wet",
+                "Wet dust",
+                f"{COATED} --set shading.dust=0.6 --set shading.wetness=0.8",
+            ),
+        ),
     ),
     Section(
         "Stages",

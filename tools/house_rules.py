@@ -37,6 +37,7 @@ FLOWS = {
     "paint_flow",
     "settle_flow",
     "style_flow",
+    "wet_flow",
     "parameters",
 }
 
@@ -88,6 +89,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "comb_flow": PURE | {"pipeline"},
     "paint_flow": PURE | {"pipeline", "comb_flow"},
     "style_flow": PURE | {"pipeline", "comb_flow"},
+    "wet_flow": PURE,
     "parameters": PURE,
     "render": PURE | {"gpu"},
     **{f"blender.{room}": PURE | FLOWS | {"render", "gpu"} | BLENDER for room in BLENDER_ROOMS},

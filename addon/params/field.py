@@ -197,13 +197,18 @@ class Settings:
 
     def multiplied(self, **factors: float) -> Self:
         """The same with these numbers times their factors, as far as their hard ranges reach."""
+        return self.clipped(
+            **{name: getattr(self, name) * factor for name, factor in factors.items()}
+        )
+
+    def clipped(self, **values: float) -> Self:
+        """The same with these numbers, as far as their hard ranges reach."""
         limits = {p.name: p.hard_range or (-math.inf, math.inf) for p in self.parameters()}
-        found = {name: getattr(self, name) * factor for name, factor in factors.items()}
         return dataclasses.replace(
             self,
             **{
                 name: min(max(each, limits[name][0]), limits[name][1])
-                for name, each in found.items()
+                for name, each in values.items()
             },
         )
 

@@ -41,6 +41,7 @@ TRANSPARENCIES = (
     ("none", "None", "Opaque strands with hard edges, no thinner than the minimum width"),
 )
 _HAS_TIPS = when("shading.tip_tint", lack="needs Tip Tint")
+_HAS_DUST = when("shading.dust", lack="needs Dust")
 _IS_MARSCHNER = when("shading.model", "marschner")
 _HAS_MELANIN = both(_IS_MARSCHNER, when("shading.pigment", "melanin"))
 _HAS_ABSORPTION = both(_IS_MARSCHNER, when("shading.pigment", "absorption"))
@@ -162,6 +163,33 @@ class SharedSettings(Settings):
         panel="Tips & Brows",
         active_when=when("shading.brow_source", "natural", lack="as the hair"),
     )
+    wetness: float = number(
+        0.0,
+        label="Wetness",
+        description="Amount of water in the hair; 1 is soaked. Wet hair is darker, with a sharp "
+        "highlight, its children clump, and it is heavier when it moves",
+        soft=(0.0, 1.0),
+        hard=(0.0, 1.0),
+        unit="factor",
+        source="Lekner and Dorf 1988",
+        panel="Wet & Dusty",
+    )
+    dust: float = number(
+        0.0,
+        label="Dust",
+        description="Fraction of the hair that dust covers, which dulls its highlights",
+        soft=(0.0, 1.0),
+        hard=(0.0, 1.0),
+        unit="factor",
+        panel="Wet & Dusty",
+    )
+    dust_color: tuple[float, float, float] = color(
+        (0.22, 0.17, 0.115),
+        label="Dust Colour",
+        description="Colour of the dust while it is dry",
+        panel="Wet & Dusty",
+        active_when=_HAS_DUST,
+    )
     color_variation: float = number(
         0.3,
         label="Colour Variation",
@@ -229,6 +257,7 @@ class ShadingSettings(MarschnerSettings, KajiyaKaySettings, SharedSettings):
         "Second Highlight",
         "Rim Light",
         "Tips & Brows",
+        "Wet & Dusty",
         "Variation",
         "Fibre",
         "Light",

@@ -17,6 +17,8 @@ from hairloom.addon.blender.cards.show import without_strands  # noqa: E402
 from hairloom.addon.blender.preview import previews, scene_events  # noqa: E402
 from hairloom.addon.blender.strands.read_hair import ExportRequest, still_hair  # noqa: E402
 from hairloom.addon.blender.viewport import overlay  # noqa: E402
+from hairloom.addon.shading.coat import coated_color  # noqa: E402
+from hairloom.addon.shading.settings import ShadingSettings  # noqa: E402
 from hairloom.addon.strands import StrandSet  # noqa: E402
 
 RED, BLUE = (0.8, 0.02, 0.03), (0.01, 0.05, 0.6)
@@ -54,6 +56,19 @@ def test_painting_the_curves_is_seen_in_the_preview(
     np.testing.assert_allclose(painted.color, np.broadcast_to(BLUE, painted.color.shape), atol=1e-6)
     scene_events.catch_up(evaluated())
     assert overlay.drawing_of(session.uid).snapshot.color is painted.color, "nothing has changed"
+
+
+def test_colours_of_wet_hair_are_seen_in_the_preview(
+    hair: Any, evaluated: Callable[[], Any]
+) -> None:
+    session = previews.start(hair, evaluated())
+    dry = overlay.drawing_of(session.uid).snapshot.color
+    for wetness in (1.0, 0.0):
+        hair.data.hairloom.shading.wetness = wetness
+        scene_events.catch_up(evaluated())
+        shown = overlay.drawing_of(session.uid).snapshot.color
+        expected = coated_color(dry, ShadingSettings(wetness=wetness))
+        np.testing.assert_allclose(shown, expected, atol=1e-6)
 
 
 def test_a_bake_keeps_the_colours(hair: Any, evaluated: Callable[[], Any]) -> None:

@@ -9,7 +9,7 @@ PICTURES: dict[str, tuple[tuple[str, ...], ...]] = {
     "look": (
         ("data_look", "data_look_look_first", "data_look_look_second"),
         ("data_look_look_rim", "data_look_look_tips", "data_look_look_variation"),
-        ("data_look_look_fibre", "data_look_look_light"),
+        ("data_look_look_wet", "data_look_look_fibre", "data_look_look_light"),
     ),
     "shadows": (("data_shadows",), ("data_shadows_skin", "data_shafts")),
     "grow": (("data_grow",),),

@@ -18,6 +18,7 @@ from ...groom.masks import mask_names
 from ...groom.settings import GuideSettings
 from ...groom.width_settings import WidthSettings
 from ...pipeline import Pose
+from ...wet_flow import heavier
 from ..base.attributes import read_attribute
 from ..base.objects import matrix_of
 from ..base.vertex_weights import painted_attribute, weight_names, weights_on
@@ -112,7 +113,8 @@ def settings_part(hair: bpy.types.Object) -> str:
 
 def _dynamics(hair: bpy.types.Object) -> DynamicsSettings:
     """Those alone, as each frame asks for them. All forms of the solver give the same motion."""
-    return replace(settings_of(hair.hairloom.dynamics, DynamicsSettings), device="automatic")
+    settings = settings_of(hair.hairloom.dynamics, DynamicsSettings)
+    return replace(heavier(settings, hair.data.hairloom.shading.wetness), device="automatic")
 
 
 def collider_places(

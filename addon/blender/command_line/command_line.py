@@ -171,7 +171,7 @@ def _job(verb: Verb, options: argparse.Namespace, report: Report) -> Job:
     return Job(
         verb=verb.name,
         sources=_sources(verb, options) if verb.takes_hair else Sources(),
-        settings=chosen_settings(options) if verb.takes_settings else SettingsMap(),
+        chosen=chosen_settings(options) if verb.takes_settings else SettingsMap(),
         output=Path() if output is None else output,
         options=options,
         report=report,

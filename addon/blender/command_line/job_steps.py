@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Self
 
@@ -23,6 +24,7 @@ from ...params import Settings, SettingsMap
 from ...pipeline import Pose, Rig
 from ...shading.ambient_settings import AmbientSettings
 from ...shading.settings import ShadingSettings
+from ...wet_flow import acting
 from ..bakes.guide_motion import BakedGuides
 from ..base.report import Report
 from ..colliders.fields import solid_of
@@ -38,14 +40,21 @@ from .object_settings import is_groom
 
 @dataclass(frozen=True)
 class Job:
-    """One call of a verb: what to work on, how, where the result goes, and what is reported."""
+    """One call of a verb: what to work on, how, where the result goes, and what is reported.
+
+    chosen: the settings as they are stored; `settings`: as they act.
+    """
 
     verb: str
     sources: Sources
-    settings: SettingsMap
+    chosen: SettingsMap
     output: Path
     options: argparse.Namespace
     report: Report
+
+    @cached_property
+    def settings(self) -> SettingsMap:
+        return acting(self.chosen)
 
 
 def read_hair(job: Job) -> Inputs:

@@ -49,7 +49,7 @@ def simulate(job: Job) -> None:
 def simulated(job: Job, inputs: Inputs, folder: Path) -> BakedGuides:
     """Bake the hair under the scene's animation or the shake; call it `at_rest`."""
     with _scene_of(job, inputs) as hair:
-        put_map(hair, job.settings)
+        put_map(hair, job.chosen)
         widths = hair.data.hairloom.widths
         if widths.method == "auto" and not inputs.strands.has_widths:
             widths.method = "found"  # the curves have had them since they were written

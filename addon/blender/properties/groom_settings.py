@@ -1,4 +1,4 @@
-"""All that the artist has set for one groom, checked."""
+"""All that the artist has set for one groom, checked, as it acts."""
 
 from __future__ import annotations
 
@@ -17,13 +17,15 @@ from ...parameters import ALL_SETTINGS, sections_of
 from ...params import Owner, Settings, SettingsMap
 from ...shading.ambient_settings import AmbientSettings
 from ...shading.settings import ShadingSettings
+from ...wet_flow import acting
 from .card_group import picture_names
 from .properties import settings_of
 
 
 @dataclass(frozen=True)
 class GroomSettings:
-    """The settings of the curves and of their object; `groom[ShadingSettings]` is one section.
+    """The settings of the curves and of their object, as they act where hair is wet or dusty;
+    `groom[ShadingSettings]` is one section.
 
     card_pictures: (texture, picture) by name, of pictures instead of generated textures.
     children_density: vertex group or attribute of the head, by name; empty: none.
@@ -56,14 +58,15 @@ class GroomSettings:
             groom = hair.data.evaluated_get(depsgraph).hairloom
             character = hair.evaluated_get(depsgraph).hairloom
         owners: dict[Owner, bpy.types.PropertyGroup] = {"groom": groom, "character": character}
+        chosen = SettingsMap(
+            *(
+                settings_of(getattr(group, section), ALL_SETTINGS[section])
+                for owner, group in owners.items()
+                for section in sections_of(owner)
+            )
+        )
         return cls(
-            SettingsMap(
-                *(
-                    settings_of(getattr(group, section), ALL_SETTINGS[section])
-                    for owner, group in owners.items()
-                    for section in sections_of(owner)
-                )
-            ),
+            acting(chosen),
             picture_names(groom.card_images),
             character.children_density,
             character.debug_view,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import bpy
 
 from ...errors import HairloomError
+from ...shading.coat import coated
 from ...shading.settings import ShadingSettings
 from ..properties import changed
 from ..properties.properties import settings_of
@@ -63,7 +64,7 @@ def _put_again(owner: bpy.types.Curves) -> None:
 
 
 def _look_of(curves: bpy.types.Curves) -> ShadingSettings:
-    return settings_of(curves.hairloom.shading, ShadingSettings)
+    return coated(settings_of(curves.hairloom.shading, ShadingSettings))
 
 
 LISTENER = ("settings", follow)

@@ -18,6 +18,7 @@ from ...refine.settings import DetailSettings
 from ...render.hair_ball import HairBall
 from ...render.snapshot import SECTIONS, Snapshot
 from ...render.strand_layout import StrandLayout
+from ...shading.coat import is_coated
 from ...shading.marschner.look import fibre_of
 from ...shading.marschner.tables import DEFAULT_SIZE, PREVIEW_SIZE, shape_of
 from ...shading.settings import ShadingSettings
@@ -147,7 +148,7 @@ class GroomPicture:
     def take_settings(self, rig: Rig, was: GroomSettings, now: GroomSettings) -> bool:
         """Take over what acts at once; whether hair has to be shown again where it is."""
         looks = was[ShadingSettings], now[ShadingSettings]
-        if looks[0] != looks[1] and any(look.color_map for look in looks):
+        if looks[0] != looks[1] and any(look.color_map or is_coated(look) for look in looks):
             self.take_colors(rig, self._colors, now)
         self.snapshot = with_settings(self.snapshot, now)
         if not shapes_alike(was[ShadingSettings], now[ShadingSettings]) and not bpy.app.background:

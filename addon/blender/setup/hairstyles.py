@@ -20,6 +20,7 @@ from ...groom.settings import GrowSettings
 from ...groom.widths import with_widths
 from ...parameters import ALL_SETTINGS
 from ...refine.lead_out_at_rest import are_inside, led_out_at_rest
+from ...shading.coat import coated
 from ...shading.settings import ShadingSettings
 from ...strands import StrandSet, Surface
 from ...strands.affine import mean_scale, moved
@@ -186,7 +187,7 @@ def add_hairstyle(
             _leave_out_inside(hair, growth.solid, _DEEP * growth.size)
     hair.hairloom.children_density = masks.get("children", "")
     hair.hairloom.hairstyle = style.name
-    put_look_material(hair.data, settings_of(hair.data.hairloom.shading, ShadingSettings))
+    put_look_material(hair.data, coated(settings_of(hair.data.hairloom.shading, ShadingSettings)))
     done = _put(growth, head, collection)
     return AddedHair(hair, done, growth.warnings)
 

@@ -10,6 +10,7 @@ import numpy as np
 from ...dynamics.settings import DynamicsSettings
 from ...errors import HairloomError
 from ...groom.settings import GrowSettings
+from ...shading.coat import coated
 from ...shading.settings import ShadingSettings
 from ..base.objects import head_of
 from ..base.parts import Parts
@@ -104,7 +105,7 @@ def new_groom(
     )
     dress(hair, presets)
     fit_motion(hair, factor)
-    put_look_material(hair.data, settings_of(hair.data.hairloom.shading, ShadingSettings))
+    put_look_material(hair.data, coated(settings_of(hair.data.hairloom.shading, ShadingSettings)))
     return hair
 
 

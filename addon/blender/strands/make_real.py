@@ -130,6 +130,8 @@ def real_look(shading: ShadingSettings) -> ShadingSettings:
         color_variation=0.0,
         grey_fraction=0.0,
         tip_tint=0.0,
+        wetness=0.0,
+        dust=0.0,
     )
 
 

@@ -46,10 +46,10 @@ def test_a_look_has_a_small_square_picture(path: Path) -> None:
 def test_looks_differ_in_both_models() -> None:
     """Turning the model leaves a look its colour: what either model asks for is set."""
     settings = [read_any_preset(path, ALL_SETTINGS).settings for path in LOOKS]
-    for asked in (("base_color", "primary_strength"), ("base_color", "strength_r", "width_r")):
-        assert len({tuple(getattr(look, name) for name in asked) for look in settings}) == len(
-            LOOKS
-        )
+    for asked in (("primary_strength",), ("strength_r", "width_r")):
+        names = ("base_color", "wetness", *asked)
+        different = {tuple(getattr(look, name) for name in names) for look in settings}
+        assert len(different) == len(LOOKS)
 
 
 def test_no_picture_lies_there_without_a_look() -> None:

@@ -1,0 +1,85 @@
+"""Dust on hair, and water in it: a look as it is drawn.
+
+Water. A film lies around each strand and fills its cuticle. It reflects a part p of the light that
+comes out of the hair back into it, where it is absorbed again: colour c becomes
+c (1 - p) / (1 - p c) (Lekner and Dorf 1988, "Why some things are darker when wet", without what
+the film itself reflects). The film is smooth, so its highlight is narrow and does not lean as the
+scales do; and the scales under water bend light less.
+
+Dust. Of the part that it covers one sees its colour, without highlights; what is left of these is
+wider. Water wets dust as it wets hair.
+
+Limitation: all of a groom is as wet and dusty.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..arrays import Floats
+from .drawn_strands import in_color, look_color
+from .settings import ShadingSettings
+
+#: Indices of refraction of hair and water.
+_HAIR, _WATER = 1.55, 1.333
+#: Of diffuse light, what a flat surface of water reflects from outside (Lekner and Dorf 1988).
+_FROM_OUTSIDE = 0.066
+#: And from within: by reciprocity the part that gets out is so much smaller.
+KEPT = 1.0 - (1.0 - _FROM_OUTSIDE) / _WATER**2
+#: Width of the highlight of a film, standard deviation of the half angle [rad].
+FILM_WIDTH = float(np.radians(2.0))
+#: By which a slope bends light that enters hair out of water, over hair out of air.
+_BENT = (_HAIR / _WATER - 1.0) / (_HAIR - 1.0)
+#: Exponent of Kajiya-Kay's highlights on a film.
+_FILM_GLOSS = 400.0
+#: How much wider dust makes what is left of highlights.
+_WIDER = 2.0
+
+
+def coated_color(color: Floats, look: ShadingSettings) -> Floats:
+    """The colour of a mass of hair, (..., 3) linear, with the look's dust and water; NaN stays.
+    Without any it is the same array."""
+    if not is_coated(look):
+        return color
+    kept = KEPT * look.wetness
+    dusty = color + look.dust * (np.array(look.dust_color) - color)
+    wet = dusty * (1.0 - kept) / (1.0 - kept * np.minimum(dusty, 1.0))
+    return wet.astype(color.dtype)
+
+
+def coated(look: ShadingSettings) -> ShadingSettings:
+    """The look in its dust and water, of which it still says how much there is. Colours of strands
+    are the matter of `coated_color`."""
+    if not is_coated(look):
+        return look
+    water, clean = look.wetness, 1.0 - look.dust
+    wider, slope = 1.0 + _WIDER * look.dust, 1.0 + water * (_BENT - 1.0)
+    film = look.width_r + water * (min(look.width_r, FILM_WIDTH) - look.width_r)
+    tip, brow = (
+        coated_color(np.array(color), look).tolist() for color in (look.tip_color, look.brow_color)
+    )
+    colored = in_color(coated_color(look_color(look), look), look)
+    return replace(colored, tip_color=tuple(tip), brow_color=tuple(brow)).clipped(
+        strength_r=clean * look.strength_r,
+        strength_trt=clean * look.strength_trt,
+        width_r=wider * film,
+        width_tt=wider * slope * look.width_tt,
+        width_trt=wider * slope * look.width_trt,
+        offset_r=look.offset_r - water * look.cuticle_tilt,
+        primary_strength=clean * look.primary_strength,
+        secondary_strength=clean * look.secondary_strength,
+        primary_exponent=_glossier(look.primary_exponent, water * clean) / wider,
+        secondary_exponent=_glossier(look.secondary_exponent, water * clean) / wider,
+        sparkle=clean * look.sparkle,
+    )
+
+
+def is_coated(look: ShadingSettings) -> bool:
+    """Whether there is any water or dust."""
+    return bool(look.wetness or look.dust)
+
+
+def _glossier(exponent: float, amount: float) -> float:
+    return max(exponent, exponent ** (1.0 - amount) * _FILM_GLOSS**amount)

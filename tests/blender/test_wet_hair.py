@@ -1,0 +1,67 @@
+"""Wet hair in Blender: what acts is not what is stored."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+import numpy as np
+import pytest
+
+from hairloom.addon.blender.bakes.groom_hashes import settings_part
+from hairloom.addon.blender.colliders.rigs import rig_of
+from hairloom.addon.blender.properties.groom_settings import GroomSettings
+from hairloom.addon.blender.scene.source import read_source
+from hairloom.addon.dynamics.settings import DynamicsSettings
+from hairloom.addon.shading.coat import coated_color
+from hairloom.addon.shading.drawn_strands import look_color
+from hairloom.addon.shading.settings import ShadingSettings
+
+
+@pytest.fixture
+def hair(new_hair: Any, sphere: Any) -> Any:
+    made = new_hair(sphere)
+    children = made.data.hairloom.children
+    children.method, children.strand_count, children.clump = "multi", 500, 0.3
+    return made
+
+
+def rig(hair: Any) -> Any:
+    return rig_of(hair, read_source(hair, bpy.context.evaluated_depsgraph_get()))
+
+
+def test_water_acts_on_look_children_and_motion_and_leaves_what_is_stored(hair: Any) -> None:
+    dry, before = GroomSettings.of(hair), rig(hair)
+    stored = hair.hairloom.dynamics.style_tip, hair.data.hairloom.shading.width_r
+    hair.data.hairloom.shading.wetness = 1.0
+    wet = GroomSettings.of(hair)
+    assert wet[DynamicsSettings].style_tip < 0.8 * dry[DynamicsSettings].style_tip
+    assert not np.allclose(rig(hair).strands.points, before.strands.points)
+    assert (hair.hairloom.dynamics.style_tip, hair.data.hairloom.shading.width_r) == stored
+    hair.data.hairloom.shading.wetness = 0.0
+    np.testing.assert_array_equal(rig(hair).strands.points, before.strands.points)
+
+
+def test_a_bake_of_dry_hair_is_out_of_date_once_it_is_wet(hair: Any) -> None:
+    before = settings_part(hair)
+    hair.data.hairloom.shading.wetness = 0.5
+    assert settings_part(hair) != before
+    hair.data.hairloom.shading.wetness = 0.0
+    hair.data.hairloom.shading.dust = 0.5  # which has no weight
+    assert settings_part(hair) == before
+
+
+def test_hair_made_real_has_its_water_within_it(hair: Any) -> None:
+    """Once: the look of real hair is dry, and its colours are those of wet hair."""
+    shading = hair.data.hairloom.shading
+    shading.base_color, shading.color_variation, shading.wetness = (0.4, 0.2, 0.1), 0.0, 1.0
+    look = GroomSettings.of(hair)[ShadingSettings]
+    expected = coated_color(np.array([0.4, 0.2, 0.1]), ShadingSettings(wetness=1.0))
+    np.testing.assert_allclose(look_color(look), expected, rtol=1e-5)
+    assert bpy.ops.hairloom.make_real() == {"FINISHED"}
+    real = bpy.context.active_object
+    own = GroomSettings.of(real)[ShadingSettings]
+    assert own.wetness == 0.0 and own.width_r == pytest.approx(look.width_r)
+    colors = np.empty((len(real.data.points), 4), np.float32)
+    real.data.attributes["color"].data.foreach_get("color", colors.ravel())
+    np.testing.assert_allclose(colors[:, :3], np.tile(expected, (len(colors), 1)), atol=2e-3)

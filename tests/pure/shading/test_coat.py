@@ -1,0 +1,103 @@
+"""Hair in water and dust, against light that is counted through a film of water."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hairloom.addon.shading.coat import FILM_WIDTH, KEPT, coated, coated_color
+from hairloom.addon.shading.drawn_strands import look_color
+from hairloom.addon.shading.marschner.look import fibre_of
+from hairloom.addon.shading.settings import ShadingSettings
+
+DRY = ShadingSettings(cuticle_tilt=0.05, width_r=0.1, width_tt=0.06, dust_color=(0.3, 0.2, 0.1))
+WET, DUSTY = replace(DRY, wetness=1.0), replace(DRY, dust=0.6)
+
+
+def reflected(index: float, cosine: np.ndarray) -> np.ndarray:
+    """Fresnel's equations for light that comes from a medium of index 1 into one of this index."""
+    sine = np.sqrt(1.0 - cosine**2) / index
+    inner = np.sqrt(np.maximum(1.0 - sine**2, 0.0))
+    across = (cosine - index * inner) / (cosine + index * inner)
+    along = (index * cosine - inner) / (index * cosine + inner)
+    return np.where(sine >= 1.0, 1.0, 0.5 * (across**2 + along**2))
+
+
+def test_a_film_keeps_what_fresnel_has_of_diffuse_light() -> None:
+    """The mean over a half sphere, weighted by the cosine, of what water reflects from within."""
+    cosine = np.sqrt((np.arange(200_000) + 0.5) / 200_000)
+    assert pytest.approx(reflected(1.0 / 1.333, cosine).mean(), abs=2e-3) == KEPT
+
+
+def test_wet_colour_is_that_of_light_followed_through_the_film() -> None:
+    """Of light in the hair a part c comes back; of that the film lets some out, and the rest goes
+    in again."""
+    color = np.array([[0.02, 0.2, 0.5], [0.9, 0.99, 1e-4]])
+    light, out = np.ones(color.shape), np.zeros(color.shape)
+    for _ in range(2000):
+        light = light * color
+        out, light = out + light * (1.0 - KEPT), light * KEPT
+    np.testing.assert_allclose(coated_color(color, WET), out, rtol=1e-9)
+
+
+def test_wet_hair_is_darker_and_more_saturated_but_white_stays_white() -> None:
+    brown = np.array([0.3, 0.15, 0.07])
+    wet = coated_color(brown, WET)
+    assert (wet < brown).all()
+    assert wet[0] / wet[2] > 1.1 * brown[0] / brown[2]
+    assert coated_color(np.ones(3), WET) == pytest.approx(1.0)
+
+
+def test_dust_has_its_colour_and_water_darkens_that_too() -> None:
+    black = np.full(3, 0.01)
+    whole = replace(DRY, dust=1.0)
+    np.testing.assert_allclose(coated_color(black, whole), DRY.dust_color)
+    assert (coated_color(black, replace(whole, wetness=1.0)) < DRY.dust_color).all()
+
+
+def test_hair_without_either_is_the_same_object() -> None:
+    color = np.ones((4, 3), np.float32)
+    assert coated(DRY) is DRY
+    assert coated_color(color, DRY) is color
+
+
+def test_a_look_in_water_has_the_colour_of_wet_hair_and_the_highlight_of_a_film() -> None:
+    for dry in (DRY, replace(DRY, pigment="melanin", melanin=0.4)):
+        wet = coated(replace(dry, wetness=1.0))
+        expected = coated_color(look_color(dry), replace(dry, wetness=1.0))
+        np.testing.assert_allclose(look_color(wet), expected, rtol=1e-5)
+        assert wet.width_r == pytest.approx(FILM_WIDTH)
+        assert fibre_of(wet).highlight_shifts[0] == pytest.approx(0.0, abs=1e-9)
+        assert wet.width_tt < 0.5 * dry.width_tt
+    half = coated(replace(DRY, wetness=0.5))
+    assert FILM_WIDTH < half.width_r < DRY.width_r
+
+
+def test_a_look_in_dust_is_dull() -> None:
+    dusty = coated(DUSTY)
+    assert dusty.strength_r == pytest.approx(0.4 * DRY.strength_r)
+    assert dusty.width_r > 2.0 * DRY.width_r
+    assert dusty.primary_exponent < 0.5 * DRY.primary_exponent
+
+
+def test_colours_that_are_missing_stay_so() -> None:
+    found = coated_color(np.array([[np.nan] * 3, [0.2] * 3], np.float32), WET)
+    assert np.isnan(found[0]).all()
+    assert found.dtype == np.float32
+
+
+@pytest.mark.parametrize("amounts", [(1.0, 1.0), (0.0, 1.0), (1.0, 0.0)])
+def test_extremes_are_settings(amounts: tuple[float, float]) -> None:
+    widest = ShadingSettings(
+        wetness=amounts[0],
+        dust=amounts[1],
+        width_r=float(np.radians(60.0)),
+        width_tt=float(np.radians(60.0)),
+        primary_exponent=1.0,
+        cuticle_tilt=float(np.radians(30.0)),
+        offset_r=float(np.radians(-45.0)),
+        base_color=(0.0, 1.0, 0.0),
+    )
+    coated(widest)

@@ -1,0 +1,77 @@
+"""What water does to children and motion, against the motion of a mass on a spring."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from small_wig import GUIDES, curves, sheet
+
+from hairloom.addon import pipeline
+from hairloom.addon.dynamics.settings import DynamicsSettings
+from hairloom.addon.groom.children_settings import ChildrenSettings
+from hairloom.addon.paint_flow import with_colors
+from hairloom.addon.params import SettingsMap
+from hairloom.addon.shading.coat import coated_color
+from hairloom.addon.shading.settings import ShadingSettings
+from hairloom.addon.wet_flow import WATER, acting, heavier, wet_children
+
+WET = ShadingSettings(wetness=1.0)
+
+
+def test_dry_settings_are_the_same_object() -> None:
+    settings = SettingsMap(ShadingSettings(melanin=0.3), ChildrenSettings(clump=0.2))
+    assert acting(settings) is settings
+
+
+def test_the_settings_of_looks_children_and_motion_act_together() -> None:
+    dry = SettingsMap(WET, ChildrenSettings(), DynamicsSettings())
+    wet = acting(dry)
+    assert wet[ShadingSettings].width_r < dry[ShadingSettings].width_r
+    assert wet[ChildrenSettings] == wet_children(dry[ChildrenSettings], 1.0)
+    assert wet[DynamicsSettings] == heavier(dry[DynamicsSettings], 1.0)
+
+
+def test_a_heavier_mass_swings_slower_and_loses_less() -> None:
+    """x'' = -(k x + c x') / m: its frequency and its rate of decay, for a mass that has grown."""
+    stiffness, loss, mass = 30.0, 0.4, 1.0 + WATER
+    dry, wet = (np.roots([m, loss, stiffness])[0] for m in (1.0, mass))
+    settings = DynamicsSettings()
+    after = heavier(settings, 1.0)
+    # without the shift that damping makes, of less than a thousandth
+    assert after.style_tip / settings.style_tip == pytest.approx(abs(wet / dry), rel=1e-6)
+    assert after.damping / settings.damping == pytest.approx(wet.real / dry.real, rel=1e-6)
+    assert after.sag_compensation == pytest.approx(1.0 / mass)
+
+
+def test_children_of_wet_hair_lie_closer_in_their_clumps() -> None:
+    def gap(settings: ChildrenSettings) -> float:
+        """How far the tip of a child is from the nearest other tip, in the mean [m]."""
+        rig = pipeline.prepare(curves(), sheet(), GUIDES, place="a wig", children=settings)
+        tips = rig.strands.grid[60:, -1]
+        away = np.linalg.norm(tips[:, None] - tips[None], axis=2)
+        np.fill_diagonal(away, np.inf)
+        return float(away.min(axis=1).mean())
+
+    dry = ChildrenSettings(
+        method="multi",
+        strand_count=1500,
+        clump=0.3,
+        frizz=0.01,
+        baby_hair=0.0,
+        length_variation=0.0,
+    )
+    assert gap(wet_children(dry, 1.0)) < 0.6 * gap(dry)
+
+
+def test_own_colours_of_strands_are_wet_too() -> None:
+    strands = curves()
+    color = np.full((strands.point_count, 3), 0.4, np.float32)
+    colored = replace(strands, color=color)
+    np.testing.assert_allclose(
+        with_colors(colored, None, WET).color, coated_color(color, WET), rtol=1e-6
+    )
+    assert with_colors(colored, None, ShadingSettings()) is colored
+    by_look = replace(WET, color_source="look")
+    assert with_colors(colored, None, by_look) is colored
