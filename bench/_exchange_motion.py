@@ -46,7 +46,7 @@ def motion_figures(seconds: float) -> dict[str, float]:
         seconds: of motion.
     """
     rig = sintel_rig()
-    motion = _shaken(rig, seconds)
+    motion = shaken(rig, seconds)
     cards, atlas, occlusion = SETTINGS
     # light on cards says nothing about their motion
     settings = SettingsMap(cards, atlas, replace(occlusion, rays=8))
@@ -84,7 +84,7 @@ def motion_figures(seconds: float) -> dict[str, float]:
     return figures
 
 
-def _shaken(rig: Rig, seconds: float) -> MadeMotion:
+def shaken(rig: Rig, seconds: float) -> MadeMotion:
     """Simulated by numpy through the shake."""
     assert rig.head is not None
     settings = DynamicsSettings()

@@ -1,12 +1,13 @@
-"""Exported cards in programs that know nothing of Hairloom, what a user sees there, the page, and
-the atlases that are exported.
+"""Exported cards in programs that know nothing of Hairloom, what a user sees there, the page, the
+springs, and the atlases that are exported.
 
-See `_engines_plain`, `_engines_page` and `_engines_atlas` for what is compared with what.
+See `_engines_plain`, `_engines_page`, `_engines_springs` and `_engines_atlas` for what is
+compared with what.
 
 Exit code 1: a limit is missed.
 
 make bench NAME=engines                     all parts
-tools/bench.py engines page                 one part: plain, page or atlas
+tools/bench.py engines page                 one part: plain, page, springs or atlas
 tools/bench.py engines atlas sintel few     some grooms
 """
 
@@ -18,10 +19,11 @@ from typing import Any
 from _engines_atlas import atlas_figures
 from _engines_page import page_figures
 from _engines_plain import plain_figures
+from _engines_springs import spring_figures
 from _report import start, tell
 
 REFERENCE = "our own picture of the strands, drawn as they come, under the same suns"
-PARTS = {"plain": plain_figures, "page": page_figures}
+PARTS = {"plain": plain_figures, "page": page_figures, "springs": spring_figures}
 #: end of a figure's name -> the most, and the least, that it may be
 MOST = {
     "plain_levels_visible": 1,
@@ -32,6 +34,8 @@ MOST = {
     "fur_coverage_percent": 10.0,
     "fur_color_percent": 10.0,
     "few_side_texels": 512,
+    "spring_error_percent": 10.0,
+    "spring_joints": 120,
 }
 LEAST = {"opaque_percent": 25.0, "strand_texels": 1.5}
 

