@@ -79,7 +79,8 @@ def moved_by_three(path: Path, head: np.ndarray, rate: float, chains: int) -> Mo
     world = to_z_up(np.array(told["frames"]))
     local = np.einsum("fab,fja->fjb", carrier[:, :3, :3], world - carrier[:, None, :3, 3])
     rest = rest_of(path)
-    places = local[:, 1:].reshape(len(local), chains, -1, 3)
+    of_chains = [number for number, name in enumerate(told["names"]) if name.startswith("chain")]
+    places = local[:, of_chains].reshape(len(local), chains, -1, 3)
     return MovedByThree(path, carrier, places, rest.reshape(chains, -1, 4, 4), told["springs"])
 
 
@@ -90,12 +91,14 @@ def head_matrices(carrier: np.ndarray) -> list[list[float]]:
 
 
 def rest_of(path: Path) -> np.ndarray:
-    """(n, 4, 4) Z up of all joints but the root, by the file's inverse bind matrices."""
+    """(n, 4, 4) Z up of all joints of chains, by the file's inverse bind matrices."""
     file: Any = GlbFile.of(path.read_bytes(), str(path))
     (skin,) = file.content["skins"]
     columns = np.asarray(file.values(skin["inverseBindMatrices"]), np.float64)
     matrices = np.linalg.inv(columns.reshape(-1, 4, 4).swapaxes(1, 2))
-    return (_AXES.T @ matrices @ _AXES)[1:]
+    names = [file.content["nodes"][number]["name"] for number in skin["joints"]]
+    of_chains = [name.startswith("chain") for name in names]
+    return (_AXES.T @ matrices @ _AXES)[of_chains]
 
 
 def to_z_up(vectors: np.ndarray) -> np.ndarray:

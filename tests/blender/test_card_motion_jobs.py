@@ -44,6 +44,11 @@ def test_the_command_line_writes_a_bake(tmp_path: Path, capfd: Any) -> None:
     told = json.loads((tmp_path / "hair.hairloom.json").read_text("utf-8"))["motion"]
     assert told["frames"] == {"first": 2, "count": 8, "rate": 60.0}
     assert told["chains"] <= 4
+    springs = ["--motion", "springs", "--spring-joints", "9", "--bake", bake]
+    assert command_line.run([*arguments, *springs]) == 0
+    told = json.loads((tmp_path / "hair.hairloom.json").read_text("utf-8"))["motion"]
+    assert (told["kind"], told["joints"] <= 9) == ("springs", True)
+    assert "head_bone" not in told
 
 
 @pytest.mark.slow
@@ -80,6 +85,20 @@ def test_a_button_writes_the_bake(sphere: Any, tmp_path: Path) -> None:
         assert bpy.ops.hairloom.export_cards(**options, **chosen) == {"FINISHED"}
         told = json.loads((path.parent / "hair.hairloom.json").read_text("utf-8"))["motion"]
         assert (told["frames"]["first"], told["frames"]["count"]) == (first, count)
+    sphere.vertex_groups.new(name="Bone").add(range(len(sphere.data.vertices)), 1.0, "REPLACE")
+    armature = bpy.data.objects.new("Rig", bpy.data.armatures.new("Rig"))
+    scene.collection.objects.link(armature)
+    bpy.context.view_layer.objects.active = armature
+    bpy.ops.object.mode_set(mode="EDIT")
+    bone = armature.data.edit_bones.new("Bone")
+    bone.tail = (0.0, 0.0, 0.1)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    sphere.modifiers.new("Armature", "ARMATURE").object = armature
+    bpy.context.view_layer.objects.active = hair
+    sprung = options | {"motion": "springs", "spring_joints": 9}
+    assert bpy.ops.hairloom.export_cards(**sprung) == {"FINISHED"}
+    told = json.loads((path.parent / "hair.hairloom.json").read_text("utf-8"))["motion"]
+    assert (told["kind"], told["head_bone"]) == ("springs", "Bone")
     with pytest.raises(RuntimeError, match="holds frames 3 to 9"):
         bpy.ops.hairloom.export_cards(**options, own_frames=True, first_frame=4, last_frame=20)
 
@@ -88,7 +107,12 @@ def test_a_button_writes_the_bake(sphere: Any, tmp_path: Path) -> None:
 @pytest.mark.usefixtures("extension")
 @pytest.mark.parametrize(
     ("kind", "amid"),
-    [("joints", "Moving the cards"), ("joints", "Fitting joints"), ("texture", "Writing")],
+    [
+        ("joints", "Moving the cards"),
+        ("joints", "Fitting joints"),
+        ("springs", "Fitting springs"),
+        ("texture", "Writing"),
+    ],
 )
 def test_cancelled_in_its_midst_it_leaves_the_old_files(
     kind: str, amid: str, sphere: Any, tmp_path: Path

@@ -15,8 +15,11 @@ from three_springs import MODULE, MovedByThree, moved_by_three, rest_of
 
 bpy = pytest.importorskip("bpy", reason="writing cards needs Blender or the bpy module")
 
+from mathutils import Matrix  # noqa: E402
+
 from hairloom.addon.blender.bakes.guide_motion import GuideMotion  # noqa: E402
 from hairloom.addon.blender.cards.files import WrittenCards  # noqa: E402
+from hairloom.addon.blender.scene.bone_weights import head_bone_of  # noqa: E402
 from hairloom.addon.cards.spring_bones import (  # noqa: E402
     Balls,
     SpringChains,
@@ -24,6 +27,10 @@ from hairloom.addon.cards.spring_bones import (  # noqa: E402
     sprung,
 )
 from hairloom.addon.errors import HairloomError  # noqa: E402
+from hairloom.addon.exchange.cards.glb_file import GlbFile  # noqa: E402
+from hairloom.addon.exchange.cards.glb_skin import add_head_bone  # noqa: E402
+from hairloom.addon.exchange.cards.glb_springs import HeadBone  # noqa: E402
+from hairloom.addon.strands import StrandSet  # noqa: E402
 
 ROOT = Path(__file__).parents[2]
 JOINTS = 40
@@ -106,6 +113,82 @@ def test_what_three_vrm_moves_is_near_the_bake(
     assert p99 < 0.1 * told["hair_length"]
     assert p99 < 0.5 * np.quantile(rigid, 0.99)
     assert p99 == pytest.approx(told["percentile_99"], rel=0.2)  # corners count twice
+
+
+@pytest.fixture(scope="module")
+def carried(
+    springs: tuple[Path, WrittenCards], tmp_path_factory: pytest.TempPathFactory
+) -> tuple[Path, HeadBone]:
+    """The same file, below a bone of a character."""
+    turn = np.array(Matrix.Rotation(0.7, 4, (1.0, 2.0, -1.0)))
+    turn[:3, 3] = [0.02, 0.1, 1.4]
+    bone, path = HeadBone("Kopf", turn), tmp_path_factory.mktemp("carried") / "hair.glb"
+    file = GlbFile.of(springs[0].read_bytes(), "hair.glb")
+    (skin,) = file.content["skins"]
+    add_head_bone(file, skin["joints"][0], bone.name, bone.matrix)
+    path.write_bytes(file.data())
+    return path, bone
+
+
+def test_below_a_bone_springs_move_as_before(
+    motion: GuideMotion,  # noqa: F811
+    carried: tuple[Path, HeadBone],
+    moved: MovedByThree,
+) -> None:
+    head = np.stack([head_matrix(motion, frame) for frame in range(FRAMES)])
+    found = moved_by_three(carried[0], head, RATE, len(moved.rest))
+    np.testing.assert_allclose(found.places, moved.places, atol=1e-6)
+    report = validated(carried[0])
+    assert report["issues"]["numErrors"] == 0, report
+
+
+def test_blender_reads_the_bone_where_it_is(carried: tuple[Path, HeadBone]) -> None:
+    path, bone = carried
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    bpy.ops.import_scene.gltf(filepath=str(path), bone_heuristic="BLENDER")
+    (armature,) = (obj for obj in bpy.data.objects if obj.type == "ARMATURE")
+    found = armature.data.bones[bone.name]
+    assert armature.data.bones["hair_root"].parent == found
+    np.testing.assert_allclose(armature.matrix_world @ found.matrix_local, bone.matrix, atol=1e-5)
+
+
+def test_the_bone_is_the_one_that_carries_the_roots() -> None:
+    """Of an armature in centimetres, whose head is at its rest pose."""
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    bpy.ops.mesh.primitive_plane_add(size=0.2, location=(0.0, 0.0, 1.5))
+    head = bpy.context.object
+    bpy.ops.object.armature_add()
+    armature = bpy.context.object
+    armature.scale = (0.01, 0.01, 0.01)
+    bpy.ops.object.mode_set(mode="EDIT")
+    neck = armature.data.edit_bones[0]
+    neck.name, neck.head, neck.tail = "neck", (0.0, 0.0, 120.0), (0.0, 0.0, 140.0)
+    skull = armature.data.edit_bones.new("skull")
+    skull.head, skull.tail, skull.parent = (0.0, 0.0, 140.0), (0.0, 5.0, 160.0), neck
+    bpy.ops.object.mode_set(mode="OBJECT")
+    for name, weight in (("neck", 0.3), ("skull", 0.7)):
+        head.vertex_groups.new(name=name).add([0, 1, 2, 3], weight, "REPLACE")
+    head.modifiers.new("Armature", "ARMATURE").object = armature
+    hair = bpy.data.objects.new("Hair", bpy.data.hair_curves.new("Hair"))
+    hair.data.surface = head
+    bpy.context.scene.collection.objects.link(hair)
+    strands = StrandSet(
+        points=np.float32([[0.0, 0.0, 1.5], [0.0, 0.0, 1.6]]),
+        offsets=np.array([0, 2]),
+        radius=np.full(2, 1e-4, np.float32),
+        group=np.zeros(1, np.int32),
+        root_triangle=np.array([0]),
+        root_barycentric=np.float32([[0.2, 0.3, 0.5]]),
+    )
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    found = head_bone_of(hair, depsgraph, strands)
+    assert found is not None and found.name == "skull"
+    np.testing.assert_allclose(found.matrix[:3, 3], [0.0, 0.0, 1.4], atol=1e-6)
+    np.testing.assert_allclose(np.linalg.norm(found.matrix[:3, :3], axis=0), 1.0, atol=1e-6)
+    along = np.array([0.0, 5.0, 20.0]) / np.hypot(5.0, 20.0)
+    np.testing.assert_allclose(found.matrix[:3, 1], along, atol=1e-6)
+    head.modifiers.clear()
+    assert head_bone_of(hair, bpy.context.evaluated_depsgraph_get(), strands) is None
 
 
 def test_springs_are_for_glb(motion: GuideMotion, tmp_path: Path) -> None:  # noqa: F811

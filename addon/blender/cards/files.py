@@ -25,6 +25,7 @@ from ...exchange.cards.card_formats import GLB, USD, CardFormat, format_of
 from ...exchange.cards.card_page import PAGE_SUFFIX
 from ...exchange.cards.glb_file import GlbFile
 from ...exchange.cards.glb_plain import screen_coverage, with_levels, with_material
+from ...exchange.cards.glb_springs import HeadBone
 from ...exchange.cards.index_buffer import index_buffer
 from ...exchange.cards.sidecar import SUFFIX, CardFile, files_of_earlier, sidecar_text
 from ...exchange.files.atomic import check_place
@@ -44,6 +45,7 @@ from ..bakes.guide_motion import BakedGuides, GuideMotion
 from ..base.outcome import Outcome
 from ..base.report import hairloom_version
 from ..base.thread_work import ThreadWork
+from ..scene.bone_weights import head_bone_of
 from .build import (
     CardInputs,
     CardMaps,
@@ -106,11 +108,13 @@ class CardOutput:
 
     format: one of exchange.card_formats by name; None goes by the file's suffix.
     name: of the hair in the file; None is the file's.
+    head_bone: of the character, which carries springs; None where there is none.
     """
 
     format: str | None = None
     name: str | None = None
     settings: CardExportSettings = field(default_factory=CardExportSettings)
+    head_bone: HeadBone | None = None
 
 
 @dataclass(frozen=True)
@@ -271,7 +275,8 @@ class _Writer:
     ) -> Generator[float, None, JointMotion | SpringMotion]:
         settings = self.output.settings
         if settings.motion == "springs":
-            return spring_motion_steps(tracks, settings, head, str(self.path))
+            bone = self.output.head_bone
+            return spring_motion_steps(tracks, settings, head, bone, str(self.path))
         return joint_motion_steps(tracks, settings)
 
     def _write_with_texture(
@@ -460,6 +465,7 @@ class CardExport:
         check_no_input(path, picture_files(hair.data.hairloom.card_images))
         rig, stale = (None, ()) if motion is None else (motion.rig, motion.notes)
         inputs, notes, dropped = read_inputs(hair, depsgraph, rig)
+        output = replace(output, head_bone=head_bone_of(hair, depsgraph, inputs.rig.strands))
         if levels is not None:
             cards = replace(inputs.settings[CardSettings], levels=levels)
             inputs = replace(inputs, settings=inputs.settings.with_settings(cards))

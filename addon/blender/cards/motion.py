@@ -31,7 +31,7 @@ from ...dynamics.fitting.sphere_fit import fit_spheres
 from ...errors import HairloomError
 from ...exchange.cards.card_formats import GLB, OBJ, CardFormat
 from ...exchange.cards.glb_skin import Skeleton, with_skeleton
-from ...exchange.cards.glb_springs import SpringSkeleton, with_springs
+from ...exchange.cards.glb_springs import HeadBone, SpringSkeleton, with_springs
 from ...exchange.cards.sidecar_motion import joint_motion, spring_motion, texture_motion
 from ...strands import Surface
 from ..bakes.guide_motion import GuideMotion
@@ -206,12 +206,20 @@ class SpringMotion:
 
 
 def spring_motion_steps(
-    tracks: CardTracks, settings: CardExportSettings, head: Surface | None, place: str
+    tracks: CardTracks,
+    settings: CardExportSettings,
+    head: Surface | None,
+    bone: HeadBone | None,
+    place: str,
 ) -> Generator[float, None, SpringMotion]:
-    """Fit springs; yields the fraction that is done."""
+    """Fit springs; yields the fraction that is done.
+
+    Args:
+        bone: that carries the head; None where there is none.
+    """
     balls, notes = _head_balls(head, place)
     rig = yield from spring_steps(tracks, settings.spring_joints, balls)
-    skeleton = SpringSkeleton(rig, tracks.root)
+    skeleton = SpringSkeleton(rig, tracks.root, bone)
     most = rig.error.most / tracks.hair_length
     if most > SPRING_ERROR:
         notes += (

@@ -21,6 +21,7 @@ from ..cards.build import CardInputs, order_line
 from ..cards.files import CardOutput, WrittenCards, check_no_input, write_cards
 from ..cards.occluders import read_occluders
 from ..cards.textures import chosen_pictures, named_pictures
+from ..scene.bone_weights import head_bone_of
 from .job_options import (
     add_bake_option,
     add_frames_option,
@@ -73,6 +74,9 @@ def written_cards(
     if levels is not None:
         settings = settings.with_settings(replace(settings[CardSettings], levels=levels))
     hair = bpy.data.objects.get(job.sources.groom or "")
+    if output is not None and hair is not None and hair.type == "CURVES":
+        depsgraph = bpy.context.evaluated_depsgraph_get()
+        output = replace(output, head_bone=head_bone_of(hair, depsgraph, rig.strands))
     occluders = read_occluders(settings[CardOcclusionSettings], hair)
     inputs = CardInputs(rig, settings, pictures, occluders)
     written = write_cards(path, inputs, output, report.stage, motion)

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import bpy
 import numpy as np
+from mathutils import Matrix
 
 from ...arrays import Floats
+from ...exchange.cards.glb_springs import HeadBone
 from ...exchange.tfxbone import BoneWeights, bones_at_roots
 from ...strands import StrandSet
 from ..base.objects import head_of
@@ -29,6 +31,28 @@ def bones_of(
         return None
     head = read_surface(skin, depsgraph, need_uv=False, place=skin.name)
     return bones_at_roots(strands, head.triangles, names, weights)
+
+
+def head_bone_of(
+    hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph, strands: StrandSet
+) -> HeadBone | None:
+    """The bone that carries most of the roots, at rest; None where no bone moves the head."""
+    skin = head_of(hair)
+    if skin is None:
+        return None
+    armature, name = skin.find_armature(), ""
+    if skin.parent_type == "BONE" and skin.parent is not None:
+        armature, name = skin.parent, skin.parent_bone
+    else:
+        weights = bones_of(hair, depsgraph, strands)
+        if weights is not None:
+            heavy = np.bincount(weights.bone.ravel(), weights.weight.ravel(), len(weights.names))
+            name = weights.names[int(heavy.argmax())]
+    bone = None if armature is None else armature.data.bones.get(name)
+    if armature is None or bone is None:
+        return None
+    place, turn, _ = (armature.matrix_world @ bone.matrix_local).decompose()
+    return HeadBone(name, np.array(Matrix.Translation(place) @ turn.to_matrix().to_4x4()))
 
 
 def has_bones(hair: bpy.types.Object) -> bool:

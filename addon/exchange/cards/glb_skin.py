@@ -97,6 +97,36 @@ def add_skinned(
     return joints
 
 
+def add_head_bone(file: GlbFile, root: int, name: str, matrix: Floats) -> None:
+    """Put the root joint below a joint that has the place and the axes of a character's bone, as
+    Blender's own exporter writes bones.
+
+    Args:
+        root: number of the root joint's node, whose parent does not move it.
+        matrix: (4, 4) rigid, of the bone in the world [m], Z up.
+    """
+    nodes, (skin,) = file.content["nodes"], file.content["skins"]
+    axes, at_root = np.eye(4), np.eye(4)
+    axes[:3, :3] = _AXES
+    at_root[:3, 3] = nodes[root]["translation"]
+    bone = axes @ matrix
+    local = np.linalg.inv(bone) @ at_root
+    nodes[root] |= {
+        "translation": local[:3, 3].tolist(),
+        "rotation": quaternions(local[:3, :3]).tolist(),
+    }
+    place = {"translation": bone[:3, 3].tolist(), "rotation": quaternions(bone[:3, :3]).tolist()}
+    number = file.append("nodes", {"name": name, "children": [root], **place})
+    for node in nodes[:number]:
+        if root in node.get("children", []):
+            node["children"] = [number if each == root else each for each in node["children"]]
+    inverse = np.asarray(file.values(skin["inverseBindMatrices"]), np.float32).reshape(-1, 16)
+    own = np.linalg.inv(bone).T.reshape(1, 16).astype(np.float32)
+    own[0, 3::4] = [0.0, 0.0, 0.0, 1.0]
+    skin["inverseBindMatrices"] = file.add(np.concatenate([inverse, own]), "MAT4")
+    skin["joints"], skin["skeleton"] = [*skin["joints"], number], number
+
+
 def vertices_of(file: GlbFile, primitive: dict[str, Any], mesh: CardMesh, place: str) -> Ints:
     """Which vertex of the mesh each vertex of the file is; known by the order of corners.
 

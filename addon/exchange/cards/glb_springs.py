@@ -17,10 +17,20 @@ from ...cards.spring_bones import DOWN, Balls
 from ...cards.spring_chains import SpringRig
 from .card_formats import GLB
 from .glb_file import GlbFile
-from .glb_skin import ROOT_JOINT, add_skinned
+from .glb_skin import ROOT_JOINT, add_head_bone, add_skinned
 
 SPRINGS = "VRMC_springBone"
 _VERSION = "1.0"
+
+
+@dataclass(frozen=True, eq=False)
+class HeadBone:
+    """The bone of a character that carries its hair. matrix: (4, 4) rigid, its place at rest in the
+    world [m], Z up, with y along the bone.
+    """
+
+    name: str
+    matrix: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,10 +38,12 @@ class SpringSkeleton:
     """What goes into the file beside the meshes, in metres and Z up.
 
     root: (3,) where the root joint, which rides on the head, is at rest.
+    bone: what carries the root joint; None where the character has no bones.
     """
 
     rig: SpringRig
     root: Floats
+    bone: HeadBone | None = None
 
 
 def with_springs(
@@ -52,6 +64,8 @@ def with_springs(
     file, rig = GlbFile.of(data, place), skeleton.rig
     chains = rig.chains
     joints = add_skinned(file, nodes, levels, chains.rest, skeleton.root, rig.skins, place)
+    if skeleton.bone is not None:
+        add_head_bone(file, joints[0], skeleton.bone.name, skeleton.bone.matrix)
     file.content.setdefault("extensions", {})[SPRINGS] = _extension(skeleton, joints)
     file.content.setdefault("extensionsUsed", []).append(SPRINGS)
     return file.data()

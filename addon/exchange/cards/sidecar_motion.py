@@ -57,6 +57,7 @@ def spring_motion(tracks: CardTracks, skeleton: SpringSkeleton, error: FitError)
         "extension": SPRINGS,
         "root_joint": ROOT_JOINT,
         "root_place": GLB.placed(skeleton.root).tolist(),
+        **({"head_bone": skeleton.bone.name} if skeleton.bone else {}),
         "chains": chains,
         "joints_in_chain": joints,
         "joints": chains * joints + 1,

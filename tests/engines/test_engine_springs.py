@@ -1,0 +1,108 @@
+"""Springs in Godot, by the add-on of docs/engines, and in a browser, by the module: they move as
+our own do."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from extension_loader import REPOSITORY
+
+pytest.importorskip("bpy", reason="writing cards needs Blender or the bpy module")
+
+from test_card_motion import FRAMES, RATE, head_matrix, motion, write  # noqa: F401
+from test_springs import sprung_as_told
+from three_springs import MODULE, head_matrices, to_z_up
+
+from hairloom.addon.blender.bakes.guide_motion import GuideMotion
+from hairloom.addon.cards.spring_bones import STEP_RATE, stepped
+
+HERE = Path(__file__).parent
+ENGINES = REPOSITORY / "docs" / "engines"
+#: the engines run where nothing but the repository is seen
+OUTPUT = REPOSITORY / "out" / "engines" / "springs"
+PROJECT = OUTPUT / "godot"
+#: Of the hair's length: Godot reckons in single precision.
+MOST_OFF = 1.0e-3
+
+
+@pytest.fixture(scope="module")
+def told(motion: GuideMotion) -> dict[str, Any]:  # noqa: F811
+    """An asset, and how the head moves; what the sidecar says of the springs, and the joints in
+    each step as we move them, in the world."""
+    shutil.rmtree(OUTPUT, ignore_errors=True)
+    glb = OUTPUT / "asset" / "hair.glb"
+    glb.parent.mkdir(parents=True)
+    told = dict(write(glb, motion, kind="springs", spring_joints=40).motion)
+    carrier = stepped(np.stack([head_matrix(motion, n) for n in range(FRAMES)]), RATE)
+    (OUTPUT / "poses.json").write_text(json.dumps({"matrices": head_matrices(carrier)}))
+    ours = sprung_as_told(told, glb, carrier)
+    ours = ours.reshape(len(ours), -1, 3)
+    world = np.einsum("fab,fjb->fja", carrier[:, :3, :3], ours) + carrier[:, None, :3, 3]
+    return told | {"world": world}
+
+
+def copied(kind: str, folder: Path) -> None:
+    """What an engine sees."""
+    shutil.copytree(HERE / kind, folder)
+    shutil.copytree(OUTPUT / "asset", folder / "asset")
+    shutil.copy2(OUTPUT / "poses.json", folder)
+
+
+def check(told: dict[str, Any], frames: list[dict[str, list[float]]]) -> None:
+    names = [name for spring in told["springs"] for name in spring["joints"]]
+    world = np.array([[frame[name] for name in names] for frame in frames])
+    off = np.linalg.norm(to_z_up(world) - told["world"], axis=-1)
+    assert off.max() < MOST_OFF * told["error"]["hair_length"]
+
+
+@pytest.fixture(scope="module")
+def project(told: dict[str, Any], sandbox: str) -> Path:
+    copied("godot_springs", PROJECT)
+    shutil.copytree(ENGINES, PROJECT / "addons" / "hairloom")
+    return PROJECT
+
+
+@pytest.mark.parametrize("is_imported", [False, True])
+def test_godot_moves_springs_as_we_do(
+    told: dict[str, Any], project: Path, sandbox: str, is_imported: bool
+) -> None:
+    """A file that no editor has imported, and one that the add-on has made a scene of."""
+    if is_imported:
+        run_godot(sandbox, "--path", str(project), "--import")
+        (project / "asset" / "hair.glb").unlink()
+    rate, written = str(int(STEP_RATE)), project / f"imported_{is_imported}.json"
+    run_godot(sandbox, "--fixed-fps", rate, "--path", str(project), "--", str(written))
+    found = json.loads(written.read_text(encoding="utf-8"))
+    assert found["springs"] == told["chains"]
+    assert found["collisions"] == len(told["colliders"]) > 0
+    check(told, found["frames"])
+
+
+def run_godot(sandbox: str, *options: str) -> None:
+    command = [sandbox, "run", "godot", "--headless", *options]
+    result = subprocess.run(command, capture_output=True, text=True, timeout=300)
+    said = result.stdout + result.stderr
+    assert result.returncode == 0 and "ERROR" not in said and "WARNING" not in said, said
+
+
+def test_our_module_hands_springs_to_three_vrm(told: dict[str, Any], sandbox: str) -> None:
+    if not MODULE.is_dir():
+        pytest.skip("three-vrm-springbone is missing: `make setup` installs it")
+    site = OUTPUT / "web"
+    copied("three_springs", site)
+    shutil.copytree(ENGINES, site / "hairloom")
+    shutil.copytree(MODULE.parents[1] / "three", site / "three")
+    shutil.copytree(MODULE / "lib", site / "springs")
+    shutil.copy2(REPOSITORY / "tools" / "draw_page.py", site)
+    command = [sandbox, "run", "python3", str(site / "draw_page.py")]
+    result = subprocess.run(command, capture_output=True, text=True, timeout=300)
+    assert result.returncode == 0, result.stderr
+    found = json.loads((site / "joints.json").read_text(encoding="utf-8"))
+    assert found["said"] == []
+    check(told, found["frames"])
