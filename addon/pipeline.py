@@ -58,11 +58,12 @@ from .refine.lead_out import (
 from .refine.lead_out_at_rest import led_out_at_rest
 from .refine.ride import Riders, ride
 from .refine.thinning import even_ranks
-from .shading.ambient import HairCells, ambient_occlusion, openness, skin_occlusion
+from .shading.ambient import ambient_occlusion, skin_occlusion
 from .shading.ambient_settings import AmbientSettings
+from .shading.density_grid import Field
 from .shading.drawn_strands import drawn_radius
 from .shading.settings import StrandSettings
-from .shading.skin_seen import skin_seen
+from .shading.skin_seen import seen_by, skin_field
 from .shading.strand_noise import SEED_LIMIT
 from .strands import StrandSet, Surface
 from .strands.arc_length import even, typical
@@ -863,37 +864,28 @@ def held_strands(rig: Rig, pose: Pose, points: Floats) -> Floats:
     return points
 
 
-def shade_cells(rig: Rig, settings: AmbientSettings) -> HairCells | None:
-    """What shades at rest, for occlusion and openness; None without strands."""
-    if not rig.strands.strand_count:
-        return None
-    return HairCells.of(rig.strands, rig.head, settings.cell_count)
-
-
-def rest_occlusion(
-    rig: Rig,
-    settings: AmbientSettings,
-    points: Floats | None = None,
-    *,
-    cells: HairCells | None = None,
-) -> Floats:
+def rest_occlusion(rig: Rig, settings: AmbientSettings, points: Floats | None = None) -> Floats:
     """Ambient occlusion of every point at rest, (point_count,), 1 where nothing shades.
 
     Args:
         points: (n, 3) [m] on the same strands; None is their own.
-        cells: see `shade_cells`; None: they are found here.
     """
-    strands, settings = rig.strands, _ambient(rig, settings)
+    strands, settings = rig.strands, ambient_of(rig, settings)
     return ambient_occlusion(
-        strands, strands.points if points is None else points, rig.head, settings, cells
+        strands, strands.points if points is None else points, rig.head, settings
     )
 
 
-def strand_axes(strands: StrandSet) -> Axes:
-    """Along the strand, along its normal of the hair's volume, and across both, at each point."""
+def strand_axes(strands: StrandSet, among: StrandSet | None = None) -> Axes:
+    """Along the strand, along its normal of the hair's volume, and across both, at each point.
+
+    Args:
+        among: the whole hair; None: it is these strands.
+    """
+    roots = (among or strands).roots
     axes = np.empty((3, 3, strands.point_count), np.float32)
     count = max(strands.strand_count, 1)
-    center = strands.roots.sum(axis=0, dtype=np.float64)[:, None] / count
+    center = roots.sum(axis=0, dtype=np.float64)[:, None] / max(len(roots), 1)
     step = max(AT_ONCE * count // max(strands.point_count, 1), 1)
     for first in range(0, strands.strand_count, step):
         offsets = strands.offsets[first : first + step + 1]
@@ -907,48 +899,45 @@ def strand_axes(strands: StrandSet) -> Axes:
     return tangent.T, normal.T, across.T
 
 
-def rest_openness(
-    rig: Rig,
-    settings: AmbientSettings,
-    axes: Axes | None = None,
-    cells: HairCells | None = None,
-) -> Floats:
-    """How open every point is by direction at rest, (point_count, 4), see `ambient.openness`: the
-    mean, and a vector by the strand's axes.
-
-    It turns with the strand, so it holds while hair moves as far as occlusion does.
-
-    Args:
-        axes: `strand_axes` of the strands.
-        cells: see `rest_occlusion`.
-    """
-    strands, extinction = rig.strands, rig.widths.extinction
-    found = openness(strands, strands.points, rig.head, extinction, settings.cell_count, cells)
-    if strands.strand_count:
-        found[:, 1:] = _by_axes(found[:, 1:], axes or strand_axes(strands))
-    return found
-
-
 def rest_skin_seen(rig: Rig, points: Floats, axes: Axes) -> Floats | None:
     """The skin that points (n, 3) see at rest, those of the strands or of cards in their place,
-    (n, 8): the received, beneath and depth of `skin_seen.SkinSeen`, vectors by the axes at each
-    point. None without a head.
+    (n, 8), see `skin_seen_by`. None without a head.
     """
-    strands = rig.strands
-    if rig.head is None or not strands.strand_count:
+    field = rest_skin_field(rig)
+    return None if field is None else skin_seen_by(axes, field.at(points))
+
+
+def rest_skin_field(rig: Rig, cell_count: int | None = None) -> Field | None:
+    """What is seen of the head, see `skin_seen.skin_field`; None without a head."""
+    if rig.head is None or not rig.strands.strand_count:
         return None
     # coarse cells do not tell each strand from the next
-    step = -(-strands.strand_count // SHADING_STRANDS)
-    some = strands.take(np.arange(0, strands.strand_count, step))
+    some, step = few_strands(rig.strands)
     radius = drawn_radius(some.radius, StrandSettings(), even(some.offsets))
     some = replace(some, radius=radius.astype(np.float32))
-    seen = skin_seen(some, points, rig.head, step * rig.widths.extinction)
-    received, beneath = (_by_axes(each, axes) for each in (seen.received[:, 1:], seen.beneath))
+    return skin_field(some, rig.head, step * rig.widths.extinction, cell_count)
+
+
+def few_strands(strands: StrandSet) -> tuple[StrandSet, int]:
+    """Strands, about SHADING_STRANDS of them, and for how many each of these stands."""
+    step = -(-strands.strand_count // SHADING_STRANDS)
+    return strands.take(np.arange(0, strands.strand_count, step)), step
+
+
+def skin_seen_by(axes: Axes, found: Floats) -> Floats:
+    """The received, beneath and depth of `skin_seen.SkinSeen`, (n, 8), vectors by the axes at each
+    point.
+
+    Args:
+        found: values of `rest_skin_field` at points, (k, n).
+    """
+    seen = seen_by(found)
+    received, beneath = (by_axes(each, axes) for each in (seen.received[:, 1:], seen.beneath))
     parts = seen.received[:, :1], received, beneath, seen.depth[:, None]
     return np.concatenate(parts, axis=1, dtype=np.float32)
 
 
-def _by_axes(vectors: Floats, axes: Axes) -> Floats:
+def by_axes(vectors: Floats, axes: Axes) -> Floats:
     """Vectors (n, 3) along each of the axes, (n, 3) float32."""
     found = np.empty((len(vectors), 3), np.float32)
     for first in range(0, len(vectors), AT_ONCE):
@@ -963,10 +952,10 @@ def head_occlusion(rig: Rig, settings: AmbientSettings) -> Floats | None:
     """The light that the hair lets through to the head, (vertex_count,); None without a head."""
     if rig.head is None:
         return None
-    return skin_occlusion(rig.strands, rig.head, _ambient(rig, settings))
+    return skin_occlusion(rig.strands, rig.head, ambient_of(rig, settings))
 
 
-def _ambient(rig: Rig, settings: AmbientSettings) -> AmbientSettings:
+def ambient_of(rig: Rig, settings: AmbientSettings) -> AmbientSettings:
     """As strong as the hairs that strands stand for are."""
     factor = rig.widths.extinction
     return settings.multiplied(extinction=factor, scalp_extinction=factor)

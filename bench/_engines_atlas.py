@@ -38,7 +38,8 @@ from hairloom.addon.blender.sessions.snapshots import snapshot_of
 from hairloom.addon.card_flow import card_groom
 from hairloom.addon.cards.atlas import AtlasPlan
 from hairloom.addon.cards.steps import result_of
-from hairloom.addon.pipeline import Rig, rest_occlusion, rest_openness
+from hairloom.addon.light_flow import rest_light
+from hairloom.addon.pipeline import Rig
 from hairloom.addon.render.camera import frame_camera
 from hairloom.addon.render.frame import render_image
 from hairloom.addon.render.snapshot import MeshSnapshot, Snapshot
@@ -135,8 +136,8 @@ def _lit(inputs: CardInputs) -> Snapshot:
     rig = inputs.rig
     holes = () if rig.head is None else (replace(MeshSnapshot.of(rig.head), is_holdout=True),)
     ambient, settings = inputs.settings[AmbientSettings], inputs.settings
-    occlusion, openness = (f(rig, ambient) for f in (rest_occlusion, rest_openness))
-    hair = snapshot_of(PreparedGroom(rig, ambient, occlusion, openness=openness))
+    light = replace(rest_light(rig, ambient), skin_seen=None)
+    hair = snapshot_of(PreparedGroom(rig, ambient, light))
     return replace(
         hair,
         shading=settings[ShadingSettings],

@@ -5,7 +5,8 @@ the same scene after *Make Real*: Blender's own curves, drawn again. FLIP is And
 (2020), over the pixels that hair changes. `make_real_seconds` is processor time.
 
 `comb_ms` is a stroke on long straight hair of 20,000 children until all strands have followed,
-`comb_all_ms` until the rest has come, `comb_undo_ms` the stroke taken back; see `_combing`.
+`comb_all_ms` until the rest has come, `comb_light_ms` until that has its own light, `comb_undo_ms`
+the stroke taken back; see `_combing`.
 `grow_edit_ms` is a setting of growth given to 4,095 strands until these and their children follow;
 see `_growing`.
 `silent_seconds_max` is the longest that a job keeps the window from saying how far it is, and from

@@ -11,7 +11,8 @@ fur, to Blender's monkey.
   like a scan of that person: few triangles with noise and holes, turned, in centimetres.
 - edit_ms: a stroke over curls, 20,000 of them by Blender's nodes and our children, until all
   strands have followed; paint_ms: a dab on the density of 20,000 children, until they stand where
-  they are painted; paint_all_ms: all that follows from it; see `_combing`.
+  they are painted; paint_all_ms: all that follows from it; paint_light_ms: its own light; see
+  `_combing`.
 
 Exit code 1: a limit is missed.
 

@@ -1,6 +1,6 @@
 """Ambient occlusion of hair: how much of the sky's light reaches a point through hair and body.
 
-Also by direction, for light that is not the same from everywhere: see `openness`.
+Also by direction, for light that is not the same from everywhere: see `openness_field`.
 
 The hair becomes a grid of extinction coefficients, light dies in it by Beer and Lambert's law,
 and the 26 directions to a cell's neighbours stand for all directions with the weights of
@@ -22,7 +22,7 @@ import numpy as np
 from ..arrays import Floats, Ints
 from ..strands import StrandSet, Surface
 from .ambient_settings import AmbientSettings
-from .density_grid import Grid, body_depth, grid_around, hair_depth, sample
+from .density_grid import Field, Grid, body_depth, grid_around, hair_depth
 
 #: From a cell to one of its 26 neighbours.
 type Step = tuple[int, int, int]
@@ -44,9 +44,11 @@ class HairCells:
     body: Floats | None
 
     @classmethod
-    def of(cls, strands: StrandSet, body: Surface | None, cell_count: int) -> Self:
-        """Args: see ambient_occlusion."""
-        grid = grid_around(strands, cell_count)
+    def of(
+        cls, strands: StrandSet, body: Surface | None, cell_count: int, most: int | None = None
+    ) -> Self:
+        """Args: see ambient_occlusion and grid_around."""
+        grid = grid_around(strands, cell_count, most)
         hair = hair_depth(strands, grid)
         if body is None:
             return cls(grid, hair, None)
@@ -65,7 +67,6 @@ def ambient_occlusion(
     points: Floats,
     body: Surface | None,
     settings: AmbientSettings,
-    cells: HairCells | None = None,
 ) -> Floats:
     """How open each point is, (n,) float32: 1 at the outside of the hair, 0 where no light comes.
 
@@ -73,39 +74,35 @@ def ambient_occlusion(
         strands: the hair that shades, world space.
         points: (n, 3) [m], world space; CVs of the same hair or any others.
         body: what else shades, world space, or None.
-        cells: of these strands and this body, if they are known.
     """
     if not strands.strand_count or not len(points):
         return np.ones(len(points), np.float32)
-    cells = cells or HairCells.of(strands, body, settings.cell_count)
+    cells = HairCells.of(strands, body, settings.cell_count)
+    return occlusion_by(sky_field(cells, settings).at(points)[0], settings)
+
+
+def sky_field(cells: HairCells, settings: AmbientSettings) -> Field:
+    """How open the sky is, one value a cell."""
     open_sky = sky_openness(cells.depth(settings.extinction), settings.upper_fraction)
-    (seen,) = sample(open_sky[None], cells.grid.coordinates(points))
-    seen /= np.float32(settings.ao_bias)
-    return (1.0 - settings.strength * (1.0 - np.minimum(seen, 1.0))).astype(np.float32)
+    return Field(cells.grid, open_sky[None])
 
 
-def openness(
-    strands: StrandSet,
-    points: Floats,
-    body: Surface | None,
-    extinction: float,
-    cell_count: int,
-    cells: HairCells | None = None,
-) -> Floats:
-    """The fraction of the light from each direction w that comes straight to each point, as
-    q0 + q . w, (n, 4) float32: the mean over all directions, and a vector in world space.
+def occlusion_by(sky: Floats, settings: AmbientSettings) -> Floats:
+    """As `ambient_occlusion`, of points (n,) to which the sky is so open."""
+    seen = sky / np.float32(settings.ao_bias)
+    found: Floats = (1.0 - settings.strength * (1.0 - np.minimum(seen, 1.0))).astype(np.float32)
+    return found
+
+
+def openness_field(cells: HairCells, extinction: float) -> Field:
+    """The fraction of the light from each direction w that comes straight to each cell, as
+    q0 + q . w, 4 values: the mean over all directions, and a vector in world space.
 
     Points lie on the light's side of their cells, as what is seen of hair does.
-
-    Args: see ambient_occlusion.
     """
-    if not strands.strand_count or not len(points):
-        return np.tile(np.array([1.0, 0.0, 0.0, 0.0], np.float32), (len(points), 1))
-    cells = cells or HairCells.of(strands, body, cell_count)
     steps, weights = zip(*sky_directions(0.0), strict=True)
     moments = np.array(weights) * with_mean(unit_steps(steps))
-    light = summed_light(cells.depth(extinction), steps, moments, own=0.0)
-    return np.ascontiguousarray(sample(light, cells.grid.coordinates(points)).T)
+    return Field(cells.grid, summed_light(cells.depth(extinction), steps, moments, own=0.0))
 
 
 def _body_depth(body: Surface, low: Floats, cell: float, shape: tuple[int, int, int]) -> Floats:

@@ -75,17 +75,33 @@ class Grid:
         return (points - low) * np.float32(1.0 / self.cell) - np.float32(0.5)
 
 
-def grid_around(strands: StrandSet, cell_count: int) -> Grid:
+@dataclass(frozen=True, eq=False)
+class Field:
+    """Values (k, x, y, z) at the centres of a grid's cells."""
+
+    grid: Grid
+    values: Floats
+
+    def at(self, points: Floats) -> Floats:
+        """At points (n, 3) [m], (k, n) float32, see `sample`."""
+        return sample(self.values, self.grid.coordinates(points))
+
+
+def grid_around(strands: StrandSet, cell_count: int, most: int | None = None) -> Grid:
     """Cells over all strands, with two empty ones on each side: `cell_count` at most without those
     along the longest side, or more where hair is short, see `_ALONG_HAIR`.
 
     They are cells of one of few lattices through the origin: hair that is combed keeps its own.
+
+    Args:
+        most: cells in all where hair is short; None: `_MAX_CELLS`.
     """
     low, high = (corner.astype(np.float64) for corner in strands.bounds())
     farthest = float(np.maximum(np.abs(low), np.abs(high)).max())
     size = max(float((high - low).max()), _SMALLEST_HAIR, _FINEST * farthest)
     least = size / (cell_count - 1)
-    finest = (float(np.prod(np.maximum(high - low, least))) / _MAX_CELLS) ** (1.0 / 3.0)
+    volume = float(np.prod(np.maximum(high - low, least)))
+    finest = (volume / (most or _MAX_CELLS)) ** (1.0 / 3.0)
     least = min(least, max(_typical_reach(strands) / _ALONG_HAIR, finest, size * _FINEST))
     cell = 2.0 ** (np.ceil(np.log2(least) * _SIZES) / _SIZES)
     first = np.floor(low / cell).astype(np.int64) - 2

@@ -25,7 +25,7 @@ import numpy as np
 from ..arrays import Bools, Floats
 from ..strands import StrandSet, Surface
 from .ambient import Step, add_shifted, depth_towards, sky_directions, unit_steps, with_mean
-from .density_grid import Grid, hair_depth, sample, small_triangles
+from .density_grid import Field, Grid, hair_depth, small_triangles
 
 #: Cells along the longest side of the grid.
 _CELLS = 44
@@ -63,11 +63,22 @@ class SkinSeen:
 def skin_seen(strands: StrandSet, points: Floats, skin: Surface, extinction: float) -> SkinSeen:
     """What points (n, 3) among strands see, of the strands or of cards in their place.
 
+    Args: see skin_field.
+    """
+    return seen_by(skin_field(strands, skin, extinction).at(points))
+
+
+def skin_field(
+    strands: StrandSet, skin: Surface, extinction: float, cell_count: int | None = None
+) -> Field:
+    """What is seen of the skin, in values for `seen_by`.
+
     Args:
         strands: with the widths with which they are drawn.
         extinction: how much more light a strand takes than its width does.
+        cell_count: along the longest side; None: `_CELLS`.
     """
-    grid = _grid_beyond(strands)
+    grid = _grid_beyond(strands, cell_count or _CELLS)
     hair = np.float32(extinction) * hair_depth(strands, grid)
     normal, is_skin = _skin_cells(skin, grid)
     is_inside = _inside(normal, is_skin)
@@ -75,8 +86,11 @@ def skin_seen(strands: StrandSet, points: Floats, skin: Surface, extinction: flo
     cells = np.concatenate(_spread(hair, sent, normal, is_skin))
     # those within the body know of nothing, and those beside fill them
     known = ~is_inside
-    whole = np.concatenate([cells * known, known[None]], dtype=np.float32)
-    found = sample(whole, grid.coordinates(points))
+    return Field(grid, np.concatenate([cells * known, known[None]], dtype=np.float32))
+
+
+def seen_by(found: Floats) -> SkinSeen:
+    """What points see that have such values (k, n) of a `skin_field`."""
     found = found[:-1] / np.maximum(found[-1], 1.0e-3)
     passed = np.clip(found[0] / np.maximum(found[4], _SMALLEST), _MIN_PASSED, 1.0)
     depth = (passed**-GAPS - 1.0) / (GAPS * PART)
@@ -109,11 +123,11 @@ def far_light(received: Floats, to_light: Floats) -> Floats:
     return result
 
 
-def _grid_beyond(strands: StrandSet) -> Grid:
+def _grid_beyond(strands: StrandSet, cell_count: int) -> Grid:
     low, high = (corner.astype(np.float64) for corner in strands.bounds())
     farthest = float(np.maximum(np.abs(low), np.abs(high)).max())
     side = max(float((high - low).max()), _SMALLEST, _SMALLEST * farthest)
-    cell = side * (1.0 + 2.0 * _BEYOND) / _CELLS
+    cell = side * (1.0 + 2.0 * _BEYOND) / cell_count
     first = np.floor((low - _BEYOND * side) / cell).astype(np.int64)
     last = np.floor((high + _BEYOND * side) / cell).astype(np.int64)
     return Grid.of_cells(first, last + 1 - first, cell)

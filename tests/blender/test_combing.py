@@ -1,5 +1,7 @@
 """Hair follows a brush at once; what follows later is what it would be without the brush."""
 
+import threading
+
 import bpy
 import numpy as np
 import pytest
@@ -8,6 +10,7 @@ from waiting import take_steps_until
 from hairloom.addon.blender.base import latest_job
 from hairloom.addon.blender.preview import previews, scene_events
 from hairloom.addon.blender.scene.curves import curve_offsets, curve_points, put_points
+from hairloom.addon.blender.sessions import session as session_module
 from hairloom.addon.blender.sessions.session import Session
 from hairloom.addon.blender.viewport import overlay
 
@@ -240,3 +243,30 @@ def test_a_combed_head_that_moved_since_takes_hair_along(hair, session, evaluate
     own = session.rig.strands.offsets[5]
     away = np.abs(drawn(session) - before).max(axis=1)
     assert away[:own].max() > 1e-3 and (away > 1e-5).mean() < 0.6
+
+
+def test_combed_hair_comes_in_the_light_before_and_keeps_strokes_made_since(
+    hair, session, evaluated, monkeypatch
+):
+    """Its own light is put on the hair as the next stroke has left it."""
+    opened, lit = threading.Event(), session_module.lit
+    monkeypatch.setattr(session_module, "lit", lambda *given: opened.wait(60.0) and lit(*given))
+    monkeypatch.setattr(latest_job, "is_blocking", lambda: False)
+    fields = session.groom.light.fields
+    stroke(hair, range(5))
+    scene_events.catch_up(evaluated())
+    take_steps_until(lambda: session.is_lighting)
+    assert session.groom.light.is_quick and session.groom.light.fields is fields
+    wanted = rebuilt(hair, evaluated)[1]
+    assert not np.array_equal(session.snapshot.occlusion, wanted)
+    assert np.abs(session.snapshot.occlusion - wanted).mean() < 0.05
+    stroke(hair, range(10, 15))
+    shown = drawn(session)
+    opened.set()
+    take_steps_until(lambda: not session.is_lighting)
+    np.testing.assert_array_equal(drawn(session), shown)
+    np.testing.assert_array_equal(session.snapshot.occlusion, wanted)
+    arrive(session, evaluated)
+    points, occlusion = rebuilt(hair, evaluated)
+    np.testing.assert_array_equal(session.rig.strands.points, points)
+    np.testing.assert_array_equal(session.snapshot.occlusion, occlusion)

@@ -19,8 +19,10 @@ from hairloom.addon.blender.preview import previews, scene_events
 from hairloom.addon.blender.preview.bake import simulated_for
 from hairloom.addon.blender.preview.phases import Phase
 from hairloom.addon.blender.sessions import prepared_groom
+from hairloom.addon.blender.sessions import session as session_module
 from hairloom.addon.blender.sessions.groom_source import GroomSource
 from hairloom.addon.blender.sessions.prepared_groom import BuildRequest, build
+from hairloom.addon.blender.sessions.snapshots import snapshot_of
 from hairloom.addon.blender.viewport import overlay
 from hairloom.addon.dynamics.colliders import DistanceField
 from hairloom.addon.dynamics.settings import DynamicsSettings
@@ -41,13 +43,13 @@ def in_window(monkeypatch):
 @pytest.fixture
 def gate(in_window, monkeypatch):
     """Holds hair back until it is opened."""
-    opened, occlusion = threading.Event(), pipeline.rest_occlusion
+    opened, ranks = threading.Event(), pipeline.strand_ranks
 
     def wait_and_make(*arguments, **named):
         assert opened.wait(60.0)
-        return occlusion(*arguments, **named)
+        return ranks(*arguments, **named)
 
-    monkeypatch.setattr(pipeline, "rest_occlusion", wait_and_make)
+    monkeypatch.setattr(pipeline, "strand_ranks", wait_and_make)
     yield opened
     opened.set()
 
@@ -103,8 +105,93 @@ def test_what_a_thread_makes_is_the_same_to_the_bit(hair, evaluated, in_window):
     alone = build(GroomSource(hair, evaluated()).request, is_drawn=True)
     assert np.array_equal(session.rig.strands.points, alone.rig.strands.points)
     assert np.array_equal(session.rig.weights.weight, alone.rig.weights.weight)
-    assert np.array_equal(session.snapshot.occlusion, alone.occlusion)
+    assert np.array_equal(session.snapshot.occlusion, alone.light.occlusion)
     assert np.array_equal(session.snapshot.rank, alone.rank)
+
+
+@pytest.fixture
+def light_gate(in_window, monkeypatch):
+    """Holds light back until it is opened."""
+    opened, lit = threading.Event(), session_module.lit
+
+    def wait_and_light(groom, report):
+        assert opened.wait(60.0)
+        return lit(groom, report)
+
+    monkeypatch.setattr(session_module, "lit", wait_and_light)
+    yield opened
+    opened.set()
+
+
+def light_of(hair, evaluated):
+    """What a preview begun now has, when all of it is there."""
+    return build(GroomSource(hair, evaluated()).request, is_drawn=True).light
+
+
+def has_light(snapshot, light):
+    return all(
+        np.array_equal(getattr(snapshot, name), getattr(light, name))
+        for name in ("occlusion", "openness", "skin_seen")
+    )
+
+
+def test_hair_is_shown_before_its_light_is_found(hair, evaluated, light_gate):
+    session, whole = previews.start(hair, evaluated()), light_of(hair, evaluated)
+    take_steps_until(lambda: session.is_made)
+    quick = shown(session).snapshot
+    assert session.is_lighting and session.is_pending and is_box(hair, evaluated)
+    assert quick.occlusion.shape == whole.occlusion.shape and not has_light(quick, whole)
+    assert quick.openness.shape == whole.openness.shape
+    assert quick.skin_seen.shape == whole.skin_seen.shape
+    assert quick.occlusion.mean() == pytest.approx(whole.occlusion.mean(), abs=0.1)
+    light_gate.set()
+    arrive(session)
+    after = shown(session).snapshot
+    assert has_light(after, whole)
+    assert after.points is quick.points and after.layout is quick.layout
+
+
+def test_a_picture_waits_for_the_light(hair, evaluated, in_window):
+    session, whole = previews.start(hair, evaluated()), light_of(hair, evaluated)
+    take_steps_until(lambda: session.is_made)
+    assert session.is_lighting
+    picture = shown_groom(hair, evaluated())
+    assert not session.is_pending and has_light(session.snapshot, whole)
+    assert has_light(snapshot_of(picture.studio._groom), whole)
+
+
+def test_other_hair_is_made_while_light_is_found_which_nobody_wants_then(
+    hair, evaluated, light_gate
+):
+    session = previews.start(hair, evaluated())
+    take_steps_until(lambda: session.is_made)
+    first = session.groom
+    assert session.is_lighting
+    hair.data.hairloom.children.method = "multi"
+    hair.data.hairloom.children.strand_count = 300
+    scene_events.catch_up(evaluated())
+    assert not session.is_lighting
+    take_steps_until(lambda: session.groom is not first)
+    quick = session.groom.light
+    assert session.is_lighting and quick.fields is first.light.fields, "in the light before"
+    light_gate.set()
+    arrive(session)
+    assert has_light(shown(session).snapshot, light_of(hair, evaluated))
+
+
+def test_nothing_is_left_of_light_that_is_found_for_hair_that_goes(hair, evaluated, light_gate):
+    session = previews.start(hair, evaluated())
+    take_steps_until(lambda: session.is_made)
+    previews.stop(session)
+    assert not session.is_pending and previews.session_of(hair) is None
+    light_gate.set()
+    take_steps_until(lambda: not latest_job.is_watched(session))
+    session = previews.start(hair, evaluated())
+    take_steps_until(lambda: session.is_made)
+    assert session.is_lighting
+    scene_events.clear()
+    bpy.data.objects.remove(hair)
+    assert not session.is_pending
 
 
 def test_play_waits_for_the_hair(hair, evaluated, gate):

@@ -387,8 +387,10 @@ def finish(session: Session, depsgraph: bpy.types.Depsgraph) -> None:
 
 
 def _take_made(preview: Preview, session: Session, depsgraph: bpy.types.Depsgraph) -> None:
-    was_made = session.is_made
+    was_made, is_lit = session.is_made, session.is_lighting
     session.take_made(depsgraph)
+    if is_lit:
+        return
     if was_made:
         preview.check(depsgraph)
     else:

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from ... import pipeline
 from ...arrays import Floats, Ints
 from ...errors import HairloomError
 from ...groom.settings import GuideSettings
+from ...light_flow import HairLight, quick_light, rest_light
 from ...pipeline import Rig
 from ...shading.ambient_settings import AmbientSettings
 from ...strands import StrandSet, Surface
@@ -74,23 +75,19 @@ class BuildRequest:
 class PreparedGroom:
     """A groom made ready to be shown.
 
-    ambient: what its occlusion was made by.
-    occlusion: (point_count,) in [0, 1], at rest; None where it was left out.
+    ambient: what its light was made by.
+    light: at rest; None where it was left out.
     rank: (strand_count,), see `pipeline.strand_ranks`; None where it was left out.
     occluders: spheres in the head that hide hair; None where it has none, or they were left out.
     is_placeholder: whether these are a few of its strands only, which are not seen.
-    openness: (point_count, 4), see `pipeline.rest_openness`; None where it was left out.
-    skin_seen: (point_count, 8), see `pipeline.rest_skin_seen`; None without a head, or left out.
     """
 
     rig: Rig
     ambient: AmbientSettings
-    occlusion: Floats | None = None
+    light: HairLight | None = None
     rank: Floats | None = None
     occluders: OccluderSpheres | None = None
     is_placeholder: bool = False
-    openness: Floats | None = None
-    skin_seen: Floats | None = None
 
     @cached_property
     def used(self) -> Ints:
@@ -133,6 +130,7 @@ def build(
     before: tuple[BuildRequest, PreparedGroom] | None = None,
     *,
     is_drawn: bool,
+    is_quick: bool = False,
     report: Report = lambda stage: None,
 ) -> PreparedGroom:
     """Make a groom; what nothing changes is taken from before.
@@ -140,6 +138,7 @@ def build(
     Args:
         before: what was made last, and what it was made from.
         is_drawn: False leaves out what only drawing needs.
+        is_quick: whether it may have quick light, until `lit` has found its own.
         report: see `prepared`.
 
     Raises:
@@ -152,7 +151,7 @@ def build(
     ambient = request.settings[AmbientSettings]
     if not is_drawn:
         return PreparedGroom(rig, ambient)
-    return prepared(rig, ambient, known, report=report)
+    return prepared(rig, ambient, known, is_quick=is_quick, report=report)
 
 
 def prepared(
@@ -161,6 +160,7 @@ def prepared(
     known: PreparedGroom | None = None,
     *,
     with_occluders: bool = True,
+    is_quick: bool = False,
     report: Report = lambda stage: None,
 ) -> PreparedGroom:
     """All that drawing a rig needs, for a preview, a render and a picture alike.
@@ -169,13 +169,14 @@ def prepared(
         known: what was made before; other guides on the same hair leave its shade and its head as
             they are.
         with_occluders: False leaves out the spheres, which take a search through the head.
+        is_quick: see `build`.
         report: is called before each stage with its name; may end it all by an exception.
     """
     report("ambient occlusion")
     with ThreadPoolExecutor(1) as beside:
         # here, as the window's first frame would wait for it; numpy leaves room for both
         riders = beside.submit(lambda: rig.riders)
-        groom = _drawn(rig, ambient, known, with_occluders, report, beside)
+        groom = _drawn(rig, ambient, known, with_occluders, is_quick, report)
         riders.result()
     return groom
 
@@ -185,21 +186,18 @@ def _drawn(
     ambient: AmbientSettings,
     known: PreparedGroom | None,
     with_occluders: bool,
+    is_quick: bool,
     report: Report,
-    beside: ThreadPoolExecutor,
 ) -> PreparedGroom:
-    """As `prepared`, without what moves it; light off the skin is found beside the rest."""
+    """As `prepared`, without what moves it."""
+    light = None if known is None else known.light
+    before = None if known is None or light is None else (known.rig, light)
     if known is not None and not _same_hair(known.rig, rig):
         known = None
-    seen = None
-    if known is not None and known.occlusion is not None and known.ambient == ambient:
-        occlusion, openness, found = known.occlusion, known.openness, known.skin_seen
-    else:
-        axes = pipeline.strand_axes(rig.strands)
-        seen = beside.submit(pipeline.rest_skin_seen, rig, rig.strands.points, axes)
-        cells = pipeline.shade_cells(rig, ambient)
-        occlusion = pipeline.rest_occlusion(rig, ambient, cells=cells)
-        openness = pipeline.rest_openness(rig, ambient, axes, cells)
+    is_other = known is None or known.ambient != ambient
+    if light is None or is_other or (light.is_quick and not is_quick):
+        find = partial(quick_light, known=before) if is_quick else rest_light
+        light = find(rig, ambient)
     report("what the head hides")
     occluders = None if known is None else known.occluders
     if occluders is None and rig.head is not None and with_occluders:
@@ -207,9 +205,18 @@ def _drawn(
         corners = np.stack([roots.min(axis=0), roots.max(axis=0)])
         occluders = rig.head.latest(OccluderSpheres, corners)
     rank = pipeline.strand_ranks(rig)
-    found = seen.result() if seen else found
-    shown = PreparedGroom(rig, ambient, occlusion, rank, occluders)
-    return replace(shown, openness=openness, skin_seen=found)
+    return PreparedGroom(rig, ambient, light, rank, occluders)
+
+
+def lit(groom: PreparedGroom, report: Report = lambda stage: None) -> PreparedGroom:
+    """The same groom in its own light.
+
+    Args:
+        report: see `prepared`.
+    """
+    report("light")
+    light = rest_light(groom.rig, groom.ambient, lambda: report("light"))
+    return replace(groom, light=light)
 
 
 def placeholder(request: BuildRequest) -> PreparedGroom:

@@ -35,7 +35,7 @@ from ..scene.source import Source, dynamics_warnings, refuse_own_dynamics
 from .groom_source import GroomSource
 from .measures import FrameTimes
 from .numpy_solver import NumpySolver
-from .prepared_groom import BuildRequest, PreparedGroom, build, placeholder
+from .prepared_groom import BuildRequest, PreparedGroom, build, lit, placeholder
 from .snapshots import GroomPicture
 from .solvers import Solver, computed_on, form_of, solver_of
 
@@ -81,6 +81,8 @@ class Session:
         self._job = LatestJob[BuildRequest, tuple[BuildRequest, PreparedGroom]](
             "hair", partial(arrived, self)
         )
+        # light of the hair that was made last; never while other hair is made
+        self._light_job = LatestJob[PreparedGroom, PreparedGroom]("light", partial(arrived, self))
         self.times = FrameTimes()
         self.obstacles: Obstacles | None = None
         self.is_playing = False
@@ -133,18 +135,23 @@ class Session:
 
     @property
     def is_pending(self) -> bool:
-        """Whether hair is being made, the first or other hair."""
-        return self._job.is_pending
+        """Whether hair is being made, the first or other hair, or its light is found."""
+        return self._job.is_pending or self._light_job.is_pending
+
+    @property
+    def is_lighting(self) -> bool:
+        """Whether hair is there, and its light is found."""
+        return self._light_job.is_pending
 
     @property
     def stage(self) -> str:
-        """What is done now of hair that is being made."""
-        return self._job.stage
+        """What is done now of what is being made."""
+        return self._job.stage or self._light_job.stage
 
     @property
     def has_arrived(self) -> bool:
-        """Whether the hair that was being made can be taken over."""
-        return self._job.has_arrived
+        """Whether the hair that was being made, or its light, can be taken over."""
+        return self._job.has_arrived or self._light_job.has_arrived
 
     def has_another_head(self) -> bool:
         """Whether the artist has set another surface since the session began."""
@@ -185,6 +192,7 @@ class Session:
     def _begin(self) -> None:
         """Have made what was requested last, once nothing else is being made."""
         request = self._source.request
+        self._light_job.cancel()
         self._job.want(
             request, lambda: partial(_build_in_thread, request=request, before=self._made)
         )
@@ -243,13 +251,18 @@ class Session:
             self._show()
         else:
             self.rest(depsgraph)
+        if groom.light is not None and groom.light.is_quick and not self._job.is_pending:
+            self._light_job.want(groom, lambda: partial(_light_in_thread, groom=groom))
 
     def take_made(self, depsgraph: bpy.types.Depsgraph) -> None:
-        """Show the hair that was made meanwhile; waits for it.
+        """Show the hair or the light that was made meanwhile; waits for it.
 
         Raises:
             HairloomError: it cannot be made.
         """
+        if self.is_lighting:
+            self._take_light()
+            return
         made = self._job.take()
         if made is not None:
             self._take(*made, self.groom, depsgraph)
@@ -257,8 +270,18 @@ class Session:
             self.color(depsgraph)
             self.paint(depsgraph)
 
+    def _take_light(self) -> None:
+        """Show the hair that was made last in its own light, combed or painted since or not."""
+        found = self._light_job.take()
+        assert found is not None, "no other hair is made meanwhile"
+        request, made = self._made
+        shown = found if self.groom is made else replace(self.groom, light=found.light)
+        self._made, self.groom = (request, found), shown
+        self.picture.take_light(shown)
+        self._show()
+
     def finish(self, depsgraph: bpy.types.Depsgraph) -> None:
-        """Wait for the hair that is being made, and show it.
+        """Wait for the hair that is being made and for its light, and show it.
 
         Raises:
             HairloomError: it cannot be made.
@@ -269,6 +292,7 @@ class Session:
     def forget(self) -> None:
         """Nobody waits any more for hair and cards that are on their way."""
         self._job.cancel()
+        self._light_job.cancel()
         self.cards.forget()
 
     def read_again(self, depsgraph: bpy.types.Depsgraph, *, blocking: bool = True) -> None:
@@ -287,7 +311,7 @@ class Session:
         self.take_settings()
         if request is not None:
             self._begin()
-        elif self.groom is not self._made[1] and not self.is_pending:
+        elif self.groom is not self._made[1] and not self._job.is_pending:
             self._take(*self._made, self.groom, depsgraph)  # combed, and back by an undo
         if blocking:
             self.finish(depsgraph)
@@ -577,7 +601,11 @@ def _build_in_thread(
     request: BuildRequest,
     before: tuple[BuildRequest, PreparedGroom],
 ) -> tuple[BuildRequest, PreparedGroom]:
-    return request, build(request, before, is_drawn=True, report=work.report)
+    return request, build(request, before, is_drawn=True, is_quick=True, report=work.report)
+
+
+def _light_in_thread(work: ThreadWork[PreparedGroom], groom: PreparedGroom) -> PreparedGroom:
+    return lit(groom, work.report)
 
 
 def _same_anchors(one: Floats | None, other: Floats | None) -> bool:

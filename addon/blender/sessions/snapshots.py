@@ -12,6 +12,7 @@ import numpy as np
 
 from ...arrays import Floats
 from ...groom.painted_color import PaintedColor
+from ...light_flow import HairLight
 from ...paint_flow import with_colors
 from ...pipeline import Pose, Rig, strand_seeds
 from ...refine.settings import DetailSettings
@@ -42,15 +43,12 @@ from .solvers import Solver
 
 def snapshot_of(groom: PreparedGroom) -> Snapshot:
     """The groom at rest, with all that does not change while it moves."""
-    strands = groom.rig.strands
-    return Snapshot(
+    strands, light = groom.rig.strands, groom.light
+    snapshot = Snapshot(
         points=strands.points,
         radius=strands.radius,
         layout=StrandLayout(strands.offsets),
         along=uneven_along(strands.points, strands.offsets),
-        occlusion=groom.occlusion,
-        openness=groom.openness,
-        skin_seen=groom.skin_seen,
         guide=np.ascontiguousarray(groom.rig.weights.guide[:, 0]),
         group=strands.group,
         rank=groom.rank,
@@ -58,6 +56,14 @@ def snapshot_of(groom: PreparedGroom) -> Snapshot:
         extinction=groom.rig.widths.extinction,
         spacing=groom.rig.widths.spacing,
         color=strands.color,
+    )
+    return snapshot if light is None else with_light(snapshot, light)
+
+
+def with_light(snapshot: Snapshot, light: HairLight) -> Snapshot:
+    """The same groom with this light at its points."""
+    return replace(
+        snapshot, occlusion=light.occlusion, openness=light.openness, skin_seen=light.skin_seen
     )
 
 
@@ -136,6 +142,12 @@ class GroomPicture:
         self.snapshot = with_settings(snapshot_of(groom), settings)
         self.take_colors(groom.rig, colors, settings)
         self._want_cards(groom.rig, settings)
+
+    def take_light(self, groom: PreparedGroom) -> None:
+        """The same strands, as many points each, in the light that was found meanwhile."""
+        assert groom.light is not None
+        self._groom = groom
+        self.snapshot = with_light(self.snapshot, groom.light)
 
     def take_colors(self, rig: Rig, colors: PaintedColor | None, settings: GroomSettings) -> None:
         """The same strands, of this rig, with other colours painted under them; their cards wait

@@ -11,7 +11,7 @@ from hairloom.addon.shading.ambient import (
     HairCells,
     ambient_occlusion,
     depth_towards,
-    openness,
+    openness_field,
     skin_occlusion,
     sky_directions,
     sky_openness,
@@ -229,6 +229,13 @@ def test_the_body_shuts_out_the_light_from_behind_and_only_that() -> None:
     assert free == pytest.approx(1.0)
 
 
+def openness(
+    strands: StrandSet, points: Floats, body: Surface | None, extinction: float, cell_count: int
+) -> Floats:
+    found = openness_field(HairCells.of(strands, body, cell_count), extinction).at(points)
+    return found.T
+
+
 def test_openness_knows_from_where_light_comes() -> None:
     """Over a ball and without hair's shade light comes from all around but a cone: its mean and
     its vector outward are integrals of that, and nothing points along the ball."""
@@ -329,17 +336,4 @@ def test_sums_of_light_are_those_of_each_direction() -> None:
     factor = 1.0 + np.arange(len(steps), dtype=np.float32)[:, None, None, None]
     np.testing.assert_allclose(
         depth_towards(factor * depth, steps), factor * depth_towards(depth[None], steps), rtol=1e-5
-    )
-
-
-def test_cells_that_are_known_change_nothing() -> None:
-    strands, settings = hair_on_ball(), AmbientSettings(extinction=2.0)
-    cells = HairCells.of(strands, ball(0.08), settings.cell_count)
-    arguments = strands, strands.points[::50], ball(0.08)
-    np.testing.assert_array_equal(
-        ambient_occlusion(*arguments, settings, cells), ambient_occlusion(*arguments, settings)
-    )
-    np.testing.assert_array_equal(
-        openness(*arguments, 2.0, settings.cell_count, cells),
-        openness(*arguments, 2.0, settings.cell_count),
     )

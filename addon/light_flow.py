@@ -1,0 +1,213 @@
+"""The flow of light to hair at rest: first the hair, then its light.
+
+Points have their light from fields, grids over the hair. To find those takes time, so that a window
+shows hair before, in quick light. Strands that were there before keep what they had, as they do
+under a brush; others take what the fields of the hair before have at their place. The first hair
+has coarse fields, of few of its strands. They are looked up at few points of each strand.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from .arrays import Floats, Ints
+from .pipeline import (
+    AT_ONCE,
+    Axes,
+    Rig,
+    ambient_of,
+    by_axes,
+    few_strands,
+    rest_skin_field,
+    skin_seen_by,
+    strand_axes,
+)
+from .shading.ambient import HairCells, occlusion_by, openness_field, sky_field
+from .shading.ambient_settings import AmbientSettings
+from .shading.density_grid import Field
+from .strands import StrandSet
+from .strands.kept import same_rows
+
+#: Of coarse fields: cells along the longest side, cells in all, and those of the skin's.
+_COARSE_CELLS, _COARSE_MOST, _COARSE_SKIN = 24, 8_000, 20
+#: Quick light is looked up at one of this many points of a strand, and at its last one.
+_STRIDE = 4
+
+
+@dataclass(frozen=True, eq=False)
+class LightFields:
+    """Of hair at rest: see `ambient.sky_field`, `ambient.openness_field` and
+    `skin_seen.skin_field`; the last is None without a head."""
+
+    sky: Field
+    openness: Field
+    skin: Field | None
+
+
+@dataclass(frozen=True, eq=False)
+class HairLight:
+    """What light comes to each point at rest.
+
+    occlusion: (point_count,), 1 where nothing shades.
+    openness: (point_count, 4), see `ambient.openness_field`: the mean, and a vector by the strand's
+        axes. It turns with the strand, so it holds while hair moves as far as occlusion does.
+    skin_seen: (point_count, 8), see `pipeline.skin_seen_by`; None without a head.
+    fields: from which it is taken; None without strands.
+    is_quick: whether these are not the hair's own.
+    """
+
+    occlusion: Floats
+    openness: Floats
+    skin_seen: Floats | None
+    fields: LightFields | None
+    is_quick: bool = False
+
+
+def rest_light(
+    rig: Rig, settings: AmbientSettings, report: Callable[[], None] = lambda: None
+) -> HairLight:
+    """The light of a rig.
+
+    Args:
+        report: is called from time to time; may end it by an exception.
+    """
+    strands = rig.strands
+    if not strands.strand_count:
+        return _NO_LIGHT
+    axes, points = strand_axes(strands), strands.points
+    with ThreadPoolExecutor(1) as beside:
+        skin_field = beside.submit(rest_skin_field, rig)
+        skin = beside.submit(
+            lambda: _skin(axes, skin_field.result(), lambda field: field.at(points))
+        )
+        cells = HairCells.of(strands, rig.head, settings.cell_count)
+        report()
+        sky = sky_field(cells, ambient_of(rig, settings))
+        report()
+        openness = openness_field(cells, rig.widths.extinction)
+        report()
+        fields = LightFields(sky, openness, skin_field.result())
+        return _light(rig, settings, fields, axes, lambda field: field.at(points), skin.result())
+
+
+def quick_light(
+    rig: Rig, settings: AmbientSettings, known: tuple[Rig, HairLight] | None
+) -> HairLight:
+    """About the light of a rig, in a fraction of the time.
+
+    Args:
+        known: hair that was much like it, and its light; None: there is none.
+    """
+    strands = rig.strands
+    if not strands.strand_count:
+        return _NO_LIGHT
+    before, light = (None, None) if known is None else known
+    fields = None if light is None else light.fields
+    if before is None or light is None or fields is None:
+        fields = _coarse_fields(rig, settings)
+        return _looked_up(rig, settings, fields, strands)
+    if (fields.skin is None) != (rig.head is None):
+        return rest_light(rig, settings)
+    number = same_rows(strands.roots, before.strands.roots)
+    number[before.strands.point_counts[number] != strands.point_counts] = -1
+    others = np.flatnonzero(number < 0)
+    there = before.strands.offsets[:-1][number] - strands.offsets[:-1]
+    there = np.repeat(there, strands.point_counts) + np.arange(strands.point_count)
+    there[np.repeat(number < 0, strands.point_counts)] = 0
+    seen = light.skin_seen
+    found = HairLight(
+        light.occlusion[there],
+        light.openness[there],
+        None if seen is None else seen[there],
+        fields,
+        is_quick=True,
+    )
+    if len(others):
+        _put(found, strands, others, _looked_up(rig, settings, fields, strands.take(others)))
+    return found
+
+
+def _put(light: HairLight, strands: StrandSet, chosen: Ints, own: HairLight) -> None:
+    """Write the light of some strands into that of all."""
+    is_own = np.zeros(strands.strand_count, bool)
+    is_own[chosen] = True
+    points = np.flatnonzero(np.repeat(is_own, strands.point_counts))
+    light.occlusion[points] = own.occlusion
+    light.openness[points] = own.openness
+    if light.skin_seen is not None and own.skin_seen is not None:
+        light.skin_seen[points] = own.skin_seen
+
+
+def _looked_up(
+    rig: Rig, settings: AmbientSettings, fields: LightFields, strands: StrandSet
+) -> HairLight:
+    """Quick light of some of a rig's strands."""
+    chosen, before, part = _few_points(strands)
+    few = strands.points[chosen]
+
+    def look(field: Field) -> Floats:
+        return _between(field.at(few), before, part)
+
+    axes = strand_axes(strands, rig.strands)
+    skin = _skin(axes, fields.skin, look)
+    return replace(_light(rig, settings, fields, axes, look, skin), is_quick=True)
+
+
+_NO_LIGHT = HairLight(np.ones(0, np.float32), np.ones((0, 4), np.float32), None, None)
+
+
+def _light(
+    rig: Rig,
+    settings: AmbientSettings,
+    fields: LightFields,
+    axes: Axes,
+    look: Callable[[Field], Floats],
+    skin_seen: Floats | None,
+) -> HairLight:
+    """Args:
+    look: gives the values of a field at all points, (k, point_count).
+    """
+    occlusion = occlusion_by(look(fields.sky)[0], ambient_of(rig, settings))
+    openness = np.ascontiguousarray(look(fields.openness).T)
+    openness[:, 1:] = by_axes(openness[:, 1:], axes)
+    return HairLight(occlusion, openness, skin_seen, fields)
+
+
+def _skin(axes: Axes, field: Field | None, look: Callable[[Field], Floats]) -> Floats | None:
+    return None if field is None else skin_seen_by(axes, look(field))
+
+
+def _coarse_fields(rig: Rig, settings: AmbientSettings) -> LightFields:
+    few, step = few_strands(rig.strands)
+    cells = HairCells.of(few, rig.head, _COARSE_CELLS, _COARSE_MOST)
+    sky = sky_field(cells, ambient_of(rig, settings).multiplied(extinction=step))
+    open_field = openness_field(cells, step * rig.widths.extinction)
+    return LightFields(sky, open_field, rest_skin_field(rig, _COARSE_SKIN))
+
+
+def _few_points(strands: StrandSet) -> tuple[Ints, Ints, Floats]:
+    """Which points are looked at, (k,); and, of each point, which of these it is or comes after,
+    and how far it is from there to the next, from 0 to 1."""
+    offsets, number = strands.offsets, np.arange(strands.point_count)
+    is_chosen = (number - np.repeat(offsets[:-1], strands.point_counts)) % _STRIDE == 0
+    is_chosen[offsets[1:] - 1] = True
+    before, chosen = np.cumsum(is_chosen) - 1, np.flatnonzero(is_chosen)
+    gap = np.diff(chosen, append=strands.point_count).astype(np.float32)
+    return chosen, before, (number - chosen[before]).astype(np.float32) / gap[before]
+
+
+def _between(values: Floats, before: Ints, part: Floats) -> Floats:
+    """Of values at few points (k, few), those at all, (k, n)."""
+    found = np.empty((len(values), len(before)), np.float32)
+    last = values.shape[1] - 1
+    for first in range(0, len(before), AT_ONCE):
+        some = slice(first, first + AT_ONCE)
+        low, high = before[some], np.minimum(before[some] + 1, last)
+        for row, target in zip(values, found, strict=True):
+            one = row.take(low)
+            target[some] = one + part[some] * (row.take(high) - one)
+    return found
