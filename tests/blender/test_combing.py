@@ -261,10 +261,11 @@ def test_combed_hair_comes_in_the_light_before_and_keeps_strokes_made_since(
     assert not np.array_equal(session.snapshot.occlusion, wanted)
     assert np.abs(session.snapshot.occlusion - wanted).mean() < 0.05
     stroke(hair, range(10, 15))
-    shown = drawn(session)
+    shown, combed = drawn(session), session.rig.strands.points
     opened.set()
     take_steps_until(lambda: not session.is_lighting)
     np.testing.assert_array_equal(drawn(session), shown)
+    np.testing.assert_array_equal(session.rig.strands.points, combed)
     np.testing.assert_array_equal(session.snapshot.occlusion, wanted)
     arrive(session, evaluated)
     points, occlusion = rebuilt(hair, evaluated)
