@@ -14,6 +14,8 @@ from typing import Any
 import pytest
 from recipes import REPOSITORY, copy_with_recipes, listed_files, recipes
 
+#: Spring bones of engines have a drag and capsules of their own.
+SPRINGS = {"addon/exchange/cards/glb_springs.py"}
 #: In the copy with all recipes applied: what each has added, used as its reader would use it.
 USES = {
     "A collider shape": """
@@ -171,12 +173,13 @@ def test_every_block_fits_the_sources(tmp_path: Path) -> None:
 def test_the_places_of_a_force_are_complete() -> None:
     others = {"addon/dynamics/constraints.py", "addon/dynamics/settings.py"}
     others |= {"addon/dynamics/force_fields.py", "addon/blender/scene/forces.py"}  # Blender's
-    others.add("gpu_shaders/lib_force_fields.glsl")
+    others |= {"gpu_shaders/lib_force_fields.glsl", "addon/wet_flow.py"}
+    others |= SPRINGS | {"addon/cards/spring_bones.py", "addon/cards/spring_fit.py"}
     assert listed_files("A force or constraint") - others == files_with("drag") - others
 
 
 def test_the_places_of_a_collider_shape_are_complete() -> None:
-    others = {"gpu_shaders/lib_collider.glsl", "addon/blender/colliders/obstacles.py"}
+    others = SPRINGS | {"gpu_shaders/lib_collider.glsl", "addon/blender/colliders/obstacles.py"}
     assert listed_files("A collider shape") - others == files_with("capsule") - others
 
 

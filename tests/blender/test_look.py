@@ -174,7 +174,7 @@ def test_what_replaces_shadows_and_scattering_is_grey_where_they_are(new_hair: A
     hair = new_hair()
     groom = hair.data.hairloom
     groom.shading.model, groom.shading.tip_tint = "marschner", 1.0
-    groom.shading.brow_source = "natural"
+    groom.shading.brow_source, groom.shading.dust = "natural", 0.1
     assert drawn_in_look(hair)[1] == {"fake_scattering", "volume_shadow"}, "a new groom has both"
     groom.volume.scattering = False
     assert drawn_in_look(hair)[1] == {"volume_shadow"}
