@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from spheres import ball
 
 from hairloom.addon import pipeline
 from hairloom.addon.arrays import Floats
@@ -14,23 +15,10 @@ from hairloom.addon.light_flow import quick_light, rest_light
 from hairloom.addon.pipeline import Rig
 from hairloom.addon.shading.ambient import occlusion_by
 from hairloom.addon.shading.ambient_settings import AmbientSettings
-from hairloom.addon.strands import StrandSet, Surface
+from hairloom.addon.strands import StrandSet
 
 RADIUS, POINTS, COUNT = 0.09, 14, 1500
 SETTINGS = AmbientSettings(cell_count=64)
-
-
-def ball() -> Surface:
-    up, around = np.meshgrid(
-        np.linspace(0, np.pi, 33), np.linspace(0, 2 * np.pi, 65), indexing="ij"
-    )
-    points = np.stack([np.sin(up) * np.cos(around), np.sin(up) * np.sin(around), np.cos(up)], -1)
-    row, column = np.meshgrid(np.arange(32), np.arange(64), indexing="ij")
-    a = (row * 65 + column).ravel()
-    triangles = np.concatenate(
-        [np.stack([a, a + 65, a + 66], axis=1), np.stack([a, a + 66, a + 1], axis=1)]
-    )
-    return Surface(RADIUS * points.reshape(-1, 3), triangles)
 
 
 @pytest.fixture(scope="module")
@@ -50,7 +38,7 @@ def rig() -> Rig:
         np.full(COUNT * POINTS, 1e-3),
         np.zeros(COUNT),
     )
-    return pipeline.prepare(strands, ball(), GuideSettings(), place="ball")
+    return pipeline.prepare(strands, ball(RADIUS), GuideSettings(), place="ball")
 
 
 def with_strands(rig: Rig, points: Floats) -> Rig:
@@ -110,7 +98,7 @@ def test_strands_of_two_points_and_none_have_quick_light(rig: Rig) -> None:
     ends = (rig.strands.offsets[:-1, None] + [0, 1]).ravel()
     offsets, radius = np.arange(COUNT + 1) * 2, np.full(2 * COUNT, 2e-4)
     short = StrandSet(rig.strands.points[ends], offsets, radius, np.zeros(COUNT))
-    bound = pipeline.prepare(short, ball(), GuideSettings(), place="ball")
+    bound = pipeline.prepare(short, ball(RADIUS), GuideSettings(), place="ball")
     light = rest_light(bound, SETTINGS)
     away = with_strands(bound, bound.strands.points + np.float32(1e-6))
     found = quick_light(away, SETTINGS, (bound, light))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from spheres import ball
 
 from hairloom.addon.arrays import Floats
 from hairloom.addon.shading.ambient import (
@@ -33,19 +34,6 @@ def straight_hair(count: int, radius: float = 1e-3) -> StrandSet:
     way *= 0.1 / np.linalg.norm(way, axis=1, keepdims=True)
     points = np.stack([root, root + 0.3 * way, root + way], axis=1).reshape(-1, 3)
     return StrandSet(points, np.arange(count + 1) * 3, np.full(count * 3, radius), np.zeros(count))
-
-
-def ball(radius: float) -> Surface:
-    up, around = np.meshgrid(
-        np.linspace(0, np.pi, 33), np.linspace(0, 2 * np.pi, 65), indexing="ij"
-    )
-    points = np.stack([np.sin(up) * np.cos(around), np.sin(up) * np.sin(around), np.cos(up)], -1)
-    row, column = np.meshgrid(np.arange(32), np.arange(64), indexing="ij")
-    a = (row * 65 + column).ravel()
-    triangles = np.concatenate(
-        [np.stack([a, a + 65, a + 66], axis=1), np.stack([a, a + 66, a + 1], axis=1)]
-    )
-    return Surface(radius * points.reshape(-1, 3), triangles)
 
 
 def test_the_sky_is_whole_and_its_directions_integrate_polynomials() -> None:
