@@ -7,6 +7,14 @@ from typing import ClassVar
 
 from ..params import Owner, Settings, choice, integer, number, toggle
 
+#: motion -> the parameters that belong to it
+OF_MOTION: dict[str, tuple[str, ...]] = {
+    "none": (),
+    "joints": ("motion_space", "chains", "joints", "joint_error"),
+    "springs": ("spring_joints",),
+    "texture": ("motion_space", "motion_depth"),
+}
+
 
 @dataclass(frozen=True, kw_only=True)
 class CardExportSettings(Settings):

@@ -18,7 +18,7 @@ from ..blender.base.outcome import Outcome
 from ..blender.cards.files import CardExport, CardOutput, FileSteps
 from ..blender.properties.groups import operator_properties
 from ..blender.properties.properties import settings_of
-from ..cards.export_settings import CardExportSettings
+from ..cards.export_settings import OF_MOTION, CardExportSettings
 from ..errors import HairloomError
 from ..exchange.cards.card_formats import FORMATS, GLB, SUFFIXES
 from .drawing import draw_idle
@@ -27,12 +27,6 @@ from .messages import draw_lines
 from .reports import tell
 from .selection import chosen_hair, needs_hair
 
-#: Motion -> the options that belong to it.
-_OF_MOTION = {
-    "joints": ("motion_space", "chains", "joints", "joint_error"),
-    "springs": ("spring_joints",),
-    "texture": ("motion_space", "motion_depth"),
-}
 _FORMATS = [(each.name, each.entry, each.about) for each in FORMATS]
 
 
@@ -190,7 +184,7 @@ class HAIRLOOM_OT_export_cards(LongWork, ExportHelper, bpy.types.Operator):
         ends.active = self.own_frames
         ends.prop(self, "first_frame", text="")
         ends.prop(self, "last_frame", text="")
-        for name in _OF_MOTION[self.motion]:
+        for name in OF_MOTION[self.motion]:
             layout.prop(self, name)
         for note in self.stale:
             draw_lines(layout.column(align=True), context, note, "ERROR")

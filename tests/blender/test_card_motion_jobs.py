@@ -45,6 +45,9 @@ def test_the_command_line_writes_a_bake(tmp_path: Path, capfd: Any) -> None:
     assert told["frames"] == {"first": 2, "count": 8, "rate": 60.0}
     assert told["chains"] <= 4
     springs = ["--motion", "springs", "--spring-joints", "9", "--bake", bake]
+    assert command_line.run([*arguments, *springs, "--motion-space", "world"]) == 1
+    refused = capfd.readouterr().err
+    assert "--motion-space" in refused and "--motion joints or texture" in refused
     assert command_line.run([*arguments, *springs]) == 0
     told = json.loads((tmp_path / "hair.hairloom.json").read_text("utf-8"))["motion"]
     assert (told["kind"], told["joints"] <= 9) == ("springs", True)

@@ -10,7 +10,7 @@ from pathlib import Path
 import bpy
 
 from ...arrays import Floats
-from ...cards.export_settings import CardExportSettings
+from ...cards.export_settings import OF_MOTION, CardExportSettings
 from ...cards.occlusion_settings import CardOcclusionSettings
 from ...cards.settings import CardSettings
 from ...errors import HairloomError
@@ -99,6 +99,7 @@ def _moving(job: Job, settings: CardExportSettings) -> tuple[Rig, GuideMotion | 
     """The hair, and what moves it if motion is asked for: the bake of a folder or of an object."""
     options = job.options
     frames = frames_of_option(options.frames)
+    _check_motion_options(job, settings.motion)
     if settings.motion != "none":
         motion = motion_of(job, frames)
         return motion.rig, motion
@@ -109,6 +110,18 @@ def _moving(job: Job, settings: CardExportSettings) -> tuple[Rig, GuideMotion | 
             remedy="Add --motion joints, springs or texture",
         )
     return read_rig(job)[0], None
+
+
+def _check_motion_options(job: Job, motion: str) -> None:
+    """Refuse options that say how another motion is written."""
+    for name in sorted({name for names in OF_MOTION.values() for name in names}):
+        if getattr(job.options, name) is not None and name not in OF_MOTION[motion]:
+            users = [each for each, names in OF_MOTION.items() if name in names]
+            raise HairloomError(
+                f"it means nothing with --motion {motion}",
+                place="--" + name.replace("_", "-"),
+                remedy=f"Leave it out, or add --motion {' or '.join(users)}",
+            )
 
 
 def _add_options(parser: argparse.ArgumentParser) -> None:
