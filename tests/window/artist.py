@@ -69,19 +69,23 @@ def sidebar_button(operator: str) -> tuple[int, int]:
     return int(sidebar.x + across * sidebar.width), int(top - below * scale)
 
 
-def field(area: Any, kind: str, path: str, across: float = 0.7) -> Iterator[int]:
+def field(
+    area: Any, kind: str, path: str, across: float = 0.7, expected: tuple[int, int] | None = None
+) -> Iterator[int]:
     """Moves the mouse over a part of an area until it is on the field of a property.
 
     Args:
         path: how the property's data path ends.
         across: the part of the area's width at which the mouse moves down.
+        expected: where in the window the mouse looks first.
 
     Returns:
         where in the window that is.
     """
     part = next(each for each in area.regions if each.type == kind)
     x = part.x + int(across * part.width)
-    for y in range(part.y + part.height - 5, part.y + 5, -12):
+    rows = ((x, y) for y in range(part.y + part.height - 5, part.y + 5, -12))
+    for x, y in (*([expected] if expected else ()), *rows):
         bpy.context.window.event_simulate("MOUSEMOVE", "NOTHING", x=x, y=y)
         yield 1
         with bpy.context.temp_override(area=area, region=part):

@@ -103,7 +103,7 @@ def comb(hair):
     yield 1
     window.event_simulate("LEFTMOUSE", "PRESS", x=x, y=y)
     yield 1
-    for along in range(5, 80, 5):
+    for along in range(10, 81, 10):
         window.event_simulate("MOUSEMOVE", "NOTHING", x=x + along, y=y)
         yield 1
     during = session().strands
@@ -170,7 +170,7 @@ def paint(hair):
     yield 1
     window.event_simulate("LEFTMOUSE", "PRESS", x=x, y=y)
     began = time.monotonic()
-    for along in range(5, 80, 5):
+    for along in range(10, 81, 10):
         window.event_simulate("MOUSEMOVE", "NOTHING", x=x + along, y=y)
         yield 1
         if np.ptp(drawn_colors(), axis=0).max() > 0.0:
