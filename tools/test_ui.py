@@ -69,11 +69,10 @@ NOT_IN_COMMITS = (
 #: pictured uncut, and Blender's own texts and gizmos must be a small part of what is compared.
 _LARGE, _SMALL = "1600x1000x24", "1024x700x24"
 _ON_SMALL = (
-    *("cards", "combing", "first_minutes", "hair_scene", "import", "layers"),
+    *("cards", "combing", "engine", "first_minutes", "hair_scene", "import", "layers"),
     *("long_work", "look", "motion", "selection", "shadows", "views"),
 )
 SCREENS = {f"session_{name}": _SMALL for name in _ON_SMALL} | {
-    "session_engine": _LARGE,
     "session_everyday": _LARGE,
     "session_guide_pictures": "1600x1500x24",
     "session_midplay": _LARGE,
@@ -260,7 +259,9 @@ def copy_or_link(source: str, target: str) -> None:
         shutil.copy2(source, target)
 
 
-def run_session(script: Path, part: dict[str, str], backend: str, tally: Tally) -> None:
+def run_session(
+    script: Path, part: dict[str, str], backend: str, is_commit: bool, tally: Tally
+) -> None:
     """One window session, in a Blender of its own with the extension installed, not enabled."""
     name = "-".join((script.stem.removeprefix("session_"), *part.values(), backend))
     log, resources = OUTPUT / f"{name}.log", OUTPUT / f"resources-{name}"
@@ -271,6 +272,7 @@ def run_session(script: Path, part: dict[str, str], backend: str, tally: Tally) 
         "BLENDER_USER_RESOURCES": str(resources),
         "HAIRLOOM_SCREENSHOTS": str(OUTPUT),
         "HAIRLOOM_SESSION": name,
+        "HAIRLOOM_TIER": "commit" if is_commit else "all",
         **part,
     }
     if script.stem in SCREENS:
@@ -308,7 +310,7 @@ def jobs_of(sessions: list[Path], *, is_commit: bool, with_tests: bool) -> list[
             chosen = () if name in NOT_IN_COMMITS else BACKENDS[name in ON_VULKAN :][:1]
         for backend in chosen:
             for part in parts_of(script, backend, is_commit):
-                jobs.append(partial(run_session, script, part, backend))
+                jobs.append(partial(run_session, script, part, backend, is_commit))
     return jobs
 
 

@@ -28,6 +28,8 @@ SLEEP_S = 0.005
 #: A machine may be as slow as it likes: only what never comes fails.
 PATIENCE_S = 180.0
 EXTENSION = "bl_ext.user_default.hairloom"
+#: For a commit a session leaves out cases that are like others.
+IS_COMMIT = os.environ.get("HAIRLOOM_TIER") == "commit"
 
 #: Where in the extension what sessions look at is. Each module is named here and nowhere else.
 MODULES = {

@@ -23,7 +23,7 @@ from artist import (
 )
 from driver import of_hairloom, until
 
-SAMPLES = 8
+SAMPLES = 4
 #: pixels from the middle of the view that are compared
 REACH = 150
 

@@ -113,7 +113,7 @@ def played_in_both(head):
     def has_swung():
         frames.add(scene.frame_current)
         lags.append(lag(session))
-        return len(frames) > 12
+        return len(frames) > 8
 
     yield from until(has_swung, "Blender does not play")
     bpy.ops.screen.animation_cancel(restore_frame=False)
