@@ -12,6 +12,7 @@ from .cards.atlas_settings import AtlasSettings
 from .cards.build import AlphaOf, CardBuild, CardGroom, card_steps, strand_occluder
 from .cards.card_mesh import CardMesh
 from .cards.card_strands import card_strands
+from .cards.edits import CardEdits
 from .cards.follow import CardBinding, bind_cards, card_lines, follow_guides
 from .cards.occlusion import CardOccluder
 from .cards.occlusion_settings import CardOcclusionSettings
@@ -31,12 +32,14 @@ def card_build_steps(
     settings: SettingsMap,
     alpha_of: AlphaOf = lambda _build: None,
     others: Sequence[CardOccluder] = (),
+    edits: CardEdits | None = None,
 ) -> Generator[str, None, CardBuild]:
     """Cards at rest in all levels of detail, with occlusion, from inside to outside.
 
     Args:
         alpha_of: the alpha of the atlas, which is best baked here; see `cards.build`.
         others: cards of other grooms, which shade these, world space.
+        edits: what the artist has changed of cards that were made before, which is kept.
 
     Yields what comes next, and returns the cards.
 
@@ -54,7 +57,7 @@ def card_build_steps(
         occlusion=occlusion.reshape(strands.strand_count, -1),
     )
     sections = settings[CardSettings], settings[AtlasSettings], settings[CardOcclusionSettings]
-    return card_steps(groom, *sections, alpha_of, others)
+    return card_steps(groom, *sections, alpha_of, others, edits)
 
 
 def card_groom(rig: Rig, drawn: StrandSettings = _AS_THEY_ARE) -> CardGroom:

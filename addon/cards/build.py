@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Generator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import cast
 
 import numpy as np
@@ -16,7 +16,9 @@ from .atlas_grid import AtlasGrid
 from .atlas_settings import AtlasSettings
 from .card_mesh import CardMesh
 from .clusters import cluster_of_guides
+from .edits import CardEdits, EditCounts, MadeCards
 from .fit import cluster_of_strands, fit_strips
+from .kept_cards import KeptCards, kept_cards
 from .layers import card_layers
 from .levels import card_levels
 from .occlusion import CardOccluder, occlusion_steps
@@ -76,6 +78,8 @@ class CardBuild:
         `order_check.wrong_fraction`.
     order_notes: where that is much, what can be done.
     shape_notes: where cards are other ones than the settings ask for.
+    made: what was made, on record, world space; None where nothing is kept of it.
+    edits: how many cards are as the artist left them; edit_notes: what is doubtful of these.
     """
 
     levels: tuple[CardMesh, ...]
@@ -85,6 +89,9 @@ class CardBuild:
     wrong_fraction: float = 0.0
     order_notes: tuple[str, ...] = ()
     shape_notes: tuple[str, ...] = ()
+    made: MadeCards | None = None
+    edits: EditCounts = field(default_factory=EditCounts)
+    edit_notes: tuple[str, ...] = ()
 
     @property
     def finest(self) -> CardMesh:
@@ -94,7 +101,7 @@ class CardBuild:
     def notes(self) -> tuple[str, ...]:
         """What the artist should know."""
         of_atlas = () if self.plan is None else self.plan.notes
-        return (*self.shape_notes, *of_atlas, *self.order_notes)
+        return (*self.shape_notes, *self.edit_notes, *of_atlas, *self.order_notes)
 
 
 #: Gives the alpha of the atlas, (height, width), or None for opaque cards; may bake it from the
@@ -109,11 +116,13 @@ def card_steps(
     occlusion: CardOcclusionSettings,
     alpha_of: AlphaOf,
     others: Sequence[CardOccluder] = (),
+    edits: CardEdits | None = None,
 ) -> Generator[str, None, CardBuild]:
     """Build the cards; each step names what comes next, and the result is returned.
 
     Args:
         others: cards of other grooms, which shade these, world space.
+        edits: what the artist has changed of cards that were made before, which is kept.
 
     Raises:
         HairloomError: the atlas is too small for its tiles, or there is nothing to bake into it.
@@ -121,19 +130,27 @@ def card_steps(
     yield "Cards from strands"
     settings, atlas, shape_notes = fitted_to_length(settings, atlas, groom.strands)
     cards, plan = uncut_cards(groom, settings, atlas)
+    usual = float(np.median(cards.strips.width[:, 0])) if len(cards) else 0.0
+    kept = kept_cards(edits, cards, settings, groom.head, plan is not None) if edits else None
+    made = MadeCards.of(cards.strips, cards.tile, cards.atlas, groom.head)
+    if kept is not None:
+        cards, made = kept.cards, kept.record
     yield "Levels of detail"
     error = None
     if settings.source == "clusters":
         error = settings.error * float(np.median(groom.strands.lengths()))
     levels = card_levels(cards, settings, error)
     meshes, errors = zip(*((level.mesh, level.error) for level in levels), strict=True)
-    usual = float(np.median(cards.strips.width[:, 0])) if len(cards) else 0.0
     meshes = tuple(on_skin(mesh, groom.head, usual) for mesh in meshes)
+    if kept is not None:
+        meshes = (kept.put_into(meshes[0]), *meshes[1:])
     unsorted = tuple(mesh.triangles for mesh in meshes)
-    build = CardBuild(meshes, unsorted, errors, plan, shape_notes=shape_notes)
+    build = CardBuild(meshes, unsorted, errors, plan, shape_notes=shape_notes, made=made)
+    if kept is not None:
+        build = replace(build, edits=kept.counts, edit_notes=kept.notes)
     yield "Atlas"
     alpha = alpha_of(build)
-    shading = _occlusion_steps(groom, settings, build.finest, alpha, others, occlusion)
+    shading = _occlusion_steps(groom, settings, build.finest, alpha, others, occlusion, kept)
     finest = build.finest.with_occlusion((yield from _reported("Ambient occlusion", shading)))
     shaded = (finest, *(with_occlusion_of(finest, level) for level in build.levels[1:]))
     orders = yield from _orders(shaded, groom.head, settings, alpha)
@@ -176,8 +193,11 @@ def _occlusion_steps(
     alpha: Floats | None,
     others: Sequence[CardOccluder],
     occlusion: CardOcclusionSettings,
+    kept: KeptCards | None,
 ) -> Generator[float, None, Floats]:
     """Of each vertex: that of the strands there, times what rays find of other grooms."""
+    if not len(mesh.triangles):  # all cards were deleted
+        return np.ones(len(mesh.positions), np.float32)
     if groom.occlusion is None:
         bodies = [] if groom.head is None else [groom.head]
         return (
@@ -185,8 +205,10 @@ def _occlusion_steps(
                 mesh, [CardOccluder(mesh, alpha), *others], bodies, occlusion
             )
         )
+    # cards of the artist's own stand beside the strands of the nearest one
+    on_strands = mesh if kept is None else replace(mesh, card=kept.model[mesh.card])
     own = strands_occlusion(
-        mesh, groom.strands.grid, groom.occlusion, card_of_strand(groom, settings)
+        on_strands, groom.strands.grid, groom.occlusion, card_of_strand(groom, settings)
     )
     shown = (1.0 - occlusion.strength * (1.0 - own)).astype(np.float32)
     if not others:

@@ -92,6 +92,8 @@ def _finest(cards: UncutCards, settings: CardSettings, error: float | None) -> _
     segments: Ints = np.full(len(cards), most, np.int32)
     if error is not None:
         segments = fewest_segments(errors, error, most)
+    if cards.absent is not None:
+        segments[cards.absent] = 0
     median = float(np.median(cards.strips.width)) if len(cards) else 0.0
     numbers = np.arange(len(cards), dtype=np.int32)
     columns, allowed = settings.column_count, error or _MIN_ERROR * median
@@ -172,7 +174,8 @@ def _parts(cut: _Cut) -> list[tuple[Ints, Strips]]:
     parts: list[tuple[Ints, Strips]] = [
         (cards, with_segments(cut.strips, cards, n)) for n, cards in by_count.items()
     ]
-    return parts or [(np.zeros(0, np.int32), cut.strips)]
+    none = np.zeros(0, np.int32)
+    return parts or [(none, cut.strips.of(none))]
 
 
 def _silhouette_error(cut: _Cut, finest: Strips) -> float:
@@ -186,8 +189,9 @@ def _silhouette_error(cut: _Cut, finest: Strips) -> float:
         side[cards] = interpolated(strips.frames.side, along)
         tangent[cards] = interpolated(strips.frames.tangent, along)
         half[cards] = interpolated(strips.width[..., None], along)[..., 0] / 2.0
-    owner = cut.owner
-    away = edges_of(finest) - center[owner][:, :, None]
+    there = np.flatnonzero(cut.segments[cut.owner])
+    owner = cut.owner[there]
+    away = edges_of(finest.of(there)) - center[owner][:, :, None]
     aside = np.einsum("crei,cri->cre", away, side[owner])
     held = np.clip(aside, -half[owner][..., None], half[owner][..., None])
     ahead = np.einsum("crei,cri->cre", away, tangent[owner])

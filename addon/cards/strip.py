@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import Floats, Ints
+from ..arrays import Bools, Floats, Ints
 from ..strands import StrandSet
 from ..strands.frames import tangents, transported_normals, volume_normals
 from ..strands.resample import resample
@@ -68,6 +68,7 @@ class UncutCards:
     atlas: how the texture is divided into tiles.
     center: (3,) [m], what normals look away from, as those of strands do; None gives each card the
         normals of its own surface.
+    absent: (card_count,) cards of which nothing is made, or None: all are made.
     """
 
     strips: Strips
@@ -77,6 +78,7 @@ class UncutCards:
     tile: Ints
     atlas: AtlasGrid
     center: Floats | None = None
+    absent: Bools | None = None
 
     def __len__(self) -> int:
         return len(self.strips)

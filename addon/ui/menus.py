@@ -71,6 +71,7 @@ class HAIRLOOM_MT_object(bpy.types.Menu):
         layout.menu("HAIRLOOM_MT_looks", icon="SHADING_RENDERED")
         layout.separator()
         layout.operator("hairloom.make_cards", icon="MESH_GRID")
+        layout.operator("hairloom.discard_card_edits", icon="LOOP_BACK")
         layout.operator("hairloom.make_real", icon="OUTLINER_OB_CURVES")
         layout.operator("hairloom.export_cards", icon="EXPORT")
         layout.operator("hairloom.show_settings", icon="PROPERTIES")

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import bpy
 
-from ..blender.base.outcome import Outcome
+from ..blender.base.outcome import Outcome, report
 from ..blender.cards.build import order_line
-from ..blender.cards.object import CardObjectJob, card_objects
+from ..blender.cards.edits import groom_edits
+from ..blender.cards.made_objects import card_objects
+from ..blender.cards.object import CardObjectJob
 from ..cards.settings import CardSettings
+from ..errors import HairloomError
 from .drawing import draw_button
 from .long_work import LongWork, Progress, Steps, draw_progress, threaded
 from .reports import tell
@@ -32,21 +36,74 @@ class HAIRLOOM_OT_make_cards(LongWork, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if not cls.is_free():
-            return False
-        if context.mode != "OBJECT":
-            cls.poll_message_set("Go back to Object Mode first")
-            return False
-        return needs_hair(cls, context)
+        return _can_make(cls, context)
 
     def steps(self, context: bpy.types.Context) -> Steps[None]:
-        job = CardObjectJob(chosen_hair(context)[0], context.evaluated_depsgraph_get())
-        yield Progress("Reading the hair")
-        job.write((yield from threaded(job.building())))
-        finest, levels = job.objects[0], len(job.objects)
-        detail = f"{levels} levels of detail" if levels > 1 else "one level of detail"
-        result = f"{finest.name}: {_counts(finest)}, {detail}. {job.order}"
-        tell(self, Outcome(result, job.dropped, job.notes))
+        yield from _built(self, context)
+
+
+class HAIRLOOM_OT_discard_card_edits(LongWork, bpy.types.Operator):
+    """Make the cards of the active hair as if nobody had edited them: edited cards are made again,
+    deleted ones come back, and your own ones go. Esc cancels"""
+
+    bl_idname = "hairloom.discard_card_edits"
+    bl_label = "Discard Edits"
+    bl_options = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        if not _can_make(cls, context):
+            return False
+        if not card_objects(chosen_hair(context)[0]):
+            cls.poll_message_set("There are no cards yet")
+            return False
+        return True
+
+    def invoke(self: Any, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        hair = chosen_hair(context)[0]
+        try:
+            edits, _ = groom_edits(hair, context.evaluated_depsgraph_get())
+        except HairloomError:  # cards that can no longer be read are what is discarded
+            lost = "All edits"
+        else:
+            if edits is None:
+                report(self, "INFO", f"{hair.name}: nobody has edited its cards")
+                return {"CANCELLED"}
+            lost = edits.counts.listed
+        return context.window_manager.invoke_confirm(
+            self,
+            event,
+            title="Discard Edits",
+            message=f"{lost} of {hair.name} will be lost",
+            confirm_text="Discard",
+            icon="WARNING",
+        )
+
+    def steps(self, context: bpy.types.Context) -> Steps[None]:
+        yield from _built(self, context, keep_edits=False)
+
+
+def _can_make(operator: Any, context: bpy.types.Context) -> bool:
+    if not operator.is_free():
+        return False
+    if context.mode != "OBJECT":
+        operator.poll_message_set("Go back to Object Mode first")
+        return False
+    return needs_hair(operator, context)
+
+
+def _built(
+    operator: bpy.types.Operator, context: bpy.types.Context, *, keep_edits: bool = True
+) -> Steps[None]:
+    """Make the cards of the active hair, and report it."""
+    hair = chosen_hair(context)[0]
+    job = CardObjectJob(hair, context.evaluated_depsgraph_get(), keep_edits=keep_edits)
+    yield Progress("Reading the hair")
+    job.write((yield from threaded(job.building())))
+    finest, levels = job.objects[0], len(job.objects)
+    detail = f"{levels} levels of detail" if levels > 1 else "one level of detail"
+    lines = f"{finest.name}: {_counts(finest)}, {detail}", job.order, job.edits.line
+    tell(operator, Outcome(". ".join(filter(None, lines)), job.dropped, job.notes))
 
 
 def draw_made_cards(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
@@ -55,6 +112,8 @@ def draw_made_cards(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
     if not draw_progress(layout, HAIRLOOM_OT_make_cards):
         text = "Make Cards Again" if objects else "Make Cards"
         draw_button(layout, "hairloom.make_cards", text=text, icon="MESH_GRID")
+    label = "Discard Edits"
+    draw_button(layout, "hairloom.discard_card_edits", label, text=label, icon="LOOP_BACK")
     finest = objects[0] if objects else None
     made = finest and finest.hairloom.card_object
     column = layout.column(align=True)
@@ -88,4 +147,4 @@ def _counts(obj: bpy.types.Object) -> str:
     return f"{cards:,} cards, {triangles:,} triangles"
 
 
-CLASSES = (HAIRLOOM_OT_make_cards,)
+CLASSES = (HAIRLOOM_OT_make_cards, HAIRLOOM_OT_discard_card_edits)

@@ -253,14 +253,14 @@ def test_the_panel_draws_what_there_is(hair):
             said.append(text)
 
     draw_made_cards(Layout(), hair)
-    assert said == ["Make Cards", "No cards yet", *5 * ["-"], "", "Texture -"]
+    assert said == ["Make Cards", "Discard Edits", "No cards yet", *5 * ["-"], "", "Texture -"]
     before = len(said)
     press()
     said.clear()
     draw_made_cards(Layout(), hair)
     assert len(said) == before, "what is below moves"
     assert said[0] == "Make Cards Again"
-    assert said[1:3] == ["12 cards, 384 triangles", "384"] and said[5:7] == ["-", "-"]
+    assert said[2:4] == ["12 cards, 384 triangles", "384"] and said[6:8] == ["-", "-"]
     assert said[-2].endswith(" % of pixels blend in the wrong order")
     assert said[-1] == "Texture 128 x 32"
 

@@ -24,6 +24,7 @@ from ...cards.bake import sampled_maps
 from ...cards.bake_strands import FlatStrands, flat_strands
 from ...cards.build import CardBuild
 from ...cards.drawing_settings import CardDrawingSettings
+from ...cards.edits import CardEdits
 from ...cards.follow import CardBinding
 from ...cards.occlusion_settings import CardOcclusionSettings
 from ...cards.settings import CardSettings
@@ -57,6 +58,7 @@ from ..colliders.rigs import rig_from
 from ..properties.groom_settings import GroomSettings
 from ..scene.painted_colors import read_colors
 from ..scene.source import read_source
+from .edits import groom_edits
 from .occluders import Occluders, read_occluders
 from .textures import chosen_pictures
 
@@ -76,24 +78,30 @@ class CardInputs:
 
     pictures: used instead of generated textures, see `textures.picture_as`.
     occluders: hair of other grooms, which shades these, where it is while these are at rest.
+    edits: what the artist has changed of cards in the scene, or None.
     """
 
     rig: Rig
     settings: SettingsMap = field(default_factory=SettingsMap)
     pictures: Mapping[str, Floats] = field(default_factory=dict)
     occluders: Occluders = field(default_factory=Occluders)
+    edits: CardEdits | None = None
 
 
 def read_inputs(
-    hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph, rig: Rig | None = None
+    hair: bpy.types.Object,
+    depsgraph: bpy.types.Depsgraph,
+    rig: Rig | None = None,
+    keep_edits: bool = True,
 ) -> tuple[CardInputs, tuple[str, ...], dict[str, int]]:
     """A groom by its own settings; what the artist should know; what was dropped and why.
 
     Args:
         rig: of the groom's bake; None is that of its curves.
+        keep_edits: of cards in the scene.
 
     Raises:
-        HairloomError: no hair that can be used.
+        HairloomError: no hair that can be used, or edited cards that cannot be read.
     """
     settings = GroomSettings.of(hair).sections
     notes: tuple[str, ...] = ()
@@ -108,8 +116,9 @@ def read_inputs(
     rig = colored(rig, colors, settings[ShadingSettings])
     pictures, problems = chosen_pictures(hair.data.hairloom.card_images)
     occluders = read_occluders(settings[CardOcclusionSettings], hair)
-    inputs = CardInputs(rig, settings, pictures, occluders)
-    return inputs, (*notes, *notes_of(hair, rig), *problems), dropped
+    edits, doubts = groom_edits(hair, depsgraph) if keep_edits else (None, ())
+    inputs = CardInputs(rig, settings, pictures, occluders, edits)
+    return inputs, (*notes, *notes_of(hair, rig), *problems, *doubts), dropped
 
 
 def cards_key(groom: GroomSettings) -> Hashable:
@@ -193,7 +202,7 @@ def build_steps(
 
     yield "Other hair"
     others, notes = inputs.occluders.cards()
-    build = yield from card_build_steps(inputs.rig, inputs.settings, alpha_of, others)
+    build = yield from card_build_steps(inputs.rig, inputs.settings, alpha_of, others, inputs.edits)
     return MappedCards(build, made[-1], (*build.notes, *notes))
 
 

@@ -496,6 +496,8 @@ class CardExport:
             f"to {first.parent.name}/{first.name}, with {len(beside)} files beside it. "
             f"{order_line(written.build.wrong_fraction)}"
         )
+        if written.build.edits:
+            result += f". {written.build.edits.line}"
         return Outcome(
             f"{result}{_motion_line(written)}", self.dropped, (*self.notes, *written.notes)
         )

@@ -14,11 +14,15 @@ from mathutils import Matrix
 from ...arrays import Floats
 from ...cards.build import CardBuild
 from ...cards.card_mesh import OF_CARDS, CardMesh
+from ...cards.edits import UNPRINTED, EditCounts, MadeCards, prints
 from ...errors import HairloomError
 from ...shading.settings import ShadingSettings
+from ..base.attributes import set_attribute
 from ..base.objects import Handle, head_of, matrix_of
 from ..base.thread_work import ThreadWork
 from .build import MappedCards, built_in_thread, order_line, read_inputs
+from .edits import MADE_ATTRIBUTE, TILE_LAYER, read_pieces, write_record
+from .made_objects import card_objects
 from .material import fill_image, new_material
 from .mesh import OCCLUSION_IS_OURS, OCCLUSION_LAYER, fill_mesh
 
@@ -27,19 +31,25 @@ class CardObjectJob:
     """Making the cards of one groom: read at once, made in a thread, then written.
 
     objects: those of the cards once they are written, finest first; order: how well it suits.
-    notes: what the artist should know.
+    notes: what the artist should know. edits: how many cards are as the artist left them.
+
+    Args:
+        keep_edits: what the artist has changed of the cards that are there.
 
     Raises:
         HairloomError: no hair that can be used, or its cards that are there cannot be changed.
     """
 
-    def __init__(self, hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> None:
+    def __init__(
+        self, hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph, *, keep_edits: bool = True
+    ) -> None:
         for obj in card_objects(hair):
             _check_editable(obj)
-        self._inputs, self.notes, self.dropped = read_inputs(hair, depsgraph)
+        self._inputs, self.notes, self.dropped = read_inputs(hair, depsgraph, keep_edits=keep_edits)
         self._hair, self._matrix = Handle.of(hair), matrix_of(hair, depsgraph)
         self.objects: list[bpy.types.Object] = []
         self.order = ""
+        self.edits = EditCounts()
 
     def building(self) -> ThreadWork[MappedCards]:
         """Build the cards in a thread, which touches nothing of Blender's."""
@@ -62,51 +72,7 @@ class CardObjectJob:
         self.notes += tuple(f"{hair.name}: {note}." for note in made.notes)
         card = made.maps.plain_card(self._inputs.settings[ShadingSettings])
         self.objects = _write(hair, build, card, self._matrix)
-        self.order = order_line(build.wrong_fraction)
-
-
-def card_objects(hair: bpy.types.Object) -> list[bpy.types.Object]:
-    """The objects that hold the cards of a groom, finest first; none of their copies."""
-    of_groom = [obj for obj in _all_cards() if obj.hairloom.card_object.groom == hair]
-    made = {obj.hairloom.card_object.level: obj for obj in of_groom if _has_made_name(obj)}
-    made |= {obj.hairloom.card_object.level: obj for obj in of_groom if _has_made_uid(obj)}
-    return [made[level] for level in sorted(made)]
-
-
-def remember_names() -> None:
-    """Before a file is saved: in another session the numbers of its objects are others."""
-    cards = _all_cards()
-    made = {_place(obj) for obj in cards if _has_made_uid(obj)}
-    for obj in cards:
-        if _has_made_uid(obj):
-            obj.hairloom.card_object.made_name = obj.name
-        elif _place(obj) in made:  # a copy may have been called as the first one was
-            obj.hairloom.card_object.made_name = ""
-
-
-def remember_numbers() -> None:
-    """After a file was opened: its objects may be renamed and copied from now on."""
-    for obj in _all_cards():
-        is_made = _has_made_name(obj) and obj.library is None
-        obj.hairloom.card_object.made_uid = obj.session_uid if is_made else 0
-
-
-def _all_cards() -> list[bpy.types.Object]:
-    meshes = (obj for obj in bpy.data.objects if obj.type == "MESH")
-    return [obj for obj in meshes if obj.hairloom.card_object.groom is not None]
-
-
-def _place(obj: bpy.types.Object) -> tuple[bpy.types.Object, int]:
-    """Which groom's cards they are, and of which level."""
-    return obj.hairloom.card_object.groom, obj.hairloom.card_object.level
-
-
-def _has_made_uid(obj: bpy.types.Object) -> bool:
-    return bool(obj.hairloom.card_object.made_uid == obj.session_uid)
-
-
-def _has_made_name(obj: bpy.types.Object) -> bool:
-    return bool(obj.hairloom.card_object.made_name == obj.name)
+        self.order, self.edits = order_line(build.wrong_fraction), build.edits
 
 
 def _check_editable(obj: bpy.types.Object) -> None:
@@ -147,6 +113,8 @@ def _write(
         obj.hairloom.card_object.card_count = cards.card_count
         obj.hairloom.card_object.wrong_fraction = build.wrong_fraction
         _fill(obj.data, cards, matrix)
+        if not level and build.made is not None:
+            _put_on_record(obj.data, build.made, cards, matrix)
         objects.append(obj)
     return objects
 
@@ -191,11 +159,28 @@ def _fill(mesh: bpy.types.Mesh, cards: CardMesh, matrix: Floats) -> None:
     fill_mesh(
         mesh,
         cards,
-        uv_maps={"UVMap": cards.uv, OCCLUSION_LAYER: np.stack([cards.occlusion, cards.along], 1)},
+        uv_maps={
+            TILE_LAYER: cards.uv,
+            OCCLUSION_LAYER: np.stack([cards.occlusion, cards.along], 1),
+        },
         points={"occlusion": cards.occlusion, "along": cards.along},
         faces={"card": cards.card} | {name: getattr(cards, name)[cards.card] for name in OF_CARDS},
         matrix=matrix,
     )
+
+
+def _put_on_record(mesh: bpy.types.Mesh, made: MadeCards, cards: CardMesh, matrix: Floats) -> None:
+    """So that it is known later what the artist has changed of these cards."""
+    is_made = cards.card < len(made)
+    set_attribute(mesh, MADE_ATTRIBUTE, "FACE", np.where(is_made, cards.card + 1, 0))
+    surface, number = read_pieces(mesh)
+    assert number is not None
+    # the artist's own cards together are one more
+    found = prints(surface, np.where(number < 0, len(made), number))
+    marks = made.marks.copy()
+    unprinted = np.flatnonzero(marks == UNPRINTED)
+    marks[unprinted] = found[unprinted]
+    write_record(mesh, made, marks, matrix)
 
 
 def _filled_image(image: bpy.types.Image | None, name: str, texture: Floats) -> bpy.types.Image:

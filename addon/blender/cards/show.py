@@ -14,6 +14,7 @@ import bpy
 import numpy as np
 
 from ...arrays import Floats
+from ...cards.edits import CardEdits
 from ...cards.occlusion_settings import CardOcclusionSettings
 from ...errors import HairloomError
 from ...params import SettingsMap
@@ -25,6 +26,7 @@ from ..base import latest_job
 from ..base.latest_job import LatestJob, Work
 from ..properties.groom_settings import GroomSettings
 from .build import BuiltCards, CardInputs, cards_key, order_line
+from .edits import groom_edits, same_edits
 from .occluders import Occluders, read_occluders
 from .textures import chosen_pictures
 
@@ -81,6 +83,7 @@ class ShownCards:
         self._wanted: tuple[Rig, GroomSettings] | None = None
         self._shown: CardSnapshot | None = None
         self._occluders = Occluders()
+        self._edits: CardEdits | None = None
         self._motion: Floats = np.eye(4)
         self.warnings: tuple[str, ...] = ()
 
@@ -131,12 +134,13 @@ class ShownCards:
         """Session numbers of the other hair that shades what is shown, or what is being built."""
         return self._occluders.uids
 
-    def shade_again(self) -> None:
-        """The same cards once more if other hair is elsewhere or other hair now."""
+    def look_again(self) -> None:
+        """The same cards once more if other hair is elsewhere or other hair now, or if the artist
+        has edited cards in the scene."""
         if self._wanted is None:
             return
-        occluders = self._read_occluders(self._wanted[1])
-        if not occluders.is_like(self._occluders):
+        occluders, edits = self._read_occluders(self._wanted[1]), self._read_edits()
+        if not (occluders.is_like(self._occluders) and same_edits(edits, self._edits)):
             self._job.cancel()
             self._build(occluders)
 
@@ -185,10 +189,14 @@ class ShownCards:
         return partial(BuiltCards.in_thread, inputs=self._read(rig, settings, occluders))
 
     def _read(self, rig: Rig, settings: GroomSettings, occluders: Occluders | None) -> CardInputs:
-        """With the chosen pictures and the other hair as they are now."""
+        """With the chosen pictures, the artist's edits and the other hair as they are now."""
         self._occluders = occluders or self._read_occluders(settings)
+        self._edits = self._read_edits()
         pictures, _ = chosen_pictures(self._hair().data.hairloom.card_images)
-        return CardInputs(rig, settings.sections, pictures, self._occluders)
+        return CardInputs(rig, settings.sections, pictures, self._occluders, self._edits)
+
+    def _read_edits(self) -> CardEdits | None:
+        return groom_edits(self._hair(), bpy.context.view_layer.depsgraph, self._motion)[0]
 
     def _read_occluders(self, settings: GroomSettings) -> Occluders:
         depsgraph = bpy.context.view_layer.depsgraph

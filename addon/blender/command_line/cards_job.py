@@ -30,7 +30,7 @@ from .job_options import (
     frames_of_option,
     parameters_of,
 )
-from .job_steps import Job, finish, motion_of, read_rig, tell_notes
+from .job_steps import Job, card_edits, finish, motion_of, read_rig, tell_notes
 from .places import check_not_read
 from .verb import Verb
 
@@ -78,7 +78,7 @@ def written_cards(
         depsgraph = bpy.context.evaluated_depsgraph_get()
         output = replace(output, head_bone=head_bone_of(hair, depsgraph, rig.strands))
     occluders = read_occluders(settings[CardOcclusionSettings], hair)
-    inputs = CardInputs(rig, settings, pictures, occluders)
+    inputs = CardInputs(rig, settings, pictures, occluders, card_edits(job))
     written = write_cards(path, inputs, output, report.stage, motion)
     report.facts.update(
         cards=written.mesh.card_count,
@@ -86,6 +86,14 @@ def written_cards(
         card_levels=[len(level.triangles) for level in written.levels],
         card_order_wrong=round(written.build.wrong_fraction, 4),
     )
+    edits = written.build.edits
+    if edits:
+        report.facts["card_edits"] = {
+            "edited": edits.edited,
+            "deleted": edits.deleted,
+            "own": edits.own,
+        }
+        print(edits.line, flush=True)
     if written.motion:
         report.facts["card_motion"] = dict(written.motion)
     print(order_line(written.build.wrong_fraction), flush=True)
@@ -134,6 +142,11 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
     )
     files.add_argument(
         "--levels", type=int, metavar="N", help="levels of detail (default: those of cards.levels)"
+    )
+    files.add_argument(
+        "--discard-edits",
+        action="store_true",
+        help="leave out what was edited on the cards in the scene",
     )
     add_parameter_options(files, CardExportSettings)
     add_bake_option(files)

@@ -13,6 +13,7 @@ import numpy as np
 
 from ... import pipeline
 from ...arrays import Floats
+from ...cards.edits import CardEdits
 from ...errors import HairloomError
 from ...groom.children_settings import ChildrenSettings
 from ...groom.masks import Mask, Masks, mask_names
@@ -27,6 +28,7 @@ from ...shading.settings import ShadingSettings
 from ...wet_flow import acting
 from ..bakes.guide_motion import BakedGuides
 from ..base.report import Report
+from ..cards.edits import groom_edits
 from ..colliders.fields import solid_of
 from ..pictures.studio import Studio
 from ..properties.groom_settings import GroomSettings
@@ -234,11 +236,23 @@ def with_uvs(rig: Rig, sources: Sources) -> Rig:
     return replace(rig, head=replace(rig.head, corner_uv=now.corner_uv))
 
 
+def card_edits(job: Job) -> CardEdits | None:
+    """What the artist has changed of the cards of --groom in the scene, unless --discard-edits."""
+    hair = bpy.data.objects.get(job.sources.groom or "")
+    if hair is None or hair.type != "CURVES" or getattr(job.options, "discard_edits", False):
+        return None
+    edits, notes = groom_edits(hair, bpy.context.evaluated_depsgraph_get())
+    tell_notes(list(notes), job.report)
+    return edits
+
+
 def open_studio(job: Job, rig: Rig) -> Studio:
     """What draws this job's hair in its look."""
     with job.report.stage("ambient occlusion"):
         groom = prepared(rig, job.settings[AmbientSettings])
-    studio = Studio(groom, GroomSettings(job.settings), look=look_of_head(job.sources, rig.head))
+    edits = card_edits(job)
+    look = look_of_head(job.sources, rig.head)
+    studio = Studio(groom, GroomSettings(job.settings), look=look, edits=edits)
     tell_notes(list(studio.warnings), job.report)
     return studio
 

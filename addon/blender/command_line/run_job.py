@@ -54,6 +54,7 @@ _OF_SCENES = (
     "fit_spheres",
     "remove_spheres",
     "make_cards",
+    "discard_card_edits",
     "sort_cards",
     "add_hairstyle",
     "place_landmarks",

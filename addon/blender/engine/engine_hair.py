@@ -15,6 +15,7 @@ import bpy
 import numpy as np
 
 from ...arrays import Floats
+from ...cards.edits import CardEdits
 from ...cards.follow import moved_mesh
 from ...cards.occlusion_settings import CardOcclusionSettings
 from ...groom.painted_color import PaintedColor
@@ -32,6 +33,7 @@ from ..base.latest_job import LatestJob
 from ..base.objects import head_of
 from ..base.redraw import redraw_views
 from ..cards.build import BuiltCards, CardInputs, cards_key
+from ..cards.edits import groom_edits, same_edits
 from ..cards.occluders import Occluders, read_occluders
 from ..cards.show import as_shown
 from ..cards.textures import chosen_pictures
@@ -54,7 +56,9 @@ class _Made:
     rig: Rig
     snapshot: Snapshot
     is_baked: bool
-    _cards: list[tuple[Hashable, BuiltCards, Occluders]] = field(default_factory=list)
+    _cards: list[tuple[Hashable, BuiltCards, Occluders, CardEdits | None]] = field(
+        default_factory=list
+    )
     _colored: list[Rig] = field(default_factory=list)
 
     def colored(self, colors: PaintedColor | None, look: ShadingSettings) -> Rig:
@@ -67,21 +71,27 @@ class _Made:
         return rig
 
     def cards(
-        self, owner: bpy.types.Object, rig: Rig, settings: GroomSettings, others: Occluders
+        self,
+        owner: bpy.types.Object,
+        rig: Rig,
+        settings: GroomSettings,
+        others: Occluders,
+        edits: CardEdits | None,
     ) -> BuiltCards:
-        """Its cards; those of the last settings and other hair are kept, to the last colour.
+        """Its cards; those of the last settings, edits and other hair are kept, to the last colour.
 
         Baked hair stays at rest, whatever other hair does in the frames: its cards are not built
         again for each of them.
         """
         key = cards_key(settings), settings[ShadingSettings]
-        for known, built, before in self._cards:
+        for known, built, before, edits_before in self._cards:
             is_lit_alike = others.uids == before.uids if self.is_baked else others.is_like(before)
-            if known == key and built.rig is rig and is_lit_alike:
+            is_cut_alike = same_edits(edits, edits_before)
+            if known == key and built.rig is rig and is_lit_alike and is_cut_alike:
                 return built
         pictures, _ = chosen_pictures(owner.data.hairloom.card_images)
-        built = BuiltCards.now(CardInputs(rig, settings.sections, pictures, others))
-        self._cards[:] = [(key, built, others)]
+        built = BuiltCards.now(CardInputs(rig, settings.sections, pictures, others, edits))
+        self._cards[:] = [(key, built, others, edits)]
         return built
 
 
@@ -185,7 +195,8 @@ def read_groom(
     snapshot = replace(made.snapshot, points=strands, color=rig.strands.color)
     if settings.shows_cards:
         others = read_occluders(settings[CardOcclusionSettings], owner, depsgraph, pose.matrix)
-        built = made.cards(owner, rig, settings, others)
+        edits, _ = groom_edits(owner, depsgraph, pose.matrix)
+        built = made.cards(owner, rig, settings, others, edits)
         cards = built.at(pose, guides, settings.sections)
         snapshot = as_shown(replace(snapshot, cards=cards))
     return with_all_strands(with_settings(snapshot, settings))

@@ -14,6 +14,7 @@ from ...pipeline import Pose
 from ...shading.ambient_settings import AmbientSettings
 from ...shading.settings import ShadingSettings
 from ..base.objects import head_of
+from ..cards.edits import groom_edits
 from ..cards.textures import chosen_pictures
 from ..preview import previews
 from ..properties.groom_settings import GroomSettings
@@ -73,4 +74,5 @@ def _studio(hair: bpy.types.Object, groom: PreparedGroom, settings: GroomSetting
     pictures, _ = chosen_pictures(hair.data.hairloom.card_images)
     head, surface = head_of(hair), groom.rig.head
     name = None if head is None else head.name
-    return Studio(groom, settings, pictures, look=head_look(name, surface, "light"))
+    edits, _ = groom_edits(hair, bpy.context.evaluated_depsgraph_get())
+    return Studio(groom, settings, pictures, head_look(name, surface, "light"), edits)

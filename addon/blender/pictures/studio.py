@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from ...arrays import Floats
+from ...cards.edits import CardEdits
 from ...pipeline import Pose, style_of_guides
 from ...render.camera import Camera, frame_points
 from ...render.card_pass import CardPass
@@ -62,6 +63,7 @@ class Studio:
         settings: GroomSettings,
         card_pictures: Mapping[str, Floats] | None = None,
         look: HeadLook | None = None,
+        edits: CardEdits | None = None,
     ) -> None:
         ensure_gpu()
         self._groom, self._rig, self._snapshot = groom, groom.rig, snapshot_of(groom)
@@ -69,7 +71,7 @@ class Studio:
         self._notes: dict[str, None] = {}
         self._cameras: dict[float, Camera] = {}
         self._cards: tuple[Hashable, BuiltCards] | None = None
-        self._card_pictures, self._look = card_pictures or {}, look
+        self._card_pictures, self._look, self._edits = card_pictures or {}, look, edits
         self.settings = settings
 
     @property
@@ -176,7 +178,7 @@ class Studio:
             return None
         key, sections = cards_key(self.settings), self.settings.sections
         if self._cards is None or self._cards[0] != key:
-            inputs = CardInputs(self._rig, sections, self._card_pictures)
+            inputs = CardInputs(self._rig, sections, self._card_pictures, edits=self._edits)
             self._cards = key, BuiltCards.now(inputs)
         if guides is None:
             guides = style_of_guides(self._rig, pose)

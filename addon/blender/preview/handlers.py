@@ -11,7 +11,7 @@ from bpy.app.handlers import persistent
 from ..bakes import baked_copy, playback
 from ..base import suspension
 from ..base.latest_job import unwatch_all
-from ..cards.object import remember_names, remember_numbers
+from ..cards.made_objects import remember_names, remember_numbers
 from ..properties import changed, library_overrides
 from ..viewport import views
 from . import previews as registry

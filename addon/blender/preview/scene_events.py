@@ -22,6 +22,7 @@ from ..bakes import playback
 from ..base import latest_job
 from ..base.originals import refresh_views
 from ..base.redraw import redraw_panels
+from ..cards.made_objects import card_objects
 from ..cards.occluders import occluder_objects
 from ..sessions.session import Session
 from ..viewport import view_transform
@@ -53,7 +54,7 @@ def settings_changed(owner: bpy.types.ID) -> None:
             if session.is_stale:
                 _read_again_soon()
         elif occluders_changed(session, {owner.session_uid}, depsgraph.view_layer):
-            _shade_again_soon(preview)
+            _look_at_cards_soon(preview)
 
 
 def _grooms() -> list[tuple[Preview, Session]]:
@@ -61,7 +62,7 @@ def _grooms() -> list[tuple[Preview, Session]]:
     return [(each, each.groom) for each in previews.values() if each.groom is not None]
 
 
-def _shade_again_soon(preview: Preview) -> None:
+def _look_at_cards_soon(preview: Preview) -> None:
     preview.cards_are_stale = True
     _read_again_soon()
 
@@ -94,8 +95,8 @@ def updated(depsgraph: bpy.types.Depsgraph) -> None:
             _read_again_soon()
         elif session.is_stale and not bpy.app.timers.is_registered(_read_again):
             _read_again_soon()  # its scene is shown again
-        if occluders_changed(session, moved, depsgraph.view_layer):
-            _shade_again_soon(preview)
+        if occluders_changed(session, moved, depsgraph.view_layer) or cards_edited(session, edited):
+            _look_at_cards_soon(preview)
         follows = preview.phase is not Phase.FREE and is_among(session, moved)
         brushes = [session.comb] * is_combed + [session.paint] * is_painted
         colors = [session.color] * is_painted
@@ -215,7 +216,7 @@ def catch_up(depsgraph: bpy.types.Depsgraph) -> None:
     for preview, session in _grooms():
         if preview.cards_are_stale:
             preview.cards_are_stale = False
-            attempt(preview, depsgraph, session.shade_cards_again)
+            attempt(preview, depsgraph, session.look_at_cards_again)
     redraw_panels()
 
 
@@ -290,6 +291,15 @@ def occluders_changed(session: Session, changed: set[int], layer: bpy.types.View
     uids = {each.session_uid for each in others}
     data = {each.data.session_uid for each in others}
     return uids != session.cards.shaded_by or not changed.isdisjoint(uids | data)
+
+
+def cards_edited(session: Session, edited: set[int]) -> bool:
+    """Whether the artist may have changed the cards of this groom in the scene."""
+    hair = session.hair.handle.find()
+    if hair is None or not session.settings.shows_cards:
+        return False
+    cards = {uid for obj in card_objects(hair) for uid in (obj.session_uid, obj.data.session_uid)}
+    return not edited.isdisjoint(cards)
 
 
 def is_among(session: Session, moved: set[int]) -> bool:

@@ -394,9 +394,10 @@ class Session:
         self.cards.collect()
         self._show()
 
-    def shade_cards_again(self) -> None:
-        """Other hair that shades its cards may be elsewhere now, or other hair."""
-        self.cards.shade_again()
+    def look_at_cards_again(self) -> None:
+        """Other hair that shades its cards may be elsewhere now, or other hair; or the artist may
+        have edited its cards in the scene."""
+        self.cards.look_again()
         self._show()
 
     @property

@@ -1,0 +1,153 @@
+"""What an artist has edited on the object of cards, read back from its mesh.
+
+Two things in the mesh tell it: the attribute `made_card`, a number for each face, 0 where it was
+not made by us; and the record of what was made, a custom property. See cards/edits.py.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+import numpy as np
+
+from ...arrays import Floats, Ints
+from ...cards.atlas_grid import AtlasGrid
+from ...cards.edits import CardEdits, MadeCards, edits_of
+from ...errors import HairloomError
+from ...strands import Surface
+from ..base.attributes import read_attribute
+from ..base.objects import matrix_of
+from .made_objects import card_objects
+from .mesh import OCCLUSION_LAYER
+
+#: the attribute of faces: the number of the card on record, counted from 1
+MADE_ATTRIBUTE = "made_card"
+#: the custom property of the mesh that holds the record
+RECORD = "hairloom_made"
+#: the UV map on the atlas
+TILE_LAYER = "UVMap"
+#: what the record holds as arrays: name -> (dtype, shape of each card's)
+_ARRAYS: dict[str, tuple[Any, tuple[int, ...]]] = {
+    "places": (np.float32, (5, 3)),
+    "tile": (np.int32, ()),
+    "marks": (np.int32, ()),
+    "stands": (np.int32, ()),
+    "triangle": (np.int32, ()),
+    "corners": (np.float32, (3, 3)),
+}
+
+
+def groom_edits(
+    hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph, motion: Floats | None = None
+) -> tuple[CardEdits | None, tuple[str, ...]]:
+    """What is to be kept of the cards of a groom in the scene, and what the artist should know;
+    None where nothing was changed, or nobody can tell.
+
+    Args:
+        motion: (4, 4) how the hair has moved since it was where its cards are built.
+
+    Raises:
+        HairloomError: the cards have lost their UVs, so that nobody can say what they show.
+    """
+    objects = card_objects(hair.original)
+    if not objects:
+        return None, ()
+    obj = objects[0]
+    if obj.mode == "EDIT":
+        obj.update_from_editmode()
+    record = _read_record(obj.data)
+    if record is None:
+        if not len(obj.data.polygons):
+            return None, ()
+        return None, (
+            f"{obj.name}: it holds no record of what was made, so edits cannot be recognised and "
+            "all its cards are made again.",
+        )
+    surface, made = read_pieces(obj.data)
+    matrix = matrix_of(hair, depsgraph)
+    if motion is not None:
+        matrix = np.linalg.pinv(motion) @ matrix
+    edits = edits_of(surface, made, record, matrix)
+    return (edits, ()) if edits else (None, tuple(f"{obj.name}: {each}." for each in edits.notes))
+
+
+def same_edits(one: CardEdits | None, other: CardEdits | None) -> bool:
+    """Whether the same is kept by both, wherever the hair is."""
+    return one is other if one is None else one.is_like(other)
+
+
+def read_pieces(mesh: bpy.types.Mesh) -> tuple[Surface, Ints | None]:
+    """All triangles of a mesh with their UVs, in its own space, and the number of the card that
+    each was made as, see `edits_of`.
+
+    Raises:
+        HairloomError: it has no UV map.
+    """
+    mesh.calc_loop_triangles()
+    count = len(mesh.loop_triangles)
+    triangles, corners = np.empty((2, count, 3), np.int32)
+    polygon = np.empty(count, np.int32)
+    mesh.loop_triangles.foreach_get("vertices", triangles.ravel())
+    mesh.loop_triangles.foreach_get("loops", corners.ravel())
+    mesh.loop_triangles.foreach_get("polygon_index", polygon)
+    positions = np.empty((len(mesh.vertices), 3), np.float32)
+    mesh.vertices.foreach_get("co", positions.ravel())
+    uv = np.zeros((len(mesh.loops), 2), np.float32)
+    if count:
+        _tile_layer(mesh).uv.foreach_get("vector", uv.ravel())
+    number = read_attribute(mesh, MADE_ATTRIBUTE, "FACE")
+    made = None if number is None else number[polygon].astype(np.int32) - 1
+    return Surface(positions, triangles, uv[corners]), made
+
+
+def write_record(mesh: bpy.types.Mesh, made: MadeCards, marks: Ints, matrix: Floats) -> None:
+    """Put on record what a mesh holds.
+
+    Args:
+        made: world space.
+        marks: (card_count,) of the cards that are in the mesh as they were made.
+        matrix: (4, 4) of the object in whose space the mesh is.
+    """
+    local = made.moved(np.linalg.inv(matrix))
+    content: dict[str, Any] = {
+        name: np.ascontiguousarray(getattr(local, name), dtype).ravel()
+        for name, (dtype, _) in _ARRAYS.items()
+    }
+    content["marks"] = np.ascontiguousarray(marks, np.int32)
+    grid = made.grid
+    content["grid"] = [grid.columns, grid.rows]
+    content["padding"] = list(grid.padding)
+    content["triangle_count"] = made.triangle_count
+    mesh[RECORD] = content
+
+
+def _read_record(mesh: bpy.types.Mesh) -> MadeCards | None:
+    """None without one, or where it was changed so that it no longer fits together."""
+    content = mesh.get(RECORD)
+    try:
+        arrays = {
+            name: np.array(content[name], dtype).reshape(-1, *shape)
+            for name, (dtype, shape) in _ARRAYS.items()
+        }
+        columns, rows = (int(each) for each in content["grid"])
+        across, along = (float(each) for each in content["padding"])
+        grid = AtlasGrid(columns, rows, (across, along))
+        triangle_count = int(content["triangle_count"])
+    except (TypeError, KeyError, ValueError):
+        return None
+    count = len(arrays["places"])
+    if not count or any(len(each) != count for each in arrays.values()):
+        return None
+    return MadeCards(grid=grid, triangle_count=triangle_count, **arrays)
+
+
+def _tile_layer(mesh: bpy.types.Mesh) -> bpy.types.MeshUVLoopLayer:
+    own = [layer for layer in mesh.uv_layers if layer.name != OCCLUSION_LAYER]
+    if not own:
+        raise HairloomError(
+            "it has lost its UV map, so nobody can tell what its cards show",
+            place=mesh.name,
+            remedy=f"Undo, or give it a UV map called {TILE_LAYER}, or press Discard Edits",
+        )
+    return mesh.uv_layers.get(TILE_LAYER) or own[0]

@@ -1,0 +1,49 @@
+"""Which objects of the scene hold the cards of a groom, and which are copies of them."""
+
+from __future__ import annotations
+
+import bpy
+
+
+def card_objects(hair: bpy.types.Object) -> list[bpy.types.Object]:
+    """The objects that hold the cards of a groom, finest first; none of their copies."""
+    of_groom = [obj for obj in _all_cards() if obj.hairloom.card_object.groom == hair]
+    made = {obj.hairloom.card_object.level: obj for obj in of_groom if _has_made_name(obj)}
+    made |= {obj.hairloom.card_object.level: obj for obj in of_groom if _has_made_uid(obj)}
+    return [made[level] for level in sorted(made)]
+
+
+def remember_names() -> None:
+    """Before a file is saved: in another session the numbers of its objects are others."""
+    cards = _all_cards()
+    made = {_place(obj) for obj in cards if _has_made_uid(obj)}
+    for obj in cards:
+        if _has_made_uid(obj):
+            obj.hairloom.card_object.made_name = obj.name
+        elif _place(obj) in made:  # a copy may have been called as the first one was
+            obj.hairloom.card_object.made_name = ""
+
+
+def remember_numbers() -> None:
+    """After a file was opened: its objects may be renamed and copied from now on."""
+    for obj in _all_cards():
+        is_made = _has_made_name(obj) and obj.library is None
+        obj.hairloom.card_object.made_uid = obj.session_uid if is_made else 0
+
+
+def _all_cards() -> list[bpy.types.Object]:
+    meshes = (obj for obj in bpy.data.objects if obj.type == "MESH")
+    return [obj for obj in meshes if obj.hairloom.card_object.groom is not None]
+
+
+def _place(obj: bpy.types.Object) -> tuple[bpy.types.Object, int]:
+    """Which groom's cards they are, and of which level."""
+    return obj.hairloom.card_object.groom, obj.hairloom.card_object.level
+
+
+def _has_made_uid(obj: bpy.types.Object) -> bool:
+    return bool(obj.hairloom.card_object.made_uid == obj.session_uid)
+
+
+def _has_made_name(obj: bpy.types.Object) -> bool:
+    return bool(obj.hairloom.card_object.made_name == obj.name)

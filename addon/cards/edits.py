@@ -1,0 +1,375 @@
+"""What an artist has changed of cards since they were made.
+
+What was made is on record: where each card lay, which tile it showed, and a print of its vertices.
+Each face knows the number of its card. So cards fall into four kinds:
+
+    unedited   the print of its piece is that on record: it is made again
+    edited     it has a number, and its print is another one: it is kept
+    deleted    it is on record, and no piece has its number: its place stays free
+    own        a piece without a number, or a copy of another one: it is kept
+
+A piece is what hangs together and has one number. The record is in the space of the hair object.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..arrays import Bools, Floats, Ints
+from ..strands import Surface
+from ..strands.affine import moved
+from ..strands.closest_point import search_of
+from .atlas_grid import AtlasGrid
+from .sort import connected_components
+from .strip import Strips
+
+#: Where along a card it is known by its middle; its edge halfway is known too, by which crossed
+#: cards differ.
+STATIONS = (0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0)
+#: The print of a card that is not in the mesh as it was made, which no piece has; and of one that
+#: is, before it is in the mesh.
+NO_PRINT, UNPRINTED = 0, -1
+#: How far from a card on record one is looked for that belongs to it, in usual gaps between cards.
+REACH = 2.0
+#: The gap of a card alone, as a fraction of its length.
+_LONELY = 0.25
+#: Numbers that spread bits (Steele, Lea and Flood 2014, "Fast splittable pseudorandom number
+#: generators", the variant of Stafford).
+_MIX = (0x9E3779B97F4A7C15, 0xBF58476D1CE4E5B9, 0x94D049BB133111EB)
+
+
+@dataclass(frozen=True, eq=False)
+class MadeCards:
+    """The record of the cards that were made, in one space (said by whoever made it).
+
+    places: (card_count, 5, 3) float32 [m] of each: its middle at `STATIONS`, and its edge halfway.
+    tile: (card_count,) int32 that each showed. grid: of the atlas.
+    marks: (card_count,) int32 prints, see `prints`, or NO_PRINT, or UNPRINTED.
+    stands: (card_count,) int32 the card that stands for each: itself, or an edited one.
+    triangle: (card_count,) int32 of the head under the root; corners: (card_count, 3, 3) of it [m].
+    triangle_count: of the head; 0 without one.
+    """
+
+    places: Floats
+    tile: Ints
+    grid: AtlasGrid
+    marks: Ints
+    stands: Ints
+    triangle: Ints
+    corners: Floats
+    triangle_count: int
+
+    def __len__(self) -> int:
+        return len(self.places)
+
+    @classmethod
+    def of(cls, strips: Strips, tile: Ints, grid: AtlasGrid, head: Surface | None) -> MadeCards:
+        """Cards as they are made, before they are in a mesh."""
+        places, count = places_of(strips), len(strips)
+        triangle: Ints = np.zeros(count, np.int32)
+        corners = np.zeros((count, 3, 3), np.float32)
+        triangle_count = 0 if head is None else len(head.triangles)
+        if head is not None and triangle_count and count:
+            triangle = search_of(head).closest(places[:, 0].astype(np.float64)).triangle
+            corners = head.corners[triangle]
+        return cls(
+            places,
+            np.asarray(tile, np.int32),
+            grid,
+            np.full(count, UNPRINTED, np.int32),
+            np.arange(count, dtype=np.int32),
+            triangle,
+            corners,
+            triangle_count,
+        )
+
+    def moved(self, matrix: Floats) -> MadeCards:
+        """The same in another space, by an affine (4, 4) matrix."""
+        places, corners = (
+            moved(each.reshape(-1, 3), matrix).reshape(each.shape).astype(np.float32)
+            for each in (self.places, self.corners)
+        )
+        return replace(self, places=places, corners=corners)
+
+
+@dataclass(frozen=True)
+class EditCounts:
+    """edited, deleted, own: cards that are kept as the artist left them.
+    lost: those for which no new card was found: edited ones stay beside the others, deleted ones
+        have nothing left to delete.
+    """
+
+    edited: int = 0
+    deleted: int = 0
+    own: int = 0
+    lost_edits: int = 0
+    lost_deletions: int = 0
+
+    def __bool__(self) -> bool:
+        return bool(self.edited or self.deleted or self.own)
+
+    @property
+    def listed(self) -> str:
+        """Such as "3 edited, 1 deleted and 2 own cards"."""
+        kinds = (self.edited, "edited"), (self.deleted, "deleted"), (self.own, "own")
+        parts = [f"{count:,} {name}" for count, name in kinds if count]
+        first = f"{', '.join(parts[:-1])} and " if parts[1:] else ""
+        is_one = self.edited + self.deleted + self.own == 1
+        return f"{first}{parts[-1]} {'card' if is_one else 'cards'}"
+
+    @property
+    def line(self) -> str:
+        """Such as "3 edited and 2 own cards kept"; empty if there are none."""
+        return f"{self.listed} kept" if self else ""
+
+
+@dataclass(frozen=True, eq=False)
+class CardEdits:
+    """What is kept when cards are made again, in the space of the record.
+
+    record: of what was made.
+    surface: the pieces that are kept, with UVs; no vertex is in two of them.
+    piece: (triangle_count,) int32 which of them each triangle belongs to, from 0 without gaps.
+    number: (piece_count,) int32 the card that each stands for; -1 for the artist's own.
+    is_there: (card_count,) which cards on record have a piece, edited or not.
+    matrix: (4, 4) to world space.
+    notes: what is doubtful, for the artist.
+    """
+
+    record: MadeCards
+    surface: Surface
+    piece: Ints
+    number: Ints
+    is_there: Bools
+    matrix: Floats
+    notes: tuple[str, ...] = ()
+
+    @property
+    def edited(self) -> int:
+        return int(np.count_nonzero(self.number >= 0))
+
+    @property
+    def own(self) -> int:
+        return int(np.count_nonzero(self.number < 0))
+
+    @property
+    def is_deleted(self) -> Bools:
+        """(card_count,) cards on record that have no piece, and for which no other card stands."""
+        stands_alone = self.record.stands == np.arange(len(self.record))
+        deleted: Bools = stands_alone & ~self.is_there
+        return deleted
+
+    @property
+    def deleted(self) -> int:
+        return int(np.count_nonzero(self.is_deleted))
+
+    @property
+    def counts(self) -> EditCounts:
+        return EditCounts(self.edited, self.deleted, self.own)
+
+    def __bool__(self) -> bool:
+        return bool(self.counts)
+
+    def is_like(self, other: CardEdits | None) -> bool:
+        """Whether the same is kept by both."""
+        if other is None or len(self.record) != len(other.record):
+            return False
+        pairs = (
+            (self.surface.positions, other.surface.positions),
+            (self.surface.triangles, other.surface.triangles),
+            (self.surface.corner_uv, other.surface.corner_uv),
+            (self.number, other.number),
+            (self.is_there, other.is_there),
+            (self.record.places, other.record.places),
+        )
+        return all(np.array_equal(one, two) for one, two in pairs)  # type: ignore[arg-type]
+
+
+def edits_of(surface: Surface, made: Ints | None, record: MadeCards, matrix: Floats) -> CardEdits:
+    """Tell what the artist has changed of these cards.
+
+    Args:
+        surface: all triangles, with UVs, in the space of the record.
+        made: (triangle_count,) the number of each triangle's card, -1 for those that we have not
+            made; None where the mesh no longer has the numbers.
+        matrix: (4, 4) from that space to the world.
+    """
+    corner, piece = _pieces(surface.triangles, made)
+    count = int(piece.max(initial=-1)) + 1
+    marks = prints(surface, piece)
+    middle = _middles(surface, piece, count)
+    notes: tuple[str, ...] = ()
+    if made is None:
+        number = _recognised(marks, middle, record)
+        if count:
+            notes = ("the numbers of its cards are gone: they were recognised by their place",)
+    else:
+        number = np.full(count, -1, np.int32)
+        number[piece] = made
+        number[number >= len(record)] = -1
+    number, is_unedited = _one_of_each(number, marks, middle, record)
+    is_there = np.zeros(len(record), bool)
+    is_there[number[number >= 0]] = True
+    kept = np.flatnonzero(~is_unedited)
+    place = np.full(count, -1, np.int32)
+    place[kept] = np.arange(len(kept))
+    chosen = place[piece] >= 0
+    assert surface.corner_uv is not None
+    return CardEdits(
+        record,
+        _with_own_vertices(surface, corner, chosen),
+        place[piece][chosen],
+        number[kept],
+        is_there,
+        matrix,
+        notes,
+    )
+
+
+def prints(surface: Surface, piece: Ints) -> Ints:
+    """A number for each piece that is another one once a vertex or a UV of it is, (piece_count,).
+
+    It does not depend on the order of vertices and faces, nor on how faces are cut into triangles.
+    """
+    assert surface.corner_uv is not None
+    flat = np.column_stack(
+        [surface.positions[surface.triangles.ravel()], surface.corner_uv.reshape(-1, 2)]
+    )
+    bits = np.ascontiguousarray(flat + np.float32(0.0), np.float32).view(np.uint32)
+    key: Ints = np.zeros(len(bits), np.uint64)
+    for column in bits.T:
+        key = _mixed((key + np.uint64(_MIX[0])) ^ column.astype(np.uint64))
+    # a vertex counts once, however many triangles it has
+    owner = np.repeat(piece, 3)
+    _, first = np.unique(_mixed(key ^ owner.astype(np.uint64)), return_index=True)
+    total = np.zeros(int(piece.max(initial=-1)) + 1, np.uint64)
+    np.add.at(total, owner[first], key[first])
+    found = (_mixed(total) & np.uint64(0x7FFFFFFF)).astype(np.int32)
+    return np.where(found == NO_PRINT, NO_PRINT + 1, found).astype(np.int32)
+
+
+def places_of(strips: Strips) -> Floats:
+    """Where cards lie, see `MadeCards.places`, (card_count, 5, 3) float32 [m]."""
+    last = strips.width.shape[1] - 1
+    rows = [round(station * last) for station in STATIONS]
+    half = last // 2
+    frames = strips.frames
+    edge = frames.center[:, half] + frames.side[:, half] * (0.5 * strips.width[:, half, None])
+    return np.concatenate([frames.center[:, rows], edge[:, None]], axis=1).astype(np.float32)
+
+
+def usual_gap(places: Floats) -> float:
+    """How far a card usually is from the next one, as `gaps` measures it [m]."""
+    count = len(places)
+    if count < 2:
+        line = np.linalg.norm(np.diff(places[:, :4], axis=1), axis=2).sum(axis=1)
+        return float(_LONELY * line.max(initial=0.0))
+    chosen = np.linspace(0, count - 1, min(count, 256)).astype(np.int64)
+    gap = gaps(places[chosen], places)
+    gap[np.arange(len(chosen)), chosen] = np.inf
+    return float(np.median(gap.min(axis=1)))
+
+
+def gaps(some: Floats, others: Floats) -> Floats:
+    """How far cards are apart, (n, m) [m]: root mean square over their places; roots count twice,
+    as where cards are found."""
+    weight = np.sqrt([2.0, 1.0, 1.0, 1.0, 1.0])[:, None] / np.sqrt(6.0)
+    one, two = ((each.astype(np.float64) * weight).reshape(-1, 15) for each in (some, others))
+    squared = (one**2).sum(axis=1)[:, None] + (two**2).sum(axis=1) - 2.0 * one @ two.T
+    found: Floats = np.sqrt(np.maximum(squared, 0.0))
+    return found
+
+
+def _mixed(key: Ints) -> Ints:
+    """64 bits, each of which depends on all."""
+    key = (key ^ (key >> np.uint64(30))) * np.uint64(_MIX[1])
+    key = (key ^ (key >> np.uint64(27))) * np.uint64(_MIX[2])
+    mixed: Ints = key ^ (key >> np.uint64(31))
+    return mixed
+
+
+def _pieces(triangles: Ints, made: Ints | None) -> tuple[Ints, Ints]:
+    """(corners that tell vertices of two cards apart, (n, 3); the piece of each triangle, (n,)).
+
+    Vertices that an artist has welded hold no cards together that were made apart.
+    """
+    if made is None:
+        return triangles, connected_components(triangles)
+    key = triangles.ravel().astype(np.int64) * (int(made.max(initial=-1)) + 2)
+    key += np.repeat(made, 3).astype(np.int64) + 1
+    _, corner = np.unique(key, return_inverse=True)
+    corner = corner.reshape(-1, 3).astype(np.int32)
+    return corner, connected_components(corner)
+
+
+def _middles(surface: Surface, piece: Ints, count: int) -> Floats:
+    """The middle of the corners of each piece, (piece_count, 3) [m]."""
+    at = surface.corners.reshape(-1, 3).astype(np.float64)
+    owner = np.repeat(piece, 3)
+    size = np.maximum(np.bincount(owner, minlength=count), 1)
+    sums = [np.bincount(owner, part, count) for part in at.T]
+    middles: Floats = np.stack(sums, axis=1) / size[:, None]
+    return middles
+
+
+def _away(middle: Floats, record: MadeCards, number: Ints) -> Floats:
+    """How far each piece is from where its card was made [m]."""
+    away: Floats = np.linalg.norm(middle - record.places[number, :4].mean(axis=1), axis=-1)
+    return away
+
+
+def _recognised(marks: Ints, middle: Floats, record: MadeCards) -> Ints:
+    """The card that each piece is, by its print, else by its place; -1 for none."""
+    number = np.full(len(marks), -1, np.int32)
+    if not len(record):
+        return number
+    order = np.argsort(record.marks, kind="stable")
+    at = np.minimum(np.searchsorted(record.marks[order], marks), len(record) - 1)
+    is_same = record.marks[order][at] == marks
+    number[is_same] = order[at][is_same]
+    free = np.setdiff1d(np.arange(len(record)), number)
+    reach = REACH * usual_gap(record.places)
+    for piece in np.flatnonzero(number < 0):
+        if not len(free):
+            break
+        away = np.linalg.norm(record.places[free, :4].mean(axis=1) - middle[piece], axis=1)
+        if away.min() <= reach:
+            number[piece] = free[away.argmin()]
+            free = np.delete(free, away.argmin())
+    return number
+
+
+def _one_of_each(
+    number: Ints, marks: Ints, middle: Floats, record: MadeCards
+) -> tuple[Ints, Bools]:
+    """Numbers of which each is there once, and which pieces are as they were made.
+
+    Of several pieces of one number the one that is unedited is the card, else the one that is
+    nearest to where it was made. The others are copies.
+    """
+    has = np.flatnonzero(number >= 0)
+    is_made = np.zeros(len(number), bool)
+    is_made[has] = record.marks[number[has]] == marks[has]
+    away = np.zeros(len(number))
+    away[has] = _away(middle[has], record, number[has])
+    order = has[np.lexsort((away[has], ~is_made[has], number[has]))]
+    first = np.unique(number[order], return_index=True)[1]
+    cards = order[first]
+    one = np.full(len(number), -1, np.int32)
+    one[cards] = number[cards]
+    return one, is_made & (one >= 0)
+
+
+def _with_own_vertices(surface: Surface, corner: Ints, chosen: Bools) -> Surface:
+    """The chosen triangles, whose pieces share no vertices.
+
+    Args:
+        corner: (triangle_count, 3) see `_pieces`.
+    """
+    assert surface.corner_uv is not None
+    used, first, place = np.unique(corner[chosen], return_index=True, return_inverse=True)
+    positions = surface.positions[surface.triangles[chosen].ravel()[first]]
+    triangles = place.reshape(-1, 3).astype(np.int32)
+    return Surface(positions.reshape(len(used), 3), triangles, surface.corner_uv[chosen])

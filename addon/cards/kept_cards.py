@@ -1,0 +1,485 @@
+"""Cards that an artist has edited, deleted or added, among cards that are made again.
+
+The rule: a new card belongs to the card on record that it lies nearest to. Where that one was
+edited, the edited one stands for the new card; where it was deleted, the place stays free. So edits
+hold as well where there are more cards now, fewer, or others. Nothing that the artist has made is
+left out: an edited card for which no new one is found stays beside the others.
+
+Kept cards go with the skin under their roots, as far as that has moved since.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ..arrays import Bools, Floats, Ints
+from ..strands import Surface
+from ..strands.affine import moved
+from ..strands.closest_point import closest_point
+from ..strands.frames import tangents, volume_normals
+from ..strands.vectors import unit, unit_or
+from .adopted import adopt_cards
+from .atlas_grid import AtlasGrid
+from .card_mesh import OF_VERTICES, CardMesh, joined
+from .edits import NO_PRINT, REACH, CardEdits, EditCounts, MadeCards, gaps, places_of, usual_gap
+from .settings import CardSettings
+from .sort import reordered
+from .strip import CardFrames, Strips, UncutCards
+
+#: Less than this fraction of a card's length is not moved: the skin is where it was.
+_STILL = 1.0e-3
+#: A card begins away from the head that begins farther from it than this part of its length.
+_FAR = 0.25
+#: A vector shorter than this has no direction.
+_SHORTEST = 1.0e-12
+_CHUNK = 512
+
+
+@dataclass(frozen=True, eq=False)
+class KeptCards:
+    """New cards with the kept ones among them.
+
+    cards: all, the artist's own ones last; those of which nothing is made are absent.
+    mesh: of the kept cards alone, world space, as the artist left them.
+    model: (card_count,) the new card whose strands each card stands for.
+    record: of the new cards, and which card stands for each.
+    notes: what the artist should know.
+    """
+
+    cards: UncutCards
+    mesh: CardMesh
+    model: Ints
+    record: MadeCards
+    counts: EditCounts
+    notes: tuple[str, ...]
+
+    def put_into(self, mesh: CardMesh) -> CardMesh:
+        """The finest level with the kept cards as they are."""
+        is_made = ~np.isin(mesh.card, np.unique(self.mesh.card))
+        rest = replace(mesh, triangles=mesh.triangles[is_made], card=mesh.card[is_made])
+        rest, _ = rest.without_loose(rest.triangles)
+        both = joined([rest, self.mesh]) if len(rest.triangles) else self._alone(mesh)
+        return reordered(both, np.arange(len(self.cards)))
+
+    def _alone(self, mesh: CardMesh) -> CardMesh:
+        own: dict[str, Any] = {name: getattr(self.mesh, name) for name in OF_VERTICES}
+        return replace(mesh, triangles=self.mesh.triangles, card=self.mesh.card, **own)
+
+
+def kept_cards(
+    edits: CardEdits, cards: UncutCards, settings: CardSettings, head: Surface | None, baked: bool
+) -> KeptCards:
+    """Find the places of an artist's cards among new ones.
+
+    Args:
+        cards: new ones, world space, as they would be without edits.
+        baked: whether the tiles show the groom's own strands, so that others may show now what one
+            has shown.
+    """
+    record = MadeCards.of(cards.strips, cards.tile, cards.atlas, head)
+    before = edits.record.moved(edits.matrix)
+    moves = _skin_moves(before, head)
+    places = _carried(edits, before, moves)
+    before = replace(before, places=_moved_each(before.places, moves).astype(np.float32))
+    ancestor = _ancestors(record.places, before.places)
+    has = np.flatnonzero(ancestor >= 0)
+    stands, is_free = np.full(len(record), -1, np.int32), np.zeros(len(record), bool)
+    stands[has] = before.stands[ancestor[has]]
+    # where the card that stands for a place is gone, the place is free
+    is_free[has] = ~edits.is_there[stands[has]]
+    number = np.full(len(edits.number), -1, np.int32)
+    stand_for = np.arange(len(record), dtype=np.int32)
+    for index in np.flatnonzero(edits.number >= 0):
+        mine = np.flatnonzero(stands == edits.number[index])
+        if len(mine):
+            was = before.places[edits.number[index]][None]
+            number[index] = mine[gaps(was, record.places[mine])[0].argmin()]
+            stand_for[mine] = number[index]
+    is_lost = number < 0
+    number[is_lost] = len(record) + np.arange(np.count_nonzero(is_lost))
+    return _assembled(
+        edits,
+        cards,
+        settings,
+        head,
+        replace(record, stands=stand_for),
+        _Placed(places, number, is_free, _tiles_now(edits, record, ancestor, number, baked)),
+        _counts(edits, stands, is_lost),
+    )
+
+
+@dataclass(frozen=True)
+class _Placed:
+    """positions: of the vertices of the edits, world space. number: (piece_count,) of each among
+    the cards now. is_free: (new card count,). tile: (piece_count,)."""
+
+    positions: Floats
+    number: Ints
+    is_free: Bools
+    tile: Ints
+
+
+def _assembled(
+    edits: CardEdits,
+    cards: UncutCards,
+    settings: CardSettings,
+    head: Surface | None,
+    record: MadeCards,
+    placed: _Placed,
+    counts: EditCounts,
+) -> KeptCards:
+    count, piece_count = len(record), len(placed.number)
+    is_new = placed.number >= count
+    total = count + int(np.count_nonzero(is_new))
+    mesh, strips = _adopted(edits, cards, settings, head, placed)
+    model = np.resize(np.arange(count, dtype=np.int32), total)
+    if is_new.any():
+        near = gaps(places_of(strips.of(np.flatnonzero(is_new))), record.places).argmin(axis=1)
+        model[placed.number[is_new]] = near
+    all_strips = _with(cards.strips, placed.number, strips, total)
+    is_replaced = record.stands != np.arange(count)
+    absent = np.zeros(total, bool)
+    absent[:count] = placed.is_free | is_replaced
+    strand_count = cards.strand_count[model]
+    covered = np.bincount(record.stands, cards.strand_count, count)
+    strand_count[:count] = np.where(is_replaced, strand_count[:count], covered)
+    tile = cards.tile[model]
+    tile[placed.number] = placed.tile
+    record.marks[absent[:count]] = NO_PRINT
+    record.marks[placed.number[~is_new]] = NO_PRINT
+    both = replace(
+        cards,
+        strips=all_strips,
+        strand_count=strand_count.astype(np.int32),
+        group=cards.group[model],
+        layer=cards.layer[model],
+        tile=tile,
+        absent=absent,
+    )
+    mesh = replace(mesh, group=both.group, layer=both.layer, tile=both.tile, atlas=both.atlas)
+    notes = _notes(edits, counts, strips, head, piece_count)
+    if absent.all() and not piece_count:
+        notes = (*notes, "all its cards were deleted; Discard Edits makes them again")
+    return KeptCards(both, mesh, model, record, counts, notes)
+
+
+def _ancestors(places: Floats, before: Floats) -> Ints:
+    """The card on record that each new one belongs to, (n,); -1 for none."""
+    found = np.full(len(places), -1, np.int32)
+    if not len(before):
+        return found
+    reach = REACH * usual_gap(before)
+    for start in range(0, len(places), _CHUNK):
+        gap = gaps(places[start : start + _CHUNK], before)
+        nearest = gap.argmin(axis=1)
+        is_near = gap[np.arange(len(gap)), nearest] <= reach
+        found[start : start + _CHUNK] = np.where(is_near, nearest, -1)
+    return found
+
+
+def _counts(edits: CardEdits, stands: Ints, is_lost: Bools) -> EditCounts:
+    is_found = np.isin(np.arange(len(edits.record)), stands)
+    return EditCounts(
+        edited=edits.edited,
+        deleted=int(np.count_nonzero(edits.is_deleted & is_found)),
+        own=edits.own,
+        lost_edits=int(np.count_nonzero(is_lost & (edits.number >= 0))),
+        lost_deletions=int(np.count_nonzero(edits.is_deleted & ~is_found)),
+    )
+
+
+def _notes(
+    edits: CardEdits, counts: EditCounts, strips: Strips, head: Surface | None, piece_count: int
+) -> tuple[str, ...]:
+    notes = list(edits.notes)
+    if counts.lost_edits:
+        notes.append(
+            f"no new card was found for {counts.lost_edits:,} edited ones, which stay beside the "
+            "others as your own"
+        )
+    if counts.lost_deletions:
+        notes.append(
+            f"no new card was found for {counts.lost_deletions:,} deleted ones, which are forgotten"
+        )
+    if head is not None and len(head.triangles) and piece_count:
+        center = strips.frames.center
+        length = np.linalg.norm(np.diff(center, axis=1), axis=2).sum(axis=1)
+        away = closest_point(center[:, 0].astype(np.float64), head).distance
+        far = int(np.count_nonzero(away > _FAR * length))
+        if far:
+            notes.append(f"{far:,} of the cards that were kept begin away from the head")
+    return tuple(notes)
+
+
+def _skin_moves(before: MadeCards, head: Surface | None) -> Floats:
+    """How the skin under each card on record has moved since, (n, 4, 4), world space; nothing
+    where it has hardly moved, or is another one.
+
+    Args:
+        before: the record where its object is now.
+    """
+    moves = np.tile(np.eye(4), (len(before), 1, 1))
+    if head is None or len(head.triangles) != before.triangle_count:
+        return moves
+    found = _frames(head.corners[before.triangle]) @ np.linalg.inv(_frames(before.corners))
+    gap = np.linalg.norm(_moved_each(before.places, found) - before.places, axis=2).max(axis=1)
+    length = np.linalg.norm(np.diff(before.places[:, :4], axis=1), axis=2).sum(axis=1)
+    has_moved = gap > _STILL * length
+    moves[has_moved] = found[has_moved]
+    return moves
+
+
+def _moved_each(points: Floats, moves: Floats) -> Floats:
+    """Points (n, m, 3), those of each by its own (4, 4) matrix."""
+    return np.einsum("nij,nmj->nmi", moves[:, :3, :3], points) + moves[:, None, :3, 3]
+
+
+def _carried(edits: CardEdits, before: MadeCards, moves: Floats) -> Floats:
+    """The vertices of the kept pieces, (n, 3) float32 [m, world], carried by the skin under the
+    roots of their cards; the artist's own by that of the nearest card."""
+    places = moved(edits.surface.positions, edits.matrix)
+    count = len(edits.number)
+    if not count:
+        return places
+    owner = np.zeros(len(places), np.int64)
+    owner[edits.surface.triangles] = edits.piece[:, None]
+    middle = np.stack([np.bincount(owner, part, count) for part in places.T], axis=1)
+    middle = middle / np.maximum(np.bincount(owner, minlength=count), 1)[:, None]
+    centers = before.places[:, :4].mean(axis=1)
+    number = np.array(edits.number)
+    for index in np.flatnonzero(number < 0):
+        number[index] = np.linalg.norm(centers - middle[index], axis=1).argmin()
+    is_still = np.array_equal(moves[number], np.tile(np.eye(4), (count, 1, 1)))
+    if is_still:
+        return places
+    return _moved_each(places[:, None], moves[number][owner])[:, 0].astype(np.float32)
+
+
+def _frames(corners: Floats) -> Floats:
+    """(n, 4, 4) from a frame on each triangle, as large as it is, to the space of its corners."""
+    a, b, c = np.moveaxis(corners.astype(np.float64), 1, 0)
+    normal = np.cross(b - a, c - a)
+    size = np.sqrt(np.maximum(np.linalg.norm(normal, axis=1), 1.0e-18))
+    x, z = unit_or(b - a, (1.0, 0.0, 0.0), _SHORTEST), unit_or(normal, (0.0, 0.0, 1.0), 1.0e-30)
+    frames = np.zeros((len(corners), 4, 4))
+    frames[:, :3, :3] = np.stack([x, np.cross(z, x), z], axis=2) * size[:, None, None]
+    frames[:, :3, 3] = corners.mean(axis=1)
+    frames[:, 3, 3] = 1.0
+    return frames
+
+
+def _tiles_now(
+    edits: CardEdits, record: MadeCards, ancestor: Ints, number: Ints, baked: bool
+) -> Ints:
+    """The tile of each piece in the atlas now, (piece_count,).
+
+    A card whose tile the artist has left has that of the card in whose place it is. One that he has
+    chosen is followed: it is the tile of most new cards that belong to those which had it.
+    """
+    old = edits.record
+    then = tiles_of(edits, old.grid)
+    is_same_grid = record.grid == old.grid
+    chosen = then % max(record.grid.tile_count, 1)
+    if baked or not is_same_grid:
+        follows = np.flatnonzero(ancestor >= 0)
+        for index, tile in enumerate(then):
+            now = record.tile[follows][old.tile[ancestor[follows]] == tile]
+            if len(now):
+                chosen[index] = np.bincount(now).argmax()
+    is_left = (edits.number >= 0) & (number < len(record))
+    is_left[is_left] = old.tile[edits.number[is_left]] == then[is_left]
+    chosen[is_left] = record.tile[number[is_left]]
+    return chosen.astype(np.int32)
+
+
+def tiles_of(edits: CardEdits, grid: AtlasGrid) -> Ints:
+    """The tile on which the middle of each piece's UVs lies, (piece_count,)."""
+    assert edits.surface.corner_uv is not None
+    count = len(edits.number)
+    owner = np.repeat(edits.piece, 3)
+    size = np.maximum(np.bincount(owner, minlength=count), 1)
+    flat = edits.surface.corner_uv.reshape(-1, 2)
+    u, v = (np.bincount(owner, part, count) / size for part in flat.T)
+    column = np.clip((u * grid.columns).astype(np.int64), 0, grid.columns - 1)
+    row = np.clip((v * grid.rows).astype(np.int64), 0, grid.rows - 1)
+    tiles: Ints = (row * grid.columns + column).astype(np.int32)
+    return tiles
+
+
+def _adopted(
+    edits: CardEdits,
+    cards: UncutCards,
+    settings: CardSettings,
+    head: Surface | None,
+    placed: _Placed,
+) -> tuple[CardMesh, Strips]:
+    """The kept cards as a mesh with their numbers, and as strips in the order of the pieces."""
+    row_count = cards.strips.width.shape[1]
+    if not len(edits.number):
+        none = np.zeros(0, np.int32)
+        empty = np.zeros((0, 3), np.float32)
+        flat = np.zeros((0, 2), np.float32)
+        mesh = CardMesh(
+            positions=empty,
+            triangles=np.zeros((0, 3), np.int32),
+            uv=flat,
+            normal=empty,
+            tangent=empty,
+            occlusion=np.zeros(0, np.float32),
+            card=none,
+            along=np.zeros(0, np.float32),
+        )
+        return mesh, cards.strips.of(none)
+    uv = _on_tiles(edits, cards.atlas, placed.tile)
+    triangles: Ints = edits.surface.triangles
+    if np.linalg.det(edits.matrix[:3, :3]) < 0.0:  # a mirrored object turns its faces around
+        triangles, uv = triangles[:, ::-1], uv[:, ::-1]
+    surface = Surface(placed.positions, triangles, uv)
+    found = adopt_cards(surface, head, direction="up", place="the edited cards")
+    adopted = _facing_as_before(found.mesh, found.corner)
+    # pieces share no vertices, so each is a card of its own
+    of_card = np.zeros(len(edits.number), np.int32)
+    of_card[adopted.card] = edits.piece
+    piece = of_card[adopted.card]
+    owner = np.zeros(len(adopted.positions), np.int64)
+    owner[adopted.triangles] = piece[:, None]
+    across = _across(adopted.uv, cards.atlas, placed.tile[owner])
+    unknown = np.zeros(0, np.int32)
+    mesh = replace(adopted, card=placed.number[piece], group=unknown, layer=unknown, tile=unknown)
+    if cards.center is not None:
+        mesh = _with_normals_of_volume(mesh, cards.center, across, settings)
+    strips = _strips(adopted, owner, across, (len(edits.number), row_count), settings)
+    return mesh, strips
+
+
+def _facing_as_before(mesh: CardMesh, triangles: Ints) -> CardMesh:
+    """With all faces as the artist has turned them, and normals to that side."""
+    a, b, c = np.moveaxis(mesh.positions[triangles].astype(np.float64), 1, 0)
+    outward, total = np.cross(b - a, c - a), np.zeros((len(mesh.positions), 3))
+    for corner in range(3):
+        np.add.at(total, triangles[:, corner], outward)
+    return replace(mesh, triangles=triangles, normal=unit_or(total, mesh.normal, 1.0e-20))
+
+
+def _on_tiles(edits: CardEdits, grid: AtlasGrid, tile: Ints) -> Floats:
+    """UVs at the same places within their tiles of the atlas now, (triangle_count, 3, 2)."""
+    uv, old = edits.surface.corner_uv, edits.record.grid
+    assert uv is not None
+    then = tiles_of(edits, old)
+    is_same = (then == tile) & (grid == old)
+    one, two = (_rectangles(each, which) for each, which in ((old, then), (grid, tile)))
+    start, size = (each[edits.piece][:, None] for each in one)
+    new_start, new_size = (each[edits.piece][:, None] for each in two)
+    there = new_start + (uv - start) / size * new_size
+    return np.where(is_same[edits.piece][:, None, None], uv, there).astype(np.float32)
+
+
+def _rectangles(grid: AtlasGrid, tile: Ints) -> tuple[Floats, Floats]:
+    """Where tiles begin, and how large they are, each (n, 2)."""
+    low = grid.uv(tile, np.zeros(1), np.zeros(1)).astype(np.float64)
+    high = grid.uv(tile, np.ones(1), np.ones(1)).astype(np.float64)
+    return low, high - low
+
+
+def _across(uv: Floats, grid: AtlasGrid, tile: Ints) -> Floats:
+    """Where across their tiles vertices are, (vertex_count,) from 0 to 1."""
+    start, size = _rectangles(grid, tile)
+    across: Floats = np.clip((uv[:, 0] - start[:, 0]) / size[:, 0], 0.0, 1.0)
+    return across
+
+
+def _with_normals_of_volume(
+    mesh: CardMesh, center: Floats, across: Floats, settings: CardSettings
+) -> CardMesh:
+    """With the normals that cards which are made have, see strip.py."""
+    volume = volume_normals(mesh.positions, mesh.tangent, center)
+    lean = settings.roundness * (2.0 * across - 1.0)
+    volume = unit(volume + np.cross(mesh.tangent, volume) * lean[:, None])
+    is_front = np.einsum("vi,vi->v", volume, mesh.normal) > 0.0
+    return replace(mesh, normal=np.where(is_front[:, None], volume, mesh.normal))
+
+
+def _strips(
+    mesh: CardMesh, owner: Ints, across: Floats, shape: tuple[int, int], settings: CardSettings
+) -> Strips:
+    """The strip that each piece is, for coarser levels: its edges cut at even steps of the way.
+
+    Args:
+        owner: (vertex_count,) the piece of each vertex.
+        shape: pieces, and rows of a strip.
+    """
+    count, row_count = shape
+    left, right = _edges(mesh, owner, across, count, row_count)
+    between = right - left
+    width = np.linalg.norm(between, axis=2)
+    middle = (left + right) / 2.0
+    tangent = tangents(middle)
+    total = np.zeros((count, 3))
+    np.add.at(total, owner, mesh.normal.astype(np.float64))
+    facing = np.broadcast_to(unit_or(total, (0.0, 0.0, 1.0), _SHORTEST)[:, None], middle.shape)
+    side = between - tangent * np.einsum("cri,cri->cr", between, tangent)[..., None]
+    side = unit_or(side, unit_or(np.cross(tangent, facing), (1.0, 0.0, 0.0), _SHORTEST), _SHORTEST)
+    normal = np.cross(side, tangent)
+    # a card that was turned over has its left edge on the right
+    is_inward = np.einsum("cri,cri->c", normal, facing) < 0.0
+    side[is_inward] *= -1.0
+    normal[is_inward] *= -1.0
+    behind = settings.bend * (1.0 if settings.column_count > 1 else 1.0 / 3.0)
+    center = middle + normal * (behind * width)[..., None]
+    parts = (each.astype(np.float32) for each in (center, tangent, normal, side))
+    return Strips(CardFrames(*parts), width.astype(np.float32))
+
+
+def _edges(
+    mesh: CardMesh, owner: Ints, across: Floats, count: int, row_count: int
+) -> tuple[Floats, Floats]:
+    """The outermost places of each piece at each row, two of (piece_count, row_count, 3) [m]."""
+    corners = mesh.triangles[:, [(0, 1), (1, 2), (2, 0)]].reshape(-1, 2)
+    one, two = np.unique(np.sort(corners, axis=1), axis=0).T
+    piece, low, high = owner[one], mesh.along[one], mesh.along[two]
+    span = (high - low).astype(np.float64)
+    is_level = np.abs(span) < 1.0e-6
+    found = np.full((2, count, row_count, 3), np.nan)
+    for row, along in enumerate(np.linspace(0.0, 1.0, row_count)):
+        fraction = np.where(is_level, 0.0, (along - low) / np.where(is_level, 1.0, span))
+        reaches = np.where(is_level, np.abs(low - along) < 1.0e-4, np.abs(fraction - 0.5) <= 0.5001)
+        cut = np.flatnonzero(reaches)
+        if not len(cut):
+            continue
+        part = np.clip(fraction[cut], 0.0, 1.0)[:, None]
+        place = mesh.positions[one[cut]] * (1.0 - part) + mesh.positions[two[cut]] * part
+        beside = across[one[cut]] * (1.0 - part[:, 0]) + across[two[cut]] * part[:, 0]
+        order = np.lexsort((beside, piece[cut]))
+        pieces, first = np.unique(piece[cut][order], return_index=True)
+        last = np.append(first[1:], len(order)) - 1
+        found[0, pieces, row], found[1, pieces, row] = place[order[first]], place[order[last]]
+    return _filled(found[0]), _filled(found[1])
+
+
+def _filled(rows: Floats) -> Floats:
+    """Rows where no edge was found have the place of the nearest row that has one."""
+    number = np.arange(rows.shape[1])
+    for piece in np.flatnonzero(np.isnan(rows[..., 0]).any(axis=1)):
+        there = np.flatnonzero(~np.isnan(rows[piece, :, 0]))
+        nearest = there[np.abs(number[:, None] - there).argmin(axis=1)]
+        rows[piece] = rows[piece, nearest]
+    return rows
+
+
+def _with(strips: Strips, numbers: Ints, changed: Strips, total: int) -> Strips:
+    """All strips, with others in the chosen places, which may be behind them."""
+    names = ("center", "tangent", "normal", "side")
+    parts = []
+    for name in names:
+        values = getattr(strips.frames, name)
+        room = np.zeros((total, *values.shape[1:]), np.float32)
+        room[: len(values)] = values
+        room[numbers] = getattr(changed.frames, name)
+        parts.append(room)
+    width = np.zeros((total, strips.width.shape[1]), np.float32)
+    width[: len(strips)] = strips.width
+    width[numbers] = changed.width
+    return Strips(CardFrames(*parts), width)

@@ -1,0 +1,435 @@
+"""Cards that an artist has edited survive being made again; Blender does the edits."""
+
+import json
+
+import bmesh
+import bpy
+import numpy as np
+import pytest
+
+from hairloom.addon.blender.cards.build import BuiltCards, build_steps, read_inputs
+from hairloom.addon.blender.cards.edits import MADE_ATTRIBUTE, RECORD, groom_edits
+from hairloom.addon.blender.cards.files import CardExport, CardOutput
+from hairloom.addon.blender.cards.made_objects import card_objects
+from hairloom.addon.blender.preview import previews, scene_events
+from hairloom.addon.blender.viewport import overlay
+from hairloom.addon.card_flow import cards_at
+from hairloom.addon.cards.steps import result_of
+
+
+@pytest.fixture
+def hair(new_hair, sphere):
+    """A hedgehog of 60 strands on a sphere, to be twelve cards in two levels."""
+    made = new_hair(sphere)
+    cards, texture = made.data.hairloom.cards, made.data.hairloom.card_texture
+    cards.source, cards.card_count, cards.levels, cards.fly_aways = "clusters", 12, 2, 0.0
+    cards.segment_count, cards.error = 8, 0.0
+    made.data.hairloom.atlas.source = "made"
+    made.data.hairloom.card_occlusion.rays = 32
+    made.data.hairloom.cards.order_by = "distance"
+    texture.height = texture.variant_width = 32
+    bpy.context.view_layer.update()
+    return made
+
+
+def make(hair):
+    select(hair)
+    assert bpy.ops.hairloom.make_cards() == {"FINISHED"}
+    bpy.context.view_layer.update()
+    return card_objects(hair)[0]
+
+
+def select(obj):
+    for other in bpy.context.selected_objects:
+        other.select_set(False)
+    obj.select_set(True)
+    bpy.context.view_layer.objects.active = obj
+
+
+def numbers(obj):
+    """The made card of each face, -1 for own ones."""
+    found = np.empty(len(obj.data.polygons), np.int32)
+    obj.data.attributes[MADE_ATTRIBUTE].data.foreach_get("value", found)
+    return found - 1
+
+
+def corners(obj, card, layer=None):
+    """Places, or UVs, of the corners of a card, sorted: the same however its faces are ordered."""
+    mesh = obj.data
+    rows = [
+        tuple(mesh.vertices[mesh.loops[loop].vertex_index].co)
+        if layer is None
+        else tuple(mesh.uv_layers[layer].uv[loop].vector)
+        for face, number in zip(mesh.polygons, numbers(obj), strict=True)
+        if number == card
+        for loop in face.loop_indices
+    ]
+    return np.array(sorted(rows))
+
+
+def edit(obj, chosen, act):
+    """In Edit Mode, with the faces of these cards selected."""
+    select(obj)
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.mesh.select_mode(type="FACE")
+    shape = bmesh.from_edit_mesh(obj.data)
+    layer = shape.faces.layers.int[MADE_ATTRIBUTE]
+    for face in shape.faces:
+        face.select_set(face[layer] - 1 in chosen)
+    shape.select_flush(False)
+    bmesh.update_edit_mesh(obj.data)
+    act()
+    bpy.ops.object.mode_set(mode="OBJECT")
+
+
+def move(obj, *chosen, by=(0.02, 0.0, 0.0)):
+    edit(obj, chosen, lambda: bpy.ops.transform.translate(value=by))
+
+
+def delete(obj, *chosen):
+    edit(obj, chosen, lambda: bpy.ops.mesh.delete(type="FACE"))
+
+
+def edits(hair):
+    return groom_edits(hair, bpy.context.evaluated_depsgraph_get())[0]
+
+
+def test_cards_that_nobody_has_touched_are_made_anew(hair):
+    obj = make(hair)
+    assert edits(hair) is None
+    edit(obj, (), lambda: None)  # in and out of Edit Mode
+    assert edits(hair) is None
+    hair.data.hairloom.cards.card_count = 20
+    assert set(numbers(make(hair))) == set(range(20)) and edits(hair) is None
+
+
+def test_a_moved_card_stays_where_it_was_put(hair):
+    obj = make(hair)
+    before = {card: corners(obj, card) for card in range(12)}
+    move(obj, 3)
+    assert edits(hair).edited == 1 and edits(hair).deleted == 0 and edits(hair).own == 0
+    for _ in range(3):  # again and again
+        obj = make(hair)
+        assert set(numbers(obj)) == set(range(12))
+        np.testing.assert_allclose(corners(obj, 3), before[3] + [0.02, 0.0, 0.0], atol=1e-6)
+        for card in set(range(12)) - {3}:
+            np.testing.assert_allclose(corners(obj, card), before[card], atol=1e-6)
+        assert edits(hair).edited == 1
+
+
+def test_a_deleted_card_stays_deleted(hair):
+    delete(make(hair), 5, 7)
+    for _ in range(2):
+        assert set(numbers(make(hair))) == set(range(12)) - {5, 7}
+        assert edits(hair).deleted == 2 and edits(hair).edited == 0
+
+
+def test_a_card_of_the_artists_own_stays(hair):
+    obj = make(hair)
+
+    def copy():
+        bpy.ops.mesh.duplicate()
+        bpy.ops.transform.translate(value=(0.0, 0.0, 0.05))
+
+    original = corners(obj, 2)
+    edit(obj, (2,), copy)
+    for _ in range(2):
+        obj = make(hair)
+        np.testing.assert_allclose(corners(obj, 2), original, atol=1e-6)
+        np.testing.assert_allclose(corners(obj, -1), original + [0.0, 0.0, 0.05], atol=1e-6)
+        assert edits(hair).own == 1 and edits(hair).edited == 0
+
+
+def test_another_tile_is_kept(hair):
+    obj = make(hair)
+    width = 1.0 / 4.0
+
+    def next_tile():
+        shape = bmesh.from_edit_mesh(obj.data)
+        layer = shape.loops.layers.uv["UVMap"]
+        for face in shape.faces:
+            if face.select:
+                for loop in face.loops:
+                    loop[layer].uv.x = (loop[layer].uv.x + width) % 1.0
+        bmesh.update_edit_mesh(obj.data)
+
+    edit(obj, (4,), next_tile)
+    chosen = corners(obj, 4, "UVMap")
+    assert edits(hair).edited == 1
+    obj = make(hair)
+    np.testing.assert_allclose(corners(obj, 4, "UVMap"), chosen, atol=1e-6)
+    tile = np.empty(len(obj.data.polygons), np.int32)
+    obj.data.attributes["tile"].data.foreach_get("value", tile)
+    assert set(tile[numbers(obj) == 4]) == {int(chosen[:, 0].mean() * 4)}
+
+
+@pytest.mark.parametrize("count", [6, 12, 24])
+def test_with_other_cards_nothing_vanishes(hair, count):
+    """Fewer, as many by another seed, and more."""
+    obj = make(hair)
+    move(obj, 3)
+    delete(obj, 5)
+    kept = corners(obj, 3)
+    hair.data.hairloom.cards.card_count = count
+    hair.data.hairloom.cards.seed = 7
+    obj = make(hair)
+    found = [corners(obj, card) for card in set(numbers(obj))]
+    assert any(len(each) == len(kept) and np.allclose(each, kept, atol=1e-6) for each in found)
+    assert obj.hairloom.card_object.card_count == len(found) <= count + 1
+
+
+def test_all_deleted_is_an_empty_mesh_and_a_note(hair, capfd):
+    delete(make(hair), *range(12))
+    obj = make(hair)
+    assert not len(obj.data.polygons) and len(card_objects(hair)) == 1
+    assert "Discard Edits makes them again" in capfd.readouterr().out
+    assert not len(make(hair).data.polygons)
+
+
+def test_discarding_makes_all_cards_anew_and_can_be_undone(hair):
+    obj = make(hair)
+    before = {card: corners(obj, card) for card in range(12)}
+    move(obj, 3)
+    delete(obj, 5)
+    obj = make(hair)
+    bpy.ops.ed.undo_push(message="before")
+    select(hair)
+    assert bpy.ops.hairloom.discard_card_edits() == {"FINISHED"}
+    bpy.ops.ed.undo_push(message="discarded")
+    assert edits(hair) is None
+    for card, places in before.items():
+        np.testing.assert_allclose(corners(card_objects(hair)[0], card), places, atol=1e-6)
+    bpy.ops.ed.undo()
+    again = bpy.data.objects["Hair"]
+    assert (edits(again).edited, edits(again).deleted) == (1, 1)
+
+
+def test_an_edit_that_is_undone_is_none(hair):
+    obj = make(hair)
+    bpy.ops.ed.undo_push(message="made")
+    move(obj, 3)
+    bpy.ops.ed.undo_push(message="moved")
+    assert edits(hair).edited == 1
+    bpy.ops.ed.undo()
+    assert edits(bpy.data.objects["Hair"]) is None
+
+
+def test_a_foreign_mesh_that_is_joined_stays_as_the_artists_own(hair):
+    obj = make(hair)
+    bpy.ops.mesh.primitive_plane_add(size=0.05, location=(0.0, 0.0, 0.3))
+    plane = bpy.context.object
+    select(obj)
+    plane.select_set(True)
+    bpy.ops.object.join()
+    assert (edits(hair).own, edits(hair).edited, edits(hair).deleted) == (1, 0, 0)
+    obj = make(hair)
+    assert obj.hairloom.card_object.card_count == 13
+    own = corners(obj, -1)
+    np.testing.assert_allclose(own[:, 2], 0.3, atol=1e-6)
+    np.testing.assert_allclose(np.ptp(own, axis=0)[:2], 0.05, atol=1e-6)
+
+
+def test_without_the_numbers_cards_are_known_by_their_place(hair, capfd):
+    obj = make(hair)
+    before = corners(obj, 3)
+    move(obj, 3, by=(0.005, 0.0, 0.0))
+    delete(obj, 5)
+    obj.data.attributes.remove(obj.data.attributes[MADE_ATTRIBUTE])
+    assert (edits(hair).edited, edits(hair).deleted, edits(hair).own) == (1, 1, 0)
+    obj = make(hair)
+    assert "were recognised by their place" in capfd.readouterr().out
+    np.testing.assert_allclose(corners(obj, 3), before + [0.005, 0.0, 0.0], atol=1e-6)
+    assert set(numbers(obj)) == set(range(12)) - {5}
+
+
+@pytest.mark.parametrize("record", [None, 1, {"places": [1.0]}])
+def test_without_the_record_cards_are_made_anew_with_a_word(hair, capfd, record):
+    obj = make(hair)
+    move(obj, 3)
+    if record is None:
+        del obj.data[RECORD]
+    else:
+        obj.data[RECORD] = record
+    make(hair)
+    assert "it holds no record of what was made" in capfd.readouterr().out
+    assert edits(hair) is None
+
+
+def test_cards_without_uvs_are_refused(hair, capfd):
+    obj = make(hair)
+    move(obj, 3)
+    places = corners(obj, 3)
+    obj.data.uv_layers.remove(obj.data.uv_layers["UVMap"])
+    select(hair)
+    with pytest.raises(RuntimeError, match="lost its UV map"):
+        bpy.ops.hairloom.make_cards()
+    np.testing.assert_array_equal(corners(obj, 3), places)
+    assert bpy.ops.hairloom.discard_card_edits() == {"FINISHED"}
+    assert edits(hair) is None
+
+
+def test_a_card_away_from_the_head_is_kept_and_said(hair, capfd):
+    obj = make(hair)
+    before = corners(obj, 3)
+    move(obj, 3, by=(0.0, 0.0, 1.0))
+    obj = make(hair)
+    assert "1 of the cards that were kept begin away from the head" in capfd.readouterr().out
+    np.testing.assert_allclose(corners(obj, 3), before + [0.0, 0.0, 1.0], atol=1e-6)
+
+
+def test_edited_cards_go_with_their_skin(hair, sphere):
+    """The head is bent within its object, as a pose does."""
+    obj = make(hair)
+    move(obj, 3)
+    before = corners(obj, 3)
+    for vertex in sphere.data.vertices:
+        vertex.co.z += 0.5
+    for curve in hair.data.curves:
+        for point in curve.points:
+            point.position.z += 0.5
+    hair.data.update_tag()
+    sphere.data.update_tag()
+    np.testing.assert_allclose(corners(make(hair), 3), before + [0.0, 0.0, 0.5], atol=1e-4)
+
+
+@pytest.mark.parametrize("scale", [(2.0, 2.0, 2.0), (-1.0, 1.0, 1.0)])
+def test_edited_cards_go_with_the_object(hair, sphere, scale):
+    """Its mesh lies in the hair's space, whether that is moved, scaled or mirrored."""
+    sphere.location, sphere.scale = (1.0, 2.0, 3.0), scale
+    bpy.context.view_layer.update()
+    obj = make(hair)
+    facing = faces(obj, 3)
+    move(obj, 3, by=(0.0, 0.0, 0.02))
+    before = corners(obj, 3)
+    sphere.location.x += 1.0
+    bpy.context.view_layer.update()
+    obj = make(hair)
+    np.testing.assert_allclose(corners(obj, 3), before, atol=2e-6)
+    np.testing.assert_allclose(faces(obj, 3), facing, atol=1e-3)
+
+
+def faces(obj, card):
+    """The mean normal of a card's faces."""
+    pairs = zip(obj.data.polygons, numbers(obj), strict=True)
+    return np.mean([face.normal[:] for face, number in pairs if number == card], axis=0)
+
+
+def test_coarser_levels_follow_the_edited_shape(hair):
+    """A card is moved and enlarged: the coarser one lies on it, and no other is where it was."""
+    hair.data.hairloom.cards.column_count, hair.data.hairloom.cards.error = 1, 0.05
+    obj = make(hair)
+    coarse = of_card(card_objects(hair)[1], 3)
+    assert len(coarse), "it is not joined with another"
+
+    def enlarge():
+        bpy.ops.transform.translate(value=(0.0, 0.0, 0.1))
+        bpy.ops.transform.resize(value=(1.5, 1.5, 1.5))
+
+    edit(obj, (3,), enlarge)
+    delete(obj, 5)
+    obj = make(hair)
+    own, coarse = corners(obj, 3), of_card(card_objects(hair)[1], 3)
+    assert not len(of_card(card_objects(hair)[1], 5))
+    assert len(coarse) < len(own)
+    for reach in (np.min, np.max):
+        np.testing.assert_allclose(reach(coarse, axis=0), reach(own, axis=0), atol=8e-3)
+
+
+def of_card(obj, card):
+    """The places of the corners of a card in any level."""
+    number = np.empty(len(obj.data.polygons), np.int32)
+    obj.data.attributes["card"].data.foreach_get("value", number)
+    pairs = zip(obj.data.polygons, number, strict=True)
+    rows = [obj.data.vertices[v].co[:] for face, n in pairs if n == card for v in face.vertices]
+    return np.array(rows)
+
+
+def test_linked_cards_are_refused(hair, tmp_path):
+    obj = make(hair)
+    move(obj, 3)
+    path = tmp_path / "cards.blend"
+    bpy.data.libraries.write(str(path), {obj, hair})
+    bpy.ops.wm.read_homefile(use_empty=True)
+    with bpy.data.libraries.load(str(path), link=True) as (there, here):
+        here.objects = there.objects
+    for each in here.objects:
+        bpy.context.collection.objects.link(each)
+    bpy.context.view_layer.update()
+    linked = bpy.data.objects["Hair"]
+    assert edits(linked).edited == 1, "exports and drawings read them"
+    select(linked)
+    with pytest.raises(RuntimeError, match="linked from another file"):
+        bpy.ops.hairloom.make_cards()
+
+
+def test_edits_are_in_the_file(hair, tmp_path):
+    move(make(hair), 3)
+    path = str(tmp_path / "saved.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    bpy.ops.wm.open_mainfile(filepath=path)
+    assert edits(bpy.data.objects["Hair"]).edited == 1
+
+
+def test_what_is_drawn_has_the_edits(hair, evaluated):
+    """The preview follows once Edit Mode is left, without Make Cards."""
+    obj = make(hair)
+    hair.data.hairloom.card_drawing.shown_as = "cards"
+    session = previews.start(hair, evaluated())
+    try:
+        before = drawn(session)
+        assert before.card_count == 12
+        move(obj, 3, by=(0.0, 0.0, 1.0))
+        delete(obj, 5, 6)
+        scene_events.updated(evaluated())
+        scene_events.catch_up(evaluated())
+        now = drawn(session)
+        assert now.card_count == 10
+        np.testing.assert_allclose(lowest(now, 3), lowest(before, 3) + 1.0, atol=1e-5)
+    finally:
+        previews.stop_all()
+
+
+def drawn(session):
+    return overlay.drawing_of(session.uid).snapshot.cards.mesh
+
+
+def lowest(mesh, card):
+    return mesh.positions[mesh.triangles[mesh.card == card]][..., 2].min()
+
+
+def test_edited_cards_ride_on_the_guides(hair, evaluated):
+    """A card that was moved aside goes with its guides as the others do."""
+    obj = make(hair)
+    move(obj, 3, by=(0.0, 0.0, 0.02))
+    built = BuiltCards.now(read_inputs(hair, evaluated())[0])
+    rig = built.rig
+    away = np.array([0.1, 0.2, 0.3], np.float32)
+    still, moved = (
+        cards_at(rig, built.binding, rig.rest_pose, rig.guide_grid + by)
+        for by in (0.0 * away, away)
+    )
+    np.testing.assert_allclose(lowest(still, 3), corners(obj, 3)[:, 2].min(), atol=1e-5)
+    part = still.triangles[still.card == 3]
+    np.testing.assert_allclose(
+        moved.positions[part].mean(axis=(0, 1)) - still.positions[part].mean(axis=(0, 1)),
+        away,
+        atol=0.03,
+    )
+
+
+def test_exported_cards_have_the_edits(hair, evaluated, tmp_path):
+    """Another importer reads the file: Blender's own."""
+    obj = make(hair)
+    move(obj, 3, by=(0.0, 0.0, 1.0))
+    delete(obj, 5)
+    export = CardExport.of(hair, evaluated(), tmp_path / "cards.glb", CardOutput(), levels=1)
+    written = result_of(export.writing(result_of(build_steps(export.inputs))))
+    assert "1 edited and 1 deleted cards kept" in written.result
+    sidecar = json.loads((tmp_path / "cards.hairloom.json").read_text())
+    before = set(bpy.data.objects)
+    bpy.ops.import_scene.gltf(filepath=str(tmp_path / "cards.glb"))
+    (read,) = [each for each in set(bpy.data.objects) - before if each.type == "MESH"]
+    assert len(read.data.polygons) == 11 * 32
+    heights = np.array([read.matrix_world @ v.co for v in read.data.vertices])[:, 2]
+    assert np.count_nonzero(heights > 0.6) == 9 * 3
+    assert sidecar["levels"][0]["cards"] == 11
