@@ -132,6 +132,13 @@ def test_pressing_again_keeps_the_object_and_what_the_artist_added(hair):
     assert "Hair Cards LOD2" not in bpy.data.objects and len(bpy.data.meshes) == 3
 
 
+def test_another_texture_may_have_another_size(hair):
+    press()
+    hair.data.hairloom.cards.atlas_columns = 8
+    press()
+    assert tuple(card_objects(hair)[0].hairloom.card_object.image.size) == (256, 32)
+
+
 @pytest.mark.alike
 @pytest.mark.parametrize("name", ["Backup", "Hair Cards", "Zoë's"])
 @pytest.mark.parametrize("reopened", [False, True])
@@ -253,14 +260,14 @@ def test_the_panel_draws_what_there_is(hair):
             said.append(text)
 
     draw_made_cards(Layout(), hair)
-    assert said == ["Make Cards", "Discard Edits", "No cards yet", *5 * ["-"], "", "Texture -"]
+    assert said == ["Make Cards", "No cards yet", *5 * ["-"], "", "Texture -"]
     before = len(said)
     press()
     said.clear()
     draw_made_cards(Layout(), hair)
     assert len(said) == before, "what is below moves"
     assert said[0] == "Make Cards Again"
-    assert said[2:4] == ["12 cards, 384 triangles", "384"] and said[6:8] == ["-", "-"]
+    assert said[1:3] == ["12 cards, 384 triangles", "384"] and said[5:7] == ["-", "-"]
     assert said[-2].endswith(" % of pixels blend in the wrong order")
     assert said[-1] == "Texture 128 x 32"
 

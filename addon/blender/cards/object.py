@@ -193,9 +193,9 @@ def _filled_image(image: bpy.types.Image | None, name: str, texture: Floats) -> 
     height, width = texture.shape[:2]
     if image is None or image.library is not None:
         image = bpy.data.images.new(name, width, height, alpha=True)
-    elif tuple(image.size) != (width, height):
+    image.alpha_mode = "CHANNEL_PACKED"  # first: Blender reads the packed picture again for it
+    if tuple(image.size) != (width, height):
         image.scale(width, height)
-    image.alpha_mode = "CHANNEL_PACKED"
     fill_image(image, texture)
     image.update()
     image.pack()
