@@ -35,3 +35,10 @@ class AtlasGrid:
         v = (row + free_along + along * (1.0 - 2.0 * free_along)) / self.rows
         places: Floats = np.stack(np.broadcast_arrays(u, v), axis=-1).astype(np.float32)
         return places
+
+    def tile_at(self, uv: Floats) -> Ints:
+        """The tile that places (n, 2) in the texture lie in; beside it the nearest, (n,) int32."""
+        column = np.clip(np.floor(uv[:, 0] * self.columns), 0, self.columns - 1)
+        row = np.clip(np.floor(uv[:, 1] * self.rows), 0, self.rows - 1)
+        tiles: Ints = (row * self.columns + column).astype(np.int32)
+        return tiles

@@ -64,6 +64,12 @@ class MadeCards:
     def __len__(self) -> int:
         return len(self.places)
 
+    @property
+    def usual_width(self) -> float:
+        """Of a card halfway [m]."""
+        half = self.places[:, 4] - (self.places[:, 1] + self.places[:, 2]) / 2.0
+        return 2.0 * float(np.median(np.linalg.norm(half, axis=1))) if len(self) else 0.0
+
     @classmethod
     def of(cls, strips: Strips, tile: Ints, grid: AtlasGrid, head: Surface | None) -> MadeCards:
         """Cards as they are made, before they are in a mesh."""

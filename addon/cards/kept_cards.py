@@ -302,11 +302,9 @@ def tiles_of(edits: CardEdits, grid: AtlasGrid) -> Ints:
     owner = np.repeat(edits.piece, 3)
     size = np.maximum(np.bincount(owner, minlength=count), 1)
     flat = edits.surface.corner_uv.reshape(-1, 2)
-    u, v = (np.bincount(owner, part, count) / size for part in flat.T)
-    column = np.clip((u * grid.columns).astype(np.int64), 0, grid.columns - 1)
-    row = np.clip((v * grid.rows).astype(np.int64), 0, grid.rows - 1)
-    tiles: Ints = (row * grid.columns + column).astype(np.int32)
-    return tiles
+    return grid.tile_at(
+        np.stack([np.bincount(owner, part, count) / size for part in flat.T], axis=1)
+    )
 
 
 def _adopted(

@@ -7,6 +7,7 @@ import bpy
 from ..blender.preview import previews
 from ..blender.properties.card_group import HAIRLOOM_PG_card_images
 from .drawing import Draw, draw_section
+from .operators_card_edits import draw_card_edits
 from .operators_cards import draw_made_cards
 from .preset_chooser import draw_preset_row
 from .state import draw_card_progress
@@ -23,6 +24,7 @@ def draw_cards(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
     for line in lines:
         layout.label(text=line)
     draw_made_cards(layout, hair)
+    draw_card_edits(layout)
 
 
 def draw_strips(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:

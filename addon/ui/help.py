@@ -88,7 +88,7 @@ _OPERATORS = (
     ("trim", "styling#trim"),
     ("mirror", "styling#mirror"),
     ("make_cards", "cards#cards-in-the-scene"),
-    ("card_edits", "cards#cards-by-hand"),
+    ("card_", "cards#cards-by-hand"),
     ("sort_cards", "cards#the-draw-order"),
     ("bake", "dynamics#bakes"),
     ("measure", "dynamics#measuring"),

@@ -11,6 +11,7 @@ import rna_keymap_ui
 from ..blender.preview import previews
 from ..blender.properties.presets import shipped
 from .drawing import draw_overlays
+from .operators_card_edits import draw_menu
 from .operators_strand_export import draw_strand_exports
 from .operators_strand_import import draw_imports
 from .selection import active_mesh, chosen_hair
@@ -71,6 +72,7 @@ class HAIRLOOM_MT_object(bpy.types.Menu):
         layout.menu("HAIRLOOM_MT_looks", icon="SHADING_RENDERED")
         layout.separator()
         layout.operator("hairloom.make_cards", icon="MESH_GRID")
+        layout.operator("hairloom.add_card_along_curve", icon="CURVE_DATA")
         layout.operator("hairloom.discard_card_edits", icon="LOOP_BACK")
         layout.operator("hairloom.make_real", icon="OUTLINER_OB_CURVES")
         layout.operator("hairloom.export_cards", icon="EXPORT")
@@ -138,6 +140,8 @@ MENUS: tuple[tuple[str, Callable[[Any, bpy.types.Context], None]], ...] = (
     ("VIEW3D_MT_curve_add", _draw_add),
     ("VIEW3D_MT_object", _draw_object),
     ("VIEW3D_MT_object_context_menu", _draw_object),
+    ("VIEW3D_MT_edit_mesh", draw_menu),
+    ("VIEW3D_MT_edit_mesh_context_menu", draw_menu),
     ("VIEW3D_PT_overlay_object", _draw_overlays),
 )
 

@@ -112,8 +112,6 @@ def draw_made_cards(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
     if not draw_progress(layout, HAIRLOOM_OT_make_cards):
         text = "Make Cards Again" if objects else "Make Cards"
         draw_button(layout, "hairloom.make_cards", text=text, icon="MESH_GRID")
-    label = "Discard Edits"
-    draw_button(layout, "hairloom.discard_card_edits", label, text=label, icon="LOOP_BACK")
     finest = objects[0] if objects else None
     made = finest and finest.hairloom.card_object
     column = layout.column(align=True)

@@ -11,6 +11,7 @@ from hairloom.addon.blender.cards.build import BuiltCards, build_steps, read_inp
 from hairloom.addon.blender.cards.edits import MADE_ATTRIBUTE, RECORD, groom_edits
 from hairloom.addon.blender.cards.files import CardExport, CardOutput
 from hairloom.addon.blender.cards.made_objects import card_objects
+from hairloom.addon.blender.command_line import command_line
 from hairloom.addon.blender.preview import previews, scene_events
 from hairloom.addon.blender.viewport import overlay
 from hairloom.addon.card_flow import cards_at
@@ -433,3 +434,42 @@ def test_exported_cards_have_the_edits(hair, evaluated, tmp_path):
     heights = np.array([read.matrix_world @ v.co for v in read.data.vertices])[:, 2]
     assert np.count_nonzero(heights > 0.6) == 9 * 3
     assert sidecar["levels"][0]["cards"] == 11
+
+
+@pytest.mark.parametrize("is_chosen", [False, True])
+def test_in_another_atlas_a_card_lies_within_one_tile(hair, is_chosen):
+    """The atlas gets eight columns in place of four."""
+    obj = make(hair)
+    move(obj, 4)
+    if is_chosen:
+        edit(obj, (4,), lambda: bpy.ops.hairloom.card_tile(to="next"))
+    hair.data.hairloom.cards.atlas_columns = 8
+    obj = make(hair)
+    tile = np.empty(len(obj.data.polygons), np.int32)
+    obj.data.attributes["tile"].data.foreach_get("value", tile)
+    (own,) = set(tile[numbers(obj) == 4])
+    u = corners(obj, 4, "UVMap")[:, 0] * 8
+    np.testing.assert_allclose([u.min(), u.max()], [own, own + 1], atol=1e-4)
+    delete(obj, 4)
+    select(hair)
+    bpy.ops.hairloom.discard_card_edits()
+    obj = card_objects(hair)[0]
+    obj.data.attributes["tile"].data.foreach_get("value", tile)
+    (made,) = set(tile[numbers(obj) == 4])
+    assert is_chosen or made == own, "it has the tile of the card that it replaces"
+
+
+@pytest.mark.parametrize("discarding", [False, True])
+def test_the_verb_cards_keeps_edits_unless_they_are_discarded(hair, tmp_path, discarding):
+    obj = make(hair)
+    move(obj, 3, by=(0.0, 0.0, 1.0))
+    delete(obj, 5)
+    scene, file, report = (str(tmp_path / name) for name in ("a.blend", "cards.glb", "r.json"))
+    bpy.ops.wm.save_as_mainfile(filepath=scene)
+    how = ["--discard-edits"] if discarding else []
+    given = ["--scene", scene, "--groom", "Hair", "--head", "Head", "--levels", "1"]
+    assert command_line.run(["cards", *given, "--output", file, "--report", report, *how]) == 0
+    facts = json.loads((tmp_path / "r.json").read_text())
+    assert facts["cards"] == (12 if discarding else 11)
+    kept = {"edited": 1, "deleted": 1, "own": 0}
+    assert facts.get("card_edits") == (None if discarding else kept)

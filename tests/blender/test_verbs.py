@@ -35,6 +35,10 @@ WINDOW_ONLY = {
     "fin_reset",
     "choose_hairstyle",
     "show_settings",
+    # what is selected in Edit Mode
+    "card_width",
+    "card_twist",
+    "card_tile",
 }
 
 

@@ -56,7 +56,7 @@ def groom_edits(
     obj = objects[0]
     if obj.mode == "EDIT":
         obj.update_from_editmode()
-    record = _read_record(obj.data)
+    record = read_record(obj.data)
     if record is None:
         if not len(obj.data.polygons):
             return None, ()
@@ -122,7 +122,7 @@ def write_record(mesh: bpy.types.Mesh, made: MadeCards, marks: Ints, matrix: Flo
     mesh[RECORD] = content
 
 
-def _read_record(mesh: bpy.types.Mesh) -> MadeCards | None:
+def read_record(mesh: bpy.types.Mesh) -> MadeCards | None:
     """None without one, or where it was changed so that it no longer fits together."""
     content = mesh.get(RECORD)
     try:

@@ -55,6 +55,7 @@ _OF_SCENES = (
     "remove_spheres",
     "make_cards",
     "discard_card_edits",
+    "add_card_along_curve",
     "sort_cards",
     "add_hairstyle",
     "place_landmarks",

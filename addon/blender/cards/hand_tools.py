@@ -1,0 +1,223 @@
+"""What changes cards by hand in the mesh of their object: in Edit Mode the cards of which something
+is selected, in Object Mode new ones along curves."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import bmesh
+import bpy
+import numpy as np
+
+from ...arrays import Floats, Ints
+from ...cards.card_mesh import CardMesh
+from ...cards.edits import MadeCards
+from ...cards.settings import CardSettings
+from ...cards.shaping import CardVertices, card_along, tile_shift
+from ...errors import HairloomError
+from ...strands.affine import moved
+from ..base.objects import head_of, matrix_of
+from ..properties.groom_settings import GroomSettings
+from ..scene.drawn_lines import pieces_of
+from ..scene.surfaces import read_surface
+from .edits import MADE_ATTRIBUTE, TILE_LAYER, read_record
+from .made_objects import card_objects
+from .mesh import OCCLUSION_LAYER
+
+
+def edited_cards(context: bpy.types.Context) -> list[bpy.types.Object]:
+    """The objects of cards that are in Edit Mode."""
+    if context.mode != "EDIT_MESH":
+        return []
+    objects = context.objects_in_mode
+    return [obj for obj in objects if obj.hairloom.card_object.groom is not None]
+
+
+def shape_selected(obj: bpy.types.Object, shape: Callable[[CardVertices], Floats]) -> int:
+    """Move the vertices of all cards of which something is selected; gives how many cards.
+
+    Raises:
+        HairloomError: the mesh has no UV map.
+    """
+    edited = bmesh.from_edit_mesh(obj.data)
+    pieces = _selected_pieces(edited)
+    if not pieces:
+        return 0
+    layer = _uv_layer(edited, obj)
+    vertices = [vertex for piece in pieces for vertex in piece]
+    cards = CardVertices(
+        np.array([vertex.co[:] for vertex in vertices]),
+        np.array([vertex.link_loops[0][layer].uv[:] for vertex in vertices]),
+        np.repeat(np.arange(len(pieces)), [len(piece) for piece in pieces]),
+    )
+    for vertex, place in zip(vertices, shape(cards).tolist(), strict=True):
+        vertex.co = place
+    edited.normal_update()
+    bmesh.update_edit_mesh(obj.data)
+    return len(pieces)
+
+
+def put_on_tiles(obj: bpy.types.Object, tile_of: Callable[[Ints, int], Ints]) -> list[int]:
+    """Lay the UVs of all cards of which something is selected on other tiles; gives the tiles.
+
+    Args:
+        tile_of: from the tile of each card, and the number of tiles, to the wanted one.
+
+    Raises:
+        HairloomError: the mesh has no UV map, or no record of its atlas.
+    """
+    edited = bmesh.from_edit_mesh(obj.data)
+    pieces = _selected_pieces(edited)
+    if not pieces:
+        return []
+    grid, layer = _record_of(obj).grid, _uv_layer(edited, obj)
+    loops = [[loop for vertex in piece for loop in vertex.link_loops] for piece in pieces]
+    middles = np.array([np.mean([loop[layer].uv[:] for loop in own], axis=0) for own in loops])
+    tile = grid.tile_at(middles)
+    wanted = tile_of(tile, grid.tile_count)
+    for own, shift in zip(loops, tile_shift(grid, tile, wanted).tolist(), strict=True):
+        for loop in own:
+            u, v = loop[layer].uv
+            loop[layer].uv = u + shift[0], v + shift[1]
+    bmesh.update_edit_mesh(obj.data)
+    found: list[int] = wanted.tolist()
+    return found
+
+
+def add_along_curves(
+    hair: bpy.types.Object,
+    curves: Sequence[bpy.types.Object],
+    depsgraph: bpy.types.Depsgraph,
+    width: float,
+    tile: int,
+) -> int:
+    """Add a card along each line of these curves to the cards of a groom; gives how many.
+
+    Args:
+        width: at the root [m]; 0 is that of the other cards.
+        tile: from 0; -1 is that of the nearest card.
+
+    Raises:
+        HairloomError: no cards yet, no line, or a tile that the atlas has not.
+    """
+    objects = card_objects(hair)
+    if not objects:
+        raise HairloomError("it has no cards yet", place=hair.name, remedy="Press Make Cards first")
+    obj, settings = objects[0], GroomSettings.of(hair)[CardSettings]
+    if not obj.data.is_editable:
+        raise HairloomError(
+            "it is linked from another file", place=obj.name, remedy="Make it local first"
+        )
+    matrix, head = matrix_of(obj, depsgraph), head_of(hair)
+    record = _record_of(obj).moved(matrix)
+    if tile >= record.grid.tile_count:
+        raise HairloomError(
+            f"its atlas has {record.grid.tile_count} tiles",
+            place=obj.name,
+            remedy="Choose one of these",
+        )
+    surface = None
+    if head is not None:
+        surface = read_surface(head, depsgraph, need_uv=False, place=head.name)
+    lines = [line for curve in curves for line in _lines_of(pieces_of(curve, depsgraph))]
+    edited = bmesh.new()
+    try:
+        edited.from_mesh(obj.data)
+        for line in lines:
+            near = np.linalg.norm(record.places[:, 0] - line[0], axis=1).argmin()
+            card = card_along(
+                line,
+                surface,
+                settings,
+                width=width or record.usual_width,
+                tile=tile if tile >= 0 else int(record.tile[near]),
+                grid=record.grid,
+            )
+            _append(edited, card, matrix)
+        edited.to_mesh(obj.data)
+    finally:
+        edited.free()
+    obj.data.update()
+    return len(lines)
+
+
+def _record_of(obj: bpy.types.Object) -> MadeCards:
+    record = read_record(obj.data)
+    if record is None:
+        raise HairloomError(
+            "it holds no record of its atlas", place=obj.name, remedy="Press Make Cards Again"
+        )
+    return record
+
+
+def _uv_layer(edited: bmesh.types.BMesh, obj: bpy.types.Object) -> bmesh.types.BMLayerItem:
+    layers = edited.loops.layers.uv
+    layer = layers.get(TILE_LAYER)
+    if layer is None:
+        raise HairloomError(
+            f"it has no UV map called {TILE_LAYER}",
+            place=obj.name,
+            remedy="Undo, or give the UV map this name",
+        )
+    return layer
+
+
+def _selected_pieces(edited: bmesh.types.BMesh) -> list[list[bmesh.types.BMVert]]:
+    """The vertices of each piece of which a vertex is selected; those without faces are none."""
+    seen: set[bmesh.types.BMVert] = set()
+    pieces = []
+    for start in edited.verts:
+        if not start.select or start in seen or not start.link_faces:
+            continue
+        piece, waiting = [], [start]
+        seen.add(start)
+        while waiting:
+            vertex = waiting.pop()
+            piece.append(vertex)
+            for face in vertex.link_faces:
+                for other in face.verts:
+                    if other not in seen:
+                        seen.add(other)
+                        waiting.append(other)
+        pieces.append(piece)
+    return pieces
+
+
+def _lines_of(pieces: Floats) -> list[Floats]:
+    """Straight pieces (n, 2, 3) as lines (point_count, 3): where one ends another begins."""
+    breaks = np.flatnonzero((pieces[:-1, 1] != pieces[1:, 0]).any(axis=1)) + 1
+    return [np.concatenate([each[:1, 0], each[:, 1]]) for each in np.split(pieces, breaks)]
+
+
+def _append(edited: bmesh.types.BMesh, card: CardMesh, matrix: Floats) -> None:
+    """Add a card, world space, to a mesh in the space of an object: one of the artist's own."""
+    places = moved(card.positions, np.linalg.inv(matrix))
+    normal = card.normal @ matrix[:3, :3]
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1.0e-12)
+    is_mirrored = np.linalg.det(matrix[:3, :3]) < 0.0
+    points, corners = edited.verts.layers, edited.loops.layers.uv
+    normals = points.float_vector.get("custom_normal")
+    along = points.float.get("along")
+    occlusion = points.float.get("occlusion")
+    tiles, shade = corners.get(TILE_LAYER), corners.get(OCCLUSION_LAYER)
+    made = edited.faces.layers.int.get(MADE_ATTRIBUTE)
+    vertices = []
+    for index, place in enumerate(places.tolist()):
+        vertex = edited.verts.new(place)
+        if normals is not None:
+            vertex[normals] = normal[index].tolist()
+        if along is not None:
+            vertex[along] = float(card.along[index])
+        if occlusion is not None:
+            vertex[occlusion] = 1.0
+        vertices.append(vertex)
+    for triangle in card.triangles.tolist():
+        numbers = triangle[::-1] if is_mirrored else triangle
+        face = edited.faces.new([vertices[number] for number in numbers])
+        if made is not None:
+            face[made] = 0
+        for loop, number in zip(face.loops, numbers, strict=True):
+            if tiles is not None:
+                loop[tiles].uv = card.uv[number].tolist()
+            if shade is not None:
+                loop[shade].uv = 1.0, float(card.along[number])
