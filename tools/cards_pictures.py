@@ -1,4 +1,4 @@
-"""Draws the pictures of docs/cards.md: both ways to make cards, their layers and their levels.
+"""Draws the pictures of docs/cards.md: ways to make cards, their layers, their levels, and edits.
 
 python tools/cards_pictures.py FOLDER
 """
@@ -16,6 +16,7 @@ from extension_loader import PACKAGE, load_package
 
 STRANDS, CARDS = 8000, 500
 WIDTH, HEIGHT, SAMPLES = 420, 480, 2
+UP = np.array([0.0, 0.0, 1.0])
 
 
 def of_addon(module: str) -> Any:
@@ -49,21 +50,24 @@ class Shots:
         rig = self.rig
         return self._studio.picture(rig.rest_pose, rig.strands.points, WIDTH, HEIGHT, SAMPLES)
 
-    def built(self, way: str, levels: int = 1) -> tuple[Any, Any]:
+    def built(
+        self, way: str, levels: int = 1, count: int = CARDS, edits: Any = None
+    ) -> tuple[Any, Any]:
         """Cards in this way, and how they are drawn."""
         settings, builds = self.settings, of_addon("blender.cards.build")
         chosen = of_addon("params").SettingsMap(
-            settings["cards"](source=way, card_count=CARDS, levels=levels),
+            settings["cards"](source=way, card_count=count, levels=levels),
             settings["card_occlusion"](rays=64),
         )
-        steps = builds.build_steps(builds.CardInputs(self.rig, chosen))
+        steps = builds.build_steps(builds.CardInputs(self.rig, chosen, edits=edits))
         made = of_addon("cards.steps").result_of(steps)
         tied = builds.BuiltCards.of(self.rig, made)
         return made.build, tied.drawn(tied.rest, chosen)
 
     def cards(self, mesh: Any, drawn: Any, back: Any = None) -> Any:
         """These cards of those that are drawn, with the order of their back faces."""
-        shown = replace(drawn, mesh=mesh, back_triangles=back)
+        seen = drawn.skin_seen if mesh is drawn.mesh else None  # of its vertices
+        shown = replace(drawn, mesh=mesh, back_triangles=back, skin_seen=seen)
         return self._studio.card_picture(shown, WIDTH, HEIGHT, SAMPLES)
 
 
@@ -71,6 +75,35 @@ def of_layer(mesh: Any, layer: int) -> Any:
     """The cards of one layer alone."""
     kept = mesh.layer[mesh.card] == layer
     return replace(mesh, triangles=mesh.triangles[kept], card=mesh.card[kept])
+
+
+def edited(build: Any) -> Any:
+    """Edits as of an artist: on one side the tips of long cards are flicked out and wider, on the
+    other side outer ones are deleted."""
+    edits, mesh = of_addon("cards.edits"), build.finest
+    surface = of_addon("strands").Surface(mesh.positions, mesh.triangles, mesh.uv[mesh.triangles])
+    record = replace(build.made, marks=edits.prints(surface, mesh.card))
+    root, tip = build.made.places[:, 0], build.made.places[:, 3]
+    is_long = tip[:, 2] < np.quantile(tip[:, 2], 0.6)
+    is_right = root[:, 0] > np.median(root[:, 0])
+    is_flicked, is_deleted = is_long & is_right, is_long & ~is_right & (mesh.layer > 0)
+    card = of_addon("cards.sort").card_of_vertex(mesh)
+    part = np.clip((mesh.along - 0.6) / 0.4, 0.0, 1.0) * is_flicked[card]
+    outwards = mesh.positions - root.mean(axis=0)
+    outwards[:, 2] = 0.0
+    outwards /= np.maximum(np.linalg.norm(outwards, axis=1, keepdims=True), 1e-6)
+    bend = 0.05 * part**1.5, 0.05 * part**2
+    moved = mesh.positions + bend[0][:, None] * outwards + bend[1][:, None] * UP
+    wider = of_addon("cards.shaping").CardVertices(moved, mesh.uv, card).widened(1.0, 1.3)
+    moved[is_flicked[card]] = wider[is_flicked[card]]
+    left = ~is_deleted[mesh.card]
+    surface = replace(
+        surface,
+        positions=moved,
+        triangles=mesh.triangles[left],
+        corner_uv=mesh.uv[mesh.triangles[left]],
+    )
+    return edits.edits_of(surface, mesh.card[left], record, np.eye(4))
 
 
 def main(folder: Path) -> None:
@@ -95,6 +128,13 @@ def main(folder: Path) -> None:
     sheet("card_layers.png", [shots.cards(of_layer(build.finest, n), baked) for n in layers])
     sheet(
         "card_levels.png", [shots.cards(build.levels[n], baked, build.backs[n]) for n in (0, 2, 4)]
+    )
+    by_hand = edited(build)
+    print(by_hand.counts.line)
+    again = [shots.built("clusters", count=count, edits=by_hand) for count in (CARDS, 400)]
+    sheet(
+        "card_edits.png",
+        [shots.cards(one.finest, drawn, one.backs[0]) for one, drawn in [(build, baked), *again]],
     )
     for mesh, error in zip(build.levels, build.errors, strict=True):
         triangles, millimetres = len(mesh.triangles), error * 1000.0

@@ -438,25 +438,27 @@ def test_exported_cards_have_the_edits(hair, evaluated, tmp_path):
 
 @pytest.mark.parametrize("is_chosen", [False, True])
 def test_in_another_atlas_a_card_lies_within_one_tile(hair, is_chosen):
-    """The atlas gets eight columns in place of four."""
+    """The atlas gets eight columns in place of four. A card that was only moved has the tile of the
+    card that it replaces."""
     obj = make(hair)
-    move(obj, 4)
+    move(obj, *range(12))
     if is_chosen:
-        edit(obj, (4,), lambda: bpy.ops.hairloom.card_tile(to="next"))
+        edit(obj, range(12), lambda: bpy.ops.hairloom.card_tile(to="next"))
     hair.data.hairloom.cards.atlas_columns = 8
-    obj = make(hair)
-    tile = np.empty(len(obj.data.polygons), np.int32)
-    obj.data.attributes["tile"].data.foreach_get("value", tile)
-    (own,) = set(tile[numbers(obj) == 4])
-    u = corners(obj, 4, "UVMap")[:, 0] * 8
-    np.testing.assert_allclose([u.min(), u.max()], [own, own + 1], atol=1e-4)
-    delete(obj, 4)
+    tiles = tiles_of(make(hair))
+    for card, tile in tiles.items():
+        u = corners(obj, card, "UVMap")[:, 0] * 8
+        np.testing.assert_allclose([u.min(), u.max()], [tile, tile + 1], atol=1e-4)
     select(hair)
     bpy.ops.hairloom.discard_card_edits()
-    obj = card_objects(hair)[0]
+    assert (tiles_of(card_objects(hair)[0]) == tiles) != is_chosen
+
+
+def tiles_of(obj):
+    """The tile of each card."""
+    tile = np.empty(len(obj.data.polygons), np.int32)
     obj.data.attributes["tile"].data.foreach_get("value", tile)
-    (made,) = set(tile[numbers(obj) == 4])
-    assert is_chosen or made == own, "it has the tile of the card that it replaces"
+    return {card: int(tile[numbers(obj) == card][0]) for card in range(12)}
 
 
 @pytest.mark.parametrize("discarding", [False, True])

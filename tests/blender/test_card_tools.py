@@ -50,7 +50,7 @@ def test_width_grows_evenly_to_the_tip_about_the_middle(hair):
 def test_twist_turns_the_tip_by_the_angle_and_keeps_widths(hair):
     obj = make(hair)
     before = grid(obj, 3)
-    apply(obj, (3,), bpy.ops.hairloom.card_twist, angle=np.pi / 2.0)
+    apply(obj, (3, 4), bpy.ops.hairloom.card_twist, angle=np.pi / 2.0)
     now = grid(obj, 3)
     np.testing.assert_allclose(widths(now), widths(before), rtol=1e-4)
     np.testing.assert_allclose(now[0], before[0], atol=1e-6)
