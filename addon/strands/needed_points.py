@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..arrays import Bools, Floats, Ints
 from .arc_length import along_of, reached, typical
-from .join import joined
 from .kept import NOTHING_KEPT, Kept
 from .resample import positions_at, resample
 from .strand_set import StrandSet
@@ -66,18 +65,21 @@ def with_points(strands: StrandSet, counts: Ints, is_even: Bools) -> StrandSet:
     points and more between them."""
     if np.array_equal(counts, strands.point_counts) and not is_even.any():
         return strands
-    parts, order = [], []
+    offsets = np.concatenate([[0], np.cumsum(counts)])
+    points = np.empty((offsets[-1], 3), np.float32)
+    radius = np.empty(offsets[-1], np.float32)
+    color = None if strands.color is None else np.empty_like(points)
     for count in np.unique(counts).tolist():
         for are_even in (False, True):
             chosen = np.flatnonzero((counts == count) & (is_even == are_even))
             if len(chosen):
                 some = strands.take(chosen)
-                parts.append(resample(some, count) if are_even else _refined(some, count))
-                order.append(chosen)
-    whole = parts[0]
-    for part in parts[1:]:
-        whole = joined(whole, part)
-    return whole.take(np.argsort(np.concatenate(order)))
+                part = resample(some, count) if are_even else _refined(some, count)
+                rows = offsets[chosen, None] + np.arange(count)
+                points[rows], radius[rows] = part.grid, part.radius.reshape(-1, count)
+                if color is not None:
+                    color[rows] = part.color_grid
+    return replace(strands, points=points, offsets=offsets, radius=radius, color=color)
 
 
 def _needed(strands: StrandSet, least: int, most: int, stray: float) -> tuple[Ints, Bools]:
@@ -87,6 +89,7 @@ def _needed(strands: StrandSet, least: int, most: int, stray: float) -> tuple[In
     then what lies halfway between what was too few and what was enough.
     """
     own = strands.point_counts
+    along = reached(strands.points, strands.offsets)
     counts = np.array(_counts(least, most))
     # of each strand the counts that are left to try, from and up to; the last is its own
     low = np.zeros(len(own), np.int64)
@@ -96,7 +99,7 @@ def _needed(strands: StrandSet, least: int, most: int, stray: float) -> tuple[In
     while (left := np.flatnonzero(low < high)).size:
         for number in np.unique(tried[left]).tolist():
             some = left[tried[left] == number]
-            suffices = _suffice(strands, some, int(counts[number]), stray)
+            suffices = _suffice(strands, along, some, int(counts[number]), stray)
             high[some[suffices]] = number
             low[some[~suffices]] = number + 1
         # curls need about as many as they have: that one fewer is too few spares all between
@@ -107,11 +110,12 @@ def _needed(strands: StrandSet, least: int, most: int, stray: float) -> tuple[In
     return needed, is_even | (own > most)
 
 
-def _suffice(strands: StrandSet, some: Ints, count: int, stray: float) -> Bools:
+def _suffice(strands: StrandSet, along: Floats, some: Ints, count: int, stray: float) -> Bools:
     """Whether some of the strands are the same by `count` even points, (n,)."""
     size = max(_CHUNK // max(int(strands.point_counts[some].max()), count), 1)
     parts = [some[start : start + size] for start in range(0, len(some), size)]
-    return np.concatenate([_suffices(strands.take(part), count, stray) for part in parts])
+    found = [_Lines.of(strands, along, part).suffice(count, stray) for part in parts]
+    return np.concatenate(found)
 
 
 def _counts(least: int, most: int) -> list[int]:
@@ -122,30 +126,71 @@ def _counts(least: int, most: int) -> list[int]:
     return counts
 
 
-def _suffices(strands: StrandSet, count: int, stray: float) -> Bools:
-    """Whether each strand is the same by `count` even points."""
-    points, offsets = strands.points, strands.offsets
-    reach = reached(points, offsets)
-    length = reach[offsets[1:] - 1]
-    left, weight = positions_at(reach, offsets, count)
-    # by axes, as numpy is slow at rows of three
-    axes = [np.ascontiguousarray(axis) for axis in points.T]
-    even = [axis[left] * (1.0 - weight) + axis[left + 1] * weight for axis in axes]
-    steps = (np.diff(axis.astype(np.float64), axis=1) for axis in even)
-    total = np.sqrt(sum(step * step for step in steps)).sum(axis=1)
-    # each point against the place as far along the even ones: no nearer than the nearest
-    place = along_of(reach, offsets) * (count - 1)
-    before = np.minimum(place.astype(np.int64), count - 2)
-    part = place - before
-    before += np.repeat(np.arange(strands.strand_count) * count, strands.point_counts)
-    away = np.zeros(len(points))
-    for axis, own in zip(even, axes, strict=True):
-        line = axis.ravel()
-        near = line[before].astype(np.float64)
-        gap = near + (line[before + 1] - near) * part - own
-        away += gap * gap
-    farthest = np.maximum.reduceat(away, offsets[:-1])
-    return np.asarray((total >= (1.0 - LOST) * length) & (farthest <= stray * stray))
+@dataclass(frozen=True)
+class _Lines:
+    """Some strands. axes: (3, point_count) [m]. along: (point_count,), see `arc_length.reached`."""
+
+    axes: Floats
+    along: Floats
+    offsets: Ints
+
+    @classmethod
+    def of(cls, strands: StrandSet, along: Floats, some: Ints) -> _Lines:
+        offsets, points = _rows(strands.offsets, some)
+        # by axes, as numpy is slow at rows of three
+        axes = np.ascontiguousarray(strands.points.take(points, axis=0).T)
+        return cls(axes, along.take(points), offsets)
+
+    def take(self, some: Ints) -> _Lines:
+        offsets, points = _rows(self.offsets, some)
+        return _Lines(self.axes.take(points, axis=1), self.along.take(points), offsets)
+
+    def suffice(self, count: int, stray: float) -> Bools:
+        """Whether each strand is the same by `count` even points."""
+        length = self.along[self.offsets[1:] - 1]
+        left, weight = positions_at(self.along, self.offsets, count)
+        before = 1.0 - weight
+        even = [axis.take(left) * before + axis.take(left + 1) * weight for axis in self.axes]
+        steps = (np.diff(axis.astype(np.float64), axis=1) for axis in even)
+        total = np.sqrt(sum(step * step for step in steps)).sum(axis=1)
+        suffices = np.asarray(total >= (1.0 - LOST) * length)
+        long = np.flatnonzero(suffices)  # of others it does not matter where they go
+        if len(long):
+            lines = self if len(long) == len(length) else self.take(long)
+            suffices[long] = lines._farthest([axis[long] for axis in even]) <= stray * stray
+        return suffices
+
+    def _farthest(self, even: list[Floats]) -> Floats:
+        """How far points are at most from even ones (strand_count, count), three axes of them,
+        squared, (strand_count,)."""
+        count = even[0].shape[1]
+        # each point against the place as far along the even ones: no nearer than the nearest
+        place = along_of(self.along, self.offsets)
+        place *= count - 1
+        before = np.minimum(place.astype(np.int64), count - 2)
+        part = place
+        part -= before
+        before += np.repeat(np.arange(len(even[0])) * count, np.diff(self.offsets))
+        away = np.zeros(len(place))
+        for axis, own in zip(even, self.axes, strict=True):
+            line = axis.ravel()
+            near = line.take(before).astype(np.float64)
+            before += 1
+            gap = line.take(before) - near
+            before -= 1
+            gap *= part
+            gap += near
+            gap -= own
+            gap *= gap
+            away += gap
+        return np.maximum.reduceat(away, self.offsets[:-1])
+
+
+def _rows(offsets: Ints, some: Ints) -> tuple[Ints, Ints]:
+    """Where some of the strands begin and end on their own, and which points they have."""
+    counts = np.diff(offsets)[some]
+    own = np.concatenate([[0], np.cumsum(counts)])
+    return own, np.arange(own[-1]) + np.repeat(offsets[:-1][some] - own[:-1], counts)
 
 
 def _refined(strands: StrandSet, count: int) -> StrandSet:

@@ -46,6 +46,20 @@ def test_inside_is_one_and_outside_zero() -> None:
     np.testing.assert_allclose(winding, distance[clear] < 0.1, atol=0.05)
 
 
+def test_right_at_the_surface_it_is_as_the_exact_sum() -> None:
+    """Where points share cells with many others, and with triangles that are near to some."""
+    points = np.random.default_rng(2).normal(0.0, 1.0, (400, 3))
+    points *= 0.1 / np.linalg.norm(points, axis=1, keepdims=True)
+    points *= np.linspace(0.97, 1.03, 400)[:, None]
+    np.testing.assert_allclose(winding_number(points, globe()), exact(points, globe()), atol=0.05)
+
+
+def test_a_number_does_not_depend_on_other_points() -> None:
+    points = np.random.default_rng(3).uniform(-0.11, 0.11, (300, 3))
+    alone = [winding_number(point[None], globe())[0] for point in points[:20]]
+    np.testing.assert_allclose(winding_number(points, globe())[:20], alone, atol=1e-5)
+
+
 def test_a_mesh_turned_inside_out_gives_minus_one() -> None:
     surface = globe()
     turned = Surface(surface.positions, surface.triangles[:, ::-1])

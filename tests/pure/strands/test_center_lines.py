@@ -8,6 +8,7 @@ import pytest
 from hairloom.addon.arrays import Floats
 from hairloom.addon.strands import StrandSet
 from hairloom.addon.strands.center_lines import center_lines
+from hairloom.addon.strands.join import joined
 from hairloom.addon.strands.resample import resample
 
 
@@ -66,8 +67,16 @@ def test_the_mean_is_that_of_the_strand_around_each_cv() -> None:
     """Against the integral with the tent, by brute force."""
     strands, cv_count = coils((9,)), 10
     lines = center_lines(strands, cv_count).grid[0]
-    dense = resample(strands, 9 * 500 + 1).grid[0].astype(np.float64)
+    dense = resample(strands, 9 * 5000 + 1).grid[0].astype(np.float64)
     place = np.linspace(0.0, 9.0, len(dense))
     for cv in range(1, 9):
         tent = np.maximum(1.0 - np.abs(place - cv), 0.0)
-        assert lines[cv] == pytest.approx((tent / tent.sum()) @ dense, abs=2e-5)
+        assert lines[cv] == pytest.approx((tent / tent.sum()) @ dense, abs=1e-6)
+
+
+def test_a_line_does_not_depend_on_other_strands() -> None:
+    """Bit for bit, whatever points the others have: what is kept of them is compared so."""
+    coil, other = coils((9,)), coils((5, 7), cv_count=120)
+    both = center_lines(joined(other, coil), 10)
+    assert np.array_equal(both.grid[2], center_lines(coil, 10).grid[0])
+    assert np.array_equal(both.grid[:2], center_lines(other, 10).grid)
