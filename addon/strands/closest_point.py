@@ -75,6 +75,10 @@ class _Candidates:
 class ClosestPointSearch:
     """A surface prepared for many calls of `closest`.
 
+    center: (3,) float64 [m], of its box.
+    corners: (triangle_count, 3, 3) float64 [m], from the center on.
+    tree: of these.
+
     Raises:
         HairloomError: the surface has no triangles.
     """
@@ -87,13 +91,13 @@ class ClosestPointSearch:
                 remedy="Choose a mesh with faces as the surface",
             )
         low, high = surface.bounds()
-        self._center = (low.astype(np.float64) + high) / 2.0  # keeps the dot products small
-        self._corners = surface.corners - self._center
-        self._forms = TriangleForms(self._corners)
-        low, high = self._corners.min(axis=1), self._corners.max(axis=1)
+        self.center = (low.astype(np.float64) + high) / 2.0  # keeps the dot products small
+        self.corners = surface.corners - self.center
+        self._forms = TriangleForms(self.corners)
+        low, high = self.corners.min(axis=1), self.corners.max(axis=1)
         self._size = float(np.median(np.linalg.norm(high - low, axis=1)))
         self._low, self._high = np.ascontiguousarray(low.T), np.ascontiguousarray(high.T)
-        self._tree: TriangleTree = build_tree(self._corners)
+        self.tree: TriangleTree = build_tree(self.corners)
 
     def closest(self, points: Floats, reach: float = np.inf) -> ClosestPoints:
         """The closest point of the surface to each of the finite points (point_count, 3).
@@ -102,24 +106,24 @@ class ClosestPointSearch:
             reach: [m]; where the surface is farther than this, the answer is some point of it
                 that is farther than this as well. Much faster where few points are near.
         """
-        local = np.asarray(points, np.float64).reshape(-1, 3) - self._center
+        local = np.asarray(points, np.float64).reshape(-1, 3) - self.center
         return self._measured(local, self._nearest(local, reach))
 
     def nearest(self, points: Floats, reach: float) -> Ints:
         """The triangle alone, (point_count,), searched for each point by itself: it depends on no
         other points, not even where two triangles are as near."""
-        return self._search_all(np.asarray(points, np.float64) - self._center, reach)
+        return self._search_all(np.asarray(points, np.float64) - self.center, reach)
 
     def closest_on(self, points: Floats, triangle: Ints) -> ClosestPoints:
         """The closest point of the triangle that is named for each point (point_count, 3)."""
-        return self._measured(np.asarray(points, np.float64) - self._center, triangle)
+        return self._measured(np.asarray(points, np.float64) - self.center, triangle)
 
     def _measured(self, local: Floats, triangle: Ints) -> ClosestPoints:
         barycentric = self._forms.closest(local, triangle)
-        closest = np.einsum("ni,nij->nj", barycentric, self._corners[triangle])
+        closest = np.einsum("ni,nij->nj", barycentric, self.corners[triangle])
         distance = np.linalg.norm(local - closest, axis=1)
         return ClosestPoints(
-            closest + self._center, triangle.astype(np.int32), barycentric, distance
+            closest + self.center, triangle.astype(np.int32), barycentric, distance
         )
 
     def _nearest(self, points: Floats, reach: float) -> Ints:
@@ -148,8 +152,8 @@ class ClosestPointSearch:
 
     def _search(self, points: Floats, reach: float) -> Ints:
         """A good guess, then all that could be nearer."""
-        triangles = self._tree.leaf_triangles
-        leaf = triangles[self._tree.nearest_leaf(points)]
+        triangles = self.tree.leaf_triangles
+        leaf = triangles[self.tree.nearest_leaf(points)]
         best = _Best(np.full(len(points), np.inf), leaf[:, 0].astype(np.int64))
         self._improve(best, points, *_each(np.arange(len(points)), leaf))
         # a hair more than the reach, so that a point just within it is found
@@ -169,7 +173,7 @@ class ClosestPointSearch:
         """Pairs of point and leaf that may be so near, ascending by point, some at a time, and the
         squared distance to the leaf's box."""
         limit = _PAIR_LIMIT if len(points) > 1 else sys.maxsize
-        found = self._tree.leaves_within(points, squared_within, limit)
+        found = self.tree.leaves_within(points, squared_within, limit)
         if found is not None:
             yield found
             return
@@ -187,7 +191,7 @@ class ClosestPointSearch:
         for start in range(0, len(middle), _CHUNK):
             part = slice(start, start + _CHUNK)
             for near, leaf, _ in self._near_leaves(middle[part], within[part] ** 2):
-                near, triangle = _each(near, self._tree.leaf_triangles[leaf])
+                near, triangle = _each(near, self.tree.leaf_triangles[leaf])
                 cluster = near + start
                 far = np.sqrt(self._forms.squared_distance(middle.take(cluster, axis=0), triangle))
                 is_near = (far <= within[cluster]) & (triangle != nearest[cluster])

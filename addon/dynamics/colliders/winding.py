@@ -19,7 +19,8 @@ import numpy as np
 
 from ...arrays import Floats, Ints
 from ...strands import Surface
-from ...strands.triangle_tree import TriangleTree, build_tree
+from ...strands.closest_point import search_of
+from ...strands.triangle_tree import TriangleTree
 from ...strands.vectors import cross_rows, dot_rows
 
 #: A group of triangles is far at this many times its own radius from its centre.
@@ -58,12 +59,14 @@ class _Dipoles:
 class _Prepared:
     """What all points need of a surface.
 
+    center: (3,) [m], of its box; all else is from there on.
     levels: dipoles from the root to the leaves. every: those of all levels, one after the other,
     and then those of each triangle alone.
     leaves: (leaf_count, k) triangles. corners: (3, 3, triangle_count) by corner and axis [m].
     cell: side of a cell [m].
     """
 
+    center: Floats
     levels: list[_Dipoles]
     every: _Dipoles
     leaves: Ints
@@ -72,8 +75,8 @@ class _Prepared:
 
     @classmethod
     def of(cls, surface: Surface) -> _Prepared:
-        corners = surface.corners.astype(np.float64)
-        tree = build_tree(corners)
+        search = search_of(surface)  # whoever asks for winding numbers asks for distances, too
+        corners, tree = search.corners, search.tree
         leaves = _without_repeats(tree.leaf_triangles)
         rows = np.ascontiguousarray(corners.transpose(1, 2, 0))
         levels = _dipoles(tree, leaves, corners)
@@ -84,7 +87,7 @@ class _Prepared:
             np.concatenate([level.reach for level in each]),
         )
         area = float(np.linalg.norm(each[-1].moment, axis=0).mean())
-        return cls(levels, every, leaves, rows, max(_CELL * area**0.5, 1.0e-9))
+        return cls(search.center, levels, every, leaves, rows, max(_CELL * area**0.5, 1.0e-9))
 
 
 def winding_number(points: Floats, surface: Surface) -> Floats:
@@ -94,7 +97,7 @@ def winding_number(points: Floats, surface: Surface) -> Floats:
         points: (n, 3) [m], space of the surface, which has at least one triangle.
     """
     prepared = surface.once(_Prepared.of)
-    place = np.ascontiguousarray(np.asarray(points, np.float64).T)
+    place = np.ascontiguousarray((points - prepared.center).T, np.float64)
     total = np.zeros(place.shape[1])
     if not len(total):
         return total
