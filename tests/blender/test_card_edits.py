@@ -390,6 +390,24 @@ def test_what_is_drawn_has_the_edits(hair, evaluated):
         previews.stop_all()
 
 
+def test_cards_that_cannot_be_read_are_drawn_as_made(hair, evaluated):
+    obj = make(hair)
+    move(obj, 3, by=(0.0, 0.0, 1.0))
+    hair.data.hairloom.card_drawing.shown_as = "cards"
+    session = previews.start(hair, evaluated())
+    try:
+        edited = lowest(drawn(session), 3)
+        obj.data.uv_layers.remove(obj.data.uv_layers["UVMap"])
+        obj.data.update_tag()
+        bpy.context.view_layer.update()
+        scene_events.updated(evaluated())
+        scene_events.catch_up(evaluated())
+        assert lowest(drawn(session), 3) < edited - 0.9
+        assert any("lost its UV map" in each for each in session.cards.warnings)
+    finally:
+        previews.stop_all()
+
+
 def drawn(session):
     return overlay.drawing_of(session.uid).snapshot.cards.mesh
 

@@ -84,6 +84,7 @@ class ShownCards:
         self._shown: CardSnapshot | None = None
         self._occluders = Occluders()
         self._edits: CardEdits | None = None
+        self._doubts: tuple[str, ...] = ()
         self._motion: Floats = np.eye(4)
         self.warnings: tuple[str, ...] = ()
 
@@ -196,7 +197,13 @@ class ShownCards:
         return CardInputs(rig, settings.sections, pictures, self._occluders, self._edits)
 
     def _read_edits(self) -> CardEdits | None:
-        return groom_edits(self._hair(), bpy.context.view_layer.depsgraph, self._motion)[0]
+        """Cards that cannot be read are drawn as they are made, with a warning."""
+        depsgraph = bpy.context.view_layer.depsgraph
+        try:
+            edits, self._doubts = groom_edits(self._hair(), depsgraph, self._motion)
+        except HairloomError as error:
+            edits, self._doubts = None, (str(error),)
+        return edits
 
     def _read_occluders(self, settings: GroomSettings) -> Occluders:
         depsgraph = bpy.context.view_layer.depsgraph
@@ -212,7 +219,7 @@ class ShownCards:
             self.warnings = (f"Strands are shown, because there are no cards. {error}",)
             return
         if built is not None:
-            self._built, self.warnings = built, built.notes
+            self._built, self.warnings = built, (*built.notes, *self._doubts)
 
 
 def _same(one: tuple[Rig, GroomSettings], other: tuple[Rig, GroomSettings]) -> bool:

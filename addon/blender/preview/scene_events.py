@@ -296,7 +296,7 @@ def occluders_changed(session: Session, changed: set[int], layer: bpy.types.View
 def cards_edited(session: Session, edited: set[int]) -> bool:
     """Whether the artist may have changed the cards of this groom in the scene."""
     hair = session.hair.handle.find()
-    if hair is None or not session.settings.shows_cards:
+    if not edited or hair is None or not session.settings.shows_cards:
         return False
     cards = {uid for obj in card_objects(hair) for uid in (obj.session_uid, obj.data.session_uid)}
     return not edited.isdisjoint(cards)
