@@ -58,13 +58,16 @@ def children(count: int, **values: Any) -> dict[str, Any]:
     return {"method": "multi", "strand_count": count, **values}
 
 
-def curled(radius: float, turns: float, start: float, stray: float, finer: int) -> Any:
+def curled(
+    radius: float, turns: float, start: float, stray: float, finer: int, apart: float = 0.0
+) -> Any:
     """Blender's Curl node.
 
     Args:
         start: how far along a lock curls begin, 0 to 1.
         stray: how much locks differ in where their turns are, 0 to 1.
         finer: how often each segment is halved first.
+        apart: those nearer to each other than this curl as one lock [m].
     """
     inputs = {
         "Radius": radius,
@@ -72,9 +75,25 @@ def curled(radius: float, turns: float, start: float, stray: float, finer: int) 
         "Subdivision": finer,
         "Curl Start": start,
         "Random Offset": stray,
-        "Guide Distance": 0.0,
+        "Guide Distance": apart,
     }
     return "Curl Hair Curves", inputs
+
+
+def clumped(factor: float, apart: float) -> Any:
+    """Blender's Clump node.
+
+    Args:
+        factor: how near to each other locks come, 0 to 1.
+        apart: those nearer to each other than this are one lock [m].
+    """
+    inputs = {
+        "Factor": factor,
+        "Shape": 0.45,
+        "Preserve Length": True,
+        "Guide Distance": apart,
+    }
+    return "Clump Hair Curves", inputs
 
 
 def toward(x: Any, y: Any, z: Any) -> np.ndarray:
@@ -375,19 +394,32 @@ def layered_fringe(head: Head) -> Any:
 
 @recipe
 def curls(head: Head) -> Any:
-    roots = head.roots(1500, "scalp")
-    length = 0.17 + 0.03 * roots.random[:, 0]
+    roots = head.roots(1700, "scalp")
+    falls, middle = parted(-0.03, 0.3), np.array([0.0, 0.015, 0.0])
+    # shorter from the crown down, so that ends make a round outline
+    length = 0.125 + 0.06 * ramp(0.08, -0.02, roots.height)
+    length = length * (0.8 + 0.3 * roots.random[:, 0])
+    aside = ramp(0.0, 0.07, np.abs(roots.place[:, 0] + 0.03))
+
+    def flow(points: np.ndarray, roots: Roots, reached: np.ndarray) -> np.ndarray:
+        droop = ramp(0.01, 0.09, reached)
+        flat = 0.6 * ramp(0.06, 0.11, points[:, 2])
+        outward = (0.1 + 0.65 * aside) * (1.0 - 0.6 * droop) * (1.0 - flat)
+        return (0.55 + 0.45 * droop)[:, None] * unit(falls(points, roots, reached)) + outward[
+            :, None
+        ] * unit(points - middle)
+
     locks = head.combed(
-        roots, parted(-0.03, 0.35), length, 20, lift=0.5, follow=0.45, clearance=layers(0.03, 0.6)
+        roots, flow, length, 20, lift=0.3 + 0.2 * aside, follow=0.5, clearance=layers(0.035, 0.6)
     )
     return style(
         "Curls",
         90,
         head.shapes(roots, locks, sides(roots, -0.03)),
         "brown",
-        modifiers=(curled(0.0075, 7.0, 0.12, 0.5, 2),),
+        modifiers=(clumped(0.8, 0.015), curled(0.0075, 6.5, 0.12, 1.0, 2, apart=0.015)),
         children=children(
-            16000, method="single", length_variation=0.15, clump=0.75, clump_size=10, frizz=0.004
+            18000, method="single", length_variation=0.15, clump=0.7, clump_size=10, frizz=0.004
         ),
         presets=("dynamics/natural",),
     )

@@ -69,10 +69,11 @@ NOT_IN_COMMITS = (
 #: pictured uncut, and Blender's own texts and gizmos must be a small part of what is compared.
 _LARGE, _SMALL = "1600x1000x24", "1024x700x24"
 _ON_SMALL = (
-    *("cards", "combing", "engine", "first_minutes", "hair_scene", "import", "layers"),
+    *("cards", "combing", "first_minutes", "hair_scene", "import", "layers"),
     *("long_work", "look", "motion", "selection", "shadows", "views"),
 )
 SCREENS = {f"session_{name}": _SMALL for name in _ON_SMALL} | {
+    "session_engine": _LARGE,
     "session_everyday": _LARGE,
     "session_guide_pictures": "1600x1500x24",
     "session_midplay": _LARGE,

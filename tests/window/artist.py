@@ -84,8 +84,9 @@ def field(
     """
     part = next(each for each in area.regions if each.type == kind)
     x = part.x + int(across * part.width)
-    rows = ((x, y) for y in range(part.y + part.height - 5, part.y + 5, -12))
-    for x, y in (*([expected] if expected else ()), *rows):
+    rows = [(x, y) for y in range(part.y + part.height - 5, part.y + 5, -12)]
+    # a mouse that comes from elsewhere is noticed later than one that moves on by a row
+    for x, y in ([expected] * 4 if expected else []) + rows:
         bpy.context.window.event_simulate("MOUSEMOVE", "NOTHING", x=x, y=y)
         yield 1
         with bpy.context.temp_override(area=area, region=part):
