@@ -21,19 +21,22 @@ bpy = pytest.importorskip("bpy", reason="writing cards needs Blender or the bpy 
 
 from hairloom.addon import pipeline  # noqa: E402
 from hairloom.addon.blender.bakes.guide_motion import GuideMotion  # noqa: E402
-from hairloom.addon.blender.cards.build import CardInputs  # noqa: E402
+from hairloom.addon.blender.cards.build import CardInputs, build_steps  # noqa: E402
 from hairloom.addon.blender.cards.files import CardOutput, WrittenCards, write_cards  # noqa: E402
 from hairloom.addon.blender.command_line.inputs import Sources, read_inputs  # noqa: E402
 from hairloom.addon.card_flow import bound_cards, cards_at  # noqa: E402
 from hairloom.addon.cards.atlas_settings import AtlasSettings  # noqa: E402
+from hairloom.addon.cards.edits import CardEdits, edits_of, prints  # noqa: E402
 from hairloom.addon.cards.export_settings import CardExportSettings  # noqa: E402
 from hairloom.addon.cards.settings import CardSettings  # noqa: E402
+from hairloom.addon.cards.steps import result_of  # noqa: E402
 from hairloom.addon.errors import HairloomError  # noqa: E402
 from hairloom.addon.exchange.cards.card_formats import FBX, GLB, USD  # noqa: E402
 from hairloom.addon.groom.settings import GrowSettings, GuideSettings  # noqa: E402
 from hairloom.addon.params import SettingsMap  # noqa: E402
 from hairloom.addon.pipeline import Pose, Rig  # noqa: E402
 from hairloom.addon.shading.texture_settings import TextureSettings  # noqa: E402
+from hairloom.addon.strands import Surface  # noqa: E402
 
 FRAMES, RATE = 31, 30.0
 PANDA_MOTION = Path(__file__).parent / "panda_motion.py"
@@ -266,3 +269,65 @@ def test_the_sidecar_follows_the_schema(
         content["motion"].pop("kind")
         with pytest.raises(jsonschema.ValidationError):
             jsonschema.Draft202012Validator(schema).validate(content)
+
+
+@pytest.fixture(scope="module")
+def card_edits(motion: GuideMotion) -> CardEdits:
+    """One card moved, one deleted, and a copy of one."""
+    build = result_of(build_steps(CardInputs(motion.rig, SETTINGS))).build
+    mesh, made = build.finest, build.made
+    assert made is not None
+    surface = Surface(mesh.positions, mesh.triangles, mesh.uv[mesh.triangles])
+    record = replace(made, marks=prints(surface, mesh.card))
+    positions = mesh.positions.copy()
+    positions[mesh.triangles[mesh.card == 3]] += np.float32([0.0, 0.0, 0.01])
+    copied = mesh.triangles[mesh.card == 7]
+    positions = np.concatenate([positions, mesh.positions + np.float32([0.0, 0.0, 0.02])])
+    left = mesh.card != 5
+    triangles = np.concatenate([mesh.triangles[left], copied + len(mesh.positions)])
+    number = np.concatenate([mesh.card[left], np.full(len(copied), -1)])
+    uv = np.concatenate([mesh.uv, mesh.uv])[triangles]
+    edits = edits_of(Surface(positions, triangles, uv), number, record, np.eye(4))
+    assert (edits.edited, edits.deleted, edits.own) == (1, 1, 1)
+    return edits
+
+
+@pytest.mark.parametrize("kind", ["joints", "springs", "texture"])
+def test_edited_cards_move_too(
+    motion: GuideMotion, card_edits: CardEdits, tmp_path: Path, kind: str
+) -> None:
+    path = tmp_path / "hair.glb"
+    inputs = CardInputs(motion.rig, SETTINGS, edits=card_edits)
+    output = CardOutput(settings=CardExportSettings(motion=kind, chains=20))
+    written = write_cards(path, inputs, output, motion=motion)
+    assert written.build.edits == card_edits.counts
+    there = set(written.mesh.card.tolist())
+    assert 3 in there and 5 not in there and len(there) == 60
+    if kind == "joints":
+        player = Player(path)
+        assert off(player.corners(0.0), simulated(motion, written, 0)).max() < 1e-3
+        middle = FRAMES // 2
+        back = head_matrix(motion, middle)
+        played = [each @ back[:3, :3].T + back[:3, 3] for each in player.corners(middle / RATE)]
+        wrong = off(played, simulated(motion, written, middle))
+        assert np.sqrt(np.mean(wrong**2)) < 0.02 * written.motion["error"]["hair_length"]
+
+
+@pytest.mark.alike
+@pytest.mark.parametrize("suffix", ["fbx", "usdc", "obj"])
+def test_every_format_has_the_edits(
+    motion: GuideMotion, card_edits: CardEdits, tmp_path: Path, suffix: str
+) -> None:
+    """Blender's importers give back as many triangles as the edited cards have."""
+    path = tmp_path / f"hair.{suffix}"
+    inputs = CardInputs(motion.rig, SETTINGS, edits=card_edits)
+    written = write_cards(path, inputs, CardOutput())
+    before = set(bpy.data.meshes)
+    importers = {
+        "fbx": lambda: bpy.ops.import_scene.fbx(filepath=str(path)),
+        "usdc": lambda: bpy.ops.wm.usd_import(filepath=str(path)),
+        "obj": lambda: bpy.ops.wm.obj_import(filepath=str(path)),
+    }
+    importers[suffix]()
+    counts = {len(mesh.polygons) for mesh in set(bpy.data.meshes) - before}
+    assert len(written.mesh.triangles) in counts
