@@ -16,8 +16,8 @@ from extension_loader import PACKAGE
 UP = np.array([0.0, 0.0, 1.0])
 #: where hair grows away from in a whorl: the crown
 CROWN = np.array([0.012, 0.062, 0.092])
-#: balls over the ears, on which hair that covers them lies: where the right one is, and its radius
-EAR_COVER, EAR_RADIUS = np.array([0.0435, 0.008, -0.008]), 0.047
+#: balls over the right ear and above it, on which hair that covers ears lies: where, and the radius
+EAR_COVER = (((0.0155, 0.012, -0.008), 0.075), ((0.02, 0.012, 0.03), 0.063))
 GRAVITY, FRAME = np.array([0.0, 0.0, -9.81]), 1.0 / 24.0
 
 #: a direction for each point (n, 3) of locks with these roots (n, 3), `reached` (n,) [m] along
@@ -89,8 +89,9 @@ class Head:
         """The head, and balls that make it round where its ears are."""
         colliders = of_addon("dynamics.colliders")
         balls = [
-            colliders.SphereCollider(tuple(EAR_COVER * (side, 1.0, 1.0)), EAR_RADIUS)
+            colliders.SphereCollider((side * x, y, z), radius)
             for side in (-1.0, 1.0)
+            for (x, y, z), radius in EAR_COVER
         ]
         return self.collider, *(colliders.PosedCollider(b, np.eye(4), np.eye(4)) for b in balls)
 
