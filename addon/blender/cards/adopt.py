@@ -210,17 +210,25 @@ def _corners(mesh: bpy.types.Mesh) -> Ints:
     return found
 
 
-def _triangles(mesh: bpy.types.Mesh, matrix: Floats) -> tuple[Surface, Ints, Ints]:
+def loop_triangles(mesh: bpy.types.Mesh) -> tuple[Floats, Ints, Ints, Ints]:
+    """The vertices' places (n, 3) float32 in the mesh's own space, and of each triangle its
+    vertices and loops, both (m, 3) int32, and its polygon, (m,) int32.
+    """
     mesh.calc_loop_triangles()
     count = len(mesh.loop_triangles)
-    triangles, corner = np.empty((2, count, 3), np.int32)
+    triangles, loops = np.empty((2, count, 3), np.int32)
     polygon = np.empty(count, np.int32)
     mesh.loop_triangles.foreach_get("vertices", triangles.ravel())
-    mesh.loop_triangles.foreach_get("loops", corner.ravel())
+    mesh.loop_triangles.foreach_get("loops", loops.ravel())
     mesh.loop_triangles.foreach_get("polygon_index", polygon)
     positions = np.empty((len(mesh.vertices), 3), np.float32)
     mesh.vertices.foreach_get("co", positions.ravel())
-    corner_uv = read_corner_uv(mesh) if count else None
+    return positions, triangles, loops, polygon
+
+
+def _triangles(mesh: bpy.types.Mesh, matrix: Floats) -> tuple[Surface, Ints, Ints]:
+    positions, triangles, corner, polygon = loop_triangles(mesh)
+    corner_uv = read_corner_uv(mesh) if len(triangles) else None
     surface = Surface(positions, triangles, corner_uv).transformed(matrix)
     if np.linalg.det(matrix[:3, :3]) < 0.0:  # mirrored triangles have been turned over
         corner = corner[:, ::-1]

@@ -18,6 +18,7 @@ from ...errors import HairloomError
 from ...strands import Surface
 from ..base.attributes import read_attribute
 from ..base.objects import matrix_of
+from .adopt import loop_triangles
 from .made_objects import card_objects
 from .mesh import OCCLUSION_LAYER
 
@@ -84,17 +85,9 @@ def read_pieces(mesh: bpy.types.Mesh) -> tuple[Surface, Ints | None]:
     Raises:
         HairloomError: it has no UV map.
     """
-    mesh.calc_loop_triangles()
-    count = len(mesh.loop_triangles)
-    triangles, corners = np.empty((2, count, 3), np.int32)
-    polygon = np.empty(count, np.int32)
-    mesh.loop_triangles.foreach_get("vertices", triangles.ravel())
-    mesh.loop_triangles.foreach_get("loops", corners.ravel())
-    mesh.loop_triangles.foreach_get("polygon_index", polygon)
-    positions = np.empty((len(mesh.vertices), 3), np.float32)
-    mesh.vertices.foreach_get("co", positions.ravel())
+    positions, triangles, corners, polygon = loop_triangles(mesh)
     uv = np.zeros((len(mesh.loops), 2), np.float32)
-    if count:
+    if len(triangles):
         _tile_layer(mesh).uv.foreach_get("vector", uv.ravel())
     number = read_attribute(mesh, MADE_ATTRIBUTE, "FACE")
     made = None if number is None else number[polygon].astype(np.int32) - 1
