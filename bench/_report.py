@@ -1,10 +1,13 @@
-"""How benchmarks begin, and tell what they found: a line a figure, then all of it as JSON."""
+"""How benchmarks begin, and report what they found: a line a figure, then all of it as JSON."""
 
 from __future__ import annotations
 
 import json
+import operator
 import platform
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
 from typing import Any
 
 import bpy
@@ -20,11 +23,54 @@ def start() -> None:
     gpu.init()
 
 
-def tell(found: Mapping[str, Any], reference: str) -> None:
-    """Print the figures. `reference`: what ratios and errors are against."""
+def report(
+    found: Mapping[str, Any],
+    reference: str,
+    *,
+    at_most: Mapping[str, float] | None = None,
+    at_least: Mapping[str, float] | None = None,
+) -> int:
+    """Print the figures and what is missed; the exit status: 1 if a figure misses its limit.
+
+    found: figures by name; None is one that has not been measured. reference: what ratios and
+    errors are against. at_most, at_least: limits by name, or by a pattern of names such as
+    `*_seconds`. One for which nothing was found asks nothing; NaN misses every limit.
+    """
+    limits = _limits(found, at_most or {}, operator.le) | _limits(
+        found, at_least or {}, operator.ge
+    )
+    missed = [name for name, limit in limits.items() if not limit.holds(found[name])]
     for name, value in found.items():
-        print(f"{name:40} {f'{value:14.{DIGITS}f}' if isinstance(value, float) else value}")
-    print(json.dumps({**_rounded(found), "reference": reference, **machine()}))
+        shown = f"{value:14.{DIGITS}f}" if isinstance(value, float) else f"{value!s:>14}"
+        told = f"   {limits[name]}" if name in limits else ""
+        print(f"{name:40} {shown}{told}{', missed' if name in missed else ''}")
+    about = {"limits": {name: str(limit) for name, limit in limits.items()}, "missed": missed}
+    print(json.dumps({**_rounded(found), "reference": reference, **about, **machine()}), flush=True)
+    return int(bool(missed))
+
+
+@dataclass(frozen=True)
+class _Limit:
+    holds_for: Callable[[float, float], bool]
+    value: float
+
+    def holds(self, found: float) -> bool:
+        return self.holds_for(found, self.value)
+
+    def __str__(self) -> str:
+        return f"at {'most' if self.holds_for is operator.le else 'least'} {self.value:,.10g}"
+
+
+def _limits(
+    found: Mapping[str, Any], patterns: Mapping[str, float], holds: Callable[[float, float], bool]
+) -> dict[str, _Limit]:
+    """Of all figures that have been measured and that a pattern names."""
+    return {
+        name: _Limit(holds, value)
+        for pattern, value in patterns.items()
+        for name in found
+        if found[name] is not None and fnmatchcase(name, pattern)
+    }
 
 
 def machine() -> dict[str, str]:

@@ -8,6 +8,7 @@ make bench NAME=cards           some minutes; writes out/cards_sheet.png
 
 from __future__ import annotations
 
+import sys
 from typing import Any
 
 from _cards_atlas import atlas_figures
@@ -16,7 +17,7 @@ from _cards_occlusion import occlusion_figures
 from _cards_order import order_figures
 from _cards_passes import passes_figures
 from _cards_strands import strands_figures
-from _report import start, tell
+from _report import report, start
 
 REFERENCE = (
     "rays one by one; cards sorted for each view and pixels sorted; the strands "
@@ -24,7 +25,7 @@ REFERENCE = (
 )
 
 
-def main() -> None:
+def main() -> int:
     start()
     found: dict[str, Any] = {
         **build_figures(),
@@ -34,7 +35,7 @@ def main() -> None:
         **passes_figures(),
         **strands_figures(),
     }
-    tell(found, REFERENCE)
+    return report(found, REFERENCE)
 
 
-main()
+sys.exit(main())

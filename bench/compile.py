@@ -23,8 +23,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
+from _report import report
 from _report import start as start_bench
-from _report import tell
 from extension_loader import REPOSITORY
 
 from hairloom.addon.blender.sessions.prepared_groom import prepared
@@ -94,9 +94,7 @@ def main(arguments: list[str]) -> int:
             f"{name}_ratio": seconds / reference,
         }
     limits = {f"{name}_ratio": most for name, most in LIMITS.items()} if is_software() else {}
-    missed = [name for name, most in limits.items() if found.get(name, 0.0) > most]
-    tell({**found, "missed": missed}, REFERENCE)
-    return int(bool(missed))
+    return report(found, REFERENCE, at_most=limits)
 
 
 def in_own_process(name: str) -> tuple[float, float]:

@@ -18,8 +18,8 @@ from itertools import pairwise
 import numpy as np
 from _cards_groom import sintel_rig
 from _forms import ComputeForm, Form, NumpyForm, has_compute
+from _report import report
 from _report import start as start_bench
-from _report import tell
 from shaken import GRAVITY
 
 from hairloom.addon import pipeline
@@ -44,8 +44,8 @@ from hairloom.addon.strands.closest_point import closest_point
 
 REFERENCE = "the triangles of the colliders"
 FPS, SAMPLES = 60.0, 6
-#: How deep a guide may be in a head, by the demo's shake and by the fast one [mm].
-MOST_MM, MOST_FAST_MM = 0.5, 1.0
+#: of plates and fingers, guides that pass through; how deep they may be in a head [mm]
+AT_MOST = {"*_passed": 0, "*_demo_depth_worst_mm": 0.5, "*_fast_depth_worst_mm": 1.0}
 #: A head at 5 Hz and 5.6 m/s.
 FAST_RATE, FAST_SWAY = 5.0, 0.178
 Motion = Callable[[float], np.ndarray]
@@ -349,18 +349,7 @@ def main(arguments: list[str]) -> int:
     use_compute = "compute" in arguments and has_compute()
     found = figures(ComputeForm if use_compute else NumpyForm, set(arguments) - {"compute"})
     flat = {f"{name}_{key}": value for name, part in found.items() for key, value in part.items()}
-    missed = [name for name, value in flat.items() if value > limit_of(name)]
-    tell({**flat, "missed": missed}, REFERENCE)
-    return int(bool(missed))
-
-
-def limit_of(name: str) -> float:
-    """The most that a figure may be; infinite for those without a limit."""
-    if name.endswith("_passed"):
-        return 0.0
-    if not name.endswith("_depth_worst_mm") or not name.startswith(("sintel", "built_in")):
-        return np.inf
-    return MOST_FAST_MM if "_fast_" in name else MOST_MM
+    return report(flat, REFERENCE, at_most=AT_MOST)
 
 
 sys.exit(main(sys.argv[1:]))

@@ -5,18 +5,20 @@ add-on does that follows the obvious path. It only copies positions; ours also t
 radii, moves all into world space and checks every curve.
 """
 
-import json
-import platform
 import statistics
+import sys
 import time
 from collections.abc import Callable
 
 import bpy
 import numpy as np
+from _report import report, start
 
 from hairloom.addon.blender.scene.curves import read_curves, write_curves
 from hairloom.addon.strands import StrandSet
 
+REFERENCE = "points.foreach_get('position')"
+AT_MOST = {"read_ms": 50.0}
 CURVES, POINTS, ROUNDS = 100_000, 16, 9
 
 
@@ -40,7 +42,8 @@ def combed(seed: int = 0) -> StrandSet:
     )
 
 
-def main() -> None:
+def main() -> int:
+    start()
     hair = write_curves("bench", combed(), None, bpy.context.scene.collection)
     hair.matrix_world = ((0.6, -0.8, 0, 1), (0.8, 0.6, 0, 2), (0, 0, 2, 3), (0, 0, 0, 1))
     depsgraph = bpy.context.evaluated_depsgraph_get()
@@ -49,21 +52,13 @@ def main() -> None:
     assert read_curves(hair, depsgraph).strands.strand_count == CURVES
     read_ms = median_ms(lambda: read_curves(hair, depsgraph))
     reference_ms = median_ms(lambda: points.foreach_get("position", buffer))
-    print(
-        json.dumps(
-            {
-                "read_ms": round(read_ms, 2),
-                "points": CURVES * POINTS,
-                "reference": "points.foreach_get('position')",
-                "reference_ms": round(reference_ms, 2),
-                "ratio": round(reference_ms / read_ms, 2),
-                "limit_ms": 50.0,
-                "blender": bpy.app.version_string,
-                "python": platform.python_version(),
-                "numpy": np.__version__,
-            }
-        )
-    )
+    found = {
+        "read_ms": read_ms,
+        "points": CURVES * POINTS,
+        "reference_ms": reference_ms,
+        "ratio": reference_ms / read_ms,
+    }
+    return report(found, REFERENCE, at_most=AT_MOST)
 
 
-main()
+sys.exit(main())

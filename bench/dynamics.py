@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import argparse
 import statistics
+import sys
 from collections.abc import Callable
 from typing import Any
 
@@ -21,7 +22,7 @@ import bpy
 import numpy as np
 from _forms import ComputeForm, Form, NumpyForm, has_compute, play
 from _hair_dynamics import HairDynamics, animate
-from _report import tell
+from _report import report
 from _shaken_head import RADIUS, Shake, depth_in, guides_on, new_head, surface_of, sway
 
 from hairloom.addon.dynamics.colliders import DistanceField, SphereCollider
@@ -31,6 +32,10 @@ from hairloom.addon.dynamics.state import DynamicsState, start
 from hairloom.addon.dynamics.step import Drive
 from hairloom.addon.strands import StrandSet, Surface
 
+REFERENCE = "Hair Dynamics, Physics, surface collision, 10 x 15 (as shipped)"
+AT_MOST = {"stretch_max_percent": 1.0, "penetration_sphere_mm": 0.001, "penetration_mesh_mm": 0.1}
+#: times faster than the peer
+AT_LEAST = {"ratio_numpy": 1.0, "ratio_compute": 1.0}
 GUIDES, FPS, WARM_UP = 762, 60.0, 10
 #: A busy minute of the machine shall not meet all rounds, nor a busy second all plays of a round.
 ROUNDS, PLAYS, SCALING_ROUNDS = 7, 4, 3
@@ -41,7 +46,7 @@ SETTINGS = DynamicsSettings()
 Forms = dict[str, Callable[[DynamicsState], Form]]
 
 
-def main() -> None:
+def main() -> int:
     options = argparse.ArgumentParser()
     options.add_argument("--peer-10k", action="store_true", help="the peer with 10,000 guides too")
     asked = options.parse_args()
@@ -65,7 +70,7 @@ def main() -> None:
         )
     if asked.peer_10k:
         found["hair_dynamics_10k_ms"] = peer_10k(head, surface)
-    tell(found, "Hair Dynamics, Physics, surface collision, 10 x 15 (as shipped)")
+    return report(found, REFERENCE, at_most=AT_MOST, at_least=AT_LEAST)
 
 
 def race(
@@ -180,4 +185,4 @@ def peer_10k(head: bpy.types.Object, surface: Surface) -> float:
     return statistics.median(times)
 
 
-main()
+sys.exit(main())

@@ -8,18 +8,19 @@ make bench NAME=engine          some minutes
 
 from __future__ import annotations
 
+import sys
 from typing import Any
 
 from _engine_frames import frame_figures
 from _engine_picture import picture_figures
 from _engine_shafts import shafts_figures
 from _engine_skin import skin_figures
-from _report import start, tell
+from _report import report, start
 
 REFERENCE = "the same scene at 1,024 samples; another process; the tenth frame"
 
 
-def main() -> None:
+def main() -> int:
     start()
     found: dict[str, Any] = {
         **picture_figures(),
@@ -27,7 +28,7 @@ def main() -> None:
         **shafts_figures(),
         **frame_figures(),
     }
-    tell(found, REFERENCE)
+    return report(found, REFERENCE)
 
 
-main()
+sys.exit(main())

@@ -14,29 +14,29 @@ tools/bench.py exchange whole kills "damaged files"    of these parts alone
 
 from __future__ import annotations
 
-import json
-import platform
 import sys
 import time
 from collections.abc import Callable
 from typing import Any
 
-import numpy as np
 from _exchange_alembic import alembic_figures, processor_seconds
 from _exchange_blender import blender_figures
 from _exchange_files import file_timings, fuzz_figures, kill_figures
 from _exchange_motion import motion_figures
 from _exchange_round_trip import round_trip_figures
 from _exchange_usd import usd_figures
+from _report import report, start
 
 #: damaged files of a format that we parse, and of one that a library parses in another process;
 #: kills of a format's writer; seconds of motion
 FEW, WHOLE = (1_000, 30, 5, 0.5), (10_000, 1_000, 100, 2.0)
+REFERENCE = "Blender's own Alembic and USD of the same strands, positions and widths only"
 #: what there may be none of
-NONE = ("fuzz_failures", "kill_failures", "kill_mixed", "kill_leftovers")
+AT_MOST = dict.fromkeys(("fuzz_failures", "kill_failures", "kill_mixed", "kill_leftovers"), 0)
 
 
 def main(chosen: list[str], *, is_whole: bool) -> int:
+    start()
     ours, libraries, kills, seconds = WHOLE if is_whole else FEW
     parts: dict[str, Callable[[], dict[str, float]]] = {
         "alembic": alembic_figures,
@@ -54,14 +54,9 @@ def main(chosen: list[str], *, is_whole: bool) -> int:
         begun, processed = time.perf_counter(), processor_seconds()
         figures = measure()
         wall, processor = time.perf_counter() - begun, processor_seconds() - processed
-        print(f"\n{name}, {wall:.0f} s, processor {processor:.0f} s")
-        for figure, value in figures.items():
-            print(f"{figure:40} {value:14.6g}", flush=True)
+        print(f"{name}, {wall:.0f} s, processor {processor:.0f} s", flush=True)
         found |= figures
-    print(json.dumps({**({} if chosen else summary(found)), **found, **machine()}))
-    missed = [name for name in NONE if found.get(name)]
-    print(f"missed: {', '.join(missed) or 'none'}")
-    return int(bool(missed))
+    return report({**({} if chosen else summary(found)), **found}, REFERENCE, at_most=AT_MOST)
 
 
 def summary(found: dict[str, float]) -> dict[str, float]:
@@ -81,14 +76,6 @@ def summary(found: dict[str, float]) -> dict[str, float]:
 
 def ratio(found: dict[str, float], ours: str, blenders: str) -> float:
     return found[f"{ours}_seconds"] / found[f"blender_{blenders}_seconds"]
-
-
-def machine() -> dict[str, str]:
-    return {
-        "reference": "Blender's own Alembic and USD of the same strands, positions and widths only",
-        "python": platform.python_version(),
-        "numpy": np.__version__,
-    }
 
 
 sys.exit(main([each for each in sys.argv[1:] if each != "whole"], is_whole="whole" in sys.argv))

@@ -17,7 +17,7 @@ from itertools import count
 from typing import Any
 
 import numpy as np
-from _report import start, tell
+from _report import report, start
 from _suzanne import suzanne
 from _volume_transparency import _target
 from gpu_calls import gpu_calls
@@ -38,7 +38,7 @@ STRANDS, WIDTH, HEIGHT, ROUNDS = 3000, 320, 240, 7
 #: [rad] by which a view turns from frame to frame
 TURN = float(np.radians(1.5))
 #: figure -> most that it may be
-LIMITS = {
+AT_MOST = {
     "readbacks_per_frame": 0,
     "playing_ratio": 1.2,
     "still_readbacks": 0,
@@ -59,10 +59,7 @@ def main() -> int:
         **stage.orbit_figures(),
         **stage.two_view_figures(),
     }
-    tell(found, REFERENCE)
-    missed = [name for name, most in LIMITS.items() if found[name] > most]
-    print("limits missed:", ", ".join(missed) or "none")
-    return len(missed)
+    return report(found, REFERENCE, at_most=AT_MOST)
 
 
 @dataclass(eq=False)

@@ -29,7 +29,7 @@ import numpy as np
 import OpenImageIO as oiio
 from _picture_environment import environment
 from _picture_soft_shadows import soft_shadows
-from _report import start, tell
+from _report import report, start
 
 import hairloom
 from hairloom.addon.blender.base.parts import at_once
@@ -45,7 +45,7 @@ DEPTH_TOLERANCE, BLUR_SIZE = 0.01, 320
 #: size of a picture that is not timed [percent]
 WARMING_UP = 10
 #: figure -> the most that it may be
-MOST = {
+AT_MOST = {
     **{f"over_{engine}_depth_mismatch_percent": 0.1 for engine in ENGINES},
     **{f"over_{engine}_outside_difference": 0.0 for engine in ENGINES},
     "over_eevee_seconds_ratio": 1.0,
@@ -197,9 +197,7 @@ def main() -> int:
     if "soft_shadows" in parts:
         empty_file()
         found |= soft_shadows(rendered)
-    missed = {name: most for name, most in MOST.items() if found.get(name, 0.0) > most}
-    tell({**found, "limits_missed": sorted(missed)}, REFERENCE)
-    return 1 if missed else 0
+    return report(found, REFERENCE, at_most=AT_MOST)
 
 
 if __name__ == "__main__":

@@ -9,15 +9,14 @@ end when the GPU has done it, `gpu_draw_ms` has nothing to pack and to upload. `
 `gpu_frame_ms` are the three stages of either way together.
 """
 
-import json
-import platform
 import statistics
+import sys
 import time
 from collections.abc import Callable
 
-import bpy
 import gpu
 import numpy as np
+from _report import report, start
 from _suzanne import suzanne
 from gpu_extras.batch import batch_for_shader
 from mathutils import Matrix
@@ -86,8 +85,8 @@ def ridden(solver: ComputeSolver, snapshot: Snapshot) -> Snapshot:
     return shown
 
 
-def main() -> None:
-    gpu.init()
+def main() -> int:
+    start()
     head = suzanne()
     strands = grow(head, GrowSettings(strand_count=STRANDS), scalp_density(head))
     rig = pipeline.prepare(strands, head, GuideSettings(), place="bench")
@@ -141,20 +140,8 @@ def main() -> None:
     medians = watch.medians()
     for way, stages in WAYS.items():
         medians[f"{way}_frame_ms"] = round(sum(medians[stage] for stage in stages), 3)
-    print(
-        json.dumps(
-            {
-                **medians,
-                "strands": STRANDS,
-                "reference": "LINES, builtin UNIFORM_COLOR, batch_for_shader each frame",
-                "draw_ratio": round(medians["lines_ms"] / medians["draw_ms"], 3),
-                "backend": gpu.platform.backend_type_get(),
-                "renderer": gpu.platform.renderer_get(),
-                "blender": bpy.app.version_string,
-                "python": platform.python_version(),
-            }
-        )
-    )
+    medians |= {"strands": STRANDS, "draw_ratio": medians["lines_ms"] / medians["draw_ms"]}
+    return report(medians, "LINES, builtin UNIFORM_COLOR, batch_for_shader each frame")
 
 
-main()
+sys.exit(main())

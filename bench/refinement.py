@@ -7,19 +7,29 @@ make bench NAME=refinement          about two minutes
 
 from __future__ import annotations
 
+import sys
 from typing import Any
 
 from _refinement_node import node_figures
 from _refinement_views import view_figures
-from _report import start, tell
+from _report import report, start
 
 REFERENCE = "Blender's Interpolate Hair Curves node; one piece a segment; the exact curve"
+#: figure -> the most, and the least, that it may be
+AT_MOST = {
+    "error_px_max": 0.5,
+    "vertices_undivided_ratio": 1.5,
+    "frame_ratio_undivided": 1.43,
+    "gpu_cpu_difference": 1e-5,
+    "coverage_eighth_difference": 0.03,
+}
+AT_LEAST = {"vertices_fixed64_ratio": 42.0}
 
 
-def main() -> None:
+def main() -> int:
     start()
     found: dict[str, Any] = {**view_figures(), **node_figures()}
-    tell(found, REFERENCE)
+    return report(found, REFERENCE, at_most=AT_MOST, at_least=AT_LEAST)
 
 
-main()
+sys.exit(main())

@@ -31,7 +31,7 @@ import numpy as np
 from _combing import combed, styled
 from _growing import edited
 from _jobs import silent
-from _report import start, tell
+from _report import report, start
 
 import hairloom
 from hairloom.addon.blender.base.parts import at_once
@@ -39,7 +39,7 @@ from hairloom.addon.blender.setup.sample_scene import add_sample_scene
 from hairloom.addon.blender.strands.make_real import make_real
 
 REFERENCE = "the same scene before Make Real"
-MOST = {
+AT_MOST = {
     "make_real_flip": 0.05,
     "comb_ms": 100.0,
     "comb_undo_ms": 100.0,
@@ -66,9 +66,7 @@ def main(parts: list[str]) -> int:
     if not parts:
         found |= _figures({})
         found |= {f"{name}_tinted": value for name, value in _figures(TINTED).items()}
-    missed = [name for name, most in MOST.items() if found.get(name, 0.0) > most]
-    tell({**found, "missed": missed}, REFERENCE)
-    return int(bool(missed))
+    return report(found, REFERENCE, at_most=AT_MOST)
 
 
 def _figures(look: dict[str, float]) -> dict[str, float]:

@@ -14,7 +14,7 @@ import sys
 from collections.abc import Callable
 from typing import Any
 
-from _report import start, tell
+from _report import report, start
 from _sight_cover import cover
 from _sight_grooms import GROOMS, lost_curves
 from _sight_missing import missing_percent
@@ -23,7 +23,7 @@ from _sight_pictures import count_figures, cycles_figures, scale_flip
 
 REFERENCE = "hashed strands, which keep no lists; strands as wide as they are apart; Cycles"
 #: figure -> the most, and the least, that it may be
-MOST = {
+AT_MOST = {
     "missing_percent": 0.0,
     "lost_curves": 0,
     "scale_flip": 0.02,
@@ -31,7 +31,7 @@ MOST = {
     "count_light_percent": 5.0,
     "cycles_flip_hair": 0.15,
 }
-LEAST = dict.fromkeys((f"cover_{name}" for name in GROOMS), 0.9)
+AT_LEAST = dict.fromkeys((f"cover_{name}" for name in GROOMS), 0.9)
 #: strands, width and height of the picture, how much wider the strands are than they grow
 CROWDED = (
     (100_000, 1920, 1440, 1.0),
@@ -69,10 +69,7 @@ def main(names: list[str]) -> int:
     found: dict[str, Any] = {}
     for name in names or PARTS:
         found |= PARTS[name]()
-    missed = [name for name, most in MOST.items() if found.get(name, most) > most]
-    missed += [name for name, least in LEAST.items() if found.get(name, least) < least]
-    tell({**found, "missed": missed}, REFERENCE)
-    return int(bool(missed))
+    return report(found, REFERENCE, at_most=AT_MOST, at_least=AT_LEAST)
 
 
 sys.exit(main(sys.argv[1:]))

@@ -25,7 +25,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from _report import start, tell
+from _report import report, start
 from _sight_grooms import GROOMS, Pair, rig_of
 from _strands_cost import cost_figures
 
@@ -56,7 +56,7 @@ GRAVITY = np.array([0.0, 0.0, -9.81])
 #: of the coils [m]; points of each before it is made ready
 COILS, TURNS, COIL_RADIUS, COIL_LENGTH, COIL_POINTS = 8000, 20, 0.004, 0.15, 400
 #: figure -> the most, and the least, that it may be
-MOST = {
+AT_MOST = {
     "length_p99_percent": 0.2,
     "length_worst_percent": 1.0,
     "segments_worst_percent": 2.0,
@@ -69,7 +69,7 @@ MOST = {
     "numpy_cost_ratio": 3.0,
     "compute_cost_ratio": 2.0,
 }
-LEAST = {"coil_length_kept": 0.995}
+AT_LEAST = {"coil_length_kept": 0.995}
 
 
 def coils() -> Pair:
@@ -317,14 +317,11 @@ def main(names: list[str]) -> int:
         print(name, {key: round(value, 6) for key, value in figures.items()}, flush=True)
     worst = {
         key: max(value for name, value in found.items() if name.endswith(f"_{key}"))
-        for key in MOST
+        for key in AT_MOST
         if any(name.endswith(f"_{key}") for name in found)
     }
-    kept = {key: found[f"coil_{key}"] for key in LEAST if f"coil_{key}" in found}
-    missed = [key for key, value in worst.items() if value > MOST[key]]
-    missed += [key for key, value in kept.items() if value < LEAST[key]]
-    tell({**found, **worst, **kept, "missed": missed}, REFERENCE)
-    return int(bool(missed))
+    kept = {key: found[f"coil_{key}"] for key in AT_LEAST if f"coil_{key}" in found}
+    return report({**found, **worst, **kept}, REFERENCE, at_most=AT_MOST, at_least=AT_LEAST)
 
 
 sys.exit(main(sys.argv[1:]))

@@ -34,7 +34,7 @@ from typing import Any
 import bpy
 import numpy as np
 from _combing import combed, painted, styled
-from _report import start, tell
+from _report import report, start
 from mathutils import Vector
 
 import hairloom
@@ -55,8 +55,15 @@ from hairloom.addon.strands.closest_point import ClosestPointSearch
 
 REFERENCE = "the curves that Blender evaluates, and the triangles of the built-in head"
 #: how many there are at least: heads of hair, and brows, lashes, beards and fur
-LEAST_HEADS, LEAST_EXTRAS = 16, 7
-LIMITS = {"inside_percent": 0.0, "length_error_percent": 0.5, "seconds": 3.0}
+AT_LEAST = {"heads": 16, "extras": 7}
+AT_MOST = {
+    "*_inside_percent": 0.0,
+    "*_length_error_percent": 0.5,
+    "*_seconds": 3.0,
+    "edit_ms": 100.0,
+    "paint_ms": 500.0,
+    "fit_distance_mm": 0.5,
+}
 #: the most skin that shows inside of the hairline [%]
 BALD = 1.0
 #: styles whose name asks for skin that shows -> the most [%]; None: nothing is to be covered
@@ -76,8 +83,6 @@ DEEP = 0.001  # [m]
 _CHUNK = 2_000_000
 #: styles that are put on other heads, and what is promised of them there
 FITTED = ("long_straight", "curls", "full_beard")
-EDIT_LIMITS = {"edit_ms": 100.0, "paint_ms": 500.0}
-FIT_LIMITS = {"fit_distance_mm": 0.5, "fit_inside_percent": 0.0}
 DATA = Path(os.environ.get("HAIRLOOM_DATA", Path(__file__).parents[2] / "shared" / "data"))
 #: of MakeHuman's base mesh: vertices of its skin, and the middle of its skull [m]
 SKIN, MAKEHUMANS_SKULL = 13380, np.array([0.0, -0.06, 0.735])
@@ -287,15 +292,12 @@ def main(names: list[str]) -> int:
     masks = [named_hairstyle(name).masks.get("children", "") for name in styles]
     heads = masks.count("scalp")
     found |= {"heads": heads, "extras": len(styles) - heads}
-    missed = [] if heads >= LEAST_HEADS else ["heads"]
-    missed += [] if found["extras"] >= LEAST_EXTRAS else ["extras"]
+    at_most = dict(AT_MOST)
     if not names or "fit" in names:
         found |= fit_figures()
-        missed += [key for key, most in FIT_LIMITS.items() if found[key] > most]
     if not names or "edit" in names:
         hair = styled("curls")
         found |= {"edit_ms": combed(hair)["comb_ms"], **painted(hair)}
-        missed += [key for key, most in EDIT_LIMITS.items() if found[key] > most]
     parts = ("fit", "edit")
     for name in [name for name in names if name not in parts] or (styles if not names else []):
         rig, seconds, length_error = added(name)
@@ -307,17 +309,13 @@ def main(names: list[str]) -> int:
             "length_error_percent": length_error,
             "seconds": seconds,
         }
-        limits, bare = dict(LIMITS), BARE.get(name, BALD)
+        bare = BARE.get(name, BALD)
         if bare is not None:
-            figures["bald_percent"], limits["bald_percent"] = bald(rig.strands, head, group), bare
-        missed += [f"{name}_{key}" for key, most in limits.items() if figures[key] > most]
+            figures["bald_percent"] = bald(rig.strands, head, group)
+            at_most[f"{name}_bald_percent"] = bare
         found |= {f"{name}_{key}": value for key, value in figures.items()}
         print(name, {key: round(value, 3) for key, value in figures.items()}, flush=True)
-    for key in (*LIMITS, "bald_percent"):
-        values = [value for name, value in found.items() if name.endswith(f"_{key}")]
-        found[f"worst_{key}"] = max(values, default=0.0)
-    tell({**found, "missed": missed}, REFERENCE)
-    return int(bool(missed))
+    return report(found, REFERENCE, at_most=at_most, at_least=AT_LEAST)
 
 
 sys.exit(main(sys.argv[1:]))

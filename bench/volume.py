@@ -9,9 +9,10 @@ make bench NAME=volume          some minutes; writes out/volume_sheet.png and ou
 
 from __future__ import annotations
 
+import sys
 from typing import Any
 
-from _report import start, tell
+from _report import report, start
 from _volume_balls import ball_figures
 from _volume_cost import cost_figures
 from _volume_shadows import shadow_figures
@@ -24,7 +25,7 @@ REFERENCE = (
 )
 
 
-def main() -> None:
+def main() -> int:
     start()
     found: dict[str, Any] = {
         **cost_figures(),
@@ -33,7 +34,7 @@ def main() -> None:
         **ball_figures(),
         **sintel_figures(),
     }
-    tell(found, REFERENCE)
+    return report(found, REFERENCE)
 
 
-main()
+sys.exit(main())

@@ -1,0 +1,53 @@
+"""What a benchmark prints, and how it ends."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+sys.path.append(str(Path(__file__).parents[2] / "bench"))
+from _report import report
+
+
+@pytest.mark.parametrize(
+    ("found", "at_most", "at_least", "missed"),
+    [
+        ({"a": 1.0}, {"a": 1.0}, {}, []),
+        ({"a": 1.1}, {"a": 1.0}, {}, ["a"]),
+        ({"a": 0.9}, {}, {"a": 1.0}, ["a"]),
+        ({"a": float("nan")}, {"a": 1.0}, {}, ["a"]),
+        ({"a": float("nan")}, {}, {"a": 1.0}, ["a"]),
+        ({"a": None}, {"a": 1.0}, {}, []),
+        ({"b": 5.0}, {"a": 1.0}, {}, []),
+        ({"x_ms": 1.0, "y_ms": 3.0, "ms": 9.0}, {"*_ms": 2.0}, {}, ["y_ms"]),
+        ({"a": 1.0, "b": 1.0}, {"a": 0.0}, {"b": 2.0}, ["a", "b"]),
+    ],
+)
+def test_limits(
+    found: dict[str, Any],
+    at_most: dict[str, float],
+    at_least: dict[str, float],
+    missed: list[str],
+    capsys: pytest.CaptureFixture[str],
+    gpu_context: object,
+) -> None:
+    status = report(found, "one", at_most=at_most, at_least=at_least)
+    *lines, last = capsys.readouterr().out.splitlines()
+    told = json.loads(last)
+    assert status == int(bool(missed))
+    assert told["missed"] == missed
+    assert [line.split()[0] for line in lines if line.endswith("missed")] == missed
+    assert told["reference"] == "one"
+    assert {"backend", "renderer", "blender", "python", "numpy"} <= set(told)
+
+
+def test_the_json_has_the_limits_in_words(
+    capsys: pytest.CaptureFixture[str], gpu_context: object
+) -> None:
+    report({"bytes": 5, "kept": 0.9}, "", at_most={"bytes": 6e6}, at_least={"kept": 0.8})
+    told = json.loads(capsys.readouterr().out.splitlines()[-1])
+    assert told["limits"] == {"bytes": "at most 6,000,000", "kept": "at least 0.8"}
