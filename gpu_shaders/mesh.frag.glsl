@@ -2,7 +2,7 @@
 // throws SHADOWS on them, and meshes do; where a light has no map of hair, the occlusion stands in.
 // OTHERS: there is more hair in the way than the maps hold. On SKIN the
 // shadow is looked up where it has been spread. PICTURES of the material take the place of its colour,
-// and bend its normals. HASHED and BLENDED: it does not cover all.
+// and bend its normals. HASHED and BLENDED: it does not cover all. EMISSION: it shines.
 #include "lib_lights.glsl"
 #include "lib_environment.glsl"
 #include "lib_microfacet.glsl"
@@ -113,6 +113,9 @@ void main()
     float shine = ggx_reflection(normal, to_light, to_eye, mesh_specular, mesh_roughness);
     radiance += irradiance * reaching * facing * (matt / LIGHT_PI + shine);
   }
+#ifdef EMISSION
+  radiance += mesh_emission;
+#endif
   // a holdout covers nothing itself and hides what is behind it
 #ifdef BLENDED
   color = mesh_cover * alpha * vec4(output_encoded(radiance, output_encoding), 1.0);

@@ -170,6 +170,12 @@ class MeshPass:
             yield self._pictures.feature(mesh, pictures)
         if mesh.transparency != "opaque":
             yield _alpha_feature(mesh)
+        if any(mesh.emission):
+            yield ShaderFeature(
+                name="emission",
+                numbers={"mesh_emission": ("VEC3", mesh.emission)},
+                defines={"EMISSION": 1},
+            )
 
     def _cover_features(
         self, mesh: MeshSnapshot, skin: SkinShadow | None

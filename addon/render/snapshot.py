@@ -86,6 +86,7 @@ class MeshSnapshot:
     skin: the head that it is a part of; None is no skin, on which shadows have hard edges.
     pictures: of its material; None, and on a surface without UVs, its colour alone.
     alpha: how much it covers, times the alpha of its picture.
+    emission: scene-linear light that it gives off to the eye alone.
     transparency: one of TRANSPARENCIES: "opaque" whatever alpha says; "hashed" has as many holes as
         alpha asks for, finer than pixels; "blended" is drawn last, the farthest first.
     """
@@ -102,6 +103,7 @@ class MeshSnapshot:
     pictures: MeshPictures | None = None
     alpha: float = 1.0
     transparency: str = "opaque"
+    emission: Color = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
         if self.transparency not in TRANSPARENCIES:

@@ -105,6 +105,20 @@ def test_a_missing_picture_leaves_the_value_and_a_message(
     assert "Gone" in note and "Missing Files" in note
 
 
+def test_emission_is_read_and_is_none_by_default(material: bpy.types.Material) -> None:
+    assert material_of(material).emission == (0.0, 0.0, 0.0)
+    node = material.node_tree.nodes["Principled BSDF"]
+    node.inputs["Emission Color"].default_value = (1.0, 0.5, 0.25, 1.0)
+    node.inputs["Emission Strength"].default_value = 4.0
+    assert material_of(material).emission == pytest.approx((4.0, 2.0, 1.0))
+    material.node_tree.nodes.remove(node)
+    shining = material.node_tree.nodes.new("ShaderNodeEmission")
+    shining.inputs["Color"].default_value = (0.5, 0.5, 1.0, 1.0)
+    shining.inputs["Strength"].default_value = 2.0
+    found = material_of(material)
+    assert found.emission == pytest.approx((1.0, 1.0, 2.0)) and found.color == (0.0, 0.0, 0.0)
+
+
 def test_nodes_that_are_not_read_are_told(material: bpy.types.Material) -> None:
     tree = material.node_tree
     noise = tree.nodes.new("ShaderNodeTexNoise")

@@ -102,6 +102,7 @@ def _with_material(mesh: MeshSnapshot, material: MeshMaterial) -> MeshSnapshot:
         pictures=material.pictures,
         alpha=material.alpha,
         transparency=material.transparency,
+        emission=material.emission,
     )
 
 
@@ -131,7 +132,7 @@ def _looks(mesh: MeshSnapshot) -> tuple[object, ...]:
     return (
         *(mesh.color, mesh.specular, mesh.roughness),
         *(mesh.number, mesh.is_holdout, mesh.skin is None),
-        *(mesh.alpha, mesh.transparency, pictures.bump),
+        *(mesh.alpha, mesh.transparency, mesh.emission, pictures.bump),
         *(id(pictures.color), id(pictures.normal)),
     )
 

@@ -1,7 +1,7 @@
 """What the renderer uses of a mesh's material: its Principled BSDF, if that is simple.
 
-Base colour, alpha and normal map are read, each as a value or as one image. What other nodes do to
-them is ignored, and reported.
+Base colour, alpha and normal map are read, each as a value or as one image; emission as a value.
+What other nodes do to them is ignored, and reported.
 """
 
 from __future__ import annotations
@@ -40,6 +40,7 @@ class MeshMaterial:
     pictures: MeshPictures | None = None
     alpha: float = 1.0
     transparency: str = "opaque"
+    emission: Color = (0.0, 0.0, 0.0)
     notes: tuple[str, ...] = ()
 
 
@@ -51,6 +52,9 @@ def material_of(material: bpy.types.Material | None) -> MeshMaterial:
     if node is None:
         return MeshMaterial(_color(material.diffuse_color))
     reader = _Reader(material)
+    if node.type == "EMISSION":
+        shining = reader.emission(node.inputs["Color"], node.inputs["Strength"])
+        return MeshMaterial((0.0, 0.0, 0.0), 0.0, emission=shining, notes=tuple(reader.notes))
     is_diffuse = node.type == "BSDF_DIFFUSE"
     socket = node.inputs["Color" if is_diffuse else "Base Color"]
     alpha = 1.0 if is_diffuse else reader.alpha(node.inputs["Alpha"], socket)
@@ -66,6 +70,9 @@ def material_of(material: bpy.types.Material | None) -> MeshMaterial:
         MeshPictures(color, normal, bump) if has_pictures else None,
         alpha,
         "opaque" if is_opaque else "blended" if is_blended else "hashed",
+        (0.0, 0.0, 0.0)
+        if is_diffuse
+        else reader.emission(node.inputs["Emission Color"], node.inputs["Emission Strength"]),
         tuple(reader.notes),
     )
 
@@ -112,6 +119,14 @@ class _Reader:
         picture = self._picture(node.image, is_color=True)
         return picture, own if picture is None else _mean(picture)
 
+    def emission(self, socket: bpy.types.NodeSocket, strength: bpy.types.NodeSocket) -> Color:
+        """Light that it gives off, everywhere the same: of an image its mean."""
+        factor = float(strength.default_value)
+        if not factor > 0.0:
+            return (0.0, 0.0, 0.0)
+        _, (red, green, blue) = self.color(socket)
+        return (factor * red, factor * green, factor * blue)
+
     def normal(self, socket: bpy.types.NodeSocket) -> tuple[Floats | None, float]:
         """The normal map and its strength; None if the surface's own normals are used."""
         giver = _giver(socket)
@@ -155,7 +170,7 @@ class _Reader:
 def _shader(material: bpy.types.Material) -> bpy.types.Node | None:
     """The surface shader, if it is a known one."""
     nodes = () if material.node_tree is None else material.node_tree.nodes
-    for kind in ("BSDF_PRINCIPLED", "BSDF_DIFFUSE"):
+    for kind in ("BSDF_PRINCIPLED", "BSDF_DIFFUSE", "EMISSION"):
         for node in nodes:
             if node.type == kind and not node.mute:
                 return node
