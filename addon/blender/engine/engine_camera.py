@@ -108,8 +108,10 @@ def border_window(
     """
     left, bottom, right, top = 0, 0, width, height
     if render.use_border:
-        left, right = int(render.border_min_x * width), int(render.border_max_x * width)
-        bottom, top = int(render.border_min_y * height), int(render.border_max_y * height)
+        # single floats, as Blender counts: 0.9 of 120 are 108
+        x, y = np.float32(width), np.float32(height)
+        left, right = (int(x * np.float32(b)) for b in (render.border_min_x, render.border_max_x))
+        bottom, top = (int(y * np.float32(b)) for b in (render.border_min_y, render.border_max_y))
     size = right - left, top - bottom
     if min(size) < _SMALLEST:
         raise HairloomError(
