@@ -24,9 +24,9 @@ vec2 screen_place(Shafts grid, int ray, int texel)
   return grid.center + (grid.nearest + (float(texel) + 0.5) * grid.radial_step) * along;
 }
 
-// The red of a texture at a place counted in texels, exact where drivers filter in eight bits.
+// A texture at a place counted in texels, exact where drivers filter in eight bits.
 // Beyond the sides as there, or with rows going round.
-float bilinear_red(sampler2D texels, vec2 place, bool wraps)
+vec4 bilinear_texel(sampler2D texels, vec2 place, bool wraps)
 {
   ivec2 size = textureSize(texels, 0);
   vec2 corner = floor(place);
@@ -37,11 +37,16 @@ float bilinear_red(sampler2D texels, vec2 place, bool wraps)
   ivec2 columns = clamp(ivec2(first.x, last.x), 0, size.x - 1);
   ivec2 rows = wraps ? (ivec2(first.y, last.y) + size.y) % size.y
                      : clamp(ivec2(first.y, last.y), 0, top);
-  vec2 below = vec2(
-      texelFetch(texels, ivec2(columns.x, rows.x), 0).r,
-      texelFetch(texels, ivec2(columns.y, rows.x), 0).r);
-  vec2 above = vec2(
-      texelFetch(texels, ivec2(columns.x, rows.y), 0).r,
-      texelFetch(texels, ivec2(columns.y, rows.y), 0).r);
-  return mix(mix(below.x, below.y, weight.x), mix(above.x, above.y, weight.x), weight.y);
+  vec4 below = mix(texelFetch(texels, ivec2(columns.x, rows.x), 0),
+                   texelFetch(texels, ivec2(columns.y, rows.x), 0),
+                   weight.x);
+  vec4 above = mix(texelFetch(texels, ivec2(columns.x, rows.y), 0),
+                   texelFetch(texels, ivec2(columns.y, rows.y), 0),
+                   weight.x);
+  return mix(below, above, weight.y);
+}
+
+float bilinear_red(sampler2D texels, vec2 place, bool wraps)
+{
+  return bilinear_texel(texels, place, wraps).r;
 }

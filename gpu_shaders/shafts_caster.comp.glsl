@@ -1,5 +1,6 @@
 // What stands before a light: the fraction of each pixel that is covered by what is nearer than it, or
 // by hair so thin that it has no depth.
+// Where meshes are holes, apart from the picture, all that has a depth covers its pixel.
 // Colour and depth may have several samples for each pixel of the picture.
 
 void main()
@@ -14,7 +15,9 @@ void main()
       ivec2 place = pixel * samples_across + ivec2(x, y);
       float depth = texelFetch(depth_of, place, 0).r;
       bool is_before = depth < shafts.radiance.w || depth >= 1.0;
-      total += is_before ? clamp(texelFetch(samples_of, place, 0).a, 0.0, 1.0) : 0.0;
+      float covered = clamp(texelFetch(samples_of, place, 0).a, 0.0, 1.0);
+      covered = is_apart != 0 && depth < 1.0 ? 1.0 : covered;
+      total += is_before ? covered : 0.0;
     }
   }
   imageStore(caster, pixel, vec4(total / float(samples_across * samples_across)));

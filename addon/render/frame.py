@@ -14,7 +14,7 @@ from .camera import Camera, frame_camera, look_at, orthographic, perspective
 from .card_pass import CardPass
 from .mesh_pass import MeshPass
 from .shader_program import ShaderRecipe, program
-from .shafts_pass import add_shafts, put_under
+from .shafts_pass import finish_with_shafts
 from .snapshot import MeshSnapshot, Snapshot
 from .strand_pass import StrandPass
 from .textures import drawing_into, texture_to_array
@@ -90,8 +90,9 @@ def render_image(
         card_pass.draw(snapshot, camera, *size, opacity=opacity)
     picture = color if samples == 1 else _averaged(color, samples)
     if snapshot.shafts.use_shafts:
-        add_shafts(picture, color, depth, camera, snapshot.lights, snapshot.shafts)
-        put_under(picture, background)
+        finish_with_shafts(
+            picture, color, depth, camera, snapshot.lights, snapshot.shafts, background
+        )
     return texture_to_array(picture)
 
 

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Hashable, Set
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from ..arrays import Floats
 from ..shading.lights import kept_lights
+from ..shading.shafts_settings import ShaftSettings
 from .accumulation import Target
+from .bright_pass import plain
 from .camera import Camera
 from .camera_window import view_depth
 from .card_pass import CardPass
@@ -22,7 +25,7 @@ from .mesh_places import MeshPlaces, Placed
 from .mesh_shadows import MeshShadowPass
 from .opacity_maps import OpacityMaps
 from .scene_snapshot import SceneSnapshot, shaded_by
-from .shafts_pass import add_shafts, put_under
+from .shafts_pass import finish_with_shafts, shafts_apart
 from .snapshot import MeshSnapshot, Snapshot
 from .strand_pass import StrandPass
 from .textures import texture_to_array
@@ -37,6 +40,24 @@ _ALL: Rgba = (1.0, 1.0, 1.0, 1.0)
 FAR_AWAY = 1.0e10
 
 
+@dataclass(frozen=True, eq=False)
+class ShaftsApart:
+    """Shafts of light beside a picture whose meshes are holes.
+
+    light: RGBA32F texture of the picture's size that gets them.
+    behind: the picture that is seen through the holes, see BrightThings; None: nothing is.
+    """
+
+    light: Any
+    behind: Any = None
+
+
+def shafts_of(scene: SceneSnapshot) -> ShaftSettings | None:
+    """By what settings a scene has shafts of light: those of the first groom that has them."""
+    grooms = (groom.snapshot.shafts for groom in scene.grooms)
+    return next((each for each in grooms if each.use_shafts), None)
+
+
 class ScenePass:
     """Keeps a scene on the GPU from draw to draw; making one touches no GPU."""
 
@@ -49,39 +70,57 @@ class ScenePass:
         self._holdout = Holdout()
 
     def draw(
-        self, scene: SceneSnapshot, camera: Camera, target: Target, size: tuple[int, int], sky: Rgba
+        self,
+        scene: SceneSnapshot,
+        camera: Camera,
+        target: Target,
+        size: tuple[int, int],
+        sky: Rgba,
+        apart: ShaftsApart | None = None,
     ) -> None:
         """Draw one moment, scene-linear, premultiplied.
 
         Args:
             size: width and height [pixels].
             sky: what is seen where nothing is.
+            apart: where shafts of light go if not into the picture.
 
         Raises:
             ShaderError: a shader does not compile here, or points on the GPU were released.
         """
         with ONE_AT_A_TIME:
-            self._draw(scene, camera, target, size, sky)
+            self._draw(scene, camera, target, size, sky, apart)
 
     def _draw(
-        self, scene: SceneSnapshot, camera: Camera, target: Target, size: tuple[int, int], sky: Rgba
+        self,
+        scene: SceneSnapshot,
+        camera: Camera,
+        target: Target,
+        size: tuple[int, int],
+        sky: Rgba,
+        apart: ShaftsApart | None,
     ) -> None:
         lit = {groom.key: scene.lit(groom) for groom in scene.grooms}
         maps = self._maps(scene)
-        shafts = next((each.shafts for each in lit.values() if each.shafts.use_shafts), None)
+        shafts = shafts_of(scene)
         holes = {groom.key for groom in scene.grooms if groom.is_holdout}
         seen = lit.keys() - holes
         # shafts ask alpha what stands before a light
-        target.sized(*size).clear(sky if shafts is None else _NOTHING)
+        goes_under = shafts is not None and apart is None
+        target.sized(*size).clear(_NOTHING if goes_under else sky)
         with target.drawing():
             self._draw_meshes(scene, camera, size, maps)
             self._draw_hair(lit, seen, camera, size, maps)
         if holes:
             self._holdout.cut(target, lambda: self._draw_hair(lit, holes, camera, size, maps))
-        if shafts is not None:
-            color, depth = target.color, target.depth
-            add_shafts(color, color, depth, camera, scene.lights, shafts)
-            put_under(color, sky)
+        color, depth = target.color, target.depth
+        if apart is not None:
+            apart.light.clear(format="FLOAT", value=_NOTHING)
+            if shafts is not None:
+                into, behind = apart.light, apart.behind or plain(sky)
+                shafts_apart(into, color, depth, behind, camera, scene.lights, shafts)
+        elif shafts is not None:
+            finish_with_shafts(color, color, depth, camera, scene.lights, shafts, sky)
 
     def draw_hair_shadow(
         self, scene: SceneSnapshot, camera: Camera, target: Target, size: tuple[int, int]

@@ -6,31 +6,31 @@ from collections.abc import Sequence
 from typing import Any
 
 import gpu
-import numpy as np
 
-from ..arrays import Floats
+from ..shading.bright_shafts import wants_bright
 from ..shading.lights import Light
-from ..shading.shafts import REACH, LightOnScreen, PolarGrid, lights_on_screen
+from ..shading.shafts import LightOnScreen, PolarGrid, lights_on_screen
 from ..shading.shafts_settings import ShaftSettings
 from . import gpu_objects
+from .bright_pass import BrightThings, plain
 from .camera import Camera
 from .shader_program import ShaderRecipe, program
+from .shafts_block import BLOCKS, STRUCTS, pack_shafts
 
-_STRUCTS, _BLOCKS = ("struct_shafts.glsl",), (("Shafts", "shafts"),)
 _CASTER = ShaderRecipe(
     name="shafts_caster",
     compute="shafts_caster.comp.glsl",
-    structs=_STRUCTS,
-    blocks=_BLOCKS,
+    structs=STRUCTS,
+    blocks=BLOCKS,
     textures=(("FLOAT_2D", "samples_of"), ("FLOAT_2D", "depth_of")),
     images=(("R32F", "caster"),),
-    integers=("samples_across",),
+    integers=("samples_across", "is_apart"),
 )
 _BLUR = ShaderRecipe(
     name="shafts_blur",
     compute="shafts_blur.comp.glsl",
-    structs=_STRUCTS,
-    blocks=_BLOCKS,
+    structs=STRUCTS,
+    blocks=BLOCKS,
     textures=(("FLOAT_2D", "caster"),),
     images=(("R32F", "rays"),),
     group_size=(64,),
@@ -38,8 +38,8 @@ _BLUR = ShaderRecipe(
 _ADD = ShaderRecipe(
     name="shafts_add",
     compute="shafts_add.comp.glsl",
-    structs=_STRUCTS,
-    blocks=_BLOCKS,
+    structs=STRUCTS,
+    blocks=BLOCKS,
     textures=(("FLOAT_2D", "rays"),),
     images=(("RGBA32F", "picture", "READ_WRITE"),),
 )
@@ -51,6 +51,49 @@ _UNDER = ShaderRecipe(
 )
 
 
+def finish_with_shafts(
+    picture: Any,
+    drawn: Any,
+    depth: Any,
+    camera: Camera,
+    lights: Sequence[Light],
+    settings: ShaftSettings,
+    background: tuple[float, float, float, float],
+) -> None:
+    """Add all shafts to a picture that was drawn over nothing, and put a colour under it.
+
+    Args: as of `add_shafts` and `put_under`.
+    """
+    # shafts from lights throw none themselves
+    behind = plain(background) if wants_bright(settings) else None
+    bright = BrightThings(picture, behind, camera, settings)
+    add_shafts(picture, drawn, depth, camera, lights, settings)
+    put_under(picture, background)
+    bright.add_to(picture)
+
+
+def shafts_apart(
+    into: Any,
+    drawn: Any,
+    depth: Any,
+    behind: Any,
+    camera: Camera,
+    lights: Sequence[Light],
+    settings: ShaftSettings,
+) -> None:
+    """Add all shafts to a texture beside the picture.
+
+    Args:
+        into: RGBA32F, black at first.
+        drawn, depth: hair over holes where meshes are, and the depth of both.
+        behind: what lies under the hair, the picture of another engine, as of `BrightThings`.
+            Others as of `add_shafts`.
+    """
+    bright = BrightThings(drawn, behind, camera, settings)
+    add_shafts(into, drawn, depth, camera, lights, settings, is_apart=True)
+    bright.add_to(into)
+
+
 def add_shafts(
     picture: Any,
     drawn: Any,
@@ -58,6 +101,8 @@ def add_shafts(
     camera: Camera,
     lights: Sequence[Light],
     settings: ShaftSettings,
+    *,
+    is_apart: bool = False,
 ) -> None:
     """Add the haze of the lights in view, and the shafts in it, to a picture on the GPU.
 
@@ -68,11 +113,12 @@ def add_shafts(
             nothing, since alpha says what stands before a light; see `put_under`.
         drawn, depth: the colour and depth that it was averaged from, with a whole number of texels
             along each side of a pixel; `drawn` may be the picture itself.
+        is_apart: meshes are holes in `drawn` and known by their depth alone.
     """
     width, height = picture.width, picture.height
     seen = lights_on_screen(lights, camera.view, camera.projection, width, height, settings)
     for light in seen:
-        _add_light(picture, drawn, depth, light, settings.samples)
+        _add_light(picture, drawn, depth, light, settings.samples, is_apart)
 
 
 def put_under(picture: Any, background: tuple[float, float, float, float]) -> None:
@@ -83,13 +129,16 @@ def put_under(picture: Any, background: tuple[float, float, float, float]) -> No
     gpu.shader.unbind()
 
 
-def _add_light(picture: Any, drawn: Any, depth: Any, light: LightOnScreen, samples: int) -> None:
+def _add_light(
+    picture: Any, drawn: Any, depth: Any, light: LightOnScreen, samples: int, is_apart: bool
+) -> None:
     width, height = picture.width, picture.height
     grid = PolarGrid.over(light.center, width, height, samples)
     block = gpu_objects.uniform_buffer(pack_shafts(light, grid))
     caster = gpu_objects.texture((width, height), format="R32F")
     rays = gpu_objects.texture((grid.radii, grid.angles), format="R32F")
     pixels = -(-width // 8), -(-height // 8)
+    integers = {"samples_across": drawn.width // width, "is_apart": int(is_apart)}
     steps: tuple[tuple[ShaderRecipe, dict[str, Any], dict[str, Any], tuple[int, int]], ...] = (
         (_CASTER, {"samples_of": drawn, "depth_of": depth}, {"caster": caster}, pixels),
         (_BLUR, {"caster": caster}, {"rays": rays}, (-(-grid.angles // 64), 1)),
@@ -101,17 +150,7 @@ def _add_light(picture: Any, drawn: Any, depth: Any, light: LightOnScreen, sampl
             blocks={"shafts": block},
             textures=textures,
             images=images,
-            integers={"samples_across": drawn.width // width} if recipe.integers else {},
+            integers=integers if recipe.integers else {},
         )
         gpu.compute.dispatch(shader.shader, *groups, 1)
     gpu.shader.unbind()
-
-
-def pack_shafts(light: LightOnScreen, grid: PolarGrid) -> Floats:
-    """The block of gpu_shaders/struct_shafts.glsl in std140, (16,) float32."""
-    middle = np.cos(grid.middle), np.sin(grid.middle)
-    floats: list[float] = [*light.radiance, light.depth, *grid.center, *middle, grid.span]
-    floats += [grid.nearest, grid.step, np.exp(-grid.step / light.length)]
-    floats += [-np.expm1(-grid.nearest / light.length), 1.0 / (REACH * light.length)]
-    whole = np.array([grid.angles, grid.is_round], np.int32)
-    return np.concatenate([np.array(floats, np.float32), whole.view(np.float32)])

@@ -16,6 +16,7 @@ it, times the strength. Lengths are angles, so that a part of a picture is as it
 Limitations: it goes by the picture alone. Nothing outside of it casts a shaft, and haze does not
 know how far away hair is. A light that is not in front of the viewer has no place on the screen and
 gives nothing; nor does any in an orthographic view, where light does not spread from a point.
+Shafts from what is bright in the picture are in bright_shafts.py.
 """
 
 from __future__ import annotations
@@ -111,6 +112,14 @@ class PolarGrid:
         """Between texels of a ray [pixels]."""
         return (self.farthest - self.nearest) / self.radii
 
+    @property
+    def places(self) -> tuple[Floats, Floats]:
+        """x and y of all texels [pixels], each (angles, radii)."""
+        along = (np.arange(self.angles) + 0.5) / self.angles - 0.5
+        angle = (self.middle + along * self.span)[:, None]
+        radius = self.nearest + (np.arange(self.radii) + 0.5) * self.step
+        return self.center[0] + radius * np.cos(angle), self.center[1] + radius * np.sin(angle)
+
 
 def lights_on_screen(
     lights: Sequence[Light],
@@ -131,7 +140,8 @@ def lights_on_screen(
     is_perspective = projection[3, 3] == 0.0
     # of a part of a picture the projection is so much larger
     length = float(np.tan(settings.length) * projection[1, 1] * height / 2.0)
-    if not (settings.use_shafts and is_perspective and length > _SHORTEST):
+    is_wanted = settings.use_shafts and settings.source in ("lights", "both")
+    if not (is_wanted and is_perspective and length > _SHORTEST):
         return []
     to_clip = np.asarray(projection, np.float64) @ np.asarray(view, np.float64)
     eye = np.linalg.inv(np.asarray(view, np.float64))[:3, 3]
@@ -196,11 +206,7 @@ def to_polar(picture: Floats, grid: PolarGrid, outside: float | None = None) -> 
         outside: what is beyond the picture's edges; None: as at the edge.
     """
     height, width = picture.shape[:2]
-    along = (np.arange(grid.angles) + 0.5) / grid.angles - 0.5
-    angle = (grid.middle + along * grid.span)[:, None]
-    radius = grid.nearest + (np.arange(grid.radii) + 0.5) * grid.step
-    x = grid.center[0] + radius * np.cos(angle)
-    y = grid.center[1] + radius * np.sin(angle)
+    x, y = grid.places
     values = _bilinear(picture, x - 0.5, y - 0.5, wraps=False)
     if outside is not None:
         is_inside = (x >= 0.0) & (x <= width) & (y >= 0.0) & (y <= height)
@@ -208,17 +214,19 @@ def to_polar(picture: Floats, grid: PolarGrid, outside: float | None = None) -> 
     return values
 
 
-def radial_blur(rays: Floats, grid: PolarGrid, length: float) -> Floats:
-    """Rays (angles, radii, n) blurred outwards; what is before the first texel is 1.
+def radial_blur(rays: Floats, grid: PolarGrid, length: float, before: float = 1.0) -> Floats:
+    """Rays (angles, radii, n) blurred outwards.
 
     Exact for values that stay the same all over a texel, at its end.
 
     Args:
         length: over which a value fades by 1/e [pixels].
+        before: the value before the first texel.
     """
     blurred = np.empty(rays.shape, np.float64)
     kept = np.exp(-grid.step / length)
-    total = weight = -np.expm1(-grid.nearest / length)
+    weight = -np.expm1(-grid.nearest / length)
+    total = before * weight
     for index in range(grid.radii):
         total = rays[:, index] * (1.0 - kept) + total * kept
         weight = 1.0 - kept + weight * kept

@@ -5,15 +5,29 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from ..params import Settings, color, integer, number, toggle, when
+from ..params import Settings, both, choice, color, integer, number, toggle, when
 
 _IS_ON = when("shafts.use_shafts", lack="switched off")
 _NGUYEN = "Nguyen and Donnelly 2005, hair of Nalu"
+_FROM_LIGHTS = both(_IS_ON, when("shafts.source", "lights", "both", lack="not from lights"))
+_FROM_BRIGHT = both(_IS_ON, when("shafts.source", "bright", "both", lack="not from bright things"))
+
+#: what throws shafts
+SOURCES = (
+    ("lights", "Lights", "Lamps and suns, from where they are in the picture"),
+    (
+        "bright",
+        "Bright Things",
+        "What is bright in the picture: windows, emission, sky and glints, cut by what stands "
+        "before them",
+    ),
+    ("both", "Both", "Lights and bright things"),
+)
 
 
 @dataclass(frozen=True, kw_only=True)
 class ShaftSettings(Settings):
-    """Light that haze or water scatters around a light, cut into shafts by what stands in it."""
+    """Light that haze or water scatters, cut into shafts by what stands in its way."""
 
     section = "shafts"
     title = "Light Shafts"
@@ -24,9 +38,17 @@ class ShaftSettings(Settings):
     use_shafts: bool = toggle(
         False,
         label="Light Shafts",
-        description="In renders: light scattered in air or water around a light, with shafts "
-        "behind the hair",
+        description="In renders: light scattered in air or water around lights and bright "
+        "things, with shafts behind the hair",
         source=_NGUYEN,
+    )
+    source: str = choice(
+        "lights",
+        SOURCES,
+        label="Source",
+        description="What throws shafts",
+        source=_NGUYEN,
+        active_when=_IS_ON,
     )
     strength: float = number(
         0.4,
@@ -35,13 +57,31 @@ class ShaftSettings(Settings):
         soft=(0.0, 1.0),
         hard=(0.0, 1000.0),
         source=_NGUYEN,
-        active_when=_IS_ON,
+        active_when=_FROM_LIGHTS,
+    )
+    bright_strength: float = number(
+        0.15,
+        label="Bright Strength",
+        description="Brightness of the shafts beside a bright thing, as a fraction of its own",
+        soft=(0.0, 1.0),
+        hard=(0.0, 1000.0),
+        source=_NGUYEN,
+        active_when=_FROM_BRIGHT,
+    )
+    bright_threshold: float = number(
+        1.0,
+        label="Bright Threshold",
+        description="Luminance above which a thing throws shafts; white paper in full light has 1",
+        soft=(0.0, 10.0),
+        hard=(0.0, 10000.0),
+        source=_NGUYEN,
+        active_when=_FROM_BRIGHT,
     )
     length: float = number(
         math.radians(10.0),
         label="Length",
         description="Length of a shaft behind its occluder, as an angle of view; the haze reaches "
-        "twice as far from the light",
+        "twice as far from a light, and as far as this from a bright thing",
         soft=(0.0, math.radians(45.0)),
         hard=(0.0, math.radians(86.0)),
         unit="angle",
@@ -51,7 +91,8 @@ class ShaftSettings(Settings):
     samples: int = integer(
         256,
         label="Samples",
-        description="Number of steps outwards from a light; more resolve finer strands",
+        description="Number of steps outwards from a light or bright thing; more resolve finer "
+        "strands",
         soft=(32, 512),
         hard=(2, 4096),
         source=_NGUYEN,
@@ -60,6 +101,6 @@ class ShaftSettings(Settings):
     tint: tuple[float, float, float] = color(
         (1.0, 1.0, 1.0),
         label="Tint",
-        description="Colour of the haze, multiplied by that of the light",
+        description="Colour of the haze, multiplied by that of the light or bright thing",
         active_when=_IS_ON,
     )

@@ -31,6 +31,7 @@ from .preset_chooser import draw_preset_row
 
 #: letters that are kept free for what the preview says of strands, guides or children
 _LINE = 140
+_SHAFTS_APPEAR = "In renders by Hairloom, and by EEVEE and Cycles with Hairloom Hair."
 #: name, label, what draws it
 type Section = tuple[str, str, Draw]
 
@@ -60,13 +61,23 @@ def _panel(section: str, panel: str = "") -> Draw:
     return draw
 
 
+def draw_shafts(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
+    draw_lines(layout.column(align=True), bpy.context, _SHAFTS_APPEAR)
+    _panel("shafts")(layout, hair)
+
+
+#: declared panels that hold more than what is declared
+_WITH_MORE: dict[str, Draw] = {"shafts": draw_shafts}
+
+
 def _with_declared(sections: Iterable[Section]) -> tuple[Section, ...]:
     """With those that only show what they declare."""
     found = list(sections)
     for name, settings in ALL_SETTINGS.items():
         if settings.panel_after:
             before = next(i for i, each in enumerate(found) if each[0] == settings.panel_after)
-            found.insert(before + 1, (name, settings.title, _panel(name)))
+            draw = _WITH_MORE.get(name) or _panel(name)
+            found.insert(before + 1, (name, settings.title, draw))
     return tuple(found)
 
 

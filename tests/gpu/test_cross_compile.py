@@ -52,6 +52,8 @@ ALL = (
     "tests/gpu/test_card_passes.py::test_a_normal_map_bends_the_normal",
     "tests/gpu/test_card_passes.py::test_states_are_those_of_the_paper",
     "tests/gpu/test_card_shadows.py::test_a_card_behind_cards_has_the_light_that_they_leave",
+    "tests/gpu/test_bright_pass.py::test_a_mesh_that_shines_shows_its_light_and_one_that_does_not_is_as_before",
+    "tests/gpu/test_bright_pass.py::test_the_shafts_of_a_window_are_the_reference",
     "tests/gpu/test_card_shadows.py::test_cards_shade_the_skin_and_a_mesh_shades_cards",
     "tests/gpu/test_card_shadows.py::test_even_cards_shade_as_much_from_all_sides_of_their_strands",
     "tests/gpu/test_debug_views.py::test_the_detail_view_shows_factors_by_colour",

@@ -1,0 +1,141 @@
+"""Shafts of light from what is bright; the reference is shading/bright_shafts.py."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import gpu
+import numpy as np
+
+from ..shading.bright_shafts import (
+    BRIGHTEST,
+    KNEE,
+    LARGEST,
+    BrightRegion,
+    BrightRegions,
+    bright_regions,
+    cell_side,
+    has_length,
+    node_spacing,
+    shaft_length,
+    wants_bright,
+)
+from ..shading.shafts import LightOnScreen, PolarGrid
+from ..shading.shafts_settings import ShaftSettings
+from . import gpu_objects
+from .camera import Camera
+from .shader_program import ShaderRecipe, program
+from .shafts_block import BLOCKS, STRUCTS, pack_shafts
+from .textures import texture_from, texture_to_array
+
+_PART = ShaderRecipe(
+    name="bright_part",
+    compute="bright_part.comp.glsl",
+    textures=(("FLOAT_2D", "seen"), ("FLOAT_2D", "behind")),
+    images=(("RGBA32F", "bright"),),
+    numbers=tuple(("FLOAT", name) for name in ("threshold", "knee", "brightest", "largest")),
+)
+_CELLS = ShaderRecipe(
+    name="bright_cells",
+    compute="bright_cells.comp.glsl",
+    textures=(("FLOAT_2D", "bright"),),
+    images=(("RGBA32F", "cells"),),
+    integers=("cell_side",),
+)
+_BLUR = ShaderRecipe(
+    name="bright_blur",
+    compute="bright_blur.comp.glsl",
+    structs=STRUCTS,
+    blocks=BLOCKS,
+    textures=(("FLOAT_2D", "bright"), ("FLOAT_2D", "weights")),
+    images=(("RGBA32F", "rays"),),
+    numbers=(("FLOAT", "node_spacing"),),
+    group_size=(64,),
+)
+_ADD = ShaderRecipe(
+    name="bright_add",
+    compute="bright_add.comp.glsl",
+    structs=STRUCTS,
+    blocks=BLOCKS,
+    textures=(("FLOAT_2D", "rays"),),
+    images=(("RGBA32F", "picture", "READ_WRITE"),),
+)
+
+
+class BrightThings:
+    """What is bright in a picture as it is now, to be added as shafts later.
+
+    Args:
+        seen: RGBA32F texture, scene-linear and premultiplied.
+        behind: what lies under it, an RGBA32F texture of its size or of one texel.
+    """
+
+    def __init__(self, seen: Any, behind: Any, camera: Camera, settings: ShaftSettings) -> None:
+        self._settings = settings
+        self._size = seen.width, seen.height
+        self._length = shaft_length(camera.projection, seen.height, settings.length)
+        self._bright: Any = None
+        self.found = BrightRegions((), 0.0)
+        if wants_bright(settings) and has_length(self._length):
+            self._take(seen, behind)
+
+    def add_to(self, picture: Any) -> None:
+        """Add the shafts to an RGBA32F texture of the same size; without any it stays as it is to
+        the bit.
+        """
+        for region in self.found.regions:
+            self._add_region(picture, region)
+
+    def _take(self, seen: Any, behind: Any) -> None:
+        width, height = self._size
+        threshold = self._settings.bright_threshold
+        self._bright = gpu_objects.texture(self._size, format="RGBA32F")
+        part = program(_PART)
+        part.bind(
+            textures={"seen": seen, "behind": behind},
+            images={"bright": self._bright},
+            numbers={
+                "threshold": threshold,
+                "knee": KNEE * threshold,
+                "brightest": BRIGHTEST,
+                "largest": LARGEST,
+            },
+        )
+        gpu.compute.dispatch(part.shader, -(-width // 8), -(-height // 8), 1)
+        side = cell_side(width, height)
+        cells = gpu_objects.texture((-(-width // side), -(-height // side)), format="RGBA32F")
+        counting = program(_CELLS)
+        counting.bind(
+            textures={"bright": self._bright},
+            images={"cells": cells},
+            integers={"cell_side": side},
+        )
+        gpu.compute.dispatch(counting.shader, -(-cells.width // 8), -(-cells.height // 8), 1)
+        gpu.shader.unbind()
+        self.found = bright_regions(texture_to_array(cells), width, height)
+
+    def _add_region(self, picture: Any, region: BrightRegion) -> None:
+        width, height = self._size
+        grid = PolarGrid.over(region.center, width, height, self._settings.samples)
+        factor = self._settings.bright_strength * self.found.scale
+        red, green, blue = (float(factor * each) for each in self._settings.tint)
+        light = LightOnScreen(region.center, (red, green, blue), 1.0, self._length)
+        block = gpu_objects.uniform_buffer(pack_shafts(light, grid))
+        weights = texture_from(region.weights[..., None], "R32F")
+        rays = gpu_objects.texture((grid.radii, grid.angles), format="RGBA32F")
+        blur, add = program(_BLUR), program(_ADD)
+        blur.bind(
+            blocks={"shafts": block},
+            textures={"bright": self._bright, "weights": weights},
+            images={"rays": rays},
+            numbers={"node_spacing": node_spacing(width, height)},
+        )
+        gpu.compute.dispatch(blur.shader, -(-grid.angles // 64), 1, 1)
+        add.bind(blocks={"shafts": block}, textures={"rays": rays}, images={"picture": picture})
+        gpu.compute.dispatch(add.shader, -(-width // 8), -(-height // 8), 1)
+        gpu.shader.unbind()
+
+
+def plain(color: tuple[float, float, float, float]) -> Any:
+    """One premultiplied colour that lies behind all of a picture."""
+    return texture_from(np.array([[color]], np.float32), "RGBA32F")

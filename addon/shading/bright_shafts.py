@@ -1,0 +1,227 @@
+"""Shafts of light from what is bright in the picture: the reference that the shaders are held to.
+
+Nguyen and Donnelly 2005 (the Nalu demo's "God Rays", as in shafts.py): bright regions are taken
+from the picture, go to polar coordinates, are blurred along the radius, and come back. What stands
+before a bright thing covers it in the picture, so it cuts the shafts: hair by as much as it covers.
+
+    S           what is bright: colour * a^2 / (a + knee * threshold) / luminance,
+                a = luminance - threshold
+    B_i(r, angle)  the mean of w_i * S on the way out from the middle of region i, of which
+                exp(-s / l) counts at a distance s back
+    added       strength * tint * scale * sum of B_i
+
+A window, an emissive mesh and a sky have no lamp to be blurred away from, so each region has a
+middle of its own. The weights w_i, which add up to 1, are bilinear over a coarse lattice; the
+middle is where the mean shift (Fukunaga and Hostetler 1975) leads the bright part around each node
+of it. Parts of one window are led to one middle, two windows far apart to two. Middles follow light
+that moves.
+
+scale is 1 as long as less than half of the picture is bright and falls to 0 where all of it is: a
+white world throws no shafts.
+
+Limitations: it goes by the picture alone, as shafts.py does.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import Floats
+from .shafts import PolarGrid, from_polar, radial_blur, to_polar
+from .shafts_settings import ShaftSettings
+
+#: luminance of scene-linear Rec. 709
+LUMINANCE = (0.2126, 0.7152, 0.0722)
+#: how far above the threshold [thresholds] brightness counts half
+KNEE = 0.5
+#: luminance that counts at most, so that single pixels do not outshine all
+BRIGHTEST = 20.0
+#: colours are cut off here, which keeps float32 from overflowing
+LARGEST = 1.0e6
+#: cells and spans of the lattice along the longer side of the picture
+CELLS, SPANS = 48, 4
+#: of the longer side: how far the mean shift looks, and middles that count as one
+_REACH, _SAME = 0.2, 0.02
+_SHIFTS = 30
+#: middles at most; what is fainter joins the nearest
+MAX_REGIONS = 6
+#: an orthographic picture is taken to be this high, as an angle of view [rad]
+_FLAT_HEIGHT = 2.0 * np.arctan(0.36)
+#: length [pixels] up to which there are no shafts
+_SHORTEST = 1.0e-3
+
+
+@dataclass(frozen=True, eq=False)
+class BrightRegion:
+    """What is blurred away from one place.
+
+    center: x, y [pixels].
+    weights: (rows, columns) of the lattice, how much of what is bright belongs to it at each node.
+    """
+
+    center: tuple[float, float]
+    weights: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class BrightRegions:
+    """scale: factor on what is added."""
+
+    regions: tuple[BrightRegion, ...]
+    scale: float
+
+
+def wants_bright(settings: ShaftSettings) -> bool:
+    """Whether bright things throw shafts."""
+    is_wanted = settings.use_shafts and settings.source in ("bright", "both")
+    return is_wanted and settings.bright_strength > 0.0
+
+
+def shaft_length(projection: Floats, height: int, length: float) -> float:
+    """A length given as an angle of view, at the middle of the picture [pixels]."""
+    is_perspective = projection[3, 3] == 0.0
+    # of a part of a picture the projection is so much larger
+    halves = projection[1, 1] if is_perspective else 1.0 / np.tan(0.5 * _FLAT_HEIGHT)
+    return float(np.tan(length) * halves * height / 2.0)
+
+
+def has_length(length: float) -> bool:
+    return length > _SHORTEST
+
+
+def bright_part(colors: Floats, threshold: float) -> Floats:
+    """What is bright of scene-linear colours (..., 3+), and how surely it is (..., 4): wholly from
+    the knee on.
+
+    What is no number counts as black.
+    """
+    colors = np.asarray(colors, np.float64)[..., :3]
+    colors = np.where(colors >= 0.0, np.minimum(colors, LARGEST), 0.0)
+    luminance = colors @ np.array(LUMINANCE)
+    above = np.maximum(luminance - threshold, 0.0)
+    is_bright = above > 0.0
+    surely = np.divide(above, above + KNEE * threshold, out=np.zeros_like(above), where=is_bright)
+    kept = np.minimum(above * surely, BRIGHTEST)
+    factor = np.divide(kept, luminance, out=np.zeros_like(above), where=is_bright)
+    surely = np.minimum(2.0 * surely, 1.0)
+    return np.concatenate([colors * factor[..., None], surely[..., None]], axis=-1)
+
+
+def cell_side(width: int, height: int) -> int:
+    """Of the cells in which what is bright is counted [pixels]."""
+    return -(-max(width, height) // CELLS)
+
+
+def bright_cells(bright: Floats) -> Floats:
+    """Sums over the cells of what `bright_part` gives of a picture, (rows, columns, 4): luminance,
+    that times x and y [pixels], and how surely it is bright.
+    """
+    height, width = bright.shape[:2]
+    side = cell_side(width, height)
+    luminance = bright[..., :3] @ np.array(LUMINANCE)
+    x, y = np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)
+    values = np.stack([luminance, luminance * x, luminance * y, bright[..., 3]], axis=-1)
+    missing = (0, -height % side), (0, -width % side), (0, 0)
+    padded = np.pad(values, missing)
+    rows, columns = padded.shape[0] // side, padded.shape[1] // side
+    return padded.reshape(rows, side, columns, side, 4).sum(axis=(1, 3))
+
+
+def node_spacing(width: int, height: int) -> float:
+    """Between nodes of the lattice, the first of which is at the corner 0, 0 [pixels]."""
+    return max(width, height) / SPANS
+
+
+def bright_regions(cells: Floats, width: int, height: int) -> BrightRegions:
+    """The places that what is bright is blurred away from, from the sums of `bright_cells`."""
+    sums = np.asarray(cells, np.float64).reshape(-1, 4)
+    scale = float(np.clip(2.0 * (1.0 - sums[:, 3].sum() / (width * height)), 0.0, 1.0))
+    sums = sums[sums[:, 0] > 0.0]
+    if not len(sums) or scale <= 0.0:
+        return BrightRegions((), 0.0)
+    light, places = sums[:, 0], sums[:, 1:3] / sums[:, :1]
+    spacing = node_spacing(width, height)
+    shape = int(np.ceil(height / spacing)) + 1, int(np.ceil(width / spacing)) + 1
+    row, column = (index.ravel() for index in np.indices(shape))
+    tents = np.maximum(1.0 - np.abs(places[:, 0] / spacing - column[:, None]), 0.0)
+    tents *= np.maximum(1.0 - np.abs(places[:, 1] / spacing - row[:, None]), 0.0)
+    of_node = tents @ light
+    lit = np.flatnonzero(of_node > 0.0)
+    # in an order that no rounding changes
+    lit = lit[np.argsort(-np.log(of_node[lit]).round(2), kind="stable")]
+    starts = (tents[lit] * light) @ places / of_node[lit, None]
+    longer = max(width, height)
+    middles = _mean_shift(starts, places, light, _REACH * longer)
+    centers: list[Floats] = []
+    group = np.zeros(len(row), np.int64)
+    for node, middle in zip(lit, middles, strict=True):
+        away = [float(np.hypot(*(middle - center))) for center in centers]
+        nearest = int(np.argmin(away)) if away else -1
+        is_new = nearest < 0 or away[nearest] > _SAME * longer
+        if is_new and len(centers) < MAX_REGIONS:
+            centers.append(middle)
+            nearest = len(centers) - 1
+        group[node] = nearest
+    is_lit = np.isin(np.arange(len(row)), lit)
+    found = []
+    for number in range(len(centers)):
+        joined = group[lit] == number
+        x, y = of_node[lit][joined] @ middles[joined] / of_node[lit][joined].sum()
+        weights = (is_lit & (group == number)).astype(np.float32).reshape(shape)
+        found.append(BrightRegion((float(x), float(y)), weights))
+    return BrightRegions(tuple(found), scale)
+
+
+def _mean_shift(starts: Floats, places: Floats, light: Floats, reach: float) -> Floats:
+    """Where these places climb to, of light at places, blurred by a Gaussian."""
+    middles = starts
+    for _ in range(_SHIFTS):
+        away = ((middles[:, None] - places) ** 2).sum(axis=-1)
+        weights = np.exp(-away / (2.0 * reach * reach)) * light
+        middles = weights @ places / np.maximum(weights.sum(axis=1, keepdims=True), 1e-300)
+    return middles
+
+
+def bright_shafts(
+    picture: Floats, seen: Floats, length: float, settings: ShaftSettings
+) -> tuple[Floats, BrightRegions]:
+    """A picture with the shafts that bright things throw, and where these are.
+
+    Args:
+        picture: (height, width, 4) scene-linear, premultiplied.
+        seen: (height, width, 3+) what there is to be seen, with what lies behind the picture.
+        length: of shafts [pixels].
+    """
+    height, width = picture.shape[:2]
+    bright = bright_part(seen, settings.bright_threshold)
+    found = bright_regions(bright_cells(bright), width, height)
+    result = np.array(picture, np.float64)
+    factor = settings.bright_strength * found.scale * np.asarray(settings.tint)
+    for region in found.regions:
+        grid = PolarGrid.over(region.center, width, height, settings.samples)
+        rays = to_polar(bright[..., :3], grid) * weights_on(grid, region, width, height)
+        blurred = radial_blur(rays, grid, length, before=0.0)
+        result[..., :3] += from_polar(blurred, grid, width, height) * factor
+    return result.astype(np.float32), found
+
+
+def weights_on(grid: PolarGrid, region: BrightRegion, width: int, height: int) -> Floats:
+    """How much of what is bright belongs to a region, on the rays of a grid, (angles, radii, 1)."""
+    x, y = grid.places
+    spacing = node_spacing(width, height)
+    rows, columns = region.weights.shape
+    column = np.clip(x / spacing, 0.0, columns - 1.0)
+    row = np.clip(y / spacing, 0.0, rows - 1.0)
+    left, lower = np.floor(column), np.floor(row)
+    across, up = column - left, row - lower
+
+    def at(column: Floats, row: Floats) -> Floats:
+        columns_, rows_ = np.minimum(column, columns - 1), np.minimum(row, rows - 1)
+        found: Floats = region.weights[rows_.astype(int), columns_.astype(int)]
+        return found
+
+    below = at(left, lower) * (1.0 - across) + at(left + 1, lower) * across
+    above = at(left, lower + 1) * (1.0 - across) + at(left + 1, lower + 1) * across
+    return (below * (1.0 - up) + above * up)[..., None]

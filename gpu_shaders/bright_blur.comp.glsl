@@ -1,0 +1,23 @@
+// One region of what is bright, to polar coordinates and blurred along the radius; a thread a ray.
+// Twin of to_polar, weights_on and radial_blur in addon/shading/.
+#include "lib_shafts.glsl"
+
+void main()
+{
+  int ray = int(gl_GlobalInvocationID.x);
+  if (ray >= shafts.angles) {
+    return;
+  }
+  int radii = imageSize(rays).x;
+  float gained = 1.0 - shafts.kept;
+  vec3 total = vec3(0.0);
+  float weight = shafts.before;
+  for (int texel = 0; texel < radii; texel++) {
+    vec2 place = screen_place(shafts, ray, texel);
+    float owned = bilinear_red(weights, place / node_spacing, false);
+    vec3 shining = owned * bilinear_texel(bright, place - 0.5, false).rgb;
+    total = shining * gained + total * shafts.kept;
+    weight = gained + weight * shafts.kept;
+    imageStore(rays, ivec2(texel, ray), vec4(total / weight, 0.0));
+  }
+}

@@ -1,0 +1,25 @@
+// What is bright in a picture over what lies behind it, and how surely it is.
+// Twin of bright_part in addon/shading/bright_shafts.py.
+//
+// What lies behind has the size of the picture, or one texel that stands for all.
+#include "lib_bright.glsl"
+
+void main()
+{
+  ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
+  if (any(greaterThanEqual(pixel, imageSize(bright)))) {
+    return;
+  }
+  vec4 over = texelFetch(seen, pixel, 0);
+  vec4 under = texelFetch(behind, min(pixel, textureSize(behind, 0) - 1), 0);
+  vec3 color = over.rgb + (1.0 - over.a) * under.rgb;
+  // comparisons with what is no number are false
+  color = vec3(color.r >= 0.0 ? min(color.r, largest) : 0.0,
+               color.g >= 0.0 ? min(color.g, largest) : 0.0,
+               color.b >= 0.0 ? min(color.b, largest) : 0.0);
+  float luminance = luminance_of(color);
+  float above = max(luminance - threshold, 0.0);
+  float surely = above > 0.0 ? above / (above + knee) : 0.0;
+  float factor = above > 0.0 ? min(above * surely, brightest) / luminance : 0.0;
+  imageStore(bright, pixel, vec4(color * factor, min(2.0 * surely, 1.0)));
+}

@@ -1,0 +1,6 @@
+// Luminance of scene-linear Rec. 709; twin of LUMINANCE in addon/shading/bright_shafts.py.
+
+float luminance_of(vec3 color)
+{
+  return dot(color, vec3(0.2126, 0.7152, 0.0722));
+}
