@@ -18,6 +18,9 @@ bpy = pytest.importorskip("bpy", reason="these tests need Blender or the bpy mod
 from engine_stage import set_world  # noqa: E402
 
 from hairloom.addon.blender.engine import hair_scene  # noqa: E402
+from hairloom.addon.blender.properties.properties import settings_of  # noqa: E402
+from hairloom.addon.shading.bright_shafts import bright_shafts, shaft_length  # noqa: E402
+from hairloom.addon.shading.shafts_settings import ShaftSettings  # noqa: E402
 from hairloom.addon.strands import StrandSet  # noqa: E402
 
 pytestmark = [pytest.mark.draws, pytest.mark.usefixtures("gpu_context", "extension")]
@@ -344,3 +347,116 @@ def test_a_border_that_is_rendered_alone_has_its_hair(
     part = rendered(tmp_path)
     quarter = SIZE // 4
     np.testing.assert_allclose(part, whole[2 * quarter :, quarter : 3 * quarter], atol=0.02)
+
+
+@pytest.fixture
+def window(cycles: Any) -> Any:
+    """A pane that shines behind the hair, off its middle; the world is dim."""
+    set_world((0.05, 0.05, 0.05))
+    bpy.ops.mesh.primitive_plane_add(
+        size=0.5, location=(0.1, 0.4, 0.1), rotation=(np.pi / 2.0, 0.0, 0.0)
+    )
+    pane = bpy.context.object
+    material = bpy.data.materials.new("Pane")
+    material.node_tree.nodes.clear()
+    shining = material.node_tree.nodes.new("ShaderNodeEmission")
+    shining.inputs["Strength"].default_value = 4.0
+    output = material.node_tree.nodes.new("ShaderNodeOutputMaterial")
+    material.node_tree.links.new(shining.outputs[0], output.inputs["Surface"])
+    pane.data.materials.append(material)
+    return pane
+
+
+def with_bright_shafts(hair: Any) -> ShaftSettings:
+    shafts = hair.data.hairloom.shafts
+    shafts.use_shafts, shafts.source = True, "bright"
+    return settings_of(shafts, ShaftSettings)
+
+
+@pytest.mark.parametrize("engine", ["CYCLES", "HAIRLOOM"])
+def test_a_window_throws_the_shafts_of_the_reference_cut_by_the_hair(
+    cycles: Any, hairy: Any, window: Any, tmp_path: Path, engine: str
+) -> None:
+    """Of samples that are each a little elsewhere; the picture without shafts is their mean."""
+    cycles.hairloom.use_hair_scene = True
+    cycles.render.engine = engine
+    without = rendered(tmp_path)
+    settings = with_bright_shafts(hairy)
+    found = rendered(tmp_path)
+    projection = np.array(
+        cycles.camera.calc_matrix_camera(
+            bpy.context.evaluated_depsgraph_get(), x=SIZE, y=SIZE, scale_x=1.0, scale_y=1.0
+        )
+    )
+    length = shaft_length(projection, SIZE, settings.length)
+    expected = bright_shafts(without, without, length, settings)[0]
+    added = (expected - without)[..., :3]
+    assert 0.1 < added.max() < 1.0
+    assert np.abs(found - expected)[..., :3].mean() < 0.02 * added.mean()
+    assert np.abs(found - expected)[..., :3].max() < 0.05
+
+
+def test_shafts_over_cycles_leave_its_file_format_and_all_else_as_it_was(
+    cycles: Any, hairy: Any, window: Any, tmp_path: Path
+) -> None:
+    cycles.hairloom.use_hair_scene = True
+    with_bright_shafts(hairy)
+    settings = cycles.render.image_settings
+    settings.file_format, settings.color_mode, settings.quality = "JPEG", "BW", 71
+    names = sorted(each.name for each in bpy.data.images)
+    cycles.render.filepath = str(tmp_path / "picture.jpg")
+    bpy.ops.render.render(write_still=True)
+    kept = settings.file_format, settings.color_mode, settings.quality, settings.media_type
+    assert kept == ("JPEG", "BW", 71, "IMAGE")
+    assert sorted({*(each.name for each in bpy.data.images)} - {"Render Result"}) == [
+        name for name in names if name != "Render Result"
+    ]
+    assert (tmp_path / "picture.jpg").read_bytes()[:2] == b"\xff\xd8"
+
+
+def test_a_lamp_throws_shafts_over_cycles_and_a_mesh_cuts_them(
+    cycles: Any, hairy: Any, tmp_path: Path
+) -> None:
+    """A lamp behind the ball of hair: haze around it, none straight before the ball."""
+    set_world((0.0, 0.0, 0.0))
+    bpy.ops.object.light_add(type="POINT", location=(0.25, 0.5, 0.0))
+    bpy.context.object.data.energy = 100.0
+    hairy.data.hairloom.volume.shadows = "none"
+    cycles.hairloom.use_hair_scene = True
+    without = rendered(tmp_path)
+    hairy.data.hairloom.shafts.use_shafts = True
+    haze = (rendered(tmp_path) - without)[..., 0]
+    middle = SIZE // 2
+    assert haze.min() > -1e-4 and haze[middle, middle + 30 :].max() > 0.2
+    # as far from the lamp on its other side nothing is in the way
+    lamp = int(haze[middle].argmax())
+    assert haze[middle, max(lamp - 50, 0)] < 0.7 * haze[middle, min(lamp + 50, SIZE - 1)]
+
+
+@pytest.mark.parametrize("is_cropped", [True, False])
+def test_a_render_region_has_the_shafts_of_what_it_shows(
+    cycles: Any, hairy: Any, window: Any, tmp_path: Path, is_cropped: bool
+) -> None:
+    render = cycles.render
+    render.use_border, render.use_crop_to_border = True, is_cropped
+    render.border_min_x, render.border_max_x = 0.25, 0.9
+    render.border_min_y, render.border_max_y = 0.3, 1.0
+    cycles.hairloom.use_hair_scene = True
+    without = rendered(tmp_path)
+    with_bright_shafts(hairy)
+    added = (rendered(tmp_path) - without)[..., :3]
+    part = added if is_cropped else added[36:120, 30:108]
+    assert part.max() > 0.1 and np.isfinite(part).all()
+    assert is_cropped or not added[:34].any()
+
+
+@pytest.mark.parametrize("engine", ["CYCLES", "HAIRLOOM"])
+def test_an_orthographic_camera_sees_shafts_of_bright_things(
+    cycles: Any, hairy: Any, window: Any, tmp_path: Path, engine: str
+) -> None:
+    cycles.camera.data.type, cycles.camera.data.ortho_scale = "ORTHO", 1.0
+    cycles.hairloom.use_hair_scene, cycles.render.engine = True, engine
+    without = rendered(tmp_path)
+    with_bright_shafts(hairy)
+    added = (rendered(tmp_path) - without)[..., 0]
+    assert added.min() > -1e-3 and added.max() > 0.1

@@ -14,7 +14,7 @@ from ...render.shader_source import ShaderError
 from ..base.gpu_context import can_draw
 from ..viewport.overlay import ENGINE
 from . import engine_hair, hair_scene
-from .engine_still import COMBINED, DEPTH_PASS, NUMBERS_PASS, SHADOW_PASS, Still
+from .engine_still import COMBINED, DEPTH_PASS, NUMBERS_PASS, SHADOW_PASS, SHAFTS_PASS, Still
 from .engine_view import EngineView
 
 
@@ -100,10 +100,12 @@ class HAIRLOOM_RE_engine(bpy.types.RenderEngine):
 
 def _passes(scene: Any, layer: Any) -> tuple[tuple[tuple[str, int, str, str], bool], ...]:
     """What there is beside the picture, and whether it is wanted."""
+    is_hair_scene = hair_scene.drawn_by(scene) is not None
     return (
         (DEPTH_PASS, layer.use_pass_z),
         (NUMBERS_PASS, layer.use_pass_object_index),
-        (SHADOW_PASS, hair_scene.drawn_by(scene) is not None),
+        (SHADOW_PASS, is_hair_scene),
+        (SHAFTS_PASS, is_hair_scene),
     )
 
 

@@ -11,29 +11,42 @@ import bpy
 import numpy as np
 
 from ...arrays import Floats
+from ...render import gpu_objects
 from ...render.accumulation import Accumulation, Target
 from ...render.camera import Camera
 from ...render.camera_window import Window, jittered
 from ...render.capabilities import CALM_SAMPLES, capabilities
 from ...render.lens import through
 from ...render.pixel_filter import jitters
-from ...render.scene_pass import FAR_AWAY, Rgba, ScenePass
+from ...render.scene_pass import FAR_AWAY, Rgba, ScenePass, ShaftsApart, shafts_of
 from ...render.scene_snapshot import SceneSnapshot
+from ...render.textures import texture_from
+from ...shading.bright_shafts import wants_bright
 from ...shading.picture_settings import PictureSettings
 from ..base.gpu_context import ensure_gpu
 from ..properties.properties import settings_of
 from . import hair_scene
 from .engine_camera import border_window, camera_warnings, read_camera, read_lens
+from .engine_picture import engine_picture
 from .engine_scene import SceneReader
 
-COMBINED, DEPTH, NUMBERS, SHADOW = "Combined", "Depth", "Object Index", "Hair Shadow"
+COMBINED, DEPTH, NUMBERS = "Combined", "Depth", "Object Index"
+SHADOW, SHAFTS = "Hair Shadow", "Hair Shafts"
 #: name, channels, their names, kind; what Blender's compositor knows each by
 DEPTH_PASS = (DEPTH, 1, "Z", "VALUE")
 NUMBERS_PASS = (NUMBERS, 1, "X", "VALUE")
 #: of hair scenes: the fraction of their light that hair leaves to meshes
 SHADOW_PASS = (SHADOW, 3, "RGB", "COLOR")
+#: of hair scenes: shafts of light, to be added to the picture
+SHAFTS_PASS = (SHAFTS, 3, "RGB", "COLOR")
 #: while it renders, the picture so far is shown this often [s]
 _SHOWN_EVERY = 1.0
+
+
+_UNSEEN = (
+    "Light Shafts: bright things throw none, since the picture of the engine could not be read. "
+    "Turn Stereoscopy off, and render the scene that the hair belongs to."
+)
 
 
 @dataclass(frozen=True)
@@ -82,7 +95,10 @@ class Still:
         self._reader, self._pass = SceneReader(), ScenePass()
         self._target, self._picture = Target(), Accumulation()
         behind = hair_scene.drawn_by(depsgraph.scene)
+        self._behind = behind
         self._shadow = None if behind is None else (Target(), Accumulation())
+        self._shafts = Accumulation()
+        self._apart: ShaftsApart | None = None
         self._is_needed = behind is None or hair_scene.is_needed(behind)
         self.warnings: tuple[str, ...] = ()
 
@@ -112,8 +128,10 @@ class Still:
         self._picture.begin(*self._size)
         if self._shadow is not None:
             self._shadow[1].begin(*self._size)
+            self._shafts.begin(*self._size)
         shown = time.monotonic()
         scene, camera = self._moment()
+        self._apart = None if self._behind is None else self._beside(self._behind, scene)
         self._add_data(result, scene, camera)
         for moment in moments:
             if len(moments) > 1:
@@ -134,6 +152,24 @@ class Still:
             self._go_to(frame)
         self._show(result)
 
+    def _beside(self, behind: bpy.types.Scene, scene: SceneSnapshot) -> ShaftsApart | None:
+        """Where shafts of light go; None without any. They come from the picture of Blender's own
+        engine too, where they are to come from what is bright."""
+        settings = shafts_of(scene)
+        if settings is None:
+            return None
+        light = gpu_objects.texture(self._size, format="RGBA32F")
+        if not wants_bright(settings):
+            return ShaftsApart(light)
+        left, bottom = (
+            round(start * side) for start, side in zip(self._window[:2], self._whole, strict=True)
+        )
+        seen = engine_picture(behind.original, self._whole, (left, bottom), self._size)
+        if seen is None:
+            self.warnings = (*self.warnings, _UNSEEN)
+            return ShaftsApart(light)
+        return ShaftsApart(light, texture_from(seen, "RGBA32F"))
+
     def _moment(self) -> tuple[SceneSnapshot, Camera]:
         """Scene and camera as they are evaluated now."""
         scene = self._reader.read(self._depsgraph)
@@ -148,13 +184,16 @@ class Still:
     def _add_sample(self, scene: SceneSnapshot, camera: Camera, place: Floats) -> None:
         moved = jittered(camera, place, *self._size, sample=self._picture.count)
         scene = scene.at_sample(self._picture.count)
-        self._pass.draw(scene, moved, self._target, self._size, sky_of(scene, self._render))
+        sky = sky_of(scene, self._render)
+        self._pass.draw(scene, moved, self._target, self._size, sky, self._apart)
         self.warnings = tuple(dict.fromkeys((*self.warnings, *self._pass.notes)))
         self._picture.add(self._target.color)
         if self._shadow is not None:
             target, shadow = self._shadow
             self._pass.draw_hair_shadow(scene, moved, target, self._size)
             shadow.add(target.color)
+        if self._apart is not None:
+            self._shafts.add(self._apart.light)
         self._engine.update_progress(self._picture.count / self._settings.samples)
         self._engine.update_stats("", f"Sample {self._picture.count} of {self._settings.samples}")
 
@@ -177,6 +216,9 @@ class Still:
             if each.name == SHADOW and self._shadow is not None:
                 shadow = self._shadow[1].mean()[..., :3]
                 each.rect.foreach_set(np.ascontiguousarray(shadow).ravel())
+            if each.name == SHAFTS and self._shafts.count:
+                shafts = self._shafts.mean()[..., :3]
+                each.rect.foreach_set(np.ascontiguousarray(shafts).ravel())
 
 
 def _leave_empty(result: Any) -> None:

@@ -8,7 +8,8 @@ from typing import Any
 import bpy
 
 NAME = "Hairloom Hair"
-IMAGE, HAIR, SHADOW, STRENGTH = "Image", "Hair", "Hair Shadow", "Shadow Strength"
+IMAGE, HAIR, SHADOW, SHAFTS = "Image", "Hair", "Hair Shadow", "Hair Shafts"
+STRENGTH = "Shadow Strength"
 #: custom property of node trees that are ours: the group, and a compositor made for it
 _KIND = "hairloom"
 _LAYERS = "CompositorNodeRLayers"
@@ -32,7 +33,9 @@ def link(scene: bpy.types.Scene, hair: bpy.types.Scene, layer: str) -> None:
             tree.links.new(group.outputs[IMAGE], old.to_socket)
         tree.links.new(picture, group.inputs[IMAGE])
         tree.links.new(beside.outputs[IMAGE], group.inputs[HAIR])
-        tree.links.new(beside.outputs[SHADOW], group.inputs[SHADOW])
+        for name in (SHADOW, SHAFTS):
+            if name in group.inputs:  # a group of an older file knows no shafts
+                tree.links.new(beside.outputs[name], group.inputs[name])
 
 
 def unlink(scene: bpy.types.Scene, hair: bpy.types.Scene | None) -> None:
@@ -100,7 +103,7 @@ def _known_group() -> Any:
 
 
 def _group() -> Any:
-    """Picture times shadow, and hair over it."""
+    """Picture times shadow, hair over it, and shafts of light over all."""
     tree = _known_group()
     if tree is not None:
         return tree
@@ -108,7 +111,10 @@ def _group() -> Any:
     tree[_KIND] = "hair"
     sockets = tree.interface
     sockets.new_socket(IMAGE, in_out="OUTPUT", socket_type="NodeSocketColor")
-    for name, color in ((IMAGE, (0, 0, 0, 1)), (HAIR, (0, 0, 0, 0)), (SHADOW, (1, 1, 1, 1))):
+    for name, color in (
+        *((IMAGE, (0, 0, 0, 1)), (HAIR, (0, 0, 0, 0))),
+        *((SHADOW, (1, 1, 1, 1)), (SHAFTS, (0, 0, 0, 1))),
+    ):
         socket = sockets.new_socket(name, in_out="INPUT", socket_type="NodeSocketColor")
         socket.default_value = color
     strength = sockets.new_socket(STRENGTH, in_out="INPUT", socket_type="NodeSocketFloat")
@@ -116,9 +122,11 @@ def _group() -> Any:
     strength.min_value, strength.max_value = 0.0, 1.0
     given, output = tree.nodes.new("NodeGroupInput"), tree.nodes.new("NodeGroupOutput")
     shaded, over = tree.nodes.new("ShaderNodeMix"), tree.nodes.new("CompositorNodeAlphaOver")
-    shaded.data_type, shaded.blend_type = "RGBA", "MULTIPLY"
-    shaded.clamp_factor = False
-    for number, node in enumerate((given, shaded, over, output)):
+    added = tree.nodes.new("ShaderNodeMix")
+    for node, blend in ((shaded, "MULTIPLY"), (added, "ADD")):
+        node.data_type, node.blend_type, node.clamp_factor = "RGBA", blend, False
+    added.inputs[0].default_value = 1.0
+    for number, node in enumerate((given, shaded, over, added, output)):
         node.location.x = 220.0 * number
     pairs = (
         (given.outputs[STRENGTH], shaded.inputs[0]),
@@ -126,7 +134,9 @@ def _group() -> Any:
         (given.outputs[SHADOW], _of_type(shaded.inputs, "RGBA", 1)),
         (_of_type(shaded.outputs, "RGBA", 0), over.inputs["Background"]),
         (given.outputs[HAIR], over.inputs["Foreground"]),
-        (over.outputs[0], output.inputs[0]),
+        (over.outputs[0], _of_type(added.inputs, "RGBA", 0)),
+        (given.outputs[SHAFTS], _of_type(added.inputs, "RGBA", 1)),
+        (_of_type(added.outputs, "RGBA", 0), output.inputs[0]),
     )
     for one, other in pairs:
         tree.links.new(one, other)

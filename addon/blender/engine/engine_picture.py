@@ -1,0 +1,86 @@
+"""The picture that Blender's own engine has just rendered, for hair that is laid over it.
+
+Blender renders the artist's scene first and hair scenes after it, before it composites. Between the
+two the picture lies in *Render Result*, which hands its pixels out to files alone: so it goes
+through one, scene-linear and in whole floats, and the scene's own file format is put back at once.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import bpy
+
+from ...arrays import Floats
+from ...errors import HairloomError
+from ..base.images import read_texture
+
+#: of a file format, in an order in which each may be set
+_FORMAT = {
+    "media_type": "IMAGE",
+    "file_format": "OPEN_EXR",
+    "color_management": "FOLLOW_SCENE",
+    "color_mode": "RGBA",
+    "color_depth": "32",
+    "exr_codec": "NONE",
+}
+
+
+def engine_picture(
+    scene: bpy.types.Scene, whole: tuple[int, int], corner: tuple[int, int], size: tuple[int, int]
+) -> Floats | None:
+    """The picture of a scene before compositing, (height, width, 4) scene-linear, premultiplied,
+    row 0 at the bottom; None where there is none.
+
+    Args:
+        whole: width and height of all of it [pixels].
+        corner, size: of the part that is wanted [pixels].
+    """
+    result = next((each for each in bpy.data.images if each.type == "RENDER_RESULT"), None)
+    if result is None or scene.render.use_multiview:
+        return None
+    with tempfile.TemporaryDirectory(prefix="hairloom") as folder:
+        path = Path(folder) / "picture.exr"
+        try:
+            with _as_floats(scene.render.image_settings):
+                result.save_render(str(path), scene=scene)
+        except RuntimeError:  # nothing was rendered
+            return None
+        found = _read(path) if path.is_file() else None
+    if found is None or found.shape[:2] == size[::-1]:
+        return found
+    if found.shape[:2] != whole[::-1]:
+        return None
+    left, bottom = corner
+    return found[bottom : bottom + size[1], left : left + size[0]]
+
+
+@contextmanager
+def _as_floats(settings: Any) -> Iterator[None]:
+    kept = {name: getattr(settings, name) for name in _FORMAT}
+    try:
+        _set(settings, _FORMAT)
+        yield
+    finally:
+        _set(settings, kept)
+
+
+def _set(settings: Any, values: dict[str, str]) -> None:
+    for name, value in values.items():
+        if getattr(settings, name) != value:
+            setattr(settings, name, value)
+
+
+def _read(path: Path) -> Floats | None:
+    try:
+        found = read_texture(path, is_color=True)
+    except HairloomError:
+        return None
+    if found.shape[2] != 4:
+        return None
+    found[..., :3] *= found[..., 3:]
+    return found
