@@ -1,11 +1,13 @@
-"""Draws what the render engine gives, and hair over Blender's own engines, for docs/engine.md.
+"""Draws what the render engine gives, and hair over Blender's own engines, for docs/engine.md and
+docs/light_shafts.md.
 
 python tools/engine_pictures.py FOLDER
 
 FOLDER gets engine.png: picture, distance and object mask. The head is the built-in one with a
 groom, her face a material of its own, before a wall; rendered as an artist would, by the engine,
-into a file of many layers. And over_engines.jpg: the sample scene by EEVEE and Cycles, with
-*Hairloom Hair*, and by Hairloom.
+into a file of many layers. over_engines.jpg: the sample scene by EEVEE and Cycles, with
+*Hairloom Hair*, and by Hairloom. And light_shafts.jpg: the head before a bright window, without
+shafts and with them, and under water.
 """
 
 import importlib
@@ -23,7 +25,16 @@ from small_pictures import write_small
 SIZE, SAMPLES, STRANDS, THICKER = 340, 16, 12000, 1.5
 #: of hair over Blender's own engines
 OVER_SIZE, OVER_SAMPLES = 480, 64
+#: of light shafts
+SHAFT_SAMPLES = 6
 WORLD = (0.12, 0.15, 0.2, 1.0)
+#: of the world in a room and under water; the bars of a window: where they are, and how large [m]
+ROOM = (0.03, 0.03, 0.04, 1.0)
+SEA = (0.01, 0.04, 0.06, 1.0)
+BARS = (
+    *(((x, 0.0), (0.006, 0.3)) for x in (-0.045, 0.045)),
+    *(((0.0, y), (0.3, 0.006)) for y in (-0.05, 0.05)),
+)
 CAMERA, TARGET = Vector((-0.42, -0.85, 0.12)), Vector((0.0, 0.0, 0.02))
 #: number in the mask -> colour [scene-linear]
 MASK = {0: (0.02, 0.02, 0.02), 1: (0.7, 0.25, 0.12), 2: (0.1, 0.3, 0.75), 3: (0.15, 0.4, 0.15)}
@@ -122,13 +133,68 @@ def by_each_engine(work: Path) -> list[Path]:
     return pictures
 
 
+def put_behind(toward: Any, size: tuple[float, float], material: Any) -> Any:
+    """A pane that faces the camera, this far behind the head along the view."""
+    bpy.ops.mesh.primitive_plane_add(size=1.0, location=TARGET + toward)
+    pane = bpy.context.object
+    pane.rotation_euler = (CAMERA - TARGET).to_track_quat("Z", "Y").to_euler()
+    pane.scale = (*size, 1.0)
+    pane.data.materials.append(material)
+    return pane
+
+
+def with_shafts(work: Path) -> list[Path]:
+    """A window without its shafts and with them, and a sun under water."""
+    scene = scene_of_head()
+    bpy.data.objects.remove(bpy.data.objects["Plane"])
+    bpy.data.objects["Area"].data.energy = 5.0
+    world = scene.world.node_tree.nodes["Background"].inputs["Color"]
+    world.default_value = ROOM
+    hair = next(each for each in scene.objects if each.type == "CURVES")
+    behind, shining = (TARGET - CAMERA).normalized(), material("Pane", (0.0, 0.0, 0.0), 0.9)
+    principled = shining.node_tree.nodes["Principled BSDF"]
+    principled.inputs["Emission Color"].default_value = (1.0, 0.85, 0.6, 1.0)
+    principled.inputs["Emission Strength"].default_value = 6.0
+    dark = material("Bar", (0.05, 0.04, 0.03), 0.9)
+    panes = [put_behind(behind * 0.3, (0.3, 0.3), shining)]
+    for place, size in BARS:
+        bar = put_behind(behind * 0.29, size, dark)
+        bar.location += bar.rotation_euler.to_matrix() @ Vector((*place, 0.0))
+        panes.append(bar)
+    scene.render.resolution_x = scene.render.resolution_y = SIZE
+    scene.render.engine, scene.hairloom.picture.samples = "HAIRLOOM", SHAFT_SAMPLES
+    shafts, pictures = hair.data.hairloom.shafts, []
+
+    def render(name: str) -> None:
+        pictures.append(work / f"{name}.png")
+        scene.render.filepath = str(pictures[-1])
+        bpy.ops.render.render(write_still=True)
+
+    render("without")
+    shafts.use_shafts, shafts.source = True, "bright"
+    render("window")
+    for pane in panes:
+        bpy.data.objects.remove(pane)
+    bpy.context.view_layer.objects.active = hair
+    bpy.ops.hairloom.apply_preset(name="looks/under_water")
+    world.default_value = SEA
+    bpy.ops.object.light_add(type="SUN")
+    sun = bpy.context.object
+    sun.data.energy, sun.data.angle = 2.5, 0.0
+    above = behind + Vector((0.0, 0.0, 0.22))
+    sun.rotation_euler = above.to_track_quat("Z", "Y").to_euler()
+    render("under_water")
+    return pictures
+
+
 def side_by_side(pictures: list[Path], kept: Path) -> None:
     import OpenImageIO as oiio
 
-    sheet = oiio.ImageBuf(oiio.ImageSpec(OVER_SIZE * len(pictures), OVER_SIZE, 3, "uint8"))
+    side = oiio.ImageBuf(str(pictures[0])).spec().width
+    sheet = oiio.ImageBuf(oiio.ImageSpec(side * len(pictures), side, 3, "uint8"))
     for number, path in enumerate(pictures):
         picture = oiio.ImageBufAlgo.channels(oiio.ImageBuf(str(path)), (0, 1, 2))
-        oiio.ImageBufAlgo.paste(sheet, number * OVER_SIZE, 0, 0, 0, picture)
+        oiio.ImageBufAlgo.paste(sheet, number * side, 0, 0, 0, picture)
     drawn = kept.with_suffix(".png")
     sheet.write(str(drawn))
     write_small(drawn, kept)
@@ -155,6 +221,7 @@ def main() -> int:
         with tempfile.TemporaryDirectory() as work:
             found = passes_of(scene_of_head(), Path(work) / "picture.exr")
             side_by_side(by_each_engine(Path(work)), folder / "over_engines.jpg")
+            side_by_side(with_shafts(Path(work)), folder / "light_shafts.jpg")
     finally:
         extension.unregister()
     mask = np.zeros((SIZE, SIZE, 3), np.float32)
