@@ -75,11 +75,7 @@ class Accumulation:
             left, bottom: the pixel of the target at which the picture begins.
         """
         if self._triangle is None:
-            layout = gpu.types.GPUVertFormat()
-            layout.attr_add(id="unused", comp_type="F32", len=1, fetch_mode="FLOAT")
-            self._triangle = gpu_objects.batch(
-                type="TRIS", buf=gpu_objects.vertex_buffer(layout, 3)
-            )
+            self._triangle = gpu_objects.triangle()
         shader = program(_SHOWING)
         with drawing_state(depth_test="NONE", depth_write=False, blend="ALPHA_PREMULT"):
             shader.bind(

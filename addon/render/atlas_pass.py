@@ -188,7 +188,4 @@ def _texture(width: int, height: int, texture_format: str) -> Any:
 
 def _ribbon(cv_count: int) -> Any:
     """A strip of vertices without attributes: two a CV."""
-    layout = gpu.types.GPUVertFormat()
-    layout.attr_add(id="unused", comp_type="F32", len=1, fetch_mode="FLOAT")
-    vertices = gpu_objects.vertex_buffer(layout, 2 * cv_count)
-    return gpu_objects.batch(type="TRI_STRIP", buf=vertices)
+    return gpu_objects.bare_batch("TRI_STRIP", 2 * cv_count)

@@ -13,9 +13,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import gpu
-import numpy as np
-
 from ..strands import Surface
 from . import gpu_objects
 from .camera import Camera
@@ -90,12 +87,6 @@ class BodyShadow:
 
 
 def _batch(surface: Surface) -> Any:
-    layout = gpu.types.GPUVertFormat()
-    for name in ("position", "normal"):
-        layout.attr_add(id=name, comp_type="F32", len=3, fetch_mode="FLOAT")
-    vertices = gpu_objects.vertex_buffer(layout, len(surface.positions))
-    vertices.attr_fill("position", np.ascontiguousarray(surface.positions, np.float32))
-    vertices.attr_fill("normal", np.ascontiguousarray(surface.vertex_normals(), np.float32))
-    triangles = np.ascontiguousarray(surface.triangles, np.int32)
-    indices = gpu_objects.index_buffer(type="TRIS", seq=triangles)
-    return gpu_objects.batch(type="TRIS", buf=vertices, elem=indices)
+    values = {"position": surface.positions, "normal": surface.vertex_normals()}
+    vertices = gpu_objects.vertex_buffer(values)
+    return gpu_objects.batch("TRIS", vertices, gpu_objects.index_buffer(surface.triangles))

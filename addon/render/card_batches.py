@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-import gpu
 import numpy as np
 
 from ..arrays import Floats, Ints
@@ -89,11 +88,10 @@ class CardBatches:
     def _batch(self, name: str, triangles: Ints) -> Any:
         order = self._orders.get(name)
         if order is None or order.triangles is not triangles:
-            whole = np.ascontiguousarray(triangles, np.int32)
-            indices = gpu_objects.index_buffer(type="TRIS", seq=whole)
+            indices = gpu_objects.index_buffer(triangles)
             order = self._orders[name] = _Order(triangles, indices)
         if order.batch is None:
-            order.batch = gpu_objects.batch(type="TRIS", buf=self._vertices, elem=order.indices)
+            order.batch = gpu_objects.batch("TRIS", self._vertices, order.indices)
         return order.batch
 
 
@@ -101,17 +99,12 @@ def _vertices(cards: CardSnapshot) -> Any:
     mesh, seen = cards.mesh, cards.skin_seen
     if seen is None:
         seen = np.broadcast_to(_PLANE, (len(mesh.positions), 8))
-    layout = gpu.types.GPUVertFormat()
-    for name, length in ATTRIBUTES.items():
-        layout.attr_add(id=name, comp_type="F32", len=length, fetch_mode="FLOAT")
-    vertices = gpu_objects.vertex_buffer(layout, len(mesh.positions))
     values = {
         "position": mesh.positions,
         "occlusion": mesh.occlusion[:, None],
         "along": mesh.along[:, None],
-        "received": np.ascontiguousarray(seen[:, :4]),
-        "beneath": np.ascontiguousarray(seen[:, 4:]),
+        "received": seen[:, :4],
+        "beneath": seen[:, 4:],
     }
-    for name in ATTRIBUTES:  # a CardMesh holds contiguous float32, as attr_fill needs it
-        vertices.attr_fill(name, values[name] if name in values else getattr(mesh, name))
-    return vertices
+    own = {name: getattr(mesh, name) for name in ATTRIBUTES if name not in values}
+    return gpu_objects.vertex_buffer({name: (values | own)[name] for name in ATTRIBUTES})

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import gpu
 import numpy as np
 
 from ..arrays import Floats, Ints
@@ -46,18 +45,9 @@ def triangle_batch(values: dict[str, Floats], triangles: Ints | None) -> Any:
     Args:
         triangles: (triangle_count, 3); None where three vertices each are a triangle.
     """
-    layout = gpu.types.GPUVertFormat()
-    for name, array in values.items():
-        layout.attr_add(id=name, comp_type="F32", len=array.shape[1], fetch_mode="FLOAT")
-    vertices = gpu_objects.vertex_buffer(layout, len(values["position"]))
-    for name, array in values.items():
-        # attr_fill checks neither dtype nor order
-        vertices.attr_fill(name, np.ascontiguousarray(array, np.float32))
-    if triangles is None:
-        return gpu_objects.batch(type="TRIS", buf=vertices)
-    corners = np.ascontiguousarray(triangles, np.int32)
-    indices = gpu_objects.index_buffer(type="TRIS", seq=corners)
-    return gpu_objects.batch(type="TRIS", buf=vertices, elem=indices)
+    vertices = gpu_objects.vertex_buffer(values)
+    indices = None if triangles is None else gpu_objects.index_buffer(triangles)
+    return gpu_objects.batch("TRIS", vertices, indices)
 
 
 def _skin_places(mesh: MeshSnapshot, skin: SkinLayout) -> Floats:

@@ -16,7 +16,6 @@ from ..arrays import Floats
 from ..shading.lights import LIGHT_CAPACITY, Light
 from ..shading.mesh_shadow_settings import MeshShadowSettings
 from ..shading.volume.light_frame import LightFrame
-from ..shading.volume.map_size import MEMORY_LIMIT
 from ..shading.volume.mesh_frames import (
     MESH_FRAME_CAPACITY,
     Extent,
@@ -24,7 +23,7 @@ from ..shading.volume.mesh_frames import (
     extent_of,
     mesh_frames,
 )
-from . import gpu_objects
+from . import gpu_memory, gpu_objects
 from .hashed_alpha import shifts
 from .mesh_depths import MeshDepths
 from .shader_feature import ShaderFeature
@@ -89,7 +88,7 @@ class MeshShadowPass:
             return None
         layers = max(sum(map(len, frames)), 2)  # one texture alone would not be an array
         most = gpu.capabilities.max_texture_size_get()
-        side = mesh_map_side(settings.mesh_resolution, layers, most)
+        side = mesh_map_side(settings.mesh_resolution, layers, most, gpu_memory.mesh_maps_room())
         values = pack_mesh_shadows(frames, side)
         wanted = (tuple(map(id, casters)), values.tobytes())
         if self._maps is None or self._drawn != wanted:
@@ -122,9 +121,9 @@ class MeshShadowPass:
         return gpu_objects.texture((side, side), layers=layers, format="DEPTH_COMPONENT32F")
 
 
-def mesh_map_side(asked: int, layers: int, most: int) -> int:
-    """Texels along a side of each of these maps, as many as memory and GPU allow."""
-    return max(min(asked, most, int(np.sqrt(MEMORY_LIMIT / (_TEXEL_BYTES * layers)))), 1)
+def mesh_map_side(asked: int, layers: int, most: int, room: int) -> int:
+    """Texels along a side of each of these maps, as many as memory [bytes] and GPU allow."""
+    return max(min(asked, most, int(np.sqrt(room / (_TEXEL_BYTES * layers)))), 1)
 
 
 def pack_mesh_shadows(frames: Sequence[Sequence[LightFrame]], side: int) -> Floats:

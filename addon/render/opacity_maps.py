@@ -33,7 +33,7 @@ from ..shading.volume.map_size import START_TEXELS, MapSize, even_size, fitted_s
 from ..shading.volume.opacity import layer_ends
 from ..shading.volume.settings import VolumeSettings
 from ..shading.volume.shadow_lights import shadow_frames
-from . import gpu_objects
+from . import gpu_memory, gpu_objects
 from .mesh_depths import MeshDepths
 from .shader_feature import ShaderFeature
 from .shader_program import ShaderRecipe, program
@@ -203,7 +203,8 @@ class OpacityDrawing:
         """
         frames = dict(enumerate(shadow_frames(lights, ball, settings)))
         wanted = {light: frame for light, frame in frames.items() if frame is not None}
-        size = fitted_size(settings, len(wanted), gpu.capabilities.max_texture_size_get())
+        largest = gpu.capabilities.max_texture_size_get()
+        size = fitted_size(settings, len(wanted), largest, gpu_memory.maps_room())
         self.note = size_note(settings, len(wanted), size)
         size = even_size(size, spacing, ball.radius)
         place = ball.center.tobytes(), ball.radius

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import gpu
-
 from . import gpu_objects
 
 
@@ -25,8 +23,5 @@ class Ribbons:
 
     def _batch(self, kind: str, count: int) -> Any:
         if (kind, count) not in self._batches:
-            layout = gpu.types.GPUVertFormat()
-            layout.attr_add(id="unused", comp_type="F32", len=1, fetch_mode="FLOAT")
-            vertices = gpu_objects.vertex_buffer(layout, count)
-            self._batches[kind, count] = gpu_objects.batch(type=kind, buf=vertices)
+            self._batches[kind, count] = gpu_objects.bare_batch(kind, count)
         return self._batches[kind, count]

@@ -12,6 +12,7 @@ import numpy as np
 from ..arrays import Floats
 from ..shading.lights import kept_lights
 from ..shading.shafts_settings import ShaftSettings
+from . import gpu_memory
 from .accumulation import Target
 from .bright_pass import plain
 from .camera import Camera
@@ -88,7 +89,7 @@ class ScenePass:
         Raises:
             ShaderError: a shader does not compile here, or points on the GPU were released.
         """
-        with ONE_AT_A_TIME:
+        with ONE_AT_A_TIME, gpu_memory.shared_by(len(scene.grooms)):
             self._draw(scene, camera, target, size, sky, apart)
 
     def _draw(
@@ -129,7 +130,7 @@ class ScenePass:
 
         Others, and errors, as of `draw`.
         """
-        with ONE_AT_A_TIME:
+        with ONE_AT_A_TIME, gpu_memory.shared_by(len(scene.grooms)):
             maps = self._maps(scene)
             target.sized(*size).clear(_ALL)
             with target.drawing():
@@ -156,7 +157,7 @@ class ScenePass:
         """Of what lies in the middle of each pixel: how far away along the view [m], and its
         object's number; each (height, width) float32, row 0 at the bottom.
         """
-        with ONE_AT_A_TIME:
+        with ONE_AT_A_TIME, gpu_memory.shared_by(len(scene.grooms)):
             target.sized(*size).clear(_NOTHING)
             with target.drawing():
                 numbered = [Placed(mesh, float(mesh.number)) for mesh in scene.meshes]

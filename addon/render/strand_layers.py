@@ -35,7 +35,7 @@ import numpy as np
 
 from ..arrays import Ints
 from ..shading.volume.transparency import LAYERS, TURNING_LAYERS
-from . import gpu_objects
+from . import gpu_memory, gpu_objects
 from .kept_picture import KeptPicture
 from .pixel_parts import PixelPart, pixel_parts
 from .shader_program import ShaderProgram, ShaderRecipe, program, released_with_shaders
@@ -43,8 +43,12 @@ from .shader_source import LAYER_ROW, ShaderError
 from .strand_drawing import StrandDrawing
 from .textures import drawing_rows, drawing_state
 
-#: rows of nodes at first, and at most: 12 Mi fragments, 240 MiB
-FIRST_ROWS, MAX_ROWS = 256, 3072
+#: rows of nodes at first, 20 MiB
+FIRST_ROWS = 256
+#: of a node and its number among those that are seen
+FRAGMENT_BYTES = 20
+#: lists are made smaller where they take this much more than there is room for now
+_TOO_LARGE = 1.25
 #: a count that turned out too small is made this much larger than what was found
 _SPARE = 1.25
 #: pixels of which the fragments of what moves are shaded by one invocation, one after the other
@@ -87,17 +91,19 @@ class StrandLayers:
     """What a draw of layers needs on the GPU; making one touches no GPU.
 
     Args:
-        max_rows: of nodes, LAYER_ROW fragments each.
+        max_rows: of nodes, LAYER_ROW fragments each; None: as many as memory has room for.
     """
 
-    def __init__(self, max_rows: int = MAX_ROWS) -> None:
+    def __init__(self, max_rows: int | None = None) -> None:
         self._wanted_rows = max_rows
         self.release()
         released_with_shaders(self)
 
     def release(self) -> None:
         """Let go of all that lies on the GPU; the next draw makes it again."""
-        self._max_rows = self._wanted_rows
+        self._max_rows = 0
+        #: where a driver has refused more
+        self._refused_rows: int | None = None
         self._pixel_count = self._too_long = 0  # of what was gathered last
         self._size = 0, 0
         self._count: Any = None
@@ -271,6 +277,15 @@ class StrandLayers:
             self._make_nodes(rows)
         return self._capacity > before
 
+    def _limit(self) -> None:
+        """How many rows there may be now; what is beyond is let go of."""
+        held = 0 if self._nodes is None else self._capacity * FRAGMENT_BYTES
+        rows = gpu_memory.lists_room(held) // (FRAGMENT_BYTES * LAYER_ROW)
+        limits = (max(rows, 1), self._wanted_rows, self._refused_rows)
+        self._max_rows = min(limit for limit in limits if limit is not None)
+        if self._nodes is not None and self._nodes.height > _TOO_LARGE * self._max_rows:
+            self._make_nodes(self._max_rows)
+
     def _make_nodes(self, rows: int) -> None:
         """This many rows, or as many as there is memory for."""
         self._nodes = self._seen = None
@@ -282,12 +297,13 @@ class StrandLayers:
             except RuntimeError as error:
                 if rows == 1:
                     raise ShaderError("strands as layers: the GPU has no memory left") from error
-                self._max_rows = rows = rows // 2
+                self._refused_rows = self._max_rows = rows = rows // 2
 
     def _fit(self, size: tuple[int, int]) -> None:
         """Buffers for this many pixels; the old ones, where they are not far too large. Views of
         several shapes that take turns have the same ones.
         """
+        self._limit()
         kept, wanted = self._size, size
         is_held = kept[0] >= wanted[0] and kept[1] >= wanted[1]
         is_far_too_large = kept[0] * kept[1] > 4 * max(wanted[0] * wanted[1], 1)

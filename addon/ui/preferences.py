@@ -6,9 +6,9 @@ from types import SimpleNamespace
 from typing import Any
 
 import bpy
-from bpy.props import BoolProperty, EnumProperty, StringProperty
+from bpy.props import BoolProperty, EnumProperty, IntProperty, StringProperty
 
-from ..blender.base import image_atomics
+from ..blender.base import gpu_choices
 from ..blender.base.gpu_context import gpu_in_use
 from ..blender.base.redraw import redraw_views
 from ..blender.properties.groups import operator_properties
@@ -56,8 +56,8 @@ NEW_GROOM: dict[str, Any] = {
 _DEVICE = operator_properties("dynamics")["device"]
 
 
-def _choose_atomics(page: Any, _context: Any) -> None:
-    image_atomics.choose(page.image_atomics)
+def _choose_gpu(page: Any, _context: Any) -> None:
+    gpu_choices.choose(image_atomics=page.image_atomics, memory=page.gpu_memory)
     redraw_views()
 
 
@@ -67,8 +67,19 @@ _MACHINE: dict[str, Any] = {
         name="Image Atomics",
         description="Whether the GPU sorts the strands of a pixel in lists. If it draws no hair or "
         "broken hair, try Never, and tell us with Copy Report",
-        items=image_atomics.CHOICES,
-        update=_choose_atomics,
+        items=gpu_choices.ATOMICS,
+        update=_choose_gpu,
+    ),
+    "gpu_memory": IntProperty(
+        name="GPU Memory (MB)",
+        description="How much of the GPU's memory hair may take. 0 is automatic: 1,024 MB, since "
+        "Blender does not tell how much there is. With less, strands are drawn in more parts, and "
+        "shadow maps have fewer texels",
+        default=0,
+        min=0,
+        max=1 << 17,
+        soft_max=1 << 14,
+        update=_choose_gpu,
     ),
 }
 
@@ -163,12 +174,12 @@ def register() -> None:
     """Take over what an artist has chosen for this machine."""
     entry = bpy.context.preferences.addons.get(ROOT_PACKAGE)
     if entry is not None and entry.preferences is not None:
-        image_atomics.choose(entry.preferences.image_atomics)
+        _choose_gpu(entry.preferences, None)
 
 
 def unregister() -> None:
     """What is chosen counts as long as there is a page to choose it on."""
-    image_atomics.choose("automatic")
+    gpu_choices.choose()
 
 
 CLASSES: tuple[type[Any], ...] = (HAIRLOOM_AP_preferences,)

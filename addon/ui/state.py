@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import bpy
 
+from ..blender.base.gpu_choices import memory_in_use, memory_problem
 from ..blender.base.outcome import dropped_phrase
 from ..blender.preview import previews as registry
 from ..blender.preview.diagnostics import instances_note, issues_of
@@ -94,7 +95,7 @@ def _figures(session: Session | None) -> Iterator[tuple[str, str]]:
     yield "Guides", _NONE if rig is None else f"{len(rig.guides):,}"
     yield from zip(("Drawn", ""), shown, strict=True)
     size = 0 if session is None or rig is None else array_bytes(rig, session.snapshot)
-    yield "Memory", f"{size / _MEGABYTE:,.0f} MB" if size else _NONE
+    yield "Memory", f"{size / _MEGABYTE:,.0f} MB, GPU {memory_in_use():,.0f} MB" if size else _NONE
     for part in PARTS:
         spent = None if session is None else session.times.milliseconds(part)
         yield part.capitalize(), _milliseconds(spent)
@@ -127,7 +128,8 @@ def problems_of(hair: bpy.types.Object, session: Session | None) -> tuple[Proble
     reported = {issue.instead_of for issue in issues}
     problems = previews[session.uid].problems
     drawn = statistics_of(session.uid).notes
-    others = filter(None, (problems, view_transform.problem(), instances_note(hair), *drawn))
+    machine = memory_problem(), view_transform.problem()
+    others = filter(None, (problems, *machine, instances_note(hair), *drawn))
     for warning in dict.fromkeys((*session.warnings, *others)):
         if warning not in reported:
             found.append(Problem(warning.removeprefix(f"{hair.name}: ")))

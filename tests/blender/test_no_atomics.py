@@ -87,8 +87,8 @@ def test_stills_take_several_draws_without_atomics() -> None:
 
 def test_the_preferences_forbid_them_and_the_self_test_says_so(monkeypatch: Any) -> None:
     monkeypatch.setattr(self_test, "_last", ())
-    page = SimpleNamespace(image_atomics="never")
-    preferences._choose_atomics(page, bpy.context)
+    page = SimpleNamespace(image_atomics="never", gpu_memory=0)
+    preferences._choose_gpu(page, bpy.context)
     self_test.run()
     found = {check.name: check for check in self_test.last_report()}
     atomics, limits = found["Image atomics"], found["GPU"]
@@ -97,7 +97,8 @@ def test_the_preferences_forbid_them_and_the_self_test_says_so(monkeypatch: Any)
     most = capabilities.capabilities().texture_size
     assert f"textures of {most:,} texels" in limits.text and "ms" in limits.text
     assert not any(check.outcome == "failed" for check in found.values())
-    preferences._choose_atomics(SimpleNamespace(image_atomics="automatic"), bpy.context)
+    page.image_atomics = "automatic"
+    preferences._choose_gpu(page, bpy.context)
     self_test.run()
     assert {check.name: check.outcome for check in self_test.last_report()}[
         "Image atomics"

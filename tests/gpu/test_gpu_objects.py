@@ -17,6 +17,7 @@ pytest.importorskip("bpy", reason="runs inside Blender")
 import gpu
 
 from hairloom.addon.render import gpu_objects
+from hairloom.addon.render.capabilities import FORMATS
 from hairloom.addon.render.textures import texture_from
 
 pytestmark = pytest.mark.usefixtures("gpu_context")
@@ -42,6 +43,11 @@ def _collected_there(box: list[Any]) -> None:
     _in_thread(gc.collect)
 
 
+def mine() -> list[Any]:
+    """What this thread has made and is kept."""
+    return gpu_objects._KEPT.owned[threading.get_ident()].objects
+
+
 @pytest.mark.parametrize(
     "drop",
     [
@@ -56,22 +62,20 @@ def test_what_another_thread_drops_waits_for_its_own(drop: Callable[[list[Any]],
         box = [_filled(value)]
         texture = id(box[0])
         drop(box)
-        owned = gpu_objects._OWNED[threading.get_ident()]
-        assert texture in map(id, owned)
+        assert texture in map(id, mine())
         assert np.asarray(kept.read()).max() == 1.0
     gpu_objects.free_unused()
-    assert texture not in map(id, gpu_objects._OWNED[threading.get_ident()])
+    assert texture not in map(id, mine())
 
 
 def test_making_another_frees_what_nothing_uses() -> None:
-    owned = gpu_objects._OWNED
     kept, dropped = _filled(1.0), _filled(2.0)
-    before = len(owned[threading.get_ident()])
+    before = len(mine())
     del dropped
     for value in range(10):
         _filled(value)
-    assert len(owned[threading.get_ident()]) <= before
-    assert any(each is kept for each in owned[threading.get_ident()])
+    assert len(mine()) <= before
+    assert any(each is kept for each in mine())
 
 
 def test_a_render_thread_leaves_what_it_made_to_the_main_thread(
@@ -90,21 +94,44 @@ def test_a_render_thread_leaves_what_it_made_to_the_main_thread(
     reads: list[int] = []
 
     def render() -> None:
-        made.append(gpu_objects.texture((1, 1)))
-        gpu_objects.texture((1, 1))  # of no use any more when the thread ends
+        made.append(gpu_objects.texture((1, 1), format="R32F"))
+        gpu_objects.texture((1, 1), format="R32F")  # of no use any more when the thread ends
         gpu_objects.hand_over()
 
     gpu_objects.free_unused()
     with monkeypatch.context() as context:
         context.setattr(gpu.types, "GPUTexture", Made)
         _in_thread(render)
-    owned = gpu_objects._OWNED
-    mine = owned[threading.get_ident()]
-    assert set(owned) == {threading.get_ident()}
-    assert [each is made[0] for each in mine if isinstance(each, Made)] == [True]
+    assert set(gpu_objects._KEPT.owned) == {threading.get_ident()}
+    assert [each is made[0] for each in mine() if isinstance(each, Made)] == [True]
     assert reads == [1], "nothing has waited for the thread's commands"
     gpu_objects.hand_over()  # the main thread's stay its own
-    assert any(each is made[0] for each in mine)
+    assert any(each is made[0] for each in mine())
+
+
+def test_bytes_are_counted_while_they_are_there() -> None:
+    def in_use() -> int:
+        gpu_objects.free_unused()
+        return gpu_objects.bytes_in_use()
+
+    before = in_use()
+    image = gpu_objects.texture((64, 32), format="RGBA16F")
+    array = gpu_objects.texture((16, 16), layers=3, format="DEPTH_COMPONENT32F")
+    corners = gpu_objects.vertex_buffer({"position": np.zeros((5, 3)), "normal": np.ones((5, 3))})
+    indices = gpu_objects.index_buffer(np.array([[0, 1, 2], [2, 3, 4]]))
+    block = gpu_objects.uniform_buffer(np.zeros(8, np.float32))
+    drawn = gpu_objects.batch("TRIS", corners, indices)
+    sizes = 64 * 32 * 8, 16 * 16 * 3 * 4, 5 * 6 * 4, 6 * 4, 8 * 4
+    assert in_use() - before == sum(sizes)
+    assert gpu_objects.peak_bytes() >= before + sum(sizes)
+    del image, drawn, corners
+    assert in_use() - before == sum(sizes[i] for i in (1, 3, 4))
+    del array, indices, block
+    assert in_use() == before
+
+
+def test_all_formats_that_passes_make_have_a_size() -> None:
+    assert set(FORMATS) <= set(gpu_objects._TEXEL_BYTES)
 
 
 def test_nothing_else_makes_gpu_objects() -> None:

@@ -18,6 +18,7 @@ import numpy as np
 
 from ...errors import HairloomError
 from ...exchange.files.atomic import write_text_atomic
+from .gpu_choices import peak_memory
 from .gpu_context import gpu_in_use
 from .interruption import stop_if_asked
 
@@ -90,7 +91,8 @@ class Report:
 
     def write(self, path: Path) -> None:
         """Write report.json: facts, median milliseconds of each stage, and what it ran on."""
-        content = {**self.facts, "stages_ms": self.stages_ms(), **environment()}
+        memory = {"gpu_memory_mb": round(peak_memory(), 1)}
+        content = {**self.facts, "stages_ms": self.stages_ms(), **memory, **environment()}
         write_text_atomic(path, json.dumps(content, indent=2) + "\n")
 
 

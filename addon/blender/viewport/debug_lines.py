@@ -262,11 +262,7 @@ def draw_lines(lines: Lines) -> None:
     try:
         shader.bind()
         shader.uniform_float("color", lines.color)
-        layout = gpu.types.GPUVertFormat()
-        layout.attr_add(id="pos", comp_type="F32", len=3, fetch_mode="FLOAT")
-        vertices = gpu_objects.vertex_buffer(layout, len(points))
-        vertices.attr_fill("pos", points)
-        gpu_objects.batch(type="LINES", buf=vertices).draw(shader)
+        gpu_objects.batch("LINES", gpu_objects.vertex_buffer({"pos": points})).draw(shader)
     finally:
         gpu.state.depth_test_set(depth)
         gpu.state.blend_set(blend)

@@ -15,6 +15,7 @@ import bpy
 import gpu
 import numpy as np
 
+from ...render import gpu_memory
 from ...render.body_shadow import BodyShadow
 from ...render.camera import Camera
 from ...render.capabilities import capabilities
@@ -215,7 +216,7 @@ def _draw_strands(context: Any) -> None:
         view.picture.release()
         return
     marks = (*view_marks(context, camera), *(mark for each in shown for mark in each.marks))
-    with ONE_AT_A_TIME:
+    with ONE_AT_A_TIME, gpu_memory.shared_by(len(shown)):
         for each in shown:
             each.draw_body_shadow(camera)
         if view.picture.is_of(marks):
@@ -231,7 +232,8 @@ def _draw_strands(context: Any) -> None:
 def _draw_afresh(view: View, camera: Camera, shown: list[_Shown], marks: tuple[Any, ...]) -> None:
     """All grooms into the view that is being drawn, and into its picture if that can be kept."""
     forget_closed_views(each.strand_pass for each in _overlay.drawn.values())
-    picture = view.picture if all(each.can_be_kept for each in shown) else None
+    can_be_kept = all(each.can_be_kept for each in shown) and not gpu_memory.is_short()
+    picture = view.picture if can_be_kept else None
     if picture is None:
         view.picture.release()
     else:

@@ -101,16 +101,13 @@ def _draw(color: tuple[float, float, float, float], points: Floats) -> None:
     if not len(points):
         return
     shader = gpu.shader.from_builtin("UNIFORM_COLOR")
-    layout = gpu.types.GPUVertFormat()
-    layout.attr_add(id="pos", comp_type="F32", len=2, fetch_mode="FLOAT")
-    vertices = gpu_objects.vertex_buffer(layout, len(points))
-    vertices.attr_fill("pos", np.ascontiguousarray(points, np.float32))
+    vertices = gpu_objects.vertex_buffer({"pos": points})
     blend = gpu.state.blend_get()
     gpu.state.blend_set("ALPHA")
     try:
         shader.bind()
         shader.uniform_float("color", color)
-        gpu_objects.batch(type="LINES", buf=vertices).draw(shader)
+        gpu_objects.batch("LINES", vertices).draw(shader)
     finally:
         gpu.state.blend_set(blend)
 

@@ -20,7 +20,7 @@ import numpy as np
 from .opacity import layer_ends
 from .settings import VolumeSettings
 
-#: [bytes] that all maps of one groom may take
+#: [bytes] that all maps of one groom may take where nobody says otherwise
 MEMORY_LIMIT = 512 * 2**20
 #: texels of a map along one of where its deep layers start
 START_TEXELS = 4
@@ -78,18 +78,22 @@ def asked_size(settings: VolumeSettings, map_count: int) -> MapSize:
 
 
 def fitted_size(
-    settings: VolumeSettings, map_count: int, largest_side: int = _LARGEST_SIDE
+    settings: VolumeSettings,
+    map_count: int,
+    largest_side: int = _LARGEST_SIDE,
+    room: int = MEMORY_LIMIT,
 ) -> MapSize:
     """What is drawn: fewer texels a side where the asked size does not fit.
 
     Args:
         map_count: lights that throw shadows.
         largest_side: of a texture on this GPU.
+        room: for all maps [bytes].
     """
     size = asked_size(settings, map_count)
     per_texel = size.bytes / size.side**2
     # `starts` has the maps above one another
-    side = min(size.side, largest_side, int(np.sqrt(MEMORY_LIMIT / per_texel)))
+    side = min(size.side, largest_side, int(np.sqrt(room / per_texel)))
     if size.is_deep:
         side = min(side, largest_side * START_TEXELS // size.map_count)
     side = max(side // START_TEXELS, 1) * START_TEXELS

@@ -1,0 +1,76 @@
+"""The budget of GPU memory in the preferences, in the panel, and where a view's picture is kept."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from types import SimpleNamespace
+from typing import Any
+
+import bpy
+import pytest
+
+from hairloom.addon.blender.base import gpu_choices
+from hairloom.addon.blender.preview import previews
+from hairloom.addon.blender.viewport import overlay
+from hairloom.addon.render import gpu_memory, gpu_objects
+from hairloom.addon.ui import preferences
+from hairloom.addon.ui.state import problems_of
+
+pytestmark = pytest.mark.usefixtures("gpu_context", "extension")
+MEGABYTE = 1 << 20
+
+
+@pytest.fixture(autouse=True)
+def automatic(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    monkeypatch.delenv(gpu_memory.MEMORY_VARIABLE, raising=False)
+    yield
+    gpu_choices.choose()
+
+
+def chosen(megabytes: int) -> None:
+    page = SimpleNamespace(image_atomics="automatic", gpu_memory=megabytes)
+    preferences._choose_gpu(page, bpy.context)
+
+
+def test_the_preference_is_the_budget_and_little_is_automatic() -> None:
+    for megabytes, found in ((4096, 4096), (0, 1024), (gpu_choices.MIN_MEMORY - 1, 1024)):
+        chosen(megabytes)
+        assert gpu_memory.budget() == found * MEGABYTE
+
+
+def test_the_panel_says_what_to_do_where_more_is_taken(
+    new_hair: Callable[..., Any], sphere: Any, evaluated: Callable[[], Any]
+) -> None:
+    hair = new_hair(sphere)
+    session = previews.start(hair, evaluated())
+
+    def told() -> list[str]:
+        return [one.text for one in problems_of(hair, session) if "GPU" in one.text]
+
+    chosen(128)
+    gpu_objects.free_unused()
+    before = gpu_objects.bytes_in_use()
+    assert before < 128 * MEGABYTE and not told()
+    side = 4096  # 256 MB
+    large = gpu_objects.texture((side, side), format="RGBA32F")
+    (text,) = told()
+    taken = before / MEGABYTE + 256
+    assert f"takes {taken:,.0f} MB" in text and "may take 128 MB" in text and "preferences" in text
+    del large
+    gpu_objects.free_unused()
+    assert not told()
+
+
+@pytest.mark.parametrize("is_short", [False, True])
+def test_a_view_keeps_no_picture_where_memory_is_short(
+    monkeypatch: pytest.MonkeyPatch, is_short: bool
+) -> None:
+    calls: list[str] = []
+    picture = SimpleNamespace(
+        begin=lambda: calls.append("begin"), release=lambda: calls.append("release"), marks=()
+    )
+    view = SimpleNamespace(picture=picture, moves_to=lambda _: False, address=0)
+    monkeypatch.setattr(gpu_memory, "is_short", lambda: is_short)
+    overlay._draw_afresh(view, None, [], ("drawn",))  # type: ignore[arg-type]
+    assert calls == (["release"] if is_short else ["begin"])
+    assert picture.marks == (() if is_short else ("drawn",))
