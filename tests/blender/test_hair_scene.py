@@ -417,20 +417,22 @@ def test_shafts_over_cycles_leave_its_file_format_and_all_else_as_it_was(
 def test_a_lamp_throws_shafts_over_cycles_and_a_mesh_cuts_them(
     cycles: Any, hairy: Any, tmp_path: Path
 ) -> None:
-    """A lamp behind the ball of hair: haze around it, none straight before the ball."""
+    """A lamp beside the ball of hair, and a plate above it, nearer to the camera."""
     set_world((0.0, 0.0, 0.0))
-    bpy.ops.object.light_add(type="POINT", location=(0.25, 0.5, 0.0))
-    bpy.context.object.data.energy = 100.0
+    cycles.camera.location.y = -1.0
+    bpy.ops.object.light_add(type="POINT", location=(0.4, 0.5, 0.0))
+    bpy.context.object.data.energy = 200.0
+    bpy.ops.mesh.primitive_cube_add(size=0.04, location=(0.3467, 0.3, 0.07))
     hairy.data.hairloom.volume.shadows = "none"
     cycles.hairloom.use_hair_scene = True
     without = rendered(tmp_path)
     hairy.data.hairloom.shafts.use_shafts = True
     haze = (rendered(tmp_path) - without)[..., 0]
-    middle = SIZE // 2
-    assert haze.min() > -1e-4 and haze[middle, middle + 30 :].max() > 0.2
-    # as far from the lamp on its other side nothing is in the way
-    lamp = int(haze[middle].argmax())
-    assert haze[middle, max(lamp - 50, 0)] < 0.7 * haze[middle, min(lamp + 50, SIZE - 1)]
+    middle, lamp = SIZE // 2, int(haze[SIZE // 2].argmax())
+    assert haze.min() > -1e-4 and haze[middle, lamp] > 0.2
+    assert haze[middle + 22, lamp] < 0.85 * haze[middle - 22, lamp]
+    # behind the edge of the hair light falls faster than in the open
+    assert haze[middle, lamp - 40] < 0.5 * haze[middle - 40, lamp]
 
 
 @pytest.mark.parametrize("is_cropped", [True, False])
@@ -460,3 +462,32 @@ def test_an_orthographic_camera_sees_shafts_of_bright_things(
     with_bright_shafts(hairy)
     added = (rendered(tmp_path) - without)[..., 0]
     assert added.min() > -1e-3 and added.max() > 0.1
+
+
+@pytest.mark.parametrize("light", [1.0, 1e6])
+def test_a_white_world_over_cycles_stays_as_it_is(
+    cycles: Any, hairy: Any, tmp_path: Path, light: float
+) -> None:
+    """Hair before it is small, so nearly all of the picture is bright."""
+    set_world((light, light, light))
+    cycles.camera.location.y = -4.0
+    cycles.hairloom.use_hair_scene = True
+    without = rendered(tmp_path)
+    with_bright_shafts(hairy)
+    found = rendered(tmp_path)
+    hair = without[..., 0] < 0.5 * light
+    assert hair.any() and np.isfinite(found).all()
+    assert np.abs(found - without)[hair].max() < 0.3
+
+
+def test_shafts_lie_over_a_transparent_film_as_light_without_alpha(
+    cycles: Any, hairy: Any, window: Any, tmp_path: Path
+) -> None:
+    cycles.render.film_transparent = True
+    cycles.hairloom.use_hair_scene = True
+    without = rendered(tmp_path)
+    with_bright_shafts(hairy)
+    found = rendered(tmp_path)
+    np.testing.assert_array_equal(found[..., 3], without[..., 3])
+    is_free = without[..., 3] == 0.0
+    assert found[..., :3][is_free].max() > 0.1
