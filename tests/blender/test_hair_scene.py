@@ -17,7 +17,7 @@ bpy = pytest.importorskip("bpy", reason="these tests need Blender or the bpy mod
 
 from engine_stage import set_world  # noqa: E402
 
-from hairloom.addon.blender.engine import hair_scene  # noqa: E402
+from hairloom.addon.blender.engine import engine_picture, hair_scene  # noqa: E402
 from hairloom.addon.blender.properties.properties import settings_of  # noqa: E402
 from hairloom.addon.shading.bright_shafts import bright_shafts, shaft_length  # noqa: E402
 from hairloom.addon.shading.shafts_settings import ShaftSettings  # noqa: E402
@@ -491,3 +491,30 @@ def test_shafts_lie_over_a_transparent_film_as_light_without_alpha(
     np.testing.assert_array_equal(found[..., 3], without[..., 3])
     is_free = without[..., 3] == 0.0
     assert found[..., :3][is_free].max() > 0.1
+
+
+@pytest.mark.parametrize(
+    "kind",
+    [("IMAGE", "PNG"), ("IMAGE", "TIFF"), ("MULTI_LAYER_IMAGE", "OPEN_EXR_MULTILAYER")]
+    + [("VIDEO", "FFMPEG")],
+)
+def test_a_file_format_comes_back_after_the_picture_was_read(
+    cycles: Any, kind: tuple[str, str]
+) -> None:
+    settings, video = cycles.render.image_settings, cycles.render.ffmpeg
+    settings.media_type, settings.file_format = kind
+    if kind[0] == "IMAGE":
+        settings.color_mode, settings.color_depth, settings.compression = "RGB", "16", 33
+
+    def state() -> list[Any]:
+        return [
+            getattr(of, each.identifier)
+            for of in (settings, video)
+            for each in of.bl_rna.properties
+            if each.type in ("ENUM", "INT", "BOOLEAN")
+        ]
+
+    before = state()
+    with engine_picture._as_floats(settings):
+        assert settings.file_format == "OPEN_EXR" and settings.color_depth == "32"
+    assert state() == before

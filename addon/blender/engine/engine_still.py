@@ -128,10 +128,11 @@ class Still:
         self._picture.begin(*self._size)
         if self._shadow is not None:
             self._shadow[1].begin(*self._size)
-            self._shafts.begin(*self._size)
         shown = time.monotonic()
         scene, camera = self._moment()
         self._apart = None if self._behind is None else self._beside(self._behind, scene)
+        if self._apart is not None:
+            self._shafts.begin(*self._size)
         self._add_data(result, scene, camera)
         for moment in moments:
             if len(moments) > 1:
@@ -216,7 +217,7 @@ class Still:
             if each.name == SHADOW and self._shadow is not None:
                 shadow = self._shadow[1].mean()[..., :3]
                 each.rect.foreach_set(np.ascontiguousarray(shadow).ravel())
-            if each.name == SHAFTS and self._shafts.count:
+            if each.name == SHAFTS and self._apart is not None:
                 shafts = self._shafts.mean()[..., :3]
                 each.rect.foreach_set(np.ascontiguousarray(shafts).ravel())
 
