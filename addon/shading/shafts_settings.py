@@ -9,8 +9,8 @@ from ..params import Settings, both, choice, color, integer, number, toggle, whe
 
 _IS_ON = when("shafts.use_shafts", lack="switched off")
 _NGUYEN = "Nguyen and Donnelly 2005, hair of Nalu"
-_FROM_LIGHTS = both(_IS_ON, when("shafts.source", "lights", "both", lack="not from lights"))
-_FROM_BRIGHT = both(_IS_ON, when("shafts.source", "bright", "both", lack="not from bright things"))
+_FROM_LIGHTS = both(_IS_ON, when("shafts.source", "lights", "both", lack="bright alone"))
+_FROM_BRIGHT = both(_IS_ON, when("shafts.source", "bright", "both", lack="lights alone"))
 
 #: what throws shafts
 SOURCES = (
