@@ -46,6 +46,7 @@ IN_NODES = (
 _SAME = (
     (r"\bvec([234])\b", r"float\1"),
     (r"\bmix\(", "lerp("),
+    (r"\bfract\(", "frac("),
     (r"\batan\(", "atan2("),
     (r"\bsampler2D\b", "Texture2D"),
     (r"^const ", "static const "),

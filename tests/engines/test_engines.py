@@ -32,12 +32,13 @@ from engine_assets import SIZE, Asset, check, written_asset
 
 from hairloom.addon.cards.export_settings import CardExportSettings
 from hairloom.addon.exchange.cards.glb_file import GlbFile
+from hairloom.addon.exchange.textures.texture_files import read_texture
 
 HERE = Path(__file__).parent
 ENGINES = REPOSITORY / "docs" / "engines"
 THREE = REPOSITORY / "tools" / "node" / "node_modules" / "three"
 #: what lies beside the files of an asset
-OF_ENGINES = shutil.ignore_patterns("godot*", "game", "web")
+OF_ENGINES = shutil.ignore_patterns("godot*", "game", "web*")
 
 
 @pytest.fixture(scope="module", params=["kajiya_kay", "marschner", "baked"])
@@ -90,8 +91,8 @@ def check_order(asset: Asset, written: Path) -> None:
 
 def ranges_of(asset: Asset) -> list[list[float]]:
     """From where to where each level is shown [m], by a camera of 75 degrees: each begins where the
-    last one ends, and that is where the hair takes up the fraction of a screen that the file says;
-    0 for the end of the last."""
+    last one ends, in the middle of the band where both are drawn, and that is where the hair takes
+    up the fraction of a screen that the file says; 0 for the end of the last."""
     path = asset.folder / "cards.glb"
     file = GlbFile.of(path.read_bytes(), str(path))
     extras = file.content["nodes"][file.node("cards_LOD0")]["extras"]
@@ -152,6 +153,70 @@ def test_three_js_draws_cards_as_we_do(asset: Asset, sandbox: str) -> None:
     sidecar = json.loads((asset.folder / "cards.hairloom.json").read_text(encoding="utf-8"))
     assert shown.pop("begins") == pytest.approx([begin for begin, _ in ranges_of(asset)], rel=1e-5)
     assert shown == {"plain": ["cards_LOD0"], "second": sidecar["levels"][1]["triangles"]}
+
+
+#: how far the second level has taken over where `fading` looks at it
+SHARE = 0.3
+
+
+def fading(asset: Asset, folder: Path) -> None:
+    """An asset whose first level is giving way to the second at the view's distance: the field of
+    view is such that this one is 2 % nearer than the distance that the file states."""
+    shutil.copytree(asset.folder, folder, ignore=OF_ENGINES)
+    view = json.loads((folder / "view.json").read_text(encoding="utf-8"))
+    sidecar = json.loads((folder / "cards.hairloom.json").read_text(encoding="utf-8"))
+    bounds = sidecar["levels"][0]["bounds"]
+    center = np.add(bounds["minimum"], bounds["maximum"]) / 2.0
+    distance = float(np.linalg.norm(np.subtract(view["eye"], center)))
+    begin = distance / (1.0 + 0.1 * (SHARE - 0.5))
+    slope = ranges_of(asset)[1][0] / begin * math.tan(math.radians(75.0 / 2.0))
+    view["fade_field_of_view"] = math.degrees(2.0 * math.atan(slope))
+    (folder / "view.json").write_text(json.dumps(view), encoding="utf-8")
+
+
+def check_fade(folder: Path, *mixed: str) -> None:
+    """Each pixel is that of one of the two levels, of the right share that of the coarser one, and
+    both are spread evenly; at once, all are those of one."""
+    names = ("fine", "coarse", "at_once", *mixed)
+    pictures = {
+        name: read_texture(folder / f"{name}.png", is_color=False)[..., :3] for name in names
+    }
+    fine, coarse = pictures["fine"], pictures["coarse"]
+    tells = np.abs(fine - coarse).max(axis=-1) > 8.0 / 255.0
+    assert tells.mean() > 0.02
+    at_once = pictures["at_once"]
+    assert min(np.abs(at_once - each).max() for each in (fine, coarse)) < 1.5 / 255.0
+    for name in mixed:
+        of_fine, of_coarse = (
+            np.abs(pictures[name] - each).max(axis=-1) < 1.5 / 255.0 for each in (fine, coarse)
+        )
+        assert (of_fine | of_coarse).all(), name
+        share = of_coarse[tells].mean()
+        assert share == pytest.approx(SHARE, abs=0.03), name
+
+
+def test_godot_fades_levels_pixel_by_pixel(baked: Asset, sandbox: str) -> None:
+    project = baked.folder / "godot_fade"
+    shutil.copytree(HERE / "godot_fade", project)
+    shutil.copytree(ENGINES, project / "addons" / "hairloom")
+    fading(baked, project / "asset")
+    run_godot(sandbox, "--path", str(project), "--", str(project))
+    check_fade(project, "both")
+
+
+def test_three_js_fades_levels_pixel_by_pixel(baked: Asset, sandbox: str) -> None:
+    if not THREE.is_dir():
+        pytest.skip("three.js is missing: `make setup` installs it")
+    site = baked.folder / "web_fade"
+    shutil.copytree(HERE / "three_fade", site)
+    shutil.copytree(ENGINES, site / "hairloom")
+    shutil.copytree(THREE, site / "three")
+    fading(baked, site / "asset")
+    shutil.copy2(REPOSITORY / "tools" / "draw_page.py", site)
+    command = [sandbox, "run", "python3", str(site / "draw_page.py")]
+    result = subprocess.run(command, capture_output=True, text=True, timeout=300)
+    assert result.returncode == 0, result.stderr
+    check_fade(site, "both", "copy")
 
 
 def test_three_js_shows_what_can_be_shown_and_says_what_is_wrong(

@@ -173,6 +173,15 @@ def test_levels_take_over_where_the_file_says(asset: Asset, hair: dict[str, Any]
     assert sorted(hair["heights"], reverse=True) == hair["heights"]
 
 
+def test_levels_fade_into_each_other_unless_that_is_turned_off(
+    imported: Callable[..., dict[str, Any]], asset: Asset, hair: dict[str, Any]
+) -> None:
+    assert hair["fade"] == "CrossFade"
+    assert hair["fades"] == pytest.approx([0.1, 0.1, 0.0])
+    at_once = imported(glb_of(asset.folder), "at_once")
+    assert at_once["fade"] == "None" and at_once["fades"] == [0.0, 0.0, 0.0]
+
+
 def test_materials_are_the_passes_of_the_sidecar(asset: Asset, hair: dict[str, Any]) -> None:
     """Of their passes, states, values and textures."""
     sidecar = sidecar_of(asset.folder)
@@ -322,7 +331,8 @@ def test_rounded_positions_are_where_they_were(
 def test_the_shaders_compile(sandbox: str, entry: str) -> None:
     OUTPUT.mkdir(parents=True, exist_ok=True)
     program = OUTPUT / f"unity_{entry}.spv"
-    options = ["-D", "-V", "-S", ENTRIES[entry], "-e", entry, "-D_ADDITIONAL_LIGHTS", f"-I{HERE}"]
+    options = ["-D", "-V", "-S", ENTRIES[entry], "-e", entry, f"-I{HERE}"]
+    options += ["-D_ADDITIONAL_LIGHTS", "-DLOD_FADE_CROSSFADE"]
     options += ["--auto-map-bindings", "--auto-map-locations", "-o", str(program)]
     for command in (
         ["glslangValidator", *options, str(SHADERS)],

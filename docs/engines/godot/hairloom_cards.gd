@@ -26,6 +26,10 @@ static func load_cards(path: String, level := -1) -> Node3D:
 		hair.visible = number == level
 		hair.visibility_range_begin = 0.0
 		hair.visibility_range_end = 0.0
+		hair.material_override = HairMaterial.with_values(hair.material_override, {
+			"fade_in": Vector2.ZERO,
+			"fade_out": Vector2.ZERO,
+		})
 	return scene
 
 

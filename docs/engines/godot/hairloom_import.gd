@@ -5,9 +5,14 @@ extends GLTFDocumentExtension
 ## as it is an ImporterMesh; here it becomes a finished one.
 
 const HairMaterial := preload("hairloom_material.gd")
-## of the camera's field of view, which Godot states for the height
-const FIELD_OF_VIEW := 75.0
-## of a distance: nothing flickers where a level takes over
+## Settings of a project, and their values if it has none: the camera's field of view, which Godot states
+## for the height; how wide the bands around the distances are in which two levels are drawn, each in its
+## own pixels, as a fraction of the distance, 0: levels change at once.
+const SETTINGS := {"hairloom/field_of_view": 75.0, "hairloom/cross_fade": 0.1}
+## of a distance: how narrow such a band may be
+const LEAST := 1e-5
+## of a distance: Godot measures from the middle of each level; this much farther it draws both, and the
+## shader knows which has a pixel
 const MARGIN := 0.05
 const KEY := &"hairloom"
 const REMEDY := "use the file that Hairloom wrote"
@@ -41,18 +46,24 @@ func _import_post(state: GLTFState, root: Node) -> Error:
 	var material := HairMaterial.of(sidecar, state.base_path)
 	var names: Array = sidecar["levels"].map(func(level): return level["node"])
 	var ends := _distances(state, sidecar)
+	var half := 0.5 * maxf(_setting("hairloom/cross_fade"), LEAST)
+	var band := Vector2(1.0 - half, 1.0 + half)
 	var is_as_written := true
 	for node in root.find_children("*", "Node3D", true, false):
 		var level := names.find(String(node.name))
 		if level < 0:
 			continue
 		var hair := _finished(node)
-		hair.material_override = material
-		is_as_written = _is_written(hair.mesh, sidecar["levels"][level], material) and is_as_written
-		hair.visibility_range_begin = ends[level - 1] if level > 0 else 0.0
-		hair.visibility_range_begin_margin = MARGIN * hair.visibility_range_begin
-		hair.visibility_range_end = ends[level]
-		hair.visibility_range_end_margin = MARGIN * ends[level]
+		var begin := ends[level - 1] if level > 0 else 0.0
+		var end := ends[level]
+		hair.material_override = HairMaterial.with_values(material, {
+			"fade_in": begin * band,
+			"fade_out": end * band,
+			"fade_center": hair.transform.affine_inverse() * _center(sidecar),
+		})
+		hair.visibility_range_begin = begin * band.x * (1.0 - MARGIN)
+		hair.visibility_range_end = end * band.y * (1.0 + MARGIN)
+		is_as_written = _is_written(hair, sidecar["levels"][level]) and is_as_written
 	if not is_as_written:
 		push_warning("%s: another program has changed it, so hair may show holes; %s"
 				% [_path(state), REMEDY])
@@ -137,13 +148,13 @@ static func _path(state: GLTFState) -> String:
 
 
 ## Whether triangles and vertices are those that Hairloom wrote, in their order.
-static func _is_written(mesh: Mesh, level: Dictionary, material: ShaderMaterial) -> bool:
-	var arrays := mesh.surface_get_arrays(0)
+static func _is_written(hair: MeshInstance3D, level: Dictionary) -> bool:
+	var arrays := hair.mesh.surface_get_arrays(0)
 	if arrays[Mesh.ARRAY_TEX_UV2] == null:  # an optimiser has taken it for unused
-		HairMaterial.set_all(material, "has_openness", false)
+		HairMaterial.set_all(hair.material_override, "has_openness", false)
 		return false
 	var indices: PackedInt32Array = arrays[Mesh.ARRAY_INDEX]
-	if mesh.get_surface_count() != 1 or indices.size() != int(level["indices"]):
+	if hair.mesh.get_surface_count() != 1 or indices.size() != int(level["indices"]):
 		return false
 	for first in range(0, indices.size(), 3):  # Godot has turned them over
 		var second := indices[first + 1]
@@ -165,6 +176,16 @@ static func _adler32(bytes: PackedByteArray) -> int:
 	return (high % 65521) * 65536 + low % 65521
 
 
+static func _setting(name: String) -> float:
+	return ProjectSettings.get_setting(name, SETTINGS[name])
+
+
+## Of the finest level.
+static func _center(sidecar: Dictionary) -> Vector3:
+	var bounds: Dictionary = sidecar["levels"][0]["bounds"]
+	return 0.5 * (_vector(bounds["minimum"]) + _vector(bounds["maximum"]))
+
+
 ## Where each level ends [m]; 0: nowhere.
 static func _distances(state: GLTFState, sidecar: Dictionary) -> Array[float]:
 	var levels: Array = sidecar["levels"]
@@ -178,7 +199,7 @@ static func _distances(state: GLTFState, sidecar: Dictionary) -> Array[float]:
 	var ends: Array[float] = []
 	for number in levels.size():
 		var part: float = sqrt(coverage[number]) if number < coverage.size() else 0.0
-		var slope := 2.0 * tan(0.5 * deg_to_rad(FIELD_OF_VIEW))
+		var slope := 2.0 * tan(0.5 * deg_to_rad(_setting("hairloom/field_of_view")))
 		ends.append(size / (slope * part) if part > 0.0 else 0.0)
 	return ends
 

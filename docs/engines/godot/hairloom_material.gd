@@ -60,6 +60,16 @@ static func of(sidecar: Dictionary, folder: String) -> ShaderMaterial:
 	return first
 
 
+## Copies of all passes, with values of their own.
+static func with_values(material: ShaderMaterial, values: Dictionary) -> ShaderMaterial:
+	var copy: ShaderMaterial = material.duplicate()
+	for uniform in values:
+		copy.set_shader_parameter(uniform, values[uniform])
+	if copy.next_pass != null:
+		copy.next_pass = with_values(copy.next_pass, values)
+	return copy
+
+
 ## Of all passes.
 static func set_all(material: ShaderMaterial, uniform: String, value: Variant) -> void:
 	while material != null:

@@ -7,6 +7,11 @@ var _import := preload("hairloom_import.gd").new()
 
 
 func _enter_tree() -> void:
+	for name in _import.SETTINGS:
+		if not ProjectSettings.has_setting(name):
+			ProjectSettings.set_setting(name, _import.SETTINGS[name])
+		ProjectSettings.set_initial_value(name, _import.SETTINGS[name])
+		ProjectSettings.set_as_basic(name, true)
 	GLTFDocument.register_gltf_document_extension(_import)
 
 

@@ -18,7 +18,7 @@ const TEXTURES = { base: 255, alpha: 255, shift: 128, noise: 255, tangent: 128, 
 const TABLES = ['longitudinal', 'azimuthal', 'paths'];
 const REPEATED = ['shift', 'noise'];
 
-// of a distance: nothing flickers where a level takes over
+// of a distance, without cross-fade: nothing flickers where a level takes over
 const HYSTERESIS = 0.05;
 
 const VERSION = 2;
@@ -26,14 +26,63 @@ const REMEDY = 'use the file that Hairloom wrote';
 // the sidecar's levels give way to the next where that one is off by a pixel of this many lines
 const SCREEN_HEIGHT = 1080;
 
-// Options: level (0 the finest; without it a THREE.LOD shows each from the distance at which it takes
-// over), fieldOfView (of the camera for which these distances are, in degrees), shading (address of
+// A THREE.LOD, each of whose levels takes over at its own distance from the middle of the hair. Around
+// that distance two of them are drawn, each in the pixels that the other one leaves out.
+export class HairLevels extends THREE.LOD {
+  crossFade = 0.1; // of a distance, how wide these bands are; 0: levels change at once
+  center = new THREE.Vector3();
+
+  copy(source) {
+    super.copy(source);
+    this.crossFade = source.crossFade;
+    this.center.copy(source.center);
+    return this;
+  }
+
+  addLevel(object, distance, hysteresis) {
+    super.addLevel(object, distance, hysteresis);
+    const level = this.levels.find((each) => each.object === object);
+    level.part = [0, 1]; // of the pixels, see hair_level_has
+    object.children.forEach((mesh) => {
+      // copies of a hair share their materials
+      mesh.onBeforeRender = (renderer, scene, camera, geometry, material) => {
+        if (!material.uniforms?.part) return;
+        material.uniforms.part.value.fromArray(this.autoUpdate ? level.part : [0, 1]);
+        material.uniformsNeedUpdate = true;
+      };
+    });
+    return this;
+  }
+
+  update(camera) {
+    const place = new THREE.Vector3().setFromMatrixPosition(camera.matrixWorld);
+    const distance = place.distanceTo(this.center.clone().applyMatrix4(this.matrixWorld)) / camera.zoom;
+    // how far each level has taken over from those before it; the last number is for one that is not there
+    let share = 1; // how far this level has taken over from those before it
+    this.levels.forEach((level, number) => {
+      const next = this.levels[number + 1];
+      level.part = [next ? Math.min(share, this.shareOf(next, distance)) : 0, share];
+      if (level.part[0] < 0.5 && share >= 0.5) this._currentLevel = number;
+      [share] = level.part;
+    });
+    this.levels.forEach(({ object, part: [low, high] }) => { object.visible = low < high; });
+  }
+
+  shareOf({ distance: begin, hysteresis, object }, distance) {
+    if (!this.crossFade) return distance >= begin * (object.visible ? 1 - hysteresis : 1) ? 1 : 0;
+    return THREE.MathUtils.clamp((distance / begin - 1) / this.crossFade + 0.5, 0, 1);
+  }
+}
+
+// Options: level (0 the finest; without it a HairLevels shows each from the distance at which it takes
+// over), fieldOfView (of the camera for which these distances are, in degrees), crossFade (see HairLevels; 0
+// turns it off), shading (address of
 // hair_shading.gdshaderinc), addressOf (file name -> address, for files that lie elsewhere), plugins (for
 // GLTFLoader.register; what they find is in userData), warn (gets a sentence for each thing that is wrong;
 // what can be shown is shown).
 export async function loadHairloomCards(
   url,
-  { level, fieldOfView = 50, shading = SHADING, addressOf, plugins = [], warn = console.warn } = {},
+  { level, fieldOfView = 50, crossFade = 0.1, shading = SHADING, addressOf, plugins = [], warn = console.warn } = {},
 ) {
   const name = addressOf
     ? url.toString().split('/').pop()
@@ -66,10 +115,12 @@ export async function loadHairloomCards(
     return group;
   };
   const last = levels.length - 1;
-  const hair = level === undefined ? new THREE.LOD() : groupOf(Math.min(level, last));
+  const hair = level === undefined ? new HairLevels() : groupOf(Math.min(level, last));
   if (level === undefined) {
     const begins = beginsOf(gltf, levels, fieldOfView);
     begins.forEach((begin, number) => hair.addLevel(groupOf(number), begin, HYSTERESIS));
+    hair.crossFade = crossFade;
+    boundsOf(levels[0]).getCenter(hair.center);
   }
   const root = gltf.scene.getObjectByName('hair_root');
   if (sidecar.motion && root) {
@@ -146,13 +197,16 @@ function completed(node) {
 // From what distance each level is shown: where the hair takes up the fraction of the screen that the
 // file has for the level before.
 function beginsOf(gltf, levels, fieldOfView) {
-  const { minimum, maximum } = levels[0].bounds;
-  const size = Math.max(...maximum.map((high, axis) => high - minimum[axis]));
+  const size = Math.max(...boundsOf(levels[0]).getSize(new THREE.Vector3()).toArray());
   const slope = 2 * Math.tan(THREE.MathUtils.degToRad(fieldOfView) / 2);
   const { extras } = gltf.parser.json.nodes[numberOf(gltf, levels[0])];
   const coverage = extras?.MSFT_screencoverage ?? levels.slice(1).map(({ error }, number) =>
     error ? Math.min(1, size / (error * SCREEN_HEIGHT)) ** 2 : 0.25 ** (number + 1));
   return levels.map((_, number) => (number ? size / (slope * Math.sqrt(coverage[number - 1])) : 0));
+}
+
+function boundsOf({ bounds: { minimum, maximum } }) {
+  return new THREE.Box3(new THREE.Vector3(...minimum), new THREE.Vector3(...maximum));
 }
 
 // The same triangles once for each pass of the sidecar, in its order. Each pass has its own states, and
@@ -203,7 +257,11 @@ function materialOf(pass, sidecar, formulas, uniforms) {
   return new THREE.ShaderMaterial({
     glslVersion: THREE.GLSL3,
     lights: true,
-    uniforms: { ...THREE.UniformsUtils.clone(THREE.UniformsLib.lights), ...uniforms },
+    uniforms: {
+      ...THREE.UniformsUtils.clone(THREE.UniformsLib.lights),
+      ...uniforms,
+      part: { value: new THREE.Vector2(0, 1) },
+    },
     defines: {
       IS_PRIME: pass.color_write ? 0 : 1,
       IS_OPAQUE: blended ? 0 : 1,
@@ -341,7 +399,7 @@ uniform float tip_tint, tint_start, tint_end, grey_fraction, shift_noise, sparkl
 uniform float primary_strength, primary_exponent, primary_shift;
 uniform float secondary_strength, secondary_exponent, secondary_shift;
 uniform float fake_scattering, volume_shadow, base_gain;
-uniform vec2 facing_range;
+uniform vec2 facing_range, part;
 uniform vec4 fibre_root, fibre_tip, fibre_strengths;
 uniform sampler2D base_texture, alpha_texture, shift_texture, noise_texture, tangent_texture;
 uniform sampler2D normal_texture;
@@ -386,6 +444,7 @@ HairPlace place() {
 }
 
 void main() {
+  if (!hair_level_has(gl_FragCoord.xy, part)) discard;
   float alpha = dot(texture(alpha_texture, card_uv), alpha_mask);
 #if VIEW_COMPENSATED_ALPHA && !IS_PRIME
   vec3 to_eye = isOrthographic ? vec3(0.0, 0.0, 1.0) : normalize(-card_point);

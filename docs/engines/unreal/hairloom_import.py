@@ -176,6 +176,7 @@ def _material(name: str, folder: str, graph: Graph, is_masked: bool) -> Any:
         "blend_mode": blend,
         "two_sided": is_masked,
         "dither_opacity_mask": is_masked,
+        "dithered_lod_transition": is_masked,
         "tangent_space_normal": True,
         "use_material_attributes": True,
     }

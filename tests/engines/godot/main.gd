@@ -57,11 +57,16 @@ func _shown(scene: Node) -> Array:
 	return names
 
 
-## Of each mesh, in order: where it begins and ends to be shown [m].
+## Of each mesh, in order: where it begins and ends to be shown [m], in the middle of what its material says.
+## It must be drawn in all of that.
 func _ranges(scene: Node) -> Array:
-	var meshes := scene.find_children("*", "MeshInstance3D", true, false)
-	var ranges := meshes.map(
-			func(mesh): return [mesh.visibility_range_begin, mesh.visibility_range_end])
+	var ranges := []
+	for mesh in scene.find_children("*", "MeshInstance3D", true, false):
+		var begin: Vector2 = mesh.material_override.get_shader_parameter("fade_in")
+		var end: Vector2 = mesh.material_override.next_pass.get_shader_parameter("fade_out")
+		assert(mesh.visibility_range_begin <= begin.x)
+		assert(end.y == 0.0 and mesh.visibility_range_end == 0.0 or mesh.visibility_range_end > end.y)
+		ranges.append([0.5 * (begin.x + begin.y), 0.5 * (end.x + end.y)])
 	scene.free()
 	return ranges
 

@@ -25,7 +25,10 @@ public static class Imported
         Call(typeof(CardPostprocessor), null, "OnPostprocessAllAssets", new[] { path }, new string[0], new string[0], new string[0]);
         var before = (string[])Call(typeof(CardImporter), null, "GatherDependenciesFromSourceFile", path);
         var context = new AssetImportContext { assetPath = path };
-        new CardImporter().OnImportAsset(context);
+        var importer = new CardImporter();
+        if (arguments.Contains("at_once"))
+            importer.crossFade = 0;
+        importer.OnImportAsset(context);
         var group = (context.Main as GameObject)?.components.OfType<LODGroup>().Single();
         var found = new Dictionary<string, object>
         {
@@ -36,6 +39,8 @@ public static class Imported
             ["meshes"] = context.Assets.OfType<Mesh>().Select(Told).ToArray(),
             ["materials"] = context.Assets.OfType<Material>().Select(Told).ToArray(),
             ["heights"] = group?.lods.Select(lod => lod.screenRelativeTransitionHeight).ToArray(),
+            ["fade"] = group?.fadeMode.ToString(),
+            ["fades"] = group?.lods.Select(lod => lod.fadeTransitionWidth).ToArray(),
             ["textures"] = before.Where(File.Exists).ToDictionary(Path.GetFileName, SetUp),
         };
         Console.WriteLine(new JavaScriptSerializer { MaxJsonLength = int.MaxValue }.Serialize(found));

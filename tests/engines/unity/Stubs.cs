@@ -134,16 +134,31 @@ namespace UnityEngine
     {
         public float screenRelativeTransitionHeight;
         public Renderer[] renderers;
+        public float fadeTransitionWidth;
         public LOD(float height, Renderer[] renderers)
         {
+            fadeTransitionWidth = 0;
             screenRelativeTransitionHeight = height;
             this.renderers = renderers;
         }
     }
 
+    public enum LODFadeMode { None, CrossFade, SpeedTree }
+
+    public sealed class RangeAttribute : Attribute
+    {
+        public RangeAttribute(float min, float max) { }
+    }
+
+    public sealed class TooltipAttribute : Attribute
+    {
+        public TooltipAttribute(string tooltip) { }
+    }
+
     public class LODGroup : Component
     {
         public LOD[] lods;
+        public LODFadeMode fadeMode;
         public void SetLODs(LOD[] lods) { this.lods = lods; }
         public void RecalculateBounds() { }
     }

@@ -121,8 +121,8 @@ Texture2D = _class("Texture2D", "srgb compression_settings address_x address_y f
 TextureFactory = _class("TextureFactory", "")
 Material = _class(
     "Material",
-    "shading_model blend_mode two_sided dither_opacity_mask opacity_mask_clip_value "
-    "tangent_space_normal use_material_attributes",
+    "shading_model blend_mode two_sided dither_opacity_mask dithered_lod_transition "
+    "opacity_mask_clip_value tangent_space_normal use_material_attributes",
 )
 MaterialFactoryNew = _class("MaterialFactoryNew", "")
 FbxFactory = _class("FbxFactory", "")

@@ -335,6 +335,7 @@ function plainMesh(group, passes) {
   const material = last.material.clone();
   Object.assign(material, { uniforms: last.material.uniforms, side: THREE.DoubleSide });
   const mesh = meshLike(last, unordered(last.geometry), material);
+  mesh.onBeforeRender = last.onBeforeRender; // with its share of the pixels
   mesh.castShadow = passes[0].castShadow;
   mesh.customDepthMaterial = passes[0].customDepthMaterial;
   group.add(mesh);

@@ -9,14 +9,19 @@ namespace Hairloom
 {
     /// Imports a GLB of Hairloom as a prefab: its levels in a LOD group, in the order of the file, with
     /// the materials of its sidecar. A GLB without a sidecar stays with whatever imports it otherwise.
-    [ScriptedImporter(1, new string[0], new[] { "glb" })]
+    [ScriptedImporter(2, new string[0], new[] { "glb" })]
     public sealed class CardImporter : ScriptedImporter
     {
+        [Tooltip("Of each level's range, the part in which the next one is drawn too, each in its own pixels; 0: "
+            + "levels change at once. It needs LOD Cross Fade in the asset of the render pipeline")]
+        [Range(0, 1)]
+        public float crossFade = 0.1f;
+
         public override void OnImportAsset(AssetImportContext context)
         {
             try
             {
-                Import(context, context.assetPath);
+                Import(context, context.assetPath, crossFade);
             }
             catch (CardFileException error)
             {
@@ -24,7 +29,7 @@ namespace Hairloom
             }
         }
 
-        static void Import(AssetImportContext context, string path)
+        static void Import(AssetImportContext context, string path, float crossFade)
         {
             var sidecar = Sidecar.Of(path);
             context.DependsOnSourceAsset(Sidecar.PathOf(path));
@@ -39,8 +44,13 @@ namespace Hairloom
             foreach (var material in materials)
                 context.AddObjectToAsset(material.name, material);
             var shown = levels.Select(level => Shown(level, root, materials, context)).ToArray();
-            var lods = levels.Select((level, i) => new LOD(level.EndHeight, new Renderer[] { shown[i] }));
+            var last = levels.Length - 1;
+            var lods = levels.Select((level, i) => new LOD(level.EndHeight, new Renderer[] { shown[i] })
+            {
+                fadeTransitionWidth = i < last ? crossFade : 0.0f,
+            });
             var group = root.AddComponent<LODGroup>();
+            group.fadeMode = crossFade > 0.0f ? LODFadeMode.CrossFade : LODFadeMode.None;
             group.SetLODs(lods.ToArray());
             group.RecalculateBounds();
         }

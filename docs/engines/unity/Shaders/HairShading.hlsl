@@ -70,6 +70,16 @@ float3 hair_unit(float3 direction, float3 fallback)
   return size > 1.0e-6 ? direction / size : fallback;
 }
 
+// Levels of detail that are drawn together while one takes over from the other share the pixels: each
+// has those whose threshold lies in its part of 0 to 1, so that no pixel is left out or drawn by two.
+// The thresholds are interleaved gradient noise: Jimenez 2014, "Next Generation Post Processing in
+// Call of Duty: Advanced Warfare".
+bool hair_level_has(float2 pixel, float2 part)
+{
+  float threshold = frac(52.9829189 * frac(dot(pixel, float2(0.06711056, 0.00583715))));
+  return threshold >= part.x && threshold < part.y;
+}
+
 // Direction of the strands from a texel of the tangent map.
 float3 hair_tangent(float3 texel, float3 tangent, float3 normal, float shift_noise)
 {

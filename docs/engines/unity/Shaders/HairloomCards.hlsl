@@ -123,8 +123,19 @@ float3 radiance_of(HairMaterial hair, HairPlace here, Light light)
     return HAIR_PI * light.color * (light.distanceAttenuation * light.shadowAttenuation) * sent;
 }
 
+// Unity's number is 1 to 0 for a level that goes and -1 to 0 for the one that comes.
+void leave_pixels_to_other_level(float4 position)
+{
+#if defined(LOD_FADE_CROSSFADE)
+    float fade = unity_LODFade.x;
+    float2 part = fade < 0.0 ? float2(-fade, 1.0) : float2(0.0, fade);
+    clip(hair_level_has(position.xy, part) ? 1.0 : -1.0);
+#endif
+}
+
 float4 fragment(CardPoint card) : SV_Target
 {
+    leave_pixels_to_other_level(card.position);
     float alpha = dot(_alpha_texture.Sample(sampler_alpha_texture, card.uv), _alpha_mask);
     float3 to_eye = mirrored(GetWorldSpaceNormalizeViewDir(card.place));
     if (_facing_range.x > 0.0)
@@ -171,6 +182,7 @@ CardPoint vertex_of_shadow(Corner corner)
 // A shadow map knows no half: what covers more than half of a pixel throws a shadow.
 float4 fragment_of_shadow(CardPoint card) : SV_Target
 {
+    leave_pixels_to_other_level(card.position);
     clip(dot(_alpha_texture.Sample(sampler_alpha_texture, card.uv), _alpha_mask) - 0.5);
     return 0.0;
 }

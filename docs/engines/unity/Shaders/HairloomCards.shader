@@ -71,6 +71,7 @@ Shader "Hairloom/Cards"
             #pragma multi_compile _ _FORWARD_PLUS
             #pragma multi_compile_fragment _ _ADDITIONAL_LIGHT_SHADOWS
             #pragma multi_compile_fragment _ _SHADOWS_SOFT
+            #pragma multi_compile_fragment _ LOD_FADE_CROSSFADE
             #pragma vertex vertex
             #pragma fragment fragment
             #include "HairloomCards.hlsl"
@@ -86,6 +87,7 @@ Shader "Hairloom/Cards"
 
             HLSLPROGRAM
             #pragma target 4.5
+            #pragma multi_compile_fragment _ LOD_FADE_CROSSFADE
             #pragma vertex vertex_of_shadow
             #pragma fragment fragment_of_shadow
             #include "HairloomCards.hlsl"

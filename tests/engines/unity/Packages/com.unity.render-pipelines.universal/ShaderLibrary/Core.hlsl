@@ -7,6 +7,7 @@
 
 float4x4 object_to_world, world_to_clip;
 float3 camera;
+float4 unity_LODFade;
 
 float3 TransformObjectToWorld(float3 place) { return mul(object_to_world, float4(place, 1.0)).xyz; }
 float3 TransformObjectToWorldNormal(float3 normal) { return mul((float3x3)object_to_world, normal); }
