@@ -23,7 +23,7 @@ from .layers import card_layers
 from .levels import card_levels
 from .occlusion import CardOccluder, occlusion_steps
 from .occlusion_settings import CardOcclusionSettings
-from .on_skin import on_skin
+from .on_skin import above_skin, on_skin
 from .order_check import wrong_fraction
 from .settings import CardSettings
 from .short_hair import fitted_to_length
@@ -142,6 +142,7 @@ def card_steps(
     levels = card_levels(cards, settings, error)
     meshes, errors = zip(*((level.mesh, level.error) for level in levels), strict=True)
     meshes = tuple(on_skin(mesh, groom.head, usual) for mesh in meshes)
+    meshes = tuple(above_skin(mesh, groom.head, usual) for mesh in meshes)
     if kept is not None:
         meshes = (kept.put_into(meshes[0]), *meshes[1:])
     unsorted = tuple(mesh.triangles for mesh in meshes)

@@ -1,9 +1,13 @@
-"""Cards begin on the skin.
+"""Cards begin on the skin, and those of few rows do not run through it.
 
 A card runs along the mean of its strands. Their roots lie around it on a skin that curves away on
 all sides, so that their mean lies under it, and a card that rises as slowly as combed hair does
 would come out of it a finger's breadth later: a parting would be bare. What of a card's first
 piece lies under the skin is put onto it.
+
+A coarser card is straight between its rows, while the skin bulges out between them: it would sink
+in there, and a parting would grow bald from level to level. Both rows are raised by as much as
+what lies between them is under the skin.
 """
 
 from __future__ import annotations
@@ -12,7 +16,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..arrays import Floats
+from ..arrays import Bools, Floats
 from ..strands import Surface
 from ..strands.closest_point import search_of
 from .card_mesh import CardMesh
@@ -23,6 +27,8 @@ _FIRST = 0.2
 _CLEARANCE = 0.02
 #: What lies deeper than cards are usually wide is no beginning of a card.
 _DEEPEST = 1.0
+#: Places on an edge that are looked at.
+_BETWEEN = (0.25, 0.5, 0.75)
 
 
 def on_skin(mesh: CardMesh, head: Surface | None, width: float) -> CardMesh:
@@ -35,12 +41,45 @@ def on_skin(mesh: CardMesh, head: Surface | None, width: float) -> CardMesh:
     near = np.flatnonzero(mesh.along < _FIRST)
     if head is None or not len(near) or not len(head.triangles):
         return mesh
-    places = mesh.positions[near].astype(np.float64)
+    skin, outwards, is_under = _under(head, mesh.positions[near], width)
+    positions = mesh.positions.copy()
+    positions[near[is_under]] = (skin + _CLEARANCE * width * outwards)[is_under]
+    return replace(mesh, positions=positions)
+
+
+def above_skin(mesh: CardMesh, head: Surface | None, width: float) -> CardMesh:
+    """The same cards, raised where they sink into the skin between their rows.
+
+    Args:
+        head, width: as for `on_skin`.
+    """
+    if head is None or not len(mesh.triangles) or not len(head.triangles):
+        return mesh
+    edges = np.concatenate([mesh.triangles[:, [k, (k + 1) % 3]] for k in range(3)])
+    one, other = np.unique(np.sort(edges, axis=1), axis=0).T
+    ends = mesh.positions[one], mesh.positions[other]
+    raised = np.zeros((len(mesh.positions), 3))
+    most = np.zeros(len(mesh.positions))
+    for part in _BETWEEN:
+        place = ends[0] * (1.0 - part) + ends[1] * part
+        skin, outwards, is_under = _under(head, place, width)
+        lacking = np.einsum("ni,ni->n", skin - place, outwards) + _CLEARANCE * width
+        for vertex in (one[is_under], other[is_under]):
+            order = np.argsort(lacking[is_under], kind="stable")  # of several the largest is last
+            vertex, need = vertex[order], lacking[is_under][order]
+            direction = outwards[is_under][order]
+            is_more = need > most[vertex]
+            most[vertex[is_more]] = need[is_more]
+            raised[vertex[is_more]] = (need[:, None] * direction)[is_more]
+    return replace(mesh, positions=(mesh.positions + raised).astype(np.float32))
+
+
+def _under(head: Surface, places: Floats, width: float) -> tuple[Floats, Floats, Bools]:
+    """The skin next to places, its normals there, and which places are under it or hardly above."""
+    places = places.astype(np.float64)
     found = search_of(head).closest(places, reach=_DEEPEST * width)
     normal = head.vertex_normals()[head.triangles[found.triangle]]
     outwards: Floats = np.einsum("nk,nki->ni", found.barycentric, normal)
     height = np.einsum("ni,ni->n", places - found.point, outwards)
     is_under = (height < _CLEARANCE * width) & (found.distance < _DEEPEST * width)
-    positions = mesh.positions.copy()
-    positions[near[is_under]] = (found.point + _CLEARANCE * width * outwards)[is_under]
-    return replace(mesh, positions=positions)
+    return found.point, outwards, is_under

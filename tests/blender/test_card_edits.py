@@ -332,8 +332,8 @@ def test_coarser_levels_follow_the_edited_shape(hair):
     own, coarse = corners(obj, 3), of_card(card_objects(hair)[1], 3)
     assert not len(of_card(card_objects(hair)[1], 5))
     assert len(coarse) < len(own)
-    for reach in (np.min, np.max):
-        np.testing.assert_allclose(reach(coarse, axis=0), reach(own, axis=0), atol=8e-3)
+    for reach in (np.min, np.max):  # the coarser one is raised where it would sink into the head
+        np.testing.assert_allclose(reach(coarse, axis=0), reach(own, axis=0), atol=0.012)
 
 
 def of_card(obj, card):

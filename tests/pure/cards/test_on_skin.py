@@ -8,7 +8,7 @@ import numpy as np
 from hair_ball import ball_mesh
 
 from hairloom.addon.cards.atlas_grid import AtlasGrid
-from hairloom.addon.cards.on_skin import on_skin
+from hairloom.addon.cards.on_skin import above_skin, on_skin
 from hairloom.addon.cards.settings import CardSettings
 from hairloom.addon.cards.strip import CardFrames, Strips, UncutCards, strip_mesh
 from hairloom.addon.strands import Surface
@@ -16,9 +16,9 @@ from hairloom.addon.strands import Surface
 WIDTH = 0.2
 
 
-def card(start: float, end: float):
+def card(start: float, end: float, row_count: int = 7, column_count: int = 2):
     """A card over the top of a ball of radius 1, at these heights above its centre."""
-    rows = np.linspace(0.0, 1.0, 7)
+    rows = np.linspace(0.0, 1.0, row_count)
     center = np.stack([0.6 * rows, 0.0 * rows, start + (end - start) * rows], axis=1)[None]
     side, normal = (
         np.broadcast_to(np.float32(way), center.shape) for way in ([0, 1, 0], [0, 0, 1])
@@ -26,9 +26,9 @@ def card(start: float, end: float):
     tangent = np.broadcast_to(np.float32([1.0, 0.0, 0.0]), center.shape)
     frames = CardFrames(center.astype(np.float32), tangent, normal, -side)
     one = np.zeros(1, np.int32)
-    strips = Strips(frames, np.full((1, 7), WIDTH, np.float32))
+    strips = Strips(frames, np.full((1, row_count), WIDTH, np.float32))
     cards = UncutCards(strips, one + 20, one, one, one, AtlasGrid())
-    return strip_mesh([(one, strips)], cards, 2, CardSettings(bend=0.0))
+    return strip_mesh([(one, strips)], cards, column_count, CardSettings(bend=0.0))
 
 
 def heights(mesh) -> np.ndarray:
@@ -57,3 +57,29 @@ def test_what_lies_on_the_skin_or_far_within_stays() -> None:
     mesh = card(0.95, 1.1)
     assert on_skin(mesh, None, WIDTH) is mesh
     assert on_skin(mesh, replace(head, triangles=head.triangles[:0]), WIDTH) is mesh
+
+
+def test_a_card_of_few_rows_does_not_run_through_the_skin() -> None:
+    """One row at each end of a chord over the ball: what lies between is raised as well."""
+    head = Surface(*ball_mesh(96))
+    mesh = card(1.0, 0.8, row_count=2, column_count=1)
+    found = above_skin(mesh, head, WIDTH)
+    assert lowest_inside(mesh) < -0.04
+    assert lowest_inside(found) > -0.01
+    # no farther than it was too low
+    assert np.linalg.norm(found.positions - mesh.positions, axis=1).max() < 0.07
+
+
+def test_what_lies_above_the_skin_or_far_within_is_not_raised() -> None:
+    head = Surface(*ball_mesh(48))
+    for mesh in (card(1.1, 1.0), card(0.4, 0.3)):
+        np.testing.assert_array_equal(above_skin(mesh, head, WIDTH).positions, mesh.positions)
+    mesh = card(1.0, 0.8)
+    assert above_skin(mesh, None, WIDTH) is mesh
+
+
+def lowest_inside(mesh) -> float:
+    """How high the triangles' edges and middles are, at least."""
+    weights = np.array([[x, y, 4 - x - y] for x in range(5) for y in range(5 - x)]) / 4.0
+    places = np.einsum("pk,tki->tpi", weights, mesh.positions[mesh.triangles])
+    return float(np.linalg.norm(places, axis=-1).min()) - 1.0
