@@ -24,7 +24,7 @@ from hairloom.addon.blender.command_line import command_line
 from hairloom.addon.blender.setup.sample_scene import add_sample_scene
 
 REPOSITORY = Path(__file__).parents[1]
-PAGE = REPOSITORY / "bench" / "engines"
+PAGE = REPOSITORY / "bench" / "engines" / "plain"
 THREE = REPOSITORY / "tools" / "node" / "node_modules" / "three"
 SANDBOX = str(REPOSITORY / "tools" / "window_blender")
 #: what the browser's machine sees of this one

@@ -1,14 +1,14 @@
 """Exported cards in programs that know nothing of Hairloom, what a user sees there, the page, the
-springs, and the atlases that are exported.
+springs, the levels of detail, and the atlases that are exported.
 
-See `_engines_plain`, `_engines_page`, `_engines_springs` and `_engines_atlas` for what is
-compared with what.
+See `_engines_plain`, `_engines_page`, `_engines_springs`, `_engines_levels` and `_engines_atlas`
+for what is compared with what.
 
 Exit code 1: a limit is missed.
 
 make bench NAME=engines                     all parts
-tools/bench.py engines page                 one part: plain, page, springs or atlas
-tools/bench.py engines atlas sintel few     some grooms
+tools/bench.py engines page                 one part: plain, page, springs, levels or atlas
+tools/bench.py engines atlas sintel few     some grooms, of atlas or levels
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ import sys
 from typing import Any
 
 from _engines_atlas import atlas_figures
+from _engines_levels import level_figures
 from _engines_page import page_figures
 from _engines_plain import plain_figures
 from _engines_springs import spring_figures
@@ -36,6 +37,7 @@ AT_MOST = {
     "*few_side_texels": 512,
     "*spring_error_percent": 10.0,
     "*spring_joints": 120,
+    "levels_pop_flip": 0.05,
 }
 AT_LEAST = {"*opaque_percent": 25.0, "*strand_texels": 1.5}
 
@@ -47,6 +49,8 @@ def main(arguments: list[str]) -> int:
     for name, figures in PARTS.items():
         if part in ("", name):
             found |= figures()
+    if part in ("", "levels"):
+        found |= level_figures(names)
     if part in ("", "atlas"):
         found |= atlas_figures(names)
     return report(found, REFERENCE, at_most=AT_MOST, at_least=AT_LEAST)

@@ -1,7 +1,7 @@
 """Serves the folder it lies in to a browser without a window, and keeps what its page sends back.
 
-python3 draw_page.py: what index.html posts to NAME becomes the file NAME, until it posts "done";
-exit code 1 and the reason where it posts that to "failed".
+python3 draw_page.py [SECONDS]: what index.html posts to NAME becomes the file NAME, until it posts
+"done"; exit code 1 and the reason where it posts that to "failed", or is not done after so long.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class Handler(http.server.SimpleHTTPRequestHandler):
         """Quiet: what fails comes as an answer."""
 
 
-def main() -> int:
+def main(seconds: float = LONGEST) -> int:
     handler = functools.partial(Handler, directory=str(FOLDER))
     server = http.server.ThreadingHTTPServer(("localhost", 0), handler)
     threading.Thread(target=server.serve_forever, daemon=True).start()
@@ -51,7 +51,7 @@ def main() -> int:
         command = [*BROWSER, f"--user-data-dir={profile}", "--remote-debugging-port=0", address]
         browser = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         try:
-            Handler.answered.wait(LONGEST)
+            Handler.answered.wait(seconds)
         finally:
             browser.kill()
             browser.wait()
@@ -62,4 +62,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(main(*map(float, sys.argv[1:])))
