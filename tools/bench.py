@@ -6,6 +6,7 @@ python tools/bench.py NAME [arguments of that benchmark]
 import runpy
 import sys
 
+import bpy  # noqa: F401  it must come before gpu, which lives inside it
 from extension_loader import REPOSITORY, load_package
 
 BENCHMARKS = REPOSITORY / "bench"
