@@ -22,6 +22,7 @@ class AtlasSettings(Settings):
 
     section = "atlas"
     title = "Atlas"
+    help_page = "card_textures"
     owner = "groom"
 
     source: str = choice(

@@ -15,6 +15,7 @@ class CardDrawingSettings(Settings):
 
     section = "card_drawing"
     title = "Card Drawing"
+    help_page = "cards#the-draw-order"
     owner = "groom"
     panels = ("Drawing",)
 

@@ -22,6 +22,7 @@ class CardExportSettings(Settings):
 
     section: ClassVar[str] = "cards_export"
     title: ClassVar[str] = "Card Files"
+    help_page = "cards_export"
     owner: ClassVar[Owner] = "job"
 
     packing: str = choice(

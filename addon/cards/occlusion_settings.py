@@ -13,6 +13,7 @@ class CardOcclusionSettings(Settings):
 
     section = "card_occlusion"
     title = "Card Occlusion"
+    help_page = "cards#cards-in-the-scene"
     owner = "groom"
 
     strength: float = number(

@@ -13,6 +13,7 @@ class CardSettings(Settings):
 
     section = "cards"
     title = "Hair Cards"
+    help_page = "cards"
     owner = "groom"
 
     source: str = choice(

@@ -19,6 +19,7 @@ class DynamicsSettings(MotionSettings):
 
     section = "dynamics"
     title = "Dynamics"
+    help_page = "dynamics"
     owner = "character"
     panels = ("Style", "Medium & Wind", "Lengths", "Collisions", "Shot")
 

@@ -17,6 +17,7 @@ class SettleSettings(Settings):
 
     section = "settle"
     title = "Settle"
+    help_page = "styling#settle"
 
     seconds: float = number(
         2.0,

@@ -33,6 +33,7 @@ class StrandExportSettings(Settings):
 
     section: ClassVar[str] = "strands_export"
     title: ClassVar[str] = "Strand Files"
+    help_page = "strands_export"
     owner: ClassVar[Owner] = "job"
     panels: ClassVar[tuple[str, ...]] = ("Engine", "Include", "TressFX", "Animation")
 

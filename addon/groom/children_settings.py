@@ -21,6 +21,7 @@ class ChildrenSettings(Settings):
 
     section = "children"
     title = "Children"
+    help_page = "refinement#children"
     owner = "groom"
 
     method: str = choice(

@@ -13,6 +13,7 @@ class FlowSettings(Settings):
 
     section = "flow"
     title = "Comb Along Flow"
+    help_page = "styling#flow"
 
     amount: float = number(
         1.0,

@@ -13,6 +13,7 @@ class MirrorSettings(Settings):
 
     section = "mirror"
     title = "Mirror Hair"
+    help_page = "styling#mirror"
 
     side: str = choice(
         "positive",

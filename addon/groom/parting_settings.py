@@ -13,6 +13,7 @@ class PartingSettings(Settings):
 
     section = "parting"
     title = "Comb from Partings"
+    help_page = "styling#partings"
 
     amount: float = number(
         0.8,

@@ -18,6 +18,7 @@ class GrowSettings(Settings):
 
     section = "grow"
     title = "Grow"
+    help_page = "styling#grow"
     owner = "groom"
 
     method: str = choice(
@@ -247,6 +248,7 @@ class GuideSettings(Settings):
 
     section = "guides"
     title = "Guides"
+    help_page = "user_guide#strands-and-children"
     owner = "groom"
     panel_after = "strands"
     panels = ("Ties",)

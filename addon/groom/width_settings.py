@@ -14,6 +14,7 @@ class WidthSettings(Settings):
 
     section = "widths"
     title = "Widths"
+    help_page = "user_guide#strands-and-children"
     owner = "groom"
 
     method: str = choice(

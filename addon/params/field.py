@@ -160,11 +160,15 @@ class Settings:
     #: short name, as in preset files, property groups and the docs
     section: ClassVar[str] = ""
     title: ClassVar[str] = ""
+    #: of the docs about it, and the heading there, such as cards#limits
+    help_page: ClassVar[str] = ""
     owner: ClassVar[Owner] = "job"
     #: below that of the section, in order
     panels: ClassVar[tuple[str, ...]] = ()
     #: the panel after which its own stands, if that shows nothing but what is declared here
     panel_after: ClassVar[str] = ""
+    #: what its panel says above all settings
+    said_above: ClassVar[str] = ""
     #: the toggle in the header of its panel
     header_toggle: ClassVar[str] = ""
 

@@ -16,6 +16,7 @@ class DetailSettings(Settings):
 
     section = "detail"
     title = "Detail"
+    help_page = "refinement#detail"
     owner = "groom"
     panel_after = "strands"
 

@@ -13,6 +13,7 @@ class AmbientSettings(Settings):
 
     section = "ambient"
     title = "Ambient Occlusion"
+    help_page = "shading#shadows"
     owner = "groom"
 
     strength: float = number(

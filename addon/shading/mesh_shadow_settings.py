@@ -13,6 +13,7 @@ class MeshShadowSettings(Settings):
 
     section = "mesh_shadows"
     title = "Mesh Shadows"
+    help_page = "engine#shadows-of-meshes-on-meshes"
     owner = "scene"
 
     mesh_shadows: bool = toggle(

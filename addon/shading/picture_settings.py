@@ -13,6 +13,7 @@ class PictureSettings(Settings):
 
     section = "picture"
     title = "Sampling"
+    help_page = "engine#samples"
     owner = "scene"
 
     samples: int = integer(

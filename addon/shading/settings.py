@@ -251,6 +251,7 @@ class ShadingSettings(MarschnerSettings, KajiyaKaySettings, SharedSettings):
 
     section = "shading"
     title = "Shading"
+    help_page = "shading#look-settings"
     owner = "groom"
     panels = (
         "First Highlight",
@@ -270,6 +271,7 @@ class StrandSettings(Settings):
 
     section = "strands"
     title = "Strands"
+    help_page = "user_guide#strands-and-children"
     owner = "groom"
 
     fullness: float = number(

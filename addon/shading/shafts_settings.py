@@ -31,8 +31,10 @@ class ShaftSettings(Settings):
 
     section = "shafts"
     title = "Light Shafts"
+    help_page = "light_shafts"
     owner = "groom"
     panel_after = "shadows"
+    said_above = "In renders by Hairloom, and by EEVEE and Cycles with Hairloom Hair."
     header_toggle = "use_shafts"
 
     use_shafts: bool = toggle(

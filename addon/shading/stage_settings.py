@@ -59,6 +59,7 @@ class StageSettings(Settings):
 
     section = "stage"
     title = "Stage"
+    help_page = "user_guide#show-and-export"
     owner = "job"
 
     key: float = _strength(3.8, "Key", "Main light")

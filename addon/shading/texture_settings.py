@@ -13,6 +13,7 @@ class TextureSettings(Settings):
 
     section = "card_texture"
     title = "Card Texture"
+    help_page = "card_textures"
     owner = "groom"
 
     variant_width: int = integer(

@@ -14,62 +14,36 @@ import bpy
 from bpy.props import StringProperty
 
 from ..errors import HairloomError
+from ..parameters import ALL_SETTINGS
 from .reports import reporting
 
 _ROOT = Path(__file__).resolve().parents[2]
 #: made for the zip; a clone has the sources
 HELP, _SOURCES = _ROOT / "help", _ROOT / "docs"
 
-#: section of the panels, or of the settings -> page of docs, and the heading on it
-PAGES = {
+#: section of the panels, or of the settings, which name theirs -> page of docs, and the heading
+#: on it
+PAGES = {section: settings.help_page for section, settings in ALL_SETTINGS.items()} | {
     "": "user_guide#the-sidebar",
     "look": "shading#look-settings",
-    "shading": "shading#look-settings",
     "shadows": "shading#shadows",
-    "volume": "shading#shadows",
-    "ambient": "shading#shadows",
-    "skin": "skin#soft-shadow-on-skin",
-    "shafts": "light_shafts",
-    "grow": "styling#grow",
-    "strands": "user_guide#strands-and-children",
-    "widths": "user_guide#strands-and-children",
-    "guides": "user_guide#strands-and-children",
-    "children": "refinement#children",
     "partings": "styling#partings",
-    "parting": "styling#partings",
-    "flow": "styling#flow",
     "trim": "styling#trim",
-    "mirror": "styling#mirror",
-    "detail": "refinement#detail",
-    "dynamics": "dynamics",
     "style": "dynamics#style-and-lengths",
     "medium": "dynamics#forces",
     "lengths": "dynamics#style-and-lengths",
     "shot": "dynamics#shots",
     "collisions": "dynamics#collisions",
-    "sphere_fit": "dynamics#collisions",
     "ties": "dynamics#ties-and-held-tips",
-    "settle": "styling#settle",
     "bake": "dynamics#bakes",
-    "fin": "dynamics#cloth",
     "show": "user_guide#show-and-export",
-    "cards": "cards",
     "card_strips": "cards#from-strands-to-cards",
-    "card_texture": "card_textures",
-    "atlas": "card_textures",
     "card_images": "card_textures",
-    "card_occlusion": "cards#cards-in-the-scene",
-    "card_drawing": "cards#the-draw-order",
     "card_object": "cards#cards-in-the-scene",
     "mesh_cards": "cards#the-draw-order",
-    "cards_export": "cards_export",
-    "strands_export": "strands_export",
     "export": "user_guide#export-and-import",
-    "picture": "engine#samples",
-    "mesh_shadows": "engine#shadows-of-meshes-on-meshes",
     "hair_scene": "engine#hair-over-eevee-and-cycles",
     "passes": "engine#passes",
-    "stage": "user_guide#show-and-export",
 }
 #: part of an operator's name -> a section, or a page; the first that fits counts
 _OPERATORS = (

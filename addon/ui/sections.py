@@ -31,7 +31,6 @@ from .preset_chooser import draw_preset_row
 
 #: letters that are kept free for what the preview says of strands, guides or children
 _LINE = 140
-_SHAFTS_APPEAR = "In renders by Hairloom, and by EEVEE and Cycles with Hairloom Hair."
 #: name, label, what draws it
 type Section = tuple[str, str, Draw]
 
@@ -56,18 +55,11 @@ def _panel(section: str, panel: str = "") -> Draw:
     owner, switch = _OWNERS[settings.owner], {settings.header_toggle}
 
     def draw(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
+        if settings.said_above and not panel:
+            draw_lines(layout.column(align=True), bpy.context, settings.said_above)
         draw_section(layout, owner(hair), section, panel, leave_out=switch)
 
     return draw
-
-
-def draw_shafts(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
-    draw_lines(layout.column(align=True), bpy.context, _SHAFTS_APPEAR)
-    _panel("shafts")(layout, hair)
-
-
-#: declared panels that hold more than what is declared
-_WITH_MORE: dict[str, Draw] = {"shafts": draw_shafts}
 
 
 def _with_declared(sections: Iterable[Section]) -> tuple[Section, ...]:
@@ -76,8 +68,7 @@ def _with_declared(sections: Iterable[Section]) -> tuple[Section, ...]:
     for name, settings in ALL_SETTINGS.items():
         if settings.panel_after:
             before = next(i for i, each in enumerate(found) if each[0] == settings.panel_after)
-            draw = _WITH_MORE.get(name) or _panel(name)
-            found.insert(before + 1, (name, settings.title, draw))
+            found.insert(before + 1, (name, settings.title, _panel(name)))
     return tuple(found)
 
 

@@ -15,6 +15,7 @@ import pytest
 from bl_operators.wm import WM_OT_doc_view_manual
 
 from hairloom.addon import registration
+from hairloom.addon.parameters import ALL_SETTINGS
 from hairloom.addon.ui import help as ours
 from hairloom.addon.ui import panels
 
@@ -151,3 +152,13 @@ def test_each_panel_of_hair_has_a_question_mark_for_its_own_page(
 def test_a_page_that_nobody_wrote_is_refused() -> None:
     with pytest.raises(RuntimeError, match="no such page"):
         bpy.ops.hairloom.help(page="../../etc/passwd")
+
+
+def test_every_section_of_settings_declares_its_page() -> None:
+    docs = Path(__file__).parents[2] / "docs"
+    for name, settings in ALL_SETTINGS.items():
+        page, _, heading = settings.help_page.partition("#")
+        text = (docs / f"{page}.md").read_text(encoding="utf-8")
+        headings = re.findall(r"^#+ (.+)$", text, re.MULTILINE)
+        known = {re.sub(r"[^a-z0-9]+", "-", each.lower()).strip("-") for each in headings}
+        assert not heading or heading in known, name

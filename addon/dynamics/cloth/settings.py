@@ -18,6 +18,7 @@ class FinSettings(MotionSettings):
 
     section = "fin"
     title = "Cloth"
+    help_page = "dynamics#cloth"
     owner = "character"
     panels = ("Cloth", "Medium & Wind", "Collisions", "Steps")
 

@@ -13,6 +13,7 @@ class SphereFitSettings(Settings):
 
     section = "sphere_fit"
     title = "Fitted Spheres"
+    help_page = "dynamics#collisions"
 
     sphere_count: int = integer(
         60,

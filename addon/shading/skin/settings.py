@@ -20,6 +20,7 @@ class SkinSettings(Settings):
 
     section = "skin"
     title = "Soft Shadow on Skin"
+    help_page = "skin#soft-shadow-on-skin"
     owner = "groom"
     header_toggle = "soft_shadow"
 

@@ -25,6 +25,7 @@ class VolumeSettings(Settings):
 
     section = "volume"
     title = "Shadows"
+    help_page = "shading#shadows"
     owner = "groom"
 
     shadows: str = choice(
