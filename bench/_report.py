@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import operator
 import platform
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from typing import Any
@@ -21,6 +21,16 @@ DIGITS = 6
 def start() -> None:
     """Blender as a module can draw after this."""
     gpu.init()
+
+
+def measured(
+    parts: Mapping[str, Callable[[], Mapping[str, Any]]], names: Sequence[str]
+) -> dict[str, Any]:
+    """The figures of these parts of a benchmark, or of all where none is named."""
+    unknown = [name for name in names if name not in parts]
+    if unknown:
+        raise SystemExit(f"There is no part {', '.join(unknown)}; there are {', '.join(parts)}.")
+    return {key: value for name in names or parts for key, value in parts[name]().items()}
 
 
 def report(

@@ -4,12 +4,12 @@ See `_cards_build`, `_cards_atlas`, `_cards_order`, `_cards_occlusion`, `_cards_
 `_cards_strands` for what is compared with what.
 
 make bench NAME=cards           some minutes; writes out/cards_sheet.png
+tools/bench.py cards build        some parts: build, atlas, order, occlusion, passes, strands
 """
 
 from __future__ import annotations
 
 import sys
-from typing import Any
 
 from _cards_atlas import atlas_figures
 from _cards_build import build_figures
@@ -17,25 +17,26 @@ from _cards_occlusion import occlusion_figures
 from _cards_order import order_figures
 from _cards_passes import passes_figures
 from _cards_strands import strands_figures
-from _report import report, start
+from _report import measured, report, start
 
 REFERENCE = (
     "rays one by one; cards sorted for each view and pixels sorted; the strands "
     "themselves; the three-pass scheme"
 )
+PARTS = {
+    "build": build_figures,
+    "atlas": atlas_figures,
+    "order": order_figures,
+    "occlusion": occlusion_figures,
+    "passes": passes_figures,
+    "strands": strands_figures,
+}
 
 
-def main() -> int:
+def main(names: list[str]) -> int:
     start()
-    found: dict[str, Any] = {
-        **build_figures(),
-        **atlas_figures(),
-        **order_figures(),
-        **occlusion_figures(),
-        **passes_figures(),
-        **strands_figures(),
-    }
+    found = measured(PARTS, names)
     return report(found, REFERENCE)
 
 
-sys.exit(main())
+sys.exit(main(sys.argv[1:]))

@@ -49,6 +49,7 @@ Forms = dict[str, Callable[[DynamicsState], Form]]
 def main() -> int:
     options = argparse.ArgumentParser()
     options.add_argument("--peer-10k", action="store_true", help="the peer with 10,000 guides too")
+    options.add_argument("--rounds", type=int, default=ROUNDS, help="in which all take turns")
     asked = options.parse_args()
     forms: Forms = {"numpy": NumpyForm}
     if has_compute():
@@ -59,7 +60,7 @@ def main() -> int:
     guides = guides_on(surface, GUIDES)
 
     found: dict[str, Any] = dict.fromkeys(("compute_ms", "ratio_compute"))
-    found |= race(forms, head, guides, field)
+    found |= race(forms, head, guides, field, asked.rounds)
     for name in forms:
         found[f"ratio_{name}"] = found["hair_dynamics_ms"] / found[f"{name}_ms"]
     found |= accuracy(forms, guides, surface, field)
@@ -74,7 +75,11 @@ def main() -> int:
 
 
 def race(
-    forms: Forms, head: bpy.types.Object, guides: StrandSet, field: DistanceField
+    forms: Forms,
+    head: bpy.types.Object,
+    guides: StrandSet,
+    field: DistanceField,
+    rounds: int,
 ) -> dict[str, float]:
     """Milliseconds a frame of all contestants, and how far the medians of the rounds lie apart."""
     shake = Shake(guides.grid, (field,))
@@ -86,7 +91,7 @@ def race(
     def note(name: str, times: list[float]) -> None:
         medians.setdefault(name, []).append(statistics.median(times))
 
-    for number in range(ROUNDS):
+    for number in range(rounds):
         for name, make in list(forms.items()) * PLAYS:
             note(f"{name}_ms", timed(make, shake, PLAY))
             note(f"{name}_sphere_ms", timed(make, balls, PLAY))

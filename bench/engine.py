@@ -4,31 +4,32 @@ See the modules `_engine_...` for what is compared with what. The reference of s
 scene at 1,024 samples.
 
 make bench NAME=engine          some minutes
+tools/bench.py engine picture        some parts: picture, skin, shafts, frames
 """
 
 from __future__ import annotations
 
 import sys
-from typing import Any
 
 from _engine_frames import frame_figures
 from _engine_picture import picture_figures
 from _engine_shafts import shafts_figures
 from _engine_skin import skin_figures
-from _report import report, start
+from _report import measured, report, start
 
 REFERENCE = "the same scene at 1,024 samples; another process; the tenth frame"
+PARTS = {
+    "picture": picture_figures,
+    "skin": skin_figures,
+    "shafts": shafts_figures,
+    "frames": frame_figures,
+}
 
 
-def main() -> int:
+def main(names: list[str]) -> int:
     start()
-    found: dict[str, Any] = {
-        **picture_figures(),
-        **skin_figures(),
-        **shafts_figures(),
-        **frame_figures(),
-    }
+    found = measured(PARTS, names)
     return report(found, REFERENCE)
 
 
-sys.exit(main())
+sys.exit(main(sys.argv[1:]))

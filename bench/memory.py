@@ -20,7 +20,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from _report import report, start
+from _report import measured, report, start
 from _sight_missing import grown_hair
 
 from hairloom.addon.render import gpu_memory, gpu_objects
@@ -47,6 +47,7 @@ def large() -> dict[str, float]:
 
 
 def small() -> dict[str, float]:
+    LAYERS_OF_PIXELS.release()
     much, _ = drawn(100_000, 1280, 720, "none")
     gpu_memory.choose_budget(LITTLE)
     little, found = drawn(100_000, 1280, 720, "none")
@@ -63,11 +64,7 @@ PARTS = {"large": large, "small": small}
 
 def main(names: list[str]) -> int:
     start()
-    found: dict[str, float] = {}
-    for name in names or PARTS:
-        found |= PARTS[name]()
-        LAYERS_OF_PIXELS.release()
-    return report(found, REFERENCE, at_most=AT_MOST)
+    return report(measured(PARTS, names), REFERENCE, at_most=AT_MOST)
 
 
 def drawn(strand_count: int, width: int, height: int, shadows: str) -> tuple[np.ndarray, Any]:

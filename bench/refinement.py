@@ -3,16 +3,16 @@
 See `_refinement_node` and `_refinement_views` for what is compared with what.
 
 make bench NAME=refinement          about two minutes
+tools/bench.py refinement views        some parts: views, node
 """
 
 from __future__ import annotations
 
 import sys
-from typing import Any
 
 from _refinement_node import node_figures
 from _refinement_views import view_figures
-from _report import report, start
+from _report import measured, report, start
 
 REFERENCE = "Blender's Interpolate Hair Curves node; one piece a segment; the exact curve"
 #: figure -> the most, and the least, that it may be
@@ -24,12 +24,16 @@ AT_MOST = {
     "coverage_eighth_difference": 0.03,
 }
 AT_LEAST = {"vertices_fixed64_ratio": 42.0}
+PARTS = {
+    "views": view_figures,
+    "node": node_figures,
+}
 
 
-def main() -> int:
+def main(names: list[str]) -> int:
     start()
-    found: dict[str, Any] = {**view_figures(), **node_figures()}
+    found = measured(PARTS, names)
     return report(found, REFERENCE, at_most=AT_MOST, at_least=AT_LEAST)
 
 
-sys.exit(main())
+sys.exit(main(sys.argv[1:]))

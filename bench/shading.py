@@ -4,14 +4,14 @@ See the modules `_shading_*` for what is compared with what. Writes out/shading_
 hair beside Cycles'.
 
 make bench NAME=shading          about five minutes
+tools/bench.py shading cost        some parts: cost, reference, glsl, cycles, ball
 """
 
 from __future__ import annotations
 
 import sys
-from typing import Any
 
-from _report import report, start
+from _report import measured, report, start
 from _shading_ball import ball_figures
 from _shading_cost import cost_figures
 from _shading_cycles import lobe_figures
@@ -30,18 +30,19 @@ AT_MOST = {
     "frame_ratio_models": 1.6,
 }
 AT_LEAST = {"furnace_energy": 0.98}
+PARTS = {
+    "cost": cost_figures,
+    "reference": reference_figures,
+    "glsl": lambda: {"glsl_relative_error": glsl_relative_error()},
+    "cycles": lobe_figures,
+    "ball": ball_figures,
+}
 
 
-def main() -> int:
+def main(names: list[str]) -> int:
     start()
-    found: dict[str, Any] = {
-        **cost_figures(),
-        **reference_figures(),
-        "glsl_relative_error": glsl_relative_error(),
-        **lobe_figures(),
-        **ball_figures(),
-    }
+    found = measured(PARTS, names)
     return report(found, REFERENCE, at_most=AT_MOST, at_least=AT_LEAST)
 
 
-sys.exit(main())
+sys.exit(main(sys.argv[1:]))

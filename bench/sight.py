@@ -14,7 +14,7 @@ import sys
 from collections.abc import Callable
 from typing import Any
 
-from _report import report, start
+from _report import measured, report, start
 from _sight_cover import cover
 from _sight_grooms import GROOMS, lost_curves
 from _sight_missing import missing_percent
@@ -66,9 +66,7 @@ PARTS: dict[str, Callable[[], dict[str, Any]]] = {
 
 def main(names: list[str]) -> int:
     start()
-    found: dict[str, Any] = {}
-    for name in names or PARTS:
-        found |= PARTS[name]()
+    found = measured(PARTS, names)
     return report(found, REFERENCE, at_most=AT_MOST, at_least=AT_LEAST)
 
 

@@ -5,14 +5,14 @@ See `_volume_shadows`, `_volume_balls`, `_volume_sintel`, `_volume_transparency`
 for what is compared with what.
 
 make bench NAME=volume          some minutes; writes out/volume_sheet.png and out/volume_sintel.png
+tools/bench.py volume cost        some parts: cost, shadows, transparency, balls, sintel
 """
 
 from __future__ import annotations
 
 import sys
-from typing import Any
 
-from _report import report, start
+from _report import measured, report, start
 from _volume_balls import ball_figures
 from _volume_cost import cost_figures
 from _volume_shadows import shadow_figures
@@ -23,18 +23,19 @@ REFERENCE = (
     "strands counted one by one; Cycles' Principled Hair, path traced; ribbons "
     "sorted; EEVEE at 1 sample"
 )
+PARTS = {
+    "cost": cost_figures,
+    "shadows": shadow_figures,
+    "transparency": transparency_figures,
+    "balls": ball_figures,
+    "sintel": sintel_figures,
+}
 
 
-def main() -> int:
+def main(names: list[str]) -> int:
     start()
-    found: dict[str, Any] = {
-        **cost_figures(),
-        **shadow_figures(),
-        **transparency_figures(),
-        **ball_figures(),
-        **sintel_figures(),
-    }
+    found = measured(PARTS, names)
     return report(found, REFERENCE)
 
 
-sys.exit(main())
+sys.exit(main(sys.argv[1:]))
