@@ -216,7 +216,7 @@ def test_three_js_fades_levels_pixel_by_pixel(baked: Asset, sandbox: str) -> Non
     command = [sandbox, "run", "python3", str(site / "draw_page.py")]
     result = subprocess.run(command, capture_output=True, text=True, timeout=300)
     assert result.returncode == 0, result.stderr
-    check_fade(site, "both", "copy")
+    check_fade(site, "both", "copy", "scaled")
 
 
 def test_three_js_shows_what_can_be_shown_and_says_what_is_wrong(

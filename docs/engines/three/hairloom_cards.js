@@ -56,8 +56,8 @@ export class HairLevels extends THREE.LOD {
 
   update(camera) {
     const place = new THREE.Vector3().setFromMatrixPosition(camera.matrixWorld);
-    const distance = place.distanceTo(this.center.clone().applyMatrix4(this.matrixWorld)) / camera.zoom;
-    // how far each level has taken over from those before it; the last number is for one that is not there
+    const away = place.distanceTo(this.center.clone().applyMatrix4(this.matrixWorld));
+    const distance = away / (camera.zoom * this.matrixWorld.getMaxScaleOnAxis()); // as if hair were not scaled
     let share = 1; // how far this level has taken over from those before it
     this.levels.forEach((level, number) => {
       const next = this.levels[number + 1];
