@@ -51,8 +51,8 @@ test-all: lint zip ## everything, on both backends: before an issue is resolved
 test-engines: setup ## exported cards drawn by Godot and by three.js, held against our own picture
 	$(PYTHON) -m pytest -q tests/engines
 
-bench: setup ## one benchmark: NAME=x runs bench/x.py, no NAME lists them
-	@$(PYTHON) tools/bench.py $(NAME)
+bench: setup ## NAME=x runs bench/x.py; without a name all, short, into docs/figures.md, half an hour
+	@$(PYTHON) tools/$(if $(NAME),bench.py $(NAME),figures.py)
 
 docs: setup ## write what the documentation takes from the code
 	$(PYTHON) tools/make_docs.py

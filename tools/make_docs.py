@@ -1,6 +1,6 @@
 """Makes what comes from the code: tables of parameters and verbs, the figure of the flows, the
 texts to translate, the page of the gallery, the index of the decisions, the shading of cards in
-HLSL, the pictures.
+HLSL, the figures that pages quote, the pictures.
 
 python tools/make_docs.py [--check | --pictures]
 
@@ -19,6 +19,7 @@ import tempfile
 from pathlib import Path
 
 import decisions_index
+import figures
 import flow_figure
 import gallery
 import hair_hlsl
@@ -107,6 +108,7 @@ def main() -> int:
     gallery.PAGE.write_text(gallery.page(), encoding="utf-8")
     decisions = decisions_index.PAGE.read_text(encoding="utf-8")
     decisions_index.PAGE.write_text(decisions_index.with_index(decisions), encoding="utf-8")
+    figures.write_quotes()
     if chosen.pictures:
         make_pictures()
     return 0

@@ -1,0 +1,149 @@
+"""docs/figures.md shows what was measured, and the other pages quote it."""
+
+from __future__ import annotations
+
+import ast
+import re
+from pathlib import Path
+
+import figures
+import pytest
+
+KEPT = {"benches": {"ties": {"figures": {"ratio": 41.26, "part": 0.0123, "off_percent": 0.5}}}}
+
+
+def test_all_benchmarks_are_run() -> None:
+    assert set(figures.BENCHES) == {path.stem for path in figures.BENCHMARKS.glob("[!_]*.py")}
+
+
+def test_the_page_is_current() -> None:
+    assert figures.PAGE.read_text(encoding="utf-8") == figures.page(figures.known()), (
+        "run make docs"
+    )
+
+
+def test_what_was_measured_is_what_would_be_measured_today() -> None:
+    found = figures.known()["benches"]
+    assert found
+    for name, each in found.items():
+        assert each["arguments"] == figures.BENCHES[name].arguments, f"run tools/figures.py {name}"
+
+
+def test_quotes_are_as_they_were_found() -> None:
+    pages = figures.pages_that_quote()
+    assert pages
+    for path in pages:
+        text = path.read_text(encoding="utf-8")
+        assert figures.quoted(text, figures.known()) == text, f"{path.name}: run make docs"
+
+
+@pytest.mark.parametrize(
+    ("text", "is_to_be"),
+    [
+        ('[7 times](figures.md "ties.ratio")', '[41.3 times](figures.md "ties.ratio")'),
+        ('[9](../dev/figures.md "ties.ratio")', '[41.3](../dev/figures.md "ties.ratio")'),
+        ('[9 %](figures.md "ties.part")', '[1.23 %](figures.md "ties.part")'),
+        ('[9 %](figures.md "ties.off_percent")', '[0.5 %](figures.md "ties.off_percent")'),
+        ("[9](figures.md#ties)", "[9](figures.md#ties)"),
+    ],
+)
+def test_a_quote_takes_the_figure_and_keeps_its_unit(text: str, is_to_be: str) -> None:
+    assert figures.quoted(text, KEPT) == is_to_be
+
+
+def test_a_quote_of_what_nobody_measured_is_an_error() -> None:
+    with pytest.raises(KeyError):
+        figures.quoted('[1](figures.md "ties.color")', KEPT)
+
+
+def test_what_is_missed_is_said_first_and_in_its_row() -> None:
+    found = {
+        "ended": True,
+        "arguments": "--strands 8",
+        "left_out": "most strands",
+        "other_work": 0.1,
+        "seconds": 2.0,
+        "reference": "a ring",
+        "limits": {"escape_mm": "at most 1", "kept": "at least 1"},
+        "missed": ["escape_mm"],
+        "figures": {"escape_mm": 2.5, "kept": 1.0, "strands": 12000, "seeds": []},
+        **dict.fromkeys(("blender", "renderer", "backend", "python", "numpy"), "x"),
+    }
+    machine = {"cores": "2", "processor": "x"}
+    kept = {"date": "2026-01-02", "machine": machine, "benches": {"ties": found}}
+    page = figures.page(kept)
+    assert "Of 2 limits 1 are missed: `ties.escape_mm`." in page
+    assert "`tools/bench.py ties --strands 8`, 2 s. Beside: a ring. Left out: most strands." in page
+    assert "| `escape_mm` | 2.5 | **at most 1, missed** |" in page
+    assert "| `strands` | 12,000 |" in page
+    assert "Not measured: curves_read, styles," in page
+    found["other_work"] = 1.5
+    assert "beside other work" not in page and "beside other work" in figures.page(kept)
+    kept["benches"] |= {"cards": {"ended": False, "seconds": 600.0}}
+    assert "Did not end: cards." in figures.page(kept)
+
+
+def test_a_benchmark_that_fails_is_not_taken_for_one_that_found_something(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    class Done:
+        stdout, stderr, returncode = "half a line", "Traceback", 1
+
+    monkeypatch.setattr(figures.subprocess, "run", lambda *_, **__: Done)
+    found = figures.run("ties")
+    assert not found["ended"] and "figures" not in found
+
+
+def test_arguments_are_words_that_benchmarks_know() -> None:
+    for name, short in figures.BENCHES.items():
+        family = "".join(
+            path.read_text(encoding="utf-8")
+            for path in (figures.BENCHMARKS / f"{name}.py", *figures.BENCHMARKS.glob("_*.py"))
+        )
+        for word in re.findall(r"--[a-z-]+", short.arguments):
+            assert f'"{word}"' in family, (name, word)
+
+
+def names_in(path: Path) -> set[str]:
+    """What can be imported from a module: all that its outermost statements bind."""
+    found: set[str] = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        match node:
+            case ast.FunctionDef(name=name) | ast.ClassDef(name=name):
+                found.add(name)
+            case ast.Import(names=names) | ast.ImportFrom(names=names):
+                found |= {(each.asname or each.name).split(".")[0] for each in names}
+            case ast.Name(id=name, ctx=ast.Store()) | ast.TypeAlias(name=ast.Name(id=name)):
+                found.add(name)
+    return found
+
+
+def module_file(name: str, folder: Path) -> Path | None:
+    """The file of a module of ours; None of others."""
+    if name.startswith("hairloom"):
+        base = figures.REPOSITORY.joinpath(*name.split(".")[1:])
+        return base / "__init__.py" if base.is_dir() else base.with_suffix(".py")
+    found = [each / f"{name}.py" for each in (folder, figures.REPOSITORY / "tools")]
+    return next((path for path in found if path.is_file()), None)
+
+
+@pytest.mark.parametrize("folder", ["bench", "tools"])
+def test_what_benchmarks_and_tools_import_is_there(folder: str) -> None:
+    """Nobody runs them for days, so a name that was changed is noticed here."""
+    lacking, asked = [], 0
+    for path in sorted((figures.REPOSITORY / folder).glob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if not isinstance(node, ast.ImportFrom) or node.module is None:
+                continue
+            module = module_file(node.module, path.parent)
+            if module is None:
+                continue
+            asked += 1
+            known = names_in(module) if module.is_file() else set()
+            for each in node.names:
+                below = module.parent / f"{each.name}.py", module.parent / each.name
+                is_module = module.name == "__init__.py" and any(it.exists() for it in below)
+                if each.name not in known and not is_module:
+                    lacking.append(f"{path.name}: {node.module}.{each.name}")
+    assert lacking == []
+    assert asked > 20

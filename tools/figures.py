@@ -1,0 +1,287 @@
+"""Runs all benchmarks, short, and writes what they find: bench/figures.json and docs/figures.md.
+
+python tools/figures.py            all of them, in half an hour; `make bench`
+python tools/figures.py NAME ...   some again; the figures of the others stay
+
+The documentation quotes these figures and no others: a link to a figure of the page, such as
+`[0.5](figures.md "refinement.error_px_max")`, has the figure as its text, which `make docs` writes.
+Exit code 1: a limit is missed, a benchmark did not end, or all took longer than they may.
+"""
+
+from __future__ import annotations
+
+import ast
+import json
+import os
+import re
+import subprocess
+import sys
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+REPOSITORY = Path(__file__).resolve().parents[1]
+BENCHMARKS = REPOSITORY / "bench"
+FIGURES, PAGE = BENCHMARKS / "figures.json", REPOSITORY / "docs" / "figures.md"
+#: [min] for all of them
+MAX_MINUTES = 30.0
+#: [s] for one of them
+LONGEST = 600.0
+#: processors that may be busy before a benchmark begins, and for how long they are watched [s]
+MAX_BUSY, WATCHED = 0.3, 1.0
+#: what says how the figures of a benchmark came about, beside the figures
+ABOUT = ("reference", "limits", "missed", "backend", "renderer", "blender", "python", "numpy")
+_QUOTE = re.compile(
+    r'\[(?P<shown>[^\]]+)\]\((?P<page>(?:\.\./)*(?:\w+/)*figures\.md) "(?P<name>[\w.]+)"\)'
+)
+
+
+@dataclass(frozen=True)
+class Short:
+    """What of a benchmark is run with all others, and what is left out for the time it takes."""
+
+    arguments: str = ""
+    left_out: str = ""
+
+
+#: in the order of the data's way
+BENCHES: dict[str, Short] = {
+    "curves_read": Short(),
+    "styles": Short("bob edit", "22 styles, and other heads"),
+    "seat": Short("comb", "growing, long jobs and *Make Real*"),
+    "dynamics": Short("--rounds 2", "five of seven rounds"),
+    "strands": Short("sintel", "other grooms"),
+    "contacts": Short("thin", "heads of hair"),
+    "ties": Short(),
+    "among": Short("--skip-cost", "what a frame costs"),
+    "endurance": Short("--runs 50 --minutes 0.2", "95 % of the runs, and most of the long shake"),
+    "refinement": Short(),
+    "shading": Short("cost reference glsl", "Cycles"),
+    "volume": Short("cost transparency", "shadows, and Cycles"),
+    "no_atomics": Short(),
+    "sight": Short("lost", "crowds, covers, scales, counts of strands, and Cycles"),
+    "frames": Short(),
+    "freeze": Short(),
+    "preview_frame": Short(),
+    "compile": Short("head", "other scenes"),
+    "memory": Short("small", "500,000 strands at 3840 x 2160"),
+    "engine": Short("shafts", "stills, skin, and animations"),
+    "picture": Short("soft_shadows", "hair over EEVEE and Cycles, blur and environments"),
+    "cards": Short("order", "building, atlases, occlusion, passes, and strands"),
+    "engines": Short("page", "other programs, springs, levels and atlases"),
+    "exchange": Short("usd", "Alembic, motion, kills and damaged files"),
+    "faults": Short("runs 40", "most of the faults"),
+    "house": Short(),
+}
+
+
+def measure(names: list[str]) -> int:
+    """Run them one after another, and write what each has found as soon as it has."""
+    kept = known()
+    begin, is_all = time.monotonic(), len(names) == len(BENCHES)
+    for number, name in enumerate(names, 1):
+        print(f"[{number}/{len(names)}] {name} {BENCHES[name].arguments}", flush=True)
+        found = kept["benches"][name] = run(name)
+        missed = ", ".join(found.get("missed", [])) or "none"
+        said = f"missed: {missed}" if found["ended"] else "did not end"
+        print(f"    {found['seconds']:.0f} s, {said}", flush=True)
+        kept |= {"date": datetime.now(UTC).date().isoformat(), "machine": machine()}
+        measured = kept["benches"]
+        kept["benches"] = {each: measured[each] for each in BENCHES if each in measured}
+        write(kept)
+    minutes = (time.monotonic() - begin) / 60.0
+    if is_all:
+        write(kept | {"minutes": round(minutes, 1)})
+    print(f"{minutes:.1f} minutes; see docs/figures.md")
+    found = [kept["benches"][name] for name in names]
+    is_missed = any(not each["ended"] or each["missed"] for each in found)
+    return int(is_missed or (is_all and minutes > MAX_MINUTES))
+
+
+def write(kept: Mapping[str, Any]) -> None:
+    FIGURES.write_text(json.dumps(kept, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    PAGE.write_text(page(kept), encoding="utf-8")
+
+
+def run(name: str) -> dict[str, Any]:
+    """What a benchmark found, in a process of its own; `ended` is false if it has found nothing."""
+    command = [sys.executable, str(REPOSITORY / "tools" / "bench.py"), name]
+    command += BENCHES[name].arguments.split()
+    ran = {
+        "arguments": BENCHES[name].arguments,
+        "left_out": BENCHES[name].left_out,
+        "other_work": busy_processors(),
+    }
+    begin = time.monotonic()
+    try:
+        done = subprocess.run(
+            command, cwd=REPOSITORY, capture_output=True, text=True, timeout=LONGEST, check=False
+        )
+        found = json.loads(done.stdout.splitlines()[-1])
+    except (subprocess.TimeoutExpired, json.JSONDecodeError, IndexError) as error:
+        print(
+            f"    {type(error).__name__}: {getattr(error, 'stderr', None) or done.stderr[-2000:]}"
+        )
+        return {**ran, "ended": False, "seconds": round(time.monotonic() - begin, 1)}
+    about = {key: found.pop(key) for key in ABOUT if key in found}
+    seconds = round(time.monotonic() - begin, 1)
+    return {**ran, "ended": True, "seconds": seconds, **about, "figures": found}
+
+
+def busy_processors() -> float:
+    """How many processors other work takes; 0 where the system does not tell."""
+    told = Path("/proc/stat")
+    if not told.is_file():
+        return 0.0
+
+    def working() -> int:
+        user, nice, system, *_ = map(int, told.read_text().splitlines()[0].split()[1:])
+        return user + nice + system
+
+    before = working()
+    time.sleep(WATCHED)
+    return round((working() - before) / os.sysconf("SC_CLK_TCK") / WATCHED, 2)
+
+
+def machine() -> dict[str, str]:
+    """On what all of it was computed."""
+    cores = os.cpu_count() or 1
+    names = Path("/proc/cpuinfo")
+    text = names.read_text(encoding="utf-8") if names.is_file() else ""
+    model = re.search(r"^model name\s*: (.+)$", text, re.MULTILINE)
+    return {"processor": model[1] if model else "unknown", "cores": str(cores)}
+
+
+def known() -> dict[str, Any]:
+    """What has been measured so far."""
+    if not FIGURES.is_file():
+        return {"benches": {}}
+    found: dict[str, Any] = json.loads(FIGURES.read_text(encoding="utf-8"))
+    return found
+
+
+def page(kept: Mapping[str, Any]) -> str:
+    """docs/figures.md, whole."""
+    benches: dict[str, Any] = kept["benches"]
+    ended = {name: found for name, found in benches.items() if found["ended"]}
+    limits = sum(len(found["limits"]) for found in ended.values())
+    missed = [f"`{name}.{key}`" for name, found in ended.items() for key in found["missed"]]
+    if not ended:
+        return "# Figures\n\nNothing has been measured yet: `make bench` does.\n"
+    first = next(iter(ended.values()))
+    lines = [
+        "# Figures",
+        "",
+        "Written by `make bench`. Do not edit this page. Each section is what one benchmark of",
+        "`bench/` found, run short so that all of them take half an hour. `make bench NAME=x` runs",
+        "one whole. The other pages quote these figures.",
+        "",
+        f"Measured on {kept['date']} with {kept['machine']['cores']} cores of "
+        f"{kept['machine']['processor']}, Blender {first['blender']}, "
+        f"{first['renderer']} ({first['backend']}), Python {first['python']}, "
+        f"numpy {first['numpy']}.",
+        "**This is a software driver: no GPU drew these figures.** "
+        "[gpu.md](dev/gpu.md#how-fast-a-machine-is) says which GPUs have been measured.",
+        "",
+        f"Of {limits} limits {len(missed)} are missed{': ' if missed else ''}{', '.join(missed)}.",
+    ]
+    for word, names in (
+        ("Did not end", [name for name in benches if name not in ended]),
+        ("Not measured", [name for name in BENCHES if name not in benches]),
+    ):
+        if names:
+            lines += ["", f"{word}: {', '.join(names)}."]
+    for name, found in ended.items():
+        lines += ["", *section(name, found)]
+    return "\n".join(lines) + "\n"
+
+
+def section(name: str, found: Mapping[str, Any]) -> list[str]:
+    command = f"tools/bench.py {name} {found['arguments']}".strip()
+    left_out = f" Left out: {found['left_out']}." if found["left_out"] else ""
+    if found["other_work"] > MAX_BUSY:
+        left_out += " **Measured beside other work: its times count for little.**"
+    lines = [
+        f"## {name}",
+        "",
+        about(name),
+        "",
+        f"`{command}`, {found['seconds']:.0f} s. Beside: {found['reference']}.{left_out}",
+        "",
+        "| figure | found | limit |",
+        "| --- | ---: | --- |",
+    ]
+    for key, value in found["figures"].items():
+        told = found["limits"].get(key, "")
+        mark = f"**{told}, missed**" if key in found["missed"] else told
+        lines.append(f"| `{key}` | {number(value)} | {mark} |")
+    return lines
+
+
+def about(name: str) -> str:
+    """The first paragraph of what a benchmark says of itself."""
+    source = (BENCHMARKS / f"{name}.py").read_text(encoding="utf-8")
+    told = (ast.get_docstring(ast.parse(source)) or "").split("\n\n")[0]
+    return " ".join(told.split())
+
+
+def number(value: Any) -> str:
+    """As the page shows it: three digits that count, or a word."""
+    if isinstance(value, bool) or value is None or isinstance(value, (str, list)):
+        return ", ".join(map(str, value)) or "none" if isinstance(value, list) else str(value)
+    if isinstance(value, int) or (value == round(value) and abs(value) < 1e6):
+        return f"{int(value):,}"
+    if abs(value) >= 100.0:
+        return f"{value:,.0f}"
+    return f"{value:.3g}"
+
+
+def quoted(text: str, kept: Mapping[str, Any]) -> str:
+    """The text of a page with each figure that it quotes as it was found last.
+
+    What follows the number stays: `[41 times](figures.md "refinement.node_ratio")`. A percentage of
+    a figure that is a fraction is counted as such.
+
+    Raises:
+        KeyError: no benchmark found a figure of this name.
+    """
+
+    def shown(match: re.Match[str]) -> str:
+        bench, key = match["name"].split(".")
+        value = kept["benches"][bench]["figures"][key]
+        number_there = re.match(r"[\d.,e+-]*\d", match["shown"])
+        unit = match["shown"][number_there.end() :] if number_there else ""
+        if unit.strip() == "%" and "percent" not in key:
+            value = 100.0 * value
+        return f'[{number(value)}{unit}]({match["page"]} "{match["name"]}")'
+
+    return _QUOTE.sub(shown, text)
+
+
+def pages_that_quote() -> list[Path]:
+    found = [REPOSITORY / "README.md", *sorted((REPOSITORY / "docs").rglob("*.md"))]
+    return [path for path in found if _QUOTE.search(path.read_text(encoding="utf-8"))]
+
+
+def write_quotes() -> None:
+    """Bring the quotes of all pages up to date, and the page of the figures."""
+    kept = known()
+    PAGE.write_text(page(kept), encoding="utf-8")
+    for path in pages_that_quote():
+        text = path.read_text(encoding="utf-8")
+        path.write_text(quoted(text, kept), encoding="utf-8")
+
+
+def main(names: list[str]) -> int:
+    unknown = [name for name in names if name not in BENCHES]
+    if unknown:
+        print(f"No such benchmark: {', '.join(unknown)}. There are {', '.join(BENCHES)}.")
+        return 2
+    return measure(names or list(BENCHES))
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
