@@ -59,6 +59,7 @@ MENU = {
         "docs/dev/development",
         "docs/dev/extending",
         "docs/dev/gpu",
+        "docs/figures",
         "docs/dev/shading",
         "docs/dev/dynamics",
         "docs/dev/refinement",

@@ -20,6 +20,12 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_site(folder)
 
 
+def test_each_page_is_in_a_menu() -> None:
+    pages = {page.relative_to(REPOSITORY) for page in (REPOSITORY / "docs").rglob("*.md")}
+    in_menu = {Path(f"{page}.md") for menu in make_site.MENU.values() for page in menu}
+    assert pages <= in_menu
+
+
 @pytest.mark.slow(instead="test_a_link_that_leads_nowhere_ends_it")
 def test_each_page_of_the_repository_is_a_page(site: Path) -> None:
     pages = {page.relative_to(REPOSITORY) for page in (REPOSITORY / "docs").rglob("*.md")}
