@@ -100,9 +100,13 @@ _PRESENT_ALPHA = 0.5
 
 
 class CardPass:
-    """Keeps the cards of the last snapshot on the GPU; making one touches no GPU."""
+    """Keeps the cards of the last snapshot on the GPU; making one touches no GPU.
+
+    notes: what the artist should know of their last maps, each with its remedy.
+    """
 
     def __init__(self) -> None:
+        self.notes: tuple[str, ...] = ()
         self._opacity = CardOpacity()
         self._batches = CardBatches()
         self.release()
@@ -114,12 +118,14 @@ class CardPass:
         Raises:
             ShaderError: as `draw`.
         """
-        cards = _drawn(snapshot)
+        cards, self.notes = _drawn(snapshot), ()
         if cards is None or snapshot.volume.shadows == "none":
             return None
         self._take_textures(cards)
         batch, alpha = self._batches.static(cards), self._textures.of("alpha")
-        return self._opacity.of(cards, batch, alpha, snapshot)
+        maps = self._opacity.of(cards, batch, alpha, snapshot)
+        self.notes = (maps.note,) if maps.note else ()
+        return maps
 
     def draw(
         self,

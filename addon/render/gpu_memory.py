@@ -26,19 +26,19 @@ from . import gpu_objects
 
 MEGABYTE = 1 << 20
 #: [MB] where nobody says otherwise
-AUTOMATIC = 1024
+DEFAULT = 1024
 #: in the environment [MB]; stronger than what is chosen in Blender
 MEMORY_VARIABLE = "HAIRLOOM_GPU_MEMORY"
 #: fractions of the budget: lists of strands at most, and at least; shadow maps of hair, and of
 #: meshes
 _LISTS, _MIN_LISTS, _MAPS, _MESH_MAPS = 1 / 4, 1 / 32, 1 / 2, 1 / 4
 
-_chosen = 0
+_chosen = DEFAULT
 _GROOMS: ContextVar[int] = ContextVar("grooms of the picture that is drawn", default=1)
 
 
 def choose_budget(megabytes: int) -> None:
-    """From the next draw on; 0 is automatic."""
+    """From the next draw on."""
     global _chosen
     _chosen = megabytes
 
@@ -49,7 +49,7 @@ def budget() -> int:
         asked = int(os.environ.get(MEMORY_VARIABLE, ""))
     except ValueError:
         asked = 0
-    return (asked if asked > 0 else _chosen or AUTOMATIC) * MEGABYTE
+    return (asked if asked > 0 else _chosen) * MEGABYTE
 
 
 @contextmanager

@@ -62,7 +62,10 @@ _NO_STARTS_RECIPE = ShaderRecipe(
 
 @dataclass(frozen=True, eq=False)
 class OpacityMaps:
-    """What shading reads: the block `Opacity`, and the textures."""
+    """What shading reads: the block `Opacity`, and the textures.
+
+    note: what the artist is to know of them, or nothing.
+    """
 
     values: Floats
     size: MapSize
@@ -70,6 +73,7 @@ class OpacityMaps:
     meshes: Any
     starts: Any = None
     spans: Any = None
+    note: str = ""
 
     @property
     def passes(self) -> int:
@@ -168,7 +172,6 @@ class HairInMaps(Protocol):
 class OpacityDrawing:
     """Keeps the maps of one groom from draw to draw; making one touches no GPU.
 
-    note: what the artist is to know of the last draw, or nothing.
     is_behind: some maps are those of where their lights were before, see `maps`.
     """
 
@@ -178,7 +181,7 @@ class OpacityDrawing:
         self._frames: dict[int, LightFrame] = {}
         self._meshes_drawn: dict[int, tuple[Any, ...]] = {}
         self._casters = MeshDepths()
-        self.note, self.is_behind = "", False
+        self.is_behind = False
 
     def maps(
         self,
@@ -204,11 +207,20 @@ class OpacityDrawing:
         frames = dict(enumerate(shadow_frames(lights, ball, settings)))
         wanted = {light: frame for light, frame in frames.items() if frame is not None}
         largest = gpu.capabilities.max_texture_size_get()
-        size = fitted_size(settings, len(wanted), largest, gpu_memory.maps_room())
-        self.note = size_note(settings, len(wanted), size)
+        room = gpu_memory.maps_room()
+        size = fitted_size(settings, len(wanted), room, largest)
+        note = size_note(settings, len(wanted), room, size)
         size = even_size(size, spacing, ball.radius)
         place = ball.center.tobytes(), ball.radius
-        drawn_of = (hair.state, settings, size, *place, tuple(wanted), tuple(map(id, casters)))
+        drawn_of = (
+            hair.state,
+            settings,
+            size,
+            note,
+            *place,
+            tuple(wanted),
+            tuple(map(id, casters)),
+        )
         is_other = self._maps is None or self._drawn_of != drawn_of
         if is_other:
             self._frames = {}
@@ -216,7 +228,7 @@ class OpacityDrawing:
         if self._maps is None or is_other or due:
             self._frames |= {light: wanted[light] for light in due}
             values = pack_opacity([self._frames.get(light) for light in frames], settings, size)
-            self._maps = maps = self._maps_of(values, size)
+            self._maps = maps = replace(self._maps_of(values, size), note=note)
             self._casters.hold(casters)
             places = [(number, light) for number, light in enumerate(wanted) if light in due]
             # all meshes first: else Mesa on the CPU reads depths of a map that it still draws

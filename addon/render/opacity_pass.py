@@ -177,11 +177,6 @@ class OpacityPass:
         self._casting: _Casting | None = None
 
     @property
-    def note(self) -> str:
-        """What the artist is to know of the last draw, or nothing."""
-        return self._drawing.note
-
-    @property
     def is_behind(self) -> bool:
         """Whether maps are those of where lights were before, see OpacityDrawing.maps."""
         return self._drawing.is_behind

@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Hashable, Set
 from dataclasses import dataclass, replace
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -148,8 +149,9 @@ class ScenePass:
     @property
     def notes(self) -> tuple[str, ...]:
         """What the artist should know of the last draw, each with its remedy."""
-        found = [note for each in self._strand_passes.values() for note in each.statistics.notes]
-        return tuple(dict.fromkeys(found))
+        of_strands = (each.statistics.notes for each in self._strand_passes.values())
+        of_cards = (each.notes for each in self._card_passes.values())
+        return tuple(dict.fromkeys(chain(*of_strands, *of_cards)))
 
     def distances_and_numbers(
         self, scene: SceneSnapshot, camera: Camera, target: Target, size: tuple[int, int]

@@ -64,25 +64,26 @@ NUMBERED_VIEWS = ("guide", "group")
 class Statistics:
     """What a draw has drawn: strands, their straight pieces, and the vertices of all instances.
 
-    layers: how those that are drawn as layers had room.
+    layers: how those that are drawn as layers had room. maps_note: of OpacityMaps.
     """
 
     strands: int = 0
     pieces: int = 0
     vertices: int = 0
     layers: LayersDrawn = field(default_factory=LayersDrawn)
+    maps_note: str = ""
 
     @property
     def notes(self) -> tuple[str, ...]:
         """What the artist should know of the draw, each with its remedy."""
-        missing = self.layers.missing
-        if not missing:
-            return ()
-        return (
-            f"Strands: {missing:,} fragments of hair are missing, because too many lie in one "
-            "point of the picture. Remove strands that lie in one another, or set Transparency "
-            "to Hashed.",
-        )
+        found = [self.maps_note] if self.maps_note else []
+        if self.layers.missing:
+            found.append(
+                f"Strands: {self.layers.missing:,} fragments of hair are missing, because too many "
+                "lie in one point of the picture. Remove strands that lie in one another, or set "
+                "Transparency to Hashed."
+            )
+        return tuple(found)
 
 
 @dataclass(eq=False)
@@ -223,6 +224,7 @@ class StrandPass:
             pieces=order.pieces,
             vertices=sum(drawn.vertex_count for drawn in order.classes),
             layers=layers,
+            maps_note="" if maps is None else maps.note,
         )
 
     def opacity(

@@ -72,11 +72,10 @@ _MACHINE: dict[str, Any] = {
     ),
     "gpu_memory": IntProperty(
         name="GPU Memory (MB)",
-        description="How much of the GPU's memory hair may take. 0 is automatic: 1,024 MB, since "
-        "Blender does not tell how much there is. With less, strands are drawn in more parts, and "
-        "shadow maps have fewer texels",
-        default=0,
-        min=0,
+        description="How much of the GPU's memory hair may take. With less, strands are drawn in "
+        "more parts, and shadow maps have fewer texels. Blender does not tell how much there is",
+        default=gpu_choices.DEFAULT_MEMORY,
+        min=gpu_choices.MIN_MEMORY,
         max=1 << 17,
         soft_max=1 << 14,
         update=_choose_gpu,

@@ -16,7 +16,7 @@ from ..blender.preview.previews import previews
 from ..blender.sessions.measures import PARTS, array_bytes
 from ..blender.sessions.session import Session
 from ..blender.viewport import view_transform
-from ..blender.viewport.overlay import statistics_of
+from ..blender.viewport.overlay import notes_of, statistics_of
 from .long_work import running
 from .messages import draw_lines, draw_message
 
@@ -127,9 +127,8 @@ def problems_of(hair: bpy.types.Object, session: Session | None) -> tuple[Proble
         found.append(Problem(dropped_phrase(session.source.dropped).capitalize()))
     reported = {issue.instead_of for issue in issues}
     problems = previews[session.uid].problems
-    drawn = statistics_of(session.uid).notes
     machine = memory_problem(), view_transform.problem()
-    others = filter(None, (problems, *machine, instances_note(hair), *drawn))
+    others = filter(None, (problems, *machine, instances_note(hair), *notes_of(session.uid)))
     for warning in dict.fromkeys((*session.warnings, *others)):
         if warning not in reported:
             found.append(Problem(warning.removeprefix(f"{hair.name}: ")))

@@ -32,10 +32,13 @@ def chosen(megabytes: int) -> None:
     preferences._choose_gpu(page, bpy.context)
 
 
-def test_the_preference_is_the_budget_and_little_is_automatic() -> None:
-    for megabytes, found in ((4096, 4096), (0, 1024), (gpu_choices.MIN_MEMORY - 1, 1024)):
-        chosen(megabytes)
-        assert gpu_memory.budget() == found * MEGABYTE
+def test_the_preference_is_the_budget_and_is_never_too_little_to_draw() -> None:
+    assert gpu_memory.budget() == gpu_choices.DEFAULT_MEMORY * MEGABYTE
+    chosen(4096)
+    assert gpu_memory.budget() == 4096 * MEGABYTE
+    page = bpy.types.AddonPreferences.bl_rna_get_subclass_py("HAIRLOOM_AP_preferences").bl_rna
+    asked = page.properties["gpu_memory"]
+    assert (asked.hard_min, asked.default) == (gpu_choices.MIN_MEMORY, gpu_choices.DEFAULT_MEMORY)
 
 
 def test_the_panel_says_what_to_do_where_more_is_taken(

@@ -87,7 +87,7 @@ def test_stills_take_several_draws_without_atomics() -> None:
 
 def test_the_preferences_forbid_them_and_the_self_test_says_so(monkeypatch: Any) -> None:
     monkeypatch.setattr(self_test, "_last", ())
-    page = SimpleNamespace(image_atomics="never", gpu_memory=0)
+    page = SimpleNamespace(image_atomics="never", gpu_memory=1024)
     preferences._choose_gpu(page, bpy.context)
     self_test.run()
     found = {check.name: check for check in self_test.last_report()}

@@ -27,7 +27,7 @@ SUN = Light.sun((0.3, 1.0, -0.5), (1.0, 1.0, 1.0), 3.0)
 def no_choice(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     monkeypatch.delenv(gpu_memory.MEMORY_VARIABLE, raising=False)
     yield
-    gpu_memory.choose_budget(0)
+    gpu_memory.choose_budget(gpu_memory.DEFAULT)
 
 
 @pytest.fixture
@@ -111,7 +111,7 @@ def test_lists_shrink_when_the_budget_does() -> None:
 
     lists, rooms = StrandLayers(), []
     with Target().sized(SIZE, SIZE).drawing():
-        for budget in (0, 1, 0):
+        for budget in (1024, 1, 1024):
             gpu_memory.choose_budget(budget)
             rooms.append(lists.room_for(10))
     assert rooms[1] < rooms[0]
@@ -133,6 +133,25 @@ def test_shadow_maps_of_many_grooms_share_half_of_it(hair: Any) -> None:
             sizes.append(maps.size.side)
     assert 256 > sizes[0] > sizes[1] > sizes[2] > 16
     assert gpu_memory.maps_room() == 4 * MEGABYTE, "alone again"
+
+
+def test_a_draw_says_once_that_its_maps_have_fewer_texels(frame: Any, hair: Any) -> None:
+    """As the budget has it, and the number of grooms."""
+    from hairloom.addon.render.strand_pass import StrandPass
+
+    passes = frame.MeshPass(), StrandPass()
+
+    def notes(count: int) -> tuple[str, ...]:
+        with gpu_memory.shared_by(count):
+            frame.render_image(hair, view_of(frame), SIZE, SIZE, 1, passes=passes)
+        return tuple(passes[1].statistics.notes)
+
+    assert notes(1) == ()
+    gpu_memory.choose_budget(8)
+    (one,), (many,) = notes(1), notes(8)
+    assert one != many and "may take 4," in one and "1 light " in one
+    gpu_memory.choose_budget(gpu_memory.DEFAULT)
+    assert notes(1) == ()
 
 
 def test_maps_do_not_depend_on_what_else_is_there(hair: Any) -> None:

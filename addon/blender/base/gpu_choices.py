@@ -11,18 +11,18 @@ ATOMICS = (
     ("automatic", "Automatic", "Use image atomics where a small test finds that they work"),
     ("never", "Never", "Draw as on GPUs without image atomics: strands are noisy in a moving view"),
 )
-#: [MB] from which on a budget is one; below, as of 0, it is automatic
-MIN_MEMORY = 128
+#: [MB] that hair may take at least, and where nobody chooses
+MIN_MEMORY, DEFAULT_MEMORY = 128, gpu_memory.DEFAULT
 
 
-def choose(*, image_atomics: str = "automatic", memory: int = 0) -> None:
+def choose(*, image_atomics: str = "automatic", memory: int = DEFAULT_MEMORY) -> None:
     """From the next draw on.
 
     Args:
-        image_atomics: the name of one of ATOMICS. memory: [MB]; 0 is automatic.
+        image_atomics: the name of one of ATOMICS. memory: [MB].
     """
     choose_image_atomics(image_atomics)
-    gpu_memory.choose_budget(memory if memory >= MIN_MEMORY else 0)
+    gpu_memory.choose_budget(memory)
 
 
 def memory_in_use() -> float:

@@ -130,7 +130,7 @@ class Studio:
             for number in range(calm_draws(snapshot.strand_settings, samples))
         ]
         picture = np.mean(pictures, axis=0)
-        self._notes |= dict.fromkeys(self.statistics.notes)
+        self._notes |= dict.fromkeys((*self.statistics.notes, *self._card_pass.notes))
         return picture
 
     @property

@@ -398,6 +398,12 @@ def statistics_of(uid: int) -> Statistics:
     return Statistics() if drawn is None else drawn.strand_pass.statistics
 
 
+def notes_of(uid: int) -> tuple[str, ...]:
+    """What the artist should know of how a groom was drawn in the last view."""
+    drawn = _overlay.drawn.get(uid)
+    return () if drawn is None else (*drawn.strand_pass.statistics.notes, *drawn.card_pass.notes)
+
+
 def drawn() -> frozenset[int]:
     """Session numbers of the grooms that are drawn here, not by Blender."""
     return frozenset(uid for uid, each in _overlay.drawn.items() if each.drawing.is_made)

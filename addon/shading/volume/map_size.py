@@ -20,8 +20,6 @@ import numpy as np
 from .opacity import layer_ends
 from .settings import VolumeSettings
 
-#: [bytes] that all maps of one groom may take where nobody says otherwise
-MEMORY_LIMIT = 512 * 2**20
 #: texels of a map along one of where its deep layers start
 START_TEXELS = 4
 #: colour slots that a framebuffer has
@@ -78,17 +76,14 @@ def asked_size(settings: VolumeSettings, map_count: int) -> MapSize:
 
 
 def fitted_size(
-    settings: VolumeSettings,
-    map_count: int,
-    largest_side: int = _LARGEST_SIDE,
-    room: int = MEMORY_LIMIT,
+    settings: VolumeSettings, map_count: int, room: int, largest_side: int = _LARGEST_SIDE
 ) -> MapSize:
     """What is drawn: fewer texels a side where the asked size does not fit.
 
     Args:
         map_count: lights that throw shadows.
-        largest_side: of a texture on this GPU.
         room: for all maps [bytes].
+        largest_side: of a texture on this GPU.
     """
     size = asked_size(settings, map_count)
     per_texel = size.bytes / size.side**2
@@ -114,18 +109,24 @@ def even_size(size: MapSize, spacing: float, radius: float) -> MapSize:
     return replace(size, side=min(side, size.side))
 
 
-def size_note(settings: VolumeSettings, map_count: int, drawn: MapSize | None = None) -> str:
-    """A warning if maps are smaller than asked for, else empty.
+def size_note(settings: VolumeSettings, map_count: int, room: int, drawn: MapSize) -> str:
+    """What the artist is to know where maps are smaller than asked for, else empty.
 
     Args:
-        drawn: None where the GPU is not known: what every GPU allows.
+        map_count, room: as of `fitted_size`, which gave `drawn`.
     """
-    if settings.shadows == "none":
-        return ""
-    asked, drawn = asked_size(settings, map_count), drawn or fitted_size(settings, map_count)
+    asked = asked_size(settings, map_count)
     if drawn == asked:
         return ""
+    megabytes = asked.bytes / 2**20, room / 2**20
+    lights = "1 light" if asked.map_count == 1 else f"{asked.map_count} lights"
+    if asked.bytes <= room:
+        reason, memory = "are larger than this GPU's textures", ""
+    else:
+        reason = f"would take {megabytes[0]:,.0f} MB and may take {megabytes[1]:,.0f}"
+        memory = ", or raise GPU Memory in the preferences"
     return (
-        f"Shadow maps of {asked.side} texels for {asked.map_count} lights would take "
-        f"{asked.bytes / 2**20:,.0f} MB: drawn with {drawn.side}"
+        f"Shadows: maps of {asked.side} x {asked.side} texels for {lights} "
+        f"{reason}, so they have {drawn.side} x {drawn.side}. Lower Resolution, the number of "
+        f"layers, or Lights in Shadows{memory}."
     )

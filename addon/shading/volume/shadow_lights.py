@@ -9,7 +9,6 @@ import numpy as np
 from ...arrays import Floats
 from ..lights import Light, light_irradiance
 from .light_frame import MIN_RADIUS, WIDEST, Ball, LightFrame, is_within, light_frame, shines_along
-from .map_size import size_note
 from .settings import VolumeSettings
 
 #: lights without a shadow are reported if they are more than this fraction of all light
@@ -41,12 +40,8 @@ def shadow_warnings(
     if settings.shadows == "none":
         return ()
     lights = [light for light in lights if light.casts_shadow]
-    maps = list(_asked(lights, ball, settings))
-    asked = [index for index, _ in maps]
+    asked = [index for index, _ in _asked(lights, ball, settings)]
     found = list(_setting_warnings(ball, settings))
-    too_large = size_note(settings, sum(frame is not None for _, frame in maps))
-    if too_large:
-        found.append(f"{too_large}. Lower Resolution, the number of layers, or Lights in Shadows.")
     found += [note for index in asked for note in _light_warnings(lights[index], ball)]
     strengths = _strengths(lights, ball)
     left_out = 1.0 - float(strengths[asked].sum()) / max(float(strengths.sum()), 1e-30)

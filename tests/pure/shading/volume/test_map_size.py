@@ -5,7 +5,6 @@ from __future__ import annotations
 import pytest
 
 from hairloom.addon.shading.volume.map_size import (
-    MEMORY_LIMIT,
     START_TEXELS,
     asked_size,
     even_size,
@@ -14,15 +13,15 @@ from hairloom.addon.shading.volume.map_size import (
 )
 from hairloom.addon.shading.volume.settings import VolumeSettings
 
-LARGEST = VolumeSettings(shadows="slices", slices=64, resolution=2048, max_lights=8)
+ROOM = 512 * 2**20
 
 
 def test_what_fits_is_drawn_as_asked() -> None:
     for shadows in ("slices", "deep"):
         settings = VolumeSettings(shadows=shadows)
-        assert fitted_size(settings, 2) == asked_size(settings, 2)
+        assert fitted_size(settings, 2, ROOM) == asked_size(settings, 2)
         assert asked_size(settings, 2).side == 512
-        assert size_note(settings, 2, fitted_size(settings, 2)) == ""
+        assert size_note(settings, 2, ROOM, fitted_size(settings, 2, ROOM)) == ""
 
 
 @pytest.mark.parametrize("shadows", ["slices", "deep"])
@@ -30,32 +29,31 @@ def test_what_fits_is_drawn_as_asked() -> None:
 def test_too_large_maps_get_fewer_texels_and_a_note(shadows: str, map_count: int) -> None:
     """As many as just fit, with all lights and layers."""
     settings = VolumeSettings(shadows=shadows, slices=64, layers=64, resolution=2048)
-    asked, drawn = asked_size(settings, map_count), fitted_size(settings, map_count)
-    assert asked.bytes > MEMORY_LIMIT >= drawn.bytes
+    asked, drawn = asked_size(settings, map_count), fitted_size(settings, map_count, ROOM)
+    assert asked.bytes > ROOM >= drawn.bytes
     assert (drawn.slots, drawn.passes, drawn.map_count) == (6, 3, map_count)
     assert drawn.side % START_TEXELS == 0
     step = START_TEXELS / drawn.side
-    assert drawn.bytes * (1.0 + step) ** 2 > MEMORY_LIMIT
-    note = size_note(settings, map_count, drawn)
-    assert f"drawn with {drawn.side}" in note and "2048" in note
+    assert drawn.bytes * (1.0 + step) ** 2 > ROOM
+    note = size_note(settings, map_count, ROOM, drawn)
+    assert f"they have {drawn.side} x {drawn.side}" in note and "maps of 2048 x 2048" in note
+    assert "may take 512" in note and "GPU Memory" in note
 
 
 def test_a_small_gpu_sets_the_side() -> None:
     settings = VolumeSettings(shadows="deep", resolution=2048)
-    assert fitted_size(settings, 1, largest_side=1024).side == 1024
+    small = fitted_size(settings, 1, ROOM, largest_side=1024)
+    assert small.side == 1024
+    note = size_note(settings, 1, ROOM, small)
+    assert "larger than this GPU's textures" in note and "GPU Memory" not in note
     # `starts` of eight maps stand above one another
-    assert fitted_size(settings, 8, largest_side=256).side == 4 * 256 // 8
+    assert fitted_size(settings, 8, ROOM, largest_side=256).side == 4 * 256 // 8
 
 
 def test_bytes_are_those_of_the_textures() -> None:
     size = asked_size(VolumeSettings(shadows="deep", layers=8, resolution=512), 2)
     starts, spans = 256 * 256 * 4, 256 * 256 * 16
     assert size.bytes == 512**2 * 2 * (2 * 16 + 4) + starts + spans
-
-
-def test_without_shadows_there_is_nothing_to_tell() -> None:
-    settings = VolumeSettings(shadows="none", resolution=2048)
-    assert size_note(settings, 8, fitted_size(LARGEST, 8)) == ""
 
 
 def test_strands_that_stand_for_many_get_texels_of_half_their_spacing() -> None:

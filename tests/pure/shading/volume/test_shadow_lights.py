@@ -90,11 +90,5 @@ def test_settings_that_leave_no_shadow_are_told(name: str, value: float, word: s
     assert word in warning
 
 
-def test_maps_that_no_gpu_could_hold_are_told() -> None:
-    settings = VolumeSettings(shadows="slices", slices=64, resolution=2048, max_lights=8)
-    (warning,) = told(*(point(1.0, turn, 1.5) for turn in range(8)), settings=settings)
-    assert "2048 texels for 8 lights" in warning and "Lower Resolution" in warning
-
-
 def test_hair_without_extent_is_told() -> None:
     assert "no extent" in told(SUN, ball=Ball(np.zeros(3), 1.2e-9))[0]
