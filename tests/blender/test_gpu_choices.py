@@ -50,15 +50,20 @@ def test_the_panel_says_what_to_do_where_more_is_taken(
     def told() -> list[str]:
         return [one.text for one in problems_of(hair, session) if "GPU" in one.text]
 
-    chosen(128)
     gpu_objects.free_unused()
-    before = gpu_objects.bytes_in_use()
-    assert before < 128 * MEGABYTE and not told()
+    before = gpu_objects.bytes_in_use()  # other tests of this process hold some
+    budget = 128 + round(before / MEGABYTE)
+    chosen(budget)
+    assert not told()
     side = 4096  # 256 MB
     large = gpu_objects.texture((side, side), format="RGBA32F")
     (text,) = told()
     taken = before / MEGABYTE + 256
-    assert f"takes {taken:,.0f} MB" in text and "may take 128 MB" in text and "preferences" in text
+    assert (
+        f"takes {taken:,.0f} MB" in text
+        and f"may take {budget:,} MB" in text
+        and "preferences" in text
+    )
     del large
     gpu_objects.free_unused()
     assert not told()
