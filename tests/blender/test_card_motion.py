@@ -292,7 +292,7 @@ def card_edits(motion: GuideMotion) -> CardEdits:
     return edits
 
 
-@pytest.mark.parametrize("kind", ["joints", "springs", "texture"])
+@pytest.mark.parametrize("kind", few_in_commits(["joints", "texture", "springs"], 2))
 def test_edited_cards_move_too(
     motion: GuideMotion, card_edits: CardEdits, tmp_path: Path, kind: str
 ) -> None:
@@ -314,7 +314,7 @@ def test_edited_cards_move_too(
 
 
 @pytest.mark.alike
-@pytest.mark.parametrize("suffix", ["fbx", "usdc", "obj"])
+@pytest.mark.parametrize("suffix", few_in_commits(["fbx", "usdc", "obj"]))
 def test_every_format_has_the_edits(
     motion: GuideMotion, card_edits: CardEdits, tmp_path: Path, suffix: str
 ) -> None:

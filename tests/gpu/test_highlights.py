@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 from hair_ball import ball_mesh, combed_strands
+from tiers import few_in_commits
 
 from hairloom.addon.parameters import ALL_SETTINGS
 from hairloom.addon.params.preset import read_any_preset
@@ -79,7 +80,7 @@ def highlights(picture: np.ndarray) -> list[tuple[float, np.ndarray]]:
     return list(zip(-np.degrees(np.arcsin(height)), smooth[row], strict=True))
 
 
-@pytest.mark.parametrize("model", ["kajiya_kay", "marschner"])
+@pytest.mark.parametrize("model", few_in_commits(["marschner", "kajiya_kay"]))
 def test_blond_shows_two_and_black_one(draw: Any, model: str) -> None:
     (second, second_color), (first, first_color) = highlights(
         draw(look("blond", model), FROM_THE_EYE)

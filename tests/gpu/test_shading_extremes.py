@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from gpu_rounding import is_same
+from tiers import few_in_commits
 
 from hairloom.addon.params import Settings
 from hairloom.addon.params.field import NAMING
@@ -98,7 +99,7 @@ def drawn(frame: Any, shading: ShadingSettings, strands: StrandSettings) -> np.n
     return picture
 
 
-@pytest.mark.parametrize("model", IDENTIFIERS)
+@pytest.mark.parametrize("model", few_in_commits(IDENTIFIERS))
 def test_every_end_of_shading(frame: Any, model: str) -> None:
     usual = ShadingSettings(model=model)
     bright = drawn(frame, usual, StrandSettings())
@@ -116,7 +117,7 @@ def test_every_end_of_shading(frame: Any, model: str) -> None:
         assert is_dark == ((model, name, value) in DARK), (name, value, mean / typical)
 
 
-@pytest.mark.parametrize("model", IDENTIFIERS)
+@pytest.mark.parametrize("model", few_in_commits(IDENTIFIERS))
 def test_every_end_of_strands(frame: Any, model: str) -> None:
     for name, value in ends(StrandSettings()):
         settings = replace(StrandSettings(), **{name: value})
