@@ -417,6 +417,7 @@ def test_the_suffix_follows_the_format() -> None:
     assert suffix("usd", "hair") == ".usd"
 
 
+@pytest.mark.slow(instead="test_a_button_writes_under_the_hairs_name")
 def test_a_collections_exporter_writes_all_its_hair(sphere: Any, tmp_path: Path) -> None:
     """With something else selected, or nothing."""
     collection = bpy.data.collections.new("Assets")

@@ -403,6 +403,7 @@ def test_a_window_throws_the_shafts_of_the_reference_cut_by_the_hair(
     assert np.abs(found - expected)[..., :3].max() < 0.05
 
 
+@pytest.mark.slow(instead="test_the_scene_is_as_it_was_after_the_render_and_after_turning_off")
 def test_shafts_over_cycles_leave_its_file_format_and_all_else_as_it_was(
     cycles: Any, hairy: Any, window: Any, tmp_path: Path
 ) -> None:
@@ -487,6 +488,7 @@ def test_a_white_world_over_cycles_stays_as_it_is(
     assert np.abs(found - without)[hair].max() < 0.3
 
 
+@pytest.mark.slow(instead="test_a_window_throws_the_shafts_of_the_reference_cut_by_the_hair")
 def test_shafts_lie_over_a_transparent_film_as_light_without_alpha(
     cycles: Any, hairy: Any, window: Any, tmp_path: Path
 ) -> None:

@@ -6,6 +6,7 @@ import pytest
 from grids import baked_grid, grid_of
 from mathutils import Matrix
 from swinging import thrown
+from tiers import few_in_commits
 
 from hairloom.addon.blender.bakes import playback
 from hairloom.addon.blender.bakes.cache import Cache
@@ -122,7 +123,7 @@ def test_a_ring_of_any_kind_holds_what_passes_through_it(swinging, evaluated, ki
     assert escape(session) < 1e-3
 
 
-@pytest.mark.parametrize("device", ["numpy", "compute"])
+@pytest.mark.parametrize("device", few_in_commits(["numpy", "compute"]))
 def test_held_strands_stay_with_a_ring_that_moves_by_itself(
     new_hair, swinging, evaluated, gpu_context, device
 ):

@@ -144,6 +144,7 @@ def test_feet_are_not_cut_off_however_wide_they_stand(top: float, foot: float) -
     assert 0.98 / MARGIN < farthest < 1.001 / MARGIN
 
 
+@pytest.mark.slow(instead="test_one_press_gives_pictures_and_a_video")
 def test_lights_turn_with_the_camera_or_stay_on_the_groom(table: Turntable) -> None:
     follows = [table.picture(frame) for frame in (0, 1)]
     table.settings = replace(SMALL, lights="groom")

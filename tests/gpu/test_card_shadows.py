@@ -62,6 +62,7 @@ def of_form(form: str, **more: Any) -> VolumeSettings:
     return VolumeSettings(shadows=form, resolution=64, scattering=False, **more)
 
 
+@pytest.mark.alike
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("alpha", [0.3, 0.7, 1.0])
 @pytest.mark.parametrize("model", ["kajiya_kay", "marschner"])

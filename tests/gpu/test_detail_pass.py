@@ -174,6 +174,7 @@ def test_stations_are_those_of_the_cpu(
         assert np.abs(beyond).max() <= 1e-5 * length[strand]
 
 
+@pytest.mark.slow(instead="test_factors_and_culling_are_those_of_numpy")
 @pytest.mark.parametrize("seen", few_in_commits(["whole", "inside"]))
 def test_the_picture_is_that_of_sixty_four_pieces(frame: Any, seen: str) -> None:
     """Strands are where they should be within half a pixel, none broken.
@@ -333,6 +334,9 @@ def test_detail_is_counted_in_pixels_of_the_final_picture(frame: Any) -> None:
     assert passes[1].statistics.pieces > pieces[0]
 
 
+@pytest.mark.slow(
+    instead="tests/pure/refine/test_thinning.py::test_the_groom_covers_as_much_when_it_is_thinned"
+)
 def test_an_eighth_of_the_strands_covers_as_much_as_all(frame: Any, shared_data: Path) -> None:
     """Sintel's hair, from near to far."""
     from hairloom.addon.exchange.tressfx import read_tfx

@@ -335,7 +335,8 @@ LONG_AT_COLLIDERS = (
 SHORT_AT_COLLIDERS = {
     f"{name}, 8 CVs": replace(AT_COLLIDERS[name], cv_count=8) for name in LONG_AT_COLLIDERS
 }
-SLOW_AT_COLLIDERS = ("64 CVs", "ball", "combed")
+SLOW_AT_COLLIDERS = ("64 CVs", "ball", "combed", "ball without friction", "set of balls")
+SLOW_AT_COLLIDERS += ("head and ball, 8 CVs", "combed at a plate and a finger, 8 CVs")
 SLOW_IN_AIR = ("64 CVs", "32 CVs", "blended and held", "half the force fields in wind")
 #: What two others do, each by itself.
 SLOW_IN_AIR += ("held curls", "curls with relaxation", "held at 24 frames a second")
@@ -546,6 +547,7 @@ def test_frames_shorter_than_a_substep(make_pass: Any) -> None:
     assert_equal(scene, make_pass, TOUCHING, seconds=0.05)
 
 
+@pytest.mark.slow(instead="test_hair_among_hair_is_the_same_to_the_last_bit_every_time")
 def test_twice_the_same_to_the_last_bit(make_pass: Any) -> None:
     scene = replace(SHORT_AT_COLLIDERS["head and ball, 8 CVs"], values={"wind_speed": 3.0})
     passes = [make_pass(scene.start()) for _ in range(2)]

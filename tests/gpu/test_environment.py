@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from gpu_rounding import is_same
 from hair_ball import ball_mesh, combed_strands
+from tiers import few_in_commits
 
 from hairloom.addon.render.camera import Camera, look_at, perspective
 from hairloom.addon.render.snapshot import MeshSnapshot, Snapshot
@@ -89,7 +90,7 @@ def seen(frame: Any, snapshot: Snapshot, turn: np.ndarray) -> np.ndarray:
     return frame.render_image(snapshot, camera, 96, 96, 2)
 
 
-@pytest.mark.parametrize("model", ["marschner", "kajiya_kay"])
+@pytest.mark.parametrize("model", few_in_commits(["marschner", "kajiya_kay"]))
 def test_turning_the_world_is_turning_all_else(frame: Any, model: str) -> None:
     directions, _ = panorama_directions(32, 64)
     radiance = 1.0 + 0.9 * directions[..., :1] * np.ones(3)

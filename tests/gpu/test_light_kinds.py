@@ -23,6 +23,7 @@ SPOT = Light.spot((0.0, -4.0, 0.0), WHITE, 2e3, Cone((SIDE, UP, (0.0, -1.0, 0.0)
 AREA = Light.area((0.0, -4.0, 0.5), WHITE, 300.0, Panel(SIDE, UP, AHEAD, 1.0, 0.5))
 
 
+@pytest.mark.alike
 @pytest.mark.parametrize("transparency", ["layers", "none"])
 @pytest.mark.parametrize(
     ("lights", "needed"),

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from gpu_rounding import tolerance
 from shadow_errors import slice_spans
+from tiers import few_in_commits
 
 from hairloom.addon.render.strand_layout import StrandLayout
 from hairloom.addon.shading.lights import Light, kept_lights
@@ -511,7 +512,7 @@ def test_textures_that_are_kept_hold_nothing_of_the_frame_before(gpu_context: An
             assert np.array_equal(one, other)
 
 
-@pytest.mark.parametrize("shadows", ["slices", "deep"])
+@pytest.mark.parametrize("shadows", few_in_commits(["deep", "slices"]))
 def test_maps_too_large_for_memory_are_drawn_smaller_and_still_right(
     gpu_context: Any, compute: Callable[..., np.ndarray], shadows: str
 ) -> None:

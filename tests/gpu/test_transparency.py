@@ -196,7 +196,7 @@ def seen_at_points(strands: np.ndarray, width: float, brightness: np.ndarray) ->
     return float(brightness[nearest[is_there.any(axis=1)]].mean())
 
 
-@pytest.mark.parametrize("opacity", [1.0, 0.3])
+@pytest.mark.parametrize("opacity", few_in_commits([0.3, 1.0]))
 def test_hair_is_as_bright_in_small_pictures(frame: Any, front: Any, opacity: float) -> None:
     """Strands get darker farther in, and the fewer pixels, the more of them lie in each."""
     random = np.random.default_rng(14)

@@ -99,6 +99,7 @@ def test_both_at_once_are_both_alone(frame: Any, transparency: str, mode: str) -
     assert apart(both, alone[0] + alone[1]).max() < 1.0 / 255.0
 
 
+@pytest.mark.alike
 @pytest.mark.parametrize("shadows", ["slices", "deep"])
 @pytest.mark.parametrize("model", ["kajiya_kay", "marschner"])
 def test_few_points_are_the_same_curves_as_many(frame: Any, model: str, shadows: str) -> None:

@@ -10,6 +10,7 @@ from pathlib import Path
 import make_site
 import pytest
 from make_site import REPOSITORY, write_site
+from tiers import few_in_commits
 
 
 @pytest.fixture(scope="module")
@@ -57,7 +58,7 @@ def test_it_knows_all_versions_and_begins_with_the_newest(site: Path) -> None:
     assert "versions.js" in (site / "docs" / "dev" / "shading.html").read_text()
 
 
-@pytest.mark.parametrize("link", ["nowhere.md", "a.md#nowhere"])
+@pytest.mark.parametrize("link", few_in_commits(["nowhere.md", "a.md#nowhere"]))
 def test_a_link_that_leads_nowhere_ends_it(
     link: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -64,6 +64,7 @@ def built(
     return result_of(card_flow.card_build_steps(rig, chosen, lambda _: alpha))
 
 
+@pytest.mark.alike
 @pytest.mark.parametrize("way", ["clusters", "guides"])
 @pytest.mark.parametrize("source", ["made", "baked"])
 def test_levels_share_one_atlas_and_all_that_is_known_of_cards(way: str, source: str) -> None:

@@ -141,6 +141,7 @@ def test_a_card_that_lies_open_on_the_head_has_nearly_all_light() -> None:
     assert found.min() > 0.97
 
 
+@pytest.mark.slow(instead="test_the_mean_error_against_brute_force_is_below_two_hundredths")
 def test_deep_inside_it_is_dark_and_outside_light() -> None:
     mesh, head = hanging(600, layers=0.04), ball()
     found = vertex_occlusion(mesh, [CardOccluder(mesh)], [head], CardOcclusionSettings(rays=128))

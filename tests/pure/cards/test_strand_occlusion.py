@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tiers import few_in_commits
 
 from hairloom.addon import card_flow, pipeline
 from hairloom.addon.cards.atlas_settings import AtlasSettings
@@ -82,7 +83,7 @@ def test_a_card_whose_strands_are_all_elsewhere_has_their_mean() -> None:
     np.testing.assert_allclose(found, 0.5, rtol=1e-5)
 
 
-@pytest.mark.parametrize("settings", [CLUSTERS, replace(CLUSTERS, crossed=True)])
+@pytest.mark.parametrize("settings", few_in_commits([CLUSTERS, replace(CLUSTERS, crossed=True)]))
 def test_each_card_is_as_open_as_its_own_strands(settings: CardSettings) -> None:
     """Against a loop over cards; the vertices of a card lie evenly along it."""
     rig = rig_of(900)

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tiers import few_in_commits
 
 from hairloom.addon.dynamics import among
 from hairloom.addon.dynamics.among import AHEAD, HairGrid, Strength, feel
@@ -72,7 +73,7 @@ def squeezed(count=30, cv_count=8):
     return start(rest, strands=random.uniform(0.0, 3.0, count)).rest, *rows, turn, middle
 
 
-@pytest.mark.parametrize("volume", [0.4, 1.0])
+@pytest.mark.parametrize("volume", few_in_commits([0.4, 1.0]))
 def test_as_without_a_grid(volume):
     rest, position, previous, turn, middle = squeezed()
     grid, settings = rest.hair_grid, DynamicsSettings(volume=volume)
@@ -89,6 +90,7 @@ def test_as_without_a_grid(volume):
         np.testing.assert_allclose(one, other, atol=2e-5 * np.abs(other).max())
 
 
+@pytest.mark.slow(instead="test_as_without_a_grid")
 def test_a_frame_as_without_a_grid():
     grid = tail(12, 8)
     settings = DynamicsSettings(volume=1.0, length_tolerance=0.0001, **SOFT)

@@ -260,6 +260,7 @@ def catenary(start_point, end_point, length, share):
     return np.stack([x0 + x - left, z0 + a * (np.cosh(x / a) - np.cosh(left / a))], axis=1)
 
 
+@pytest.mark.alike
 @pytest.mark.parametrize("solver", few_in_commits(["direct", "relaxation"]))
 @pytest.mark.parametrize("rise", [0.0, 0.06])
 @pytest.mark.parametrize("by", ["tip", "tie"])

@@ -224,7 +224,7 @@ def swept(kit, shake, guides, settings):
     return scene.play(0.4)[-1]
 
 
-@pytest.mark.parametrize("solver", ["direct", "relaxation"])
+@pytest.mark.parametrize("solver", few_in_commits(["direct", "relaxation"]))
 def test_a_guide_does_not_feel_the_others(kit, shake, solver):
     """Alone and among others, to the last bit; but for the groom's mean rotation, not asked for."""
     settings = DynamicsSettings(**WINDY | {"length_solver": solver})
