@@ -34,7 +34,7 @@ def of_addon(module: str) -> Any:
 
 def alone(blond: Any, lobe: str) -> Any:
     """One lobe of the look, without what stands in for light from strand to strand."""
-    others = {f"strength_{name}": 0.0 for name in ("r", "tt", "trt", "rest") if name != lobe}
+    others = {f"strength_{name}": 0.0 for name in ("r", "tt", "trt", "higher") if name != lobe}
     return replace(blond, fake_scattering=0.0, **others)
 
 
