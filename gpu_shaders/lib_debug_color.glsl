@@ -1,4 +1,4 @@
-// Colours that tell whole numbers apart, for the debug views.
+// Colours of the debug views: of whole numbers, of changes of length, and of depths.
 //
 // Holds no resources.
 #include "lib_strand_noise.glsl"
@@ -24,4 +24,20 @@ vec3 index_color(int index)
   float hue = fract(float(index % 4096) * 0.61803398875);
   float paler = 0.45 * hash_unit(uint(index), 0u);
   return mix(hue_color(hue), vec3(1.0), paler) * (1.0 - 0.5 * hash_unit(uint(index), 1u));
+}
+
+// A segment that is longer by a fraction of its length: grey where it is as in its style, red where it is
+// longer by {{shown_stretch}} or more, blue where it is shorter by as much.
+vec3 stretch_color(float change)
+{
+  vec3 full = change < 0.0 ? vec3(0.05, 0.25, 1.0) : vec3(1.0, 0.1, 0.05);
+  return mix(vec3(0.5), full, min(abs(change) / {{shown_stretch}}, 1.0));
+}
+
+// At a signed distance from a collider, in terms of the depth that is shown in full: from blue, ten times as
+// far away, to green at its surface; inside from yellow to red.
+vec3 depth_color(float away)
+{
+  return away < 0.0 ? hue_color(mix(0.16, 0.0, min(-away, 1.0))) :
+                      hue_color(mix(0.33, 0.66, min(away / 10.0, 1.0)));
 }

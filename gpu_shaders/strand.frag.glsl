@@ -7,20 +7,42 @@
 #  include "lib_debug_color.glsl"
 #  include "lib_detail_packing.glsl"
 #  include "lib_strand_texel.glsl"
+#  ifdef HAS_SOLIDS
+#    include "lib_signed_distance.glsl"
+#  endif
 #else
 #  include "lib_strand_light.glsl"
 #endif
 
 #if DEBUG
+int segment_of(StrandSpan span)
+{
+  return clamp(int(strand_place * float(span.count - 1)), 0, span.count - 2);
+}
+
 vec3 debug_color()
 {
 #  if DEBUG == {{debug_occlusion}}
   return vec3(strand_along_and_occlusion.y);
-#  elif DEBUG != {{debug_detail}}
+#  elif DEBUG == {{debug_guide}} || DEBUG == {{debug_group}}
   return index_color(int(texelFetch(debug_numbers, strand_texel(strand_index, 0, 1), 0).x));
+#  elif DEBUG == {{debug_stretch}}
+  StrandSpan span = strand_span(strand_spans, strand_index);
+  int segment = segment_of(span);
+  vec3 begin = texelFetch(cv_points, span_texel(span, segment), 0).xyz;
+  vec3 end = texelFetch(cv_points, span_texel(span, segment + 1), 0).xyz;
+  float rest = texelFetch(rest_lengths, span_texel(span, segment), 0).x;
+  return stretch_color(rest > 0.0 ? distance(begin, end) / rest - 1.0 : 0.0);
+#  elif DEBUG == {{debug_depth}}
+#    ifdef HAS_SOLIDS
+  float reach = 10.0 * shown_depth;
+  return depth_color(signed_distance(solid_at(0), strand_point, reach).w / shown_depth);
+#    else
+  return vec3(0.5);
+#    endif
 #  elif ADAPTIVE
   StrandSpan span = strand_span(strand_spans, strand_index);
-  int segment = clamp(int(strand_place * float(span.count - 1)), 0, span.count - 2);
+  int segment = segment_of(span);
   int texel = segment / FACTORS_IN_TEXEL;
   uvec4 words = floatBitsToUint(texelFetch(factors, counted_texel(span.factors + texel), 0));
   return detail_color(unpacked_factor(words, segment - texel * FACTORS_IN_TEXEL));

@@ -90,7 +90,9 @@ OTHER_TAU_LIGHTS = 4
 #: how a pass writes its colour; see encoded() in lib_output.glsl
 OUTPUTS = ("scene_linear", "viewport")
 #: what strands may be coloured by in place of their shading, see lib_debug_color.glsl
-DEBUG_VIEWS = ("none", "detail", "guide", "group", "occlusion")
+DEBUG_VIEWS = ("none", "detail", "guide", "group", "occlusion", "stretch", "depth")
+#: a change of length that is shown in full colour, as a fraction; and a depth, of the hair's radius
+SHOWN_STRETCH, SHOWN_DEPTH = 0.01, 0.02
 #: the choices of DetailSettings, by the numbers under which shaders know them
 DETAIL_CHOICES = {
     parameter.name: tuple(name for name, _, _ in parameter.choices)
@@ -198,6 +200,7 @@ CONSTANTS: Mapping[str, str] = MappingProxyType(
             for choice, names in DETAIL_CHOICES.items()
             for index, name in enumerate(names)
         },
+        "shown_stretch": repr(SHOWN_STRETCH),
         **{f"debug_{name}": str(index) for index, name in enumerate(DEBUG_VIEWS)},
         **{f"output_{name}": str(index) for index, name in enumerate(OUTPUTS)},
     }

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from ..arrays import Floats, Ints
+from ..dynamics.colliders import PosedCollider
 from ..params import Settings
 from ..refine.settings import DetailSettings
 from ..shading.lights import Light
@@ -32,6 +33,7 @@ TRANSPARENCIES = ("opaque", "hashed", "blended")
 #: what a snapshot has of each point, and its channels
 _OF_POINTS = {
     "points": (3,),
+    "rest": (3,),
     "radius": (),
     "along": (),
     "occlusion": (),
@@ -191,6 +193,9 @@ class Snapshot:
     occluder_spheres: (k, 4) xyz center and w radius [m, world] of spheres inside the head that hide
         the strands behind them (refine/culling.py). The first 16 count; None hides nothing.
     debug_view: one of DEBUG_VIEWS.
+    rest: (point_count, 3) [m], the strands in their style, whose lengths "stretch" compares; None:
+        these are at rest.
+    solids: colliders as they stand, from which "depth" measures; none: it is not known.
     casters: meshes that are not drawn here but throw shadows on the hair, world space.
     table_size: texels across Marschner's look-up tables; PREVIEW_SIZE while their shape changes.
     cards: hair cards, drawn after meshes and strands (render/card_pass.py).
@@ -225,6 +230,8 @@ class Snapshot:
     rank: Floats | None = None
     occluder_spheres: Floats | None = None
     debug_view: str = "none"
+    rest: Floats | None = None
+    solids: tuple[PosedCollider, ...] = ()
     casters: tuple[Caster, ...] = ()
     table_size: int = DEFAULT_SIZE
     cards: CardSnapshot | None = None
@@ -239,6 +246,7 @@ class Snapshot:
         points, strands = (self.layout.point_count,), (self.layout.strand_count,)
         expected: dict[str, tuple[int, ...]] = {
             "points": (*points, 3),
+            "rest": (*points, 3),
             "radius": points,
             "along": points,
             "occlusion": points,

@@ -10,6 +10,8 @@ And a texel a strand, as strand_layout.strand_rows has them:
     strand_spans  RGBA32F: where its points lie, see lib_strand_texel.glsl
     strand_seeds  R32F:    what its noise depends on
     debug_numbers R32F:    the guide or the group that a debug view shows
+    rest_lengths R32F:     how long the segment that begins at a point is at rest [m]
+    solids, rounds, fields: colliders, see collider_textures.py
 
 How many pieces each segment has comes from detail_pass.py, unless all have equally many.
 """
@@ -32,6 +34,7 @@ from ..shading.strand_noise import SEED_LIMIT
 from ..shading.volume.light_frame import Ball
 from .camera import Camera
 from .capabilities import CALM_SAMPLES, capabilities
+from .collider_textures import UploadedColliders
 from .detail_pass import DetailPass
 from .display import Display
 from .feature_programs import UniformBlocks
@@ -45,7 +48,7 @@ from .opacity_pass import OpacityPass
 from .ribbons import Ribbons
 from .shader_feature import ShaderFeature
 from .shader_program import released_with_shaders
-from .shader_source import DEBUG_VIEWS, ShaderError, output_index
+from .shader_source import DEBUG_VIEWS, SHOWN_DEPTH, ShaderError, output_index
 from .snapshot import Snapshot
 from .strand_curves import curves_feature, spans_texture
 from .strand_drawing import StrandDrawing
@@ -56,6 +59,8 @@ from .view_block import lights_feature, view_feature
 
 #: half floats end soon after
 _BRIGHTEST = 6.0e4
+#: hair of no size has depths too [m]
+_THIN = 1.0e-9
 #: debug views that show a number of each strand
 NUMBERED_VIEWS = ("guide", "group")
 
@@ -198,7 +203,7 @@ class StrandPass:
             shading=tuple(self._shading(snapshot, maps, others)),
             shown=(
                 *(() if display is None else (display.feature,)),
-                *((self._debug_feature(snapshot.debug_view),) if is_debug else ()),
+                *((self._debug_feature(snapshot),) if is_debug else ()),
             ),
             output_encoding=output_encoding,
             samples_across=samples,
@@ -290,6 +295,7 @@ class StrandPass:
         self._blocks = UniformBlocks()
         self._views = {}
         self._ball, self._between = HairBall(), InterGroomShadow()
+        self._colliders = UploadedColliders()
         self._textures: dict[str, Any] = {}
         self._uploaded: dict[str, tuple[Any, ...]] = {}
         self._ribbons = Ribbons()
@@ -379,14 +385,29 @@ class StrandPass:
             defines={"SKIN_SEEN": 1},
         )
 
-    def _debug_feature(self, debug_view: str) -> ShaderFeature:
+    def _debug_feature(self, snapshot: Snapshot) -> ShaderFeature:
         """What a program has that shows a debug view."""
-        numbers = {"debug_numbers": ("FLOAT_2D", self._textures.get("debug_numbers"))}
+        names: tuple[str, ...] = ()
+        integers: dict[str, int] = {}
+        numbers: dict[str, tuple[str, float]] = {}
+        defines = {"DEBUG": DEBUG_VIEWS.index(snapshot.debug_view)}
+        if snapshot.debug_view in NUMBERED_VIEWS:
+            names = ("debug_numbers",)
+        elif snapshot.debug_view == "stretch":
+            names = ("rest_lengths",)
+        elif snapshot.debug_view == "depth" and snapshot.solids:
+            kinds = self._colliders.of(snapshot.solids).kinds
+            names, defines = kinds.textures, defines | dict(kinds.defines) | {"HAS_SOLIDS": 1}
+            integers = dict.fromkeys(kinds.integers, len(snapshot.solids))
+            shown = SHOWN_DEPTH * self._ball.of(snapshot).radius
+            numbers = {"shown_depth": ("FLOAT", max(shown, _THIN))}
         return ShaderFeature(
-            name=debug_view,
-            textures=numbers if debug_view in NUMBERED_VIEWS else {},
+            name=snapshot.debug_view,
+            textures={name: ("FLOAT_2D", self._textures[name]) for name in names},
+            integers=integers,
+            numbers=numbers,
             varyings=(("flat", "INT", "strand_index"), ("smooth", "FLOAT", "strand_place")),
-            defines={"DEBUG": DEBUG_VIEWS.index(debug_view)},
+            defines=defines,
         )
 
     def _upload(self, snapshot: Snapshot) -> None:
@@ -418,10 +439,21 @@ class StrandPass:
             make = partial(_half_texture, layout, openness)
             self._take("cv_openness", (openness, layout), make)
         self._upload_skin(snapshot)
+        self._upload_debug(snapshot)
+
+    def _upload_debug(self, snapshot: Snapshot) -> None:
+        layout = snapshot.layout
         if snapshot.debug_view in NUMBERED_VIEWS:
             numbers = getattr(snapshot, snapshot.debug_view)
-            shown = (numbers, layout)
-            self._take("debug_numbers", shown, lambda: _numbers_texture(snapshot))
+            self._take("debug_numbers", (numbers, layout), lambda: _numbers_texture(snapshot))
+        elif snapshot.debug_view == "stretch":
+            make = partial(_lengths_texture, snapshot)
+            self._take("rest_lengths", (snapshot.rest, layout), make)
+        elif snapshot.debug_view == "depth" and snapshot.solids:
+            solids = self._colliders.of(snapshot.solids)
+            self._take("rounds", (solids,), lambda: solids.rounds)
+            self._take("fields", (solids,), lambda: solids.fields)
+            self._take("solids", (snapshot.solids,), lambda: solids.solids(snapshot.solids))
 
     def _upload_skin(self, snapshot: Snapshot) -> None:
         """Only light from strand to strand asks for it."""
@@ -505,6 +537,14 @@ def _numbers_texture(snapshot: Snapshot) -> Any:
     if numbers is not None:
         shown[:, 0, 0] = numbers
     return texture_from(strand_rows(shown), "R32F")
+
+
+def _lengths_texture(snapshot: Snapshot) -> Any:
+    """0 of what has no segment behind it, and everywhere where strands are at rest."""
+    length = np.zeros((snapshot.layout.point_count, 1), np.float32)
+    if snapshot.rest is not None:
+        length[:-1, 0] = np.linalg.norm(np.diff(snapshot.rest, axis=0), axis=1)
+    return texture_from(snapshot.layout.pixels(length), "R32F")
 
 
 def _looks_texture(snapshot: Snapshot) -> Any:

@@ -16,6 +16,7 @@ from hairloom.addon.blender.viewport import overlay
 from hairloom.addon.blender.viewport.overlay_text import counts_line, free_corner
 from hairloom.addon.pipeline import Pose
 from hairloom.addon.render.camera import frame_camera
+from hairloom.addon.render.shader_source import DEBUG_VIEWS
 from hairloom.addon.render.strand_pass import Statistics, StrandPass
 from hairloom.addon.strands import Surface
 
@@ -75,7 +76,7 @@ def test_of_children_the_last_to_grow_are_the_first_to_go(new_hair, sphere, eval
     assert sorted(rank[:60]) == pytest.approx(np.arange(60) / 60, abs=1e-6)
 
 
-@pytest.mark.parametrize("view", ["detail", "guide", "group", "occlusion", "none"])
+@pytest.mark.parametrize("view", DEBUG_VIEWS)
 def test_a_debug_view_reaches_the_snapshot_and_brings_its_counts(view, preview):
     hair, _, session = preview
     assert drawing(session).counts_of == ""
@@ -201,3 +202,19 @@ def test_statistics_begin_with_nothing():
     assert counts_line("Hair", 5, 10, Statistics()) == (
         "Hairloom Hair   guides 5   strands 0 of 10   pieces 0   vertices 0"
     )
+
+
+def test_stretch_and_depth_know_the_style_and_the_colliders(preview, evaluated):
+    """At rest and while it plays, where the head is then."""
+    hair, head, session = preview
+    hair.hairloom.debug_view = "stretch"
+    assert drawing(session).snapshot.rest is session.rig.strands.points
+    hair.hairloom.debug_view = "depth"
+    session.play(evaluated())
+    head.location.x += 0.5
+    bpy.context.view_layer.update()
+    (solid,) = drawing(session).snapshot.solids
+    np.testing.assert_allclose(solid.matrix_now, np.array(head.matrix_world), atol=1e-6)
+    hair.hairloom.debug_view = "none"
+    plain = drawing(session).snapshot
+    assert plain.rest is None and plain.solids == ()

@@ -1,4 +1,4 @@
-"""The debug views: colours that show detail factors, guides and groups."""
+"""The debug views: colours that show detail factors, guides and groups, and what dynamics do."""
 
 from __future__ import annotations
 
@@ -9,11 +9,17 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hair_ball import ball_mesh
 
+from hairloom.addon.dynamics.colliders import CapsuleCollider, PosedCollider, SphereCollider
+from hairloom.addon.dynamics.colliders.distance_field import DistanceField
+from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.refine.detail import PictureView, detail_factors
 from hairloom.addon.refine.settings import DetailSettings
 from hairloom.addon.refine.smooth import points_at
+from hairloom.addon.render.hair_ball import HairBall
 from hairloom.addon.shading.settings import StrandSettings
+from hairloom.addon.strands import Surface
 
 pytestmark = pytest.mark.usefixtures("gpu_context")
 
@@ -126,3 +132,101 @@ def test_the_occlusion_view_shows_it_in_grey(frame: Any, front: Any) -> None:
     grey = picture[[50, 100, 150], 100, :3]
     assert np.ptp(grey, axis=1).max() < 1e-3 and grey[1].max() > 0.2
     assert grey[:, 0] / grey[1, 0] == pytest.approx([2.0 / 3.0, 1.0, 4.0 / 3.0], abs=0.05)
+
+
+def hue_of(pixel: np.ndarray) -> float:
+    return colorsys.rgb_to_hsv(*(float(each) for each in pixel[:3]))[0]
+
+
+def upright_strands(count: int, cv_count: int) -> np.ndarray:
+    """Beside each other across the picture, (count, cv_count, 3)."""
+    strands = np.zeros((count, cv_count, 3), np.float32)
+    strands[..., 0] = (np.arange(count)[:, None] + 0.5) / count - 0.5
+    strands[..., 2] = np.linspace(-0.4, 0.4, cv_count)
+    return strands
+
+
+WIDE = StrandSettings(fullness=60.0, tip_width=1.0)
+
+
+def test_stretch_is_red_where_segments_are_longer_and_blue_where_they_are_shorter(
+    frame: Any, front: Any
+) -> None:
+    """The middle one of three segments of each strand has changed."""
+    changes = np.array([-0.02, -0.01, -0.005, 0.0, 0.005, 0.01, 0.02, 0.5])
+    strands = upright_strands(len(changes), 4)
+    rest = strands.copy()
+    rest[:, 2:, 2] -= (strands[:, 2, 2] - strands[:, 1, 2])[:, None] * (
+        1.0 - 1.0 / (1.0 + changes)
+    )[:, None]
+
+    def shown(**more: Any) -> np.ndarray:
+        snapshot = snapshot_of(
+            frame, strands, BARE, strand_settings=WIDE, debug_view="stretch", **more
+        )
+        picture = frame.render_image(snapshot, front, 80, 80, 1)
+        return np.array(
+            [
+                [chromaticity(picture[row, 5 + 10 * place]) for place in range(len(changes))]
+                for row in (18, 40, 61)
+            ]
+        )
+
+    root, middle, tip = shown(rest=rest)
+    grey = [1.0, 1.0, 1.0]
+    for plain in (*root, *tip, middle[3], *shown()[1]):
+        assert plain == pytest.approx(grey, abs=0.01)
+    red = middle[4:, 0] - middle[4:, 2]
+    blue = middle[:3, 2] - middle[:3, 0]
+    assert red == pytest.approx([red[0], 0.95, 0.95, 0.95], abs=0.02) and 0.3 < red[0] < 0.8
+    assert blue == pytest.approx([0.95, 0.95, blue[2]], abs=0.02) and 0.3 < blue[2] < 0.8
+
+
+@pytest.mark.parametrize(
+    ("kind", "error"), [("ball", 0.01), ("capsule and ball", 0.01), ("field", 0.15)]
+)
+def test_depth_is_the_distance_from_colliders(
+    frame: Any, front: Any, kind: str, error: float
+) -> None:
+    """What the centre and the radius of a ball say; a field has it by cells."""
+    strands = upright_strands(20, 9)
+    center, radius = np.array([-0.1, 0.0, 0.0]), 0.25
+    posed = np.eye(4)
+    posed[:3, 3] = center
+    ball = SphereCollider((0.0, 0.0, 0.0), radius)
+    far = CapsuleCollider((0.0, 5.0, 0.0), (0.0, 5.0, 1.0), 0.1)
+    solids = {
+        "ball": (ball,),
+        "capsule and ball": (far, ball),
+        "field": (DistanceField.from_surface(Surface(*ball_mesh(64, radius)), DynamicsSettings()),),
+    }[kind]
+    snapshot = snapshot_of(
+        frame,
+        strands,
+        BARE,
+        strand_settings=WIDE,
+        debug_view="depth",
+        solids=tuple(PosedCollider(solid, posed, posed) for solid in solids),
+    )
+    picture = frame.render_image(snapshot, front, 200, 200, 1)
+    size = 0.02 * HairBall().of(snapshot).radius
+    found, expected = [], []
+    for place in range(20):
+        for row in range(30, 170, 7):
+            point = np.array([strands[place, 0, 0], 0.0, (row + 0.5) / 200.0 - 0.5])
+            away = (np.linalg.norm(point - center) - radius) / size
+            inside, outside = 0.16 * (1.0 - min(-away, 1.0)), 0.33 + 0.33 * min(away / 10.0, 1.0)
+            if abs(away) > 0.05:  # there the hue jumps
+                expected.append(inside if away < 0.0 else outside)
+                found.append(hue_of(picture[row, 5 + 10 * place]))
+    apart = np.abs(np.array(found) - expected)
+    apart = np.minimum(apart, 1.0 - apart)  # red is 0 and 1
+    assert np.ptp(expected) > 0.6 and apart.max() < error
+
+
+def test_without_colliders_depth_is_grey(frame: Any, front: Any) -> None:
+    snapshot = snapshot_of(
+        frame, upright_strands(4, 3), BARE, strand_settings=WIDE, debug_view="depth"
+    )
+    pixel = frame.render_image(snapshot, front, 80, 80, 1)[40, 10]
+    assert pixel[:3].max() > 0.1 and chromaticity(pixel) == pytest.approx([1.0, 1.0, 1.0], abs=0.01)

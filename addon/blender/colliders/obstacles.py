@@ -9,6 +9,7 @@ be used is left out with a warning.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass, field
 
 import bpy
@@ -130,6 +131,15 @@ class Obstacles:
             except HairloomError as error:
                 self._fail(part, error)
         return tuple(posed)
+
+    def standing(self, depsgraph: bpy.types.Depsgraph) -> tuple[PosedCollider, ...]:
+        """Where they stand now; those that cannot be used, which Play tells of, are left out."""
+        found = []
+        for part in self.parts:
+            with suppress(HairloomError):
+                collider, matrix = part.now(depsgraph)
+                found.append(PosedCollider(collider, matrix, matrix))
+        return tuple(found)
 
     def _there(self, depsgraph: bpy.types.Depsgraph) -> Iterator[Part]:
         """The parts that Blender evaluates; others start at rest when they return."""

@@ -82,6 +82,18 @@ _DEBUG_VIEWS = (
     ("guide", "Guides", "Each strand by the guide that it follows most"),
     ("group", "Groups", "Each strand by its group"),
     ("occlusion", "Ambient Occlusion", "How much of the sky's light comes to each point, in grey"),
+    (
+        "stretch",
+        "Stretch",
+        "Each segment by its length beside that in the style: red is longer by 1 % or more, blue "
+        "is shorter, grey is as long",
+    ),
+    (
+        "depth",
+        "Depth",
+        "Each point by its distance from the head and other colliders: green touches them, blue is "
+        "far away, yellow and red are inside",
+    ),
 )
 
 

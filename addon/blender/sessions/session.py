@@ -563,11 +563,25 @@ class Session:
         measure.add(self.solver.strands(), self._rest_lengths(), guides, self._posed)
 
     def _rest_lengths(self) -> Floats:
-        """Of all strands; those of hair without a head grow with its object."""
+        """Of all strands."""
         rig = self.rig
         if rig.head is not None:
             return rig.rest_lengths
-        return lengths(pipeline.carried(rig, self.solver.pose), rig.strands.offsets)
+        return lengths(self.rest_points(), rig.strands.offsets)
+
+    def rest_points(self) -> Floats:
+        """All strands as long as in their style, (point_count, 3) [m]; those of hair without a head
+        grow with its object."""
+        rig = self.rig
+        if rig.head is not None:
+            return rig.strands.points
+        return pipeline.carried(rig, self.solver.pose)
+
+    def solids(self, depsgraph: bpy.types.Depsgraph) -> tuple[PosedCollider, ...]:
+        """What the hair would collide with now; none before they are made."""
+        if self.obstacles is None:
+            self.make_fields(depsgraph)
+        return () if self.obstacles is None else self.obstacles.standing(depsgraph)
 
     def recorded(self) -> Arrays:
         """See `baked_rig.frame_arrays`."""

@@ -4,7 +4,6 @@ hidden."""
 
 from __future__ import annotations
 
-from contextlib import suppress
 from dataclasses import dataclass
 
 import bpy
@@ -22,7 +21,6 @@ from ...dynamics.colliders import (
 from ...dynamics.force_fields import ForceFields, felt
 from ...dynamics.settings import DynamicsSettings
 from ...dynamics.wind import Air, air_of
-from ...errors import HairloomError
 from ...pipeline import carried_guides, root_normals, root_turns
 from ...render import gpu_objects
 from ...shading.lights import Light
@@ -137,14 +135,9 @@ def _radius(session: Session) -> float:
 
 def collider_lines(session: Session, depsgraph: bpy.types.Depsgraph) -> Floats:
     """(2n, 3): all that the groom collides with, where it is now; none before they are made."""
-    if session.obstacles is None:
-        session.make_fields(depsgraph)
-    found: list[Floats] = [np.zeros((0, 3))]
-    for part in () if session.obstacles is None else session.obstacles.parts:
-        with suppress(HairloomError):  # Play tells it
-            collider, matrix = part.now(depsgraph)
-            found.append(moved(shape_lines(collider), matrix))
-    return np.concatenate(found)
+    solids = session.solids(depsgraph)
+    lines = [moved(shape_lines(solid.collider), solid.matrix_now) for solid in solids]
+    return np.concatenate([np.zeros((0, 3)), *lines])
 
 
 def shape_lines(collider: Collider) -> Floats:

@@ -40,7 +40,7 @@ class Collider(Protocol):
         """Signed distance [m] (n,) at the points (3, n), and its gradient (3, n)."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class PosedCollider:
     """A collider and its way during one frame.
 
