@@ -71,14 +71,14 @@ class Chart:
 def error_chart(errors: dict[str, float]) -> Any:
     """Error over how many slices or layers there are, both in octaves."""
     chart = Chart()
-    most, least = 2.0, 0.025
+    most, least = 5.0, 0.1
 
     def place(count: float, error: float) -> tuple[float, float]:
         right = np.log2(count / 4.0) / np.log2(64.0)
         up = np.log2(error / least) / np.log2(most / least)
         return LEFT + right * (WIDE - LEFT - RIGHT), LOW + up * (HIGH - LOW - TOP)
 
-    for error in (0.025, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0):
+    for error in (0.1, 0.2, 0.5, 1.0, 2.0, 5.0):
         chart.line(place(4, error), place(256, error), PALE, 1.0)
         chart.word((LEFT - 30, place(4, error)[1]), f"{100.0 * error:g} %", INK)
     for count in (4, 8, 16, 64, 255):
@@ -123,7 +123,7 @@ def shadow_pictures(strands: Any) -> list[Any]:
                 meshes=(ball,),
                 lights=(sun,),
                 ambient=(0.02, 0.02, 0.02),
-                shading=settings["shading"](volume_shadow=0.0),
+                shading=settings["shading"](model="kajiya_kay", volume_shadow=0.0),
                 volume=way,
                 volume_center=np.zeros(3, np.float32),
             ),
