@@ -2,9 +2,12 @@
 // what is seen of it later.
 //
 // Reads the textures of strands by name, see addon/render/strand_pass.py, and the block `strands`.
+// TANGENTS: the unit tangent, from root to tip in world space, in place of the colour.
 #define SHADED_LATER
 #include "lib_strand_geometry.glsl"
-#include "lib_strand_light.glsl"
+#ifndef TANGENTS
+#  include "lib_strand_light.glsl"
+#endif
 
 // How much the tangent turns in a pixel, at a place of a segment.
 vec3 tangent_bend(vec3 before, vec3 from, vec3 to, vec3 after, float u, vec3 tangent)
@@ -33,10 +36,13 @@ vec3 layer_radiance(int strand, float place)
   vec3 after = texelFetch(cv_points, span_texel(span, min(segment + 2, last)), 0).xyz;
   before = segment == 0 ? 2.0 * from - to : before;
   after = segment == last - 1 ? 2.0 * to - from : after;
+  vec3 tangent = catmull_rom_tangent(before, from, to, after, u);
+#ifdef TANGENTS
+  return tangent;
+#else
   vec2 from_look = texelFetch(cv_looks, root_side, 0).xy;
   vec2 to_look = texelFetch(cv_looks, tip_side, 0).xy;
   vec3 point = catmull_rom_point(before, from, to, after, u);
-  vec3 tangent = catmull_rom_tangent(before, from, to, after, u);
   vec3 bend = vec3(0.0);
 #if MARSCHNER
   bend = tangent_bend(before, from, to, after, u, tangent);
@@ -68,4 +74,5 @@ vec3 layer_radiance(int strand, float place)
   uint seed = uint(texelFetch(strand_seeds, strand_texel(strand, 0, 1), 0).x);
   return strand_radiance(
       point, tangent, bend, radius, along, occlusion, openness, between, own, seen, seed);
+#endif
 }

@@ -1,8 +1,12 @@
-// Where meshes are, vertex stage: world-space positions.
+// Where meshes are, vertex stage: world-space positions. CARRIED: other values of their vertices instead.
 
 void main()
 {
+#ifdef CARRIED
+  mesh_point = carried;
+#else
   mesh_point = position;
+#endif
 #ifdef PICTURES
   mesh_uv = picture_place;
 #endif

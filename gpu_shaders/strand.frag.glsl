@@ -1,5 +1,5 @@
 // Strands, fragment stage, opaque: each pixel shaded as it is drawn. With a DEBUG view colours that show
-// numbers, just enough shaded that strands stay apart.
+// numbers, just enough shaded that strands stay apart. TANGENTS: as in lib_layer_radiance.glsl.
 #include "lib_kajiya_kay.glsl"
 #include "lib_strand_noise.glsl"
 #include "lib_output.glsl"
@@ -10,7 +10,7 @@
 #  ifdef HAS_SOLIDS
 #    include "lib_signed_distance.glsl"
 #  endif
-#else
+#elif !defined(TANGENTS)
 #  include "lib_strand_light.glsl"
 #endif
 
@@ -65,6 +65,8 @@ void main()
   vec3 tangent = unit_or(strand_tangent, vec3(0.0, 0.0, 1.0));
 #if DEBUG
   vec3 radiance = debug_radiance(tangent, seed);
+#elif defined(TANGENTS)
+  vec3 radiance = tangent;
 #else
   vec2 place = strand_along_and_occlusion;
   vec4 between = vec4(0.0), own = vec4(0.0), openness = vec4(0.0);

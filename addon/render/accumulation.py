@@ -116,6 +116,11 @@ class Target:
         with drawing_into(self._framebuffer):
             self._framebuffer.clear(color=color, depth=1.0)
 
+    def clear_color(self, color: tuple[float, float, float, float]) -> None:
+        """Fill its colours alone."""
+        with drawing_into(self._framebuffer):
+            self._framebuffer.clear(color=color)
+
     def drawing(self) -> Any:
         """A context in which draws go into it."""
         return drawing_into(self._framebuffer)

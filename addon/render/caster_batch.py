@@ -18,15 +18,19 @@ def alpha_picture(caster: Caster) -> Floats | None:
     return None if pictures is None else pictures.color
 
 
-def caster_batch(caster: Caster) -> Any:
+def caster_batch(caster: Caster, carried: Floats | None = None) -> Any:
     """The triangles: position; with such a picture UVs as well, for which each corner is a vertex
     of its own.
+
+    Args:
+        carried: (vertex_count, 3), an attribute of this name; None for none.
     """
     surface = surface_of(caster)
     values, has_corners = {"position": surface.positions}, alpha_picture(caster) is not None
+    if carried is not None:
+        values["carried"] = carried
     if has_corners and surface.corner_uv is not None:
-        values = {
-            "position": surface.corners.reshape(-1, 3),
-            "picture_place": surface.corner_uv.reshape(-1, 2),
-        }
+        corners = surface.triangles.ravel()
+        values = {name: array[corners] for name, array in values.items()}
+        values["picture_place"] = surface.corner_uv.reshape(-1, 2)
     return triangle_batch(values, None if has_corners else surface.triangles)

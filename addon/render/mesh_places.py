@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from ..arrays import Floats
 from .camera import Camera
 from .caster_batch import alpha_picture, caster_batch
 from .mesh_pictures import PictureTextures
@@ -20,17 +21,23 @@ CUT = (-1.0, -1.0)
 
 @dataclass(frozen=True, eq=False)
 class Placed:
-    """A mesh to draw. number: what is written. chance: of its holes, see hashed_alpha.shifts."""
+    """A mesh to draw.
+
+    number: what is written. chance: of its holes, see hashed_alpha.shifts.
+    carried: (vertex_count, 3), written in place of where the mesh is; None: that is.
+    """
 
     mesh: MeshSnapshot
     number: float
     chance: tuple[float, float] = CUT
+    carried: Floats | None = None
 
 
-def place_recipe(*, has_alpha: bool, has_pictures: bool) -> ShaderRecipe:
+def place_recipe(*, has_alpha: bool, has_pictures: bool, is_carrying: bool) -> ShaderRecipe:
     """The program of meshes that have holes, or have not."""
+    parts = "_alpha" * has_alpha, "_pictures" * has_pictures, "_carrying" * is_carrying
     return ShaderRecipe(
-        name=f"mesh_place{'_alpha' * has_alpha}{'_pictures' * has_pictures}",
+        name=f"mesh_place{''.join(parts)}",
         vertex="mesh_place.vert.glsl",
         fragment="mesh_place.frag.glsl",
         structs=("struct_view.glsl",),
@@ -40,7 +47,11 @@ def place_recipe(*, has_alpha: bool, has_pictures: bool) -> ShaderRecipe:
             ("FLOAT", "mesh_number"),
             *((("FLOAT", "mesh_alpha"), ("VEC2", "mesh_chance")) if has_alpha else ()),
         ),
-        inputs=(("VEC3", "position"), *((("VEC2", "picture_place"),) if has_pictures else ())),
+        inputs=(
+            ("VEC3", "position"),
+            *((("VEC2", "picture_place"),) if has_pictures else ()),
+            *((("VEC3", "carried"),) if is_carrying else ()),
+        ),
         varyings=(
             ("smooth", "VEC3", "mesh_point"),
             *((("smooth", "VEC2", "mesh_uv"),) if has_pictures else ()),
@@ -49,6 +60,7 @@ def place_recipe(*, has_alpha: bool, has_pictures: bool) -> ShaderRecipe:
         defines=(
             *((("ALPHA", 1),) if has_alpha else ()),
             *((("PICTURES", 1),) if has_pictures else ()),
+            *((("CARRIED", 1),) if is_carrying else ()),
         ),
     )
 
@@ -63,24 +75,22 @@ class MeshPlaces:
     def release(self) -> None:
         """Let go of all that lies on the GPU; the next draw uploads again."""
         self._view = UniformBlock()
-        self._batches: list[tuple[MeshSnapshot, Any]] = []
+        self._batches: list[tuple[Placed, Any]] = []
         self._pictures = PictureTextures()
 
     def draw(self, meshes: Sequence[Placed], camera: Camera, width: int, height: int) -> None:
         """Draw place [m, world] and number of each mesh into the bound framebuffer."""
-        kept = {id(mesh): batch for mesh, batch in self._batches}
+        kept = {_key(each): batch for each, batch in self._batches}
         self._batches = [
-            (each.mesh, kept[id(each.mesh)] if id(each.mesh) in kept else caster_batch(each.mesh))
+            (each, kept.get(_key(each)) or caster_batch(each.mesh, each.carried))
             for each in meshes
             if len(each.mesh.surface.triangles)
         ]
-        batches = {id(mesh): batch for mesh, batch in self._batches}
         view = self._view.holding(view_values(camera, width, height))
-        for each in meshes:
-            if id(each.mesh) in batches:
-                shader = self._bound(each, view)
-                with drawing_state():
-                    batches[id(each.mesh)].draw(shader)
+        for each, batch in self._batches:
+            shader = self._bound(each, view)
+            with drawing_state():
+                batch.draw(shader)
         self._pictures.forget_but([each.mesh for each in meshes])
 
     def _bound(self, each: Placed, view: Any) -> Any:
@@ -93,6 +103,16 @@ class MeshPlaces:
         numbers: dict[str, Any] = {"mesh_number": each.number}
         if has_alpha:
             numbers |= {"mesh_alpha": mesh.alpha, "mesh_chance": each.chance}
-        shader = program(place_recipe(has_alpha=has_alpha, has_pictures=has_pictures))
+        recipe = place_recipe(
+            has_alpha=has_alpha,
+            has_pictures=has_pictures,
+            is_carrying=each.carried is not None,
+        )
+        shader = program(recipe)
         shader.bind(blocks={"view": view}, textures=textures, numbers=numbers)
         return shader.shader
+
+
+def _key(each: Placed) -> tuple[int, int]:
+    """What its batch is made of; both live as long as that is kept."""
+    return id(each.mesh), id(each.carried)

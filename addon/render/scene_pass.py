@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Hashable, Set
+from collections.abc import Hashable, Sequence, Set
 from dataclasses import dataclass, replace
 from itertools import chain
 from typing import Any
@@ -17,14 +17,15 @@ from . import gpu_memory
 from .accumulation import Target
 from .bright_pass import plain
 from .camera import Camera
-from .camera_window import view_depth
 from .card_pass import CardPass
 from .hair_on_meshes import HairOnMeshes
+from .hashed_alpha import shifts
 from .holdout import Holdout
 from .inter_groom_shadow import may_shade
 from .mesh_pass import MeshPass
 from .mesh_places import MeshPlaces, Placed
 from .mesh_shadows import MeshShadowPass
+from .nearest import Nearest
 from .opacity_maps import OpacityMaps
 from .scene_snapshot import SceneSnapshot, shaded_by
 from .shafts_pass import finish_with_shafts, shafts_apart
@@ -38,8 +39,7 @@ type Rgba = tuple[float, float, float, float]
 ONE_AT_A_TIME = threading.Lock()
 _NOTHING: Rgba = (0.0, 0.0, 0.0, 0.0)
 _ALL: Rgba = (1.0, 1.0, 1.0, 1.0)
-#: distance [m] where nothing is, as Blender's engines have it
-FAR_AWAY = 1.0e10
+_NOWHERE: Rgba = (0.0, 0.0, 0.0, -1.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +68,7 @@ class ScenePass:
         self._card_passes: dict[Hashable, CardPass] = {}
         self._mesh_passes: dict[Hashable, MeshPass] = {}
         self._mesh_shadows, self._hair_on_meshes = MeshShadowPass(), HairOnMeshes()
-        self._numbered = MeshPlaces()
+        self._placed = MeshPlaces()
         self._holdout = Holdout()
 
     def draw(
@@ -153,27 +153,108 @@ class ScenePass:
         of_cards = (each.notes for each in self._card_passes.values())
         return tuple(dict.fromkeys(chain(*of_strands, *of_cards)))
 
-    def distances_and_numbers(
+    def nearest(
         self, scene: SceneSnapshot, camera: Camera, target: Target, size: tuple[int, int]
-    ) -> tuple[Floats, Floats]:
-        """Of what lies in the middle of each pixel: how far away along the view [m], and its
-        object's number; each (height, width) float32, row 0 at the bottom.
+    ) -> Nearest:
+        """What lies in the middle of each pixel. A strand hides what is behind it, whatever its
+        transparency, and is no thinner than *Min Width*; cards and meshes do where they cover at
+        least a half.
+        """
+        with ONE_AT_A_TIME, gpu_memory.shared_by(len(scene.grooms)):
+            target.sized(*size).clear(_NOWHERE)
+            with target.drawing():
+                meshes = [Placed(mesh, float(index)) for index, mesh in enumerate(scene.meshes)]
+                self._placed.draw(meshes, camera, *size)
+            mesh = texture_to_array(target.color)[..., 3].astype(np.int32)
+            groom, strand = np.full_like(mesh, -1), np.full_like(mesh, -1)
+            place, depth = np.zeros(mesh.shape, np.float32), target.depths()
+            for index, drawn in enumerate(scene.grooms):
+                target.clear_color(_NOTHING)
+                with target.drawing():
+                    opaque = _opaque(scene.lit(drawn))
+                    self._strands(drawn.key).draw(opaque, camera, *size, content="places")
+                    self._cards(drawn.key).draw_depth(drawn.snapshot, camera, *size)
+                before, depth = depth, target.depths()
+                here, found = depth < before, texture_to_array(target.color)
+                is_strand = here & (found[..., 3] > 0.0)
+                mesh[here], groom[here], strand[here] = -1, index, -1
+                strand[is_strand] = found[is_strand, 0].astype(np.int32)
+                place[is_strand] = found[is_strand, 1]
+        return Nearest(depth, mesh, groom, strand, place)
+
+    def on_meshes(
+        self,
+        scene: SceneSnapshot,
+        values: Sequence[Floats],
+        camera: Camera,
+        target: Target,
+        size: tuple[int, int],
+    ) -> Floats:
+        """Values of vertices where a mesh is nearest, (height, width, 3); 0 elsewhere.
+
+        Args:
+            values: (vertex_count, 3) of each mesh.
+        """
+        pairs = zip(scene.meshes, values, strict=True)
+        with ONE_AT_A_TIME:
+            target.sized(*size).clear(_NOTHING)
+            with target.drawing():
+                carrying = [Placed(mesh, 0.0, carried=each) for mesh, each in pairs]
+                self._placed.draw(carrying, camera, *size)
+            return texture_to_array(target.color)[..., :3].copy()
+
+    def tangents(
+        self, scene: SceneSnapshot, camera: Camera, target: Target, size: tuple[int, int]
+    ) -> Floats:
+        """Sums of the unit tangents of all strands that are seen, each as strong as it covers the
+        pixel, (height, width, 3), world space, root to tip. Cards have none.
         """
         with ONE_AT_A_TIME, gpu_memory.shared_by(len(scene.grooms)):
             target.sized(*size).clear(_NOTHING)
             with target.drawing():
-                numbered = [Placed(mesh, float(mesh.number)) for mesh in scene.meshes]
-                self._numbered.draw(numbered, camera, *size)
-            numbers = texture_to_array(target.color)[..., 3].copy()
-            depth = target.depths()
-            for groom in scene.grooms:
+                self._placed.draw(_places(scene, camera.sample), camera, *size)
+            target.clear_color(_NOTHING)
+            with target.drawing():
+                for drawn in (each for each in scene.grooms if not each.is_holdout):
+                    snapshot = scene.lit(drawn)
+                    self._strands(drawn.key).draw(snapshot, camera, *size, content="tangents")
+            return texture_to_array(target.color)[..., :3].copy()
+
+    def coverages(
+        self, scene: SceneSnapshot, camera: Camera, target: Target, size: tuple[int, int]
+    ) -> tuple[dict[str, Floats], Floats]:
+        """How much of each pixel each object covers, by name, and all hair, as `draw` has them;
+        (height, width) each. Meshes that are blended, and holdouts, cover nothing.
+        """
+        # as `draw` has them: strands before cards, holes last
+        grooms = sorted(
+            scene.grooms, key=lambda each: (each.is_holdout, each.snapshot.cards is not None)
+        )
+        alphas = []
+        with ONE_AT_A_TIME, gpu_memory.shared_by(len(scene.grooms)):
+            target.sized(*size).clear(_NOWHERE)
+            with target.drawing():
+                self._placed.draw(_places(scene, camera.sample), camera, *size)
+            mesh = texture_to_array(target.color)[..., 3].astype(np.int32)
+            for drawn in grooms:
+                target.clear_color(_NOTHING)
                 with target.drawing():
-                    self._strands(groom.key).draw(_hiding(scene.lit(groom)), camera, *size)
-                    self._cards(groom.key).draw_depth(groom.snapshot, camera, *size)
-                before, depth = depth, target.depths()
-                numbers[depth < before] = groom.number
-        distances = np.where(depth < 1.0, view_depth(camera, depth), FAR_AWAY)
-        return distances.astype(np.float32), numbers
+                    snapshot = scene.lit(drawn)
+                    self._strands(drawn.key).draw(snapshot, camera, *size, content="tangents")
+                    self._cards(drawn.key).draw(snapshot, camera, *size)
+                alphas.append(texture_to_array(target.color)[..., 3].copy())
+        found: dict[str, Floats] = {}
+        left = np.ones(mesh.shape, np.float32)
+        for drawn, alpha in reversed(list(zip(grooms, alphas, strict=True))):
+            if not drawn.is_holdout:
+                found[drawn.name] = found.get(drawn.name, 0.0) + left * alpha
+            left = left * (1.0 - alpha)
+        hair = sum(found.values(), np.zeros_like(left))
+        for index in np.unique(mesh[mesh >= 0]):
+            drawn_mesh = scene.meshes[index]
+            if not drawn_mesh.is_holdout:
+                found[drawn_mesh.name] = found.get(drawn_mesh.name, 0.0) + left * (mesh == index)
+        return found, hair
 
     def _draw_hair(
         self,
@@ -254,7 +335,17 @@ class ScenePass:
                 del passes[key]
 
 
-def _hiding(snapshot: Snapshot) -> Snapshot:
+def _opaque(snapshot: Snapshot) -> Snapshot:
     """The same hair, whose strands hide all that is behind them."""
     opaque = replace(snapshot.strand_settings, transparency="none")
     return replace(snapshot, strand_settings=opaque)
+
+
+def _places(scene: SceneSnapshot, sample: int) -> list[Placed]:
+    """Meshes by their index, with as many holes as they are drawn with; others are seen through
+    those that are blended."""
+    return [
+        Placed(mesh, float(index), shifts(index, sample))
+        for index, mesh in enumerate(scene.meshes)
+        if mesh.transparency != "blended"
+    ]

@@ -23,12 +23,13 @@ class DrawnGroom:
 
     key: equal from moment to moment.
     snapshot: its own meshes, lights and ambient count for nothing, the scene's stand for them.
-    number: what the object mask holds where it is seen.
+    name, number: of its object; what Cryptomattes and the object mask hold where it is seen.
     is_holdout: it hides what is behind it and is a hole in the picture itself.
     """
 
     key: Hashable
     snapshot: Snapshot
+    name: str = ""
     number: int = 0
     is_holdout: bool = False
 

@@ -5,6 +5,7 @@ Pure numpy: importable without gpu.
 
 from __future__ import annotations
 
+from collections.abc import Hashable
 from dataclasses import dataclass, field, fields
 from inspect import isclass
 from typing import Any
@@ -83,6 +84,7 @@ class MeshSnapshot:
     occlusion: (vertex_count,) light that arrives, 0 to 1; None is 1 everywhere.
     specular: the fraction of the light that the boundary reflects where it falls straight in.
     roughness: of the boundary, as Principled has it.
+    key: of the mesh, equal from moment to moment. name: of its object, in Cryptomattes.
     number: what object masks hold where it is seen.
     is_holdout: it hides what is behind it and is a hole in the picture itself.
     skin: the head that it is a part of; None is no skin, on which shadows have hard edges.
@@ -99,6 +101,8 @@ class MeshSnapshot:
     occlusion: Floats | None = None
     specular: float = SKIN_SPECULAR
     roughness: float = SKIN_ROUGHNESS
+    key: Hashable = None
+    name: str = ""
     number: int = 0
     is_holdout: bool = False
     skin: Skin | None = None

@@ -43,6 +43,18 @@ _OPAQUE_RECIPE = ShaderRecipe(
     outputs=(("VEC4", "color"),),
     defines=(*_PLAIN, *_WHOLE, ("COVERED", 0), ("GATHERED", 0)),
 )
+#: who is nearest
+_PLACE_RECIPE = ShaderRecipe(
+    name="strand_place",
+    vertex="strand.vert.glsl",
+    fragment="strand_place.frag.glsl",
+    structs=("struct_view.glsl",),
+    settings=(StrandSettings,),
+    integers=("samples_across",),
+    varyings=(("smooth", "FLOAT", "strand_place"), ("flat", "INT", "strand_index")),
+    outputs=(("VEC4", "color"),),
+    defines=(*_WHOLE, ("COVERED", 0), ("GATHERED", 1)),
+)
 #: the nearest fragment that chance lets stay
 _HASHED_RECIPE = ShaderRecipe(
     name="strand_hashed",
@@ -146,6 +158,12 @@ class StrandDrawing:
         integers = {"output_encoding": self.output_encoding, "samples_across": self.samples_across}
         features = [*self.points, self._detail, *self.shading, *self.shown]
         self._draw(bound(_OPAQUE_RECIPE, features, self.blocks, integers=integers))
+
+    def place(self) -> None:
+        """Who is nearest, as wide as opaque strands are, and where along its points."""
+        integers = {"samples_across": self.samples_across}
+        features = [*self.points, self._detail]
+        self._draw(bound(_PLACE_RECIPE, features, self.blocks, integers=integers))
 
     def hash(self, turn: int) -> None:
         """Who is seen where, of all strands, in one of two turns, see hashed_strands.py."""

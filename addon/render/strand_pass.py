@@ -61,6 +61,9 @@ from .view_block import lights_feature, view_feature
 _BRIGHTEST = 6.0e4
 #: hair of no size has depths too [m]
 _THIN = 1.0e-9
+#: what a draw may write: light; in its place unit tangents from root to tip, in world space; or, of
+#: opaque strands alone, the number of the nearest one and where along its points
+CONTENTS = ("light", "tangents", "places")
 #: debug views that show a number of each strand
 NUMBERED_VIEWS = ("guide", "group")
 
@@ -140,6 +143,7 @@ class StrandPass:
         width: int,
         height: int,
         *,
+        content: str = "light",
         output: str = "scene_linear",
         display: Display | None = None,
         samples: int = 1,
@@ -153,6 +157,7 @@ class StrandPass:
 
         Args:
             width, height: of the target [pixels].
+            content: one of CONTENTS.
             output: "scene_linear" for a picture of ours; "viewport" for a POST_VIEW handler in
                 Blender's viewport.
             display: for "viewport", the view transform; None is the plain "Standard".
@@ -169,6 +174,8 @@ class StrandPass:
         Raises:
             ShaderError: the shader does not compile here, or points on the GPU were released.
         """
+        if content not in CONTENTS:
+            raise ValueError(f"content {content!r} is none of {', '.join(CONTENTS)}")
         own = self._views.setdefault(view, _View())
         own.is_moving = False
         self.statistics = Statistics()
@@ -178,7 +185,7 @@ class StrandPass:
         self._upload(snapshot)
         size = width // samples, height // samples
         serial = self._points_serial
-        is_debug = snapshot.debug_view != "none"
+        is_debug = content == "light" and snapshot.debug_view != "none"
         transparency = "none" if is_debug else drawn_transparency(snapshot.strand_settings)
         is_layered = transparency == "layers"
         own.is_moving = is_moving and is_layered and own.detail.may_move(snapshot)
@@ -190,7 +197,9 @@ class StrandPass:
         )
         if not order.classes:
             return
-        maps = None if is_debug else self.opacity(snapshot, view=view, is_turning=is_turning)
+        maps = None
+        if content == "light" and not is_debug:
+            maps = self.opacity(snapshot, view=view, is_turning=is_turning)
         drawing = StrandDrawing(
             order=order,
             ribbon=self._ribbons.of,
@@ -200,7 +209,11 @@ class StrandPass:
                 self._strands_feature(snapshot),
                 self._curves(snapshot),
             ),
-            shading=tuple(self._shading(snapshot, maps, others)),
+            shading=(
+                tuple(self._shading(snapshot, maps, others))
+                if content == "light"
+                else (self._tangents(snapshot),)
+            ),
             shown=(
                 *(() if display is None else (display.feature,)),
                 *((self._debug_feature(snapshot),) if is_debug else ()),
@@ -223,7 +236,7 @@ class StrandPass:
             HASHED_STRANDS.draw(drawing)
         else:
             with drawing_state():
-                drawing.draw()
+                (drawing.place if content == "places" else drawing.draw)()
         self.statistics = Statistics(
             strands=order.strands,
             pieces=order.pieces,
@@ -311,6 +324,17 @@ class StrandPass:
         looks = None if snapshot.along is None else textures["cv_looks"]
         return curves_feature(textures["cv_points"], textures["strand_spans"], looks)
 
+    def _tangents(self, snapshot: Snapshot) -> ShaderFeature:
+        """What all programs that write tangents have in place of what shades."""
+        return ShaderFeature(
+            name="tangents", textures=self._looks(snapshot), defines={"TANGENTS": 1}
+        )
+
+    def _looks(self, snapshot: Snapshot) -> dict[str, tuple[str, Any]]:
+        """Textures of strands' looks; of unevenly spaced points, all programs have the other."""
+        names = ("strand_seeds", *(("cv_looks",) if snapshot.along is None else ()))
+        return {name: ("FLOAT_2D", self._textures[name]) for name in names}
+
     def _shading(
         self, snapshot: Snapshot, maps: OpacityMaps | None, others: Sequence[OpacityMaps]
     ) -> Iterator[ShaderFeature]:
@@ -318,9 +342,8 @@ class StrandPass:
 
         A debug view has no model: it is the same with either.
         """
-        looks = ("strand_seeds", *(("cv_looks",) if snapshot.along is None else ()))
         yield ShaderFeature(
-            textures={name: ("FLOAT_2D", self._textures[name]) for name in looks},
+            textures=self._looks(snapshot),
             blocks={"shading": ("ShadingSettings", struct_values(snapshot.shading))},
             numbers={"volume_center": ("VEC3", snapshot.center.tolist())},
         )

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from ..arrays import Floats, Ints
@@ -19,13 +21,28 @@ def on_curve(grid: Floats, left: Ints, t: Floats) -> Floats:
     result = np.empty((*number.shape, 3), grid.dtype)
     for axis in range(3):  # one by one, as numpy is slow at rows of three
         along = np.ascontiguousarray(extended[..., axis])
-        p0, p1, p2, p3 = (along.take(number + step) for step in range(4))
-        m1, m2 = 0.5 * (p2 - p0), 0.5 * (p3 - p1)  # the tangents
-        chord = p2 - p1
-        result[..., axis] = p1 + t * (
-            m1 + t * (3.0 * chord - 2.0 * m1 - m2 + t * (m1 + m2 - 2.0 * chord))
-        )
+        result[..., axis] = between([along.take(number + step) for step in range(4)], t)
     return result
+
+
+def between(points: Sequence[Floats], t: Floats) -> Floats:
+    """Where the curve is from the second of four points, at t = 0, to the third, at 1."""
+    p0, p1, p2, p3 = points
+    m1, m2 = 0.5 * (p2 - p0), 0.5 * (p3 - p1)  # the tangents
+    chord = p2 - p1
+    found: Floats = p1 + t * (m1 + t * (3.0 * chord - 2.0 * m1 - m2 + t * (m1 + m2 - 2.0 * chord)))
+    return found
+
+
+def slope_between(points: Sequence[Floats], t: Floats) -> Floats:
+    """The derivative of `between` by t."""
+    p0, p1, p2, p3 = points
+    m1, m2 = 0.5 * (p2 - p0), 0.5 * (p3 - p1)
+    chord = p2 - p1
+    found: Floats = m1 + t * (
+        2.0 * (3.0 * chord - 2.0 * m1 - m2) + t * 3.0 * (m1 + m2 - 2.0 * chord)
+    )
+    return found
 
 
 def evenly_on_curve(grid: Floats, count: int) -> Floats:

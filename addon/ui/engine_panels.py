@@ -130,6 +130,9 @@ class HAIRLOOM_PT_hair_scene(WithHelp, bpy.types.Panel):
             column.prop(settings.picture, "motion_steps", text="Motion Steps")
         else:
             draw_idle(column.row(), settings.picture, "motion_steps", "no Motion Blur")
+        passes = column.column(heading="Passes")
+        for name in ("use_alpha", "use_tangent", "use_strand_index"):
+            passes.prop(hair_scene.drawn_layer(context.scene).hairloom, name)
         problem = hair_scene.problem_of(context.scene) if settings.use_hair_scene else ""
         if problem:
             draw_message(layout, context, f"Blender draws the hair. {problem}", "ERROR")
@@ -155,7 +158,37 @@ class HAIRLOOM_PT_engine_passes(WithHelp, bpy.types.Panel):
         layout.use_property_decorate = False
         column = layout.column()
         column.prop(layer, "use_pass_z")
+        column.prop(layer, "use_pass_normal")
+        column.prop(layer, "use_pass_vector")
         column.prop(layer, "use_pass_object_index")
+        column = layout.column(heading="Cryptomatte")
+        column.prop(layer, "use_pass_cryptomatte_object", text="Object")
+        levels = column.column()
+        levels.active = layer.use_pass_cryptomatte_object
+        levels.prop(layer, "pass_cryptomatte_depth", text="Levels")
+
+
+class HAIRLOOM_PT_hair_passes(WithHelp, bpy.types.Panel):
+    """Passes of hair that Blender has no setting for"""
+
+    bl_label = "Hair"
+    helped = "passes"
+    bl_space_type = "PROPERTIES"
+    bl_region_type = "WINDOW"
+    bl_context = "view_layer"
+    bl_parent_id = "VIEWLAYER_PT_layer_passes"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return context.engine == ENGINE
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout, passes = self.layout, context.view_layer.hairloom
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        column = layout.column()
+        for name in passes.__annotations__:
+            column.prop(passes, name)
 
 
 CLASSES = (
@@ -165,6 +198,7 @@ CLASSES = (
     HAIRLOOM_PT_engine_film,
     HAIRLOOM_PT_hair_scene,
     HAIRLOOM_PT_engine_passes,
+    HAIRLOOM_PT_hair_passes,
 )
 
 

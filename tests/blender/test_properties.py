@@ -120,7 +120,7 @@ def test_an_edit_names_the_data_block_at_once(new_hair):
 
 def test_the_preview_listens_while_hairloom_is_enabled_and_no_longer(extension):
     heard = {kind: list(listeners) for kind, listeners in changed._listeners.items()}
-    own = (*handlers.LISTENERS, growing.LISTENER, look_materials.LISTENER, hair_scene.LISTENER)
+    own = (*handlers.LISTENERS, growing.LISTENER, look_materials.LISTENER, *hair_scene.LISTENERS)
     for kind, listener in own:
         heard[kind].remove(listener)
     assert not any(heard.values())

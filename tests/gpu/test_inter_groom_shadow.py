@@ -211,7 +211,8 @@ def test_light_from_each_side_may_shade_and_none_without_light(gpu_context: Any)
 def test_masks_hold_what_alpha_shows(gpu_context: Any, compute: Callable[..., Any]) -> None:
     """A sheet with holes lets the object behind it through, in both passes."""
     from hairloom.addon.render.accumulation import Target
-    from hairloom.addon.render.scene_pass import FAR_AWAY, ScenePass
+    from hairloom.addon.render.nearest import FAR_AWAY
+    from hairloom.addon.render.scene_pass import ScenePass
     from hairloom.addon.render.snapshot import MeshPictures
 
     camera = Camera(
@@ -226,13 +227,13 @@ def test_masks_hold_what_alpha_shows(gpu_context: Any, compute: Callable[..., An
     below = replace(MeshSnapshot.of(FLOOR), number=3)
     for transparency, right in (("hashed", 3.0), ("blended", 3.0), ("opaque", 7.0)):
         meshes = (below, replace(sheet_of, transparency=transparency))
-        distances, numbers = ScenePass().distances_and_numbers(
-            SceneSnapshot(meshes=meshes), camera, Target(), (SIZE, SIZE)
-        )
+        scene = SceneSnapshot(meshes=meshes)
+        nearest = ScenePass().nearest(scene, camera, Target(), (SIZE, SIZE))
+        distances, numbers = nearest.distances(camera), nearest.object_numbers(scene)
         assert numbers[64, 20] == 7.0 and numbers[64, 108] == right
         assert distances[64, 20] == pytest.approx(2.0, abs=1e-3)
         assert distances[64, 108] == pytest.approx(3.0 if right == 3.0 else 2.0, abs=1e-3)
-    distances, numbers = ScenePass().distances_and_numbers(
-        SceneSnapshot(), camera, Target(), (SIZE, SIZE)
-    )
+    scene = SceneSnapshot()
+    nearest = ScenePass().nearest(scene, camera, Target(), (SIZE, SIZE))
+    distances, numbers = nearest.distances(camera), nearest.object_numbers(scene)
     assert numbers.max() == 0.0 and distances.min() == np.float32(FAR_AWAY)

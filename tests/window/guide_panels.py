@@ -31,7 +31,7 @@ PICTURES: dict[str, tuple[tuple[str, ...], ...]] = {
     "physics": (("collider", "fin"), ("fin_bake",)),
     "engine": (
         ("engine_sampling", "engine_mesh_shadows", "engine_motion_blur", "engine_film"),
-        ("engine_passes",),
+        ("engine_passes", "hair_passes"),
     ),
     "hair_scene": (("hair_scene",),),
     "preview": (("sidebar",),),

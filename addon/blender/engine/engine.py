@@ -13,8 +13,9 @@ from ...render import gpu_objects, skin_layouts
 from ...render.shader_source import ShaderError
 from ..base.gpu_context import can_draw
 from ..viewport.overlay import ENGINE
-from . import engine_hair, hair_scene
-from .engine_still import COMBINED, DEPTH_PASS, NUMBERS_PASS, SHADOW_PASS, SHAFTS_PASS, Still
+from . import engine_hair
+from .engine_passes import COMBINED, wanted_passes
+from .engine_still import Still
 from .engine_view import EngineView
 
 
@@ -36,10 +37,9 @@ class HAIRLOOM_RE_engine(bpy.types.RenderEngine):
 
     def update_render_passes(self, scene: Any, renderlayer: Any) -> None:
         """Tell Blender's compositor and file outputs what passes there will be."""
-        self.register_pass(scene, renderlayer, COMBINED, 4, "RGBA", "COLOR")
-        for (name, channels, ids, kind), is_wanted in _passes(scene, renderlayer):
-            if is_wanted:
-                self.register_pass(scene, renderlayer, name, channels, ids, kind)
+        for each in (COMBINED, *wanted_passes(scene, renderlayer)):
+            channels = len(each.channels), each.channels
+            self.register_pass(scene, renderlayer, each.name, *channels, each.kind)
 
     def render(self, depsgraph: Any) -> None:
         """F12 and animations, once for each view layer; in a separate thread in the window."""
@@ -50,9 +50,8 @@ class HAIRLOOM_RE_engine(bpy.types.RenderEngine):
 
     def _render(self, depsgraph: Any) -> None:
         layer = depsgraph.view_layer
-        for (name, channels, ids, _), is_wanted in _passes(depsgraph.scene, layer):
-            if is_wanted:
-                self.add_pass(name, channels, ids, layer=layer.name)
+        for each in wanted_passes(depsgraph.scene, layer):
+            self.add_pass(each.name, len(each.channels), each.channels, layer=layer.name)
         try:
             still = Still(self, depsgraph)
             for name in _views(depsgraph.scene.render):
@@ -96,17 +95,6 @@ class HAIRLOOM_RE_engine(bpy.types.RenderEngine):
             print(self.failure)
             self.update_stats("Hairloom cannot draw here", str(error).splitlines()[0])
             return None
-
-
-def _passes(scene: Any, layer: Any) -> tuple[tuple[tuple[str, int, str, str], bool], ...]:
-    """What there is beside the picture, and whether it is wanted."""
-    is_hair_scene = hair_scene.drawn_by(scene) is not None
-    return (
-        (DEPTH_PASS, layer.use_pass_z),
-        (NUMBERS_PASS, layer.use_pass_object_index),
-        (SHADOW_PASS, is_hair_scene),
-        (SHAFTS_PASS, is_hair_scene),
-    )
 
 
 def _views(render: Any) -> list[str]:

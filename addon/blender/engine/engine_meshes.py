@@ -131,7 +131,7 @@ def _looks(mesh: MeshSnapshot) -> tuple[object, ...]:
     pictures = mesh.pictures or MeshPictures()
     return (
         *(mesh.color, mesh.specular, mesh.roughness),
-        *(mesh.number, mesh.is_holdout, mesh.skin is None),
+        *(mesh.key, mesh.name, mesh.number, mesh.is_holdout, mesh.skin is None),
         *(mesh.alpha, mesh.transparency, mesh.emission, pictures.bump),
         *(id(pictures.color), id(pictures.normal)),
     )

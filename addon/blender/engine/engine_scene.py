@@ -172,8 +172,14 @@ class SceneReader:
         number = obj.pass_index
         is_head = obj.original.session_uid in self._heads
         fresh = tuple(
-            replace(mesh, number=number, is_holdout=visibility.is_holdout)
-            for mesh in read_meshes(obj, matrix, is_head=is_head)
+            replace(
+                mesh,
+                key=(*key, part),
+                name=obj.name,
+                number=number,
+                is_holdout=visibility.is_holdout,
+            )
+            for part, mesh in enumerate(read_meshes(obj, matrix, is_head=is_head))
         )
         if known is not None and len(known.meshes) == len(fresh):
             pairs = zip(known.meshes, fresh, strict=True)
@@ -217,11 +223,13 @@ class SceneReader:
         if len(key) > 1:
             own = np.array(hair.evaluated_get(depsgraph).matrix_world)
             snapshot = engine_hair.placed(snapshot, matrix @ np.linalg.pinv(own))
-        number = engine_hair.owner_of(hair).pass_index
+        owner = engine_hair.owner_of(hair)
         if not blocking and engine_hair.is_pending(uid):
             self.pending.add(uid)
             state = ()
-        return _ReadGroom(state, DrawnGroom(key, snapshot, number, is_holdout))
+        return _ReadGroom(
+            state, DrawnGroom(key, snapshot, owner.name, owner.pass_index, is_holdout)
+        )
 
 
 def _has_soft_shadow(snapshot: Snapshot) -> bool:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -17,8 +16,9 @@ from ...render.camera import Camera
 from ...render.camera_window import Window, jittered
 from ...render.capabilities import CALM_SAMPLES, capabilities
 from ...render.lens import through
+from ...render.nearest import Moment, Nearest, background, motion, projected, unit, unprojected
 from ...render.pixel_filter import jitters
-from ...render.scene_pass import FAR_AWAY, Rgba, ScenePass, ShaftsApart, shafts_of
+from ...render.scene_pass import Rgba, ScenePass, ShaftsApart, shafts_of
 from ...render.scene_snapshot import SceneSnapshot
 from ...render.textures import texture_from
 from ...shading.bright_shafts import wants_bright
@@ -27,18 +27,25 @@ from ..base.gpu_context import ensure_gpu
 from ..properties.properties import settings_of
 from . import hair_scene
 from .engine_camera import border_window, camera_warnings, read_camera, read_lens
+from .engine_mattes import Mattes
+from .engine_passes import (
+    COMBINED,
+    DATA,
+    DEPTH,
+    NORMAL,
+    OBJECT_INDEX,
+    SHADOW,
+    SHAFTS,
+    STRAND_INDEX,
+    TANGENT,
+    VECTOR,
+    empty_of,
+    passes_in,
+    write,
+)
 from .engine_picture import engine_picture
 from .engine_scene import SceneReader
 
-COMBINED, DEPTH, NUMBERS = "Combined", "Depth", "Object Index"
-SHADOW, SHAFTS = "Hair Shadow", "Hair Shafts"
-#: name, channels, their names, kind; what Blender's compositor knows each by
-DEPTH_PASS = (DEPTH, 1, "Z", "VALUE")
-NUMBERS_PASS = (NUMBERS, 1, "X", "VALUE")
-#: of hair scenes: the fraction of their light that hair leaves to meshes
-SHADOW_PASS = (SHADOW, 3, "RGB", "COLOR")
-#: of hair scenes: shafts of light, to be added to the picture
-SHAFTS_PASS = (SHAFTS, 3, "RGB", "COLOR")
 #: while it renders, the picture so far is shown this often [s]
 _SHOWN_EVERY = 1.0
 
@@ -50,7 +57,7 @@ _UNSEEN = (
 
 
 @dataclass(frozen=True)
-class Moment:
+class SampleTime:
     """When samples are taken.
 
     time: [frames], from the frame that is rendered.
@@ -61,15 +68,17 @@ class Moment:
     places: Floats
 
 
-def moments_of(settings: PictureSettings, render: bpy.types.RenderSettings) -> tuple[Moment, ...]:
+def sample_times(
+    settings: PictureSettings, render: bpy.types.RenderSettings
+) -> tuple[SampleTime, ...]:
     """How the samples are shared out in time; all at once without motion blur."""
     places = jitters(settings.samples, render.filter_size)
     steps = min(settings.motion_steps, settings.samples) if render.use_motion_blur else 1
     if steps == 1:
-        return (Moment(0.0, places),)
+        return (SampleTime(0.0, places),)
     opens = {"START": 0.0, "CENTER": -0.5, "END": -1.0}[render.motion_blur_position]
     return tuple(
-        Moment(render.motion_blur_shutter * (opens + (step + 0.5) / steps), places[step::steps])
+        SampleTime(render.motion_blur_shutter * (opens + (step + 0.5) / steps), places[step::steps])
         for step in range(steps)
     )
 
@@ -96,10 +105,12 @@ class Still:
         self._target, self._picture = Target(), Accumulation()
         behind = hair_scene.drawn_by(depsgraph.scene)
         self._behind = behind
-        self._shadow = None if behind is None else (Target(), Accumulation())
+        self._shadow: tuple[Target, Accumulation] | None = None
         self._shafts = Accumulation()
         self._apart: ShaftsApart | None = None
         self._is_needed = behind is None or hair_scene.is_needed(behind)
+        self._layer = depsgraph.view_layer
+        self._mattes: Mattes | None = None
         self.warnings: tuple[str, ...] = ()
 
     def view(self, name: str) -> None:
@@ -119,21 +130,27 @@ class Still:
                 _leave_empty(result)
         finally:
             engine.end_result(result)
+        for key, value in () if self._mattes is None else self._mattes.metadata.items():
+            engine.get_result().stamp_data_add_field(key, value)
 
     def _fill(self, result: Any) -> None:
         frame = self._depsgraph.scene.frame_current_final
-        moments = moments_of(self._settings, self._render)
+        moments = sample_times(self._settings, self._render)
         lens = read_lens(self._engine, self._depsgraph)
         through_lens = None if lens is None else lens.places(self._settings.samples)
         self._picture.begin(*self._size)
-        if self._shadow is not None:
+        wanted = passes_in(result)
+        if SHADOW.name in wanted:
+            self._shadow = Target(), Accumulation()
             self._shadow[1].begin(*self._size)
         shown = time.monotonic()
         scene, camera = self._moment()
         self._apart = None if self._behind is None else self._beside(self._behind, scene)
         if self._apart is not None:
             self._shafts.begin(*self._size)
-        self._add_data(result, scene, camera)
+        self._mattes = Mattes.of(wanted, self._layer, *self._size)
+        if DATA & wanted.keys():
+            self._add_data(wanted, frame, scene, camera)
         for moment in moments:
             if len(moments) > 1:
                 self._go_to(frame + moment.time)
@@ -152,6 +169,8 @@ class Still:
         if len(moments) > 1:
             self._go_to(frame)
         self._show(result)
+        if self._mattes is not None:
+            self._mattes.write(wanted)
 
     def _beside(self, behind: bpy.types.Scene, scene: SceneSnapshot) -> ShaftsApart | None:
         """Where shafts of light go; None without any. They come from the picture of Blender's own
@@ -195,38 +214,70 @@ class Still:
             shadow.add(target.color)
         if self._apart is not None:
             self._shafts.add(self._apart.light)
+        if self._mattes is not None:
+            self._mattes.add(*self._pass.coverages(scene, moved, self._target, self._size))
         self._engine.update_progress(self._picture.count / self._settings.samples)
         self._engine.update_stats("", f"Sample {self._picture.count} of {self._settings.samples}")
 
-    def _add_data(self, result: Any, scene: SceneSnapshot, camera: Camera) -> None:
-        """Depth and object numbers, of the middle of each pixel at the frame itself."""
-        wanted = {each.name: each for each in _passes(result) if each.name in (DEPTH, NUMBERS)}
-        if not wanted:
-            return
-        distances, numbers = self._pass.distances_and_numbers(
-            scene, camera, self._target, self._size
-        )
-        for name, values in ((DEPTH, distances), (NUMBERS, numbers)):
-            if name in wanted:
-                wanted[name].rect.foreach_set(np.ascontiguousarray(values, np.float32).ravel())
+    def _add_data(
+        self, wanted: dict[str, Any], frame: float, scene: SceneSnapshot, camera: Camera
+    ) -> None:
+        """What is nearest in the middle of each pixel, at the frame itself."""
+        drawing = self._target, self._size
+        nearest = self._pass.nearest(scene, camera, *drawing)
+        if self._behind is not None:
+            nearest = nearest.of_hair()
+        found = {
+            DEPTH.name: lambda: nearest.distances(camera),
+            OBJECT_INDEX.name: lambda: nearest.object_numbers(scene),
+            STRAND_INDEX.name: nearest.strand_numbers,
+            TANGENT.name: lambda: unit(self._pass.tangents(scene, camera, *drawing)),
+            NORMAL.name: lambda: nearest.normals(
+                scene,
+                camera,
+                self._pass.on_meshes(
+                    scene, [mesh.vertex_normals for mesh in scene.meshes], camera, *drawing
+                ),
+            ),
+            VECTOR.name: lambda: self._motion(nearest, frame, scene, camera),
+        }
+        for name in DATA & wanted.keys():
+            write(wanted[name], found[name]())
+
+    def _motion(
+        self, nearest: Nearest, frame: float, scene: SceneSnapshot, camera: Camera
+    ) -> Floats:
+        """Where what is nearest was a frame before, and will be a frame later."""
+        moments = {}
+        for step in (-1, 1):
+            self._go_to(frame + step)
+            moments[step] = Moment.of(scene, *self._moment())
+        self._go_to(frame)
+        moments[0] = Moment.of(scene, scene, camera)
+        # cards, and what lies behind all, move as the camera makes them
+        is_there, is_mesh = (nearest.depth < 1.0)[..., None], (nearest.mesh >= 0)[..., None]
+        seen, behind = unprojected(camera, nearest.depth), background(camera, nearest.depth)
+        still, places = np.where(is_there, seen, behind), {}
+        for step, each in moments.items():
+            drawing = camera, self._target, self._size
+            meshes = np.where(is_mesh, self._pass.on_meshes(scene, each.meshes, *drawing), still)
+            points = nearest.on_strands(each.grooms, meshes)
+            places[step] = projected(each.camera, points, self._size)
+        return motion(places[-1], places[0], places[1])
 
     def _show(self, result: Any) -> None:
-        for each in _passes(result):
-            if each.name == COMBINED:
-                each.rect.foreach_set(self._picture.mean().ravel())
-            if each.name == SHADOW and self._shadow is not None:
-                shadow = self._shadow[1].mean()[..., :3]
-                each.rect.foreach_set(np.ascontiguousarray(shadow).ravel())
-            if each.name == SHAFTS and self._apart is not None:
-                shafts = self._shafts.mean()[..., :3]
-                each.rect.foreach_set(np.ascontiguousarray(shafts).ravel())
+        wanted = passes_in(result)
+        write(wanted[COMBINED.name], self._picture.mean())
+        if self._shadow is not None:
+            write(wanted[SHADOW.name], self._shadow[1].mean()[..., :3])
+        if self._apart is not None:
+            write(wanted[SHAFTS.name], self._shafts.mean()[..., :3])
 
 
 def _leave_empty(result: Any) -> None:
     """No hair, and no shadow of any: whoever lays it over a picture changes nothing."""
-    for each in _passes(result):
-        value = 1.0 if each.name == SHADOW else FAR_AWAY if each.name == DEPTH else 0.0
-        each.rect.foreach_set(np.full(len(each.rect) * each.channels, value, np.float32))
+    for name, each in passes_in(result).items():
+        write(each, np.full(len(each.rect) * each.channels, empty_of(name)))
 
 
 def _calm(settings: PictureSettings) -> PictureSettings:
@@ -239,11 +290,6 @@ def _calm(settings: PictureSettings) -> PictureSettings:
 def sky_of(scene: SceneSnapshot, render: bpy.types.RenderSettings) -> Rgba:
     """What is seen where nothing is, premultiplied."""
     return (0.0, 0.0, 0.0, 0.0) if render.film_transparent else (*scene.ambient, 1.0)
-
-
-def _passes(result: Any) -> Iterator[Any]:
-    for layer in result.layers:
-        yield from layer.passes
 
 
 def _dark(scene: SceneSnapshot) -> tuple[str, ...]:

@@ -11,7 +11,8 @@ from which a file that was saved meanwhile is healed.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from typing import Any
 
 import bpy
 from bpy.app.handlers import persistent
@@ -32,6 +33,11 @@ _RENDER = (
     *("border_max_x", "border_max_y", "filter_size", "fps", "fps_base"),
     *("use_motion_blur", "motion_blur_position", "motion_blur_shutter"),
     *("use_multiview", "views_format"),
+)
+#: what its view layer has as that of the artist's scene has it
+_LAYER = (
+    *("use_pass_z", "use_pass_normal", "use_pass_vector", "use_pass_object_index"),
+    *("use_pass_cryptomatte_object", "pass_cryptomatte_depth"),
 )
 
 
@@ -113,13 +119,35 @@ def follow(scene: bpy.types.Scene, hair: bpy.types.Scene) -> None:
     for section in ("picture", "mesh_shadows"):
         ours = getattr(scene.hairloom, section)
         pairs += [(ours, getattr(hair.hairloom, section), name) for name in ours.__annotations__]
+    _copy(pairs)
+    _follow_passes(scene, hair)
+    used = {view.name: view.use for view in scene.render.views}
+    for view in hair.render.views:
+        view.use = used.get(view.name, False)
+
+
+def _follow_passes(scene: bpy.types.Scene, hair: bpy.types.Scene) -> None:
+    """Give the hair scene the passes of the view layer whose hair it draws."""
+    ours, theirs = drawn_layer(scene), hair.view_layers[0]
+    of_hair = ((ours.hairloom, theirs.hairloom, name) for name in ours.hairloom.__annotations__)
+    _copy([*((ours, theirs, name) for name in _LAYER), *of_hair])
+
+
+def _copy(pairs: Iterable[tuple[Any, Any, str]]) -> None:
+    """Properties by name, from one owner to the other, where they differ."""
     for ours, theirs, name in pairs:
         value = getattr(ours, name)
         if getattr(theirs, name) != value:
             setattr(theirs, name, value)
-    used = {view.name: view.use for view in scene.render.views}
-    for view in hair.render.views:
-        view.use = used.get(view.name, False)
+
+
+def passes_changed(scene: bpy.types.Scene) -> None:
+    """The artist has turned a pass of hair on or off."""
+    for layer in scene.view_layers:
+        layer.update_render_passes()
+    hair = hair_scene_of(scene)
+    if hair is not None:
+        _follow_passes(scene, hair)
 
 
 def _hair_in(collection: bpy.types.Collection, seen: set[str]) -> Iterator[bpy.types.Object]:
@@ -189,8 +217,12 @@ def on_render_end(*_: object) -> None:
 
 @persistent
 def on_update(scene: bpy.types.Scene, *_: object) -> None:
-    """Blender asks all scenes of a compositor for a camera before a render begins."""
+    """Blender asks all scenes of a compositor for a camera before a render begins, and the nodes
+    of the compositor have the passes of these scenes."""
     _follow_camera(scene)
+    hair = hair_scene_of(scene)
+    if hair is not None:
+        _follow_passes(scene, hair)
 
 
 @persistent
@@ -214,17 +246,19 @@ HANDLERS = (
 )
 
 
-#: the property that the artist changes, and what follows
-LISTENER = ("hair_scene", switched)
+#: the properties that the artist changes, and what follows
+LISTENERS = (("hair_scene", switched), ("passes", passes_changed))
 
 
 def register() -> None:
     for handlers, handler in HANDLERS:
         handlers.append(handler)
-    changed.subscribe(*LISTENER)
+    for listener in LISTENERS:
+        changed.subscribe(*listener)
 
 
 def unregister() -> None:
-    changed.unsubscribe(*LISTENER)
+    for listener in LISTENERS:
+        changed.unsubscribe(*listener)
     for handlers, handler in reversed(HANDLERS):
         handlers.remove(handler)

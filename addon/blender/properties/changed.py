@@ -16,6 +16,7 @@ _listeners: dict[str, list[Listener]] = {
     "display": [],
     "bake": [],
     "hair_scene": [],
+    "passes": [],
 }
 #: kinds and data-blocks of changes that wait for the end of `together`; None outside of it
 _held: list[tuple[str, bpy.types.ID]] | None = None
@@ -53,6 +54,11 @@ def bake(owner: bpy.types.ID) -> None:
 def hair_scene(owner: bpy.types.ID) -> None:
     """Whether Hairloom draws the hair of a scene over its engine's pictures was changed."""
     _call("hair_scene", owner)
+
+
+def passes(owner: bpy.types.ID) -> None:
+    """Which passes a view layer of a scene has was changed."""
+    _call("passes", owner)
 
 
 @contextmanager

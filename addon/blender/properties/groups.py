@@ -421,6 +421,36 @@ class HAIRLOOM_PG_scene(bpy.types.PropertyGroup):
     }
 
 
+def _pass_of_hair(name: str, description: str) -> Any:
+    return BoolProperty(
+        name=name,
+        description=description,
+        update=lambda self, _context: changed.passes(self.id_data),
+    )
+
+
+class HAIRLOOM_PG_view_layer(bpy.types.PropertyGroup):
+    """Passes of hair that Blender has no setting for."""
+
+    __annotations__ = {
+        "use_alpha": _pass_of_hair(
+            "Alpha", "Deliver how much of each pixel is covered by hair that nothing hides"
+        ),
+        "use_tangent": _pass_of_hair(
+            "Tangent",
+            "Deliver the direction of hair from root to tip, in world space: the mean of all "
+            "strands that are seen in a pixel",
+        ),
+        "use_shadow": _pass_of_hair(
+            "Shadow", "Deliver the fraction of their light that hair leaves to meshes, by colour"
+        ),
+        "use_strand_index": _pass_of_hair(
+            "Strand Index",
+            "Deliver the number of the nearest strand in its groom, counted from 1; 0 is no strand",
+        ),
+    }
+
+
 CLASSES = (
     *SECTION_GROUPS.values(),
     HAIRLOOM_PG_bake,
@@ -429,6 +459,7 @@ CLASSES = (
     HAIRLOOM_PG_groom,
     HAIRLOOM_PG_character,
     HAIRLOOM_PG_scene,
+    HAIRLOOM_PG_view_layer,
 )
 
 
@@ -449,9 +480,13 @@ def register() -> None:
     bpy.types.Scene.hairloom = PointerProperty(
         type=HAIRLOOM_PG_scene, name="Hairloom", description="Settings of this scene's pictures"
     )
+    bpy.types.ViewLayer.hairloom = PointerProperty(
+        type=HAIRLOOM_PG_view_layer, name="Hairloom", description="Passes of hair in this layer"
+    )
 
 
 def unregister() -> None:
+    del bpy.types.ViewLayer.hairloom
     del bpy.types.Scene.hairloom
     del bpy.types.Object.hairloom
     del bpy.types.Curves.hairloom

@@ -1,0 +1,193 @@
+"""What lies nearest in the middle of each pixel, and what a compositor asks of it: which object and
+strand it is, where it was and will be, and how it faces.
+
+Pure numpy: importable without gpu.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..arrays import Floats, Ints
+from ..strands.catmull_rom import between, slope_between
+from .camera import Camera
+from .camera_window import view_depth
+from .scene_snapshot import SceneSnapshot
+from .snapshot import Snapshot
+
+#: distance [m] where nothing is, as Blender's engines have it; and from which what lies behind all
+#: seems to move by the turning of the camera alone
+FAR_AWAY, _BACKGROUND = 1.0e10, 1.0e9
+
+
+@dataclass(frozen=True, eq=False)
+class Nearest:
+    """Each (height, width), row 0 at the bottom.
+
+    depth: of the depth buffer, in [0, 1]; 1 where nothing is.
+    mesh, groom: indices into those of the scene; -1 where it is none. One at most is not -1.
+    strand, place: of a groom's strands, -1 where it is none, and where along its points: 0 at the
+        first one, 1 at the last one, and as much from each to the next.
+    """
+
+    depth: Floats
+    mesh: Ints
+    groom: Ints
+    strand: Ints
+    place: Floats
+
+    def of_hair(self) -> Nearest:
+        """The same where hair is nearest, and nothing elsewhere."""
+        is_hair = self.groom >= 0
+        return replace(
+            self, depth=np.where(is_hair, self.depth, 1.0), mesh=np.full_like(self.mesh, -1)
+        )
+
+    def distances(self, camera: Camera) -> Floats:
+        """How far away it is, along the view [m]."""
+        far = view_depth(camera, self.depth)
+        return np.where(self.depth < 1.0, far, FAR_AWAY).astype(np.float32)
+
+    def object_numbers(self, scene: SceneSnapshot) -> Floats:
+        """The number of its object, 0 where nothing is."""
+        found = np.zeros(self.depth.shape, np.float32)
+        for indices, drawn in ((self.mesh, scene.meshes), (self.groom, scene.grooms)):
+            numbers = np.array([0, *(each.number for each in drawn)], np.float32)
+            found += numbers[indices + 1]
+        return found
+
+    def strand_numbers(self) -> Floats:
+        """The number of its strand in the groom, counted from 1; 0 where it is none."""
+        return (self.strand + 1).astype(np.float32)
+
+    def on_strands(
+        self, grooms: Sequence[Snapshot], meshes: Floats, *, slope: bool = False
+    ) -> Floats:
+        """Where strands are that are nearest, (height, width, 3) [m, world].
+
+        Args:
+            grooms: those of the scene, now or at another time.
+            meshes: (height, width, 3), what is given back elsewhere.
+            slope: give the derivative along them instead.
+        """
+        found = np.array(meshes, np.float64)
+        for index, groom in enumerate(grooms):
+            here = (self.groom == index) & (self.strand >= 0)
+            if here.any():
+                curve = slope_between if slope else between
+                found[here] = curve(*_around(groom, self.strand[here], self.place[here]))
+        return found
+
+    def normals(self, scene: SceneSnapshot, camera: Camera, meshes: Floats) -> Floats:
+        """Unit normals towards the eye, (height, width, 3), world space; 0 where nothing is.
+
+        Of a strand, the direction towards the eye that is across it.
+
+        Args:
+            meshes: (height, width, 3), of those that are nearest, of any length.
+        """
+        height, width = self.depth.shape
+        to_eye = camera.eye[:3] - camera.eye[3] * unprojected(camera, self.depth)
+        grooms = [groom.snapshot for groom in scene.grooms]
+        along = unit(self.on_strands(grooms, np.zeros((height, width, 3)), slope=True))
+        across = to_eye - along * (along * to_eye).sum(axis=2, keepdims=True)
+        outward = np.where((meshes * to_eye).sum(axis=2, keepdims=True) < 0.0, -1.0, 1.0)
+        is_strand, is_mesh = (self.strand >= 0)[..., None], (self.mesh >= 0)[..., None]
+        found = np.where(is_strand, across, np.where(is_mesh, meshes * outward, 0.0))
+        return unit(found).astype(np.float32)
+
+
+@dataclass(frozen=True, eq=False)
+class Moment:
+    """Where all that a scene has now is at some time.
+
+    meshes: (vertex_count, 3) of each [m, world]. grooms: as they are then.
+    """
+
+    camera: Camera
+    meshes: tuple[Floats, ...]
+    grooms: tuple[Snapshot, ...]
+
+    @classmethod
+    def of(cls, scene: SceneSnapshot, then: SceneSnapshot, camera: Camera) -> Moment:
+        """What is not there then, or has other points, is where it is now."""
+        meshes = {mesh.key: mesh.surface.positions for mesh in then.meshes}
+        grooms = {groom.key: groom.snapshot for groom in then.grooms}
+        return cls(
+            camera,
+            tuple(_if_like(meshes.get(mesh.key), mesh.surface.positions) for mesh in scene.meshes),
+            tuple(_as_then(groom.snapshot, grooms.get(groom.key)) for groom in scene.grooms),
+        )
+
+
+def background(camera: Camera, depth: Floats) -> Floats:
+    """Places far behind all that is seen, for what nothing is in front of; (height, width, 3)."""
+    behind = unprojected(camera, np.ones_like(depth))
+    away = behind - camera.eye[:3]
+    return behind if camera.eye[3] == 0.0 else camera.eye[:3] + _BACKGROUND * unit(away)
+
+
+def motion(before: Floats, now: Floats, after: Floats) -> Floats:
+    """Blender's Vector: how far each pixel's content has moved since the frame before, and moves
+    until the next one, both backwards; (height, width, 4) [pixels].
+
+    Args:
+        before, now, after: places in the picture at these times, (height, width, 2) [pixels].
+    """
+    return np.concatenate([before - now, now - after], axis=2).astype(np.float32)
+
+
+def projected(camera: Camera, points: Floats, size: tuple[int, int]) -> Floats:
+    """Places in a picture of this size, (height, width, 2) [pixels] from its lower left corner.
+
+    Args:
+        points: (height, width, 3) [m, world].
+    """
+    matrix = np.asarray(camera.projection, np.float64) @ np.asarray(camera.view, np.float64)
+    clip = points @ matrix[:, :3].T + matrix[:, 3]
+    away = clip[..., 3:]
+    behind_eye = np.abs(away) < 1.0e-12
+    return np.asarray((0.5 + 0.5 * clip[..., :2] / np.where(behind_eye, 1.0, away)) * size)
+
+
+def unprojected(camera: Camera, depth: Floats) -> Floats:
+    """What a depth buffer sees, (height, width, 3) [m, world]."""
+    height, width = depth.shape
+    x, y = np.meshgrid((np.arange(width) + 0.5) / width, (np.arange(height) + 0.5) / height)
+    clip = np.stack([2.0 * x - 1.0, 2.0 * y - 1.0, 2.0 * depth - 1.0, np.ones_like(x)], axis=2)
+    matrix = np.asarray(camera.projection, np.float64) @ np.asarray(camera.view, np.float64)
+    found = clip @ np.linalg.inv(matrix).T
+    return np.asarray(found[..., :3] / found[..., 3:])
+
+
+def _around(groom: Snapshot, strand: Ints, place: Floats) -> tuple[list[Floats], Floats]:
+    """The four points around places on strands, (n, 3) each, and where between the middle two,
+    (n, 1); beyond its ends a strand goes on straight."""
+    first = groom.layout.offsets[strand].astype(np.int64)
+    last = groom.layout.counts[strand].astype(np.int64) - 1
+    along = place.astype(np.float64) * last
+    segment = np.minimum(along.astype(np.int64), last - 1)
+    points = np.asarray(groom.points, np.float64)
+    start, end = points[first + segment], points[first + segment + 1]
+    before = points[first + np.maximum(segment - 1, 0)]
+    after = points[first + np.minimum(segment + 2, last)]
+    before = np.where((segment == 0)[:, None], 2.0 * start - end, before)
+    after = np.where((segment == last - 1)[:, None], 2.0 * end - start, after)
+    return [before, start, end, after], (along - segment)[:, None]
+
+
+def _if_like(then: Floats | None, now: Floats) -> Floats:
+    return now if then is None or then.shape != now.shape else then
+
+
+def _as_then(now: Snapshot, then: Snapshot | None) -> Snapshot:
+    return now if then is None or not then.layout.is_as(now.layout) else then
+
+
+def unit(vectors: Floats) -> Floats:
+    """Of length 1, (height, width, 3); what has no direction stays 0."""
+    length = np.linalg.norm(vectors, axis=2, keepdims=True)
+    return np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0.0)

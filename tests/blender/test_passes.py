@@ -1,0 +1,321 @@
+"""The passes of a render, against Cycles' and Blender's own readers."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+bpy = pytest.importorskip("bpy", reason="these tests need Blender or the bpy module")
+
+import OpenImageIO  # noqa: E402
+from engine_stage import SIZE, passes_in, rendered, set_world  # noqa: E402
+
+from hairloom.addon.blender.engine import hair_scene  # noqa: E402
+from hairloom.addon.render.cryptomatte import matte_id  # noqa: E402
+from hairloom.addon.render.scene_pass import ScenePass  # noqa: E402
+from hairloom.addon.strands import StrandSet  # noqa: E402
+
+pytestmark = [pytest.mark.draws, pytest.mark.usefixtures("gpu_context", "extension")]
+
+COUNT, POINTS, RADIUS = 40, 6, 0.008
+OWN = ("use_alpha", "use_tangent", "use_shadow", "use_strand_index")
+BLENDERS = tuple(
+    f"use_pass_{name}" for name in ("z", "normal", "vector", "object_index", "cryptomatte_object")
+)
+
+
+@pytest.fixture
+def thick(stage: Any, sphere: Any, new_hair: Callable[..., Any]) -> Any:
+    """Opaque thick curves on a ball, as thick at their tips as at their roots."""
+    outward = np.random.default_rng(1).normal(size=(COUNT, 1, 3))
+    outward /= np.linalg.norm(outward, axis=2, keepdims=True)
+    along = np.linspace(0.0, 1.0, POINTS)[None, :, None]
+    points = outward * (0.1 + 0.15 * along) - (0.0, 0.0, 0.06) * along**2
+    offsets, radius = np.arange(COUNT + 1) * POINTS, np.full(COUNT * POINTS, RADIUS)
+    hair = new_hair(sphere, StrandSet(points.reshape(-1, 3), offsets, radius, np.zeros(COUNT)))
+    strands = hair.data.hairloom.strands
+    strands.tip_width = strands.opacity = hair.data.hairloom.detail.min_density = 1.0
+    return hair
+
+
+def asks_for(layer: Any, *names: str) -> None:
+    for name in names:
+        setattr(layer.hairloom if name in OWN else layer, name, True)
+
+
+def of_cycles(stage: Any, folder: Path) -> dict[str, np.ndarray]:
+    """The passes of the same scene by Cycles, in the middle of each pixel."""
+    stage.render.engine = "CYCLES"
+    stage.cycles.samples, stage.cycles.use_denoising, stage.cycles.max_bounces = 1, False, 0
+    stage.cycles.use_adaptive_sampling, stage.cycles.pixel_filter_type = False, "BOX"
+    stage.cycles.filter_width = 0.01
+    found = rendered(folder)
+    stage.render.engine = "HAIRLOOM"
+    return found
+
+
+def matte_of(stage: Any, scene: Any, name: str, folder: Path) -> np.ndarray:
+    """What Blender's own Cryptomatte node selects by a name, in a render of the stage."""
+    tree = stage.compositing_node_group or bpy.data.node_groups.new("Matte", "CompositorNodeTree")
+    if not len(tree.interface.items_tree):
+        tree.interface.new_socket("Image", in_out="OUTPUT", socket_type="NodeSocketColor")
+        tree.nodes.new("NodeGroupOutput")
+    stage.compositing_node_group = tree
+    output = next(node for node in tree.nodes if node.bl_idname == "NodeGroupOutput")
+    picker = tree.nodes.new("CompositorNodeCryptomatteV2")
+    picker.scene, picker.matte_id = scene, name
+    tree.links.new(picker.outputs["Matte"], output.inputs[0])
+    settings = stage.render.image_settings
+    if hasattr(settings, "media_type"):
+        settings.media_type = "IMAGE"
+    settings.file_format, settings.color_depth, settings.color_mode = "OPEN_EXR", "32", "RGB"
+    stage.render.filepath = str(folder / "matte.exr")
+    bpy.ops.render.render(write_still=True)
+    file = OpenImageIO.ImageInput.open(stage.render.filepath)
+    pixels = file.read_image("float")[::-1, :, 0].copy()
+    file.close()
+    return pixels
+
+
+def noted(path: Path) -> dict[str, str]:
+    """What a file says of its Cryptomattes."""
+    file = OpenImageIO.ImageInput.open(str(path))
+    found = {each.name: each.value for each in file.spec().extra_attribs if "crypto" in each.name}
+    file.close()
+    return found
+
+
+def pass_of(found: dict[str, np.ndarray], name: str) -> np.ndarray:
+    return np.squeeze(found[f"ViewLayer.{name}"])
+
+
+@pytest.mark.alike
+@pytest.mark.parametrize("lens", ["PERSP", "ORTHO"])
+def test_depth_motion_and_normals_are_those_of_cycles(
+    stage: Any, sphere: Any, thick: Any, tmp_path: Path, lens: str
+) -> None:
+    """Of hair that goes with its head, and of the head, while the camera turns."""
+    stage.camera.data.type, stage.camera.data.ortho_scale = lens, 0.6
+    asks_for(stage.view_layers[0], *BLENDERS[:4])
+    thick.pass_index, sphere.pass_index = 7, 3
+    bpy.ops.object.shade_smooth()
+    for frame, place in ((1, (0.0, 0.0, 0.0)), (2, (0.03, 0.0, 0.02)), (3, (0.1, -0.05, 0.02))):
+        sphere.location, stage.camera.rotation_euler.z = place, 0.05 * frame**2
+        sphere.keyframe_insert("location", frame=frame)
+        stage.camera.keyframe_insert("rotation_euler", frame=frame)
+    stage.frame_set(2)
+    ours, theirs = rendered(tmp_path), of_cycles(stage, tmp_path)
+    numbers = [pass_of(found, "Object Index") for found in (ours, theirs)]
+    assert {0.0, 3.0, 7.0} == set(np.unique(numbers[0])) == set(np.unique(numbers[1]))
+    assert (numbers[0] == numbers[1]).mean() > 0.98
+    depths = [pass_of(found, "Depth") for found in (ours, theirs)]
+    # elsewhere another strand is nearest, at an edge
+    same = (numbers[0] == numbers[1]) & (numbers[0] > 0.0) & (np.abs(depths[0] - depths[1]) < 0.02)
+    assert same.sum() > 0.97 * (numbers[1] > 0.0).sum()
+    # Cycles meets the surface of a strand, which is drawn as flat
+    differs = np.abs(depths[0] - depths[1])
+    assert differs[same].max() < 2.0 * RADIUS and np.median(differs[same]) < 1.0e-3
+    vectors = [pass_of(found, "Vector") for found in (ours, theirs)]
+    assert np.abs(vectors[1][same]).max() > 5.0
+    differs = np.abs(vectors[0] - vectors[1])[same]
+    assert np.median(differs) < 0.01 and differs.max() < 0.6
+    normals = [pass_of(found, "Normal") for found in (ours, theirs)]
+    on_head = same & (numbers[0] == 3.0)
+    assert np.abs(normals[0] - normals[1])[on_head].max() < 0.02
+    on_hair = same & (numbers[0] == 7.0)
+    # of a flat ribbon in place of a round strand: the mean over its width
+    assert (normals[0] * normals[1]).sum(axis=2)[on_hair].mean() > 0.75
+    # far behind all, where the camera alone moves things
+    if lens == "PERSP":
+        sky = vectors[0][0, 0]
+        focal = SIZE * stage.camera.data.lens / stage.camera.data.sensor_width
+        place = np.arctan(0.5 * (1.0 - SIZE) / focal)
+        for pair, turn in ((slice(0, 1), 0.15), (slice(2, 3), 0.25)):
+            assert sky[pair] == pytest.approx(-focal * turn, rel=0.35), place
+
+
+def test_blenders_cryptomatte_node_selects_what_hair_covers(
+    stage: Any, sphere: Any, new_hair: Any, tmp_path: Path
+) -> None:
+    """Of thin strands whose alpha is that of the picture, before the head and beside it."""
+    hair = new_hair(sphere)
+    hair.data.hairloom.strands.fullness = 8.0
+    asks_for(stage.view_layers[0], "use_pass_cryptomatte_object", *OWN)
+    found = rendered(tmp_path)
+    alpha = pass_of(found, "Hair Alpha")
+    assert 0.02 < (alpha > 0.0).mean() < 0.6 and alpha.max() < 0.999
+    said = noted(tmp_path / "picture.exr")
+    (manifest,) = (value for key, value in said.items() if key.endswith("manifest"))
+    assert set(json.loads(manifest)) == {"Hair", "Head"}
+    matte = matte_of(stage, stage, "Hair", tmp_path)
+    np.testing.assert_allclose(matte, alpha, atol=1e-6)
+    head = matte_of(stage, stage, "Head", tmp_path)
+    inside = head + matte > 0.999
+    assert inside.mean() > 0.03 and (head[inside] < 0.999).any()
+    stage.render.film_transparent, stage.compositing_node_group = True, None
+    whole = pass_of(rendered(tmp_path), "Combined")[..., 3]
+    np.testing.assert_allclose(head + matte, whole, atol=1e-5)
+    stage.view_layers[0].use_pass_cryptomatte_object = False
+    np.testing.assert_array_equal(pass_of(rendered(tmp_path), "Hair Alpha"), alpha)
+    assert not noted(tmp_path / "picture.exr")
+
+
+@pytest.mark.slow(instead="test_blenders_cryptomatte_node_selects_what_hair_covers")
+def test_names_and_coverages_are_those_of_cycles(
+    stage: Any, sphere: Any, thick: Any, tmp_path: Path
+) -> None:
+    asks_for(stage.view_layers[0], "use_pass_cryptomatte_object")
+    stage.hairloom.picture.samples = 8
+    mattes = {"HAIRLOOM": {}, "CYCLES": {}}
+    manifests = {}
+    stage.cycles.samples, stage.cycles.use_denoising, stage.cycles.max_bounces = 32, False, 0
+    for engine, found in mattes.items():
+        stage.render.engine, stage.compositing_node_group = engine, None
+        rendered(tmp_path)
+        said = noted(tmp_path / "picture.exr")
+        (place,) = {key.split("/")[1] for key in said}
+        manifests[engine] = (place, json.loads(said[f"cryptomatte/{place}/manifest"]))
+        for name in ("Hair", "Head"):
+            found[name] = matte_of(stage, stage, name, tmp_path)
+    assert manifests["HAIRLOOM"][0] == manifests["CYCLES"][0]
+    assert manifests["HAIRLOOM"][1].items() <= manifests["CYCLES"][1].items()
+    for name in ("Hair", "Head"):
+        ours, theirs = (found[name] for found in mattes.values())
+        assert abs(ours.mean() - theirs.mean()) < 0.005 and theirs.mean() > 0.02
+        assert np.abs(ours - theirs).mean() < 0.02
+
+
+def test_over_cycles_passes_are_of_hair_alone_and_follow_the_view_layer(
+    stage: Any, sphere: Any, thick: Any, tmp_path: Path
+) -> None:
+    asks_for(stage.view_layers[0], *BLENDERS, *OWN)
+    thick.pass_index, sphere.pass_index = 7, 3
+    own = rendered(tmp_path)
+    stage.render.engine, stage.cycles.samples = "CYCLES", 1
+    stage.hairloom.use_hair_scene = True
+    hair = hair_scene.hair_scene_of(stage)
+    alpha = matte_of(stage, hair, "Hair", tmp_path)
+    np.testing.assert_allclose(alpha, pass_of(own, "Hair Alpha"), atol=1e-6)
+    over = layers_of(stage, hair, tmp_path)
+    numbers = pass_of(own, "Object Index")
+    is_hair = numbers == 7.0
+    np.testing.assert_array_equal(over["Object Index"], np.where(is_hair, 7.0, 0.0))
+    for name in ("Depth", "Strand Index", "Vector", "Normal", "Hair Tangent"):
+        mine, theirs = pass_of(own, name), over[name]
+        if name == "Vector":  # a File Output node writes three numbers of it
+            mine = mine[..., :3]
+        np.testing.assert_allclose(theirs[is_hair], mine[is_hair], atol=1e-6, err_msg=name)
+    assert (over["Depth"][~is_hair] == np.float32(1.0e10)).all()
+    layer = stage.view_layers[0]
+    layer.use_pass_vector = layer.hairloom.use_tangent = False
+    bpy.context.view_layer.update()
+    theirs = hair.view_layers[0]
+    assert not theirs.use_pass_vector and not theirs.hairloom.use_tangent
+    assert theirs.use_pass_z and theirs.hairloom.use_alpha
+
+
+def layers_of(stage: Any, scene: Any, folder: Path) -> dict[str, np.ndarray]:
+    """All outputs of a Render Layers node in a render of the stage, by a File Output node."""
+    tree = stage.compositing_node_group
+    layers = next(node for node in tree.nodes if getattr(node, "scene", None) == scene)
+    out = tree.nodes.new("CompositorNodeOutputFile")
+    out.directory, out.file_name = str(folder), "layers"
+    out.format.media_type, out.format.file_format = "MULTI_LAYER_IMAGE", "OPEN_EXR_MULTILAYER"
+    out.format.color_depth = "32"
+    for socket in layers.outputs:
+        if socket.enabled:
+            kind = "FLOAT" if socket.type == "VALUE" else socket.type
+            out.file_output_items.new(kind, socket.name)
+            tree.links.new(socket, out.inputs[socket.name])
+    bpy.ops.render.render()
+    (path,) = folder.glob("layers*.exr")
+    return {name.rpartition(".")[2]: np.squeeze(each) for name, each in passes_in(path).items()}
+
+
+def test_without_passes_nothing_is_drawn_for_them(
+    stage: Any, sphere: Any, new_hair: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    new_hair(sphere)
+    stage.view_layers[0].use_pass_z = False
+    plain = rendered(tmp_path)
+    assert set(plain) == {"ViewLayer.Combined"}
+    asks_for(stage.view_layers[0], *BLENDERS, *OWN)
+    found = rendered(tmp_path)
+    assert len(found) == 1 + 4 + 3 + 4
+    np.testing.assert_array_equal(found["ViewLayer.Combined"], plain["ViewLayer.Combined"])
+    for name in ("nearest", "tangents", "coverages", "on_meshes"):
+        monkeypatch.setattr(ScenePass, name, None)
+    for name in BLENDERS:
+        setattr(stage.view_layers[0], name, False)
+    for name in OWN:
+        setattr(stage.view_layers[0].hairloom, name, False)
+    assert set(rendered(tmp_path)) == {"ViewLayer.Combined"}
+
+
+def test_a_region_two_grooms_and_two_layers(
+    stage: Any, thick: Any, new_hair: Any, tmp_path: Path
+) -> None:
+    """Each layer has the passes that it asks for; those of a region are those of the whole."""
+    other = new_hair()
+    other.name, other.location.x = "Other", 0.1
+    other.data.hairloom.strands.fullness = 20.0
+    asks_for(stage.view_layers[0], *BLENDERS, *OWN)
+    second = stage.view_layers.new("Second")
+    second.use_pass_z = False
+    asks_for(second, "use_strand_index")
+    whole = rendered(tmp_path)
+    names = {name for name in whole if name.startswith("Second")}
+    assert names == {"Second.Combined", "Second.Strand Index"}
+    np.testing.assert_array_equal(whole["Second.Strand Index"], whole["ViewLayer.Strand Index"])
+    ids = np.concatenate([whole[f"ViewLayer.CryptoObject0{rank}"][..., ::2] for rank in range(3)])
+    assert {matte_id(name) for name in ("Hair", "Other", "Head")} <= set(np.unique(ids))
+    render = stage.render
+    render.use_border = render.use_crop_to_border = True
+    render.border_min_x, render.border_max_x = 0.25, 0.75
+    render.border_min_y, render.border_max_y = 0.5, 1.0
+    part = rendered(tmp_path)
+    for name in ("Object Index", "Strand Index", "CryptoObject00", "Depth"):
+        cut = whole[f"ViewLayer.{name}"][SIZE // 2 :, SIZE // 4 : 3 * SIZE // 4]
+        assert np.isclose(part[f"ViewLayer.{name}"], cut, atol=0.01).mean() > 0.99, name
+
+
+@pytest.mark.slow(instead="test_a_region_two_grooms_and_two_layers")
+def test_one_pixel_and_both_eyes(stage: Any, sphere: Any, thick: Any, tmp_path: Path) -> None:
+    asks_for(stage.view_layers[0], *BLENDERS, *OWN)
+    stage.render.resolution_x = stage.render.resolution_y = 4
+    stage.render.resolution_percentage = 25
+    assert all(np.isfinite(each).all() for each in rendered(tmp_path).values())
+    stage.render.resolution_x = stage.render.resolution_y = SIZE
+    stage.render.resolution_percentage = 100
+    stage.render.use_multiview = True
+    stage.camera.data.stereo.interocular_distance = 0.1
+    rendered(tmp_path)
+    eyes = [passes_in(tmp_path / f"picture_{side}.exr") for side in "LR"]
+    for name in ("Strand Index", "Hair Alpha", "Depth"):
+        one, other = (pass_of(found, name) for found in eyes)
+        assert (one != other).any() and one.any()
+
+
+def test_the_shadow_of_hair_is_what_it_takes_of_the_picture(
+    stage: Any, thick: Any, tmp_path: Path
+) -> None:
+    """Of a sun alone, on the head: the picture without hair's shadow, times the factor."""
+    set_world((0.0, 0.0, 0.0))
+    bpy.ops.object.light_add(type="SUN", rotation=(0.5, 0.0, 0.0))
+    asks_for(stage.view_layers[0], "use_pass_object_index", "use_shadow")
+    thick.pass_index = 7
+    shaded = rendered(tmp_path)
+    thick.data.hairloom.volume.shadows = "none"
+    bare = rendered(tmp_path)
+    factor = shaded["ViewLayer.Hair Shadow"]
+    is_head = (pass_of(shaded, "Object Index") == 0.0) & (pass_of(bare, "Combined")[..., 0] > 0.05)
+    taken = (factor < 0.97).any(axis=2) & is_head
+    assert taken.sum() > 8 and (bare["ViewLayer.Hair Shadow"] == 1.0).all()
+    light = np.maximum(bare["ViewLayer.Combined"][..., :3], 1e-6)
+    ratio = shaded["ViewLayer.Combined"][..., :3] / light
+    assert np.abs(ratio - factor)[taken].mean() < 0.05
