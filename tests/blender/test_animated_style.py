@@ -12,6 +12,7 @@ import pytest
 
 from hairloom.addon.blender.bakes.cache import Cache
 from hairloom.addon.blender.bakes.playback import rig_in
+from hairloom.addon.blender.command_line import command_line
 from hairloom.addon.blender.preview import previews
 from hairloom.addon.blender.preview.bake import Bake
 from hairloom.addon.blender.scene.curves import read_curves
@@ -180,3 +181,19 @@ def test_both_forms_agree_halfway(moving: Any, evaluated: Any) -> None:
         assert session.solver.form == form
         found.append(session.strands.copy())
     np.testing.assert_allclose(*found, atol=2e-4)
+
+
+def test_the_verb_simulates_the_style_of_each_frame(moving: Any, tmp_path: Any) -> None:
+    """Frame by frame what a bake in the scene stores."""
+    moving.hairloom.dynamics.simulated = 0.3
+    for _ in Bake.of([moving], bpy.context.scene).steps():
+        pass
+    baked, verb = Cache(Path(moving.hairloom.bake.folder)), tmp_path / "verb"
+    asked = ["simulate", "--groom", "Hair", "--animated", "--output", str(verb)]
+    assert command_line.run(asked) == 0
+    found = Cache(verb)
+    for frame in range(1, LAST + 1):
+        expected, own = baked.frame(frame), found.frame(frame)
+        assert own.keys() == expected.keys()
+        for name, values in expected.items():
+            np.testing.assert_array_equal(own[name], values, err_msg=f"{name} at {frame}")
