@@ -319,3 +319,40 @@ def test_the_shadow_of_hair_is_what_it_takes_of_the_picture(
     light = np.maximum(bare["ViewLayer.Combined"][..., :3], 1e-6)
     ratio = shaded["ViewLayer.Combined"][..., :3] / light
     assert np.abs(ratio - factor)[taken].mean() < 0.05
+
+
+def test_baked_hair_moves_as_its_copy_does(
+    stage: Any, sphere: Any, thick: Any, tmp_path: Path
+) -> None:
+    """Simulated, so that it lags behind the head: no pixel of a strand moves more, or less, than
+    the points of that curve, which Blender projects."""
+    from bpy_extras.object_utils import world_to_camera_view
+    from mathutils import Vector
+
+    stage.frame_start, stage.frame_end = 1, 3
+    asks_for(stage.view_layers[0], "use_pass_vector", "use_strand_index")
+    for frame in (1, 2, 3):
+        sphere.location = (0.03 * frame, 0.0, 0.0)
+        sphere.keyframe_insert("location", frame=frame)
+    thick.hairloom.dynamics.collider_resolution = 8
+    thick.hairloom.bake.folder = str(tmp_path / "bake")
+    assert bpy.ops.hairloom.bake() == {"FINISHED"}
+    copy, seen = thick.hairloom.bake.copy, []
+    for frame in (1, 2, 3):
+        stage.frame_set(frame)
+        evaluated = copy.evaluated_get(bpy.context.evaluated_depsgraph_get())
+        points = np.empty(len(evaluated.data.points) * 3, np.float32)
+        evaluated.data.position_data.foreach_get("vector", points)
+        places = [
+            world_to_camera_view(stage, stage.camera, evaluated.matrix_world @ Vector(point))[:2]
+            for point in points.reshape(-1, 3)
+        ]
+        seen.append(SIZE * np.array(places).reshape(COUNT, -1, 2))
+    moves = np.concatenate([seen[0] - seen[1], seen[1] - seen[2]], axis=2)
+    assert np.abs(moves).max() > 1.0 and moves.std(axis=(0, 1)).max() > 0.2
+    stage.frame_set(2)
+    found = rendered(tmp_path)
+    strand = pass_of(found, "Strand Index").astype(int) - 1
+    vectors, own = pass_of(found, "Vector")[strand >= 0], moves[strand[strand >= 0]]
+    assert len(vectors) > 200
+    assert (vectors > own.min(axis=1) - 0.1).all() and (vectors < own.max(axis=1) + 0.1).all()
