@@ -20,6 +20,7 @@ static func load_cards(path: String, level := -1) -> Node3D:
 		scene = _read(path)
 	if scene == null or level < 0 or not scene.has_meta(Import.KEY):
 		return scene
+	scene.get_node(Import.Levels.NAME).free()
 	var names: Array = scene.get_meta(Import.KEY)
 	for number in names.size():
 		var hair: MeshInstance3D = scene.find_child(names[number], true, false)

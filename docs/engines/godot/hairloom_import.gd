@@ -5,6 +5,7 @@ extends GLTFDocumentExtension
 ## as it is an ImporterMesh; here it becomes a finished one.
 
 const HairMaterial := preload("hairloom_material.gd")
+const Levels := preload("hairloom_levels.gd")
 ## Settings of a project, and their values if it has none: the camera's field of view, which Godot states
 ## for the height; how wide the bands around the distances are in which two levels are drawn, each in its
 ## own pixels, as a fraction of the distance, 0: levels change at once.
@@ -48,6 +49,10 @@ func _import_post(state: GLTFState, root: Node) -> Error:
 	var ends := _distances(state, sidecar)
 	var half := 0.5 * maxf(_setting("hairloom/cross_fade"), LEAST)
 	var band := Vector2(1.0 - half, 1.0 + half)
+	var levels := Levels.new()
+	levels.name = Levels.NAME
+	root.add_child(levels)
+	levels.owner = root
 	var is_as_written := true
 	for node in root.find_children("*", "Node3D", true, false):
 		var level := names.find(String(node.name))
@@ -56,13 +61,16 @@ func _import_post(state: GLTFState, root: Node) -> Error:
 		var hair := _finished(node)
 		var begin := ends[level - 1] if level > 0 else 0.0
 		var end := ends[level]
+		var size := Levels.size_of(hair.transform.basis)
 		hair.material_override = HairMaterial.with_values(material, {
-			"fade_in": begin * band,
-			"fade_out": end * band,
+			"fade_in": begin / size * band,
+			"fade_out": end / size * band,
 			"fade_center": hair.transform.affine_inverse() * _center(sidecar),
 		})
 		hair.visibility_range_begin = begin * band.x * (1.0 - MARGIN)
 		hair.visibility_range_end = end * band.y * (1.0 + MARGIN)
+		levels.names.append(hair.name)
+		levels.ranges.append(Vector2(hair.visibility_range_begin, hair.visibility_range_end))
 		is_as_written = _is_written(hair, sidecar["levels"][level]) and is_as_written
 	if not is_as_written:
 		push_warning("%s: another program has changed it, so hair may show holes; %s"

@@ -1,7 +1,7 @@
 extends Node3D
 ## Draws asset/cards.glb from view.json's eye: the first two levels alone, all levels where the first one
-## gives way to the second, and the same with the cross-fade turned off. Writes fine.png, coarse.png,
-## both.png and at_once.png into the folder that the command line names.
+## gives way to the second, the same of hair three times as large from three times as far, and with the
+## cross-fade turned off. Writes fine.png, coarse.png, both.png, scaled.png and at_once.png into the folder that the command line names.
 
 const Cards := preload("res://addons/hairloom/godot/hairloom_cards.gd")
 const GLB := "res://asset/cards.glb"
@@ -28,6 +28,15 @@ func _ready() -> void:
 	await _draw(Cards.load_cards(GLB, 0), "fine")
 	await _draw(Cards.load_cards(GLB, 1), "coarse")
 	await _draw(Cards.load_cards(GLB), "both")
+	var large := Cards.load_cards(GLB)
+	large.scale = 3.0 * Vector3.ONE
+	camera.near *= 3.0
+	camera.far *= 3.0
+	camera.look_at_from_position(3.0 * _vector(view["eye"]), 3.0 * _vector(view["target"]))
+	await _draw(large, "scaled")
+	camera.look_at_from_position(_vector(view["eye"]), _vector(view["target"]))
+	camera.near /= 3.0
+	camera.far /= 3.0
 	ProjectSettings.set_setting("hairloom/cross_fade", 0.0)
 	await _draw(Cards.load_cards(GLB), "at_once")
 	get_tree().quit()
