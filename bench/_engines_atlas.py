@@ -14,6 +14,7 @@ Writes out/bench_engines/cards_NAME.png, strands above and cards below, and the 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -149,6 +150,8 @@ def _lit(inputs: CardInputs) -> Snapshot:
     )
 
 
-def _from_all_sides(rig: Rig, hair: Snapshot) -> list[np.ndarray]:
-    cameras = [frame_camera(rig.strands.bounds(), side, FIELD_OF_VIEW, 1.0) for side in SIDES]
+def _from_all_sides(
+    rig: Rig, hair: Snapshot, sides: Sequence[tuple[float, float, float]] = SIDES
+) -> list[np.ndarray]:
+    cameras = [frame_camera(rig.strands.bounds(), side, FIELD_OF_VIEW, 1.0) for side in sides]
     return [render_image(hair, camera, SIZE, SIZE, SAMPLES) for camera in cameras]

@@ -1,13 +1,14 @@
 """Exported cards in programs that know nothing of Hairloom, what a user sees there, the page, the
 springs, the levels of detail, and the atlases that are exported.
 
-See `_engines_plain`, `_engines_page`, `_engines_springs`, `_engines_levels` and `_engines_atlas`
+See `_engines_plain`, `_engines_page`, `_engines_springs`, `_engines_shells`, `_engines_levels` and
+`_engines_atlas`
 for what is compared with what.
 
 Exit code 1: a limit is missed.
 
 make bench NAME=engines                     all parts
-tools/bench.py engines page                 one part: plain, page, springs, levels or atlas
+tools/bench.py engines page                 one part: plain, page, springs, shells, levels or atlas
 tools/bench.py engines atlas sintel few     some grooms, of atlas or levels
 """
 
@@ -20,11 +21,17 @@ from _engines_atlas import atlas_figures
 from _engines_levels import level_figures
 from _engines_page import page_figures
 from _engines_plain import plain_figures
+from _engines_shells import shell_figures
 from _engines_springs import spring_figures
 from _report import report, start
 
 REFERENCE = "our own picture of the strands, drawn as they come, under the same suns"
-PARTS = {"plain": plain_figures, "page": page_figures, "springs": spring_figures}
+PARTS = {
+    "plain": plain_figures,
+    "page": page_figures,
+    "springs": spring_figures,
+    "shells": shell_figures,
+}
 #: figures -> the most, and the least, that they may be
 AT_MOST = {
     "*plain_levels_visible": 1,
@@ -34,6 +41,9 @@ AT_MOST = {
     "*fur_triangles": 8.0,
     "*fur_coverage_percent": 10.0,
     "*fur_color_percent": 10.0,
+    "shells_triangles": 12_000,
+    "shells_coverage_percent": 10.0,
+    "shells_color_percent": 10.0,
     "*few_side_texels": 512,
     "*spring_error_percent": 10.0,
     "*spring_joints": 120,

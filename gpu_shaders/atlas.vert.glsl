@@ -12,12 +12,12 @@ void main()
   vec4 where = texelFetch(cv_places, texel, 0);  // xy place, zw half
   vec4 tangent = texelFetch(cv_tangents, texel, 0);      // xyz tangent, w depth
   vec4 look = texelFetch(cv_looks, texel, 0);    // xyz base, w occlusion
-  vec4 rest = texelFetch(cv_rest, texel, 0);     // x fraction, y strand_id
+  vec4 rest = texelFetch(cv_rest, texel, 0);     // x fraction, y strand_id, z along
 
   vec2 place = leaning(where.xy + side * where.zw, atlas_size, block_start) / block_samples;
   strand_number = strand;
   strand_id = rest.y;
-  along_and_side = vec2(float(station) / float(cv_count - 1), side);
+  along_and_side = vec2(rest.z, side);
   depth_and_fraction = vec2(tangent.w, rest.x);
   strand_tangent = tangent.xyz;
   base_and_occlusion = look;

@@ -2,7 +2,7 @@
 //
 // PRIME 1: depth alone, of opaque pixels. CLIPPED 1: pixels of alpha_range alone; without it nothing
 // is left out here, so that the depth test may come first. TANGENT_MAP 1: a map says which way strands
-// run, in place of the shift texture. NORMAL_MAP 1: a map bends the normal. SHADOWS of hair on hair, and SCATTERING from strand to strand, as strands have
+// run, in place of the shift texture. LAYERED 1: shells, see addon/cards/shells.py. NORMAL_MAP 1: a map bends the normal. SHADOWS of hair on hair, and SCATTERING from strand to strand, as strands have
 // them; where a light has no map, the occlusion stands in.
 #include "lib_card_texture.glsl"
 #if PRIME
@@ -61,6 +61,12 @@ void main()
 #  endif
 
   SkinSeen seen = SkinSeen(card_received, card_beneath.xyz, card_beneath.w);
+  float own_alpha = texture_alpha;
+#  if LAYERED
+  // a texel shows a strand or none; what its layer is in the maps is the mean
+  own_alpha = card_texel_at(
+      alpha_texture, card_uv, float({{card_texture_levels}} - 1), atlas_tiles).x;
+#  endif
   vec3 radiance = vec3(0.0);
 #  if WORLD
   vec4 openness = openness_by_occlusion(card_occlusion, normal);
@@ -79,7 +85,7 @@ void main()
     vec3 to_light, irradiance;
     light_at(lights, index, card_point, to_light, irradiance);
     vec3 path = shadow_path_to_card(
-        index, card_point, texture_alpha, to_light, across, card_axis, card_front);
+        index, card_point, own_alpha, to_light, across, card_axis, card_front);
     irradiance *= path.x < 0.0 ? card_occlusion : path.z;
     float level = 0.0;
 #  if MARSCHNER

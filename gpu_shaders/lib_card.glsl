@@ -25,7 +25,7 @@ vec3 mapped_normal(vec3 texel, vec3 tangent, vec3 normal)
 // its strands. `across`: normal of its plane, of any length.
 float view_compensated_alpha(float alpha, vec3 across, vec3 tangent, vec3 to_eye)
 {
-  float facing = turned_facing(across, tangent, to_eye);
+  float facing = hair_facing(across, tangent, to_eye);
   return 1.0 - pow(1.0 - alpha, {{mean_facing}} / max(facing, {{min_facing}}));
 }
 

@@ -17,10 +17,30 @@ float turned_facing(vec3 across, vec3 tangent, vec3 direction)
   return size > 0.0 ? abs(dot(across, turned)) / size : 1.0;
 }
 
+// The same of a layer that strands cross: how much denser it is as it was baked than from this direction.
+// `tangent` may stand out of its plane.
+float layer_facing(vec3 across, vec3 tangent, vec3 direction)
+{
+  vec3 front = across / max(length(across), 1.0e-30);
+  float upright = dot(tangent, front), along = dot(tangent, direction);
+  float baked = sqrt(1.0 - (1.0 - {{upright_shown}}) * upright * upright);
+  return abs(dot(front, direction)) * baked / sqrt(max(1.0 - along * along, 1.0e-4));
+}
+
+// LAYERED: shells, else cards.
+float hair_facing(vec3 across, vec3 tangent, vec3 direction)
+{
+#if defined(LAYERED) && LAYERED
+  return layer_facing(across, tangent, direction);
+#else
+  return turned_facing(across, tangent, direction);
+#endif
+}
+
 // Factor of the tau that light from this direction meets in a card of view-compensated alpha.
 float view_compensated_depth(vec3 across, vec3 tangent, vec3 direction)
 {
-  return {{mean_turn}} / max(turned_facing(across, tangent, direction), {{min_facing}});
+  return {{mean_turn}} / max(hair_facing(across, tangent, direction), {{min_facing}});
 }
 
 // How much hair lies before and beyond the strand that is seen of such a card; `plane`: before and beyond

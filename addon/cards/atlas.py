@@ -96,12 +96,7 @@ def plan_atlas(
     Raises:
         HairloomError: the atlas is too small for its tiles, or no strand has a width.
     """
-    if not (radius > 0.0).any():
-        raise HairloomError(
-            "no strand has a width, so that the atlas would be empty",
-            place="strands",
-            remedy="Give the strands a radius, or raise Fullness",
-        )
+    check_width(radius)
     settings = settings.fitted(len(strips), *_wanted_texels(strips, radius, cluster, settings))
     atlas = settings.grid
     shapes = _card_shapes(strips, grid, radius, cluster)
@@ -130,6 +125,18 @@ def plan_atlas(
         thickness=crowding * np.where(is_face[medoid], 1.0, settings.strand_width),
         notes=notes,
     )
+
+
+def check_width(radius: Floats) -> None:
+    """Raises:
+    HairloomError: no strand has a width.
+    """
+    if not (radius > 0.0).any():
+        raise HairloomError(
+            "no strand has a width, so that the atlas would be empty",
+            place="strands",
+            remedy="Give the strands a radius, or raise Fullness",
+        )
 
 
 def _wanted_texels(
@@ -240,16 +247,16 @@ def _shared_tiles(
     while parts.sum() > tile_count:  # each kind has one at least
         parts[parts.argmax()] -= 1
     tile = np.zeros(len(kind), np.int32)
-    medoids = np.zeros(0, np.int64)
+    shown = np.zeros(0, np.int64)
     for number, wanted in enumerate(parts):
         own = np.flatnonzero(kind == number)
-        label, medoid = _medoids(features[own], int(wanted), random)
-        tile[own] = len(medoids) + label
-        medoids = np.concatenate([medoids, own[medoid]])
-    return tile, medoids
+        label, medoid = medoids(features[own], int(wanted), random)
+        tile[own] = len(shown) + label
+        shown = np.concatenate([shown, own[medoid]])
+    return tile, shown
 
 
-def _medoids(features: Floats, count: int, random: np.random.Generator) -> tuple[Ints, Ints]:
+def medoids(features: Floats, count: int, random: np.random.Generator) -> tuple[Ints, Ints]:
     """The group of each, (n,), and the member that stands for each group, (count,)."""
     if count >= len(features):
         return np.arange(len(features)), np.arange(len(features))

@@ -197,7 +197,7 @@ def _samples(corners: Floats, shape: tuple[int, int]) -> Iterator[tuple[Ints, In
 def _vertex_values(flat: FlatStrands, fraction: Floats, strand: int, vertices: Ints) -> Floats:
     """fraction, side, along, id, depth, occlusion, tangent, base of the vertices, (3, 12)."""
     cv, sign = vertices // 2, 2.0 * (vertices % 2) - 1.0
-    along = cv / (flat.place.shape[1] - 1)
+    along = flat.along[strand, cv]
     number = np.full(3, flat.strand_id[strand])
     depth, occlusion = flat.depth[strand, cv], flat.occlusion[strand, cv]
     single = np.stack([fraction[strand, cv], sign, along, number, depth, occlusion], axis=1)

@@ -32,6 +32,7 @@ class FlatStrands:
 
     place: (n, station_count, 2) in the atlas, 0 to 1.
     half: (n, station_count, 2) from there to the right edge.
+    along: (n, station_count) from 0 at the strand's root to 1 at its tip.
     depth: (n, station_count) 0 to 1 as in AtlasMaps.
     tangent: (n, station_count, 3) unit vectors in the card's frame.
     base: (n, station_count, 3) the strand's colour as a factor of the hair's, over base_gain.
@@ -42,6 +43,7 @@ class FlatStrands:
 
     place: Floats
     half: Floats
+    along: Floats
     depth: Floats
     tangent: Floats
     base: Floats
@@ -94,6 +96,7 @@ def flat_strands(
     parts = {
         "place": place,
         "half": edge - place,
+        "along": np.broadcast_to(np.linspace(0.0, 1.0, place.shape[1]), place.shape[:2]),
         "depth": np.clip(depth, 0.0, 1.0),
         "tangent": _tangents(points, *(axis[tile] for axis in axes)),
         "base": np.clip(_finer(shade), 0.0, 1.0),

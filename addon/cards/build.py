@@ -26,6 +26,8 @@ from .occlusion_settings import CardOcclusionSettings
 from .on_skin import above_skin, on_skin
 from .order_check import wrong_fraction
 from .settings import CardSettings
+from .shell_plan import ShellPlan
+from .shells import are_wanted, build_shells
 from .short_hair import fitted_to_length
 from .sort import VIEW_COUNT, CardOrders, SortBy, card_of_vertex, in_order, order_steps
 from .steps import map_progress
@@ -74,6 +76,7 @@ class CardBuild:
     backs: the triangles of each level once more, in the order in which back faces are drawn.
     errors: of each level [m], see `levels.CardLevel`: how far it is from the strands' own way.
     plan: what is to be baked into the atlas; None where its tiles are made at random.
+    shell_layers: how many layers shells have; 0: they are cards.
     wrong_fraction: of the pixels of the finest level those that are drawn in a wrong order, see
         `order_check.wrong_fraction`.
     order_notes: where that is much, what can be done.
@@ -85,7 +88,8 @@ class CardBuild:
     levels: tuple[CardMesh, ...]
     backs: tuple[Ints, ...]
     errors: tuple[float, ...]
-    plan: AtlasPlan | None
+    plan: AtlasPlan | ShellPlan | None
+    shell_layers: int = 0
     wrong_fraction: float = 0.0
     order_notes: tuple[str, ...] = ()
     shape_notes: tuple[str, ...] = ()
@@ -127,6 +131,8 @@ def card_steps(
     Raises:
         HairloomError: the atlas is too small for its tiles, or there is nothing to bake into it.
     """
+    if are_wanted(settings, groom.strands, groom.head, bool(edits)):
+        return (yield from _shell_steps(groom, settings, atlas, occlusion, alpha_of, others))
     yield "Cards from strands"
     settings, atlas, shape_notes = fitted_to_length(settings, atlas, groom.strands)
     cards, plan = uncut_cards(groom, settings, atlas)
@@ -173,6 +179,52 @@ def card_steps(
         wrong_fraction=wrong,
         order_notes=_order_notes(wrong, settings),
     )
+
+
+def _shell_steps(
+    groom: CardGroom,
+    settings: CardSettings,
+    atlas: AtlasSettings,
+    occlusion: CardOcclusionSettings,
+    alpha_of: AlphaOf,
+    others: Sequence[CardOccluder],
+) -> Generator[str, None, CardBuild]:
+    """The same of shells, whose order is known."""
+    yield "Shells from strands"
+    assert groom.head is not None
+    made = build_shells(
+        groom.strands,
+        groom.radius,
+        groom.root_normal,
+        groom.head,
+        groom.occlusion,
+        settings,
+        atlas,
+    )
+    meshes = []
+    for level in made.levels:
+        own = 1.0 - occlusion.strength * (1.0 - level.mesh.occlusion)
+        meshes.append(level.mesh.with_occlusion(own.astype(np.float32)))
+    errors = tuple(level.error for level in made.levels)
+    build = CardBuild(tuple(meshes), made.backs, errors, made.plan, settings.shell_layers)
+    yield "Atlas"
+    alpha = alpha_of(build)
+    if others:
+        for number, mesh in enumerate(meshes):
+            rays = occlusion_steps(mesh, others, [], occlusion)
+            shade = yield from _reported("Ambient occlusion", rays)
+            meshes[number] = mesh.with_occlusion(mesh.occlusion * shade)
+    yield "Check of the order"
+    finest = meshes[0]
+    wrong = wrong_fraction(
+        finest,
+        groom.head,
+        front=np.arange(len(finest.triangles)),
+        back=np.arange(len(finest.triangles)).reshape(settings.shell_layers, -1)[::-1].ravel(),
+        alpha=alpha,
+        view_count=_CHECKED_VIEWS,
+    )
+    return replace(build, levels=tuple(meshes), wrong_fraction=wrong)
 
 
 def _order_notes(wrong: float, settings: CardSettings) -> tuple[str, ...]:

@@ -75,9 +75,10 @@ def card_levels(
     Args:
         error: that the rows of the finest level are allowed [m]; None keeps as many as there are.
     """
-    cuts = [_finest(cards, settings, error)]
+    cuts = [_within(_finest(cards, settings, error), cards.group, settings)]
     while cuts[-1].triangle_count and len(cuts) < settings.levels:
-        coarser = _coarser(cuts[-1], cards.group, settings.segment_count)
+        half = cuts[-1].triangle_count / 2.0
+        coarser = _coarser(cuts[-1], cards.group, settings.segment_count, half)
         if coarser.triangle_count > _MAX_KEPT * cuts[-1].triangle_count:
             break
         cuts.append(coarser)
@@ -102,9 +103,21 @@ def _finest(cards: UncutCards, settings: CardSettings, error: float | None) -> _
     return _Cut(strips, count, numbers, segments, errors, columns, allowed, max_allowed)
 
 
-def _coarser(cut: _Cut, group: Ints, most: int) -> _Cut:
-    """Half the triangles, or as near as may be."""
-    half, allowed = cut.triangle_count / 2.0, min(2.0 * cut.error, cut.max_error)
+def _within(cut: _Cut, group: Ints, settings: CardSettings) -> _Cut:
+    """No more triangles than the settings allow, as far as cards can be joined."""
+    budget = settings.max_triangles
+    while budget and cut.triangle_count > budget:
+        target = max(float(budget), cut.triangle_count / 2.0)
+        coarser = _coarser(cut, group, settings.segment_count, target)
+        if coarser.triangle_count == cut.triangle_count:
+            break
+        cut = coarser
+    return cut
+
+
+def _coarser(cut: _Cut, group: Ints, most: int, half: float) -> _Cut:
+    """No more than these triangles, half of what there are or more, or as near as may be."""
+    allowed = min(2.0 * cut.error, cut.max_error)
     if _fewer_rows(cut, allowed, most).triangle_count > half and cut.columns > 1:
         cut = replace(cut, columns=(cut.columns + 1) // 2)
     least = _fewer_rows(cut, allowed, most)

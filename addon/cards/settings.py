@@ -16,6 +16,37 @@ class CardSettings(Settings):
     help_page = "cards"
     owner = "groom"
 
+    kind: str = choice(
+        "cards",
+        (
+            ("cards", "Cards", "Strips of triangles along the hair"),
+            ("shells", "Shells", "Layers of the skin, each of which shows where hair crosses it"),
+            (
+                "auto",
+                "Automatic",
+                "Shells for hair that is short beside the skin that it grows on, as fur and "
+                "stubble are, if nobody has edited its cards; else cards",
+            ),
+        ),
+        label="Kind",
+        description="What stands for the strands",
+    )
+    max_triangles: int = integer(
+        0,
+        label="Max Triangles",
+        description="Maximum number of triangles of the finest level; 0 is no limit for cards, and "
+        "12,000 for shells",
+        soft=(0, 50_000),
+        hard=(0, 1_000_000),
+    )
+    shell_layers: int = integer(
+        12,
+        label="Shell Layers",
+        description="Number of layers of shells from the skin to the tips",
+        soft=(4, 24),
+        hard=(2, 64),
+        source="Lengyel 2001",
+    )
     source: str = choice(
         "clusters",
         (

@@ -6,7 +6,7 @@ compute shader that makes texels of them. Reference: cards/bake.py. The textures
     cv_places  RGBA32F: xy place, zw half width             of each CV
     cv_ways    RGBA32F: xyz tangent, w depth
     cv_looks   RGBA32F: xyz base, w occlusion
-    cv_rest    RG32F:   x fraction of samples that count, y strand_id
+    cv_rest    RGBA32F: x fraction of samples that count, y strand_id, z along
 
     sample_place  RGBA16F: x along, y strand_id, z depth, w occlusion
     sample_way    RGBA16F: xyz tangent, w place across the strand
@@ -130,10 +130,10 @@ class _Bake:
             np.concatenate([flat.place, half], axis=-1),
             np.concatenate([flat.tangent, flat.depth[..., None]], axis=-1),
             np.concatenate([flat.base, flat.occlusion[..., None]], axis=-1),
-            np.stack([fraction, number], axis=-1),
+            np.stack([fraction, number, flat.along, np.zeros_like(fraction)], axis=-1),
         )
         textures = {
-            name: texture_from(strand_rows(value), "RG32F" if name == "cv_rest" else "RGBA32F")
+            name: texture_from(strand_rows(value), "RGBA32F")
             for name, value in zip(_CVS, values, strict=True)
         }
         return cls(flat, half, size, textures, is_sparse=bool((fraction < 1.0).any()))

@@ -42,7 +42,7 @@ _LAYERS_RECIPE = ShaderRecipe(
     numbers=(("FLOAT", "card_thickness"),),
     inputs=_INPUTS,
     varyings=_VARYINGS,
-    defines=(("DEEP", 0), ("CARDS", 1)),
+    defines=(("DEEP", 0), ("CARDS", 1), ("LAYERED", 0)),
 )
 _DEPTH_RECIPE = ShaderRecipe(
     name="opacity_card_depth",
@@ -66,14 +66,18 @@ class _Cards:
     tiles: tuple[float, float]
     thickness: float
     is_view_compensated: bool
+    is_layered: bool
 
     @property
     def feature(self) -> ShaderFeature:
         return ShaderFeature(
-            name="view_compensated" if self.is_view_compensated else "",
+            name="view_compensated" * self.is_view_compensated + "layered" * self.is_layered,
             textures={"alpha_texture": ("FLOAT_2D", self.alpha)},
             numbers={"atlas_tiles": ("VEC2", self.tiles)},
-            defines={"VIEW_COMPENSATED": int(self.is_view_compensated)},
+            defines={
+                "VIEW_COMPENSATED": int(self.is_view_compensated),
+                "LAYERED": int(self.is_layered),
+            },
         )
 
     def draw_layers(self, features: Sequence[ShaderFeature]) -> None:
@@ -120,10 +124,17 @@ class CardOpacity:
         mesh = cards.mesh
         if self._extent[0] is not mesh:
             self._extent = mesh, ball_around(mesh.positions)
-        state = self._serial, cards.thickness, cards.is_view_compensated
+        state = self._serial, cards.thickness, cards.is_view_compensated, cards.is_layered
         tiles = tiles_of(mesh.atlas)
         hair = _Cards(
-            state, self._blocks, batch, alpha, tiles, cards.thickness, cards.is_view_compensated
+            state,
+            self._blocks,
+            batch,
+            alpha,
+            tiles,
+            cards.thickness,
+            cards.is_view_compensated,
+            cards.is_layered,
         )
         lights = kept_lights(snapshot.lights)
         return self._drawing.maps(

@@ -89,6 +89,7 @@ _SHADED_RECIPE = ShaderRecipe(
             ("PRIME", 0),
             ("CLIPPED", 0),
             ("VIEW_COMPENSATED", 0),
+            ("LAYERED", 0),
             ("TANGENT_MAP", 0),
             ("NORMAL_MAP", 0),
         ),
@@ -210,7 +211,10 @@ class CardPass:
         yield self._maps_feature(cards)
         yield ShaderFeature(
             blocks={"shading": ("ShadingSettings", struct_values(snapshot.shading))},
-            defines={"VIEW_COMPENSATED": int(cards.is_view_compensated)},
+            defines={
+                "VIEW_COMPENSATED": int(cards.is_view_compensated),
+                "LAYERED": int(cards.is_layered),
+            },
         )
         is_marschner = snapshot.shading.model == "marschner"
         if is_marschner:

@@ -20,6 +20,7 @@ class CardSnapshot:
         the order of the mesh. Neither counts where cards are sorted for each view.
     is_view_compensated: alpha is what the strands cover on the mean of all turns of a card, as
         a baked atlas has it; cards cover as much at a slant, see card_look.view_compensated_alpha.
+    is_layered: they are shells, each of which shows a part of each strand.
     thickness: of the hair that alpha stands for in shadows, see shading/volume/card_opacity.py.
     base_color: that the base texture is a factor of, where it is not the look's: of strands that
         have colours of their own.
@@ -38,6 +39,7 @@ class CardSnapshot:
     drawing: CardDrawingSettings = field(default_factory=CardDrawingSettings)
     thickness: float = 1.0
     is_view_compensated: bool = False
+    is_layered: bool = False
     base_color: tuple[float, float, float] | None = None
     skin_seen: Floats | None = None
     device: Any = None

@@ -8,7 +8,7 @@ from typing import Any
 import bpy
 
 from ..blender.base.outcome import Outcome, report
-from ..blender.cards.build import order_line
+from ..blender.cards.build import counts_line, order_line
 from ..blender.cards.edits import groom_edits
 from ..blender.cards.made_objects import card_objects
 from ..blender.cards.object import CardObjectJob
@@ -141,8 +141,8 @@ def _short(count: int) -> str:
 
 
 def _counts(obj: bpy.types.Object) -> str:
-    cards, triangles = obj.hairloom.card_object.card_count, len(obj.data.polygons)
-    return f"{cards:,} cards, {triangles:,} triangles"
+    made = obj.hairloom.card_object
+    return counts_line(made.card_count, len(obj.data.polygons), made.shell_layers)
 
 
 CLASSES = (HAIRLOOM_OT_make_cards, HAIRLOOM_OT_discard_card_edits)

@@ -41,6 +41,7 @@ def wavy(count: int, half: float, seed: int = 0) -> FlatStrands:
     parts = (
         place,
         half * taper * np.stack([way[..., 1], -way[..., 0]], axis=-1),
+        random.random((count, STATIONS)),
         np.clip(depth, 0.0, 1.0),
         tangent / np.linalg.norm(tangent, axis=-1, keepdims=True),
         random.random((count, STATIONS, 3)),

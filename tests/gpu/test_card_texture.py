@@ -15,6 +15,7 @@ from hairloom.addon.shading.settings import ShadingSettings
 from hairloom.addon.shading.volume.card_opacity import (
     among_strands,
     card_optical_depth,
+    layer_facing,
     view_compensated_depth,
 )
 
@@ -41,6 +42,24 @@ def test_texel(compute: Callable[..., np.ndarray], size: tuple[int, int]) -> Non
         expected = card_texel(whole, place[chosen], level[chosen], tiles)
         # a driver interpolates with weights of eight bits
         assert np.abs(found[chosen] - expected).max() < 0.01
+
+
+def test_slant_of_shells(compute: Callable[..., np.ndarray]) -> None:
+    normals, tangents, eyes = np.random.default_rng(6).normal(size=(3, *SHAPE, 3))
+    tangents, eyes = (
+        each / np.linalg.norm(each, axis=-1, keepdims=True) for each in (tangents, eyes)
+    )
+    named = {"normals": normals, "tangents": tangents, "eyes": eyes}
+    textures = {name: np.dstack([each, np.ones(SHAPE)]) for name, each in named.items()}
+    found = compute(
+        "layer_facing.glsl",
+        (SHAPE[1], SHAPE[0]),
+        textures={
+            name: np.dstack([each, alpha]).astype(np.float32) for name, each in named.items()
+        },
+    )
+    expected = layer_facing(normals, tangents, eyes)
+    assert found[..., 0] == pytest.approx(expected, rel=1e-3, abs=1e-4)
 
 
 def test_level_and_slant(compute: Callable[..., np.ndarray]) -> None:

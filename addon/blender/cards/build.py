@@ -28,6 +28,7 @@ from ...cards.edits import CardEdits
 from ...cards.follow import CardBinding
 from ...cards.occlusion_settings import CardOcclusionSettings
 from ...cards.settings import CardSettings
+from ...cards.shell_plan import ShellPlan, shell_strands
 from ...cards.steps import map_progress, result_of
 from ...errors import HairloomError
 from ...exchange.textures.card_textures import of_one_size
@@ -50,7 +51,7 @@ from ...shading.drawn_strands import (
 from ...shading.settings import ShadingSettings, StrandSettings
 from ...shading.texture_settings import TextureSettings
 from ...shading.textures import TEXTURES, HairTextures, hair_textures
-from ...shading.volume.card_opacity import StrandArea, card_shadow_area
+from ...shading.volume.card_opacity import UPRIGHT_SHOWN, StrandArea, card_shadow_area
 from ..base.gpu_context import ensure_gpu
 from ..base.outcome import notes_of
 from ..base.thread_work import ThreadWork
@@ -220,6 +221,12 @@ def built_in_thread(work: ThreadWork[Any], inputs: CardInputs) -> MappedCards:
     return result_of(map_progress(build_steps(inputs, draw), work.report))
 
 
+def counts_line(cards: int, triangles: int, shell_layers: int) -> str:
+    """What there is, such as "800 cards, 15,296 triangles"."""
+    things = f"{shell_layers} layers of shells" if shell_layers else f"{cards:,} cards"
+    return f"{things}, {triangles:,} triangles"
+
+
 def order_line(wrong_fraction: float) -> str:
     """How often the order of cards is wrong, such as "18 % of pixels blend in the wrong order"."""
     return f"{100.0 * wrong_fraction:.0f} % of pixels blend in the wrong order"
@@ -261,9 +268,14 @@ def card_maps(inputs: CardInputs, build: CardBuild, draw: AtlasDraw) -> CardMaps
         textures,
         "tangent",
         gain,
-        is_view_compensated="alpha" not in pictures,
+        is_view_compensated="alpha" not in pictures and _lies_in_its_plane(build.plan),
         base_color=brightest_look(_card_color(inputs.rig), look).base_color if colored else None,
     )
+
+
+def _lies_in_its_plane(plan: AtlasPlan | ShellPlan) -> bool:
+    """Whether what the tiles show lies in the plane of what shows them."""
+    return not isinstance(plan, ShellPlan) or plan.is_flat
 
 
 def _card_color(rig: Rig) -> Floats | None:
@@ -285,7 +297,7 @@ def drawing_maps(flat: FlatStrands, size: int) -> Generator[None, None, AtlasMap
 
 def baked_atlas(
     rig: Rig,
-    plan: AtlasPlan,
+    plan: AtlasPlan | ShellPlan,
     shading: ShadingSettings,
     drawn: StrandSettings,
     draw: AtlasDraw = drawn_maps,
@@ -300,7 +312,10 @@ def baked_atlas(
     colors = strand_variation(
         groom.number, grid.shape[1], shading, strands.color_grid, strands.group
     )
-    flat = flat_strands(plan, grid, groom.radius, colors)
+    if isinstance(plan, ShellPlan):
+        flat = shell_strands(plan, grid, groom.radius, UPRIGHT_SHOWN, colors)
+    else:
+        flat = flat_strands(plan, grid, groom.radius, colors)
     return dilated(draw(flat, plan.size), plan.grid)
 
 
@@ -318,7 +333,7 @@ def has_gpu() -> bool:
 class BuiltCards:
     """Cards at rest, tied to the guides of their rig, with all that drawing them needs.
 
-    wrong_fraction: see cards.build.CardBuild.
+    shell_layers, wrong_fraction: see cards.build.CardBuild.
     notes: what the artist should know.
     """
 
@@ -327,6 +342,7 @@ class BuiltCards:
     rest: CardSnapshot
     strand_area: StrandArea
     card_shadow_area: float
+    shell_layers: int
     wrong_fraction: float
     notes: tuple[str, ...]
 
@@ -342,12 +358,14 @@ class BuiltCards:
                 textures,
                 maps.has_tangent_map,
                 build.backs[0],
-                is_view_compensated=maps.is_view_compensated,
+                is_view_compensated=maps.is_view_compensated or build.shell_layers > 0,
+                is_layered=build.shell_layers > 0,
                 base_color=maps.base_color,
                 skin_seen=rest_skin_seen(rig, mesh.positions, mesh.axes),
             ),
             StrandArea.of(strands),
             card_shadow_area(mesh.positions, mesh.triangles, mesh.uv, textures.alpha),
+            build.shell_layers,
             build.wrong_fraction,
             cards.notes,
         )

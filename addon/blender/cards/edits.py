@@ -59,7 +59,7 @@ def groom_edits(
         obj.update_from_editmode()
     record = read_record(obj.data)
     if record is None:
-        if not len(obj.data.polygons):
+        if not len(obj.data.polygons) or obj.hairloom.card_object.shell_layers:
             return None, ()
         return None, (
             f"{obj.name}: it holds no record of what was made, so edits cannot be recognised and "
@@ -113,6 +113,12 @@ def write_record(mesh: bpy.types.Mesh, made: MadeCards, marks: Ints, matrix: Flo
     content["padding"] = list(grid.padding)
     content["triangle_count"] = made.triangle_count
     mesh[RECORD] = content
+
+
+def forget_record(mesh: bpy.types.Mesh) -> None:
+    """Of a mesh that holds no cards any more."""
+    if RECORD in mesh:
+        del mesh[RECORD]
 
 
 def read_record(mesh: bpy.types.Mesh) -> MadeCards | None:

@@ -491,8 +491,10 @@ class CardExport:
     def outcome(self, written: WrittenCards) -> Outcome:
         """What is reported to the artist."""
         first, *beside = written.files
+        mesh, layers = written.mesh, written.build.shell_layers
+        things = f"{layers} layers of shells" if layers else f"{mesh.card_count:,} cards"
         result = (
-            f"Wrote {written.mesh.card_count:,} cards in {len(written.levels)} levels of detail "
+            f"Wrote {things} in {len(written.levels)} levels of detail "
             f"to {first.parent.name}/{first.name}, with {len(beside)} files beside it. "
             f"{order_line(written.build.wrong_fraction)}"
         )

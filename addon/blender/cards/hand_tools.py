@@ -142,6 +142,12 @@ def add_along_curves(
 
 
 def _record_of(obj: bpy.types.Object) -> MadeCards:
+    if obj.hairloom.card_object.shell_layers:
+        raise HairloomError(
+            "it holds shells, which have no cards to work on",
+            place=obj.name,
+            remedy="Set Kind to Cards and press Make Cards Again",
+        )
     record = read_record(obj.data)
     if record is None:
         raise HairloomError(

@@ -21,7 +21,7 @@ from ..base.attributes import set_attribute
 from ..base.objects import Handle, head_of, matrix_of
 from ..base.thread_work import ThreadWork
 from .build import MappedCards, built_in_thread, order_line, read_inputs
-from .edits import MADE_ATTRIBUTE, TILE_LAYER, read_pieces, write_record
+from .edits import MADE_ATTRIBUTE, TILE_LAYER, forget_record, read_pieces, write_record
 from .made_objects import card_objects
 from .material import fill_image, new_material
 from .mesh import OCCLUSION_IS_OURS, OCCLUSION_LAYER, fill_mesh
@@ -111,10 +111,13 @@ def _write(
             obj.data.materials.append(material)
         obj.hairloom.card_object.image = image
         obj.hairloom.card_object.card_count = cards.card_count
+        obj.hairloom.card_object.shell_layers = build.shell_layers
         obj.hairloom.card_object.wrong_fraction = build.wrong_fraction
         _fill(obj.data, cards, matrix)
         if not level and build.made is not None:
             _put_on_record(obj.data, build.made, cards, matrix)
+        elif not level:
+            forget_record(obj.data)
         objects.append(obj)
     return objects
 

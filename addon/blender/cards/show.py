@@ -25,7 +25,7 @@ from ...render.strand_layout import NO_STRANDS
 from ..base import latest_job
 from ..base.latest_job import LatestJob, Work
 from ..properties.groom_settings import GroomSettings
-from .build import BuiltCards, CardInputs, cards_key, order_line
+from .build import BuiltCards, CardInputs, cards_key, counts_line, order_line
 from .edits import groom_edits, same_edits
 from .occluders import Occluders, read_occluders
 from .textures import chosen_pictures
@@ -117,7 +117,8 @@ class ShownCards:
         if self._built is None or self._shown is None:
             return ()
         cards, triangles, _ = self.counts
-        return f"{cards:,} cards, {triangles:,} triangles", order_line(self._built.wrong_fraction)
+        line = counts_line(cards, triangles, self._built.shell_layers)
+        return line, order_line(self._built.wrong_fraction)
 
     def want(self, rig: Rig, settings: GroomSettings) -> None:
         """Cards of this rig by these settings from now on; nothing is built twice."""

@@ -82,6 +82,7 @@ def written_cards(
     written = write_cards(path, inputs, output, report.stage, motion)
     report.facts.update(
         cards=written.mesh.card_count,
+        card_shell_layers=written.build.shell_layers,
         card_triangles=len(written.mesh.triangles),
         card_levels=[len(level.triangles) for level in written.levels],
         card_order_wrong=round(written.build.wrong_fraction, 4),

@@ -49,6 +49,12 @@ class HAIRLOOM_PG_card_object(bpy.types.PropertyGroup):
             options={"HIDDEN"},
             override=OVERRIDABLE,
         ),
+        "shell_layers": IntProperty(
+            name="Shell Layers",
+            description="How many layers of shells this mesh holds; 0: it holds cards",
+            options={"HIDDEN"},
+            override=OVERRIDABLE,
+        ),
         "wrong_fraction": FloatProperty(
             name="Wrong Order",
             description="Fraction of the pixels that the finest level draws in a wrong order, from "

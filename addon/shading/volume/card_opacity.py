@@ -30,6 +30,8 @@ MAX_ALPHA = 0.98
 MEAN_TURN = 2.0 / np.pi
 #: where a card is nearly on edge, it counts as this far turned to the eye, or to the light
 MIN_FACING = 0.1
+#: how much of an upright piece's length a layer of shells shows, squared
+UPRIGHT_SHOWN = 0.5
 #: fewer strands than that are as good as none [1]
 MIN_TAU = 1.0e-3
 
@@ -50,6 +52,22 @@ def turned_facing(across: Floats, tangent: Floats, direction: Floats) -> Floats:
     size = np.linalg.norm(across, axis=-1) * np.linalg.norm(turned, axis=-1)
     facing = np.abs(np.sum(across * turned, axis=-1)) / np.maximum(size, 1.0e-30)
     return np.where(size > 0.0, facing, 1.0)
+
+
+def layer_facing(across: Floats, tangent: Floats, direction: Floats) -> Floats:
+    """How much denser a layer of shells is as it was baked than from a direction, (...).
+
+    A slab of hair, in which strands run along the tangent, covers sin(tangent, direction) / |cos|
+    of the slant; baked it covers what is seen from straight above, and of upright strands a part
+    of their length. Arguments of `turned_facing`, but the tangent may stand out of the plane.
+    """
+    front = across / np.maximum(np.linalg.norm(across, axis=-1, keepdims=True), 1.0e-30)
+    upright = np.sum(tangent * front, axis=-1)
+    along = np.sum(tangent * direction, axis=-1)
+    baked = np.sqrt(1.0 - (1.0 - UPRIGHT_SHOWN) * upright**2)
+    sine = np.sqrt(np.maximum(1.0 - along**2, 1.0e-4))
+    facing: Floats = np.abs(np.sum(front * direction, axis=-1)) * baked / sine
+    return facing
 
 
 def view_compensated_depth(across: Floats, tangent: Floats, direction: Floats) -> Floats:

@@ -68,6 +68,14 @@ def test_each_level_has_about_half_the_triangles_of_the_one_before(columns: int)
         assert 0.4 <= coarser / finer <= 0.6
 
 
+@pytest.mark.parametrize("budget", [600, 2400])
+def test_the_finest_level_keeps_to_a_budget_of_triangles(budget: int) -> None:
+    settings = CardSettings(levels=2, max_triangles=budget)
+    levels = card_levels(fall(), settings, 0.0)
+    assert 0.7 * budget <= len(levels[0].mesh.triangles) <= budget
+    assert len(levels[1].mesh.triangles) <= 0.6 * len(levels[0].mesh.triangles)
+
+
 def test_rows_go_first_then_columns_then_cards() -> None:
     settings = CardSettings(levels=5, column_count=2, error=0.002)
     levels = card_levels(fall(), settings, settings.error)

@@ -13,6 +13,7 @@ from hairloom.addon.shading.volume.card_opacity import (
     among_strands,
     card_optical_depth,
     card_shadow_area,
+    layer_facing,
     view_compensated_depth,
 )
 from hairloom.addon.shading.volume.opacity import (
@@ -106,6 +107,20 @@ def test_even_cards_count_the_same_from_all_sides_of_their_strands() -> None:
     assert counted[width > MIN_FACING] == pytest.approx(2.0 / np.pi)
     assert counted.mean() == pytest.approx(width.mean(), rel=0.04)
     assert view_compensated_depth(across[:1], tangent, tangent) == pytest.approx(2.0 / np.pi)
+
+
+def test_a_slab_of_hair_covers_what_its_strands_do_from_any_side() -> None:
+    """n strands of a unit's length and width w to the unit of skin cover n w sin(t, e) / |n . e|:
+    those that lie alone what was baked, from straight above."""
+    up = np.array([0.0, 0.0, 2.0])
+    angle = np.linspace(0.0, 1.2, 7)
+    eye = np.stack([np.sin(angle), 0.0 * angle, np.cos(angle)], axis=-1)
+    lying = layer_facing(up, np.array([0.0, 1.0, 0.0]), eye)
+    assert lying == pytest.approx(np.cos(angle))
+    along_the_way = layer_facing(up, np.array([1.0, 0.0, 0.0]), eye)
+    assert along_the_way == pytest.approx(np.ones(7))
+    upright = layer_facing(up, np.array([0.0, 0.0, 1.0]), eye[1:])
+    assert upright == pytest.approx(np.sqrt(0.5) / np.tan(angle[1:]))
 
 
 @pytest.mark.parametrize("tau", [0.05, 0.7, 3.0])

@@ -1,0 +1,80 @@
+"""What short hair is like from place to place: what its shells are shaped by."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import Floats
+from ..strands import StrandSet
+from ..strands.nearest import nearest_points
+
+#: Beyond all colours, where a strand has none of its own.
+_NO_COLOR = 4.0
+#: Strands that the shape of hair is learnt from; neighbours by which it is known how long hair is
+#: at a place, and what it is like there. Nine tenths of them are no longer than the shells.
+_MAX_LEARNT, _NEIGHBOURS, _LIKE, _LONGEST = 20_000, 24, 12, 0.97
+
+
+def between(values: Floats, along: Floats) -> Floats:
+    """Values (n, cv_count, c) of CVs at parts (n, m) of their way, (n, m, c); beyond 1 they go
+    on as they end."""
+    place = along * (values.shape[1] - 1)
+    low = np.clip(place.astype(np.int64), 0, values.shape[1] - 2)
+    rows = np.arange(len(values))[:, None]
+    first = values[rows, low]
+    found: Floats = first + (values[rows, low + 1] - first) * (place - low)[..., None]
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class ShortHair:
+    """Strands by the length that hair has around each: from the skin to the outermost layer.
+
+    roots: (n, 3) [m]. shift: (n, 2 layers + 1, 3) [m] from there, at the borders and middles of the
+    slabs. occlusion: (n, layers) in their middles, not a
+    number beyond the tip. reach: (n,) how long hair is there [m].
+    hue: (n, 3) the colour as an eye tells it apart; beyond all colours where it is the look's.
+    """
+
+    roots: Floats
+    shift: Floats
+    occlusion: Floats
+    reach: Floats
+    hue: Floats
+
+    @classmethod
+    def of(cls, strands: StrandSet, occlusion: Floats | None, layers: int) -> ShortHair:
+        chosen = np.linspace(
+            0, strands.strand_count - 1, min(strands.strand_count, _MAX_LEARNT)
+        ).astype(np.int64)
+        grid = strands.grid[chosen].astype(np.float64)
+        length = np.maximum(strands.lengths()[chosen], 1e-12)
+        near = nearest_points(grid[:, 0], grid[:, 0], _NEIGHBOURS)[0]
+        reach = np.quantile(length[near], _LONGEST, axis=1)
+        station = np.linspace(0.0, 1.0, 2 * layers + 1)
+        # what is shorter goes on as it ends
+        along = np.minimum((reach / length)[:, None] * station, 2.0)
+        shift = between(grid, along) - grid[:, :1]
+        light: Floats = np.ones((len(chosen), layers))
+        if occlusion is not None:
+            within = along[:, 1::2]
+            light = between(occlusion[chosen][..., None], np.minimum(within, 1.0))[..., 0]
+            light[within > 1.0] = np.nan
+        hue = np.full((len(chosen), 3), _NO_COLOR)
+        if strands.color_grid is not None:
+            hue = np.nan_to_num(strands.color_grid[chosen].mean(axis=1), nan=_NO_COLOR)
+        return cls(grid[:, 0], shift, light, reach, np.sqrt(np.maximum(hue, 0.0)))
+
+    def around(self, places: Floats) -> ShortHair:
+        """What hair is like around places (m, 3)."""
+        near = nearest_points(places, self.roots, _LIKE)[0]
+        shift, reach, hue = (part[near].mean(axis=1) for part in (self.shift, self.reach, self.hue))
+        there = self.occlusion[near]
+        reaches = np.isfinite(there)
+        total = np.where(reaches, there, 0.0).sum(axis=1)
+        light = total / np.maximum(reaches.sum(axis=1), 1)
+        # where none reaches, it is as open as hair is outermost
+        light = np.where(reaches.any(axis=1), light, np.nanmax(there, axis=(1, 2))[:, None])
+        return ShortHair(places, shift, light, reach, hue)

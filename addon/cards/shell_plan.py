@@ -1,0 +1,400 @@
+"""What the atlas of shells shows: patterns, each with a tile for every layer.
+
+A texture of its own for all skin would need more than 4,096 texels a side on any head: strands are
+a tenth of a millimetre wide, and there is a layer for each slab. So a few patches of skin stand
+for all: k-medoids over how long, how upright, and of which colour hair is there. A tile shows the
+strands that grow on and around such a patch, each layer their pieces within its slab, as they are
+seen from straight above. A strand's pieces follow one another from layer to layer, so that from
+above the layers show the strands themselves. At the hairline patches show fewer strands of a
+pattern.
+
+A piece that stands upright is a dot from above and a line from the side. A layer shows it by a
+length between the two.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..arrays import Floats, Ints
+from ..strands import StrandSet, Surface
+from ..strands.closest_point import search_of
+from ..strands.vectors import unit, unit_or
+from .atlas import check_width, medoids
+from .atlas_grid import AtlasGrid
+from .atlas_settings import AtlasSettings
+from .bake_strands import FlatStrands
+from .shell_hair import ShortHair, between
+from .shell_skin import ShellSkin
+
+#: Patterns of whole hair, and which fractions of the strands others show; below the borders a
+#: patch has the next.
+_PATTERNS, _KEPT, _BORDERS = 4, (1.0, 0.6, 0.3), (0.8, 0.45)
+#: Fewer strands than expected are none by chance from this many standard deviations on.
+_BY_CHANCE = 2.0
+#: How far around a patch strands are taken, as a fraction of its tile; strands of a tile at most.
+_AROUND, _MAX_STRANDS = 0.15, 2500
+#: Cells of a tile along each side, at most, of which empty ones are filled from others; and the
+#: strands that a cell should hold, so that chance leaves none empty.
+_MAX_CELLS, _PER_CELL = 5, 16.0
+#: A texel is this fraction of a strand's width.
+_STRAND_TEXELS = 1.5
+#: How much wider strands are than drawn, of what cards have.
+_WIDER = 0.9
+#: Hair lies where the sine of its angle to the skin is smaller.
+_FLAT = 0.6
+#: A difference of colour that counts like hair twice as long: of square roots of linear colours.
+_HUE = 0.15
+_TINY = 1e-12
+
+
+@dataclass(frozen=True, eq=False)
+class Patches:
+    """Pieces of skin. Each array has a row a patch.
+
+    center: (n, 3) [m]. axes: (n, 3, 3) unit vectors: across hair, along it within the skin, and
+    the normal; right-handed. extent: how far it goes from its center [m]. area: [m^2].
+    features: (n, k) of the hair, by which patches are alike. surface: all of them, and of_triangle
+    the patch of each of its triangles.
+    """
+
+    center: Floats
+    axes: Floats
+    extent: Floats
+    area: Floats
+    features: Floats
+    surface: Surface
+    of_triangle: Ints
+
+    @classmethod
+    def of(
+        cls, skin: ShellSkin, of_triangle: Ints, hair: ShortHair, vertex: Ints, patch: Ints
+    ) -> tuple[Patches, Floats]:
+        """The patches, and the places of their vertices in their planes, (len(vertex), 2) [m]."""
+        count = int(of_triangle.max()) + 1
+        vertices = np.bincount(patch, minlength=count)[:, None]
+
+        def mean(values: Floats) -> Floats:
+            rows = values[vertex].reshape(len(vertex), -1)
+            sums = [np.bincount(patch, row, count) for row in rows.T]
+            return np.stack(sums, axis=1) / vertices
+
+        across = np.zeros((count, 3))
+        np.add.at(across, of_triangle, skin.area_vectors)
+        normal = unit(across)
+        lean = mean(hair.shift[:, -1])
+        upright = np.einsum("pi,pi->p", lean, normal)
+        flat = lean - upright[:, None] * normal
+        any_side = np.eye(3)[np.abs(normal).argmin(axis=1)]
+        side = unit(np.cross(unit_or(flat, any_side, 1e-9), normal))
+        axes = np.stack([side, np.cross(normal, side), normal], axis=1)
+        center = mean(skin.positions)
+        away = np.einsum("vi,vai->va", skin.positions[vertex] - center[patch], axes[patch, :2])
+        high, low = np.full((count, 2), -np.inf), np.full((count, 2), np.inf)
+        np.maximum.at(high, patch, away)
+        np.minimum.at(low, patch, away)
+        middle = (high + low) / 2.0
+        center = center + np.einsum("pa,pai->pi", middle, axes[:, :2])
+        reach = np.maximum(mean(hair.reach[:, None])[:, 0], _TINY)
+        leaning = upright / np.maximum(np.linalg.norm(lean, axis=1), _TINY)
+        shape = np.stack([np.log2(reach), 2.0 * leaning], axis=1)
+        features = np.concatenate([shape, mean(hair.hue) / _HUE], axis=1)
+        area = np.bincount(of_triangle, skin.areas, count)
+        extent = (high - low).max(axis=1) / 2.0
+        surface = Surface(skin.positions, skin.triangles)
+        made = cls(center, axes, extent, area, features, surface, of_triangle)
+        return made, away - middle[patch]
+
+
+@dataclass(frozen=True, eq=False)
+class ShellPlan:
+    """All that the bake needs beside the strands' points and radii.
+
+    grid: how the atlas is divided; a pattern's layers are tiles one after another. size: of the
+    atlas [pixels]. half: half of the side of the square that a tile shows [m].
+    features: (pattern_count, k) of whole patterns, see `Patches`; thinned: the pattern of which two
+    more show fewer strands, or None.
+    center: (pattern_count, 3), axes: (pattern_count, 3, 3), reach: (pattern_count,) [m] how long
+    hair is there.
+    strands, pattern: (n,) which strands each pattern shows. shift: (n, 2) how far aside [m].
+    thickness: (pattern_count,) factor of the radii.
+    density: of roots on most patches [1/m^2]. roots: by which it is known of others, (m, 3) [m].
+    head: that hair grows on.
+    is_flat: whether hair lies rather than stands.
+    notes: what the artist should know.
+    """
+
+    grid: AtlasGrid
+    size: int
+    layers: int
+    half: float
+    features: Floats
+    thinned: int | None
+    center: Floats
+    axes: Floats
+    reach: Floats
+    strands: Ints
+    pattern: Ints
+    shift: Floats
+    thickness: Floats
+    density: float
+    roots: Floats
+    head: Surface
+    is_flat: bool
+    notes: tuple[str, ...] = ()
+
+    def pattern_of(self, patches: Patches) -> Ints:
+        """The pattern that each patch shows, (patch_count,) int32."""
+        gap = ((patches.features[:, None] - self.features) ** 2).sum(axis=2)
+        pattern = gap.argmin(axis=1)
+        if self.thinned is not None:
+            kept = kept_steps(patches, self.roots, self.density)
+            pattern = np.where(kept > 0, len(self.features) - 1 + kept, pattern)
+        return pattern.astype(np.int32)
+
+
+def kept_steps(patches: Patches, roots: Floats, density: float) -> Ints:
+    """Which of _KEPT each patch has, (patch_count,)."""
+    found = search_of(patches.surface).closest(roots).triangle
+    count = np.bincount(patches.of_triangle[found], minlength=len(patches.area))
+    expected = density * patches.area
+    is_thin = count < expected - _BY_CHANCE * expected**0.5
+    steps = np.digitize(-count / np.maximum(expected, _TINY), -np.array(_BORDERS), right=True)
+    return np.where(is_thin, steps, 0)
+
+
+def plan_shells(
+    patches: Patches,
+    strands: StrandSet,
+    radius: Floats,
+    root_normal: Floats,
+    head: Surface,
+    layers: int,
+    settings: AtlasSettings,
+) -> ShellPlan:
+    """Choose what the tiles show.
+
+    Args:
+        strands: uniform. radius: (strand_count, cv_count) [m]. root_normal: (strand_count, 3).
+
+    Raises:
+        HairloomError: the atlas is too small for its tiles, or no strand has a width.
+    """
+    check_width(radius)
+    roots = strands.roots.astype(np.float64)
+    random = np.random.default_rng(settings.seed)
+    density = _usual_density(patches, roots)
+    step = kept_steps(patches, roots, density)
+    whole = np.flatnonzero(step == 0)
+    whole = whole if len(whole) else np.arange(len(step))
+    _, chosen = medoids(patches.features[whole], min(_PATTERNS, len(whole)), random)
+    features = patches.features[whole[chosen]]
+    source, kept = list(whole[chosen]), [_KEPT[0]] * len(chosen)
+    thinned = None
+    if (step > 0).any():
+        gap = ((patches.features[step > 0][:, None] - features) ** 2).sum(axis=2)
+        thinned = int(np.bincount(gap.argmin(axis=1)).argmax())
+        source += [source[thinned]] * (len(_KEPT) - 1)
+        kept += _KEPT[1:]
+    half = 1.02 * float(np.quantile(patches.extent, 0.95))
+    shown = [
+        _shown(patches, patch, half, fraction, density, roots, root_normal, random)
+        for patch, fraction in zip(source, kept, strict=True)
+    ]
+    count = np.array([len(strand) for strand, _, _ in shown])
+    crowding = np.array([each[2] for each in shown])
+    used = np.concatenate([strand for strand, _, _ in shown])
+    pattern = np.repeat(np.arange(len(shown)), count)
+    thickness = _WIDER * settings.strand_width * crowding
+    texel = 2.0 * float(np.median(radius[used].mean(axis=1))) * thickness[0] / _STRAND_TEXELS
+    fitted = _fitted(settings, layers * len(shown), 2.0 * half / texel)
+    texels = _STRAND_TEXELS * fitted.inner_tile[0] * texel / (2.0 * half)
+    length = strands.lengths()[used]
+    return ShellPlan(
+        grid=fitted.grid,
+        size=fitted.side,
+        layers=layers,
+        half=half,
+        features=features,
+        thinned=thinned,
+        center=patches.center[source],
+        axes=patches.axes[source],
+        reach=np.array([np.quantile(length[pattern == p], 0.9) for p in range(len(shown))]),
+        strands=used,
+        pattern=pattern,
+        shift=np.concatenate([shift for _, shift, _ in shown]),
+        thickness=thickness,
+        density=density,
+        roots=roots,
+        head=head,
+        is_flat=float(np.median(patches.features[:, 1])) < 2.0 * _FLAT,
+        notes=_notes(texels),
+    )
+
+
+def _usual_density(patches: Patches, roots: Floats) -> float:
+    found = search_of(patches.surface).closest(roots).triangle
+    count = np.bincount(patches.of_triangle[found], minlength=len(patches.area))
+    return float(np.median((count / np.maximum(patches.area, _TINY))[count > 0]))
+
+
+def _shown(
+    patches: Patches,
+    patch: int,
+    half: float,
+    fraction: float,
+    density: float,
+    roots: Floats,
+    root_normal: Floats,
+    random: np.random.Generator,
+) -> tuple[Ints, Floats, float]:
+    """The strands of a tile, how far aside each is shown, (n, 2) [m], and for how many
+    each stands."""
+    axes, away = patches.axes[patch], roots - patches.center[patch]
+    place = away @ axes[:2].T
+    is_near = (np.abs(place) <= (1.0 + _AROUND) * half).all(axis=1)
+    is_near &= (np.abs(away @ axes[2]) <= half) & (root_normal @ axes[2] > 0.3)
+    own = np.flatnonzero(is_near)
+    expected = density * (2.0 * (1.0 + _AROUND) * half) ** 2
+    every, shift = _filled(own, place[own], half, expected, random)
+    wanted = int(np.ceil(fraction * len(every)))
+    kept = np.sort(random.permutation(len(every))[: min(wanted, _MAX_STRANDS)])
+    return every[kept], shift[kept], wanted / len(kept)
+
+
+def _filled(
+    own: Ints,
+    place: Floats,
+    half: float,
+    expected: float,
+    random: np.random.Generator,
+) -> tuple[Ints, Floats]:
+    """With copies in cells of the tile that have no hair, as at a rim: others show it as well."""
+    reach = (1.0 + _AROUND) * half
+    cells = int(np.clip((expected / _PER_CELL) ** 0.5, 1.0, _MAX_CELLS))
+    cell = np.clip(((place / reach + 1.0) * 0.5 * cells).astype(int), 0, cells - 1)
+    number = cell[:, 0] * cells + cell[:, 1]
+    count = np.bincount(number, minlength=cells**2)
+    usual = expected / cells**2
+    is_full = count >= min(usual - _BY_CHANCE * usual**0.5, float(count.max()))
+    full = np.flatnonzero(is_full)
+    all_own = [own[is_full[number]]]
+    all_shift = [np.zeros((len(all_own[0]), 2))]
+    for empty in np.flatnonzero(~is_full):
+        of = random.choice(full)
+        copied = number == of
+        step = np.array(divmod(int(empty), cells)) - divmod(int(of), cells)
+        all_own.append(own[copied])
+        moved = step * 2.0 * reach / cells
+        all_shift.append(np.tile(moved, (int(copied.sum()), 1)))
+    return np.concatenate(all_own), np.concatenate(all_shift)
+
+
+def _fitted(settings: AtlasSettings, tile_count: int, texels: float) -> AtlasSettings:
+    """With square tiles, as many as are needed."""
+    columns = 1 << round(np.log2(tile_count) / 2.0)
+    square = replace(settings, columns=columns, rows=-(-tile_count // columns))
+    return square.fitted(tile_count, texels, texels)
+
+
+def _notes(texels: float) -> tuple[str, ...]:
+    if texels >= 1.0:
+        return ()
+    return (
+        f"strands are {texels:.2g} pixels of the atlas wide and show as fainter lines; a larger "
+        "atlas, fewer Shell Layers or a higher Max Triangles would show them as they are",
+    )
+
+
+def shell_strands(
+    plan: ShellPlan,
+    grid: Floats,
+    radius: Floats,
+    upright_shown: float,
+    base: Floats | None = None,
+    seed: int = 0,
+) -> FlatStrands:
+    """The pieces of the strands of the plan in its tiles, tile after tile.
+
+    Args:
+        upright_shown: how much of an upright piece's length shows, squared.
+        grid, radius, base: as of `bake_strands.flat_strands`.
+    """
+    layers, pattern = plan.layers, plan.pattern
+    points = grid[plan.strands].astype(np.float64)
+    length = np.linalg.norm(np.diff(points, axis=1), axis=2).sum(axis=1)
+    slab = (plan.reach[pattern] / np.maximum(length, _TINY))[:, None] * (
+        np.linspace(0.0, 1.0, layers + 1)
+    )
+    start, end = slab[:, :-1], np.minimum(slab[:, 1:], 1.0)
+    mean = _mean_shifts(plan, points, slab)
+    strand, layer = np.nonzero(start < 1.0)
+    order = np.argsort(pattern[strand] * layers + layer, kind="stable")
+    strand, layer = strand[order], layer[order]
+    own = pattern[strand]
+    along = np.stack([start[strand, layer], end[strand, layer]], axis=1)
+    ends = between(points[strand], along)
+    axes = plan.axes[own]
+    away = ends - (plan.center[own] + mean[own, layer])[:, None]
+    away = np.einsum("nei,nai->nea", away, axes)
+    away[..., :2] += plan.shift[strand][:, None]
+    step = away[:, 1] - away[:, 0]
+    flat, whole = np.linalg.norm(step[:, :2], axis=1), np.linalg.norm(step, axis=1)
+    shown = np.sqrt(flat**2 + upright_shown * np.maximum(whole**2 - flat**2, 0.0))
+    heading = unit_or(np.pad(step[:, :2], ((0, 0), (0, 1))), (0.0, 1.0, 0.0), 1e-9)[:, :2]
+    middle = away[..., :2].mean(axis=1)
+    thick = between(radius[plan.strands][..., None].astype(np.float64)[strand], along)[..., 0]
+    thick = thick * plan.thickness[own, None]
+    side = 2.0 * plan.half
+    place = middle[:, None] + np.array([[-0.5], [0.5]]) * (shown[:, None] * heading)[:, None]
+    place = 0.5 + place / side
+    aside = np.stack([heading[:, 1], -heading[:, 0]], axis=1)[:, None] * thick[..., None] / side
+    room = np.array([free / (1.0 - 2.0 * free) for free in plan.grid.padding])
+    inside = (np.abs(0.5 - place.mean(axis=1)) < 0.5 + room).all(axis=1)
+    place = np.clip(place, np.abs(aside) - room, 1.0 + room - np.abs(aside))
+    tile = (own * layers + layer)[:, None]
+    on_atlas = plan.grid.uv(tile, place[..., 0], place[..., 1])
+    edge = plan.grid.uv(tile, place[..., 0] + aside[..., 0], place[..., 1] + aside[..., 1])
+    area = np.bincount(tile[:, 0], 2.0 * thick.mean(axis=1) * shown, len(plan.reach) * layers)
+    shade = np.ones((len(points), 2, 3)) if base is None else base[plan.strands]
+    gain = max(float(shade.max(initial=0.0)), 1.0)
+    ids = (np.random.default_rng(seed).permutation(len(points)) + 0.5) / len(points)
+    parts = {
+        "place": on_atlas,
+        "half": edge - on_atlas,
+        "along": along,
+        "depth": np.clip(0.5 + away[..., 2] / side, 0.0, 1.0),
+        "tangent": np.repeat(_directions(step, mean, own, layer, axes)[:, None], 2, axis=1),
+        "base": between(shade[strand], along) / gain,
+        "occlusion": np.repeat(_beneath(area, side**2, layers)[tile], 2, axis=1),
+        "strand_id": ids[strand],
+    }
+    single = {name: part[inside].astype(np.float32) for name, part in parts.items()}
+    return FlatStrands(**single, base_gain=gain)
+
+
+def _mean_shifts(plan: ShellPlan, points: Floats, slab: Floats) -> Floats:
+    """How far the middle of each slab is from the roots, (pattern_count, layers, 3) [m]."""
+    middle = (slab[:, :-1] + slab[:, 1:]) / 2.0
+    shift = between(points, np.minimum(middle, 2.0)) - points[:, :1]
+    means = [shift[plan.pattern == pattern].mean(axis=0) for pattern in range(len(plan.reach))]
+    return np.stack(means)
+
+
+def _directions(step: Floats, mean: Floats, own: Ints, layer: Ints, axes: Floats) -> Floats:
+    """Directions of the pieces where the mean one is up the picture, (n, 3) unit vectors."""
+    course = np.gradient(np.pad(mean, ((0, 0), (1, 0), (0, 0))), axis=1)[:, 1:]
+    along = unit(np.einsum("ni,nai->na", course[own, layer], axes))
+    right = unit_or(np.cross(along, (0.0, 0.0, 1.0)), (1.0, 0.0, 0.0))
+    frame = np.stack([right, along, np.cross(right, along)], axis=1)
+    return unit_or(np.einsum("ni,nai->na", step, frame), (0.0, 1.0, 0.0), 1e-12)
+
+
+def _beneath(area: Floats, side: float, layers: int) -> Floats:
+    """What the layers above let through from the front, of each tile: exp(-tau)."""
+    tau = (area / side).reshape(-1, layers)
+    above = tau[:, ::-1].cumsum(axis=1)[:, ::-1] - tau
+    open_: Floats = np.exp(-above).ravel()
+    return open_

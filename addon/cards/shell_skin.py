@@ -1,0 +1,240 @@
+"""The skin that hair grows on, in as many triangles as a layer of shells may have.
+
+The skin is cut finely; its vertices are gathered into cells of about one size (centroidal Voronoi
+cells; Lloyd 1982), and cells that meet become a triangle (Valette and Chassery 2004, "Approximated
+centroidal Voronoi diagrams for uniform polygonal mesh coarsening"). So the triangles are even,
+whatever the skin's own are like, and there are as many of them as are wanted.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import Bools, Floats, Ints
+from ..strands import Surface
+from ..strands.closest_point import search_of
+from ..strands.morton import morton_code
+from ..strands.nearest import nearest_points
+from ..strands.vectors import unit
+from ..strands.weld import same_places
+
+#: How far from a root there is hair, in distances between roots.
+_REACH = 2.5
+#: How many times finer than the triangles that are made the skin is cut, and pieces at most.
+_FINER, _MAX_PIECES = 4.0, 400_000
+#: How far cells are kept apart along the normal, as a fraction of an edge: both sides of a sheet.
+_SIDES_APART = 0.4
+_ROUNDS, _ATTEMPTS = 10, 5
+#: A triangle that faces farther away from its patch than this cosine is one of its own.
+_APART = 0.6
+#: A triangle of less than this fraction of the usual area has no direction, and shows nothing.
+_SLIVER = 0.02
+#: The four quarters of a triangle, by its corners and the middles of its edges.
+_QUARTERS = np.array(
+    [
+        [[2, 0, 0], [1, 1, 0], [1, 0, 1]],
+        [[1, 1, 0], [0, 2, 0], [0, 1, 1]],
+        [[1, 0, 1], [0, 1, 1], [0, 0, 2]],
+        [[0, 1, 1], [1, 0, 1], [1, 1, 0]],
+    ]
+) / 2.0  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class ShellSkin:
+    """A coarse skin under hair.
+
+    positions, normals: (vertex_count, 3) [m], on the skin, and unit normals of the triangles there.
+    triangles: (triangle_count, 3), counter-clockwise seen from outside.
+    error: nine tenths of the skin under hair are nearer to it than this [m].
+    """
+
+    positions: Floats
+    normals: Floats
+    triangles: Ints
+    error: float
+
+    @property
+    def middles(self) -> Floats:
+        """Of the triangles, (triangle_count, 3) [m]."""
+        middles: Floats = self.positions[self.triangles].mean(axis=1)
+        return middles
+
+    @property
+    def facings(self) -> Floats:
+        """Of the triangles, mean normals, (triangle_count, 3)."""
+        return unit(self.normals[self.triangles].mean(axis=1))
+
+    @property
+    def area_vectors(self) -> Floats:
+        """Across the triangles, as long as their areas, (triangle_count, 3) [m^2]."""
+        return area_vectors(self.positions[self.triangles])
+
+    @property
+    def areas(self) -> Floats:
+        """Of the triangles, (triangle_count,) [m^2]."""
+        return np.linalg.norm(self.area_vectors, axis=1)
+
+    def patches(self, count: int, layers: Floats) -> Ints:
+        """A patch of about one size for each triangle, (triangle_count,), from 0 without gaps; more
+        than `count` where triangles that lie together face apart.
+
+        Args:
+            layers: (layer_count, vertex_count, 3) [m], where the vertices are in layers of shells.
+        """
+        label = gathered(self.middles, self.facings, self.areas, count)
+        is_lonely = np.zeros(len(label), bool)
+        for positions in (self.positions, *layers):
+            vectors = area_vectors(positions[self.triangles])
+            across = np.zeros((len(self.triangles), 3))
+            np.add.at(across, label, vectors)
+            is_lonely |= np.einsum("ti,ti->t", unit(across[label]), unit(vectors)) < _APART
+        alone = np.bincount(label, is_lonely)[label] > 0
+        label = np.where(alone, len(label) + np.arange(len(label)), label)
+        return np.asarray(np.unique(label, return_inverse=True)[1]).reshape(-1)
+
+
+@dataclass(frozen=True, eq=False)
+class FineSkin:
+    """The skin under hair cut finely; as `ShellSkin`, with the area around each vertex [m^2]."""
+
+    positions: Floats
+    normals: Floats
+    triangles: Ints
+    area: Floats
+
+
+def areas_of(corners: Floats) -> Floats:
+    """Areas of triangles (n, 3, 3), (n,) [m^2]."""
+    area: Floats = np.linalg.norm(area_vectors(corners), axis=1)
+    return area
+
+
+def area_vectors(corners: Floats) -> Floats:
+    """Across triangles (n, 3, 3), as long as their areas, (n, 3) [m^2]."""
+    vectors: Floats = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) / 2.0
+    return vectors
+
+
+def fine_skin(head: Surface, roots: Floats, spacing: float, triangle_count: int) -> FineSkin:
+    """The skin near roots, finely enough for this many coarse triangles.
+
+    Args:
+        roots: (strand_count, 3) [m]. spacing: of them, on the mean [m].
+    """
+    reach = _REACH * spacing
+    middle = head.corners.mean(axis=1)
+    size = np.linalg.norm(head.corners - middle[:, None], axis=2).max(axis=1)
+    away = nearest_points(middle, roots, 1)[1][:, 0]
+    chosen = np.flatnonzero(away <= reach + size)
+    corners = head.corners[chosen].astype(np.float64)
+    normals = head.vertex_normals()[head.triangles[chosen]].astype(np.float64)
+    edge = _edge(min(float(areas_of(corners).sum()), len(roots) * spacing**2), triangle_count)
+    while len(corners) and 4 * len(corners) <= _MAX_PIECES:
+        longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
+        if np.quantile(longest, 0.9) <= edge / _FINER:
+            break
+        corners, normals = (
+            np.einsum("qck,nki->nqci", _QUARTERS, part).reshape(-1, 3, 3)
+            for part in (corners, normals)
+        )
+    number = same_places(corners.reshape(-1, 3).astype(np.float32))
+    _, first = np.unique(number, return_index=True)
+    positions, triangles = corners.reshape(-1, 3)[first], number.reshape(-1, 3)
+    has_hair = nearest_points(positions, roots, 1)[1][:, 0] <= reach
+    triangles = triangles[has_hair[triangles].all(axis=1)]
+    used, compact = np.unique(triangles, return_inverse=True)
+    triangles = np.asarray(compact).reshape(-1, 3)
+    around = np.repeat(areas_of(positions[used][triangles]) / 3.0, 3)
+    area = np.bincount(triangles.ravel(), around, len(used))
+    return FineSkin(positions[used], unit(normals.reshape(-1, 3)[first][used]), triangles, area)
+
+
+def coarse_skin(fine: FineSkin, head: Surface, triangle_count: int) -> ShellSkin | None:
+    """No more triangles than this, and nearly as many; None where the hair is too small for any."""
+    cells, best = max(triangle_count // 2, 3), None
+    for _ in range(_ATTEMPTS):
+        found = _of_cells(fine, head, min(cells, len(fine.positions)))
+        count = len(found.triangles)
+        if count <= triangle_count and count > (0 if best is None else len(best.triangles)):
+            best = found
+        if 0.93 * triangle_count <= count <= triangle_count or cells > len(fine.positions):
+            break
+        wanted = 0.97 * triangle_count / max(count, 1)
+        cells = max(int(cells * np.clip(wanted, 0.4, 2.5)), 3)
+    return best
+
+
+def gathered(places: Floats, normals: Floats, area: Floats, count: int) -> Ints:
+    """A cell of about one size for each place, (n,), of at most `count`.
+
+    Args:
+        places, normals: (n, 3); places of opposite normals are kept apart. area: (n,) weights.
+    """
+    edge = _edge(float(area.sum()), 2 * count)
+    points = places + _SIDES_APART * edge * normals
+    order = np.argsort(morton_code(points), kind="stable")
+    middle = points[order[np.linspace(0, len(order) - 1, count).round().astype(int)]]
+    for _ in range(_ROUNDS):
+        label = nearest_points(points, middle, 1)[0][:, 0]
+        total = np.bincount(label, area, len(middle))
+        sums = [np.bincount(label, area * axis, len(middle)) for axis in points.T]
+        used = total > 0.0
+        middle = np.stack(sums, axis=1)[used] / total[used, None]
+    return nearest_points(points, middle, 1)[0][:, 0]
+
+
+def _of_cells(fine: FineSkin, head: Surface, count: int) -> ShellSkin:
+    label = gathered(fine.positions, fine.normals, fine.area, count)
+    # a cell at the border stands on it, or hair would recede by half a cell
+    weight = np.where(_is_border(fine), 1.0, 1e-6) * fine.area
+    has_border = np.bincount(label, _is_border(fine)) > 0
+    weight = np.where(has_border[label], weight, fine.area)
+    total = np.maximum(np.bincount(label, weight), 1e-30)
+    place = np.stack([np.bincount(label, weight * axis) for axis in fine.positions.T], axis=1)
+    on_skin = search_of(head).closest(place / total[:, None])
+    normals = head.vertex_normals()[head.triangles[on_skin.triangle]]
+    normals = unit(np.einsum("nk,nki->ni", on_skin.barycentric, normals))
+
+    met = label[fine.triangles]
+    is_corner = (met[:, 0] != met[:, 1]) & (met[:, 1] != met[:, 2]) & (met[:, 2] != met[:, 0])
+    met = met[is_corner]
+    _, first = np.unique(np.sort(met, axis=1), axis=0, return_index=True)
+    triangles = met[np.sort(first)]
+    corners = on_skin.point[triangles]
+    face = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    is_turned = np.einsum("ni,ni->n", face, normals[triangles].sum(axis=1)) < 0.0
+    triangles[is_turned] = triangles[is_turned, ::-1]
+    area = areas_of(on_skin.point[triangles])
+    triangles = triangles[area > _SLIVER * np.median(area)] if len(area) else triangles
+    used, compact = np.unique(triangles, return_inverse=True)
+    triangles = np.asarray(compact).reshape(-1, 3)
+    positions = on_skin.point[used]
+    # its own normals: those of the skin at a point may be of a fold that the triangles lack
+    across = np.zeros_like(positions)
+    np.add.at(across, triangles, area_vectors(positions[triangles])[:, None])
+    return ShellSkin(positions, unit(across), triangles, _error(fine, positions, triangles))
+
+
+def _is_border(fine: FineSkin) -> Bools:
+    """Which vertices lie where the hair ends, (vertex_count,)."""
+    edges = np.concatenate([fine.triangles[:, [k, (k + 1) % 3]] for k in range(3)])
+    pairs, times = np.unique(np.sort(edges, axis=1), axis=0, return_counts=True)
+    border = np.zeros(len(fine.positions), bool)
+    border[pairs[times == 1]] = True
+    return border
+
+
+def _error(fine: FineSkin, positions: Floats, triangles: Ints) -> float:
+    if not len(triangles):
+        return 0.0
+    places = fine.positions[:: max(len(fine.positions) // 4000, 1)]
+    found = search_of(Surface(positions, triangles)).closest(places)
+    return float(np.percentile(found.distance, 90.0))
+
+
+def _edge(area: float, triangle_count: int) -> float:
+    """Of even triangles of this area together [m]."""
+    return float((4.0 / 3.0**0.5 * max(area, 1e-30) / max(triangle_count, 1)) ** 0.5)

@@ -1,0 +1,35 @@
+"""Shells of the short coat beside its strands, as `_engines_atlas` compares cards of fur.
+
+From eight sides, with the settings that the hairstyle has: shells_triangles of the finest level,
+and shells_coverage_percent and shells_color_percent, the worst side and channel.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from _cards_strands import _differences
+from _engines_atlas import _added, _from_all_sides, _lit
+
+from hairloom.addon.blender.cards.build import BuiltCards
+from hairloom.addon.blender.cards.show import without_strands
+from hairloom.addon.cards.settings import CardSettings
+
+SIDES = tuple((np.sin(turn), -np.cos(turn), 0.25) for turn in 2.0 * np.pi * np.arange(8) / 8)
+
+
+def shell_figures() -> dict[str, Any]:
+    inputs = _added("short_coat")
+    kind = replace(inputs.settings[CardSettings], kind="shells", levels=1)
+    inputs = replace(inputs, settings=inputs.settings.with_settings(kind))
+    strands, made = _lit(inputs), BuiltCards.now(inputs)
+    drawn = replace(without_strands(strands), cards=made.drawn(made.rest, inputs.settings))
+    pictures = [_from_all_sides(inputs.rig, hair, SIDES) for hair in (strands, drawn)]
+    coverage, color = _differences(*pictures)
+    return {
+        "shells_triangles": len(made.rest.mesh.triangles),
+        "shells_coverage_percent": 100.0 * coverage,
+        "shells_color_percent": 100.0 * color,
+    }

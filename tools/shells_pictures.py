@@ -1,0 +1,51 @@
+"""Draws the picture of shells in docs/cards.md: two hairstyles as strands and as shells.
+
+python tools/shells_pictures.py FOLDER
+"""
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import bpy
+import gpu
+from cards_pictures import HEIGHT, SAMPLES, WIDTH, of_addon
+from extension_loader import load_package
+from make_styles import animal
+
+STYLES = ("short_coat", "buzz_cut")
+
+
+def pictures_of(style: str) -> list[Any]:
+    """Strands, and shells."""
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    load_package().register()
+    if style == "short_coat":
+        animal()
+    bpy.ops.hairloom.add_hairstyle(style=style, plays=False)
+    hair = bpy.context.object
+    builds, cards = of_addon("blender.cards.build"), of_addon("cards.settings").CardSettings
+    inputs, _, _ = builds.read_inputs(hair, bpy.context.evaluated_depsgraph_get())
+    shells = replace(inputs.settings[cards], kind="shells", levels=1)
+    inputs = replace(inputs, settings=inputs.settings.with_settings(shells))
+    rig, groom = inputs.rig, of_addon("blender.properties.groom_settings").GroomSettings.of(hair)
+    ambient = inputs.settings[of_addon("shading.ambient_settings").AmbientSettings]
+    prepared = of_addon("blender.sessions.prepared_groom").prepared(rig, ambient)
+    studio = of_addon("blender.pictures.studio").Studio(prepared, groom)
+    size = WIDTH, HEIGHT, SAMPLES
+    strands = studio.picture(rig.rest_pose, rig.strands.points, *size)
+    made = builds.BuiltCards.now(inputs)
+    return [strands, studio.card_picture(made.drawn(made.rest, inputs.settings), *size)]
+
+
+def main(folder: Path) -> None:
+    gpu.init()
+    pairs = [pictures_of(style) for style in STYLES]
+    rows = [picture for pair in zip(*pairs, strict=True) for picture in pair]
+    images = of_addon("blender.base.images")
+    images.write_png(folder / "shells.png", images.contact_sheet(rows, len(STYLES)))
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))
