@@ -20,7 +20,8 @@ STYLES = ("short_coat", "buzz_cut")
 def pictures_of(style: str) -> list[Any]:
     """Strands, and shells."""
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    load_package().register()
+    if not hasattr(bpy.types.Scene, "hairloom"):
+        load_package().register()
     if style == "short_coat":
         animal()
     bpy.ops.hairloom.add_hairstyle(style=style, plays=False)

@@ -121,7 +121,6 @@ class ShellPlan:
     strands, pattern: (n,) which strands each pattern shows. shift: (n, 2) how far aside [m].
     thickness: (pattern_count,) factor of the radii.
     density: of roots on most patches [1/m^2]. roots: by which it is known of others, (m, 3) [m].
-    head: that hair grows on.
     is_flat: whether hair lies rather than stands.
     notes: what the artist should know.
     """
@@ -141,7 +140,6 @@ class ShellPlan:
     thickness: Floats
     density: float
     roots: Floats
-    head: Surface
     is_flat: bool
     notes: tuple[str, ...] = ()
 
@@ -170,7 +168,6 @@ def plan_shells(
     strands: StrandSet,
     radius: Floats,
     root_normal: Floats,
-    head: Surface,
     layers: int,
     settings: AtlasSettings,
 ) -> ShellPlan:
@@ -228,7 +225,6 @@ def plan_shells(
         thickness=thickness,
         density=density,
         roots=roots,
-        head=head,
         is_flat=float(np.median(patches.features[:, 1])) < 2.0 * _FLAT,
         notes=_notes(texels),
     )

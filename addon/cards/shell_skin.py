@@ -8,7 +8,7 @@ whatever the skin's own are like, and there are as many of them as are wanted.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -27,6 +27,10 @@ _FINER, _MAX_PIECES = 4.0, 400_000
 #: How far cells are kept apart along the normal, as a fraction of an edge: both sides of a sheet.
 _SIDES_APART = 0.4
 _ROUNDS, _ATTEMPTS = 10, 5
+#: Places of the skin at which it is looked for bulges, about.
+_MAX_BULGES = 20_000
+#: How far a vertex is raised at most, in what the coarse skin is off the skin.
+_MAX_RAISED = 2.5
 #: A triangle that faces farther away from its patch than this cosine is one of its own.
 _APART = 0.6
 #: A triangle of less than this fraction of the usual area has no direction, and shows nothing.
@@ -49,12 +53,14 @@ class ShellSkin:
     positions, normals: (vertex_count, 3) [m], on the skin, and unit normals of the triangles there.
     triangles: (triangle_count, 3), counter-clockwise seen from outside.
     error: nine tenths of the skin under hair are nearer to it than this [m].
+    raised: the positions moved out, so that no skin bulges out of the triangles.
     """
 
     positions: Floats
     normals: Floats
     triangles: Ints
     error: float
+    raised: Floats
 
     @property
     def middles(self) -> Floats:
@@ -164,7 +170,7 @@ def coarse_skin(fine: FineSkin, head: Surface, triangle_count: int) -> ShellSkin
             break
         wanted = 0.97 * triangle_count / max(count, 1)
         cells = max(int(cells * np.clip(wanted, 0.4, 2.5)), 3)
-    return best
+    return None if best is None else _raised(best, fine)
 
 
 def gathered(places: Floats, normals: Floats, area: Floats, count: int) -> Ints:
@@ -215,7 +221,25 @@ def _of_cells(fine: FineSkin, head: Surface, count: int) -> ShellSkin:
     # its own normals: those of the skin at a point may be of a fold that the triangles lack
     across = np.zeros_like(positions)
     np.add.at(across, triangles, area_vectors(positions[triangles])[:, None])
-    return ShellSkin(positions, unit(across), triangles, _error(fine, positions, triangles))
+    error = _error(fine, positions, triangles)
+    return ShellSkin(positions, unit(across), triangles, error, positions)
+
+
+def _raised(skin: ShellSkin, fine: FineSkin) -> ShellSkin:
+    """With vertices raised so far that hardly any skin under hair bulges out of the triangles: each
+    bulge moves the corners of the triangle below by as little as it takes together."""
+    places = np.arange(0, len(fine.positions), max(len(fine.positions) // _MAX_BULGES, 1))
+    on = search_of(Surface(skin.positions, skin.triangles)).closest(fine.positions[places])
+    out = skin.facings[on.triangle]
+    height = np.einsum("ni,ni->n", fine.positions[places] - on.point, out)
+    # what is beyond the border is not below a triangle
+    is_over = (height > 0.5 * on.distance) & (on.distance > 0.0)
+    corner, weight = skin.triangles[on.triangle], on.barycentric
+    need = height[:, None] * weight / np.sum(weight**2, axis=1, keepdims=True)
+    most = np.zeros(len(skin.positions))
+    np.maximum.at(most, corner[is_over], need[is_over])
+    raised = np.minimum(most, _MAX_RAISED * skin.error)[:, None] * skin.normals
+    return replace(skin, raised=skin.positions + raised)
 
 
 def _is_border(fine: FineSkin) -> Bools:

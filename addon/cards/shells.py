@@ -27,7 +27,6 @@ from ..strands.vectors import unit
 from .atlas_settings import AtlasSettings
 from .card_mesh import CardMesh
 from .levels import CardLevel
-from .on_skin import above_skin
 from .settings import CardSettings
 from .shell_hair import ShortHair
 from .shell_plan import Patches, ShellPlan, plan_shells
@@ -45,8 +44,6 @@ _TRIANGLES = 12_000
 _PATCH = 2
 #: The cosine by which a normal of the hair's volume must look out of the layer.
 _FRONT = 0.3
-#: How deep the coarse skin may lie in the skin itself, in what it is off it.
-_BULGES = 4.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,7 +139,7 @@ def build_shells(
     fine = fine_skin(head, strands.roots, _spacing(strands), budget // layers)
     skins = _skins(fine, head, budget, settings)
     first = _Layered.of(skins[0], hair)
-    plan = plan_shells(first.patches, strands, radius, root_normal, head, layers, atlas)
+    plan = plan_shells(first.patches, strands, radius, root_normal, layers, atlas)
     center = strands.roots.mean(axis=0, dtype=np.float64)
     made = [first, *(_Layered.of(skin, hair) for skin in skins[1:])]
     meshes = [each.mesh(plan, strands, center) for each in made]
@@ -208,7 +205,7 @@ class _Layered:
     def mesh(self, plan: ShellPlan, strands: StrandSet, center: Floats) -> CardMesh:
         """All layers, from the innermost to the outermost."""
         layers, count = plan.layers, len(self.vertex)
-        skin, hair, vertex = self._raised(plan), self.hair, self.vertex
+        skin, hair, vertex = self.skin.raised, self.hair, self.vertex
         positions = skin[vertex] + hair.shift[vertex][:, 1::2].swapaxes(0, 1)
         outwards = self._outwards(positions)
         step = np.diff(hair.shift[vertex][:, ::2], axis=1).swapaxes(0, 1)
@@ -249,20 +246,3 @@ class _Layered:
         for layer, positions in zip(across, placed, strict=True):
             np.add.at(layer, self.triangles, area_vectors(positions[self.triangles])[:, None])
         return unit(across)
-
-    def _raised(self, plan: ShellPlan) -> Floats:
-        """The vertices of the skin, raised where it bulges out between them."""
-        skin = self.skin
-        flat = np.zeros(len(skin.positions))
-        base = CardMesh(
-            positions=skin.positions,
-            triangles=skin.triangles,
-            uv=np.zeros((len(flat), 2)),
-            normal=skin.normals,
-            tangent=skin.normals,
-            occlusion=flat,
-            card=np.zeros(len(skin.triangles), np.int32),
-            along=flat,
-        )
-        raised: Floats = above_skin(base, plan.head, _BULGES * skin.error).positions
-        return raised

@@ -54,9 +54,7 @@ def test_slant_of_shells(compute: Callable[..., np.ndarray]) -> None:
     found = compute(
         "layer_facing.glsl",
         (SHAPE[1], SHAPE[0]),
-        textures={
-            name: np.dstack([each, alpha]).astype(np.float32) for name, each in named.items()
-        },
+        textures={name: each.astype(np.float32) for name, each in textures.items()},
     )
     expected = layer_facing(normals, tangents, eyes)
     assert found[..., 0] == pytest.approx(expected, rel=1e-3, abs=1e-4)
