@@ -14,8 +14,10 @@ import gpu
 import numpy as np
 from extension_loader import PACKAGE, load_package
 
-#: guides and hair of the Nalu demo
+#: guides and hair of the Nalu demo, whose few strands are wide enough to tell their pieces apart
 GUIDES, CHILDREN = 762, 4095
+#: as many children as a head of hair has
+WHOLE = 20_000
 WIDTH, HEIGHT, SAMPLES = 640, 720, 3
 #: where the built-in head's hair falls over its temple [m]
 TEMPLE = np.array([-0.12, -0.01, 0.075])
@@ -25,7 +27,7 @@ def of_addon(module: str) -> Any:
     return importlib.import_module(f"{PACKAGE}.addon.{module}")
 
 
-def wig(children: str) -> Any:
+def wig(children: str, count: int = CHILDREN, widths: str = "auto") -> Any:
     """A rig of wavy guides on the built-in head, with or without children; each side is a group."""
     settings = of_addon("parameters").ALL_SETTINGS
     grown = settings["grow"](strand_count=GUIDES, wave=0.018, wave_length=0.06, clump=0.3)
@@ -38,8 +40,8 @@ def wig(children: str) -> Any:
         head,
         settings["guides"](guide_count=GUIDES, cv_count=9),
         place="the built-in groom",
-        widths="auto",
-        children=settings["children"](method=children, strand_count=CHILDREN),
+        widths=widths,
+        children=settings["children"](method=children, strand_count=count),
     )
 
 
@@ -82,10 +84,10 @@ def main(folder: Path) -> None:
         images.write_png(folder / f"{name}.png", images.contact_sheet(pictures, len(pictures)))
         print(f"Wrote {name}.png", flush=True)
 
-    guides, full = wig("none"), wig("multi")
+    full = wig("multi")
     close, closer = close_camera(full, reach=0.16), close_camera(full, reach=0.06)
     undivided = {"mode": "fixed", "subdivisions": 1}
-    write("children", [picture(guides, {}), picture(full, {})])
+    write("children", [picture(wig("none", widths="own"), {}), picture(wig("multi", WHOLE), {})])
     write("curl", [picture(full, dict(undivided), closer), picture(full, {}, closer)])
     views = [dict(undivided), {"mode": "fixed", "subdivisions": 64}, {}]
     shown = [picture(full, view | {"debug_view": "detail"}, close) for view in views]

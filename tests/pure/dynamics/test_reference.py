@@ -167,7 +167,7 @@ def test_with_a_ball_and_a_mesh(kit, shake, friction, is_combed):
         **radii,
     )
     mesh = DistanceField.from_surface(kit.icosphere(0.095, 2), settings)
-    grid = kit.curly(6, 12)
+    grid = kit.curly(4, 12)
     ball = SphereCollider(grid[3, 7] + [0.0, 0.0, 0.03], 0.05)
     scene = kit.Scene(grid, settings, shake, on_head=(mesh,), standing=(ball,), is_combed=is_combed)
     fast, slow = both(kit, scene)
