@@ -138,10 +138,9 @@ class HAIRLOOM_PT_hair_scene(WithHelp, bpy.types.Panel):
             draw_message(layout, context, f"Blender draws the hair. {problem}", "ERROR")
 
 
-class HAIRLOOM_PT_engine_passes(WithHelp, bpy.types.Panel):
-    """Passes rendered besides the image"""
+class _PassesPanel(WithHelp):
+    """What both panels of passes have in common."""
 
-    bl_label = "Data"
     helped = "passes"
     bl_space_type = "PROPERTIES"
     bl_region_type = "WINDOW"
@@ -151,6 +150,12 @@ class HAIRLOOM_PT_engine_passes(WithHelp, bpy.types.Panel):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         return context.engine == ENGINE
+
+
+class HAIRLOOM_PT_engine_passes(_PassesPanel, bpy.types.Panel):
+    """Passes rendered besides the image"""
+
+    bl_label = "Data"
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, layer = self.layout, context.view_layer
@@ -168,19 +173,10 @@ class HAIRLOOM_PT_engine_passes(WithHelp, bpy.types.Panel):
         levels.prop(layer, "pass_cryptomatte_depth", text="Levels")
 
 
-class HAIRLOOM_PT_hair_passes(WithHelp, bpy.types.Panel):
+class HAIRLOOM_PT_hair_passes(_PassesPanel, bpy.types.Panel):
     """Passes of hair that Blender has no setting for"""
 
     bl_label = "Hair"
-    helped = "passes"
-    bl_space_type = "PROPERTIES"
-    bl_region_type = "WINDOW"
-    bl_context = "view_layer"
-    bl_parent_id = "VIEWLAYER_PT_layer_passes"
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return context.engine == ENGINE
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, passes = self.layout, context.view_layer.hairloom
