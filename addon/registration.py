@@ -143,7 +143,7 @@ def _steps() -> tuple[Step, ...]:
         (preferences.register, preferences.unregister),
         (groups.register, groups.unregister),
         (engine_panels.register, engine_panels.unregister),
-        (previews.register, previews.unregister),
+        (previews.pictures, previews.unregister),
         (operators_preview.register, operators_preview.unregister),
         (preset_chooser.register, preset_chooser.unregister),
         (object_lists.register, object_lists.unregister),

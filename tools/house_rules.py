@@ -204,8 +204,8 @@ _CHANGING = {"append", "add", "update", "pop", "popitem", "clear", "discard", "r
 _CHANGING |= {"setdefault", "insert", "difference_update", "appendleft", "popleft", "subtract"}
 
 
-#: Names that modules may change, at most; and the aim. The first may only fall.
-MOST_MUTABLE, MOST_MUTABLE_WANTED = 48, 20
+#: Names that modules may change, at most.
+MOST_MUTABLE = 20
 
 
 def mutable_names(addon: Path = ADDON) -> list[str]:

@@ -16,6 +16,7 @@ from __future__ import annotations
 import os
 import time
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import Any
 
 import gpu
@@ -76,7 +77,6 @@ class Capabilities:
     probe_ms: float
 
 
-_found: Capabilities | None = None
 _chosen = "automatic"
 
 
@@ -89,10 +89,7 @@ def choose_image_atomics(choice: str) -> None:
 
 def capabilities() -> Capabilities:
     """What the GPU here can do; the first call in a context that can draw finds out."""
-    global _found
-    if _found is None:
-        _found = _probed()
-    return _found if _forbidden() is None else _without_atomics(_found, _forbidden())
+    return _probed(_forbidden())
 
 
 def pair_format() -> str:
@@ -115,15 +112,12 @@ def _forbidden() -> str | None:
     return "turned off in the preferences" if _chosen == "never" else None
 
 
-def _without_atomics(found: Capabilities, problem: str | None) -> Capabilities:
-    return replace(found, image_atomics=False, atomics_problem=problem or "")
-
-
-def _probed() -> Capabilities:
+@cache
+def _probed(forbidden: str | None) -> Capabilities:
     begin = time.perf_counter()
     backend = str(gpu.platform.backend_type_get())
     # a program that a driver refuses is never made where nobody wants it
-    problem = _forbidden() or (_METAL if backend == "METAL" else _atomics_problem())
+    problem = forbidden or (_METAL if backend == "METAL" else _atomics_problem())
     dispatch_ms = _dispatch_ms()
     missing = tuple(each for each in FORMATS if not _is_format_there(each))
     size, count = (

@@ -24,8 +24,6 @@ _FIT = frozenset(
     }
 )
 
-_served: list[type[Any]] = []
-
 
 class _RenderPanel(WithHelp, bpy.types.Panel):
     bl_space_type = "PROPERTIES"
@@ -200,20 +198,21 @@ CLASSES = (
 
 def register() -> None:
     """Show Blender's panels with our engine, as its documentation suggests."""
-    for panel in _panels(bpy.types.Panel):
-        engines = getattr(panel, "COMPAT_ENGINES", None)
-        name = panel.__name__
-        if engines is None or name in _UNFIT or ENGINE in engines:
-            continue
-        if "BLENDER_RENDER" in engines or name in _FIT:
+    for panel in _panels_of_blender():
+        name, engines = panel.__name__, panel.COMPAT_ENGINES
+        if name in _FIT or ("BLENDER_RENDER" in engines and name not in _UNFIT):
             engines.add(ENGINE)
-            _served.append(panel)
 
 
 def unregister() -> None:
-    for panel in _served:
+    for panel in _panels_of_blender():
         panel.COMPAT_ENGINES.discard(ENGINE)
-    _served.clear()
+
+
+def _panels_of_blender() -> list[type[Any]]:
+    """Those that ask which engine renders."""
+    all_panels = (each for each in _panels(bpy.types.Panel) if each not in CLASSES)
+    return [each for each in all_panels if hasattr(each, "COMPAT_ENGINES")]
 
 
 def _panels(parent: type[Any]) -> list[type[Any]]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -119,15 +120,21 @@ def test_what_the_gpu_can_do_is_found_once(monkeypatch: pytest.MonkeyPatch) -> N
 
     from hairloom.addon.render import capabilities as module
 
-    monkeypatch.setattr(module, "_found", None)
+    probe_anew(monkeypatch)
     found = module.capabilities()
     assert found.backend == gpu.platform.backend_type_get() and found.image_atomics
     assert not found.atomics_problem and not found.missing_formats
     assert found.texture_size == gpu.capabilities.max_texture_size_get() >= 4096
     assert min(found.group_size) >= 64 and found.texture_layers >= 256
     assert found.dispatch_ms is not None and 0.0 < found.dispatch_ms < found.probe_ms
-    monkeypatch.setattr(module, "_probed", lambda: pytest.fail("it is found again"))
     assert module.capabilities() is found
+
+
+def probe_anew(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As in a Blender that has just started."""
+    from hairloom.addon.render import capabilities
+
+    monkeypatch.setattr(capabilities, "_probed", cache(capabilities._probed.__wrapped__))
 
 
 @pytest.mark.parametrize("change", ["nothing", "no add", "no program"])
@@ -150,7 +157,7 @@ def test_atomics_that_do_nothing_are_noticed(
         module._ATOMICS_RECIPE, name=f"probe {change}", folders=(tmp_path, SHADER_FOLDER)
     )
     monkeypatch.setattr(module, "_ATOMICS_RECIPE", recipe)
-    monkeypatch.setattr(module, "_found", None)
+    probe_anew(monkeypatch)
     found = module.capabilities()
     assert not found.image_atomics
     assert ("nonsense" if change == "no program" else "they give [") in found.atomics_problem
@@ -167,7 +174,7 @@ def test_metal_is_not_even_tried(monkeypatch: pytest.MonkeyPatch, made: list[Any
         compute, shader, types = module.gpu.compute, module.gpu.shader, module.gpu.types
 
     monkeypatch.setattr(module, "gpu", Gpu)
-    monkeypatch.setattr(module, "_found", None)
+    probe_anew(monkeypatch)
     found = module.capabilities()
     assert not found.image_atomics and "Metal" in found.atomics_problem
     assert not any(uses_atomics(recipe) for recipe in made)
@@ -187,6 +194,18 @@ def test_both_preferences_and_environment_forbid_them(
     assert ATOMICS_VARIABLE in capabilities().atomics_problem
 
 
+def test_a_choice_counts_from_the_next_draw_on(
+    choose: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from hairloom.addon.render.capabilities import capabilities
+
+    probe_anew(monkeypatch)
+    choose("never")
+    assert not capabilities().image_atomics
+    choose("automatic")
+    assert capabilities().image_atomics and not capabilities().atomics_problem
+
+
 def uses_atomics(recipe: Any) -> bool:
     return any("imageAtomic" in text.source for text in recipe.texts.values())
 
@@ -196,9 +215,8 @@ def test_no_program_with_atomics_is_made_where_they_are_forbidden(
     frame: Any, choose: Any, made: list[Any], monkeypatch: pytest.MonkeyPatch, choice: str
 ) -> None:
     """Strands as layers, deep maps of strands, and of cards."""
-    from hairloom.addon.render import capabilities as module
 
-    monkeypatch.setattr(module, "_found", None)
+    probe_anew(monkeypatch)
     choose(choice)
     frame.render_image(shown(frame), camera_of(frame), SIZE, SIZE, 1)
     draw_cards(frame)

@@ -6,6 +6,7 @@ import time
 from collections import deque
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -60,18 +61,18 @@ class PastReport(NamedTuple):
 past_reports: deque[PastReport] = deque(maxlen=20)
 
 #: where reports go while a job without a window runs an operator; None: to Blender
-_collected: Reports | None = None
+_COLLECTED: ContextVar[Reports | None] = ContextVar("collected reports", default=None)
 
 
 @contextmanager
 def collected_reports() -> Iterator[Reports]:
     """All reports of operators come here; Blender would make text of errors."""
-    global _collected
-    reports = _collected = Reports()
+    reports = Reports()
+    token = _COLLECTED.set(reports)
     try:
         yield reports
     finally:
-        _collected = None
+        _COLLECTED.reset(token)
 
 
 def report(operator: bpy.types.Operator, kind: str, message: str | HairloomError) -> None:
@@ -80,12 +81,13 @@ def report(operator: bpy.types.Operator, kind: str, message: str | HairloomError
     Args:
         kind: "INFO", "WARNING" or "ERROR"; the message of an error is the error itself.
     """
-    if _collected is None:
+    collected = _COLLECTED.get()
+    if collected is None:
         past_reports.append(
             PastReport(time.strftime("%H:%M:%S"), operator.bl_label, kind, str(message))
         )
         operator.report({kind}, str(message))
     elif isinstance(message, HairloomError):
-        _collected.error = message
+        collected.error = message
     else:
-        (_collected.messages if kind == "INFO" else _collected.warnings).append(message)
+        (collected.messages if kind == "INFO" else collected.warnings).append(message)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from contextvars import ContextVar
 
 import bpy
 
@@ -18,8 +19,8 @@ _listeners: dict[str, list[Listener]] = {
     "hair_scene": [],
     "passes": [],
 }
-#: kinds and data-blocks of changes that wait for the end of `together`; None outside of it
-_held: list[tuple[str, bpy.types.ID]] | None = None
+#: changes that wait for the end of `together`: kinds and data-blocks; None outside of it
+_HELD: ContextVar[list[tuple[str, bpy.types.ID]] | None] = ContextVar("held changes", default=None)
 
 
 def subscribe(kind: str, listener: Listener) -> None:
@@ -64,23 +65,24 @@ def passes(owner: bpy.types.ID) -> None:
 @contextmanager
 def together() -> Iterator[None]:
     """Many properties that are set inside count as one change, at the end."""
-    global _held
-    if _held is not None:
+    if _HELD.get() is not None:
         yield
         return
-    _held = []
+    held: list[tuple[str, bpy.types.ID]] = []
+    token = _HELD.set(held)
     try:
         yield
     finally:
-        held, _held = _held, None
+        _HELD.reset(token)
         for kind, owner in held:
             _call(kind, owner)
 
 
 def _call(kind: str, owner: bpy.types.ID) -> None:
-    if _held is not None:
-        if (kind, owner) not in _held:
-            _held.append((kind, owner))
+    held = _HELD.get()
+    if held is not None:
+        if (kind, owner) not in held:
+            held.append((kind, owner))
         return
     for listener in _listeners[kind]:
         listener(owner)

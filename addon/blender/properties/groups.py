@@ -135,8 +135,7 @@ SECTION_GROUPS = {
     section: property_group(kind, _redraw if kind.owner == "scene" else changed.settings)
     for section, kind in ALL_SETTINGS.items()
     if kind.owner != "job"
-}
-SECTION_GROUPS["grow"] = property_group(ALL_SETTINGS["grow"], changed.grow, is_animated=False)
+} | {"grow": property_group(ALL_SETTINGS["grow"], changed.grow, is_animated=False)}
 SECTION_GROUPS["grow"].__annotations__ |= {
     "density_group": StringProperty(
         name="Density",

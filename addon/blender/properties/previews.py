@@ -2,23 +2,22 @@
 
 from __future__ import annotations
 
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import bpy.utils.previews
 
-_pictures: Any = None
 
-
-def register() -> None:
-    global _pictures
-    _pictures = bpy.utils.previews.new()
+@cache
+def pictures() -> Any:
+    """Blender's collection of them, from the first use until the extension is unregistered."""
+    return bpy.utils.previews.new()
 
 
 def unregister() -> None:
-    global _pictures
-    bpy.utils.previews.remove(_pictures)
-    _pictures = None
+    bpy.utils.previews.remove(pictures())
+    pictures.cache_clear()
 
 
 def icon_of(preset: Path) -> int:
@@ -27,17 +26,17 @@ def icon_of(preset: Path) -> int:
     Blender reads the picture when it is first drawn; a damaged one stays empty.
     """
     picture = preset.with_suffix(".png")
-    if _pictures is None or not picture.is_file():
+    if not picture.is_file():
         return 0
-    name = str(picture)
-    if name not in _pictures:
-        _pictures.load(name, name, "IMAGE")
-    icon: int = _pictures[name].icon_id
+    name, known = str(picture), pictures()
+    if name not in known:
+        known.load(name, name, "IMAGE")
+    icon: int = known[name].icon_id
     return icon
 
 
 def forget(preset: Path) -> None:
     """Its picture is another one now, or gone."""
-    name = str(preset.with_suffix(".png"))
-    if _pictures is not None and name in _pictures:
-        del _pictures[name]
+    name, known = str(preset.with_suffix(".png")), pictures()
+    if name in known:
+        del known[name]

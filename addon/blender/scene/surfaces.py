@@ -9,6 +9,7 @@ from __future__ import annotations
 import weakref
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass, field
 
 import bpy
 import numpy as np
@@ -17,9 +18,26 @@ from ...arrays import Floats, Ints
 from ...errors import HairloomError
 from ...strands import Surface
 
-#: surfaces that somebody may have, and the last one that was read
-_in_use: list[weakref.ref[Surface]] = []
-_last: list[Surface] = []
+
+@dataclass
+class _Read:
+    """in_use: surfaces that somebody may have. last: the one that was read last, kept for who reads
+    it again."""
+
+    in_use: list[weakref.ref[Surface]] = field(default_factory=list)
+    last: Surface | None = None
+
+    def kept(self, surface: Surface) -> Surface:
+        """The surface that is in use already if it is the same."""
+        there = [known for one in self.in_use if (known := one()) is not None]
+        self.last = next((known for known in there if _is_same(surface, known)), surface)
+        if self.last is surface:
+            there.append(surface)
+        self.in_use = [weakref.ref(each) for each in there]
+        return self.last
+
+
+_read = _Read()
 
 
 def read_surface(
@@ -50,20 +68,7 @@ def read_surface(
                 remedy="Unwrap it (Edit Mode, UV > Unwrap), or leave out --strict",
             )
         surface = Surface(_positions(mesh), triangles, corner_uv)
-    return _known(surface.transformed(np.array(obj.evaluated_get(depsgraph).matrix_world)))
-
-
-def _known(surface: Surface) -> Surface:
-    """The surface that is in use already if it is the same."""
-    in_use = [(one, one()) for one in _in_use]
-    _in_use[:] = [one for one, there in in_use if there is not None]
-    for _, there in in_use:
-        if there is not None and _is_same(surface, there):
-            _last[:] = [there]
-            return there
-    _in_use.append(weakref.ref(surface))
-    _last[:] = [surface]
-    return surface
+    return _read.kept(surface.transformed(np.array(obj.evaluated_get(depsgraph).matrix_world)))
 
 
 def _is_same(one: Surface, other: Surface) -> bool:

@@ -50,9 +50,8 @@ class _Read:
     note: str = ""
 
 
+#: the last that were asked for, the youngest at the end
 _known: dict[Hashable, _Read] = {}
-#: what each world was rendered as last, by its session number
-_last: dict[int, _Read] = {}
 
 
 def read_environment(scene: bpy.types.Scene, *, blocking: bool = True) -> Environment:
@@ -117,17 +116,24 @@ def _read(world: bpy.types.World | None, *, blocking: bool) -> _Read:
     if key not in _known and not blocking:
         # a sky that is being turned stays as it was until the new one is there
         _want(uid, key, _colors(world))
-        return _last.get(uid) or _plain(world)
-    if key not in _known:
+        return _rendered_last(uid) or _plain(world)
+
+    def render() -> _Read:
         with tempfile.TemporaryDirectory(prefix="hairloom") as folder:
             _write(world, Path(folder))
-            _once(key, partial(_rendered, Path(folder), world.name, _colors(world)))
-    _last[uid] = _known[key]
-    return _known[key]
+            return _rendered(Path(folder), world.name, _colors(world))
+
+    return _once(key, render)
 
 
 def _key(world: bpy.types.World) -> Hashable:
     return "nodes", world.original.session_uid, _state(world.node_tree)
+
+
+def _rendered_last(uid: int) -> _Read | None:
+    """What the world of this number was when it was last asked for; None where nobody did."""
+    keys = (each for each in reversed(_known) if isinstance(each, tuple))
+    return next((_known[key] for key in keys if key[:2] == ("nodes", uid)), None)
 
 
 def _want(uid: int, key: Hashable, plain: tuple[float, float, float]) -> None:
@@ -149,11 +155,11 @@ def _want(uid: int, key: Hashable, plain: tuple[float, float, float]) -> None:
 
 
 def _once(key: Hashable, make: Callable[[], _Read]) -> _Read:
-    if key not in _known:
-        if len(_known) >= _KEPT:
-            del _known[next(iter(_known))]
-        _known[key] = make()
-    return _known[key]
+    read = _known.pop(key, None) or make()
+    while len(_known) >= _KEPT:
+        del _known[next(iter(_known))]
+    _known[key] = read
+    return read
 
 
 def _plain(world: bpy.types.World) -> _Read:
@@ -207,7 +213,8 @@ def _picture(surface: bpy.types.Node) -> _Read | None:
     try:
         state = _image_state(image)
         key = ("picture", state, strength, turn.tobytes())
-        return _once(key, lambda: _Read(environment_of(strength * _panorama(image, state), turn)))
+        uid = image.original.session_uid
+        return _once(key, lambda: _Read(environment_of(strength * _panorama(uid, state), turn)))
     except HairloomError as error:
         note = f"World: {error} Until then it is black."
         return _once(("missing", note), lambda: _Read(Environment(), note))
@@ -256,20 +263,18 @@ def _image_state(image: bpy.types.Image) -> Hashable:
     return (*state, zlib.crc32(pixels.tobytes()))
 
 
-#: the last image that was read, so that turning it does not read it again
-_last_panorama: list[tuple[Hashable, Floats]] = []
+@lru_cache(maxsize=1)
+def _panorama(uid: int, _state: Hashable) -> Floats:
+    """Pixels of the image of this number in scene-linear colour, few enough, (rows, columns, 3).
 
-
-def _panorama(image: bpy.types.Image, state: Hashable) -> Floats:
-    """Its pixels in scene-linear colour, few enough, (rows, columns, 3).
+    Kept while its state is the same, so that turning it does not read it again.
 
     Raises:
         HairloomError: its file is missing or broken.
     """
-    if not _last_panorama or _last_panorama[0][0] != state:
-        pixels = read_image(image, is_color=True, place=f"Image '{image.name}'")
-        _last_panorama[:] = [(state, reduced(pixels[..., :3] * pixels[..., 3:]))]
-    return _last_panorama[0][1]
+    image = next(each for each in bpy.data.images if each.session_uid == uid)
+    pixels = read_image(image, is_color=True, place=f"Image '{image.name}'")
+    return reduced(pixels[..., :3] * pixels[..., 3:])
 
 
 def _rgb(picture: Floats) -> Floats:
