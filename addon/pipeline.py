@@ -40,7 +40,7 @@ from .groom.guides import choose_guides, grouped
 from .groom.holds import Holds
 from .groom.masks import NO_MASKS, Masks
 from .groom.partings import Partings
-from .groom.roots import RootFrames, bind_roots, follow, root_frames, root_motions
+from .groom.roots import RootFrames, RootHolds, bind_roots, follow, root_frames, root_motions
 from .groom.settings import GuideSettings
 from .groom.ties import NO_HOLDERS, Holders, find_holds, idle
 from .groom.weights import GuideWeights, guide_weights
@@ -201,6 +201,16 @@ class Rig:
     def child_count(self) -> int:
         own = self.own_count
         return 0 if own is None else self.strands.strand_count - own
+
+    @cached_property
+    def root_holds(self) -> RootHolds | None:
+        """Which of the head's vertices hold roots; None without a head."""
+        return None if self.head is None else RootHolds.of(self.strands, self.head)
+
+    @property
+    def root_vertices(self) -> Ints:
+        """The head's vertices that hold roots, ascending; none without a head."""
+        return np.zeros(0, np.int32) if self.root_holds is None else self.root_holds.vertices
 
     @cached_property
     def riders(self) -> Riders:

@@ -6,7 +6,6 @@ import numpy as np
 
 from ..arrays import Ints
 from ..strands import StrandSet
-from ..strands.arc_length import uneven_along
 from ..strands.resample import evenly_spaced, resample
 
 #: Where strands have points as they need them, cards have at least as many rows,
@@ -21,7 +20,7 @@ def card_strands(strands: StrandSet) -> StrandSet:
     """The same strands with one point count, evenly; those that are so already as they are."""
     if not strands.is_uniform:
         return resample(strands, row_count(strands.point_counts))
-    if uneven_along(strands.points, strands.offsets) is None:
+    if strands.uneven_along is None:
         return strands
     return evenly_spaced(strands, int(strands.point_counts[0]))
 

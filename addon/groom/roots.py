@@ -52,6 +52,52 @@ class RootFrames:
     rotation: Floats
 
 
+@dataclass(frozen=True, eq=False)
+class RootHolds:
+    """Which vertices of a surface hold roots, and how.
+
+    vertices: (n,) ascending. corners: (strand_count, 3), those of each root's triangle, by their
+        place among these. barycentric: (strand_count, 3).
+    fraction: (n,) of all roots that each vertex holds. lift: (3,) [m], from the middle of where
+        they are held to that of the roots.
+    rest_positions: (vertex_count, 3) [m], of the whole surface.
+    """
+
+    vertices: Ints
+    corners: Ints
+    barycentric: Floats
+    fraction: Floats
+    lift: Floats
+    rest_positions: Floats
+
+    @classmethod
+    def of(cls, strands: StrandSet, head: Surface) -> RootHolds:
+        """Args:
+        strands: bound to the head.
+        """
+        assert strands.root_triangle is not None and strands.root_barycentric is not None
+        triangles = head.triangles[strands.root_triangle]
+        holds_any = np.zeros(len(head.positions), bool)
+        holds_any[triangles] = True
+        vertices = np.flatnonzero(holds_any)
+        place = np.cumsum(holds_any) - 1
+        weight = strands.root_barycentric[:, 1:].astype(np.float64)
+        weights = np.column_stack([1.0 - weight.sum(axis=1), weight])
+        held = np.bincount(triangles.ravel(), weights.ravel(), len(holds_any))[vertices]
+        fraction = held / max(len(triangles), 1)
+        middle = fraction @ head.positions[vertices]
+        lift = strands.roots.mean(axis=0, dtype=np.float64) - middle
+        corners = place[triangles].astype(np.int32)
+        return cls(vertices, corners, strands.root_barycentric, fraction, lift, head.positions)
+
+    def center(self, positions: Floats) -> Floats:
+        """The middle of all roots (3,) [m] on vertices (vertex_count, 3).
+
+        How far they stand off the surface does not turn.
+        """
+        return np.asarray(self.fraction @ positions[self.vertices] + self.lift, np.float32)
+
+
 def bind_roots(strands: StrandSet, surface: Surface, *, place: str) -> BoundRoots:
     """Hold each root at the closest point of the surface; the points stay where they are.
 

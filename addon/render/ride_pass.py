@@ -38,9 +38,10 @@ import numpy as np
 from ..arrays import Floats, Ints
 from ..dynamics.colliders import PosedCollider
 from ..groom.holds import Holds
+from ..groom.roots import RootHolds
 from ..refine.lead_out import NOT_LED, LedOut
 from ..refine.ride import Riders
-from ..strands import StrandSet, Surface
+from ..strands import StrandSet
 from . import gpu_objects
 from .collider_textures import SolidKinds, UploadedColliders
 from .hold_pass import HoldPass
@@ -112,7 +113,7 @@ class RidePass:
 
     Args:
         strands: world space at rest; bound when there is a head.
-        head: world space at rest, or None for hair that one matrix carries.
+        root_holds: how a head holds them; None for hair that one matrix carries.
         guides: (guide_count,) indices of the strands that are simulated.
         guide_grid: (guide_count, cv_count, 3) [m], the lines that are simulated, at rest.
         riders: how the strands ride on them.
@@ -125,7 +126,7 @@ class RidePass:
     def __init__(
         self,
         strands: StrandSet,
-        head: Surface | None,
+        root_holds: RootHolds | None,
         guides: Ints,
         guide_grid: Floats,
         riders: Riders,
@@ -135,7 +136,7 @@ class RidePass:
         self._strands = strands
         self._guides, self._guide_grid = guides, guide_grid
         self._riders = riders
-        self._holds = None if head is None else RootHolds(strands, head)
+        self._root_holds = root_holds
         self._root_mean = strands.roots.mean(axis=0, dtype=np.float64)
         self.points = DevicePoints(StrandLayout(strands.offsets))
         self._held = None if holds is None else HoldPass(holds, self.points.layout)
@@ -231,18 +232,18 @@ class RidePass:
     @property
     def _mover_count(self) -> int:
         """How many root motions there are: one for each strand, or one for all."""
-        return 1 if self._holds is None else self._strands.strand_count
+        return 1 if self._root_holds is None else self._strands.strand_count
 
     def _take_pose(self, head_positions: Floats | None, matrix: Floats) -> None:
         """Write root_motions, and the middle of all roots."""
         if not self._textures:
             self._upload()
-        if self._holds is None or head_positions is None:
+        if self._root_holds is None or head_positions is None:
             self._textures["root_motions"] = texture_from(matrix_motion(matrix), "RGBA32F")
             middle = matrix[:3, :3] @ self._root_mean + matrix[:3, 3]
             self.points.center = middle.astype(np.float32)
             return
-        self.points.center = self._holds.center(head_positions)
+        self.points.center = self._root_holds.center(head_positions)
         self._run_roots(head_positions)
 
     def _upload(self) -> None:
@@ -259,13 +260,15 @@ class RidePass:
         at_rest[:, :-1, 3] = 1.0
         textures["rest_turns"] = texture_from(strand_rows(at_rest), "RGBA32F")
         self.points.texture = _cleared(layout.size)
-        if self._holds is not None:
-            holds = strand_rows(self._holds.texels)
-            textures["root_holds"] = texture_from(holds, "RGBA32F")
+        if self._root_holds is not None:
+            held = np.zeros((count, 2, 4), np.float32)
+            held[:, 0, :3] = self._root_holds.corners
+            held[:, 1, :2] = self._root_holds.barycentric[:, 1:]
+            textures["root_holds"] = texture_from(strand_rows(held), "RGBA32F")
             textures["root_motions"] = _empty(count, 4)
             textures["frames"] = _empty(count, 4)
             textures["rest_frames"] = _empty(count, 4)
-            self._run_roots(self._holds.rest_positions)
+            self._run_roots(self._root_holds.rest_positions)
             rest_frames = textures.pop("frames")
             textures |= {"frames": textures["rest_frames"], "rest_frames": rest_frames}
 
@@ -285,8 +288,8 @@ class RidePass:
         textures["guide_weights"] = texture_from(strand_rows(_padded(riding)), "RGBA32F")
 
     def _run_roots(self, head_positions: Floats) -> None:
-        assert self._holds is not None
-        taken = head_positions[self._holds.vertices][:, None]
+        assert self._root_holds is not None
+        taken = head_positions[self._root_holds.vertices][:, None]
         vertices = texture_from(strand_rows(_padded(taken)), "RGBA32F")
         textures, count = self._textures, self._strands.strand_count
         shader = program(ROOTS_RECIPE)
@@ -379,37 +382,6 @@ def _dispatch(shader: Any, width: int, height: int) -> None:
     across, down = shader.recipe.group_size
     gpu.compute.dispatch(shader.shader, -(-width // across), -(-height // down), 1)
     gpu.shader.unbind()
-
-
-class RootHolds:
-    """Which vertices hold the roots of strands, and how.
-
-    Args:
-        strands: bound to the head.
-
-    vertices: (n,) indices of the head's vertices that any root is attached to.
-    texels: (strand_count, 2, 4) as root_holds, triangles by place in `vertices`.
-    rest_positions: (vertex_count, 3) [m] of the head.
-    """
-
-    def __init__(self, strands: StrandSet, head: Surface) -> None:
-        assert strands.root_triangle is not None and strands.root_barycentric is not None
-        corners = head.triangles[strands.root_triangle]
-        self.vertices, place = np.unique(corners, return_inverse=True)
-        place = place.reshape(corners.shape)
-        self.rest_positions = head.positions
-        self.texels = np.zeros((len(corners), 2, 4), np.float32)
-        self.texels[:, 0, :3] = place
-        self.texels[:, 1, :2] = weight = strands.root_barycentric[:, 1:]
-        fractions = np.column_stack([1.0 - weight.sum(axis=1, dtype=np.float64), weight])
-        self._fraction = np.bincount(place.ravel(), fractions.ravel()) / max(len(corners), 1)
-        surface_mean = self._fraction @ head.positions[self.vertices]
-        self._lift = strands.roots.mean(axis=0, dtype=np.float64) - surface_mean
-
-    def center(self, head_positions: Floats) -> Floats:
-        """The middle of all roots (3,) [m]; how far they stand off the surface does not turn."""
-        middle = self._fraction @ head_positions[self.vertices] + self._lift
-        return np.asarray(middle, np.float32)
 
 
 def matrix_motion(matrix: Floats) -> Floats:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ import numpy as np
 from ..arrays import Floats, Ints
 from ..errors import HairloomError
 from .affine import mean_scale, moved
-from .arc_length import lengths
+from .arc_length import lengths, uneven_along
 
 #: Of hair whose width nobody knows, until it is found (`groom.widths`).
 DEFAULT_RADIUS = 4.0e-5  # [m], half of 0.08 mm, a typical human hair
@@ -134,6 +135,12 @@ class StrandSet:
     def lengths(self) -> Floats:
         """Arc length of each strand, (strand_count,) [m]."""
         return lengths(self.points, self.offsets)
+
+    @cached_property
+    def uneven_along(self) -> Floats | None:
+        """How far along its strand each point lies, (point_count,); None where points are evenly
+        spaced, see `arc_length.uneven_along`."""
+        return uneven_along(self.points, self.offsets)
 
     def take(self, strands: Ints) -> StrandSet:
         """The strands with these indices, in this order."""

@@ -28,6 +28,7 @@ from hairloom.addon.dynamics.colliders import DistanceField
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.groom.settings import GuideSettings
+from hairloom.addon.refine import lead_out
 
 FRAME = 1.0 / 60.0
 COUNT = 60
@@ -259,6 +260,34 @@ def test_old_hair_plays_until_the_new_is_made(playing, hair, evaluated, monkeypa
     assert np.array_equal(playing.solver.guides()[:, -1], tips)
     at_rest = pipeline.carried_guides(playing.rig, playing.solver.pose)[:, -1]
     assert np.abs(tips - at_rest).max() > 1e-3, "the hair did not swing"
+
+
+def test_hair_that_arrives_in_play_knows_how_far_it_stays_from_colliders(
+    playing, hair, evaluated, monkeypatch
+):
+    """Found beside the window's work, where it is the same as the next frame would find."""
+    of_each, find = [], lead_out.clearance_at
+
+    def recorded(*arguments):
+        is_beside = threading.current_thread() is not threading.main_thread()
+        of_each.append((is_beside, find(*arguments)))
+        return of_each[-1][1]
+
+    previews.advance(evaluated(), FRAME)
+    monkeypatch.setattr(pipeline, "clearance_at", recorded)
+    hair.data.hairloom.children.strand_count = 3 * COUNT
+    hair.data.hairloom.children.method = "multi"
+    scene_events.catch_up(evaluated())
+    arrive(playing)
+    previews.advance(evaluated(), FRAME)
+    ((is_beside, found),) = of_each
+    assert is_beside and playing.solver.motion.clearance is found
+    motion, settings = playing.solver.motion, playing.settings[DynamicsSettings]
+    unknown = replace(motion, clearance=None)
+    expected = pipeline.with_clearance(playing.rig, unknown, motion.colliders, settings).clearance
+    np.testing.assert_array_equal(found.points, expected.points)
+    np.testing.assert_array_equal(found.held, expected.held)
+    assert np.isfinite(found.points).any() and found.kept == expected.kept
 
 
 def test_of_many_settings_the_last_one_counts(playing, hair, evaluated, monkeypatch):

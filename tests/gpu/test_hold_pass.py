@@ -58,7 +58,7 @@ def pose_of(rig: Rig, seed: int) -> Pose:
 def test_equals_numpy(rig: Rig) -> None:
     from hairloom.addon.render.ride_pass import RidePass
 
-    ride = RidePass(rig.strands, rig.head, rig.guides, rig.guide_grid, rig.riders, rig.holds)
+    ride = RidePass(rig.strands, rig.root_holds, rig.guides, rig.guide_grid, rig.riders, rig.holds)
     for seed in range(3):
         pose = pose_of(rig, seed)
         if seed == 2:  # a tie that is gone holds nothing

@@ -108,7 +108,7 @@ def simulated(rig: Rig, pose: Pose, seed: int = 2) -> np.ndarray:
 def pass_of(rig: Rig) -> Any:
     from hairloom.addon.render.ride_pass import RidePass
 
-    return RidePass(rig.strands, rig.head, rig.guides, rig.guide_grid, rig.riders)
+    return RidePass(rig.strands, rig.root_holds, rig.guides, rig.guide_grid, rig.riders)
 
 
 def shown(ride: Any, pose: Pose, guides: Any) -> np.ndarray:

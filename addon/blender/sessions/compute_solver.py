@@ -44,7 +44,7 @@ class ComputeSolver:
         self._colliders = UploadedColliders()
         self._ride = RidePass(
             rig.strands,
-            rig.head,
+            rig.root_holds,
             rig.guides,
             rig.guide_grid,
             rig.riders,

@@ -90,13 +90,6 @@ class PreparedGroom:
     is_placeholder: bool = False
 
     @cached_property
-    def used(self) -> Ints:
-        """The head's vertices that carry roots, sorted; none without a head."""
-        if self.rig.head is None or self.rig.strands.root_triangle is None:
-            return np.zeros(0, np.int32)
-        return np.unique(self.rig.head.triangles[self.rig.strands.root_triangle])
-
-    @cached_property
     def head_occlusion(self) -> Floats | None:
         """(vertex_count,) in [0, 1], at rest; None without a head."""
         return pipeline.head_occlusion(self.rig, self.ambient)
@@ -175,9 +168,9 @@ def prepared(
     report("ambient occlusion")
     with ThreadPoolExecutor(1) as beside:
         # here, as the window's first frame would wait for it; numpy leaves room for both
-        riders = beside.submit(lambda: rig.riders)
+        moving = beside.submit(lambda: (rig.riders, rig.root_holds, rig.strands.uneven_along))
         groom = _drawn(rig, ambient, known, with_occluders, is_quick, report)
-        riders.result()
+        moving.result()
     return groom
 
 

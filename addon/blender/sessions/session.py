@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 
 import bpy
@@ -20,6 +20,7 @@ from ...dynamics.state import start
 from ...errors import HairloomError
 from ...paint_flow import painted
 from ...pipeline import Pose, Rig
+from ...refine.lead_out import Clearance
 from ...render.snapshot import Snapshot
 from ...strands.arc_length import lengths
 from ..bakes.baked_rig import BakedRig, frame_arrays, led_in, rig_arrays
@@ -78,9 +79,7 @@ class Session:
         self.hair, self.head = self._source.hair, self._source.head
         self.uid = self.hair.handle.uid
         self._is_drawn = is_drawn
-        self._job = LatestJob[BuildRequest, tuple[BuildRequest, PreparedGroom]](
-            "hair", partial(arrived, self)
-        )
+        self._job = LatestJob[BuildRequest, _Built]("hair", partial(arrived, self))
         # light of the hair that was made last; never while other hair is made
         self._light_job = LatestJob[PreparedGroom, PreparedGroom]("light", partial(arrived, self))
         self.times = FrameTimes()
@@ -194,8 +193,15 @@ class Session:
         request = self._source.request
         self._light_job.cancel()
         self._job.want(
-            request, lambda: partial(_build_in_thread, request=request, before=self._made)
+            request, lambda: partial(_build_in_thread, request, self._made, self._moment())
         )
+
+    def _moment(self) -> _Moment | None:
+        """That hair which is being made will go on from; None: it will begin at rest."""
+        if not self.is_playing or not self._posed:
+            return None
+        standing = tuple(each.at_end() for each in self._posed)
+        return _Moment(self.solver.pose, standing, self.settings[DynamicsSettings])
 
     @property
     def snapshot(self) -> Snapshot:
@@ -229,10 +235,14 @@ class Session:
         groom: PreparedGroom,
         before: PreparedGroom | None,
         depsgraph: bpy.types.Depsgraph,
+        clearance: Clearance | None = None,
     ) -> None:
         """Everything that depends on the strands and on the choice of guides.
 
         Hair that plays goes on, unless its guides are others now.
+
+        Args:
+            clearance: of these strands, where it is known; else the next frame finds it.
         """
         self._made = request, groom
         self.groom = groom
@@ -241,7 +251,7 @@ class Session:
         goes_on = before is not None and self.is_playing and _same_guides(groom.rig, before.rig)
         if not is_same:
             # strands are others now, and guides go on
-            motion = replace(self.solver.motion, clearance=None) if goes_on else None
+            motion = replace(self.solver.motion, clearance=clearance) if goes_on else None
             self.solver = solver_of(groom.rig, self.settings[DynamicsSettings].device, motion)
             self._styled = None
             self._take_style(depsgraph)
@@ -265,7 +275,7 @@ class Session:
             return
         made = self._job.take()
         if made is not None:
-            self._take(*made, self.groom, depsgraph)
+            self._take(made.request, made.groom, self.groom, depsgraph, made.clearance)
             self.comb(depsgraph)  # a brush has gone on meanwhile
             self.color(depsgraph)
             self.paint(depsgraph)
@@ -500,7 +510,7 @@ class Session:
             self.settings[DynamicsSettings],
             depsgraph,
             self.obstacles,
-            self.groom.used,
+            self.groom.rig.root_vertices,
             blocking=blocking,
         )
 
@@ -611,12 +621,36 @@ class Session:
         self.picture.show(self.rig, self.solver, self.settings)
 
 
+@dataclass(frozen=True, eq=False)
+class _Moment:
+    """A moment of hair that plays. colliders: as they stand."""
+
+    pose: Pose
+    colliders: tuple[PosedCollider, ...]
+    settings: DynamicsSettings
+
+
+@dataclass(frozen=True, eq=False)
+class _Built:
+    """clearance: of hair that was playing when it was asked for; None: it was not."""
+
+    request: BuildRequest
+    groom: PreparedGroom
+    clearance: Clearance | None = None
+
+
 def _build_in_thread(
-    work: ThreadWork[tuple[BuildRequest, PreparedGroom]],
     request: BuildRequest,
     before: tuple[BuildRequest, PreparedGroom],
-) -> tuple[BuildRequest, PreparedGroom]:
-    return request, build(request, before, is_drawn=True, is_quick=True, report=work.report)
+    moment: _Moment | None,
+    work: ThreadWork[_Built],
+) -> _Built:
+    groom = build(request, before, is_drawn=True, is_quick=True, report=work.report)
+    if moment is None or groom.rig is before[1].rig:
+        return _Built(request, groom)
+    motion = pipeline.begin(groom.rig, moment.pose)
+    motion = pipeline.with_clearance(groom.rig, motion, moment.colliders, moment.settings)
+    return _Built(request, groom, motion.clearance)
 
 
 def _light_in_thread(work: ThreadWork[PreparedGroom], groom: PreparedGroom) -> PreparedGroom:

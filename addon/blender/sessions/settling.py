@@ -127,8 +127,8 @@ def _colliders(
     depsgraph: bpy.types.Depsgraph,
 ) -> tuple[tuple[PosedCollider, ...], tuple[str, ...]]:
     """What the hair falls onto, and warnings."""
-    roots = PreparedGroom(rig, AmbientSettings()).used
-    obstacles = Obstacles.of(hair, source.head, rig.head, dynamics, depsgraph, None, roots)
+    roots, head = rig.root_vertices, source.head
+    obstacles = Obstacles.of(hair, head, rig.head, dynamics, depsgraph, None, roots)
     return obstacles.rest(depsgraph), (*source.warnings, *obstacles.warnings)
 
 

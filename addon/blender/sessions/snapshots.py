@@ -26,7 +26,6 @@ from ...shading.settings import ShadingSettings
 from ...shading.volume.settings import VolumeSettings
 from ...shading.volume.shadow_lights import shadow_warnings
 from ...strands import Surface
-from ...strands.arc_length import uneven_along
 from ...strands.colors import same_colors
 from ..cards.show import ShownCards
 from ..properties.groom_settings import GroomSettings
@@ -48,7 +47,7 @@ def snapshot_of(groom: PreparedGroom) -> Snapshot:
         points=strands.points,
         radius=strands.radius,
         layout=StrandLayout(strands.offsets),
-        along=uneven_along(strands.points, strands.offsets),
+        along=strands.uneven_along,
         guide=np.ascontiguousarray(groom.rig.weights.guide[:, 0]),
         group=strands.group,
         rank=groom.rank,

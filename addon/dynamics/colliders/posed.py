@@ -75,6 +75,10 @@ class PosedCollider:
         """Where it stands still at the frame's begin."""
         return PosedCollider(self.collider, self.matrix_before, self.matrix_before)
 
+    def at_end(self) -> PosedCollider:
+        """Where it stands still at the frame's end."""
+        return PosedCollider(self.collider, self.matrix_now, self.matrix_now)
+
     def matrix_at(self, moment: float) -> Floats:
         """Object to world (4, 4) float64 at `moment`, 0 the frame's begin and 1 its end."""
         displacement = self.matrix_now - self.matrix_before
