@@ -808,7 +808,9 @@ def with_clearance(
     if simulated is not None and not simulated.any():
         strands = None
     elif colliders and (strands is None or strands.kept != kept):
-        strands = clearance_at(carried(rig, motion.pose), rig.strands.offsets, before, kept)
+        # what `carried` would give an unmoved rig, bit for bit
+        points = rig.strands.points if _is_unmoved(rig, motion.pose) else carried(rig, motion.pose)
+        strands = clearance_at(points, rig.strands.offsets, before, kept)
     if colliders and (guides is None or guides.reach != reach):
         guides = guide_clearance(motion.carried_guides, before, reach)
     return replace(motion, clearance=strands, guide_clearance=guides)

@@ -12,6 +12,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from types import MappingProxyType
 
@@ -276,20 +277,32 @@ def _append(
     if name in done:
         return
     done.add(name)
-    for number, line in enumerate(_read(name, asked_by, folders).splitlines(), start=1):
-        include = _INCLUDE.match(line)
-        if include:
-            _append(include.group(1), f"{name}:{number}", folders, done, lines, origins)
+    for number, (line, included) in enumerate(_read(name, asked_by, folders), start=1):
+        if included:
+            _append(included, f"{name}:{number}", folders, done, lines, origins)
             continue
-        lines.append(_named(line, f"{name}:{number}"))
+        lines.append(line)
         origins.append((name, number))
 
 
-def _read(name: str, asked_by: str, folders: tuple[Path, ...]) -> str:
+def _read(name: str, asked_by: str, folders: tuple[Path, ...]) -> tuple[tuple[str, str], ...]:
+    """The lines of a file, each with the file that it includes; "" for none."""
     for folder in folders:
-        if (folder / name).is_file():
-            return (folder / name).read_text(encoding="utf-8")
+        file = folder / name
+        if file.is_file():
+            return _lines(file, file.stat().st_mtime_ns)
     raise ShaderError(f"{asked_by}: there is no shader file '{name}'")
+
+
+@cache
+def _lines(file: Path, _written: int) -> tuple[tuple[str, str], ...]:
+    """As `_read`; many programs include the same files."""
+    lines = []
+    for number, line in enumerate(file.read_text(encoding="utf-8").splitlines(), start=1):
+        include = _INCLUDE.match(line)
+        own = "" if include else _named(line, f"{file.name}:{number}")
+        lines.append((own, include.group(1) if include else ""))
+    return tuple(lines)
 
 
 def _named(line: str, place: str) -> str:
