@@ -808,12 +808,23 @@ def with_clearance(
     if simulated is not None and not simulated.any():
         strands = None
     elif colliders and (strands is None or strands.kept != kept):
-        # what `carried` would give an unmoved rig, bit for bit
-        points = rig.strands.points if _is_unmoved(rig, motion.pose) else carried(rig, motion.pose)
-        strands = clearance_at(points, rig.strands.offsets, before, kept)
+        strands = strand_clearance(rig, motion.pose, before, kept)
     if colliders and (guides is None or guides.reach != reach):
         guides = guide_clearance(motion.carried_guides, before, reach)
     return replace(motion, clearance=strands, guide_clearance=guides)
+
+
+def strand_clearance(
+    rig: Rig, pose: Pose, colliders: tuple[PosedCollider, ...], kept: float
+) -> Clearance:
+    """How far strands stay from colliders that stand still, by where their roots carry them now.
+
+    Args:
+        kept: [m], at most.
+    """
+    # of an unmoved rig what `carried` would give, bit for bit
+    points = rig.strands.points if _is_unmoved(rig, pose) else carried(rig, pose)
+    return clearance_at(points, rig.strands.offsets, colliders, kept)
 
 
 def strands_and_led(rig: Rig, motion: Motion) -> tuple[Floats, LedOut]:

@@ -64,9 +64,7 @@ BENCHES: dict[str, Short] = {
     "no_atomics": Short(),
     "sight": Short("lost", "crowds, covers, scales, counts of strands, and Cycles"),
     "frames": Short(),
-    "freeze": Short(
-        "--form numpy", "dynamics on a GPU, whose programs a software driver compiles for seconds"
-    ),
+    "freeze": Short(),
     "preview_frame": Short(),
     "compile": Short("head", "other scenes"),
     "memory": Short("small", "500,000 strands at 3840 x 2160"),

@@ -209,6 +209,18 @@ def test_play_waits_for_the_hair(hair, evaluated, gate):
     assert session.is_playing and len(grid_of(session)) == COUNT
 
 
+def test_play_begins_and_simulates_in_frames_of_their_own(hair, evaluated, gate):
+    session = previews.start(hair, evaluated())
+    previews.play(evaluated(), blocking=False)
+    gate.set()
+    arrive(session)
+    previews.advance(evaluated(), FRAME)
+    assert session.is_playing and session.solver.motion.clearance is not None
+    assert not session.solver.motion.duration, "it begins"
+    previews.advance(evaluated(), FRAME)
+    assert session.solver.motion.duration == FRAME
+
+
 def test_blenders_playback_and_a_bake_wait_for_no_timer(hair, evaluated, in_window):
     session = previews.start(hair, evaluated())
     session.play(evaluated())

@@ -234,9 +234,9 @@ def advance(depsgraph: bpy.types.Depsgraph, duration: float) -> None:
     """Simulate the time [s] that has passed since the last call."""
     for preview in tuple(previews.values()):
         if preview.phase is Phase.WAITING and preview.is_made and fields.are_made():
+            # its first frame is the next tick's, so that neither holds the window up for long
             attempt(preview, depsgraph, partial(_begin, preview, depsgraph))
-    for preview in tuple(previews.values()):
-        if preview.phase is Phase.FREE and not previews.is_paused:
+        elif preview.phase is Phase.FREE and not previews.is_paused:
             attempt(preview, depsgraph, partial(preview.go, Event.TICK, depsgraph, duration))
 
 

@@ -69,9 +69,25 @@ class ComputeSolver:
             guides=self.guides(),
         )
 
+    @property
+    def size(self) -> float:
+        return self._motion.dynamics.rest.size
+
     def rest(self, pose: Pose) -> None:
         self._take(pipeline.begin(self._rig, pose))
         self._is_resting = True
+
+    def meet(
+        self,
+        colliders: tuple[PosedCollider, ...],
+        settings: DynamicsSettings,
+        painted: PaintedGuides | None = None,
+    ) -> None:
+        simulated = simulated_of(painted, settings, len(self._rig.guides))
+        self._motion = pipeline.with_clearance(
+            self._rig, self._motion, colliders, settings, simulated
+        )
+        self._ride.leading.take(self._motion.clearance)
 
     def advance(
         self,
@@ -89,10 +105,8 @@ class ComputeSolver:
         if self._motion.clearance is not None and not self._is_resting:
             self._draw()  # what was not shown counts too: motion does not depend on who looks
             self._since = duration
-        motion = self._motion = pipeline.with_clearance(
-            self._rig, self._motion, colliders, settings, simulated
-        )
-        self._ride.leading.take(motion.clearance)
+        self.meet(colliders, settings, painted)
+        motion = self._motion
         if self._dynamics is None:
             self._dynamics = DynamicsPass(motion.dynamics, self._colliders)
         rig = self._rig

@@ -11,7 +11,7 @@ from ... import pipeline
 from ...arrays import Floats
 from ...dynamics.colliders import PosedCollider
 from ...dynamics.force_fields import NO_FIELDS, ForceFields
-from ...dynamics.painted import PaintedGuides
+from ...dynamics.painted import PaintedGuides, simulated_of
 from ...dynamics.settings import DynamicsSettings
 from ...dynamics.state import rows_of
 from ...errors import HairloomError
@@ -47,9 +47,24 @@ class NumpySolver:
     def motion(self) -> Motion:
         return let_go(self._rig, self._motion) if self._is_baked else self._motion
 
+    @property
+    def size(self) -> float:
+        return self._motion.dynamics.rest.size
+
     def rest(self, pose: Pose) -> None:
         self._take(pipeline.begin(self._rig, pose))
         self._strands = pipeline.strands_at_rest(self._rig, pose)
+
+    def meet(
+        self,
+        colliders: tuple[PosedCollider, ...],
+        settings: DynamicsSettings,
+        painted: PaintedGuides | None = None,
+    ) -> None:
+        simulated = simulated_of(painted, settings, len(self._rig.guides))
+        self._motion = pipeline.with_clearance(
+            self._rig, self._motion, colliders, settings, simulated
+        )
 
     def advance(
         self,

@@ -201,7 +201,8 @@ class Session:
         if not self.is_playing or not self._posed:
             return None
         standing = tuple(each.at_end() for each in self._posed)
-        return _Moment(self.solver.pose, standing, self.settings[DynamicsSettings])
+        kept = self.settings[DynamicsSettings].radius_root * self.solver.size
+        return _Moment(self.solver.pose, standing, kept)
 
     @property
     def snapshot(self) -> Snapshot:
@@ -442,6 +443,8 @@ class Session:
         if self.is_playing and self.obstacles is not None:
             self._posed = self.obstacles.rest(depsgraph)
             self._begun = self.solver.pose, self._posed
+            painted = self._source.painted_guides(self.rig)
+            self.solver.meet(self._posed, self.settings[DynamicsSettings], painted)
             rate = frame_rate(depsgraph.scene)
             for _ in range(self.settings[DynamicsSettings].pre_roll):
                 self._simulate(depsgraph, 1.0 / rate)
@@ -623,11 +626,14 @@ class Session:
 
 @dataclass(frozen=True, eq=False)
 class _Moment:
-    """A moment of hair that plays. colliders: as they stand."""
+    """A moment of hair that plays.
+
+    colliders: as they stand. kept: how far strands stay from them at most [m].
+    """
 
     pose: Pose
     colliders: tuple[PosedCollider, ...]
-    settings: DynamicsSettings
+    kept: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -648,9 +654,8 @@ def _build_in_thread(
     groom = build(request, before, is_drawn=True, is_quick=True, report=work.report)
     if moment is None or groom.rig is before[1].rig:
         return _Built(request, groom)
-    motion = pipeline.begin(groom.rig, moment.pose)
-    motion = pipeline.with_clearance(groom.rig, motion, moment.colliders, moment.settings)
-    return _Built(request, groom, motion.clearance)
+    clearance = pipeline.strand_clearance(groom.rig, moment.pose, moment.colliders, moment.kept)
+    return _Built(request, groom, clearance)
 
 
 def _light_in_thread(work: ThreadWork[PreparedGroom], groom: PreparedGroom) -> PreparedGroom:

@@ -50,8 +50,21 @@ class Solver(Protocol):
     def motion(self) -> Motion:
         """All that another solver needs to go on from here; read back where it must be."""
 
+    @property
+    def size(self) -> float:
+        """How long its guides were when the motion began, the median [m]."""
+
     def rest(self, pose: Pose) -> None:
         """Hair in its style, carried by the body, at no speed."""
+
+    def meet(
+        self,
+        colliders: tuple[PosedCollider, ...],
+        settings: DynamicsSettings,
+        painted: PaintedGuides | None = None,
+    ) -> None:
+        """Find how far hair stays from colliders, see `pipeline.with_clearance`; what has not met
+        them does so when it advances."""
 
     def advance(
         self,
