@@ -20,11 +20,12 @@ from .dynamics.constraints import PINNED
 from .dynamics.force_fields import NO_FIELDS, ForceFields
 from .dynamics.held import Held
 from .dynamics.painted import PaintedGuides, simulated_of
+from .dynamics.rigid_path import NOT_MOVED, Carrier, KnownStep
 from .dynamics.settings import DynamicsSettings
 from .dynamics.state import DynamicsState, rows_of, start
 from .dynamics.step import Drive, grid_at_frame_end
 from .dynamics.step import advance as advance_dynamics
-from .dynamics.turn import rotation_from
+from .dynamics.turn import root_sample, rotation_from
 from .errors import HairloomError
 from .groom.automatic_children import are_few, automatic
 from .groom.children import (
@@ -703,7 +704,7 @@ def advance(
         target, colliders, gravity, duration, force_fields, held, simulated, painted
     )
     state = advance_dynamics(motion.dynamics, drive, settings, duration)
-    guides, before = grid_at_frame_end(state, drive, duration), motion.carried_guides
+    guides, before = grid_at_frame_end(state, drive, settings, duration), motion.carried_guides
     return Motion(
         state,
         guides,
@@ -773,7 +774,14 @@ def go_along(
 
     position = taken_along(state.position)
     previous = position if duration else taken_along(state.previous)
-    state = replace(state, position=position, previous=previous, styles=(), push=None)
+    carried = NOT_MOVED
+    if not duration:
+        roots = Carrier.through(root_sample(motion.carried_guides), root_sample(target))
+        before, now = (place.turned(roots.path.now.rotation) for place in state.carried.places)
+        carried = KnownStep((before, now))
+    state = replace(
+        state, position=position, previous=previous, styles=(), push=None, carried=carried
+    )
     return Motion(
         state,
         state.grid,

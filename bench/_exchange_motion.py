@@ -31,7 +31,6 @@ from hairloom.addon.cards.export_settings import CardExportSettings  # noqa: E40
 from hairloom.addon.cards.steps import result_of  # noqa: E402
 from hairloom.addon.dynamics.colliders import DistanceField, PosedCollider  # noqa: E402
 from hairloom.addon.dynamics.settings import DynamicsSettings  # noqa: E402
-from hairloom.addon.dynamics.trajectory import curvature  # noqa: E402
 from hairloom.addon.exchange.cards.card_formats import GLB  # noqa: E402
 from hairloom.addon.params import SettingsMap  # noqa: E402
 from hairloom.addon.pipeline import Rig  # noqa: E402
@@ -93,10 +92,8 @@ def shaken(rig: Rig, seconds: float) -> MadeMotion:
     motion = pipeline.begin(rig, poses[0])
     guides, earlier = [motion.guides], None
     for before, now in pairwise(poses):
-        bent = (
-            None if earlier is None else curvature(earlier.matrix, before.matrix, now.matrix, 1.0)
-        )
-        posed = (PosedCollider(collider, before.matrix, now.matrix, bent),)
+        since = None if earlier is None else earlier.matrix
+        posed = (PosedCollider(collider, before.matrix, now.matrix, since),)
         motion = pipeline.advance(rig, motion, now, posed, settings, GRAVITY, 1.0 / RATE)
         guides.append(motion.guides)
         earlier = before

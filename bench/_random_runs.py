@@ -35,7 +35,6 @@ from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.dynamics.springs import give
 from hairloom.addon.dynamics.state import DynamicsState, start
 from hairloom.addon.dynamics.step import Drive
-from hairloom.addon.dynamics.trajectory import curvature
 from hairloom.addon.params import Parameter
 
 CV_COUNTS = (2, 3, 4, 8, 16, 24)
@@ -116,8 +115,8 @@ class RandomRun:
 
     def _posed(self, collider: Collider, way: Way, moments: list[float]) -> PosedCollider:
         matrices = [way.matrix(time) for time in moments]
-        bent = curvature(*matrices, 1.0) if self.is_bent and len(matrices) == 3 else None
-        return PosedCollider(collider, matrices[-2], matrices[-1], bent)
+        earlier = matrices[0] if self.is_bent and len(matrices) == 3 else None
+        return PosedCollider(collider, matrices[-2], matrices[-1], earlier)
 
 
 @dataclass(frozen=True)

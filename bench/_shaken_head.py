@@ -16,7 +16,6 @@ from shaken import GRAVITY
 from hairloom.addon.blender.scene.surfaces import read_surface
 from hairloom.addon.dynamics.colliders import Collider, PosedCollider
 from hairloom.addon.dynamics.step import Drive
-from hairloom.addon.dynamics.trajectory import curvature
 from hairloom.addon.groom.grow import grow, scalp_density
 from hairloom.addon.groom.settings import GrowSettings
 from hairloom.addon.strands import StrandSet, Surface
@@ -71,9 +70,9 @@ class Shake:
     def _drive(self, targets: tuple[np.ndarray | None, ...], places: list[float]) -> Drive:
         """Of the last two or three places of the head."""
         matrices = [_moved(x) for x in places]
-        bent = curvature(matrices[0], matrices[1], matrices[2], 1.0) if len(places) == 3 else None
+        since = matrices[0] if len(places) == 3 else None
         colliders = tuple(
-            PosedCollider(one, matrices[-2], matrices[-1], bent) for one in self.colliders
+            PosedCollider(one, matrices[-2], matrices[-1], since) for one in self.colliders
         )
         earlier, before, now = targets
         assert before is not None and now is not None

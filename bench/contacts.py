@@ -35,7 +35,6 @@ from hairloom.addon.dynamics.colliders.winding import winding_number
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.dynamics.state import start
 from hairloom.addon.dynamics.step import Drive
-from hairloom.addon.dynamics.trajectory import curvature
 from hairloom.addon.groom.face_hair import grow_with_face
 from hairloom.addon.groom.settings import GrowSettings, GuideSettings
 from hairloom.addon.pipeline import Pose, Rig
@@ -147,8 +146,8 @@ def shaken(
         pose = Pose(moved(now, rig.head.positions).astype(np.float32), now)
         targets.append(pipeline.carried_guides(rig, pose)[::every])
         earlier = matrices[max(frame - 2, 0)]
-        bent = curvature(earlier, matrices[frame - 1], now, 1.0) if frame > 1 else None
-        posed = PosedCollider(collider, matrices[frame - 1], now, bent)
+        since = earlier if frame > 1 else None
+        posed = PosedCollider(collider, matrices[frame - 1], now, since)
         drive = Drive(
             targets[-2], targets[-1], (posed,), GRAVITY, targets[-3] if frame > 1 else None
         )

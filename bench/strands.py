@@ -39,7 +39,6 @@ from hairloom.addon.dynamics.colliders.signed_distance import signed_distance
 from hairloom.addon.dynamics.colliders.winding import winding_number
 from hairloom.addon.dynamics.measure import length_changes
 from hairloom.addon.dynamics.settings import DynamicsSettings
-from hairloom.addon.dynamics.trajectory import curvature
 from hairloom.addon.pipeline import Motion, Pose, Rig
 from hairloom.addon.refine.lead_out import NOT_LED, LedOut
 from hairloom.addon.strands import StrandSet, Surface
@@ -113,8 +112,7 @@ def played(
     earlier, before, led = None, np.eye(4), NOT_LED
     for frame in range(1, round(SECONDS * fps) + 1):
         matrix = shake(frame / fps, centre)
-        bent = None if earlier is None else curvature(earlier, before, matrix, 1.0)
-        posed = (PosedCollider(collider, before, matrix, bent),)
+        posed = (PosedCollider(collider, before, matrix, earlier),)
         motion = pipeline.advance(
             rig,
             motion,

@@ -2,7 +2,7 @@
 //
 // Twin of advance in addon/dynamics/step.py. Defines: CV_COUNT; RELAXATION;
 // IS_PAINTED, where guides have numbers of their own; HAS_HELD; HAS_SPRINGS; HAS_PUSHES, where hair feels other hair; HAS_AIR; HAS_FORCE_FIELDS; CONTACT_SLOTS, 0 where there are no colliders; HAS_ROUNDS and HAS_FIELDS, the
-// kinds of colliders; HAS_SHARP, HAS_FOLLOWED and HAS_CLEARANCE, see lib_contacts.glsl.
+// kinds of colliders; INHERITS, where hair takes over some of its head's motion; HAS_SHARP, HAS_FOLLOWED and HAS_CLEARANCE, see lib_contacts.glsl.
 //
 // Loops of an unknown number of turns ask at their end: drivers on CPUs go once more through the
 // body of one that asks at its begin, with nothing to do.
@@ -41,6 +41,56 @@ float own_carried = 1.0;  // by which what the moving style gives is multiplied
 float own_gravity = 1.0;
 vec3 fall[FREE_SIZE];  // [m] that gravity and other hair add to each free CV in a substep
 
+// Where something is carried, see Carry in addon/dynamics/rigid_path.py, and what else its texels say.
+struct Carry {
+  vec4 row[3];  // xyz of the rotation, w a coordinate of where the origin goes
+  vec4 origin;
+};
+
+// In `carriers`, see dynamics_pass. What is the same for all substeps lies in the last row.
+Carry carry_at(int number, int texel)
+{
+  Carry carry;
+  for (int i = 0; i < 3; i++) {
+    carry.row[i] = texelFetch(carriers, ivec2(texel + i, number), 0);
+  }
+  carry.origin = texelFetch(carriers, ivec2(texel + 3, number), 0);
+  return carry;
+}
+
+vec3 carried(Carry carry, vec3 point)
+{
+  vec3 beside = point - carry.origin.xyz;
+  return vec3(dot(carry.row[0].xyz, beside), dot(carry.row[1].xyz, beside), dot(carry.row[2].xyz, beside)) +
+         vec3(carry.row[0].w, carry.row[1].w, carry.row[2].w);
+}
+
+// [m] that the motion of the style gives each free CV in the substep, beyond what it inherits, where it
+// goes on an arc; else zero
+vec3 style_moved[FREE_SIZE];
+float arc_carried;  // fraction of its motion that the style gives, 0 where there is no arc
+#ifdef INHERITS
+Carry inherited;         // in this substep
+Carry inherited_before;  // in the one before
+#endif
+
+// Where a CV is and was as it takes over its head's motion, before anything else acts on it.
+vec3 inheriting(vec3 here)
+{
+#ifdef INHERITS
+  here = carried(inherited, here);
+#endif
+  return here;
+}
+
+vec3 inheriting_before(vec3 before)
+{
+#ifdef INHERITS
+  before = carried(inherited, carried(inherited_before, before));
+#endif
+  return before;
+}
+
 // How the path of a point is bent, times r (r + 1); twin of curvature in addon/dynamics/trajectory.py.
 vec3 curvature_of(vec3 earlier, vec3 before, vec3 displacement)
 {
@@ -58,6 +108,9 @@ void load_guide(int guide)
   own_carried = own.z;
   own_gravity = own.w;
 #endif
+  Carry seen_now = carry_at(frame.substep_count, 8);
+  arc_carried = seen_now.origin.w;
+  Carry seen_earlier = carry_at(frame.substep_count, 12);
   for (int cv = 0; cv < CV_COUNT; cv++) {
     ivec2 texel = strand_texel(guide, cv, CV_COUNT);
     vec4 here = imageLoad(positions, texel);
@@ -67,8 +120,12 @@ void load_guide(int guide)
       previous[cv] = position[cv] - (position[cv] - previous[cv]) * frame.speed_ratio;
     }
     style_before[cv] = texelFetch(styles_before, texel, 0).xyz;
-    style_displacement[cv] = texelFetch(styles_now, texel, 0).xyz - style_before[cv];
-    style_curvature[cv] = curvature_of(texelFetch(styles_earlier, texel, 0).xyz, style_before[cv], style_displacement[cv]);
+    vec3 now = texelFetch(styles_now, texel, 0).xyz;
+    vec3 earlier = texelFetch(styles_earlier, texel, 0).xyz;
+    now = carried(seen_now, now);
+    earlier = carried(seen_earlier, earlier);
+    style_displacement[cv] = now - style_before[cv];
+    style_curvature[cv] = curvature_of(earlier, style_before[cv], style_displacement[cv]);
   }
   for (int i = 0; i < FREE; i++) {
     ivec2 texel = strand_texel(guide, i + 1, CV_COUNT);
@@ -99,17 +156,35 @@ void load_guide(int guide)
   int twist_cv = int(texelFetch(rest_shapes, strand_texel(guide, 0, CV_COUNT), 0).x);
   ivec2 texel = strand_texel(guide, twist_cv, CV_COUNT);
   twist_before = texelFetch(styles_before, texel, 0).xyz;
-  twist_displacement = texelFetch(styles_now, texel, 0).xyz - twist_before;
-  twist_curvature = curvature_of(texelFetch(styles_earlier, texel, 0).xyz, twist_before, twist_displacement);
+  vec3 now = texelFetch(styles_now, texel, 0).xyz;
+  vec3 earlier = texelFetch(styles_earlier, texel, 0).xyz;
+  now = carried(seen_now, now);
+  earlier = carried(seen_earlier, earlier);
+  twist_displacement = now - twist_before;
+  twist_curvature = curvature_of(earlier, twist_before, twist_displacement);
+  Carry begin = carry_at(frame.substep_count, 0);
+  float at_curvature = carry_at(frame.substep_count, 4).origin.w;
+  for (int cv = 0; cv < CV_COUNT; cv++) {
+    style[cv] = carried(begin, style_before[cv] + style_displacement[cv] * begin.origin.w + style_curvature[cv] * at_curvature);
+  }
+}
+
+// Halfway through the frame.
+vec3 middle_of_style(int cv)
+{
+  vec3 middle = style_before[cv] + 0.5 * style_displacement[cv];
+  Carry halfway = carry_at(frame.substep_count, 16);
+  middle = carried(halfway, middle + style_curvature[cv] * halfway.origin.w);
+  return middle;
 }
 
 void find_fall(int guide)
 {
   vec3 middle[FREE_SIZE];
   for (int i = 0; i < FREE; i++) {
-    middle[i] = style_before[i + 2] + 0.5 * style_displacement[i + 2];
+    middle[i] = middle_of_style(i + 2);
   }
-  vec3 root = style_before[1] + 0.5 * style_displacement[1];
+  vec3 root = middle_of_style(1);
   weight_on_style(frame.combed.xyz * own_gravity, root, middle, fall);
   for (int i = 0; i < FREE; i++) {
     fall[i] = frame.fall.xyz * own_gravity - fall[i];
@@ -135,9 +210,9 @@ void feel_fields(vec3 air_displacement)
 {
   int i = 0;
   do {
-    vec3 here = picked(position, i + 2);
-    vec3 before = slowed(here, picked(previous, i + 2), air_displacement);
-    vec3 along = picked(position, min(i + 3, CV_COUNT - 1)) - picked(position, i + 1);
+    vec3 here = inheriting(picked(position, i + 2));
+    vec3 before = slowed(here, inheriting_before(picked(previous, i + 2)), air_displacement);
+    vec3 along = inheriting(picked(position, min(i + 3, CV_COUNT - 1))) - inheriting(picked(position, i + 1));
     vec3 felt = blown_by_fields(here, before, field_direction(along));
     for (int k = 0; k < FREE; k++) {
       blown[k] = k == i ? felt : blown[k];
@@ -153,15 +228,15 @@ void predict(vec4 moment, vec3 air_displacement)
   feel_fields(air_displacement);
 #endif
   for (int i = 0; i < FREE; i++) {
-    vec3 here = position[i + 2];
-    vec3 before = slowed(here, previous[i + 2], air_displacement);
+    vec3 here = inheriting(position[i + 2]);
+    vec3 before = slowed(here, inheriting_before(previous[i + 2]), air_displacement);
 #ifdef HAS_FORCE_FIELDS
     before -= blown[i];
 #endif
-    vec3 impulse = style_displacement[i + 2] * moment.z + style_curvature[i + 2] * moment.w;
+    vec3 impulse = style_displacement[i + 2] * moment.z + style_curvature[i + 2] * moment.w + style_moved[i];
     impulse = impulse * own_carried + fall[i] + air_displacement * own_air;
+    previous[i + 2] = position[i + 2];
     position[i + 2] = (here - before) * own_kept + here + impulse;
-    previous[i + 2] = here;
   }
 }
 
@@ -272,10 +347,23 @@ void do_substep(int number)
 #else
   vec3 air_displacement = vec3(0.0);
 #endif
+#ifdef INHERITS
+  inherited = carry_at(number, 4);
+  inherited_before = carry_at(number > 0 ? number - 1 : frame.substep_count, 4);
+#endif
+  Carry place = carry_at(number, 0);
+  for (int i = 0; i < FREE; i++) {
+    style_moved[i] = -inheriting(style[i + 2]);
+  }
   for (int cv = 0; cv < CV_COUNT; cv++) {
     style[cv] = style_before[cv] + style_displacement[cv] * moment.x + style_curvature[cv] * moment.y;
+    style[cv] = carried(place, style[cv]);
   }
   style_twist = twist_before + twist_displacement * moment.x + twist_curvature * moment.y;
+  style_twist = carried(place, style_twist);
+  for (int i = 0; i < FREE; i++) {
+    style_moved[i] = (style_moved[i] + style[i + 2]) * arc_carried;
+  }
   predict(moment, air_displacement);
   pin();
 #ifdef HAS_SPRINGS

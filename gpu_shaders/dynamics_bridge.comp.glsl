@@ -1,6 +1,6 @@
 // Guides at a frame's very end: moved as a whole to where their roots are, and what is held to where
-// it is held, which bridges the time that is left over; between there and their style where not all
-// of them is simulated. One invocation a CV. Defines: HAS_HELD, IS_BLENDED.
+// it is held, which bridges the time that is left over; turned about their roots as these turn, where they inherit it; between there and their style where not all
+// of them is simulated. One invocation a CV. Defines: HAS_HELD, IS_TURNED, IS_BLENDED.
 //
 // Twin of grid_at_frame_end in addon/dynamics/step.py, and of blended in addon/dynamics/blend.py.
 #include "lib_strand_texel.glsl"
@@ -19,7 +19,13 @@ vec3 simulated_at(int guide, int cv, vec3 displacement)
 #ifdef HAS_HELD
   displacement += texelFetch(beside_root, texel, 0).xyz;
 #endif
-  return texelFetch(positions, texel, 0).xyz + displacement;
+  vec3 place = texelFetch(positions, texel, 0).xyz;
+#ifdef IS_TURNED
+  vec3 root = texelFetch(positions, strand_texel(guide, 0, cv_count), 0).xyz;
+  vec3 beside = place - root;
+  place = root + vec3(dot(turn_x, beside), dot(turn_y, beside), dot(turn_z, beside));
+#endif
+  return place + displacement;
 }
 
 void main()

@@ -18,12 +18,12 @@ from .force_fields import NO_FIELDS, ForceFields
 from .forces import Damped, combed_gravity, felt_gravity
 from .held import Held
 from .painted import PaintedFrame, PaintedGuides, painted_frame
+from .rigid_path import CarriedPath, Carrier, Carry, KnownStep, LastStep, Rigid
 from .settings import DynamicsSettings
 from .springs import Springs
 from .state import DynamicsState, Rest, StyleRows, as_rows, checked_grid
 from .style import StyleBand, style_band
-from .trajectory import at, curvature
-from .turn import rotation_from, sample
+from .turn import root_sample, rotation_from, sample
 from .wind import Air, air_of
 
 
@@ -68,13 +68,30 @@ class Drive:
         return tuple(target for target in known if target is not None)
 
     @cached_property
-    def target_curvature(self) -> Floats | None:
-        """How the way of the style is bent, in the shape of the targets [m]; None: straight."""
-        if self.target_earlier is None:
-            return None
-        return curvature(
-            self.target_earlier, self.target_before, self.target_now, self.earlier_ratio
+    def carrier(self) -> Carrier:
+        """How the roots go as a whole."""
+        earlier = self.target_earlier
+        return Carrier.through(
+            root_sample(self.target_before),
+            root_sample(self.target_now),
+            None if earlier is None else root_sample(earlier),
+            self.earlier_ratio,
         )
+
+    @cached_property
+    def style_carrier(self) -> Carrier | None:
+        """The same where it turns the style by so much that it goes on an arc."""
+        return self.carrier if self.carrier.path.is_arc else None
+
+    def target_at(self, moment: float) -> Floats:
+        """Where the style is at a moment of the frame, in the shape of the targets [m]."""
+        before, now, earlier = (
+            None if grid is None else grid.T
+            for grid in (self.target_before, self.target_now, self.target_earlier)
+        )
+        assert before is not None and now is not None
+        path = CarriedPath.through(before, now, earlier, self.earlier_ratio, self.style_carrier)
+        return path.at(moment).T
 
 
 def check_drive(state: DynamicsState, drive: Drive, known: tuple[Floats, ...] = ()) -> None:
@@ -140,6 +157,30 @@ def check_drive(state: DynamicsState, drive: Drive, known: tuple[Floats, ...] = 
         )
 
 
+def carried_after(
+    state: DynamicsState, frame: Frame | None, drive: Drive, settings: DynamicsSettings, count: int
+) -> LastStep | KnownStep:
+    """`DynamicsState.carried` after a frame of this number of substeps.
+
+    Args:
+        frame: None where there are none.
+    """
+    if not inherits(settings):
+        return (
+            state.carried if frame is None else LastStep(drive.carrier.path, frame.span(count - 1))
+        )
+    known = state.carried.places
+    if frame is not None:
+        known = frame.place(count - 2), frame.place(count - 1)
+    before, now = (place.since(drive.carrier.path.now) for place in known)
+    return KnownStep((before, now))
+
+
+def inherits(settings: DynamicsSettings) -> bool:
+    """Whether hair takes over some of the roots' motion without inertia."""
+    return settings.inherit_movement > 0.0 or settings.inherit_rotation > 0.0
+
+
 def style_rows(state: DynamicsState, drive: Drive) -> tuple[StyleRows, ...]:
     """The drive's targets in rows; those that the state knows from the frame before as they are."""
     known = {id(style.grid): style for style in state.styles}
@@ -166,6 +207,8 @@ class Frame:
     size: float  # of the hair [m], see `state.Rest`
     among: Among | None  # None where hair does not feel other hair
     painted: PaintedFrame | None  # None where nothing is painted
+    begun: LastStep | KnownStep  # see `DynamicsState.carried`
+    speed_ratio: float  # of a substep to the one before the frame
 
     @classmethod
     def of(
@@ -203,11 +246,42 @@ class Frame:
             size,
             among,
             painted,
+            state.carried,
+            dt / state.substep if state.substep else 1.0,
         )
 
     def pieces(self, count: int) -> list[range]:
         """The substeps that guides may go through one guide after the other."""
         return [range(count)] if self.among is None else self.among.pieces(count)
+
+    @property
+    def inherits(self) -> bool:
+        """See `inherits`."""
+        return inherits(self.settings)
+
+    @property
+    def style_carrier(self) -> Carrier | None:
+        """See `Drive.style_carrier`."""
+        return self.drive.carrier if self.inherits else self.drive.style_carrier
+
+    def place(self, number: int) -> Rigid:
+        """Where the roots are as a whole after a substep, seen from the frame's begin; -1: before
+        the first one."""
+        return (
+            self.begun.places[1] if number < 0 else self.drive.carrier.path.at(self.span(number)[1])
+        )
+
+    def inherited(self, number: int) -> Carry:
+        """How hair goes with the roots in a substep without inertia; -1: in the one before."""
+        settings, ratio = self.settings, 1.0
+        if number >= 0:
+            now, before = self.place(number), self.place(number - 1)
+        else:
+            before, now, ratio = *self.begun.places, self.speed_ratio
+        motion = now.since(before).part(
+            settings.inherit_movement * ratio, settings.inherit_rotation * ratio
+        )
+        return self.drive.carrier.carry(motion, before)
 
     def span(self, number: int) -> tuple[float, float]:
         """Begin and end of a substep as fractions of the frame."""
@@ -247,9 +321,10 @@ def _among(
 class Block:
     """Some guides made ready for a frame, rows (3, cv_count, n) world [m].
 
+    style: where the head carries the CVs.
     impulse, impulse_curvature: what gravity and the moving style add to each CV in a
-        substep, and how
-        that changes while the way of the style bends.
+        substep, and how that changes while the way of the style bends. Where the style goes on an
+        arc, gravity alone.
     radius: (cv_count * n,) [m], the distance that each CV keeps from colliders; not to be written.
     between: (len(BETWEEN), cv_count * n) [m], the same of points of the segment that ends there.
     held: (cv_count, n), see `held.Held.rows`; None where none of these guides is held.
@@ -258,9 +333,7 @@ class Block:
     """
 
     rest: Rest
-    style_before: Floats
-    style_displacement: Floats
-    style_curvature: Floats | None
+    style: CarriedPath
     impulse: Floats
     impulse_curvature: Floats | None
     radius: Floats
@@ -279,17 +352,25 @@ class Block:
         """
         drive, settings, dt = frame.drive, frame.settings, frame.dt
         now, before, *earlier = (style.rows[:, :, guides] for style in styles)
-        displacement = now - before
-        bent = curvature(earlier[0], before, now, drive.earlier_ratio) if earlier else None
-        middle = before + displacement * np.float32(0.5)
+        since = earlier[0] if earlier else None
+        style = CarriedPath.through(before, now, since, drive.earlier_ratio, frame.style_carrier)
+        middle: Floats = before + (now - before) * np.float32(0.5)
+        if style.carrier is not None:
+            middle = style.at(0.5)
         own = None if frame.painted is None else frame.painted.part(guides)
         matrix, damped = frame.matrix, frame.damped
         if own is not None:
             matrix, damped = own.matrix, own.damped
-        carried = np.float32(damped.carried * (dt / frame.duration))
-        impulse = displacement * carried
         felt = felt_gravity(drive.gravity, settings, frame.turn, middle) * np.float32(dt * dt)
-        impulse += felt if own is None else felt * own.gravity
+        if own is not None:
+            felt = felt * own.gravity
+        impulse: Floats = np.asarray(felt)
+        bent: Floats | None = None
+        if style.carrier is None:
+            carried = np.float32(damped.carried * (dt / frame.duration))
+            impulse = style.displacement * carried
+            impulse += felt
+            bent = None if style.curvature is None else style.curvature * carried
         radius = radius_of_all(settings, state.cv_count, before.shape[2], state.rest.size)
         between = np.tile(radius * BETWEEN_RADIUS, (len(BETWEEN), 1))
         if drive.clearance is not None:
@@ -309,11 +390,9 @@ class Block:
             springs = replace(springs, load=springs.load * own.gravity[springs.guides])
         return cls(
             rest,
-            before,
-            displacement,
-            bent,
+            style,
             impulse,
-            None if bent is None else bent * carried,
+            bent,
             radius,
             between,
             held,
@@ -322,11 +401,17 @@ class Block:
             damped,
         )
 
-    def style_at(self, moment: float) -> Floats:
-        return at(self.style_before, self.style_displacement, self.style_curvature, moment)
+    def impulse_at(self, span: tuple[float, float], begin: Floats | None, end: Floats) -> Floats:
+        """[m] that gravity and the moving style add to each CV in a substep; not to be written.
 
-    def impulse_at(self, span: tuple[float, float]) -> Floats:
-        """[m] that gravity and the moving style add to each CV in a substep; not to be written."""
+        Args:
+            begin, end: the style at its ends; the former counts where this goes on an arc.
+        """
+        if begin is not None:
+            moved = end - begin
+            moved *= np.float32(self.damped.carried)
+            moved += self.impulse
+            return moved
         if self.impulse_curvature is None:
             return self.impulse
         impulse = self.impulse_curvature * np.float32(span[0] + span[1] - 1.0)

@@ -257,6 +257,28 @@ class DynamicsSettings(MotionSettings):
         source='"Pearl" configuration, Nguyen and Donnelly 2005',
         panel="Collisions",
     )
+    inherit_movement: float = number(
+        0.0,
+        label="Inherit Movement",
+        description="Fraction of the roots' movement that hair takes over at once, without lagging "
+        "behind; at 1 it moves as if its head stayed in place",
+        soft=(0.0, 1.0),
+        hard=(0.0, 1.0),
+        unit="factor",
+        source="1 less the linear velocity scale of grooms in Unreal",
+        panel="Shot",
+    )
+    inherit_rotation: float = number(
+        0.0,
+        label="Inherit Rotation",
+        description="Fraction of the roots' rotation that hair takes over at once, without lagging "
+        "behind; at 1 it moves as if its head did not turn, but for its weight",
+        soft=(0.0, 1.0),
+        hard=(0.0, 1.0),
+        unit="factor",
+        source="1 less the angular velocity scale of grooms in Unreal",
+        panel="Shot",
+    )
     jump_distance: float = number(
         3.0,
         label="Jump Distance",

@@ -16,6 +16,7 @@ from ..arrays import Floats
 from ..errors import HairloomError
 from .among import HairGrid
 from .constraints import PINNED
+from .rigid_path import NOT_MOVED, KnownStep, LastStep
 from .style import LocalShape, local_shape
 from .turn import rest_sample
 
@@ -85,6 +86,7 @@ class DynamicsState:
     styles: what the last frame went by, so that the next need not turn and check it again.
     push: (3, cv_count, guide_count) [m], what other hair adds to each CV in a substep until it is
         felt again; None where it is to be felt at once.
+    carried: where the roots were as a whole in the last substep.
     """
 
     position: Floats
@@ -95,6 +97,7 @@ class DynamicsState:
     time: float = 0.0
     styles: tuple[StyleRows, ...] = ()
     push: Floats | None = None
+    carried: LastStep | KnownStep = NOT_MOVED
 
     def __post_init__(self) -> None:
         self.position.flags.writeable = False

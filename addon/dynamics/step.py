@@ -53,7 +53,8 @@ from .contacts import (
 )
 from .force_fields import along_strands, blow
 from .forces import brake, predict
-from .frame import Block, Drive, Frame, check_drive, style_rows
+from .frame import Block, Drive, Frame, carried_after, check_drive, style_rows
+from .rigid_path import Carry
 from .schedule import due_substeps
 from .settings import DynamicsSettings
 from .state import DynamicsState
@@ -77,9 +78,10 @@ def advance(
     dt = 1.0 / settings.substep_rate
     longest = settings.longest_frame
     duration, count, left = due_substeps(state.time_left, duration, longest, dt)
-    if not count:
-        return replace(state, time_left=left)
     check_drive(state, drive, tuple(style.grid for style in state.styles))
+    if not count:
+        carried = carried_after(state, None, drive, settings, count)
+        return replace(state, time_left=left, carried=carried)
     styles = style_rows(state, drive)
     frame = Frame.of(state, drive, settings, duration, dt)
     spans = [frame.span(number) for number in range(count)]
@@ -100,7 +102,8 @@ def advance(
                 block, here, before, pushed, frame, spans, poses, numbers
             )
     time = state.time + count * dt
-    return DynamicsState(position, previous, state.rest, dt, left, time, styles, push)
+    carried = carried_after(state, frame, drive, settings, count)
+    return DynamicsState(position, previous, state.rest, dt, left, time, styles, push, carried)
 
 
 def _previous(state: DynamicsState, dt: float) -> Floats:
@@ -133,20 +136,32 @@ def _advance_block(
     settings, rest, damped = frame.settings, block.rest, block.damped
     spare = np.empty_like(position)
     chain = _Chain(rest.length, block.held, rest.size, settings)
+    is_arc, begun = block.style.carrier is not None, None
+    if is_arc:
+        first = frame.place(numbers[0] - 1) if frame.inherits else None
+        begun = block.style.at(spans[numbers[0]][0], first)
+    inherited = frame.inherited(numbers[0] - 1) if frame.inherits else None
     for number in numbers:
         span = spans[number]
-        style = block.style_at(span[1])
-        impulse = block.impulse_at(span)
+        style = block.style.at(span[1])
+        here, before = position, previous
+        if inherited is not None:
+            here, before = position, inherited.moved(previous)
+            inherited = frame.inherited(number)
+            here, before = inherited.moved(here), inherited.moved(before)
+            begun = None if begun is None else inherited.moved(begun)
+        impulse = block.impulse_at(span, begun, style)
+        begun = style if is_arc else None
         if push is not None:
             impulse = impulse + push
         air_displacement = frame.air_displacement(position[:, 0], number)
         if settings.drag:
-            brake(position, previous, settings.drag, air_displacement)
+            brake(here, before, settings.drag, air_displacement)
         if frame.force_fields is not None:
-            _blow(position, previous, frame)
+            _blow(here, before, frame)
         if air_displacement is not None:
             impulse = impulse + air_displacement[:, None] * np.float32(damped.air)
-        predict(position, previous, impulse, damped.kept, out=spare)
+        predict(here, before, impulse, damped.kept, out=spare)
         previous, position, spare = position, spare, previous
         pin(position, style, rest.length, block.held)
         if block.springs is not None:
@@ -169,7 +184,9 @@ def _blow(position: Floats, previous: Floats, frame: Frame) -> None:
     previous[:, PINNED:] = before
 
 
-def grid_at_frame_end(state: DynamicsState, drive: Drive, duration: float) -> Floats:
+def grid_at_frame_end(
+    state: DynamicsState, drive: Drive, settings: DynamicsSettings, duration: float
+) -> Floats:
     """CVs at the frame's very end, (guide_count, cv_count, 3) world [m], for drawing.
 
     Bridges the time that is left over: each guide is moved as a whole to where its root is now,
@@ -183,10 +200,23 @@ def grid_at_frame_end(state: DynamicsState, drive: Drive, duration: float) -> Fl
     beside_root = displacement_beside_root(state.time_left, drive, duration)
     if beside_root is not None:
         displacement = displacement + beside_root
-    grid = (state.grid + displacement).astype(np.float32)
+    turn, grid = turned_beside_root(state, settings), state.grid
+    if turn is not None:
+        root = grid[:, :1]
+        grid = Carry(turn, np.zeros(3), np.zeros(3)).moved((grid - root).T).T + root
+    grid = (grid + displacement).astype(np.float32)
     if drive.simulated is None:
         return grid
     return blended(grid, drive.target_now.astype(np.float32), drive.simulated)
+
+
+def turned_beside_root(state: DynamicsState, settings: DynamicsSettings) -> Floats | None:
+    """How hair turns about its roots (3, 3) in the time left over, where it inherits their
+    rotation; None: not."""
+    if not settings.inherit_rotation or not state.time_left:
+        return None
+    left = state.carried.places[1].inverse
+    return left.part(0.0, settings.inherit_rotation).rotation
 
 
 def displacement_beside_root(time_left: float, drive: Drive, duration: float) -> Floats | None:
@@ -194,11 +224,7 @@ def displacement_beside_root(time_left: float, drive: Drive, duration: float) ->
     of the targets [m]; None where nothing is held, or no time is left."""
     if drive.held is None or not time_left or not duration:
         return None
-    left = min(time_left / duration, 1.0)
-    displacement: Floats = drive.target_now - drive.target_before
-    displacement *= np.float32(left)
-    if drive.target_curvature is not None:
-        displacement += drive.target_curvature * np.float32(left * (1.0 - left))
+    displacement: Floats = drive.target_now - drive.target_at(1.0 - min(time_left / duration, 1.0))
     displacement -= displacement[:, :1]
     displacement = drive.held.spread(displacement)
     displacement[~drive.held.is_held.any(axis=1)] = 0.0

@@ -32,6 +32,14 @@ def sample(grid: Floats) -> Floats:
     return np.ascontiguousarray(places.transpose(2, 1, 0), np.float64).reshape(3, -1)
 
 
+def root_sample(grid: Floats) -> Floats:
+    """The pinned CVs of evenly chosen guides in the shape of `sample`: what goes with the head. All
+    CVs where there are fewer than three guides, since two roots do not tell how they turn."""
+    step = max(-(-len(grid) // SAMPLED_GUIDES), 1)
+    places = np.asarray(grid)[::step, : PINNED if len(grid) > PINNED else None]
+    return np.ascontiguousarray(places.transpose(2, 1, 0), np.float64).reshape(3, -1)
+
+
 def rest_sample(grid: Floats) -> Floats:
     """`sample` about its own middle."""
     places = sample(grid)

@@ -4,7 +4,8 @@ and a table of moments, one row a substep.
 A row of the table, texels of RGBA32F:
     0     x the substep's end s as a fraction of the frame, y s (s - 1); z and w fractions of the
           style's displacement and curvature that swing damping gives to each CV. y and w are over
-          r (r + 1) with the ratio r of `trajectory.curvature`, or 0 where the style moves straight
+          r (r + 1) with the ratio r of `trajectory.curvature`, or 0 where the style moves straight.
+          Where it goes on an arc, z and w are 0
     1, 2  phases of the gusts' modes [rad]
     then  COLLIDER_TEXELS for each collider, see collider_textures.py
 """
@@ -21,6 +22,7 @@ from ..dynamics.contacts import REACH, cv_radius
 from ..dynamics.force_fields import FARTHEST
 from ..dynamics.frame import Frame
 from ..dynamics.painted import PaintedFrame
+from ..dynamics.rigid_path import STILL
 from ..dynamics.settings import DynamicsSettings
 from ..dynamics.springs import give, stiffness
 from ..dynamics.style import StyleBand, style_band
@@ -47,11 +49,40 @@ def moments_of(frame: Frame, first: int, spans: Floats) -> Floats:
         ratio = clamped_ratio(frame.drive.earlier_ratio)
         table[:, 0, 1] = end * (end - 1.0) / (ratio * (ratio + 1.0))
         table[:, 0, 3] = part * (begin + end - 1.0) / (ratio * (ratio + 1.0))
+    if frame.style_carrier is not None:
+        table[:, 0, 2:] = 0.0
     if frame.air is not None and len(frame.air.phase):
         time = frame.time + np.arange(first, first + len(spans)) * frame.dt
         turns = np.mod(frame.air.phase - frame.air.rate * time[:, None], 2.0 * np.pi)
         table[:, 1:] = turns.reshape(len(spans), MOMENT_TEXELS - 1, 4)
     return table
+
+
+def carriers_of(frame: Frame, first: int, count: int) -> Floats:
+    """`carriers` of dynamics_pass for some substeps, (count + 1, 20, 4) float32."""
+    table = np.zeros((count + 1, 5, 4, 4), np.float32)
+    table[:, :, :3, :3] = np.eye(3)
+    begin, bend = frame.span(first)[0], 0.0
+    if frame.drive.target_earlier is not None:
+        ratio = clamped_ratio(frame.drive.earlier_ratio)
+        bend = 1.0 / (ratio * (ratio + 1.0))
+    carrier = frame.style_carrier
+    if carrier is not None:
+        path = carrier.path
+        ends = [frame.span(number)[1] for number in range(first, first + count)]
+        places = [path.at(end) for end in ends]
+        places.append(frame.place(first - 1) if frame.inherits else path.at(begin))
+        table[:, 0] = [carrier.carry(place).texels for place in places]
+        table[-1, 2] = carrier.seen(path.now).texels
+        table[-1, 3] = carrier.seen(path.earlier or STILL).texels
+        table[-1, 4] = carrier.carry(path.at(0.5)).texels
+        table[-1, 2, 3, 3] = frame.damped.carried
+    if frame.inherits:
+        numbers = (*range(first, first + count), first - 1)
+        table[:, 1] = [frame.inherited(number).texels for number in numbers]
+    table[-1, :2, 3, 3] = begin, begin * (begin - 1.0) * bend
+    table[-1, 4, 3, 3] = -0.25 * bend if carrier is not None else 0.0
+    return table.reshape(count + 1, 20, 4)
 
 
 def block_of(

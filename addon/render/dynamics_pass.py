@@ -21,6 +21,12 @@ strand_layout.strand_rows:
     painted_numbers   RGBA32F: of a guide's first CV x the speed that damping leaves, y the fraction
                    of the air's, z and w by which those of the style and gravity are multiplied;
                    of all others x bend; both only where something is painted
+    carriers       RGBA32F: four texels a place or motion, see rigid_path.Carry.texels. Row n: where
+                   the roots are as a whole at the end of substep n; what hair inherits in it. One
+                   more row: the same at the begin of the first and in the one before, where w of
+                   the origins are that moment s and s (s - 1) as in the table of moments; back from
+                   the frame's end, with w the fraction of its motion that a style gives which goes
+                   on an arc; back from one frame earlier; halfway, with w as s (s - 1)
     fractions      R32F: of a guide's first CV how much of it is simulated, see blend.blended; only
                    where not all is
 
@@ -43,17 +49,17 @@ from ..arrays import Floats
 from ..dynamics.clearance import GuideClearance, farthest_kept
 from ..dynamics.constraints import PINNED
 from ..dynamics.contacts import REACH
-from ..dynamics.frame import Drive, Frame, check_drive
+from ..dynamics.frame import Drive, Frame, carried_after, check_drive
 from ..dynamics.held import Held
 from ..dynamics.painted import PaintedFrame
 from ..dynamics.schedule import due_substeps
 from ..dynamics.settings import DynamicsSettings
 from ..dynamics.state import DynamicsState, Rest, as_rows
-from ..dynamics.step import displacement_beside_root
+from ..dynamics.step import displacement_beside_root, turned_beside_root
 from .among_pass import AmongPass
 from .capabilities import pair_format
 from .collider_textures import NOT_FOLLOWED, UploadedColliders
-from .dynamics_block import bands_of, block_of, moments_of, own_of, spans_of
+from .dynamics_block import bands_of, block_of, carriers_of, moments_of, own_of, spans_of
 from .shader_program import ShaderRecipe, program, released_with_shaders
 from .strand_layout import from_strand_rows, strand_rows
 from .textures import UniformBlock, texture_from, texture_to_array
@@ -63,10 +69,12 @@ SUBSTEPS_AT_ONCE = 64
 #: Contacts that a CV may have at once.
 CONTACT_SLOTS = 2
 GROUP_SIZE = 32
+#: What a bridge's shader calls the rows of the turn about roots.
+TURN_ROWS = ("turn_x", "turn_y", "turn_z")
 
 
 @lru_cache(maxsize=4)
-def bridge_recipe(*, held: bool, blended: bool) -> ShaderRecipe:
+def bridge_recipe(*, held: bool, blended: bool, turned: bool = False) -> ShaderRecipe:
     """The program of a frame's very end."""
     names = ["positions", "styles_now", *["beside_root"] * held, *["fractions"] * blended]
     return ShaderRecipe(
@@ -75,8 +83,13 @@ def bridge_recipe(*, held: bool, blended: bool) -> ShaderRecipe:
         textures=tuple(("FLOAT_2D", name) for name in names),
         images=(("RGBA32F", "bridged"),),
         integers=("cv_count", "guide_count"),
+        numbers=tuple(("VEC3", name) for name in TURN_ROWS) if turned else (),
         group_size=(16, 4),
-        defines=(*[("HAS_HELD", 1)] * held, *[("IS_BLENDED", 1)] * blended),
+        defines=(
+            *[("HAS_HELD", 1)] * held,
+            *[("IS_TURNED", 1)] * turned,
+            *[("IS_BLENDED", 1)] * blended,
+        ),
     )
 
 
@@ -97,6 +110,7 @@ def dynamics_recipe(
     sharp: bool = False,
     clearance: bool = False,
     painted: bool = False,
+    inherits: bool = False,
     pairs: str = "RG32F",
 ) -> ShaderRecipe:
     """The program for guides of this many CVs, without what the scene does not need.
@@ -117,9 +131,10 @@ def dynamics_recipe(
         "HAS_SHARP": sharp and cv_count > PINNED,
         "HAS_CLEARANCE": clearance,
         "IS_PAINTED": painted,
+        "INHERITS": inherits,
     }
     textures = ["styles_earlier", "styles_before", "styles_now", "rest_shapes", "rest_lengths"]
-    textures += ["moments"] + ["held_cvs"] * held + ["curl_rooms"] * springs
+    textures += ["moments", "carriers"] + ["held_cvs"] * held + ["curl_rooms"] * springs
     textures += ["pushes"] * pushed + ["force_fields"] * (force_fields and cv_count > PINNED)
     textures += ["painted_bands", "painted_numbers"] * painted
     textures += ["rounds"] * rounds + ["fields"] * fields + ["clearances"] * clearance
@@ -172,16 +187,21 @@ class DynamicsPass:
         state, dt, longest = self._state, 1.0 / settings.substep_rate, settings.longest_frame
         duration, count, left = due_substeps(state.time_left, duration, longest, dt)
         check_drive(state, drive, tuple(style for style, _ in self._styles))
+        carried = state.carried
         if state.guide_count:
             self._upload(drive)
-            if count:
-                frame = Frame.of(state, drive, settings, duration, dt)
+            frame = Frame.of(state, drive, settings, duration, dt) if count else None
+            carried = carried_after(state, frame, drive, settings, count)
+            if frame is not None:
                 self._advance(frame, count, dt / state.substep if state.substep else 1.0)
             self._is_bridged = left > 0.0 or not count or drive.simulated is not None
             if self._is_bridged:
-                self._bridge(displacement_beside_root(left, drive, duration), drive.simulated)
+                left_over = replace(state, time_left=left, carried=carried)
+                turn = turned_beside_root(left_over, settings)
+                self._bridge(displacement_beside_root(left, drive, duration), drive.simulated, turn)
         self._state = replace(
             state,
+            carried=carried,
             substep=dt if count else state.substep,
             time_left=left,
             time=state.time + count * dt,
@@ -294,6 +314,7 @@ class DynamicsPass:
         textures |= {"rounds": colliders.rounds, "fields": colliders.fields}
         if frame.force_fields is not None:
             textures["force_fields"] = texture_from(frame.force_fields.table, "RGBA32F")
+        textures["carriers"] = texture_from(carriers_of(frame, first, count), "RGBA32F")
         recipe = dynamics_recipe(
             state.cv_count,
             relaxation=settings.length_solver == "relaxation",
@@ -309,6 +330,7 @@ class DynamicsPass:
             sharp=is_sharp,
             clearance=bool(posed) and frame.drive.clearance is not None,
             painted=frame.painted is not None,
+            inherits=frame.inherits,
             pairs=pair_format(),
         )
         block = block_of(frame, state.guide_count, state.cv_count, count, speed_ratio)
@@ -321,10 +343,15 @@ class DynamicsPass:
         gpu.compute.dispatch(shader.shader, -(-state.guide_count // GROUP_SIZE), 1, 1)
         gpu.shader.unbind()
 
-    def _bridge(self, beside_root: Floats | None, simulated: Floats | None) -> None:
+    def _bridge(
+        self, beside_root: Floats | None, simulated: Floats | None, turn: Floats | None
+    ) -> None:
         """Fill `bridged`."""
         state, textures = self._state, dict(self._textures)
-        recipe = bridge_recipe(held=beside_root is not None, blended=simulated is not None)
+        recipe = bridge_recipe(
+            held=beside_root is not None, blended=simulated is not None, turned=turn is not None
+        )
+        rows = {} if turn is None else dict(zip(TURN_ROWS, turn.tolist(), strict=True))
         if beside_root is not None:
             textures["beside_root"] = points_texture(beside_root)
         if simulated is not None:
@@ -336,6 +363,7 @@ class DynamicsPass:
             textures={name: textures[name] for _, name in recipe.textures},
             images={"bridged": self._textures["bridged"]},
             integers={"cv_count": state.cv_count, "guide_count": state.guide_count},
+            numbers=rows,
         )
         across, down = recipe.group_size
         groups = -(-state.cv_count // across), -(-state.guide_count // down)

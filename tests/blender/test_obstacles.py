@@ -168,7 +168,7 @@ def test_after_rest_there_is_no_speed_and_no_bow(scene):
     found.rest(depsgraph())
     (posed,) = moved(found)
     assert posed.matrix_before[0, 3] == posed.matrix_now[0, 3] == pytest.approx(2.0, abs=1e-6)
-    assert posed.matrix_curvature is None
+    assert posed.matrix_earlier is None
 
 
 def test_balls_that_move_apart_become_another_set(scene):

@@ -164,3 +164,25 @@ def test_a_bake_has_all_of_them(new_hair, sphere, tmp_path):
     assert np.abs(frames[4] - frames[3]).max() > 1e-5
     for later in frames[6:]:
         np.testing.assert_allclose(later, frames[5], atol=1e-6)
+
+
+def test_hair_that_inherits_all_motion_stays_in_its_style(playing, evaluated):
+    settings, head, session = playing
+    settings.inherit_movement = settings.inherit_rotation = 1.0
+    settings.gravity, settings.jump_turn = 0.0, 0.0
+    before = on_head(session, head)
+
+    def thrown(frame):
+        head.matrix_world = Matrix.Translation((0.1 * frame**2, 0.0, 0.0)) @ Matrix.Rotation(
+            0.3 * frame**2, 4, "Y"
+        )
+
+    advance(evaluated, 4, thrown)
+    np.testing.assert_allclose(on_head(session, head), before, atol=1e-4)
+
+
+def test_without_inheriting_it_lags(playing, evaluated):
+    _, head, session = playing
+    before = on_head(session, head)
+    advance(evaluated, 4, lambda frame: setattr(head.location, "x", 0.1 * frame**2))
+    assert np.abs(on_head(session, head) - before).max() > 0.01

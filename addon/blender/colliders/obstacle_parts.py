@@ -19,7 +19,6 @@ from ...dynamics.colliders import (
 )
 from ...dynamics.colliders.bent_field import BentField
 from ...dynamics.settings import DynamicsSettings
-from ...dynamics.trajectory import curvature
 from ...strands import Surface
 from ...strands.affine import mean_scale, moved
 from .carriers import Carrier, scales_of
@@ -82,10 +81,10 @@ class Track:
         if self.before is None:
             self.rest(matrix)
         assert self.before is not None
-        bent = None
+        earlier, ratio = None, 1.0
         if self.earlier is not None and duration:
-            bent = curvature(self.earlier, self.before, matrix, self.duration / duration)
-        posed = PosedCollider(collider, self.before, matrix, bent, swelling)
+            earlier, ratio = self.earlier, self.duration / duration
+        posed = PosedCollider(collider, self.before, matrix, earlier, ratio, swelling)
         self.earlier, self.before, self.duration = self.before, matrix, duration
         return posed
 

@@ -111,7 +111,12 @@ def push_out_at_end(
 
 def seen_from(origin: Floats, posed: PosedCollider) -> PosedCollider:
     """A collider moved so that `origin` (3, 1) world [m] becomes the origin."""
-    matrices = [posed.matrix_before.copy(), posed.matrix_now.copy()]
-    for matrix in matrices:
-        matrix[:3, 3:] -= origin
-    return replace(posed, matrix_before=matrices[0], matrix_now=matrices[1])
+    back = np.eye(4)
+    back[:3, 3:] = -origin
+    earlier = None if posed.matrix_earlier is None else back @ posed.matrix_earlier
+    return replace(
+        posed,
+        matrix_before=back @ posed.matrix_before,
+        matrix_now=back @ posed.matrix_now,
+        matrix_earlier=earlier,
+    )

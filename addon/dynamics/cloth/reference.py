@@ -1,6 +1,7 @@
 """The same cloth, one vertex and one edge after the other in float64: to be read and compared.
 
-Nothing is shared with the fast form but settings, state, drive, colliders and the order of edges.
+Nothing is shared with the fast form but settings, state, drive and how it carries the mesh,
+colliders and the order of edges.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from ..force_fields import ForceFields
 from ..reference.force_fields import blown_slowly
 from ..step import Drive
 from ..wind import air_of
+from .carried import pinned_path
 from .coloring import greedy_colors, opposite_pairs
 from .settings import FinSettings
 from .state import PINNED_FROM, ClothState
@@ -141,13 +143,11 @@ class _Cloth:
     def _small_step(self, moment: float) -> None:
         settings, drive = self.settings, self.drive
         mobility = []
+        paths = pinned_path(self.fabric, drive, np.zeros((3, 1))).at(moment)
         for v in range(len(self.x)):
             x = 2.0 * self.x[v] - self.previous[v] + self.gravity * self.small**2
             self.previous[v] = self.x[v]
-            before, now = (np.float64(t[v]) for t in (drive.target_before, drive.target_now))
-            carried = before + (now - before) * moment
-            if drive.target_curvature is not None:
-                carried = carried + np.float64(drive.target_curvature[v]) * moment * (moment - 1.0)
+            carried = paths[:, v]
             weight = float(self.fabric.pin[v])
             if self.pinned[v]:
                 self.x[v] = carried

@@ -36,10 +36,11 @@ from ...strands.vectors import dot_rows
 from ..colliders import PosedCollider, poses_through
 from ..contacts import find_contacts
 from ..force_fields import ForceFields, blow
+from ..rigid_path import CarriedPath
 from ..schedule import due_substeps
 from ..step import Drive
-from ..trajectory import at
 from ..wind import Air, air_of
+from .carried import pinned_path
 from .constraints import edge_fractions, fold_fractions, hold_in_reach, keep_distances, pull_of
 from .contacts import MovingPlanes, planes_ahead, push_out_at_end, seen_from
 from .settings import FinSettings
@@ -54,9 +55,7 @@ class _Frame:
     """
 
     origin: Floats
-    before: Floats
-    displacement: Floats
-    curvature: Floats | None
+    path: CarriedPath
     colliders: tuple[PosedCollider, ...]
     gravity: Floats  # (3, 1) [m/s^2]
     air: Air | None
@@ -70,8 +69,7 @@ class _Frame:
     radius: Floats  # (n,) [m]
 
     def carried(self, moment: float, chosen: Ints | slice) -> Floats:
-        curvature = None if self.curvature is None else self.curvature[:, chosen]
-        return at(self.before[:, chosen], self.displacement[:, chosen], curvature, moment)
+        return self.path.part(chosen).at(moment)
 
 
 def advance_cloth(
@@ -80,7 +78,7 @@ def advance_cloth(
     """The state after a frame of `duration` seconds; the state given stays as it is.
 
     Args:
-        drive: its targets and their curvature are (vertex_count, 3), where the animation carries
+        drive: its targets are (vertex_count, 3), where the animation carries
             the mesh.
 
     Raises:
@@ -256,16 +254,9 @@ def _prepare(state: ClothState, drive: Drive, settings: FinSettings, dt: float) 
     pull = pull_of(fabric, settings, small)
     mobility = np.where(fabric.pinned, 0.0, 1.0 / (1.0 + pull)).astype(np.float32)
     origin = state.position.mean(axis=1, keepdims=True)
-    curvature = (
-        None
-        if drive.target_curvature is None
-        else vertex_rows(drive.target_curvature).astype(np.float32)
-    )
     return _Frame(
         origin=origin,
-        before=(before - origin).astype(np.float32),
-        displacement=(now - before).astype(np.float32),
-        curvature=curvature,
+        path=pinned_path(fabric, drive, origin),
         colliders=tuple(seen_from(origin, posed) for posed in drive.colliders),
         gravity=(gravity * np.float32(settings.gravity * (1.0 - settings.buoyancy)))[:, None],
         air=air_of(settings),

@@ -11,7 +11,8 @@ import numpy as np
 from ...arrays import Floats, Ints
 from ...errors import HairloomError
 from ...strands.vectors import dot_rows
-from ..trajectory import at
+from ..rigid_path import Rigid, RigidPath
+from ..trajectory import at, curvature
 
 #: A collider that turns around within a frame is flat on its way; then it holds nothing out. A
 #: fraction of the largest scale.
@@ -45,8 +46,9 @@ class PosedCollider:
     """A collider and its way during one frame.
 
     matrix_before, matrix_now: (4, 4) affine, object to world, at the frame's begin and end.
-    matrix_curvature: (4, 4), how the path between them is bent, see `trajectory.curvature`; None:
-        straight.
+    matrix_earlier: (4, 4), the same one frame earlier, so that its path is bent, see
+        `trajectory.curvature`; None: straight.
+    earlier_ratio: duration of that frame, over that of this one.
     swelling: how far [m] its surface has moved in the frame by its change of shape, at most: what
         that has swallowed is led out at once.
 
@@ -57,18 +59,19 @@ class PosedCollider:
     collider: Collider
     matrix_before: Floats
     matrix_now: Floats
-    matrix_curvature: Floats | None = None
+    matrix_earlier: Floats | None = None
+    earlier_ratio: float = 1.0
     swelling: float = 0.0
 
     def __post_init__(self) -> None:
-        for name in ("matrix_before", "matrix_now", "matrix_curvature"):
+        for name in ("matrix_before", "matrix_now", "matrix_earlier"):
             if getattr(self, name) is None:
                 continue
             matrix = np.asarray(getattr(self, name), np.float64)
             object.__setattr__(self, name, matrix)
             if matrix.shape != (4, 4) or not np.isfinite(matrix).all():
                 raise _broken("its matrix is not a finite 4 by 4 matrix")
-            if name != "matrix_curvature" and np.linalg.cond(matrix[:3, :3]) > 1.0e6:
+            if np.linalg.cond(matrix[:3, :3]) > 1.0e6:
                 raise _broken("its scale is zero")
 
     def at_begin(self) -> PosedCollider:
@@ -81,8 +84,40 @@ class PosedCollider:
 
     def matrix_at(self, moment: float) -> Floats:
         """Object to world (4, 4) float64 at `moment`, 0 the frame's begin and 1 its end."""
-        displacement = self.matrix_now - self.matrix_before
-        return at(self.matrix_before, displacement, self.matrix_curvature, moment)
+        before, displacement, bent = self._seen
+        matrix = at(before, displacement, bent, moment)
+        if self._arc is None:
+            return matrix
+        moments = np.ravel(moment).tolist()
+        places = [_matrix_of(self._arc.at(each)) for each in moments]
+        return np.reshape(places, (*np.shape(moment)[:-2], 4, 4)) @ matrix
+
+    @cached_property
+    def _arc(self) -> RigidPath | None:
+        """How it turns as a whole; None where that is too little to matter, or it is mirrored."""
+        others = (self.matrix_now, self.matrix_earlier)
+        axes = [each[:3, :3] for each in others if each is not None]
+        if all(np.array_equal(each, self.matrix_before[:3, :3]) for each in axes):
+            return None
+        now, earlier = (
+            None if matrix is None else _rigid_between(self.matrix_before, matrix)
+            for matrix in (self.matrix_now, self.matrix_earlier)
+        )
+        if now is None or (earlier is None and self.matrix_earlier is not None):
+            return None
+        path = RigidPath(now, earlier, self.earlier_ratio)
+        return path if path.is_arc else None
+
+    @cached_property
+    def _seen(self) -> tuple[Floats, Floats, Floats | None]:
+        """Its matrix at the begin, its change and how that is bent, as what turns sees them."""
+        before, now, earlier = self.matrix_before, self.matrix_now, self.matrix_earlier
+        if self._arc is not None:
+            now = _matrix_of(self._arc.now.inverse) @ now
+            if earlier is not None and self._arc.earlier is not None:
+                earlier = _matrix_of(self._arc.earlier.inverse) @ earlier
+        bent = None if earlier is None else curvature(earlier, before, now, self.earlier_ratio)
+        return before, now - before, bent
 
     def poses(self, spans: list[tuple[float, float]]) -> list[Pose | None]:
         """Where it is after each substep; None where it is flat.
@@ -117,6 +152,26 @@ class PosedCollider:
             )
             for i, (largest, _, smallest) in enumerate(scales.tolist())
         ]
+
+
+def _rigid_between(before: Floats, now: Floats) -> Rigid | None:
+    """The rigid part of the motion from one matrix to another; None where it mirrors.
+
+    Its origin goes where both matrices put it: what they put elsewhere is a change of shape.
+    """
+    motion = now[:3, :3] @ np.linalg.inv(before[:3, :3])
+    left, _, right = np.linalg.svd(motion)
+    rotation = left @ right
+    if np.linalg.det(rotation) < 0.0:
+        return None
+    return Rigid(rotation, now[:3, 3] - rotation @ before[:3, 3])
+
+
+def _matrix_of(place: Rigid) -> Floats:
+    """(4, 4) of a rigid motion."""
+    matrix = np.eye(4)
+    matrix[:3, :3], matrix[:3, 3] = place.rotation, place.shift
+    return matrix
 
 
 @dataclass(frozen=True)

@@ -1,9 +1,9 @@
 """The same step, one guide and one CV after the other in float64: slow, to be read and compared.
 
 Nothing is shared with the fast form but settings and their curves, state, drive, colliders, the
-air, the groom's mean rotation and the cells of hair that feels hair. Frames are rotation matrices
-here, and each linear system is written out and solved densely, so the banded solves are checked as
-well.
+air, how the groom turns and its roots go as a whole, and the cells of hair that feels hair. Frames
+are rotation matrices here, and each linear system is written out and solved densely, so the banded
+solves are checked as well.
 """
 
 from __future__ import annotations
@@ -18,10 +18,13 @@ from ...params.curve import along as curve_along
 from ..among import FELT_PER_SECOND
 from ..constraints import CONTACT_WEIGHT, HELD, HELD_SWEEPS, PINNED, ROUNDING
 from ..contacts import BETWEEN, MORE_ROUNDS
+from ..frame import Frame, carried_after, inherits
+from ..rigid_path import Carry, Rigid
 from ..settings import DynamicsSettings
 from ..springs import STEEPEST, give, stiffness
 from ..state import DynamicsState
 from ..step import Drive
+from ..trajectory import curvature
 from ..turn import best_rotation
 from ..wind import air_of
 from .among import Hair, feel_slowly
@@ -46,12 +49,16 @@ def advance_slowly(
         for guide in guides:
             guide.previous = guide.x - (guide.x - guide.previous) * (dt / state.substep)
     push = _Push(state, drive, settings, dt)
+    frame = Frame.of(state, drive, settings, duration, dt) if count else None
     for number in range(count):
         push.before(number, guides)
+        assert frame is not None
+        carries = [frame.inherited(k) for k in (number - 1, number)] if frame.inherits else []
+        placed = frame.place(number - 1) if frame.inherits else None
         begin = (number * dt - state.time_left) / duration
         moment = Moment(begin, begin + dt / duration, state.time + number * dt, dt)
         for guide in guides:
-            guide.substep(drive, moment)
+            guide.substep(drive, moment, carries, placed)
     if not guides:
         return state
     rows = [np.stack([g.x for g in guides]), np.stack([g.previous for g in guides])]
@@ -59,7 +66,15 @@ def advance_slowly(
     left = max(time - count * dt, 0.0)
     substep = dt if count else state.substep
     time = state.time + count * dt
-    return DynamicsState(position, previous, state.rest, substep, left, time, (), push.rows)
+    carried = carried_after(state, frame, drive, settings, count)
+    return DynamicsState(
+        position, previous, state.rest, substep, left, time, (), push.rows, carried
+    )
+
+
+def _carried(carry: Carry, points: Floats) -> Floats:
+    result: Floats = (points - carry.origin) @ carry.rotation.T + carry.there
+    return result
 
 
 class _Push:
@@ -134,14 +149,21 @@ class _Guide:
         self.clearance = np.full((len(self.x), 1 + len(BETWEEN)), np.inf)
         if drive.clearance is not None:
             self.clearance = drive.clearance.distances[guide].astype(np.float64)
+        self.carrier = drive.carrier if inherits(settings) else drive.style_carrier
         self.before = drive.target_before[guide].astype(np.float64)
-        self.displacement = drive.target_now[guide].astype(np.float64) - self.before
-        curvature = drive.target_curvature
-        self.curvature = (
-            np.zeros_like(self.displacement)
-            if curvature is None
-            else curvature[guide].astype(np.float64)
-        )
+        now, earlier = drive.target_now[guide].astype(np.float64), drive.target_earlier
+        self.curvature = np.zeros_like(now)
+        if self.carrier is not None:
+            now = self._as_carrier_sees(now, self.carrier.path.now)
+        if earlier is not None:
+            since = earlier[guide].astype(np.float64)
+            if self.carrier is not None and self.carrier.path.earlier is not None:
+                since = self._as_carrier_sees(since, self.carrier.path.earlier)
+            self.curvature = curvature(since, self.before, now, drive.earlier_ratio)
+        self.displacement = now - self.before
+        self.middle = (self.before + drive.target_now[guide]) / 2.0
+        if self.carrier is not None:
+            self.middle = self._style_at(0.5)
         middle = (drive.target_before + drive.target_now).transpose(2, 1, 0) / 2.0
         turn = best_rotation(state.rest.position, middle)
         self.gravity = self._felt_gravity(drive, settings, turn)
@@ -149,14 +171,27 @@ class _Guide:
             turn @ (np.asarray(drive.gravity, np.float64) * settings.gravity)
         )
 
-    def substep(self, drive: Drive, moment: Moment) -> None:
-        settings = self.settings
+    def substep(
+        self, drive: Drive, moment: Moment, carries: list[Carry], placed: Rigid | None
+    ) -> None:
+        """Args:
+        carries: how hair goes with the roots without inertia, in the substep before and in this
+            one; none where it does not.
+        placed: where the roots are as a whole at the begin; None: as their path says.
+        """
+        settings, begun = self.settings, self.x.copy()
         air = self._air(settings, moment)
+        style_begun = self._style_at(moment.begin, placed)
+        for carry in carries:
+            self.previous = _carried(carry, self.previous)
+        if carries:
+            self.x, style_begun = (_carried(carries[1], each) for each in (self.x, style_begun))
         self._brake(settings.drag, air, moment.dt)
         fields = drive.force_fields.by(settings.force_fields)
         if fields is not None:
             self.previous = blown_slowly(self.x, self.previous, fields, moment.dt, self.size)
-        self._predict(settings, air, moment)
+        self._predict(settings, air, moment, style_begun)
+        self.previous = begun
         style = self._style_at(moment.end)
         self._pin(style)
         self._give(settings, moment.dt)
@@ -189,12 +224,21 @@ class _Guide:
         if settings.length_solver == "direct":
             self._finish_lengths(normals, settings)
 
-    def _style_at(self, fraction: float) -> Floats:
-        return (
+    def _style_at(self, fraction: float, place: Rigid | None = None) -> Floats:
+        seen = (
             self.before
             + self.displacement * fraction
             + self.curvature * fraction * (fraction - 1.0)
         )
+        if self.carrier is None:
+            return seen
+        place, pivot = place or self.carrier.path.at(fraction), self.carrier.pivot
+        return (seen - pivot) @ place.rotation.T + pivot + place.shift
+
+    def _as_carrier_sees(self, points: Floats, place: Rigid) -> Floats:
+        assert self.carrier is not None
+        pivot = self.carrier.pivot
+        return (points - pivot - place.shift) @ place.rotation + pivot
 
     def _air(self, settings: DynamicsSettings, moment: Moment) -> Floats:
         """Velocity of the air at the root, (3,)."""
@@ -209,17 +253,19 @@ class _Guide:
             through = through / (1.0 + drag * float(np.linalg.norm(through)) * dt)
             self.previous[cv] = self.x[cv] - (through + air) * dt
 
-    def _predict(self, settings: DynamicsSettings, air: Floats, moment: Moment) -> None:
+    def _predict(
+        self, settings: DynamicsSettings, air: Floats, moment: Moment, style_begun: Floats
+    ) -> None:
         both = settings.damping + settings.style_damping
         kept = math.exp(-both * moment.dt)
         lost = (1.0 - kept) / both if both else 0.0
-        style_displacement = self._style_at(moment.end) - self._style_at(moment.begin)
+        style_displacement = self._style_at(moment.end) - style_begun
         for cv in range(len(self.x)):
             moved = (self.x[cv] - self.previous[cv]) * kept
             moved = moved + style_displacement[cv] * lost * settings.style_damping
             moved = moved + air * moment.dt * lost * settings.damping
             moved = moved + self.gravity[cv] * moment.dt**2 + self.push[cv]
-            self.previous[cv], self.x[cv] = self.x[cv].copy(), self.x[cv] + moved
+            self.x[cv] = self.x[cv] + moved
 
     def _pin(self, style: Floats) -> None:
         self.x[:PINNED] = style[:PINNED]
@@ -247,7 +293,7 @@ class _Guide:
             return felt
         # the part of the combed weight across all length constraints, by projection
         combed = np.tile(turn @ pull, free)
-        jacobian = jacobian_of(self.before + self.displacement / 2.0)
+        jacobian = jacobian_of(self.middle)
         tension = self._tension_on_style(turn @ pull)
         felt[PINNED:] -= settings.sag_compensation * (combed - jacobian.T @ tension).reshape(
             free, 3
@@ -259,7 +305,7 @@ class _Guide:
         free = len(self.x) - PINNED
         if free < 1:
             return np.zeros(0)
-        jacobian = jacobian_of(self.before + self.displacement / 2.0)
+        jacobian = jacobian_of(self.middle)
         tension: Floats = np.linalg.solve(jacobian @ jacobian.T, jacobian @ np.tile(combed, free))
         return tension
 

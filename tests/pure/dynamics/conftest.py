@@ -16,7 +16,6 @@ from hairloom.addon.dynamics.held import Held
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.dynamics.state import DynamicsState, start
 from hairloom.addon.dynamics.step import Drive, advance
-from hairloom.addon.dynamics.trajectory import curvature
 from hairloom.addon.strands import Surface
 
 EARTH = np.array([0.0, 0.0, -9.81])
@@ -182,8 +181,8 @@ class Scene:
     def colliders(self, before: float, now: float) -> tuple[PosedCollider, ...]:
         matrices = self.motion(before), self.motion(now)
         still = np.eye(4)
-        bend = curvature(self.motion(2 * before - now), *matrices, 1.0) if self.bowed else None
-        return tuple(PosedCollider(one, *matrices, bend) for one in self.on_head) + tuple(
+        earlier = self.motion(2 * before - now) if self.bowed else None
+        return tuple(PosedCollider(one, *matrices, earlier) for one in self.on_head) + tuple(
             PosedCollider(one, still, still) for one in self.standing
         )
 

@@ -51,7 +51,7 @@ def test_a_ponytail_through_a_ring_that_turns_with_the_head_stays_in_it(kit, sha
     for frame in range(48):  # at 24 frames a second half a substep is left at every other
         drive = scene.drive(frame / 24.0, (frame + 1) / 24.0)
         state = advance(state, drive, scene.settings, 1.0 / 24.0)
-        shown = grid_at_frame_end(state, drive, 1.0 / 24.0)
+        shown = grid_at_frame_end(state, drive, DynamicsSettings(), 1.0 / 24.0)
         assert np.abs((shown - drive.target_now)[held]).max() < 1e-4
         assert max_stretch(state) < 0.0025
     assert np.abs(shown - drive.target_now)[:, -1].max() > 0.005  # the tail does swing

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from hairloom.addon.dynamics.colliders import PosedCollider, SphereCollider
+from hairloom.addon.dynamics.rigid_path import CarriedPath, Carrier
 from hairloom.addon.dynamics.trajectory import at, curvature
 
 
@@ -65,9 +66,12 @@ def test_roots_and_colliders_go_the_same_way(kit):
     """A point fixed to a collider stays fixed to it within the frame."""
     matrices = [kit.translation(0.1 * k * k, 0.0, 0.0) @ kit.rotation(0, 0.3 * k) for k in range(3)]
     point = np.array([0.02, 0.1, -0.03])
-    earlier, before, now = (m[:3, :3] @ point + m[:3, 3] for m in matrices)
-    posed = PosedCollider(SphereCollider((0, 0, 0), 0.1), *matrices[1:], curvature(*matrices, 1.0))
+    posed = PosedCollider(SphereCollider((0, 0, 0), 0.1), *matrices[1:], matrices[0])
+    places = point + np.random.default_rng(5).normal(0.0, 0.1, (20, 3))
+    earlier, before, now = (places @ m[:3, :3].T + m[:3, 3] for m in matrices)
+    carrier = Carrier.through(before.T, now.T, earlier.T)
+    path = CarriedPath.through(before.T, now.T, earlier.T, 1.0, carrier)
     for share in (0.0, 0.3, 1.0):
         matrix = posed.matrix_at(share)
-        expected = at(before, now - before, curvature(earlier, before, now, 1.0), share)
-        np.testing.assert_allclose(matrix[:3, :3] @ point + matrix[:3, 3], expected, atol=1e-15)
+        expected = places @ matrix[:3, :3].T + matrix[:3, 3]
+        np.testing.assert_allclose(path.at(share).T, expected, atol=1e-6)
