@@ -36,7 +36,7 @@ class PaintedGuides:
     @property
     def is_of_motion(self) -> bool:
         """Whether any is painted but what is seen of the motion."""
-        return bool(self.factors.keys() - {"simulated"})
+        return bool(self.factors.keys() - {"simulated", "only_selected"})
 
     def fits(self, cv_count: int, guide_count: int) -> bool:
         return all(
@@ -50,11 +50,15 @@ def simulated_of(
 ) -> Floats | None:
     """How much of each guide is simulated, (guide_count,) float32, see `blend.blended`; None: all
     of all."""
-    if painted is not None and "simulated" in painted.factors:
-        return painted.of_guides(settings, "simulated").astype(np.float32)
-    if settings.simulated == 1.0:
+    factors = {} if painted is None else painted.factors
+    if settings.simulated == 1.0 and not factors.keys() & {"simulated", "only_selected"}:
         return None
-    return np.full(guide_count, settings.simulated, np.float32)
+    fraction = np.full(guide_count, settings.simulated, np.float32)
+    if painted is not None and "simulated" in factors:
+        fraction = painted.of_guides(settings, "simulated").astype(np.float32)
+    if "only_selected" in factors:
+        fraction *= factors["only_selected"].mean(axis=0).astype(np.float32)
+    return fraction
 
 
 @dataclass(frozen=True, eq=False)

@@ -257,6 +257,13 @@ class DynamicsSettings(MotionSettings):
         source='"Pearl" configuration, Nguyen and Donnelly 2005',
         panel="Collisions",
     )
+    only_selected: bool = toggle(
+        False,
+        label="Only Selected",
+        description="Simulate the curves that are selected in Sculpt or Edit Mode; guides that are "
+        "not selected stay in their style",
+        panel="Shot",
+    )
     inherit_movement: float = number(
         0.0,
         label="Inherit Movement",

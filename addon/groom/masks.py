@@ -22,6 +22,9 @@ from ..strands.catmull_rom import even_places
 from ..strands.nearest import nearest_points
 from ..strands.resample import arc_length_positions
 
+#: Blender's name of what is selected of curves: a mask of the curves themselves, 1 everywhere where
+#: it is not there.
+SELECTION = ".selection"
 #: Places along a strand at which it keeps what was painted on its points.
 _ALONG = 17
 
@@ -36,7 +39,10 @@ def mask_names(settings: Settings) -> dict[str, str]:
     sections = SimpleNamespace(**{settings.section: settings})
     named = {of: str(getattr(settings, name)) for of, name in masks_of(type(settings)).items()}
     acts = {p.name for p in settings.parameters() if not p.shown_when or p.shown_when(sections)}
-    return {of: name for of, name in named.items() if name and of in acts}
+    found = {of: name for of, name in named.items() if name and of in acts}
+    if getattr(settings, "only_selected", False):
+        found["only_selected"] = SELECTION
+    return found
 
 
 @dataclass(frozen=True, eq=False)

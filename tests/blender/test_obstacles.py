@@ -54,6 +54,7 @@ TURN = Matrix.Translation((0.1, -0.2, 0.3)) @ Matrix.Rotation(0.7, 4, (1, 2, 3))
 
 
 def test_nothing_to_collide_with(scene):
+    scene.owner.hairloom.collider_collection = None
     assert moved(scene.obstacles()) == ()
     assert scene.obstacles().warnings == ()
 
@@ -80,7 +81,8 @@ def test_an_empty_that_is_no_sphere_a_lamp_and_the_owner_are_left_alone(scene):
         scene.add(obj)
     scene.add(scene.owner)
     found = scene.obstacles()
-    assert moved(found) == () and found.warnings == ()
+    assert moved(found) == () and len(found.warnings) == 1
+    assert "nothing in the collection" in found.warnings[0]
 
 
 def test_a_ball_is_as_large_as_blender_shows_it(scene):

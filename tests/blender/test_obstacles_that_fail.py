@@ -8,7 +8,7 @@ import pytest
 from collider_scene import COARSE, Scene, depsgraph, distance_now, moved
 
 from hairloom.addon.blender.base.objects import Body
-from hairloom.addon.blender.colliders.obstacles import Obstacles
+from hairloom.addon.blender.colliders.obstacles import Obstacles, sources_of
 from hairloom.addon.blender.scene.surfaces import read_surface
 from hairloom.addon.errors import HairloomError
 
@@ -185,3 +185,33 @@ def test_a_chosen_collider_stands_in_for_the_head(scene, sphere):
     sphere.hairloom.collider_shape = "none"
     scene.owner.hairloom.collider = None
     assert moved(Obstacles.of(scene.owner, head, at_rest, COARSE, depsgraph(), None)) == ()
+
+
+def test_a_collection_in_which_nothing_collides_is_named(scene):
+    """And one that is deleted leaves the surface alone, without a word."""
+    plain = bpy.data.objects.new("Plain", None)
+    scene.add(plain)
+    assert "nothing in the collection Colliders collides" in scene.obstacles().warnings[0]
+    ball = scene.ball()
+    assert scene.obstacles().warnings == ()
+    ball.hairloom.collider_shape = "none"
+    assert len(scene.obstacles().warnings) == 1
+    bpy.data.collections.remove(scene.colliders)
+    found = scene.obstacles()
+    assert scene.owner.hairloom.collider_collection is None
+    assert (found.parts, found.warnings) == ([], ())
+
+
+def test_two_grooms_have_their_own_colliders(scene):
+    other = bpy.data.objects.new("Other", bpy.data.meshes.new("Other"))
+    group = bpy.data.collections.new("Hands")
+    bpy.context.scene.collection.children.link(group)
+    bpy.context.scene.collection.objects.link(other)
+    other.hairloom.collider_collection = group
+    scene.ball(0.1, name="Own")
+    scene.cube(name="Both")
+    group.objects.link(bpy.data.objects["Both"])
+    names = [{obj.name for obj in sources_of(owner, None)} for owner in (scene.owner, other)]
+    assert names == [{"Own", "Both"}, {"Both"}]
+    assert len(scene.obstacles().parts) == 2
+    assert len(Obstacles.of(other, None, None, COARSE, depsgraph(), None).parts) == 1

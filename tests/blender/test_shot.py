@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from mathutils import Matrix
 
+from hairloom.addon import pipeline
 from hairloom.addon.blender.bakes.cache import Cache
 from hairloom.addon.blender.command_line import command_line
 from hairloom.addon.blender.preview import previews
@@ -186,3 +187,57 @@ def test_without_inheriting_it_lags(playing, evaluated):
     before = on_head(session, head)
     advance(evaluated, 4, lambda frame: setattr(head.location, "x", 0.1 * frame**2))
     assert np.abs(on_head(session, head) - before).max() > 0.01
+
+
+def select(hair, domain, chosen):
+    """Curves by number, as Sculpt or Edit Mode of curves writes it."""
+    curves = hair.data
+    attribute = curves.attributes.new(".selection", "BOOLEAN", domain)
+    values = np.isin(np.arange(len(curves.curves)), chosen)
+    if domain == "POINT":  # one of its points alone
+        firsts = np.array([curve.first_point_index for curve in curves.curves])
+        values = np.isin(np.arange(len(curves.points)), firsts[values])
+    attribute.data.foreach_set("value", values)
+
+
+@pytest.mark.parametrize("domain", ["CURVE", "POINT"])
+def test_only_selected_curves_are_simulated(playing, evaluated, domain):
+    """Guides that are not selected are exactly where their style is."""
+    settings, head, session = playing
+    hair = session.hair.found()
+    chosen = np.arange(0, len(hair.data.curves), 2)
+    select(hair, domain, chosen)
+    settings.only_selected = True
+    session.read_again(evaluated())
+    session.play(evaluated())
+    advance(evaluated, 4, lambda frame: setattr(head.location, "x", 0.05 * frame**2))
+    rig = session.rig
+    style = pipeline.style_of_guides(rig, session.solver.pose)
+    away = np.abs(session.solver.guides() - style).max(axis=(1, 2))
+    is_chosen = np.isin(rig.guides, chosen)
+    assert is_chosen.any() and not is_chosen.all()
+    assert (away[is_chosen] > 0.003).all()
+    assert (away[~is_chosen] == 0.0).all()
+
+
+def test_where_no_selection_is_known_all_is_simulated(playing, evaluated):
+    settings, head, session = playing
+    settings.only_selected = True
+    session.read_again(evaluated())
+    session.play(evaluated())
+    advance(evaluated, 3, lambda frame: setattr(head.location, "x", 0.05 * frame**2))
+    style = pipeline.style_of_guides(session.rig, session.solver.pose)
+    assert (np.abs(session.solver.guides() - style).max(axis=(1, 2)) > 0.0).all()
+    assert session.warnings == ()
+
+
+def test_a_selection_of_nothing_is_named(playing, evaluated):
+    settings, head, session = playing
+    select(session.hair.found(), "CURVE", [])
+    settings.only_selected = True
+    session.read_again(evaluated())
+    session.play(evaluated())
+    advance(evaluated, 3, lambda frame: setattr(head.location, "x", 0.05 * frame**2))
+    style = pipeline.style_of_guides(session.rig, session.solver.pose)
+    np.testing.assert_array_equal(session.solver.guides(), style)
+    assert "none of its curves is selected" in session.warnings[0]

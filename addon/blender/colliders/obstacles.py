@@ -90,6 +90,7 @@ class Obstacles:
                     found._doubtful += _mesh_notes(made.surface, obj.name)
         if not is_whole:
             raise NotMadeYetError
+        found._doubtful += _unused_collection(owner)
         found.parts += [BallsPart.new(group, depsgraph) for group in balls.values()]
         found.rest(depsgraph)
         return found
@@ -185,6 +186,18 @@ def sources_of(
     if collection is not None:
         objects += collection.all_objects
     return tuple(obj for obj in dict.fromkeys(objects) if obj != owner)
+
+
+def _unused_collection(owner: bpy.types.Object) -> Iterator[str]:
+    """What is said where nothing in its collection collides."""
+    collection = owner.hairloom.collider_collection
+    if collection is None:
+        return
+    if all(shape_of(obj) == "none" or obj == owner for obj in collection.all_objects):
+        yield (
+            f"{owner.name}: nothing in the collection {collection.name} collides. Put meshes, or "
+            "Empties shown as spheres, into it, or clear Colliders."
+        )
 
 
 def _mesh_notes(surface: Surface, name: str) -> Iterator[str]:

@@ -314,7 +314,8 @@ class HAIRLOOM_PG_character(bpy.types.PropertyGroup):
         "collider_collection": PointerProperty(
             type=bpy.types.Collection,
             name="Colliders",
-            description="Collection of more objects that hair stays out of; read as Play begins",
+            description="Collection of the other objects that this hair or cloth stays out of; "
+            "each has its own. Empty: the surface alone. Read as Play begins",
             override=OVERRIDABLE,
         ),
         "field_collection": PointerProperty(

@@ -14,7 +14,15 @@ import numpy as np
 
 from ...arrays import Floats, Ints
 from ...errors import HairloomError
-from ...groom.masks import ImageMask, Mask, Masks, StrandMask, SurfaceMask, mask_names
+from ...groom.masks import (
+    SELECTION,
+    ImageMask,
+    Mask,
+    Masks,
+    StrandMask,
+    SurfaceMask,
+    mask_names,
+)
 from ...params import Settings
 from ...strands import StrandSet, Surface
 from ..base.vertex_weights import (
@@ -88,6 +96,11 @@ class Canvas:
                 found[of] = mask
             if warning and warning not in warnings:
                 warnings.append(warning)
+            elif name == SELECTION and mask is not None and mask.is_zero:
+                warnings.append(
+                    f"{self._place}: none of its curves is selected, so none is simulated. Select"
+                    " some in Sculpt or Edit Mode, or turn Only Selected off"
+                )
             elif mask is not None and mask.is_zero:
                 warnings.append(
                     f"{self._place}: the mask '{name}' is 0 everywhere, and so is {labels[of]}."
@@ -111,6 +124,8 @@ class Canvas:
         """Raises:
         HairloomError: there is none of this name, or none that can be used.
         """
+        if name == SELECTION:
+            return self._selection(depsgraph)
         found = self._of_surface(name, depsgraph)
         if found is None:
             found = self._of_curves(name, depsgraph)
@@ -158,7 +173,28 @@ class Canvas:
             corners = corners[:, ::-1]  # as triangles are, see `Surface.transformed`
         return SurfaceMask(usable(corners, name, surface.name))
 
-    def _of_curves(self, name: str, depsgraph: bpy.types.Depsgraph) -> Mask | None:
+    def _of_curves(self, name: str, depsgraph: bpy.types.Depsgraph) -> StrandMask | None:
+        found = self._on_curves(name, depsgraph)
+        if found is None:
+            return None
+        values, domain = found
+        if domain == "CURVE":
+            return StrandMask(values[:, None])
+        return StrandMask.of_points(self.strands, values)
+
+    def _selection(self, depsgraph: bpy.types.Depsgraph) -> StrandMask:
+        """How much each curve is selected: as much as the most selected of its points. Where
+        Blender has no attribute all are."""
+        found = self._on_curves(SELECTION, depsgraph)
+        if found is None:
+            return StrandMask(np.ones((self.strands.strand_count, 1), np.float32))
+        values, domain = found
+        if domain == "POINT":
+            values = np.maximum.reduceat(values, self.strands.offsets[:-1])
+        return StrandMask(values[:, None])
+
+    def _on_curves(self, name: str, depsgraph: bpy.types.Depsgraph) -> tuple[Floats, str] | None:
+        """An attribute of the curves that are usable, or of their points, and its domain."""
         if self.hair is None:
             return None
         curves = self.hair.evaluated_get(depsgraph).data
@@ -177,10 +213,10 @@ class Canvas:
                 remedy="Wait until the hair is made again",
             )
         if domain == "CURVE":
-            return StrandMask(values[self.kept, None])
+            return values[self.kept], domain
         is_kept = np.zeros(len(counts), bool)
         is_kept[self.kept] = True
-        return StrandMask.of_points(strands, values[np.repeat(is_kept, counts)])
+        return values[np.repeat(is_kept, counts)], domain
 
     def _of_image(self, name: str) -> ImageMask | None:
         return image_mask(name, self.head, self._place) if name in image_names() else None
