@@ -178,7 +178,7 @@ def carried_after(
 
 def inherits(settings: DynamicsSettings) -> bool:
     """Whether hair takes over some of the roots' motion without inertia."""
-    return settings.inherit_movement > 0.0 or settings.inherit_rotation > 0.0
+    return settings.inherit_location > 0.0 or settings.inherit_rotation > 0.0
 
 
 def style_rows(state: DynamicsState, drive: Drive) -> tuple[StyleRows, ...]:
@@ -279,7 +279,7 @@ class Frame:
         else:
             before, now, ratio = *self.begun.places, self.speed_ratio
         motion = now.since(before).part(
-            settings.inherit_movement * ratio, settings.inherit_rotation * ratio
+            settings.inherit_location * ratio, settings.inherit_rotation * ratio
         )
         return self.drive.carrier.carry(motion, before)
 

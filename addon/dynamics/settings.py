@@ -264,9 +264,9 @@ class DynamicsSettings(MotionSettings):
         "not selected stay in their style",
         panel="Shot",
     )
-    inherit_movement: float = number(
+    inherit_location: float = number(
         0.0,
-        label="Inherit Movement",
+        label="Inherit Location",
         description="Fraction of the roots' movement that hair takes over at once, without lagging "
         "behind; at 1 it moves as if its head stayed in place",
         soft=(0.0, 1.0),

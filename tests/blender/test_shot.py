@@ -169,7 +169,7 @@ def test_a_bake_has_all_of_them(new_hair, sphere, tmp_path):
 
 def test_hair_that_inherits_all_motion_stays_in_its_style(playing, evaluated):
     settings, head, session = playing
-    settings.inherit_movement = settings.inherit_rotation = 1.0
+    settings.inherit_location = settings.inherit_rotation = 1.0
     settings.gravity, settings.jump_turn = 0.0, 0.0
     before = on_head(session, head)
 

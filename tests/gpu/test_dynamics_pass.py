@@ -287,12 +287,12 @@ IN_AIR = {
     "blended": Scene(LIMP, is_blended=True),
     "blended and held": Scene(LIMP, is_blended=True, is_held=True, fps=50.0),
     "inherits": Scene(
-        {"inherit_movement": 0.6, "inherit_rotation": 0.9, "drag": 2.0, "wind_speed": 2.0},
+        {"inherit_location": 0.6, "inherit_rotation": 0.9, "drag": 2.0, "wind_speed": 2.0},
         cv_count=8,
         fps=24.0,
     ),
     "inherits blended, in fields": Scene(
-        {"inherit_movement": 1.0, "inherit_rotation": 1.0},
+        {"inherit_location": 1.0, "inherit_rotation": 1.0},
         cv_count=8,
         fps=50.0,
         is_blended=True,

@@ -10,7 +10,7 @@ from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.dynamics.state import start
 from hairloom.addon.dynamics.step import Drive, advance, grid_at_frame_end
 
-WHOLE = {"inherit_movement": 1.0, "inherit_rotation": 1.0}
+WHOLE = {"inherit_location": 1.0, "inherit_rotation": 1.0}
 SOFT = {"style_root": 0.5, "style_tip": 0.0, "bend": 0.5, "length_tolerance": 0.0001}
 
 
@@ -71,7 +71,7 @@ def test_parts_lie_in_between(kit):
         expected = kit.moved(kit.translation(0.75, 0.0, 0.0), kit.curly(30, 8))
         return float(np.abs(shown[-1] - expected).max())
 
-    lags = [lag(inherit_movement=fraction) for fraction in (0.0, 0.5, 1.0)]
+    lags = [lag(inherit_location=fraction) for fraction in (0.0, 0.5, 1.0)]
     assert lags[0] > 1.3 * lags[1] > 0.003
     assert lags[2] < 1e-5
     assert lag(inherit_rotation=1.0) == pytest.approx(lags[0], rel=1e-3)
@@ -95,7 +95,7 @@ def test_it_fades_in_without_a_jerk(kit):
     np.testing.assert_allclose(states[1].grid, states[0].grid, atol=2e-4)
 
 
-@pytest.mark.parametrize("values", [WHOLE, {"inherit_movement": 0.4}, {"inherit_rotation": 0.7}])
+@pytest.mark.parametrize("values", [WHOLE, {"inherit_location": 0.4}, {"inherit_rotation": 0.7}])
 def test_equals_the_reference(kit, values):
     """With wind, drag and weight, in frames that substeps do not fit into."""
     settings = DynamicsSettings(
