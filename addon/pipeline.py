@@ -778,7 +778,9 @@ def go_along(
     if not duration:
         roots = Carrier.through(root_sample(motion.carried_guides), root_sample(target))
         before, now = (place.turned(roots.path.now.rotation) for place in state.carried.places)
-        carried = KnownStep((before, now))
+        # hair goes to where its roots are at the frame's end
+        begun = replace(before, shift=before.shift - now.shift)
+        carried = KnownStep((begun, replace(now, shift=np.zeros(3))))
     state = replace(
         state, position=position, previous=previous, styles=(), push=None, carried=carried
     )

@@ -241,3 +241,20 @@ def test_a_selection_of_nothing_is_named(playing, evaluated):
     style = pipeline.style_of_guides(session.rig, session.solver.pose)
     np.testing.assert_array_equal(session.solver.guides(), style)
     assert "none of its curves is selected" in session.warnings[0]
+
+
+def test_frozen_hair_that_inherits_goes_on_without_a_whip(playing, evaluated):
+    """The head goes on moving while time stands still, and has turned when it goes on."""
+    settings, head, session = playing
+    settings.inherit_location = settings.inherit_rotation = 1.0
+    settings.gravity, settings.jump_turn, settings.jump_distance = 0.0, 0.0, 0.0
+    before = on_head(session, head)
+
+    def moving(frame):
+        settings.time_scale = 0.0 if 4 <= frame < 8 else 1.0
+        turn = Matrix.Rotation(0.25 * frame, 4, "Y")
+        head.matrix_world = turn @ Matrix.Translation((0.5, 0.0, 0.1 * frame))
+
+    advance(evaluated, 1, moving)
+    advance(evaluated, 12, moving)
+    np.testing.assert_allclose(on_head(session, head), before, atol=1e-3)
