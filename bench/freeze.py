@@ -9,7 +9,7 @@ late as the thread holds it up; to be compared with the one without a thread, la
 on the machine. Its second number leaves out the time in which it waited for a processor, where the
 system (Linux) tells that: what is left is the thread's.
 
-Programs are compiled before, by hair on a ball: `compile` times that.
+Programs are compiled before: `compile` times that.
 
 make bench NAME=freeze
 """
@@ -33,6 +33,7 @@ from hairloom.addon.blender.base.parts import at_once
 from hairloom.addon.blender.colliders import fields
 from hairloom.addon.blender.preview import previews, scene_events
 from hairloom.addon.blender.preview.phases import Phase
+from hairloom.addon.blender.scene.surfaces import read_surface
 from hairloom.addon.blender.sessions.session import Session
 from hairloom.addon.blender.setup.sample_scene import add_sample_scene
 
@@ -40,7 +41,7 @@ REFERENCE = "a heartbeat without a thread, and what Blender itself takes"
 #: longest stop of the main thread [ms processor]: by default, while 100,000 children come, and
 #: while these are combed
 AT_MOST = {"default_ms": 40.0, "arrival_100k_ms": 100.0, "combing_100k_ms": 100.0}
-RATE, FRAMES, MOVES, BEATS, POINTS = 24.0, 24, 8, 2000, 16
+RATE, FRAMES, MOVES, BEATS = 24.0, 24, 8, 2000
 #: group of settings -> a slider of it and what it is dragged to
 SLIDERS = {
     "dynamics.damping": 0.3,
@@ -176,24 +177,19 @@ def main() -> int:
 
 
 def compile_programs(form: str) -> None:
-    """Have hair on a ball play, and remove it."""
-    bpy.ops.mesh.primitive_uv_sphere_add(radius=0.1)
-    ball, few = bpy.context.object, bpy.data.hair_curves.new("Few")
-    roots = np.array([vertex.co for vertex in ball.data.vertices], np.float32)
-    few.add_curves([POINTS] * len(roots))
-    lengths = np.linspace(1.0, 2.0, POINTS, dtype=np.float32)
-    few.position_data.foreach_set("vector", (roots[:, None] * lengths[:, None]).ravel())
-    few.surface = ball
-    hair = bpy.data.objects.new("Few", few)
-    bpy.context.scene.collection.objects.link(hair)
+    """Have the sample scene play once, and forget it with all that was found on its head."""
+    scene, hair = at_once(add_sample_scene(()))
     hair.hairloom.dynamics.device = form
-    depsgraph = bpy.context.evaluated_depsgraph_get()
+    depsgraph = scene.view_layers[0].depsgraph
     session = Session(hair, depsgraph)
     session.play(depsgraph)
     for _ in range(2):
         session.advance(depsgraph, 1.0 / RATE)
-    for each in (hair, ball):
-        bpy.data.objects.remove(each)
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    bpy.ops.mesh.primitive_cube_add()
+    cube, depsgraph = bpy.context.object, bpy.context.evaluated_depsgraph_get()
+    read_surface(cube, depsgraph, need_uv=False, place="cube")  # the last surface is kept
+    bpy.data.objects.remove(cube)
 
 
 def _slug(kind: str) -> str:
