@@ -18,8 +18,10 @@ from .cards.occlusion import CardOccluder
 from .cards.occlusion_settings import CardOcclusionSettings
 from .cards.settings import CardSettings
 from .groom.weights import guide_weights
+from .light_flow import rest_occlusion
+from .motion_flow import root_turns
 from .params import SettingsMap
-from .pipeline import Pose, Rig, rest_occlusion, root_normals, root_turns
+from .rig_flow import Pose, Rig, root_normals
 from .shading.ambient_settings import AmbientSettings
 from .shading.drawn_strands import drawn_radius, own_colors
 from .shading.settings import ShadingSettings, StrandSettings

@@ -3,7 +3,7 @@
 Curves that moved, and the children that they have a part in, are shaped again; each keeps its root,
 its guides and their weights, its clump, its random numbers and its point count. So nothing else
 changes, and what was found for the whole groom, such as ambient occlusion, stays. What it leaves
-to `pipeline.prepare`, which is to follow: points by need, children that are led out of the head or
+to `rig_flow.prepare`, which is to follow: points by need, children that are led out of the head or
 change guides, widths.
 """
 
@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from .arrays import Floats, Ints
-from .pipeline import Grown, Rig
+from .rig_flow import Grown, Rig
 from .strands import StrandSet
 from .strands.center_lines import center_lines
 from .strands.needed_points import with_points
@@ -27,7 +27,7 @@ def combed(rig: Rig, curves: StrandSet, number: Ints, *, is_animated: bool = Fal
     Args:
         curves: (n,) world space at rest, as they are now.
         number: (n,) ascending, which of the rig's own strands these are.
-        is_animated: whether strands have kept their own points, see `pipeline.prepare`.
+        is_animated: whether strands have kept their own points, see `rig_flow.prepare`.
     """
     strands, cv_count = rig.strands, rig.guide_grid.shape[1]
     points = strands.points.copy()

@@ -15,23 +15,32 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .arrays import Floats, Ints
-from .pipeline import (
-    AT_ONCE,
-    Axes,
-    Rig,
-    ambient_of,
-    by_axes,
-    few_strands,
-    rest_skin_field,
-    skin_seen_by,
-    strand_axes,
+from .rig_flow import Rig
+from .shading.ambient import (
+    HairCells,
+    ambient_occlusion,
+    occlusion_by,
+    openness_field,
+    skin_occlusion,
+    sky_field,
 )
-from .shading.ambient import HairCells, occlusion_by, openness_field, sky_field
 from .shading.ambient_settings import AmbientSettings
 from .shading.density_grid import Field
+from .shading.drawn_strands import drawn_radius
+from .shading.settings import StrandSettings
+from .shading.skin_seen import seen_by, skin_field
 from .strands import StrandSet
+from .strands.arc_length import even
+from .strands.frames import strand_tangents, volume_normal_rows
 from .strands.kept import same_rows
+from .strands.vectors import cross_rows, dot_rows
 
+#: Points whose directions are found at once: they stay in the cache.
+AT_ONCE = 1 << 14
+#: Three directions at each point, three times (point_count, 3), see `strand_axes`.
+type Axes = tuple[Floats, Floats, Floats]
+#: Strands, about, that stand in the way of light off far skin for all.
+SHADING_STRANDS = 6000
 #: Of coarse fields: cells along the longest side, cells in all, and those of the skin's.
 _COARSE_CELLS, _COARSE_MOST, _COARSE_SKIN = 24, 8_000, 20
 #: Quick light is looked up at one of this many points of a strand, and at its last one.
@@ -55,7 +64,7 @@ class HairLight:
     occlusion: (point_count,), 1 where nothing shades.
     openness: (point_count, 4), see `ambient.openness_field`: the mean, and a vector by the strand's
         axes. It turns with the strand, so it holds while hair moves as far as occlusion does.
-    skin_seen: (point_count, 8), see `pipeline.skin_seen_by`; None without a head.
+    skin_seen: (point_count, 8), see `skin_seen_by`; None without a head.
     fields: from which it is taken; None without strands.
     is_quick: whether these are not the hair's own.
     """
@@ -211,3 +220,100 @@ def _between(values: Floats, before: Ints, part: Floats) -> Floats:
             one = row.take(low)
             target[some] = one + part[some] * (row.take(high) - one)
     return found
+
+
+def rest_occlusion(rig: Rig, settings: AmbientSettings, points: Floats | None = None) -> Floats:
+    """Ambient occlusion of every point at rest, (point_count,), 1 where nothing shades.
+
+    Args:
+        points: (n, 3) [m] on the same strands; None is their own.
+    """
+    strands, settings = rig.strands, ambient_of(rig, settings)
+    return ambient_occlusion(
+        strands, strands.points if points is None else points, rig.head, settings
+    )
+
+
+def strand_axes(strands: StrandSet, among: StrandSet | None = None) -> Axes:
+    """Along the strand, along its normal of the hair's volume, and across both, at each point.
+
+    Args:
+        among: the whole hair; None: it is these strands.
+    """
+    roots = (among or strands).roots
+    axes = np.empty((3, 3, strands.point_count), np.float32)
+    count = max(strands.strand_count, 1)
+    center = roots.sum(axis=0, dtype=np.float64)[:, None] / max(len(roots), 1)
+    step = max(AT_ONCE * count // max(strands.point_count, 1), 1)
+    for first in range(0, strands.strand_count, step):
+        offsets = strands.offsets[first : first + step + 1]
+        some = slice(offsets[0], offsets[-1])
+        points = np.ascontiguousarray(strands.points[some].T)
+        tangent = strand_tangents(points, offsets - offsets[0])
+        normal = volume_normal_rows(points - center.astype(np.float32), tangent)
+        for axis, rows in zip(axes, (tangent, normal, cross_rows(tangent, normal)), strict=True):
+            axis[:, some] = rows
+    tangent, normal, across = axes
+    return tangent.T, normal.T, across.T
+
+
+def rest_skin_seen(rig: Rig, points: Floats, axes: Axes) -> Floats | None:
+    """The skin that points (n, 3) see at rest, those of the strands or of cards in their place,
+    (n, 8), see `skin_seen_by`. None without a head.
+    """
+    field = rest_skin_field(rig)
+    return None if field is None else skin_seen_by(axes, field.at(points))
+
+
+def rest_skin_field(rig: Rig, cell_count: int | None = None) -> Field | None:
+    """What is seen of the head, see `skin_seen.skin_field`; None without a head."""
+    if rig.head is None or not rig.strands.strand_count:
+        return None
+    # coarse cells do not tell each strand from the next
+    some, step = few_strands(rig.strands)
+    radius = drawn_radius(some.radius, StrandSettings(), even(some.offsets))
+    some = replace(some, radius=radius.astype(np.float32))
+    return skin_field(some, rig.head, step * rig.widths.extinction, cell_count)
+
+
+def few_strands(strands: StrandSet) -> tuple[StrandSet, int]:
+    """Strands, about SHADING_STRANDS of them, and for how many each of these stands."""
+    step = -(-strands.strand_count // SHADING_STRANDS)
+    return strands.take(np.arange(0, strands.strand_count, step)), step
+
+
+def skin_seen_by(axes: Axes, found: Floats) -> Floats:
+    """The received, beneath and depth of `skin_seen.SkinSeen`, (n, 8), vectors by the axes at each
+    point.
+
+    Args:
+        found: values of `rest_skin_field` at points, (k, n).
+    """
+    seen = seen_by(found)
+    received, beneath = (by_axes(each, axes) for each in (seen.received[:, 1:], seen.beneath))
+    parts = seen.received[:, :1], received, beneath, seen.depth[:, None]
+    return np.concatenate(parts, axis=1, dtype=np.float32)
+
+
+def by_axes(vectors: Floats, axes: Axes) -> Floats:
+    """Vectors (n, 3) along each of the axes, (n, 3) float32."""
+    found = np.empty((len(vectors), 3), np.float32)
+    for first in range(0, len(vectors), AT_ONCE):
+        some = slice(first, first + AT_ONCE)
+        rows = np.ascontiguousarray(vectors[some].T)
+        for column, axis in zip(found.T, axes, strict=True):
+            column[some] = dot_rows(rows, axis[some].T)
+    return found
+
+
+def head_occlusion(rig: Rig, settings: AmbientSettings) -> Floats | None:
+    """The light that the hair lets through to the head, (vertex_count,); None without a head."""
+    if rig.head is None:
+        return None
+    return skin_occlusion(rig.strands, rig.head, ambient_of(rig, settings))
+
+
+def ambient_of(rig: Rig, settings: AmbientSettings) -> AmbientSettings:
+    """As strong as the hairs that strands stand for are."""
+    factor = rig.widths.extinction
+    return settings.multiplied(extinction=factor, scalp_extinction=factor)

@@ -4,7 +4,7 @@ of the colours that are painted.
 Children that the new density does not want make room for those that it wants now: these get their
 points, as many as they were, and shapes as all children grow, in the clumps of their neighbours.
 So nothing else changes, and what was found for the whole groom stays, as in `comb_flow`. What it
-leaves to `pipeline.prepare`, which is to follow: how many children there are, occlusion where they
+leaves to `rig_flow.prepare`, which is to follow: how many children there are, occlusion where they
 have come, from where children scatter, guides in motion, and all that `comb_flow` leaves to it.
 Children that a mask shapes in another way are shaped again, as combed ones are.
 """
@@ -23,7 +23,7 @@ from .groom.child_roots import ChildRoots, child_roots
 from .groom.masks import NO_MASKS, Masks, Places
 from .groom.painted_color import PaintedColor
 from .groom.roots import RootFrames, root_frames
-from .pipeline import Grown, Rig
+from .rig_flow import Grown, Rig
 from .shading.coat import coated_color
 from .shading.drawn_strands import look_color, natural_strands
 from .shading.settings import ShadingSettings
@@ -39,7 +39,7 @@ def painted(rig: Rig, density: Floats | None, masks: Masks = NO_MASKS) -> Rig:
 
     Args:
         rig: with children that have grown.
-        density: (vertex_count,), see `pipeline.prepare`. masks: of the settings of children.
+        density: (vertex_count,), see `rig_flow.prepare`. masks: of the settings of children.
 
     Raises:
         HairloomError: as `child_roots`.

@@ -10,14 +10,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from . import pipeline
+from . import motion_flow
 from .arrays import Bools, Floats
 from .dynamics.colliders import DistanceField, PosedCollider
 from .dynamics.settings import DynamicsSettings
 from .dynamics.settle_settings import SettleSettings
 from .groom.settings import GuideSettings
-from .pipeline import Pose, Rig
 from .refine.lead_out_at_rest import led_out_at_rest
+from .rig_flow import Pose, Rig
 from .strands import StrandSet
 from .strands.arc_length import along, steps
 from .strands.vectors import unit
@@ -57,15 +57,15 @@ def settle(
     """
     falling = settings.falling(own)
     still = _STILL * float(np.median(rig.rest_lengths))
-    motion = pipeline.begin(rig, pose)
+    motion = motion_flow.begin(rig, pose)
     frame_count = round(settings.seconds / _FRAME)
     for frame in range(frame_count):
         before = motion.guides
-        motion = pipeline.advance(rig, motion, pose, colliders, falling, gravity, _FRAME)
+        motion = motion_flow.advance(rig, motion, pose, colliders, falling, gravity, _FRAME)
         yield (frame + 1) / frame_count
         if frame >= _FEWEST and np.abs(motion.guides - before).max(initial=0.0) < still:
             break
-    return pipeline.strands_and_led(rig, motion)[0]
+    return motion_flow.strands_and_led(rig, motion)[0]
 
 
 def as_curves(

@@ -16,8 +16,9 @@ import numpy as np
 
 from .arrays import Floats
 from .comb_flow import combed
-from .pipeline import Pose, Rig, motions_of
+from .motion_flow import motions_of
 from .refine.ride import ride
+from .rig_flow import Pose, Rig
 from .strands import StrandSet
 from .strands.root_motions import RootMotions
 

@@ -33,7 +33,7 @@ from hairloom.addon.cards.sort import (
 )
 from hairloom.addon.cards.steps import result_of
 from hairloom.addon.params import SettingsMap
-from hairloom.addon.pipeline import Rig
+from hairloom.addon.rig_flow import Rig
 from hairloom.addon.shading.settings import ShadingSettings
 from hairloom.addon.shading.texture_settings import TextureSettings
 from hairloom.addon.shading.textures import hair_textures

@@ -14,7 +14,7 @@ import numpy as np
 from _cards_groom import SETTINGS, sintel_rig
 from extension_loader import REPOSITORY
 
-from hairloom.addon import pipeline
+from hairloom.addon import light_flow
 from hairloom.addon.blender.base.images import contact_sheet, write_png
 from hairloom.addon.blender.cards.build import (
     CardInputs,
@@ -27,12 +27,12 @@ from hairloom.addon.blender.cards.show import without_strands
 from hairloom.addon.blender.properties.presets import named_preset
 from hairloom.addon.cards.steps import result_of
 from hairloom.addon.params import SettingsMap
-from hairloom.addon.pipeline import Rig
 from hairloom.addon.render.camera import Camera, look_at, perspective
 from hairloom.addon.render.card_snapshot import CardSnapshot
 from hairloom.addon.render.frame import render_image
 from hairloom.addon.render.snapshot import MeshSnapshot, Snapshot
 from hairloom.addon.render.strand_layout import StrandLayout
+from hairloom.addon.rig_flow import Rig
 from hairloom.addon.shading.ambient_settings import AmbientSettings
 from hairloom.addon.shading.lights import Light
 from hairloom.addon.shading.settings import ShadingSettings, StrandSettings
@@ -56,7 +56,7 @@ def strands_figures() -> dict[str, float]:
         and of both widths, with shadows; color_difference_<look>_unshadowed: without.
     """
     rig = sintel_rig()
-    occlusion = pipeline.rest_occlusion(rig, AmbientSettings())
+    occlusion = light_flow.rest_occlusion(rig, AmbientSettings())
     found: dict[str, float] = {"coverage_difference": 0.0}
     pictures: list[np.ndarray] = []
     for width in WIDTHS:
@@ -100,7 +100,7 @@ def _cards(rig: Rig, made: MappedCards, look: str, width: float) -> CardSnapshot
         build.backs[0],
         thickness=area.shadow_area(settings[StrandSettings]) / shadow,
         is_view_compensated=maps.is_view_compensated,
-        skin_seen=pipeline.rest_skin_seen(rig, mesh.positions, mesh.axes),
+        skin_seen=light_flow.rest_skin_seen(rig, mesh.positions, mesh.axes),
     )
 
 
@@ -129,7 +129,7 @@ def _strands(rig: Rig, look: str, width: float, occlusion: np.ndarray) -> Snapsh
 
 @lru_cache(maxsize=1)
 def _skin_seen(rig: Rig) -> np.ndarray | None:
-    return pipeline.rest_skin_seen(rig, rig.strands.points, pipeline.strand_axes(rig.strands))
+    return light_flow.rest_skin_seen(rig, rig.strands.points, light_flow.strand_axes(rig.strands))
 
 
 def _as_cards(hair: Snapshot, cards: CardSnapshot) -> Snapshot:

@@ -40,10 +40,10 @@ from hairloom.addon.card_flow import card_groom
 from hairloom.addon.cards.atlas import AtlasPlan
 from hairloom.addon.cards.steps import result_of
 from hairloom.addon.light_flow import rest_light
-from hairloom.addon.pipeline import Rig
 from hairloom.addon.render.camera import frame_camera
 from hairloom.addon.render.frame import render_image
 from hairloom.addon.render.snapshot import MeshSnapshot, Snapshot
+from hairloom.addon.rig_flow import Rig
 from hairloom.addon.shading.ambient_settings import AmbientSettings
 from hairloom.addon.shading.lights import Light
 from hairloom.addon.shading.settings import ShadingSettings, StrandSettings

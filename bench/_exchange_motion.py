@@ -19,7 +19,7 @@ load_package()
 from _cards_groom import SETTINGS, sintel_rig  # noqa: E402
 from shaken import GRAVITY, MadeMotion, shaken_poses  # noqa: E402
 
-from hairloom.addon import pipeline  # noqa: E402
+from hairloom.addon import motion_flow  # noqa: E402
 from hairloom.addon.blender.base.images import read_texture  # noqa: E402
 from hairloom.addon.blender.cards.motion import (  # noqa: E402
     TextureMotion,
@@ -33,7 +33,7 @@ from hairloom.addon.dynamics.colliders import DistanceField, PosedCollider  # no
 from hairloom.addon.dynamics.settings import DynamicsSettings  # noqa: E402
 from hairloom.addon.exchange.cards.card_formats import GLB  # noqa: E402
 from hairloom.addon.params import SettingsMap  # noqa: E402
-from hairloom.addon.pipeline import Rig  # noqa: E402
+from hairloom.addon.rig_flow import Rig  # noqa: E402
 
 RATE = 60.0
 
@@ -89,12 +89,12 @@ def shaken(rig: Rig, seconds: float) -> MadeMotion:
     settings = DynamicsSettings()
     collider = DistanceField.from_surface(rig.head, settings, place="Sintel")
     poses = shaken_poses(rig, round(seconds * RATE) + 1, RATE)
-    motion = pipeline.begin(rig, poses[0])
+    motion = motion_flow.begin(rig, poses[0])
     guides, earlier = [motion.guides], None
     for before, now in pairwise(poses):
         since = None if earlier is None else earlier.matrix
         posed = (PosedCollider(collider, before.matrix, now.matrix, since),)
-        motion = pipeline.advance(rig, motion, now, posed, settings, GRAVITY, 1.0 / RATE)
+        motion = motion_flow.advance(rig, motion, now, posed, settings, GRAVITY, 1.0 / RATE)
         guides.append(motion.guides)
         earlier = before
     return MadeMotion(rig, range(len(poses)), RATE, lambda frame: (poses[frame], guides[frame]))

@@ -22,8 +22,8 @@ from _sight_pictures import COLORS, _flip, _studio, plain_look
 from hairloom.addon.blender.base.images import contact_sheet, write_png
 from hairloom.addon.blender.properties.groom_settings import GroomSettings
 from hairloom.addon.blender.scene.world import read_environment
-from hairloom.addon.pipeline import Rig
 from hairloom.addon.render.snapshot import SKIN
+from hairloom.addon.rig_flow import Rig
 from hairloom.addon.shading.drawn_strands import drawn_radius
 from hairloom.addon.shading.settings import StrandSettings
 from hairloom.addon.strands.arc_length import along

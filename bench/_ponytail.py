@@ -6,14 +6,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hairloom.addon import pipeline
+from hairloom.addon import rig_flow
 from hairloom.addon.blender.scene.built_in_head import BuiltInHead, built_in_head
 from hairloom.addon.groom.children_settings import ChildrenSettings
 from hairloom.addon.groom.grow import grow
 from hairloom.addon.groom.holds import anchors_of
 from hairloom.addon.groom.settings import GrowSettings, GuideSettings
 from hairloom.addon.groom.ties import Holders, Tie
-from hairloom.addon.pipeline import Pose, Rig
+from hairloom.addon.rig_flow import Pose, Rig
 from hairloom.addon.strands import StrandSet
 
 #: From the middle of the skull to the ring, a fraction beyond the skin, and the ring's radius [m].
@@ -53,7 +53,7 @@ def ponytail(count: int, *, children: ChildrenSettings | None = None) -> Ponytai
     shape[:3, 1] = np.cross(axis, shape[:3, 0])
     shape[:3, :3] *= 1.2 * RADIUS
     shape[:3, 3] = middle
-    rig = pipeline.prepare(
+    rig = rig_flow.prepare(
         strands,
         bust.surface,
         GuideSettings(cv_count=POINTS),

@@ -55,11 +55,11 @@ class Shake:
     colliders: tuple[Collider, ...]
 
     def drives(self, fps: float, seconds: float) -> Iterator[Drive]:
-        """One a frame, with ways bent as `pipeline.advance` bends them."""
+        """One a frame, with ways bent as `motion_flow.advance` bends them."""
         places = [sway(frame / fps) for frame in range(round(seconds * fps) + 1)]
         earlier, before = None, self._carried(places[0])
         for frame in range(1, len(places)):
-            # as in the pipeline the style at one frame's end is the same array at the next's begin
+            # as in motion_flow the style at one frame's end is the same array at the next's begin
             now = self._carried(places[frame])
             yield self._drive((earlier, before, now), places[max(frame - 2, 0) : frame + 1])
             earlier, before = before, now

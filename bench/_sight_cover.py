@@ -16,10 +16,10 @@ from _sight_grooms import rig_of, scaled
 from hairloom.addon.blender.sessions.prepared_groom import PreparedGroom
 from hairloom.addon.blender.sessions.snapshots import snapshot_of
 from hairloom.addon.groom.widths import _found
-from hairloom.addon.pipeline import Rig
 from hairloom.addon.render.camera import Camera, frame_camera
 from hairloom.addon.render.frame import render_image
 from hairloom.addon.render.snapshot import MeshSnapshot, Snapshot
+from hairloom.addon.rig_flow import Rig
 from hairloom.addon.shading.ambient_settings import AmbientSettings
 from hairloom.addon.shading.volume.settings import VolumeSettings
 

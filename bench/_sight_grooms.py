@@ -11,7 +11,7 @@ import bmesh
 import numpy as np
 from extension_loader import REPOSITORY
 
-from hairloom.addon import pipeline
+from hairloom.addon import rig_flow
 from hairloom.addon.blender.scene.built_in_head import built_in_head
 from hairloom.addon.blender.scene.mesh_files import read_mesh_file
 from hairloom.addon.exchange.joined_grooms import joined_grooms
@@ -20,7 +20,7 @@ from hairloom.addon.groom.children_settings import ChildrenSettings
 from hairloom.addon.groom.face_hair import grow_with_face
 from hairloom.addon.groom.settings import GrowSettings, GuideSettings
 from hairloom.addon.groom.width_settings import WidthSettings
-from hairloom.addon.pipeline import Rig
+from hairloom.addon.rig_flow import Rig
 from hairloom.addon.strands import StrandSet, Surface
 
 _DATA = Path(os.environ.get("HAIRLOOM_DATA", REPOSITORY.parent / "shared" / "data"))
@@ -60,7 +60,7 @@ def scaled(pair: Pair, factor: float) -> Pair:
 def rig_of(pair: Pair, name: str, children: str = ChildrenSettings().method) -> Rig:
     strands, head = pair
     widths, settings = WidthSettings().method, ChildrenSettings(method=children)
-    return pipeline.prepare(
+    return rig_flow.prepare(
         strands, head, GuideSettings(), place=name, children=settings, widths=widths
     )
 
@@ -85,7 +85,7 @@ def lost_curves() -> int:
     lost = 0
     for method in ("none", "multi"):
         children = ChildrenSettings(method=method, strand_count=5000)
-        rig = pipeline.prepare(strands, head, GuideSettings(), place="hair", children=children)
+        rig = rig_flow.prepare(strands, head, GuideSettings(), place="hair", children=children)
         own = rig.strands.take(np.arange(rig.strands.strand_count - rig.child_count))
         tips = strands.points[strands.offsets[1:] - 1]
         kept = {tip.tobytes() for tip in own.points[own.offsets[1:] - 1]}

@@ -28,7 +28,7 @@ from _shading_room import CyclesRoom
 from _sight_cover import coverage
 from _sight_grooms import Pair, rig_of, scaled
 
-from hairloom.addon import pipeline
+from hairloom.addon import rig_flow
 from hairloom.addon.blender.pictures.studio import FIELD_OF_VIEW, Studio
 from hairloom.addon.blender.properties.groom_settings import GroomSettings
 from hairloom.addon.blender.scene.built_in_head import built_in_head
@@ -38,9 +38,9 @@ from hairloom.addon.groom.children_settings import ChildrenSettings
 from hairloom.addon.groom.face_hair import grow_with_face
 from hairloom.addon.groom.grow import grow
 from hairloom.addon.groom.settings import GrowSettings
-from hairloom.addon.pipeline import Rig
 from hairloom.addon.render.camera import Camera
 from hairloom.addon.render.snapshot import SKIN
+from hairloom.addon.rig_flow import Rig
 from hairloom.addon.shading.ambient_settings import AmbientSettings
 from hairloom.addon.shading.drawn_strands import drawn_radius
 from hairloom.addon.shading.lights import Light
@@ -95,7 +95,7 @@ def _count_figures(children: str) -> dict[str, float]:
     settings = GrowSettings(strand_count=COUNTS[-1])
     grown = grow(head.surface, settings, head.weights["scalp"])
     whole = rig_of((grown, head.surface), "built-in", "none")
-    order = np.argsort(pipeline.strand_ranks(whole), kind="stable")
+    order = np.argsort(rig_flow.strand_ranks(whole), kind="stable")
     studio = _studio(whole)
     camera = studio._camera(1.0)
     lights = studio.lights(camera)

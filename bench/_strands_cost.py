@@ -18,15 +18,16 @@ from typing import Any
 import gpu
 import numpy as np
 
-from hairloom.addon import pipeline
+from hairloom.addon import motion_flow
 from hairloom.addon.arrays import Floats, Ints
 from hairloom.addon.groom.roots import RootFrames, root_frames
-from hairloom.addon.pipeline import Motion, Pose, Rig
+from hairloom.addon.motion_flow import Motion
 from hairloom.addon.render import gpu_objects
 from hairloom.addon.render.ride_pass import RidePass
 from hairloom.addon.render.shader_program import ShaderRecipe, program
 from hairloom.addon.render.shader_source import SHADER_FOLDER
 from hairloom.addon.render.strand_layout import strand_rows_size
+from hairloom.addon.rig_flow import Pose, Rig
 
 SHADERS = Path(__file__).parent / "shaders"
 ROUNDS, EVERY, CHUNK = 9, 4, 512
@@ -39,7 +40,7 @@ def cost_figures(rig: Rig, motions: Sequence[Motion]) -> dict[str, float]:
     assert rig.strands.points.size == np.prod(shape)
     rest = RootFrames(*map(np.ascontiguousarray, vars(rig.rest_frames).values()))
     ours, peer = _least(
-        lambda motion: pipeline.strands_and_led(rig, motion),
+        lambda motion: motion_flow.strands_and_led(rig, motion),
         lambda motion: _summed(rig, rest, motion),
         [[motion] for motion in chosen],
     )

@@ -22,7 +22,7 @@ from _report import report
 from _report import start as start_bench
 from shaken import GRAVITY
 
-from hairloom.addon import pipeline
+from hairloom.addon import motion_flow, rig_flow
 from hairloom.addon.blender.command_line.simulate_job import shake_matrix
 from hairloom.addon.blender.scene.built_in_head import built_in_head
 from hairloom.addon.dynamics.colliders import (
@@ -37,7 +37,7 @@ from hairloom.addon.dynamics.state import start
 from hairloom.addon.dynamics.step import Drive
 from hairloom.addon.groom.face_hair import grow_with_face
 from hairloom.addon.groom.settings import GrowSettings, GuideSettings
-from hairloom.addon.pipeline import Pose, Rig
+from hairloom.addon.rig_flow import Pose, Rig
 from hairloom.addon.strands import Surface
 from hairloom.addon.strands.closest_point import closest_point
 
@@ -137,14 +137,14 @@ def shaken(
     assert rig.head is not None
     settings = DynamicsSettings()
     collider = DistanceField.from_surface(rig.head, settings)
-    rest = pipeline.carried_guides(rig, rig.rest_pose)[::every]
+    rest = motion_flow.carried_guides(rig, rig.rest_pose)[::every]
     depths = Depths.of(rest, rig.head)
     form = make(start(rest))
     matrices = [motion(frame / FPS) for frame in range(round(seconds * FPS) + 1)]
     targets = [rest]
     for frame, now in enumerate(matrices[1:], 1):
         pose = Pose(moved(now, rig.head.positions).astype(np.float32), now)
-        targets.append(pipeline.carried_guides(rig, pose)[::every])
+        targets.append(motion_flow.carried_guides(rig, pose)[::every])
         earlier = matrices[max(frame - 2, 0)]
         since = earlier if frame > 1 else None
         posed = PosedCollider(collider, matrices[frame - 1], now, since)
@@ -160,7 +160,7 @@ def shaken(
 def built_in_rig(count: int = 600) -> Rig:
     head = built_in_head()
     strands = grow_with_face(head.surface, GrowSettings(strand_count=count), head.weights, None)
-    return pipeline.prepare(strands, head.surface, GuideSettings(), place="built-in")
+    return rig_flow.prepare(strands, head.surface, GuideSettings(), place="built-in")
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,7 @@ from gpu_extras.batch import batch_for_shader
 from mathutils import Matrix
 from shaken import GRAVITY, shaken_poses
 
-from hairloom.addon import pipeline
+from hairloom.addon import motion_flow, rig_flow
 from hairloom.addon.blender.sessions.compute_solver import ComputeSolver
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.groom.grow import grow, scalp_density
@@ -71,7 +71,7 @@ class Lines:
         batch.draw(self._shader)
 
 
-def simulated(solver: ComputeSolver, pose: pipeline.Pose) -> None:
+def simulated(solver: ComputeSolver, pose: rig_flow.Pose) -> None:
     """A frame of dynamics; the guides are read back, 0.05 ms, so that it is over."""
     solver.advance(pose, (), DynamicsSettings(), GRAVITY, 1.0 / 60.0)
     solver.guides()
@@ -89,9 +89,9 @@ def main() -> int:
     start()
     head = suzanne()
     strands = grow(head, GrowSettings(strand_count=STRANDS), scalp_density(head))
-    rig = pipeline.prepare(strands, head, GuideSettings(), place="bench")
+    rig = rig_flow.prepare(strands, head, GuideSettings(), place="bench")
     poses = shaken_poses(rig, FRAMES, 60.0)
-    motion = pipeline.begin(rig, poses[0])
+    motion = motion_flow.begin(rig, poses[0])
     radius = rig.strands.radius.reshape(STRANDS, -1)
     camera = frame_camera(rig.strands.bounds(), (-0.5, -1.0, 0.2), 0.5, WIDTH / HEIGHT)
     lights, ours, riding = three_point_lights(camera.view), StrandPass(), StrandPass()
@@ -117,12 +117,12 @@ def main() -> int:
     for pose in poses[1:]:
         motion = watch.measure(
             "simulate_ms",
-            lambda m=motion, p=pose: pipeline.advance(
+            lambda m=motion, p=pose: motion_flow.advance(
                 rig, m, p, (), DynamicsSettings(), GRAVITY, 1.0 / 60.0
             ),
         )
         points = watch.measure(
-            "interpolate_ms", lambda m=motion: pipeline.strands_and_led(rig, m)[0]
+            "interpolate_ms", lambda m=motion: motion_flow.strands_and_led(rig, m)[0]
         )
         points = points.reshape(shape)
         snapshot = Snapshot(points=points, radius=radius, lights=lights)

@@ -29,7 +29,7 @@ from _report import report, start
 from _sight_grooms import GROOMS, Pair, rig_of
 from _strands_cost import cost_figures
 
-from hairloom.addon import pipeline
+from hairloom.addon import motion_flow
 from hairloom.addon.arrays import Floats, Ints
 from hairloom.addon.blender.colliders.fields import field_of
 from hairloom.addon.blender.command_line.simulate_job import shake_matrix
@@ -39,8 +39,9 @@ from hairloom.addon.dynamics.colliders.signed_distance import signed_distance
 from hairloom.addon.dynamics.colliders.winding import winding_number
 from hairloom.addon.dynamics.measure import length_changes
 from hairloom.addon.dynamics.settings import DynamicsSettings
-from hairloom.addon.pipeline import Motion, Pose, Rig
+from hairloom.addon.motion_flow import Motion
 from hairloom.addon.refine.lead_out import NOT_LED, LedOut
+from hairloom.addon.rig_flow import Pose, Rig
 from hairloom.addon.strands import StrandSet, Surface
 from hairloom.addon.strands.arc_length import lengths, steps
 from hairloom.addon.strands.closest_point import ClosestPointSearch
@@ -108,12 +109,12 @@ def played(
     """The motion in each frame, the head's matrix, all strands, and those that were led out."""
     assert rig.head is not None
     centre = rig.head.positions.mean(axis=0).astype(np.float64)
-    motion = pipeline.begin(rig, rig.rest_pose)
+    motion = motion_flow.begin(rig, rig.rest_pose)
     earlier, before, led = None, np.eye(4), NOT_LED
     for frame in range(1, round(SECONDS * fps) + 1):
         matrix = shake(frame / fps, centre)
         posed = (PosedCollider(collider, before, matrix, earlier),)
-        motion = pipeline.advance(
+        motion = motion_flow.advance(
             rig,
             motion,
             pose_of(rig, matrix),
@@ -124,7 +125,7 @@ def played(
             led=led,
         )
         earlier, before = before, matrix
-        points, led = pipeline.strands_and_led(rig, motion)
+        points, led = motion_flow.strands_and_led(rig, motion)
         yield motion, matrix, points, led
 
 
@@ -158,7 +159,7 @@ def shaken(rig: Rig, shake: Any, fps: float) -> dict[str, float]:
             deep[index] = np.where(were_inside[index], 0.0, search.closest(local).distance)
         np.maximum(depth, np.maximum.reduceat(deep, offsets[:-1]), out=depth)
         before = correction
-        correction = points - pipeline.strands_at(rig, motion.pose, motion.guides)
+        correction = points - motion_flow.strands_at(rig, motion.pose, motion.guides)
         jumped.append(_farthest(correction - before, offsets) * scale)
         if motion_before is not None and len(jumped) % FLIPS_EVERY == 0:
             is_far = jumped[-1] > JUMP
@@ -205,7 +206,7 @@ def _farthest_in_parts(
     """
     (before, now), offsets = moments, rig.strands.offsets
     farthest = np.zeros((2, rig.strands.strand_count))
-    ridden = _as_head(pipeline.strands_at(rig, before.pose, before.guides), before.pose.matrix)
+    ridden = _as_head(motion_flow.strands_at(rig, before.pose, before.guides), before.pose.matrix)
     for part in np.arange(1, PARTS + 1) / PARTS:
         matrix = before.pose.matrix + part * (now.pose.matrix - before.pose.matrix)
         guides = before.guides + np.float32(part) * (now.guides - before.guides)
@@ -219,8 +220,8 @@ def _farthest_in_parts(
             leans=led.leans,
         )
         last, ridden_before = correction, ridden
-        correction, led = pipeline.strands_and_led(rig, there)
-        rides = pipeline.strands_at(rig, there.pose, guides)
+        correction, led = motion_flow.strands_and_led(rig, there)
+        rides = motion_flow.strands_at(rig, there.pose, guides)
         correction -= rides
         ridden = _as_head(rides, matrix)
         way = _farthest(correction - last, offsets)
@@ -249,14 +250,14 @@ def _inside(
 
 def still_and_turned(rig: Rig) -> dict[str, float]:
     """Errors at rest [m], and of head and guides that turn as one, by the median length."""
-    rest = pipeline.strands_at(rig, rig.rest_pose, rig.guide_grid)
+    rest = motion_flow.strands_at(rig, rig.rest_pose, rig.guide_grid)
     matrix = shake_matrix(np.zeros(3), 0.3)
     matrix[:3, 3] = 0.3, -0.2, 0.1
     assert rig.head is not None
     # in double precision, so that only what riding does is seen
     turned = rig.head.positions.astype(np.float64) @ matrix[:3, :3].T + matrix[:3, 3]
     guides = rig.guide_grid.astype(np.float64) @ matrix[:3, :3].T + matrix[:3, 3]
-    now = pipeline.strands_at(rig, Pose(turned, matrix), guides)
+    now = motion_flow.strands_at(rig, Pose(turned, matrix), guides)
     expected = rig.strands.points @ matrix[:3, :3].T + matrix[:3, 3]
     length = lengths(rig.strands.points, rig.strands.offsets)
     return {

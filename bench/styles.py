@@ -49,7 +49,7 @@ from hairloom.addon.dynamics.colliders import PosedCollider
 from hairloom.addon.dynamics.colliders.signed_distance import signed_distance
 from hairloom.addon.dynamics.colliders.winding import winding_number
 from hairloom.addon.dynamics.settings import DynamicsSettings
-from hairloom.addon.pipeline import Rig
+from hairloom.addon.rig_flow import Rig
 from hairloom.addon.strands import StrandSet, Surface
 from hairloom.addon.strands.closest_point import ClosestPointSearch
 

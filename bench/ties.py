@@ -18,7 +18,7 @@ import numpy as np
 from _ponytail import Ponytail, ponytail
 from _report import report, start
 
-from hairloom.addon import pipeline
+from hairloom.addon import rig_flow
 from hairloom.addon.blender.colliders.fields import field_of
 from hairloom.addon.blender.command_line.simulate_job import shake_matrix
 from hairloom.addon.blender.sessions.compute_solver import ComputeSolver
@@ -95,7 +95,7 @@ def played(tail: Ponytail, shake, collider, *, compute: bool):
     }, shown
 
 
-def escape(tail: Ponytail, pose: pipeline.Pose, strands: np.ndarray) -> np.ndarray:
+def escape(tail: Ponytail, pose: rig_flow.Pose, strands: np.ndarray) -> np.ndarray:
     """How far each held strand is from its place in the ring [m]."""
     holds = tail.rig.holds
     first = holds.place.astype(int)

@@ -5,19 +5,19 @@ from __future__ import annotations
 import numpy as np
 from small_wig import GUIDES, curves, sheet
 
-from hairloom.addon import pipeline
+from hairloom.addon import rig_flow
 from hairloom.addon.arrays import Bools
 from hairloom.addon.groom.children_settings import ChildrenSettings
 
 
-def wig() -> pipeline.Rig:
+def wig() -> rig_flow.Rig:
     children = ChildrenSettings(
         method="multi", strand_count=500, length_variation=0.0, baby_hair=0.8
     )
-    return pipeline.prepare(curves(), sheet(), GUIDES, place="a wig", children=children)
+    return rig_flow.prepare(curves(), sheet(), GUIDES, place="a wig", children=children)
 
 
-def short_strands(rig: pipeline.Rig) -> Bools:
+def short_strands(rig: rig_flow.Rig) -> Bools:
     """(strand_count,) those that no setting but Baby Hair has cut."""
     length = rig.strands.lengths()
     is_short: Bools = length < 0.5 * np.median(length)

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from extension_loader import REPOSITORY
 
-from hairloom.addon import pipeline
+from hairloom.addon import rig_flow
 from hairloom.addon.blender.cards.build import CardInputs
 from hairloom.addon.blender.cards.files import CardOutput, WrittenCards, write_cards
 from hairloom.addon.cards.atlas_settings import AtlasSettings
@@ -93,7 +93,7 @@ def written_asset(
         strand_count=6,
         highlights="shift" if model == "kajiya_kay" else "tangent",
     )
-    rig = pipeline.prepare(curtain(), None, GuideSettings(), place="curtain")
+    rig = rig_flow.prepare(curtain(), None, GuideSettings(), place="curtain")
     settings = SettingsMap(
         CardSettings(source="clusters" if is_baked else "guides", width_factor=1.5, card_count=40),
         AtlasSettings(source="baked" if is_baked else "made", size="512", columns=8),

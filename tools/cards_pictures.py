@@ -33,8 +33,8 @@ class Shots:
         grow, studio = of_addon("groom.grow"), of_addon("blender.pictures.studio")
         grown = settings["grow"](strand_count=STRANDS, clump=0.4)
         strands = grow.grow(head, grown, bust.weights["scalp"])
-        self.settings, self._pipeline = settings, of_addon("pipeline")
-        self.rig = self._pipeline.prepare(
+        self.settings = settings
+        self.rig = of_addon("rig_flow").prepare(
             strands,
             head,
             settings["guides"](guide_count=CARDS),

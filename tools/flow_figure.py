@@ -20,7 +20,7 @@ _FLOORS = """
     blender/viewport blender/sessions blender/strands blender/cards blender/bakes
     blender/colliders blender/scene blender/properties blender/base
     render
-    card_flow pipeline
+    card_flow motion_flow rig_flow
     exchange cards shading refine dynamics groom strands params
 """
 FLOORS = tuple(_FLOORS.split())
@@ -33,7 +33,7 @@ ui/operators_preview.py start_preview
       blender/sessions/groom_source.py GroomSource
         blender/scene/source.py read_source
       blender/sessions/prepared_groom.py build
-        pipeline.py prepare
+        rig_flow.py prepare
           groom/guides.py choose_guides
           groom/weights.py guide_weights
     blender/viewport/overlay.py show
@@ -64,7 +64,7 @@ blender/preview/handlers.py register
           blender/sessions/compute_solver.py ComputeSolver
             render/dynamics_pass.py DynamicsPass
           blender/sessions/numpy_solver.py NumpySolver
-            pipeline.py advance
+            motion_flow.py advance
               dynamics/step.py advance
     blender/preview/previews.py attempt
       blender/viewport/overlay.py show
@@ -165,7 +165,7 @@ def _panel(title: str, tops: list[Step], top: int, right: int) -> tuple[str, int
             continue
         starts[floor], height = y, max(rows) * _ROW
         color = _COLORS.get(floor.partition("/")[0], _PURE)
-        name = f"{floor}.py" if floor in ("pipeline", "card_flow") else f"{floor}/"
+        name = f"{floor}.py" if floor.endswith("_flow") else f"{floor}/"
         parts.append(
             f'<rect x="0" y="{y}" width="{right}" height="{height - 4}" fill="{color}"/>'
             f'<text x="8" y="{y + _ROW // 2 + 2}" font-size="11" fill="#444">{name}</text>'

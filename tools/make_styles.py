@@ -75,7 +75,7 @@ def rig_of(name: str, most: int = 1_000_000) -> tuple[Any, bpy.types.Object]:
     )
     own = of_addon("blender.command_line.object_settings").own_settings(hair)
     read = inputs.read_inputs(sources, of_addon("groom.settings").GrowSettings())
-    rig = of_addon("pipeline").prepare(
+    rig = of_addon("rig_flow").prepare(
         read.strands,
         read.head,
         own["guides"],

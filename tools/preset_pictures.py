@@ -32,11 +32,11 @@ def of_addon(module: str) -> Any:
 
 def wig(strand_count: int = STRANDS) -> Any:
     """Shoulder-long hair on the built-in head with its brows and lashes, made ready to move."""
-    settings, pipeline = of_addon("parameters").ALL_SETTINGS, of_addon("pipeline")
+    settings = of_addon("parameters").ALL_SETTINGS
     grown = settings["grow"](strand_count=strand_count)
     bust = of_addon("blender.scene.built_in_head").built_in_head()
     strands = of_addon("groom.face_hair").grow_with_face(bust.surface, grown, bust.weights)
-    return pipeline.prepare(
+    return of_addon("rig_flow").prepare(
         strands, bust.surface, settings["guides"](), place="the built-in groom", widths="auto"
     )
 

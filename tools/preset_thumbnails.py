@@ -32,18 +32,18 @@ def turned(rig: Any, angle: float) -> Any:
     sine, cosine = np.sin(angle), np.cos(angle)
     matrix[:2, :2] = ((cosine, -sine), (sine, cosine))
     positions = rig.head.positions @ matrix[:3, :3].T
-    return of_addon("pipeline").Pose(positions.astype(np.float32), matrix)
+    return of_addon("rig_flow").Pose(positions.astype(np.float32), matrix)
 
 
 def moved(rig: Any, dynamics: Any) -> tuple[Any, Any]:
     """Pose and strands after the head has turned to the front, and a moment more."""
-    pipeline = of_addon("pipeline")
+    motion_flow = of_addon("motion_flow")
     angles = [-TURN * (1.0 - min(frame / TURNING, 1.0)) for frame in range(FRAMES)]
-    motion = pipeline.begin(rig, turned(rig, angles[0]))
+    motion = motion_flow.begin(rig, turned(rig, angles[0]))
     for angle in angles[1:]:
         pose = turned(rig, angle)
-        motion = pipeline.advance(rig, motion, pose, (), dynamics, GRAVITY, DURATION)
-    return motion.pose, pipeline.strands_and_led(rig, motion)[0]
+        motion = motion_flow.advance(rig, motion, pose, (), dynamics, GRAVITY, DURATION)
+    return motion.pose, motion_flow.strands_and_led(rig, motion)[0]
 
 
 def main(folder: Path) -> None:

@@ -35,7 +35,7 @@ def wig(children: str, count: int = CHILDREN, widths: str = "auto") -> Any:
     head = bust.surface
     grow = of_addon("groom.grow")
     strands = grow.grow(head, grown, bust.weights["scalp"])
-    return of_addon("pipeline").prepare(
+    return of_addon("rig_flow").prepare(
         replace(strands, group=strands.roots[:, 0] > 0.0),
         head,
         settings["guides"](guide_count=GUIDES, cv_count=9),

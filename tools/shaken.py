@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hairloom.addon.blender.command_line.simulate_job import shake_matrix
-from hairloom.addon.pipeline import Pose, Rig
+from hairloom.addon.rig_flow import Pose, Rig
 
 GRAVITY = np.array([0.0, 0.0, -9.81])  # [m/s^2]
 

@@ -186,7 +186,8 @@ class Head:
         Args:
             settings: of dynamics, over those of hair that keeps hardly any style.
         """
-        pipeline, all_settings = of_addon("pipeline"), of_addon("parameters").ALL_SETTINGS
+        rig_flow, motion_flow = of_addon("rig_flow"), of_addon("motion_flow")
+        all_settings = of_addon("parameters").ALL_SETTINGS
         loose = {
             "style_root": 2.0,
             "style_tip": 0.0,
@@ -201,11 +202,13 @@ class Head:
         dynamics = all_settings["dynamics"].from_dict(loose | settings, "style")
         strands = self.strands(roots, locks)
         guides = all_settings["guides"](guide_count=len(locks), cv_count=locks.shape[1])
-        rig = pipeline.prepare(strands, self.surface, guides, place="style")
-        motion = pipeline.begin(rig, rig.rest_pose)
+        rig = rig_flow.prepare(strands, self.surface, guides, place="style")
+        motion = motion_flow.begin(rig, rig.rest_pose)
         solid = self.with_ears_covered if over_ears else (self.collider,)
         for _ in range(round(seconds / FRAME)):
-            motion = pipeline.advance(rig, motion, rig.rest_pose, solid, dynamics, GRAVITY, FRAME)
+            motion = motion_flow.advance(
+                rig, motion, rig.rest_pose, solid, dynamics, GRAVITY, FRAME
+            )
         fallen = locks.copy()
         fallen[rig.guides] = motion.guides
         return self.kept_out(fallen)

@@ -25,7 +25,7 @@ class CardSnapshot:
     base_color: that the base texture is a factor of, where it is not the look's: of strands that
         have colours of their own.
     skin_seen: (vertex_count, 8), the skin that each vertex sees, by
-        `mesh.axes`, see pipeline.rest_skin_seen; None is skin right beneath, as on a plane.
+        `mesh.axes`, see light_flow.rest_skin_seen; None is skin right beneath, as on a plane.
     device: the card_textures.CardTextures that all who draw these cards share; None: each its own.
 
     Mesh and textures are uploaded again only when they are other objects than before; triangles

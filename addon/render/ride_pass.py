@@ -1,6 +1,6 @@
 """Strands that ride on guides, computed on the GPU: what StrandPass draws without an upload.
 
-The same as pipeline.strands_and_led, in dispatches over textures in the layout of
+The same as motion_flow.strands_and_led, in dispatches over textures in the layout of
 strand_layout.strand_rows:
 
     vertices ------> ride_roots ------> root_motions                    one invocation a strand

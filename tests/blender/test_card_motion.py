@@ -19,7 +19,7 @@ from tiers import few_in_commits
 
 bpy = pytest.importorskip("bpy", reason="writing cards needs Blender or the bpy module")
 
-from hairloom.addon import pipeline  # noqa: E402
+from hairloom.addon import motion_flow, rig_flow  # noqa: E402
 from hairloom.addon.blender.bakes.guide_motion import GuideMotion  # noqa: E402
 from hairloom.addon.blender.cards.build import CardInputs, build_steps  # noqa: E402
 from hairloom.addon.blender.cards.files import CardOutput, WrittenCards, write_cards  # noqa: E402
@@ -34,7 +34,7 @@ from hairloom.addon.errors import HairloomError  # noqa: E402
 from hairloom.addon.exchange.cards.card_formats import FBX, GLB, USD  # noqa: E402
 from hairloom.addon.groom.settings import GrowSettings, GuideSettings  # noqa: E402
 from hairloom.addon.params import SettingsMap  # noqa: E402
-from hairloom.addon.pipeline import Pose, Rig  # noqa: E402
+from hairloom.addon.rig_flow import Pose, Rig  # noqa: E402
 from hairloom.addon.shading.texture_settings import TextureSettings  # noqa: E402
 from hairloom.addon.strands import Surface  # noqa: E402
 
@@ -52,9 +52,9 @@ def motion() -> GuideMotion:
     """Hair grown here on a head that shakes; the guides lag behind, each as a wave of its own."""
     grown = read_inputs(Sources(), GrowSettings(strand_count=400, length=0.12))
     scalp = grown.strands.take(np.flatnonzero(grown.strands.group == 0))
-    rig = pipeline.prepare(scalp, grown.head, GuideSettings(guide_count=60), place="x")
+    rig = rig_flow.prepare(scalp, grown.head, GuideSettings(guide_count=60), place="x")
     poses = shaken_poses(rig, FRAMES, RATE)
-    carried = [pipeline.carried_guides(rig, pose) for pose in poses]
+    carried = [motion_flow.carried_guides(rig, pose) for pose in poses]
     along = np.linspace(0.0, 1.0, carried[0].shape[1])[:, None] ** 2
 
     def moment(frame: int) -> tuple[Pose, np.ndarray]:

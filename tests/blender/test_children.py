@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from grids import baked_grid, grid_of
 
-from hairloom.addon import pipeline
+from hairloom.addon import rig_flow
 from hairloom.addon.blender.bakes import playback
 from hairloom.addon.blender.bakes.groom_hashes import groom_rig_hash
 from hairloom.addon.blender.bakes.simulated import differences
@@ -97,7 +97,7 @@ def test_none_is_the_artists_own_hair(new_hair, sphere, evaluated):
     hair = new_hair(sphere)
     hair.data.hairloom.children.strand_count = 17
     session = previews.start(hair, evaluated())
-    plain = pipeline.prepare(
+    plain = rig_flow.prepare(
         session.source.strands, session.source.head, session.settings[GuideSettings], place="Hair"
     )
     np.testing.assert_array_equal(session.rig.strands.points, plain.strands.points)
@@ -127,7 +127,7 @@ def test_no_children_at_all_are_the_guides(hair, evaluated):
 @pytest.mark.slow
 def test_a_hundred_thousand_children_are_made(hair, evaluated):
     session = previews.start(hair, evaluated())
-    rig = pipeline.prepare(
+    rig = rig_flow.prepare(
         session.source.strands,
         session.source.head,
         session.settings[GuideSettings],

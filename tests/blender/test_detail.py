@@ -14,10 +14,10 @@ from hairloom.addon.blender.preview import previews
 from hairloom.addon.blender.sessions.occluder_spheres import OccluderSpheres
 from hairloom.addon.blender.viewport import overlay
 from hairloom.addon.blender.viewport.overlay_text import counts_line, free_corner
-from hairloom.addon.pipeline import Pose
 from hairloom.addon.render.camera import frame_camera
 from hairloom.addon.render.shader_source import DEBUG_VIEWS
 from hairloom.addon.render.strand_pass import Statistics, StrandPass
+from hairloom.addon.rig_flow import Pose
 from hairloom.addon.strands import Surface
 
 pytestmark = pytest.mark.draws(light=False)

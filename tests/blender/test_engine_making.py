@@ -13,7 +13,7 @@ from waiting import take_steps_until
 
 bpy = pytest.importorskip("bpy", reason="these tests need Blender or the bpy module")
 
-from hairloom.addon import pipeline  # noqa: E402
+from hairloom.addon import rig_flow  # noqa: E402
 from hairloom.addon.blender.base import latest_job  # noqa: E402
 from hairloom.addon.blender.engine import engine_hair  # noqa: E402
 from hairloom.addon.blender.engine.engine_scene import SceneReader  # noqa: E402
@@ -29,7 +29,7 @@ class Gate:
 
     def __init__(self) -> None:
         self.opened, self.makers = threading.Event(), list[str]()
-        self._prepare = pipeline.prepare
+        self._prepare = rig_flow.prepare
 
     def prepare(self, *arguments: Any, **named: Any) -> Any:
         self.makers.append(threading.current_thread().name)
@@ -41,7 +41,7 @@ class Gate:
 @pytest.fixture
 def gate(monkeypatch: pytest.MonkeyPatch) -> Iterator[Gate]:
     gate = Gate()
-    monkeypatch.setattr(pipeline, "prepare", gate.prepare)
+    monkeypatch.setattr(rig_flow, "prepare", gate.prepare)
     yield gate
     gate.opened.set()
     engine_hair.forget()
@@ -127,7 +127,7 @@ def test_hair_that_cannot_be_made_is_told(
     def fail(*_: Any, **__: Any) -> None:
         raise HairloomError("it cannot be", place="Hair", remedy="Undo")
 
-    monkeypatch.setattr(pipeline, "prepare", fail)
+    monkeypatch.setattr(rig_flow, "prepare", fail)
     view = View()
     view.read()
     assert view.arrive() == () and "it cannot be" in view.reader.warnings[0]

@@ -13,7 +13,7 @@ import bpy
 import numpy as np
 import pytest
 
-from hairloom.addon import pipeline
+from hairloom.addon import rig_flow
 from hairloom.addon.blender.command_line import command_line
 from hairloom.addon.blender.command_line.inputs import Sources, read_inputs
 from hairloom.addon.errors import HairloomError
@@ -261,7 +261,7 @@ def test_hair_beside_its_head_is_told(tmp_path: Path, head: Path) -> None:
         write_tfx(tmp_path / "hair.tfx", Groom(strands.transformed(matrix)))
         sources = Sources(str(tmp_path / "hair.tfx"), str(head))
         inputs = read_inputs(sources, GrowSettings())
-        rig = pipeline.prepare(inputs.strands, inputs.head, GuideSettings(), place="hair.tfx")
+        rig = rig_flow.prepare(inputs.strands, inputs.head, GuideSettings(), place="hair.tfx")
         assert any("its roots lie 20 mm from" in note for note in rig.notes) == is_told
 
 

@@ -10,7 +10,7 @@ import pytest
 from grids import grid_of
 from waiting import take_steps_until, until
 
-from hairloom.addon import pipeline
+from hairloom.addon import motion_flow, rig_flow
 from hairloom.addon.blender.bakes import playback
 from hairloom.addon.blender.base import latest_job
 from hairloom.addon.blender.colliders import fields
@@ -44,13 +44,13 @@ def in_window(monkeypatch):
 @pytest.fixture
 def gate(in_window, monkeypatch):
     """Holds hair back until it is opened."""
-    opened, ranks = threading.Event(), pipeline.strand_ranks
+    opened, ranks = threading.Event(), rig_flow.strand_ranks
 
     def wait_and_make(*arguments, **named):
         assert opened.wait(60.0)
         return ranks(*arguments, **named)
 
-    monkeypatch.setattr(pipeline, "strand_ranks", wait_and_make)
+    monkeypatch.setattr(rig_flow, "strand_ranks", wait_and_make)
     yield opened
     opened.set()
 
@@ -245,13 +245,13 @@ def playing(hair, evaluated, in_window, sphere):
 
 def hold(monkeypatch):
     """From now on hair is held back until the gate is opened."""
-    opened, prepare = threading.Event(), pipeline.prepare
+    opened, prepare = threading.Event(), rig_flow.prepare
 
     def wait_and_prepare(*arguments, **named):
         assert opened.wait(60.0)
         return prepare(*arguments, **named)
 
-    monkeypatch.setattr(pipeline, "prepare", wait_and_prepare)
+    monkeypatch.setattr(rig_flow, "prepare", wait_and_prepare)
     return opened
 
 
@@ -270,7 +270,7 @@ def test_old_hair_plays_until_the_new_is_made(playing, hair, evaluated, monkeypa
     assert len(grid_of(playing)) > COUNT and playing.is_playing
     # no step has been taken since: the same guides are where they were
     assert np.array_equal(playing.solver.guides()[:, -1], tips)
-    at_rest = pipeline.carried_guides(playing.rig, playing.solver.pose)[:, -1]
+    at_rest = motion_flow.carried_guides(playing.rig, playing.solver.pose)[:, -1]
     assert np.abs(tips - at_rest).max() > 1e-3, "the hair did not swing"
 
 
@@ -286,7 +286,7 @@ def test_hair_that_arrives_in_play_knows_how_far_it_stays_from_colliders(
         return of_each[-1][1]
 
     previews.advance(evaluated(), FRAME)
-    monkeypatch.setattr(pipeline, "clearance_at", recorded)
+    monkeypatch.setattr(motion_flow, "clearance_at", recorded)
     hair.data.hairloom.children.strand_count = 3 * COUNT
     hair.data.hairloom.children.method = "multi"
     scene_events.catch_up(evaluated())
@@ -296,7 +296,9 @@ def test_hair_that_arrives_in_play_knows_how_far_it_stays_from_colliders(
     assert is_beside and playing.solver.motion.clearance is found
     motion, settings = playing.solver.motion, playing.settings[DynamicsSettings]
     unknown = replace(motion, clearance=None)
-    expected = pipeline.with_clearance(playing.rig, unknown, motion.colliders, settings).clearance
+    expected = motion_flow.with_clearance(
+        playing.rig, unknown, motion.colliders, settings
+    ).clearance
     np.testing.assert_array_equal(found.points, expected.points)
     np.testing.assert_array_equal(found.held, expected.held)
     assert np.isfinite(found.points).any() and found.kept == expected.kept
@@ -347,7 +349,7 @@ def test_edits_while_hair_is_made_arrive_too(playing, hair, evaluated, monkeypat
 
 
 def test_ambient_light_needs_no_other_strands(playing, hair, evaluated, monkeypatch):
-    monkeypatch.setattr(pipeline, "prepare", None)
+    monkeypatch.setattr(rig_flow, "prepare", None)
     rig, motion, before = playing.rig, grid_of(playing), playing.snapshot.occlusion
     hair.data.hairloom.ambient.strength = 0.2
     scene_events.catch_up(evaluated())
@@ -374,7 +376,7 @@ def test_hair_that_cannot_be_made_ends_the_preview_with_a_notice(playing, hair, 
     def fail(*_, **__):
         raise HairloomError("it cannot be", place="Hair", remedy="Undo")
 
-    monkeypatch.setattr(pipeline, "prepare", fail)
+    monkeypatch.setattr(rig_flow, "prepare", fail)
     hair.data.hairloom.guides.guide_count = 5
     scene_events.catch_up(bpy.context.evaluated_depsgraph_get())
     arrive(playing)
@@ -384,7 +386,7 @@ def test_hair_that_cannot_be_made_ends_the_preview_with_a_notice(playing, hair, 
 def test_a_failure_of_what_nobody_wants_any_more_is_no_matter(
     playing, hair, evaluated, monkeypatch
 ):
-    opened, prepare = threading.Event(), pipeline.prepare
+    opened, prepare = threading.Event(), rig_flow.prepare
 
     def fail_for_five(strands, head, settings, **named):
         assert opened.wait(60.0)
@@ -392,7 +394,7 @@ def test_a_failure_of_what_nobody_wants_any_more_is_no_matter(
             raise HairloomError("it cannot be", place="Hair", remedy="Undo")
         return prepare(strands, head, settings, **named)
 
-    monkeypatch.setattr(pipeline, "prepare", fail_for_five)
+    monkeypatch.setattr(rig_flow, "prepare", fail_for_five)
     for count in (5, 6):
         hair.data.hairloom.guides.guide_count = count
         scene_events.catch_up(evaluated())
@@ -455,10 +457,10 @@ def test_playback_goes_on_before_the_hair_is_made(hair, moving, evaluated, gate,
     arrive(session)
     begun = rounds(session, 5)[0]
     assert session.is_playing and not previews.previews[session.uid].is_deferred
-    at_rest = pipeline.carried(session.rig, session.solver.pose)
+    at_rest = motion_flow.carried(session.rig, session.solver.pose)
     np.testing.assert_array_equal(begun.reshape(-1, 3), at_rest)
     after = rounds(session, 6, 7)[1]
-    at_rest = pipeline.carried(session.rig, session.solver.pose)
+    at_rest = motion_flow.carried(session.rig, session.solver.pose)
     assert np.abs(after.reshape(-1, 3) - at_rest).max() > 1e-3, "it does not swing"
     second = rounds(session, *range(1, 8))
     previews.stop(session)
@@ -514,20 +516,20 @@ def test_what_stands_in_on_a_dense_head_searches_a_part_of_it(new_hair, evaluate
     bpy.ops.mesh.primitive_ico_sphere_add(radius=0.1, subdivisions=5)
     hair = new_hair(bpy.context.object)
     order = GroomSource(hair, evaluated()).request
-    head, searched, bind = order.source.head, [], pipeline.bind_roots
+    head, searched, bind = order.source.head, [], rig_flow.bind_roots
     assert len(head.triangles) > prepared_groom._LARGE
 
     def noted(strands, surface, *, place):
         searched.append(len(surface.triangles))
         return bind(strands, surface, place=place)
 
-    monkeypatch.setattr(pipeline, "bind_roots", noted)
+    monkeypatch.setattr(rig_flow, "bind_roots", noted)
     made = prepared_groom.placeholder(order)
     assert len(searched) == 1 and searched[0] < len(head.triangles) / 10
     assert made.rig.head is head and made.is_placeholder
     wanted = bind(made.rig.strands, head, place="Hair").strands
     assert np.array_equal(made.rig.strands.root_triangle, wanted.root_triangle)
-    carried = pipeline.carried(made.rig, made.rig.rest_pose)
+    carried = motion_flow.carried(made.rig, made.rig.rest_pose)
     assert np.array_equal(carried, made.rig.strands.points)
 
 

@@ -14,7 +14,7 @@ from glb_files import validated
 
 bpy = pytest.importorskip("bpy", reason="exporters need Blender or the bpy module")
 
-from hairloom.addon import pipeline  # noqa: E402
+from hairloom.addon import rig_flow  # noqa: E402
 from hairloom.addon.blender.cards.build import BuiltCards, CardInputs  # noqa: E402
 from hairloom.addon.blender.cards.object import card_objects  # noqa: E402
 from hairloom.addon.blender.cards.show import without_strands  # noqa: E402
@@ -64,7 +64,7 @@ def fur_on_ball(count: int = 8000, length: float = 0.012) -> tuple[StrandSet, Su
 def test_shells_cover_as_much_as_strands_from_eight_sides_in_their_colour(gpu_context: Any) -> None:
     """In even light, without shadows; within a tenth of the strands, as cards are asked for."""
     strands, head = fur_on_ball()
-    rig = pipeline.prepare(strands, head, GuideSettings(guide_count=40), place="fur")
+    rig = rig_flow.prepare(strands, head, GuideSettings(guide_count=40), place="fur")
     settings = SettingsMap(CardSettings(kind="shells", levels=1, max_triangles=6000))
     made = BuiltCards.now(CardInputs(rig, settings))
     hole = replace(MeshSnapshot.of(head), is_holdout=True)

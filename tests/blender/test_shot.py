@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from mathutils import Matrix
 
-from hairloom.addon import pipeline
+from hairloom.addon import motion_flow
 from hairloom.addon.blender.bakes.cache import Cache
 from hairloom.addon.blender.command_line import command_line
 from hairloom.addon.blender.preview import previews
@@ -212,7 +212,7 @@ def test_only_selected_curves_are_simulated(playing, evaluated, domain):
     session.play(evaluated())
     advance(evaluated, 4, lambda frame: setattr(head.location, "x", 0.05 * frame**2))
     rig = session.rig
-    style = pipeline.style_of_guides(rig, session.solver.pose)
+    style = motion_flow.style_of_guides(rig, session.solver.pose)
     away = np.abs(session.solver.guides() - style).max(axis=(1, 2))
     is_chosen = np.isin(rig.guides, chosen)
     assert is_chosen.any() and not is_chosen.all()
@@ -226,7 +226,7 @@ def test_where_no_selection_is_known_all_is_simulated(playing, evaluated):
     session.read_again(evaluated())
     session.play(evaluated())
     advance(evaluated, 3, lambda frame: setattr(head.location, "x", 0.05 * frame**2))
-    style = pipeline.style_of_guides(session.rig, session.solver.pose)
+    style = motion_flow.style_of_guides(session.rig, session.solver.pose)
     assert (np.abs(session.solver.guides() - style).max(axis=(1, 2)) > 0.0).all()
     assert session.warnings == ()
 
@@ -238,7 +238,7 @@ def test_a_selection_of_nothing_is_named(playing, evaluated):
     session.read_again(evaluated())
     session.play(evaluated())
     advance(evaluated, 3, lambda frame: setattr(head.location, "x", 0.05 * frame**2))
-    style = pipeline.style_of_guides(session.rig, session.solver.pose)
+    style = motion_flow.style_of_guides(session.rig, session.solver.pose)
     np.testing.assert_array_equal(session.solver.guides(), style)
     assert "none of its curves is selected" in session.warnings[0]
 

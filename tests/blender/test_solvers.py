@@ -1,4 +1,4 @@
-"""The two solvers: numpy as the pipeline, compute as numpy, and the way from one to the other."""
+"""The two solvers: numpy as `motion_flow`, compute as numpy, and the way from one to the other."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import pytest
 from extension_loader import REPOSITORY
 from shaken import GRAVITY, shaken_poses
 
-from hairloom.addon import pipeline
+from hairloom.addon import motion_flow, rig_flow
 from hairloom.addon.blender.scene.built_in_head import built_in_head
 from hairloom.addon.blender.sessions import solvers
 from hairloom.addon.blender.sessions.compute_solver import ComputeSolver
@@ -25,8 +25,8 @@ from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.groom.grow import grow, scalp_density
 from hairloom.addon.groom.settings import GrowSettings, GuideSettings
-from hairloom.addon.pipeline import Pose, Rig
 from hairloom.addon.render.snapshot import Snapshot
+from hairloom.addon.rig_flow import Pose, Rig
 from hairloom.addon.strands import StrandSet
 
 pytestmark = pytest.mark.draws(light=False)
@@ -41,7 +41,7 @@ SETTINGS = DynamicsSettings(bend=0.0)
 def rig() -> Rig:
     head = built_in_head().surface
     strands = grow(head, GrowSettings(strand_count=300), scalp_density(head))
-    return pipeline.prepare(strands, head, GuideSettings(), place="test")
+    return rig_flow.prepare(strands, head, GuideSettings(), place="test")
 
 
 @pytest.fixture(scope="module")
@@ -64,15 +64,15 @@ def test_numpy_is_the_pipeline(rig: Rig, poses: list[Pose]) -> None:
     solver = solvers.solver_of(rig, "numpy")
     assert solver.form == "numpy"
     assert np.array_equal(solver.strands(), rig.strands.points)
-    motion = pipeline.begin(rig, rig.rest_pose)
+    motion = motion_flow.begin(rig, rig.rest_pose)
     for pose in poses[1:6]:
-        motion = pipeline.advance(rig, motion, pose, (), SETTINGS, GRAVITY, 1.0 / RATE)
+        motion = motion_flow.advance(rig, motion, pose, (), SETTINGS, GRAVITY, 1.0 / RATE)
     advance(solver, poses[1:6])
     assert solver.pose is poses[5]
     assert np.array_equal(solver.guides(), motion.guides)
-    assert np.array_equal(solver.strands(), pipeline.strands_and_led(rig, motion)[0])
+    assert np.array_equal(solver.strands(), motion_flow.strands_and_led(rig, motion)[0])
     solver.rest(poses[3])
-    assert np.array_equal(solver.strands(), pipeline.carried(rig, poses[3]))
+    assert np.array_equal(solver.strands(), motion_flow.carried(rig, poses[3]))
 
 
 @pytest.mark.usefixtures("gpu_context")
@@ -91,7 +91,7 @@ def test_both_agree_on_a_shaken_head(
     both = numpy, compute = NumpySolver(rig), ComputeSolver(rig)
     for solver in both:
         advance(solver, poses[1:], settings)
-    assert np.abs(numpy.guides() - pipeline.carried_guides(rig, poses[-1])).max() > 0.01
+    assert np.abs(numpy.guides() - motion_flow.carried_guides(rig, poses[-1])).max() > 0.01
     assert agree(compute.guides(), numpy.guides(), share)
     assert agree(compute.strands(), numpy.strands(), share)
     for solver in both:
@@ -110,7 +110,7 @@ def test_coils_bounce_alike_and_keep_their_lengths() -> None:
     coil = np.stack([around * np.cos(angle), around * np.sin(angle), -0.2 * along], axis=1)
     points, offsets = (roots[:, None] + coil).reshape(-1, 3), np.arange(25) * 200
     strands = StrandSet(points, offsets, np.full(len(points), 5e-5), np.zeros(24))
-    coils = pipeline.prepare(strands, None, GuideSettings(guide_count=8), place="coils")
+    coils = rig_flow.prepare(strands, None, GuideSettings(guide_count=8), place="coils")
     offsets, length = coils.strands.offsets, coils.strands.lengths()
 
     def pose(frame: int) -> Pose:
@@ -241,14 +241,14 @@ def test_without_a_gpu_numpy_it_is() -> None:
         f"sys.path.insert(0, {str(REPOSITORY / 'tools')!r})\n"
         "from extension_loader import load_package\n"
         "load_package()\n"
-        "from hairloom.addon import pipeline\n"
+        "from hairloom.addon import rig_flow\n"
         "from hairloom.addon.errors import HairloomError\n"
         "from hairloom.addon.groom.settings import GuideSettings\n"
         "from hairloom.addon.blender.sessions import solvers\n"
         "from hairloom.addon.strands import StrandSet\n"
         "points = numpy.linspace((0, 0, 0), (0, 0, 1), 6)\n"
         "strands = StrandSet(points, numpy.array([0, 6]), numpy.full(6, 1e-4), numpy.zeros(1))\n"
-        "rig = pipeline.prepare(strands, None, GuideSettings(), place='test')\n"
+        "rig = rig_flow.prepare(strands, None, GuideSettings(), place='test')\n"
         "assert not solvers.compute_available()\n"
         "assert solvers.solver_of(rig, 'automatic').form == 'numpy'\n"
         "try:\n"

@@ -10,7 +10,7 @@ import bpy
 import numpy as np
 import pytest
 
-from hairloom.addon import pipeline
+from hairloom.addon import rig_flow
 from hairloom.addon.blender.base.images import read_texture
 from hairloom.addon.blender.command_line import command_line
 from hairloom.addon.blender.pictures.film import write_picture
@@ -62,7 +62,7 @@ def scaled(strands: StrandSet, head: Surface, scale: float) -> tuple[StrandSet, 
 def studio_of(
     strands: StrandSet, head: Surface, children: ChildrenSettings | None = None
 ) -> Studio:
-    rig = pipeline.prepare(
+    rig = rig_flow.prepare(
         strands, head, GuideSettings(), place="the test's hair", children=children
     )
     settings = SettingsMap(VolumeSettings(shadows="deep"), StrandSettings())
@@ -205,7 +205,7 @@ def test_a_film_that_this_blender_does_not_have_is_told(
 @pytest.mark.usefixtures("gpu_context")
 def test_skin_that_hair_sees_lights_it(head: Surface) -> None:
     """Blond hair beside the same hair that takes what lies beneath it for a plane."""
-    rig = pipeline.prepare(half_a_head(head), head, GuideSettings(), place="hair")
+    rig = rig_flow.prepare(half_a_head(head), head, GuideSettings(), place="hair")
     groom = prepared(rig, AmbientSettings())
     settings = GroomSettings().with_settings(named_preset("looks/blond").settings)
     both = [
@@ -221,7 +221,7 @@ def test_hardly_any_hair_is_burnt(tmp_path: Path) -> None:
     """On every stage a channel of no more than half a percent of the hair's pixels is full."""
     head, file = built_in_head(), tmp_path / "still.png"
     grown = grow_with_face(head.surface, GrowSettings(strand_count=1500), head.weights)
-    rig = pipeline.prepare(grown, head.surface, GuideSettings(), place="hair", widths="found")
+    rig = rig_flow.prepare(grown, head.surface, GuideSettings(), place="hair", widths="found")
     studio = Studio(prepared(rig, AmbientSettings()), GroomSettings())
     for stage, look in itertools.product(sorted(STAGES), ("brown", "blond")):
         chosen = (named_preset(name).settings for name in (f"stage/{stage}", f"looks/{look}"))

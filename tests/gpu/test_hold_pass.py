@@ -1,4 +1,4 @@
-"""Strands brought to where they are held: the GPU against the pipeline's numpy."""
+"""Strands brought to where they are held: the GPU against numpy."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hairloom.addon import pipeline
+from hairloom.addon import motion_flow, rig_flow
 from hairloom.addon.groom.holds import anchors_of
 from hairloom.addon.groom.settings import GuideSettings
 from hairloom.addon.groom.ties import Holders, Tie, TipSurface
-from hairloom.addon.pipeline import Pose, Rig
+from hairloom.addon.rig_flow import Pose, Rig
 from hairloom.addon.strands import StrandSet, Surface
 
 pytestmark = pytest.mark.usefixtures("gpu_context")
@@ -35,7 +35,7 @@ def rig() -> Rig:
     corners = np.array([[-1.0, -1.0, 0.1], [1.0, -1.0, 0.1], [0.0, 1.0, 0.1]])
     sheet = TipSurface("Sheet", Surface(corners, np.array([[0, 1, 2]])))
     settings = GuideSettings(guide_count=20, cv_count=12, tip_distance=0.1)
-    rig = pipeline.prepare(strands, None, settings, place="hair", holders=Holders(ties, sheet))
+    rig = rig_flow.prepare(strands, None, settings, place="hair", holders=Holders(ties, sheet))
     assert rig.holds is not None
     strand, count = np.unique(rig.holds.strand, return_counts=True)
     assert 30 < len(strand) < 110
@@ -65,9 +65,9 @@ def test_equals_numpy(rig: Rig) -> None:
             gone = pose.anchors.copy()
             gone[0] = np.nan
             pose = replace(pose, anchors=gone)
-        guides = pipeline.style_of_guides(rig, pose)
-        expected = pipeline.strands_at(rig, pose, guides)
-        free = pipeline.strands_at(rig, replace(pose, anchors=None), guides)
+        guides = motion_flow.style_of_guides(rig, pose)
+        expected = motion_flow.strands_at(rig, pose, guides)
+        free = motion_flow.strands_at(rig, replace(pose, anchors=None), guides)
         assert np.abs(expected - free).max() > 1e-3
         ride.ride(pose.head_positions, pose.matrix, guides, pose.anchors)
         np.testing.assert_allclose(ride.read(), expected, atol=2e-6)

@@ -1,4 +1,4 @@
-"""Strands that ride on guides: the GPU against the pipeline's numpy."""
+"""Strands that ride on guides: the GPU against numpy."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hairloom.addon import pipeline
+from hairloom.addon import motion_flow, rig_flow
 from hairloom.addon.dynamics.colliders import PosedCollider, SphereCollider
 from hairloom.addon.groom.roots import root_frames
 from hairloom.addon.groom.settings import GuideSettings
 from hairloom.addon.groom.weights import GuideWeights
-from hairloom.addon.pipeline import Pose, Rig
 from hairloom.addon.refine.lead_out import NO_LEANS, Clearance, clearance_at
+from hairloom.addon.rig_flow import Pose, Rig
 from hairloom.addon.strands import StrandSet, Surface
 
 pytestmark = pytest.mark.usefixtures("gpu_context")
@@ -99,7 +99,7 @@ def deformed(head: Surface) -> Pose:
 
 def simulated(rig: Rig, pose: Pose, seed: int = 2) -> np.ndarray:
     """Guides that have swung away from where their roots carry them, by up to some centimetres."""
-    guides = pipeline.carried_guides(rig, pose)
+    guides = motion_flow.carried_guides(rig, pose)
     swing = np.random.default_rng(seed).normal(scale=0.02, size=guides.shape)
     swing[:, 0] *= np.arange(len(guides))[:, None] % 2  # every other one leaves its root too
     return (guides + swing).astype(np.float32)
@@ -121,12 +121,12 @@ def test_strands_ride_as_in_numpy_on_a_deformed_head() -> None:
     ride, pose = pass_of(rig), deformed(rig.head)
     for seed in (2, 3):
         guides = simulated(rig, pose, seed)
-        expected = pipeline.strands_at(rig, pose, guides)
+        expected = motion_flow.strands_at(rig, pose, guides)
         found = shown(ride, pose, guides)
         assert np.abs(found - expected).max() < TOLERANCE
     assert np.abs(found - rig.strands.points).max() > 0.1, "it has gone a long way"
     ride.carry(pose.head_positions, pose.matrix)
-    assert np.abs(ride.read() - pipeline.carried(rig, pose)).max() < TOLERANCE
+    assert np.abs(ride.read() - motion_flow.carried(rig, pose)).max() < TOLERANCE
 
 
 def test_more_strands_than_a_texture_has_rows() -> None:
@@ -135,7 +135,7 @@ def test_more_strands_than_a_texture_has_rows() -> None:
     rig.guide_grid[:] = rig.strands.grid[rig.guides]
     pose = deformed(rig.head)
     guides = simulated(rig, pose)
-    expected = pipeline.strands_at(rig, pose, guides)
+    expected = motion_flow.strands_at(rig, pose, guides)
     assert np.abs(shown(pass_of(rig), pose, guides) - expected).max() < TOLERANCE
 
 
@@ -146,10 +146,10 @@ def test_hair_without_a_head_goes_with_a_matrix() -> None:
     pose = Pose(None, matrix)
     guides = simulated(rig, pose)
     ride = pass_of(rig)
-    expected = pipeline.strands_at(rig, pose, guides)
+    expected = motion_flow.strands_at(rig, pose, guides)
     # the matrix is rounded to float32, and strands are three metres from the origin
     assert np.abs(shown(ride, pose, guides) - expected).max() < 4.0 * TOLERANCE
-    carried = pipeline.carried(rig, pose)[rig.strands.offsets[:-1]].mean(axis=0)
+    carried = motion_flow.carried(rig, pose)[rig.strands.offsets[:-1]].mean(axis=0)
     assert ride.points.center == pytest.approx(carried, abs=2.0e-6)
 
 
@@ -171,7 +171,7 @@ def test_hair_on_triangles_without_area() -> None:
     for positions in (head.positions, good):  # the flat ones become others
         pose = Pose(positions, np.eye(4))
         guides = simulated(rig, pose)
-        expected = pipeline.strands_at(rig, pose, guides)
+        expected = motion_flow.strands_at(rig, pose, guides)
         assert np.isfinite(expected).all()
         assert np.abs(shown(pass_of(rig), pose, guides) - expected).max() < TOLERANCE
 
@@ -212,7 +212,7 @@ def test_the_middle_of_all_roots_follows_the_head(
     pose = deformed(rig.head)
     ride = pass_of(rig)
     ride.carry(pose.head_positions, pose.matrix)
-    expected = pipeline.carried(rig, pose)[rig.strands.offsets[:-1]].mean(axis=0)
+    expected = motion_flow.carried(rig, pose)[rig.strands.offsets[:-1]].mean(axis=0)
     assert ride.points.center == pytest.approx(expected, abs=tolerance)
 
 
@@ -252,7 +252,7 @@ def coiled(count: int = 200) -> Rig:
     )
     offsets, width = np.arange(count + 1) * 160, np.full(count * 160, 4e-5)
     strands = StrandSet(grid.reshape(-1, 3), offsets, width, np.zeros(count))
-    return pipeline.prepare(strands, None, GuideSettings(guide_count=30), place="coils")
+    return rig_flow.prepare(strands, None, GuideSettings(guide_count=30), place="coils")
 
 
 def test_curls_are_drawn_out_as_in_numpy() -> None:
@@ -260,18 +260,18 @@ def test_curls_are_drawn_out_as_in_numpy() -> None:
     assert rig.curl_room is not None and 0 < rig.curl_room.any(axis=1).sum() < 30
     ride, matrix = pass_of(rig), turned(0.7, (0.1, 0.0, 0.0))
     pose = Pose(None, matrix)
-    guides = pipeline.carried_guides(rig, pose).astype(np.float64)
+    guides = motion_flow.carried_guides(rig, pose).astype(np.float64)
     way = np.diff(guides, axis=1) * np.random.default_rng(6).uniform(0.7, 1.9, (30, 1, 1))
     way += np.random.default_rng(7).normal(scale=0.002, size=way.shape)
     now = np.concatenate([guides[:, :1], guides[:, :1] + way.cumsum(axis=1)], axis=1)
-    expected = pipeline.strands_at(rig, pose, now.astype(np.float32))
+    expected = motion_flow.strands_at(rig, pose, now.astype(np.float32))
     found = shown(ride, pose, now.astype(np.float32))
     assert np.abs(found - expected).max() < 2.0 * TOLERANCE
     plain = replace(rig.riders, gives=None)
     other = type(ride)(rig.strands, None, rig.guides, rig.guide_grid, plain)
     assert np.abs(shown(other, pose, now.astype(np.float32)) - found).max() > 0.02
     ride.carry(None, matrix)
-    assert np.abs(ride.read() - pipeline.carried(rig, pose)).max() < TOLERANCE
+    assert np.abs(ride.read() - motion_flow.carried(rig, pose)).max() < TOLERANCE
 
 
 @pytest.mark.parametrize("rounds", [8, 1 << 20])
@@ -284,14 +284,16 @@ def test_strands_that_ride_are_led_out(monkeypatch: pytest.MonkeyPatch, rounds: 
     ride, pose, offsets = pass_of(rig), deformed(rig.head), rig.strands.offsets
     head = SphereCollider(ABOVE_GROUND, 0.11)
     posed = (PosedCollider(head, pose.matrix, pose.matrix),)
-    begun = clearance_at(pipeline.carried(rig, pose), offsets, posed, 0.001)
+    begun = clearance_at(motion_flow.carried(rig, pose), offsets, posed, 0.001)
     held = np.where(np.arange(700) % 5, 0, 4).astype(np.int32)
     number = np.arange(len(begun.points)) - np.repeat(offsets[:-1], np.diff(offsets))
     is_held = number <= np.repeat(held, np.diff(offsets))
     clearance = Clearance(0.001, np.where(is_held, -np.inf, begun.points), held)
     guides = simulated(rig, pose)
-    motion = replace(pipeline.begin(rig, pose), guides=guides, colliders=posed, clearance=clearance)
-    expected, led = pipeline.strands_and_led(rig, motion)
+    motion = replace(
+        motion_flow.begin(rig, pose), guides=guides, colliders=posed, clearance=clearance
+    )
+    expected, led = motion_flow.strands_and_led(rig, motion)
     ride.leading.take(clearance)
     ride.ride(pose.head_positions, pose.matrix, guides, None, posed)
     found = ride.read_led()
@@ -300,7 +302,7 @@ def test_strands_that_ride_are_led_out(monkeypatch: pytest.MonkeyPatch, rounds: 
     off = np.abs(ride.read() - expected).max(axis=1)
     assert (np.maximum.reduceat(off, offsets[:-1]) > TOLERANCE).mean() < 0.03
     assert off[is_held].max() < TOLERANCE
-    shift = pipeline.carried(rig, pose) - pipeline.strands_at(rig, pose, guides)
+    shift = motion_flow.carried(rig, pose) - motion_flow.strands_at(rig, pose, guides)
     assert np.abs(shift[is_held]).max() > 0.01
 
     # the next frames start from how those before them were bent
@@ -308,13 +310,13 @@ def test_strands_that_ride_are_led_out(monkeypatch: pytest.MonkeyPatch, rounds: 
     for frame in (1.0, 2.0, 3.0):
         moved = guides + frame * np.float32([0.0, 0.004, 0.0]) * along
         after = replace(motion, guides=moved, duration=1.0 / 60.0, leans=led.leans)
-        expected, led = pipeline.strands_and_led(rig, after)
+        expected, led = motion_flow.strands_and_led(rig, after)
         ride.ride(pose.head_positions, pose.matrix, moved, None, posed, since=1.0 / 60.0)
         found = ride.read_led()
         assert len(np.setxor1d(found.strands, led.strands)) <= 3, "rounding decides few"
         off = np.abs(ride.read() - expected).max(axis=1)
         assert (np.maximum.reduceat(off, offsets[:-1]) > TOLERANCE).mean() < 0.05
-    forgotten = pipeline.strands_and_led(rig, replace(after, leans=NO_LEANS))[0]
+    forgotten = motion_flow.strands_and_led(rig, replace(after, leans=NO_LEANS))[0]
     is_other = np.abs(expected - forgotten).max(axis=1) > 10.0 * TOLERANCE
     assert np.maximum.reduceat(is_other, offsets[:-1]).mean() > 0.1
     # a jump to this frame remembers nothing

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from small_wig import GUIDES, curves, sheet, turned
 
-from hairloom.addon import pipeline
+from hairloom.addon import rig_flow
 from hairloom.addon.comb_flow import combed
 from hairloom.addon.groom.child_clumps import Clumps
 from hairloom.addon.groom.children_settings import ChildrenSettings
@@ -15,8 +15,8 @@ from hairloom.addon.strands import StrandSet
 COMBED = np.array([3, 17, 40])
 
 
-def rig_of(strands: StrandSet, settings: ChildrenSettings) -> pipeline.Rig:
-    return pipeline.prepare(strands, sheet(), GUIDES, place="a wig", children=settings)
+def rig_of(strands: StrandSet, settings: ChildrenSettings) -> rig_flow.Rig:
+    return rig_flow.prepare(strands, sheet(), GUIDES, place="a wig", children=settings)
 
 
 @pytest.mark.alike
@@ -60,7 +60,7 @@ def test_curves_of_other_point_counts_keep_those_of_the_rig() -> None:
     points = np.concatenate([strands.points, coil.astype(np.float32)])
     offsets = np.append(strands.offsets, strands.offsets[-1] + 200)
     mixed = StrandSet(points, offsets, np.full(len(points), 1e-4), np.zeros(61))
-    rig = pipeline.prepare(mixed, sheet(), GUIDES, place="a wig")
+    rig = rig_flow.prepare(mixed, sheet(), GUIDES, place="a wig")
     straight = StrandSet(
         np.linspace(coil[0], coil[-1], 200), [0, 200], np.full(200, 1e-4), np.zeros(1)
     )

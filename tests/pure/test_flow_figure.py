@@ -66,16 +66,16 @@ def test_the_figure_is_current_and_shown() -> None:
 
 def test_a_wrong_arrow_is_seen(tmp_path: Path) -> None:
     files = {
-        "ui/button.py": "from ..render import draw\nfrom ..pipeline import prepare\ndraw.frame()\n",
+        "ui/button.py": "from ..render import draw\nfrom ..rig_flow import prepare\ndraw.frame()\n",
         "render/__init__.py": "",
         "render/draw.py": "def frame(): ...\ndef other(): ...\n",
-        "pipeline.py": "def prepare(): ...\n",
+        "rig_flow.py": "def prepare(): ...\n",
     }
     for name, text in files.items():
         (tmp_path / name).parent.mkdir(exist_ok=True)
         (tmp_path / name).write_text(text)
     button, draw = Step("ui/button.py", "press"), Step("render/draw.py", "frame")
-    other, prepare = Step("render/draw.py", "other"), Step("pipeline.py", "prepare")
+    other, prepare = Step("render/draw.py", "other"), Step("rig_flow.py", "prepare")
     pairs = [(button, draw), (button, prepare), (button, other), (draw, prepare), (draw, button)]
     faults = [fault(*pair, tmp_path).rpartition(": ")[2] for pair in pairs]
     assert faults == ["", "", "is not called there", "no such import", "points up"]

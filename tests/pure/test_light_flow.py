@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from spheres import ball
 
-from hairloom.addon import pipeline
+from hairloom.addon import light_flow, rig_flow
 from hairloom.addon.arrays import Floats
 from hairloom.addon.groom.settings import GuideSettings
 from hairloom.addon.light_flow import quick_light, rest_light
-from hairloom.addon.pipeline import Rig
+from hairloom.addon.rig_flow import Rig
 from hairloom.addon.shading.ambient import occlusion_by
 from hairloom.addon.shading.ambient_settings import AmbientSettings
 from hairloom.addon.strands import StrandSet
@@ -38,7 +38,7 @@ def rig() -> Rig:
         np.full(COUNT * POINTS, 1e-3),
         np.zeros(COUNT),
     )
-    return pipeline.prepare(strands, ball(RADIUS), GuideSettings(), place="ball")
+    return rig_flow.prepare(strands, ball(RADIUS), GuideSettings(), place="ball")
 
 
 def with_strands(rig: Rig, points: Floats) -> Rig:
@@ -53,7 +53,7 @@ def test_quick_light_is_the_fields_at_some_points_and_straight_between(rig: Rig)
     other = with_strands(rig, rig.strands.points + np.float32(1e-4))
     quick = quick_light(other, SETTINGS, (rig, light))
     assert quick.is_quick and not light.is_quick and quick.fields is fields
-    factors = pipeline.ambient_of(rig, SETTINGS)
+    factors = light_flow.ambient_of(rig, SETTINGS)
     own = occlusion_by(fields.sky.at(other.strands.points)[0], factors)
     first, last = rig.strands.offsets[:-1], rig.strands.offsets[1:] - 1
     for at in (first, last):
@@ -98,7 +98,7 @@ def test_strands_of_two_points_and_none_have_quick_light(rig: Rig) -> None:
     ends = (rig.strands.offsets[:-1, None] + [0, 1]).ravel()
     offsets, radius = np.arange(COUNT + 1) * 2, np.full(2 * COUNT, 2e-4)
     short = StrandSet(rig.strands.points[ends], offsets, radius, np.zeros(COUNT))
-    bound = pipeline.prepare(short, ball(RADIUS), GuideSettings(), place="ball")
+    bound = rig_flow.prepare(short, ball(RADIUS), GuideSettings(), place="ball")
     light = rest_light(bound, SETTINGS)
     away = with_strands(bound, bound.strands.points + np.float32(1e-6))
     found = quick_light(away, SETTINGS, (bound, light))

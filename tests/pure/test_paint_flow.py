@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from small_wig import GUIDES, curves, sheet, turned
 
-from hairloom.addon import pipeline
+from hairloom.addon import rig_flow
 from hairloom.addon.arrays import Floats
 from hairloom.addon.comb_flow import combed
 from hairloom.addon.groom.children_settings import ChildrenSettings
@@ -22,8 +22,8 @@ def dab(weight: float, x: float = 0.0) -> Floats:
     return np.where(away < 0.05, weight, EVEN)
 
 
-def rig_of(density: Floats | None, settings: ChildrenSettings, **others: object) -> pipeline.Rig:
-    return pipeline.prepare(
+def rig_of(density: Floats | None, settings: ChildrenSettings, **others: object) -> rig_flow.Rig:
+    return rig_flow.prepare(
         others.get("strands", curves()),
         HEAD,
         GUIDES,
@@ -33,7 +33,7 @@ def rig_of(density: Floats | None, settings: ChildrenSettings, **others: object)
     )
 
 
-def shapes(rig: pipeline.Rig) -> dict[bytes, Floats]:
+def shapes(rig: rig_flow.Rig) -> dict[bytes, Floats]:
     """Of the children, by their roots."""
     own = rig.own_count
     assert own is not None

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from small_wig import GUIDES, curves, sheet
 
-from hairloom.addon import pipeline
+from hairloom.addon import motion_flow, rig_flow
 from hairloom.addon.dynamics.painted import PaintedGuides
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.groom.children_settings import ChildrenSettings
-from hairloom.addon.pipeline import Pose, Rig
+from hairloom.addon.rig_flow import Pose, Rig
 from hairloom.addon.strands import StrandSet
 from hairloom.addon.style_flow import at_rest, styled
 
@@ -21,7 +21,7 @@ CHILDREN = ChildrenSettings(method="multi", strand_count=2000, clump=0.6, frizz=
 
 
 def rig_of(strands: StrandSet, children: ChildrenSettings | None = CHILDREN) -> Rig:
-    return pipeline.prepare(
+    return rig_flow.prepare(
         strands, sheet(), GUIDES, place="a wig", children=children, is_animated=True
     )
 
@@ -87,11 +87,11 @@ def test_children_of_a_bake_ride_on_the_guides_of_the_frame() -> None:
 def test_hair_comes_to_rest_in_another_style_as_if_it_had_begun_there() -> None:
     rig, settings = rig_of(curves(), None), DynamicsSettings(style_damping=20.0)
     now = styled(rig, bowed(curves(), 0.04, 1.3))
-    other = pipeline.with_style(now, pipeline.begin(rig, rig.rest_pose))
-    there = pipeline.begin(now, rig.rest_pose)
+    other = motion_flow.with_style(now, motion_flow.begin(rig, rig.rest_pose))
+    there = motion_flow.begin(now, rig.rest_pose)
     for _ in range(48):
         other, there = (
-            pipeline.advance(now, motion, rig.rest_pose, (), settings, GRAVITY, 1.0 / 24.0)
+            motion_flow.advance(now, motion, rig.rest_pose, (), settings, GRAVITY, 1.0 / 24.0)
             for motion in (other, there)
         )
     assert np.abs(other.guides - there.guides).max() < 1e-4
@@ -104,16 +104,16 @@ def test_nothing_of_it_is_simulated_at_0_and_all_of_it_at_1() -> None:
     rig = rig_of(curves(), None)
     matrix, count = turned(0.2), len(rig.guides)
     fractions = np.where(np.arange(count) % 2 == 0, 0.0, 1.0).astype(np.float32)
-    begun, pose = pipeline.begin(rig, rig.rest_pose), pose_of(rig, matrix)
+    begun, pose = motion_flow.begin(rig, rig.rest_pose), pose_of(rig, matrix)
 
     def shown(simulated: np.ndarray | None) -> np.ndarray:
         painted = None if simulated is None else PaintedGuides({"simulated": simulated[None]})
-        motion = pipeline.advance(
+        motion = motion_flow.advance(
             rig, begun, pose, (), DynamicsSettings(), GRAVITY, 0.04, painted=painted
         )
         return motion.guides
 
-    some, free, style = shown(fractions), shown(None), pipeline.style_of_guides(rig, pose)
+    some, free, style = shown(fractions), shown(None), motion_flow.style_of_guides(rig, pose)
     np.testing.assert_array_equal(some[1::2], free[1::2])
     np.testing.assert_array_equal(some[::2], style[::2])
     assert np.abs(free - style).max() > 0.01

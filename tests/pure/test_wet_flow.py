@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from small_wig import GUIDES, curves, sheet
 
-from hairloom.addon import pipeline
+from hairloom.addon import rig_flow
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.groom.children_settings import ChildrenSettings
 from hairloom.addon.paint_flow import with_colors
@@ -48,7 +48,7 @@ def test_a_heavier_mass_swings_slower_and_loses_less() -> None:
 def test_children_of_wet_hair_lie_closer_in_their_clumps() -> None:
     def gap(settings: ChildrenSettings) -> float:
         """How far the tip of a child is from the nearest other tip, in the mean [m]."""
-        rig = pipeline.prepare(curves(), sheet(), GUIDES, place="a wig", children=settings)
+        rig = rig_flow.prepare(curves(), sheet(), GUIDES, place="a wig", children=settings)
         tips = rig.strands.grid[60:, -1]
         away = np.linalg.norm(tips[:, None] - tips[None], axis=2)
         np.fill_diagonal(away, np.inf)

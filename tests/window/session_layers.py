@@ -125,7 +125,7 @@ def played_in_both(head):
 
 def lag(session):
     """How far the tips are from where the style would have them [m]."""
-    style = of_hairloom("pipeline").carried(session.rig, session.solver.pose)
+    style = of_hairloom("motion_flow").carried(session.rig, session.solver.pose)
     tips = session.rig.strands.offsets[1:] - 1
     return float(np.abs(session.strands[tips] - style[tips]).max())
 

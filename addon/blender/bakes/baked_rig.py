@@ -9,15 +9,15 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ... import pipeline
+from ... import motion_flow
 from ...arrays import Floats, Ints
 from ...errors import HairloomError
 from ...groom.holds import Holds
 from ...groom.roots import root_frames
 from ...groom.weights import GuideWeights
 from ...groom.widths import Widths
-from ...pipeline import Pose, Rig
 from ...refine.lead_out import LedOut
+from ...rig_flow import Pose, Rig
 from ...strands import StrandSet, Surface
 from .simulated import Arrays
 
@@ -82,7 +82,7 @@ class BakedRig:
                 "a frame is of another groom than the bake", place="bake", remedy="Bake again"
             )
         rig, pose = self.styled(frame), self.pose(frame)
-        return pipeline.strands_at(rig, pose, frame["guides"], led_in(frame))
+        return motion_flow.strands_at(rig, pose, frame["guides"], led_in(frame))
 
 
 def frame_arrays(pose: Pose, guides: Floats, led: LedOut, styled: Rig | None = None) -> Arrays:

@@ -17,7 +17,7 @@ from ...groom.children_settings import ChildrenSettings
 from ...groom.masks import mask_names
 from ...groom.settings import GuideSettings
 from ...groom.width_settings import WidthSettings
-from ...pipeline import Pose
+from ...rig_flow import Pose
 from ...wet_flow import heavier
 from ..base.attributes import read_attribute
 from ..base.objects import matrix_of

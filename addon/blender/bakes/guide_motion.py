@@ -10,7 +10,7 @@ import bpy
 
 from ...arrays import Floats
 from ...errors import HairloomError
-from ...pipeline import Pose, Rig
+from ...rig_flow import Pose, Rig
 from . import playback
 from .cache import Cache
 from .stale_bakes import stale_notes

@@ -15,7 +15,7 @@ import numpy as np
 
 from ...arrays import Floats
 from ...errors import HairloomError
-from ...pipeline import Pose
+from ...rig_flow import Pose
 from ..scene.fin_modifier import clear, fin_modifier, has_fins, show
 from .bake_settings import absolute, folder_of
 from .baked_rig import BakedRig, rig_of

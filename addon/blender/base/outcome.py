@@ -13,7 +13,7 @@ from typing import NamedTuple
 import bpy
 
 from ...errors import HairloomError
-from ...pipeline import Rig
+from ...rig_flow import Rig
 
 
 @dataclass(frozen=True)

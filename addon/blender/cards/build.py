@@ -32,12 +32,13 @@ from ...cards.shell_plan import ShellPlan, shell_strands
 from ...cards.steps import map_progress, result_of
 from ...errors import HairloomError
 from ...exchange.textures.card_textures import of_one_size
+from ...light_flow import rest_skin_seen
 from ...paint_flow import colored
 from ...params import SettingsMap
-from ...pipeline import Pose, Rig, rest_skin_seen
 from ...render.atlas_pass import baked_maps, baking
 from ...render.card_snapshot import CardSnapshot
 from ...render.card_textures import CardTextures, packed_textures
+from ...rig_flow import Pose, Rig
 from ...shading.ambient_settings import AmbientSettings
 from ...shading.card_look import plain_albedo
 from ...shading.drawn_strands import (

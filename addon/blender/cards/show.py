@@ -18,10 +18,10 @@ from ...cards.edits import CardEdits
 from ...cards.occlusion_settings import CardOcclusionSettings
 from ...errors import HairloomError
 from ...params import SettingsMap
-from ...pipeline import Pose, Rig
 from ...render.card_snapshot import CardSnapshot
 from ...render.snapshot import Snapshot
 from ...render.strand_layout import NO_STRANDS
+from ...rig_flow import Pose, Rig
 from ..base import latest_job
 from ..base.latest_job import LatestJob, Work
 from ..properties.groom_settings import GroomSettings

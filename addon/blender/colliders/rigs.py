@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import bpy
 
-from ... import pipeline
+from ... import rig_flow
 from ...dynamics.settings import DynamicsSettings
 from ...groom.children_settings import ChildrenSettings
 from ...groom.settings import GuideSettings
 from ...groom.width_settings import WidthSettings
 from ...params import SettingsMap
-from ...pipeline import Rig
+from ...rig_flow import Rig
 from ...strands.kept import NOTHING_KEPT, Kept
 from ..properties.groom_settings import GroomSettings
 from ..scene.source import Source
@@ -24,12 +24,12 @@ def rig_from(
 
     Args:
         place: names the hair in messages.
-        kept: see `pipeline.prepare`.
+        kept: see `rig_flow.prepare`.
 
     Raises:
         HairloomError: no hair that can be used.
     """
-    return pipeline.prepare(
+    return rig_flow.prepare(
         source.strands,
         source.head,
         settings[GuideSettings],

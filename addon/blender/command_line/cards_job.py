@@ -15,7 +15,7 @@ from ...cards.occlusion_settings import CardOcclusionSettings
 from ...cards.settings import CardSettings
 from ...errors import HairloomError
 from ...exchange.cards.card_formats import FORMATS, format_of
-from ...pipeline import Rig
+from ...rig_flow import Rig
 from ..bakes.guide_motion import GuideMotion
 from ..cards.build import CardInputs, order_line
 from ..cards.files import CardOutput, WrittenCards, check_no_input, write_cards

@@ -8,7 +8,7 @@ from tempfile import TemporaryDirectory
 
 from ...arrays import Floats
 from ...exchange.tressfx import write_tfx
-from ...pipeline import Rig
+from ...rig_flow import Rig
 from ..base.images import contact_sheet
 from ..cards.build import BuiltCards, MappedCards
 from ..cards.files import WrittenCards

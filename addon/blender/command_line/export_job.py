@@ -18,7 +18,7 @@ from ...exchange.strand_check import check_lines
 from ...exchange.strand_export_settings import StrandExportSettings
 from ...exchange.strand_formats import STRAND_FORMATS, StrandFormat, format_of
 from ...groom.widths import as_wide
-from ...pipeline import Rig
+from ...rig_flow import Rig
 from ...shading.settings import ShadingSettings
 from ..strands.groom_motion import BakedMotion
 from ..strands.read_hair import hair_of_rig

@@ -11,7 +11,7 @@ from typing import Self
 import bpy
 import numpy as np
 
-from ... import pipeline
+from ... import rig_flow
 from ...arrays import Floats
 from ...cards.edits import CardEdits
 from ...errors import HairloomError
@@ -22,7 +22,7 @@ from ...groom.settings import GrowSettings, GuideSettings
 from ...groom.width_settings import WidthSettings
 from ...paint_flow import colored
 from ...params import Settings, SettingsMap
-from ...pipeline import Pose, Rig
+from ...rig_flow import Pose, Rig
 from ...shading.ambient_settings import AmbientSettings
 from ...shading.settings import ShadingSettings
 from ...wet_flow import acting
@@ -75,7 +75,7 @@ def read_rig(job: Job) -> tuple[Rig, Inputs]:
     """Read what the job names and make it ready to move."""
     inputs, report = read_hair(job), job.report
     with report.stage("bind roots, choose guides"):
-        rig = pipeline.prepare(
+        rig = rig_flow.prepare(
             inputs.strands,
             inputs.head,
             job.settings[GuideSettings],

@@ -20,8 +20,8 @@ from ...cards.follow import moved_mesh
 from ...cards.occlusion_settings import CardOcclusionSettings
 from ...groom.painted_color import PaintedColor
 from ...paint_flow import colored
-from ...pipeline import Rig
 from ...render.snapshot import Snapshot
+from ...rig_flow import Rig
 from ...shading.ambient_settings import AmbientSettings
 from ...shading.settings import ShadingSettings
 from ...strands.affine import moved

@@ -10,8 +10,8 @@ import numpy as np
 
 from ...arrays import Floats
 from ...params import SettingsMap
-from ...pipeline import Pose
 from ...render.camera import Camera
+from ...rig_flow import Pose
 from ...shading.settings import ShadingSettings
 from ...shading.shafts_settings import ShaftSettings
 from ...wet_flow import acting

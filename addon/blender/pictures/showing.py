@@ -10,7 +10,7 @@ import bpy
 from ...arrays import Floats
 from ...exchange.files.names import no_device
 from ...paint_flow import colored
-from ...pipeline import Pose
+from ...rig_flow import Pose
 from ...shading.ambient_settings import AmbientSettings
 from ...shading.settings import ShadingSettings
 from ..base.objects import head_of

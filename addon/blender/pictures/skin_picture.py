@@ -9,11 +9,11 @@ import numpy as np
 
 from ...arrays import Floats
 from ...errors import HairloomError
-from ...pipeline import Pose, Rig
 from ...render.marschner_textures import hair_forward
 from ...render.skin_pass import SkinPass, SkinShadow
 from ...render.snapshot import MeshSnapshot, Snapshot
 from ...render.strand_pass import StrandPass
+from ...rig_flow import Pose, Rig
 from ...shading.lights import kept_lights
 from ...shading.skin.diffusion import SKIN_LIGHTS
 from ...strands import Surface

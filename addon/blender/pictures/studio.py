@@ -11,7 +11,7 @@ import numpy as np
 
 from ...arrays import Floats
 from ...cards.edits import CardEdits
-from ...pipeline import Pose, style_of_guides
+from ...motion_flow import style_of_guides
 from ...render.camera import Camera, frame_points
 from ...render.card_pass import CardPass
 from ...render.card_snapshot import CardSnapshot
@@ -21,6 +21,7 @@ from ...render.hair_ball import HairBall
 from ...render.mesh_pass import MeshPass
 from ...render.snapshot import MeshSnapshot, Snapshot
 from ...render.strand_pass import Statistics, StrandPass, calm_draws
+from ...rig_flow import Pose
 from ...shading.lights import Light
 from ...shading.skin.notes import skin_notes
 from ...shading.stage import backdrop, over, stage_lights

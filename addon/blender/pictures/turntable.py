@@ -18,8 +18,8 @@ from ...arrays import Floats
 from ...errors import HairloomError
 from ...exchange.files.atomic import folder_unwritable
 from ...exchange.files.file_set import written_together
-from ...pipeline import Pose
 from ...render.camera import Camera
+from ...rig_flow import Pose
 from ...shading.lights import Light
 from .studio import Studio
 from .video import write_video

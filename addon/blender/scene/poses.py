@@ -7,7 +7,7 @@ import numpy as np
 
 from ...arrays import Floats
 from ...errors import HairloomError
-from ...pipeline import Pose
+from ...rig_flow import Pose
 from ..base.objects import Body
 from .surfaces import read_positions
 

@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from ... import pipeline
+from ... import motion_flow
 from ...arrays import Floats
 from ...dynamics.colliders import PosedCollider
 from ...dynamics.force_fields import NO_FIELDS, ForceFields
 from ...dynamics.painted import PaintedGuides, simulated_of
 from ...dynamics.settings import DynamicsSettings
-from ...pipeline import Motion, Pose, Rig
+from ...motion_flow import Motion
 from ...refine.lead_out import NOT_LED, LedOut
 from ...render.collider_textures import UploadedColliders
 from ...render.dynamics_pass import DynamicsPass
@@ -21,6 +21,7 @@ from ...render.ride_pass import RidePass
 from ...render.snapshot import Snapshot
 from ...render.strand_layout import from_strand_rows
 from ...render.textures import texture_to_array
+from ...rig_flow import Pose, Rig
 from .numpy_solver import carried_motion, let_go
 
 
@@ -34,7 +35,7 @@ class ComputeSolver:
 
     def __init__(self, rig: Rig, motion: Motion | None = None) -> None:
         self._rig = rig
-        self._motion = motion or pipeline.begin(rig, rig.rest_pose)
+        self._motion = motion or motion_flow.begin(rig, rig.rest_pose)
         self._is_baked = False
         self._is_resting = motion is None
         self._is_drawn = False
@@ -74,7 +75,7 @@ class ComputeSolver:
         return self._motion.dynamics.rest.size
 
     def rest(self, pose: Pose) -> None:
-        self._take(pipeline.begin(self._rig, pose))
+        self._take(motion_flow.begin(self._rig, pose))
         self._is_resting = True
 
     def meet(
@@ -84,7 +85,7 @@ class ComputeSolver:
         painted: PaintedGuides | None = None,
     ) -> None:
         simulated = simulated_of(painted, settings, len(self._rig.guides))
-        self._motion = pipeline.with_clearance(
+        self._motion = motion_flow.with_clearance(
             self._rig, self._motion, colliders, settings, simulated
         )
         self._ride.leading.take(self._motion.clearance)
@@ -110,7 +111,7 @@ class ComputeSolver:
         if self._dynamics is None:
             self._dynamics = DynamicsPass(motion.dynamics, self._colliders)
         rig = self._rig
-        target, held = pipeline.style_of_guides(rig, pose), pipeline.held_cvs(rig, pose)
+        target, held = motion_flow.style_of_guides(rig, pose), motion_flow.held_cvs(rig, pose)
         drive = motion.drive(
             target, colliders, gravity, duration, force_fields, held, simulated, painted
         )
@@ -128,16 +129,16 @@ class ComputeSolver:
     def take_style(self, rig: Rig) -> None:
         if self._motion.clearance is not None and not self._is_resting:
             self._draw()  # the frame before, by its style
-        self._rig, self._motion = rig, pipeline.with_style(rig, self._motion)
+        self._rig, self._motion = rig, motion_flow.with_style(rig, self._motion)
         self._ride.take_style(rig.strands, rig.guide_grid, rig.riders)
         if self._dynamics is not None:
             self._dynamics.take_rest(self._motion.dynamics.rest)
 
     def has_jumped(self, pose: Pose, settings: DynamicsSettings, duration: float) -> bool:
-        return pipeline.has_jumped(self._rig, self._motion, pose, settings, duration)
+        return motion_flow.has_jumped(self._rig, self._motion, pose, settings, duration)
 
     def go_along(self, pose: Pose, colliders: tuple[PosedCollider, ...], duration: float) -> None:
-        self._take(pipeline.go_along(self._rig, self.motion, pose, colliders, duration))
+        self._take(motion_flow.go_along(self._rig, self.motion, pose, colliders, duration))
 
     def carry(self, pose: Pose, guides: Floats, led: LedOut = NOT_LED) -> None:
         self._take(carried_motion(self._rig, self._motion, pose, guides))
@@ -191,7 +192,7 @@ class ComputeSolver:
             return
         pose, texture = self.pose, self._guides_texture
         head, matrix, anchors = pose.head_positions, pose.matrix, pose.anchors
-        if self._is_resting and pipeline.held_guides(self._rig, pose) is None:
+        if self._is_resting and motion_flow.held_guides(self._rig, pose) is None:
             self._ride.carry(head, matrix, anchors)
         else:
             guides = self._motion.guides if texture is None else texture

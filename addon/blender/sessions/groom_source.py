@@ -16,7 +16,7 @@ from ...dynamics.settings import DynamicsSettings
 from ...groom.children_settings import ChildrenSettings
 from ...groom.masks import NO_MASKS, Mask, Masks, mask_names
 from ...paint_flow import painted_guides
-from ...pipeline import Pose, Rig
+from ...rig_flow import Pose, Rig
 from ...shading.ambient_settings import AmbientSettings
 from ...shading.settings import ShadingSettings
 from ...strands import StrandSet

@@ -7,7 +7,7 @@ from typing import Self
 
 import numpy as np
 
-from ... import pipeline
+from ... import motion_flow
 from ...arrays import Floats
 from ...dynamics.colliders import PosedCollider
 from ...dynamics.force_fields import NO_FIELDS, ForceFields
@@ -15,9 +15,10 @@ from ...dynamics.painted import PaintedGuides, simulated_of
 from ...dynamics.settings import DynamicsSettings
 from ...dynamics.state import rows_of
 from ...errors import HairloomError
-from ...pipeline import Motion, Pose, Rig
+from ...motion_flow import Motion
 from ...refine.lead_out import NOT_LED, LedOut
 from ...render.snapshot import Snapshot
+from ...rig_flow import Pose, Rig
 
 
 class NumpySolver:
@@ -27,7 +28,7 @@ class NumpySolver:
 
     def __init__(self, rig: Rig, motion: Motion | None = None) -> None:
         self._rig = rig
-        self._motion = motion or pipeline.begin(rig, rig.rest_pose)
+        self._motion = motion or motion_flow.begin(rig, rig.rest_pose)
         self._is_baked = False
         self._strands: Floats | None = None
         self._led = NOT_LED
@@ -35,8 +36,8 @@ class NumpySolver:
     @classmethod
     def at_rest(cls, rig: Rig, pose: Pose) -> Self:
         """With hair in its style in this pose, as `rest` brings it there."""
-        solver = cls(rig, pipeline.begin(rig, pose))
-        solver._strands = pipeline.strands_at_rest(rig, pose)
+        solver = cls(rig, motion_flow.begin(rig, pose))
+        solver._strands = motion_flow.strands_at_rest(rig, pose)
         return solver
 
     @property
@@ -52,8 +53,8 @@ class NumpySolver:
         return self._motion.dynamics.rest.size
 
     def rest(self, pose: Pose) -> None:
-        self._take(pipeline.begin(self._rig, pose))
-        self._strands = pipeline.strands_at_rest(self._rig, pose)
+        self._take(motion_flow.begin(self._rig, pose))
+        self._strands = motion_flow.strands_at_rest(self._rig, pose)
 
     def meet(
         self,
@@ -62,7 +63,7 @@ class NumpySolver:
         painted: PaintedGuides | None = None,
     ) -> None:
         simulated = simulated_of(painted, settings, len(self._rig.guides))
-        self._motion = pipeline.with_clearance(
+        self._motion = motion_flow.with_clearance(
             self._rig, self._motion, colliders, settings, simulated
         )
 
@@ -79,7 +80,7 @@ class NumpySolver:
         # what was not shown counts too: motion does not depend on who looks
         led = NOT_LED if self._motion.clearance is None else self.led()
         self._take(
-            pipeline.advance(
+            motion_flow.advance(
                 self._rig,
                 self.motion,
                 pose,
@@ -96,13 +97,13 @@ class NumpySolver:
     def take_style(self, rig: Rig) -> None:
         if self._motion.clearance is not None:
             self.led()  # of the frame before, by its style
-        self._rig, self._motion = rig, pipeline.with_style(rig, self._motion)
+        self._rig, self._motion = rig, motion_flow.with_style(rig, self._motion)
 
     def has_jumped(self, pose: Pose, settings: DynamicsSettings, duration: float) -> bool:
-        return pipeline.has_jumped(self._rig, self._motion, pose, settings, duration)
+        return motion_flow.has_jumped(self._rig, self._motion, pose, settings, duration)
 
     def go_along(self, pose: Pose, colliders: tuple[PosedCollider, ...], duration: float) -> None:
-        self._take(pipeline.go_along(self._rig, self.motion, pose, colliders, duration))
+        self._take(motion_flow.go_along(self._rig, self.motion, pose, colliders, duration))
 
     def carry(self, pose: Pose, guides: Floats, led: LedOut = NOT_LED) -> None:
         self._take(carried_motion(self._rig, self._motion, pose, guides))
@@ -114,9 +115,9 @@ class NumpySolver:
     def strands(self) -> Floats:
         if self._strands is None and self._is_baked:
             shown = self._motion
-            self._strands = pipeline.strands_at(self._rig, shown.pose, shown.guides, self._led)
+            self._strands = motion_flow.strands_at(self._rig, shown.pose, shown.guides, self._led)
         elif self._strands is None:
-            self._strands, self._led = pipeline.strands_and_led(self._rig, self._motion)
+            self._strands, self._led = motion_flow.strands_and_led(self._rig, self._motion)
         return self._strands
 
     def led(self) -> LedOut:
@@ -148,7 +149,7 @@ def carried_motion(rig: Rig, motion: Motion, pose: Pose, guides: Floats) -> Moti
 
 def let_go(rig: Rig, shown: Motion) -> Motion:
     """The motion that starts from shown guides at no speed."""
-    begun = pipeline.begin(rig, shown.pose)
+    begun = motion_flow.begin(rig, shown.pose)
     rows = rows_of(shown.guides, "bake")
     dynamics = replace(begun.dynamics, position=rows, previous=rows)
     return replace(begun, dynamics=dynamics, guides=shown.guides)

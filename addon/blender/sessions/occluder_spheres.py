@@ -11,8 +11,8 @@ import numpy as np
 
 from ...arrays import Floats, Ints
 from ...dynamics.fitting.similarity import fit_similarity
-from ...pipeline import Pose
 from ...refine.culling import moved_spheres, occluder_spheres_of
+from ...rig_flow import Pose
 from ...strands import Surface
 from ...strands.affine import moved
 

@@ -15,12 +15,12 @@ from functools import cached_property, partial
 
 import numpy as np
 
-from ... import pipeline
+from ... import light_flow, rig_flow
 from ...arrays import Floats, Ints
 from ...errors import HairloomError
 from ...groom.settings import GuideSettings
 from ...light_flow import HairLight, quick_light, rest_light
-from ...pipeline import Rig
+from ...rig_flow import Rig
 from ...shading.ambient_settings import AmbientSettings
 from ...strands import StrandSet, Surface
 from ...strands.kept import NOTHING_KEPT, Kept
@@ -77,7 +77,7 @@ class PreparedGroom:
 
     ambient: what its light was made by.
     light: at rest; None where it was left out.
-    rank: (strand_count,), see `pipeline.strand_ranks`; None where it was left out.
+    rank: (strand_count,), see `rig_flow.strand_ranks`; None where it was left out.
     occluders: spheres in the head that hide hair; None where it has none, or they were left out.
     is_placeholder: whether these are a few of its strands only, which are not seen.
     """
@@ -92,7 +92,7 @@ class PreparedGroom:
     @cached_property
     def head_occlusion(self) -> Floats | None:
         """(vertex_count,) in [0, 1], at rest; None without a head."""
-        return pipeline.head_occlusion(self.rig, self.ambient)
+        return light_flow.head_occlusion(self.rig, self.ambient)
 
     @cached_property
     def loose_roots(self) -> int:
@@ -197,7 +197,7 @@ def _drawn(
         roots = rig.strands.roots
         corners = np.stack([roots.min(axis=0), roots.max(axis=0)])
         occluders = rig.head.latest(OccluderSpheres, corners)
-    rank = pipeline.strand_ranks(rig)
+    rank = rig_flow.strand_ranks(rig)
     return PreparedGroom(rig, ambient, light, rank, occluders)
 
 
@@ -239,10 +239,10 @@ def _quickly_bound(few: StrandSet, head: Surface | None, request: BuildRequest) 
         part = replace(head, triangles=head.triangles[near], corner_uv=uv)
         # roots that seem far away may be near to the rest of the head
         with suppress(HairloomError):
-            rig = pipeline.prepare(few, part, request.settings[GuideSettings], place=request.name)
+            rig = rig_flow.prepare(few, part, request.settings[GuideSettings], place=request.name)
             bound = replace(rig.strands, root_triangle=near[rig.strands.root_triangle])
             return replace(rig, strands=bound, head=head)
-    return pipeline.prepare(few, head, request.settings[GuideSettings], place=request.name)
+    return rig_flow.prepare(few, head, request.settings[GuideSettings], place=request.name)
 
 
 def _triangles_near(points: Floats, surface: Surface) -> Ints:

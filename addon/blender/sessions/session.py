@@ -10,7 +10,7 @@ from functools import partial
 import bpy
 import numpy as np
 
-from ... import pipeline
+from ... import motion_flow
 from ...arrays import Floats
 from ...comb_flow import combed
 from ...dynamics.colliders import PosedCollider
@@ -19,9 +19,9 @@ from ...dynamics.settings import DynamicsSettings
 from ...dynamics.state import start
 from ...errors import HairloomError
 from ...paint_flow import painted
-from ...pipeline import Pose, Rig
 from ...refine.lead_out import Clearance
 from ...render.snapshot import Snapshot
+from ...rig_flow import Pose, Rig
 from ...strands.arc_length import lengths
 from ..bakes.baked_rig import BakedRig, frame_arrays, led_in, rig_arrays
 from ..bakes.groom_hashes import frame_rate
@@ -549,7 +549,7 @@ class Session:
         self.solver.advance(pose, self._posed, settings, gravity, duration, fields, painted)
 
     def _go_along(self, depsgraph: bpy.types.Depsgraph, pose: Pose, duration: float) -> None:
-        """A frame in which hair goes with its head as it is; see `pipeline.go_along`."""
+        """A frame in which hair goes with its head as it is; see `motion_flow.go_along`."""
         self._posed = () if self.obstacles is None else self.obstacles.rest(depsgraph)
         self.solver.go_along(pose, self._posed, duration)
 
@@ -564,14 +564,14 @@ class Session:
         assert self._begun is not None, "it is simulated"
         pose, posed = self._begun
         rig = self.rig
-        guides = start(pipeline.carried_guides(rig, pose), rig.curl_room)
-        return Measure(guides, pipeline.carried(rig, pose), rig.strands.offsets, posed)
+        guides = start(motion_flow.carried_guides(rig, pose), rig.curl_room)
+        return Measure(guides, motion_flow.carried(rig, pose), rig.strands.offsets, posed)
 
     def measure_into(self, measure: Measure) -> None:
         """Take the present frame into account; reads strands back from a GPU."""
         guides, rig = self.solver.guides(), self.rig
         if self._styled is not None:
-            style = pipeline.carried_guides(rig, self.solver.pose)
+            style = motion_flow.carried_guides(rig, self.solver.pose)
             measure.take_style(start(style, rig.curl_room))
         measure.add(self.solver.strands(), self._rest_lengths(), guides, self._posed)
 
@@ -588,7 +588,7 @@ class Session:
         rig = self.rig
         if rig.head is not None:
             return rig.strands.points
-        return pipeline.carried(rig, self.solver.pose)
+        return motion_flow.carried(rig, self.solver.pose)
 
     def solids(self, depsgraph: bpy.types.Depsgraph) -> tuple[PosedCollider, ...]:
         """What the hair would collide with now; none before they are made."""
@@ -654,7 +654,7 @@ def _build_in_thread(
     groom = build(request, before, is_drawn=True, is_quick=True, report=work.report)
     if moment is None or groom.rig is before[1].rig:
         return _Built(request, groom)
-    clearance = pipeline.strand_clearance(groom.rig, moment.pose, moment.colliders, moment.kept)
+    clearance = motion_flow.strand_clearance(groom.rig, moment.pose, moment.colliders, moment.kept)
     return _Built(request, groom, clearance)
 
 

@@ -11,14 +11,14 @@ from collections.abc import Generator
 import bpy
 import numpy as np
 
-from ... import pipeline, settle_flow
+from ... import rig_flow, settle_flow
 from ...arrays import Floats
 from ...dynamics.colliders import PosedCollider
 from ...dynamics.settings import DynamicsSettings
 from ...dynamics.settle_settings import SettleSettings
 from ...errors import HairloomError
 from ...groom.settings import GuideSettings
-from ...pipeline import Rig
+from ...rig_flow import Rig
 from ...shading.ambient_settings import AmbientSettings
 from ...strands.clean import Cleaned
 from ..base.outcome import Outcome
@@ -58,7 +58,7 @@ def settle_hair(
     own = read_own_curves(hair, depsgraph, COMBED.before(hair))
     guides = settle_flow.guides_that_fall(own.strands, source.settings[GuideSettings])
     read = source.source
-    rig = pipeline.prepare(
+    rig = rig_flow.prepare(
         own.strands,
         read.head,
         guides,

@@ -14,11 +14,11 @@ from ...arrays import Floats
 from ...groom.painted_color import PaintedColor
 from ...light_flow import HairLight
 from ...paint_flow import with_colors
-from ...pipeline import Pose, Rig, strand_seeds
 from ...refine.settings import DetailSettings
 from ...render.hair_ball import HairBall
 from ...render.snapshot import SECTIONS, Snapshot
 from ...render.strand_layout import StrandLayout
+from ...rig_flow import Pose, Rig, strand_seeds
 from ...shading.coat import is_coated
 from ...shading.marschner.look import fibre_of
 from ...shading.marschner.tables import DEFAULT_SIZE, PREVIEW_SIZE, shape_of

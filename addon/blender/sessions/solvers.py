@@ -12,7 +12,7 @@ from typing import Protocol
 import gpu
 import numpy as np
 
-from ... import pipeline
+from ... import rig_flow
 from ...arrays import Floats
 from ...dynamics.colliders import PosedCollider
 from ...dynamics.force_fields import NO_FIELDS, ForceFields
@@ -20,9 +20,10 @@ from ...dynamics.painted import PaintedGuides
 from ...dynamics.settings import DynamicsSettings
 from ...errors import HairloomError
 from ...groom.settings import GuideSettings
-from ...pipeline import Motion, Pose, Rig
+from ...motion_flow import Motion
 from ...refine.lead_out import NOT_LED, LedOut
 from ...render.snapshot import Snapshot
+from ...rig_flow import Pose, Rig
 from ...strands import StrandSet
 from ..base.gpu_context import gpu_in_use
 from .compute_solver import ComputeSolver
@@ -63,8 +64,8 @@ class Solver(Protocol):
         settings: DynamicsSettings,
         painted: PaintedGuides | None = None,
     ) -> None:
-        """Find how far hair stays from colliders, see `pipeline.with_clearance`; what has not met
-        them does so when it advances."""
+        """Find how far hair stays from colliders, see `motion_flow.with_clearance`; what
+        has not met them does so when it advances."""
 
     def advance(
         self,
@@ -76,17 +77,17 @@ class Solver(Protocol):
         force_fields: ForceFields = NO_FIELDS,
         painted: PaintedGuides | None = None,
     ) -> None:
-        """One frame of motion, as pipeline.advance."""
+        """One frame of motion, as motion_flow.advance."""
 
     def take_style(self, rig: Rig) -> None:
         """Go by this rig in the next frame: the same groom with curves of other shapes, see
-        `pipeline.with_style`."""
+        `motion_flow.with_style`."""
 
     def has_jumped(self, pose: Pose, settings: DynamicsSettings, duration: float) -> bool:
-        """Whether the head is elsewhere all of a sudden, see `pipeline.has_jumped`."""
+        """Whether the head is elsewhere all of a sudden, see `motion_flow.has_jumped`."""
 
     def go_along(self, pose: Pose, colliders: tuple[PosedCollider, ...], duration: float) -> None:
-        """A frame in which hair goes along with its roots, see `pipeline.go_along`."""
+        """A frame in which hair goes along with its roots, see `motion_flow.go_along`."""
 
     def carry(self, pose: Pose, guides: Floats, led: LedOut = NOT_LED) -> None:
         """Show guides (guide_count, cv_count, 3) [m, world], and strands that were led out of
@@ -179,7 +180,7 @@ def _tried_out() -> str:
         radius=np.full(3 * len(along), 4.0e-5),
         group=np.zeros(3, np.int32),
     )
-    rig = pipeline.prepare(strands, None, GuideSettings(), place="a few strands")
+    rig = rig_flow.prepare(strands, None, GuideSettings(), place="a few strands")
     moved = np.eye(4)
     moved[:3, 3] = 0.01
     ends = []

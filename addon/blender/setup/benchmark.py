@@ -18,16 +18,16 @@ from typing import Any
 import gpu
 import numpy as np
 
-from ... import pipeline
+from ... import rig_flow
 from ...dynamics.settings import DynamicsSettings
 from ...groom.settings import GuideSettings
-from ...pipeline import Pose, Rig
 from ...render import gpu_objects
 from ...render.accumulation import Target
 from ...render.camera import Camera, frame_camera
 from ...render.snapshot import Snapshot
 from ...render.strand_layers import is_software
 from ...render.strand_pass import StrandPass, drawn_transparency
+from ...rig_flow import Pose, Rig
 from ...shading.ambient_settings import AmbientSettings
 from ...shading.lights import three_point_lights
 from ...strands import StrandSet
@@ -183,4 +183,4 @@ def hair_ball(strand_count: int) -> Rig:
         radius=np.full(strand_count * POINTS, 4.0e-5),
         group=np.zeros(strand_count, np.int32),
     )
-    return pipeline.prepare(strands, None, GuideSettings(), place="the benchmark")
+    return rig_flow.prepare(strands, None, GuideSettings(), place="the benchmark")

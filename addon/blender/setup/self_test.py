@@ -12,15 +12,15 @@ from typing import Literal
 
 import numpy as np
 
-from ... import pipeline
+from ... import rig_flow
 from ...arrays import Floats
 from ...exchange.tressfx import read_tfx, write_tfx
 from ...groom.settings import GuideSettings
-from ...pipeline import Rig
 from ...refine.settings import DetailSettings
 from ...render.camera import frame_camera
 from ...render.capabilities import capabilities
 from ...render.frame import render_image
+from ...rig_flow import Rig
 from ...shading.ambient_settings import AmbientSettings
 from ...shading.lights import three_point_lights
 from ...shading.settings import ShadingSettings
@@ -180,7 +180,7 @@ def _brush() -> Rig:
         radius=np.full(points.shape[0] * points.shape[1], 4.0e-4),
         group=np.zeros(len(across), np.int32),
     )
-    return pipeline.prepare(strands, None, GuideSettings(), place="the self-test")
+    return rig_flow.prepare(strands, None, GuideSettings(), place="the self-test")
 
 
 def _files() -> str:

@@ -9,10 +9,10 @@ from typing import Protocol
 import bpy
 import numpy as np
 
-from ... import pipeline
+from ... import motion_flow
 from ...arrays import Floats, Ints
 from ...errors import HairloomError
-from ...pipeline import Pose, Rig
+from ...rig_flow import Pose, Rig
 from ...strands.center_lines import center_lines
 from ..bakes import playback
 from ..bakes.cache import Cache
@@ -107,7 +107,7 @@ class ChildrenMotion:
             name = self.body.handle.name
             positions = read_positions(self.body.found(), depsgraph, place=name)
         pose = Pose(positions, self.body.moved(depsgraph))
-        return pipeline.strands_at(self.rig, pose, now)
+        return motion_flow.strands_at(self.rig, pose, now)
 
 
 def moving_hair(

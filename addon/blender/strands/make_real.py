@@ -14,7 +14,7 @@ from ...groom.children_settings import ChildrenSettings
 from ...groom.width_settings import WidthSettings
 from ...paint_flow import with_colors
 from ...parameters import ALL_SETTINGS, sections_of
-from ...pipeline import Rig, strand_seeds
+from ...rig_flow import Rig, strand_seeds
 from ...shading.drawn_strands import drawn_radius, strand_colors
 from ...shading.settings import ShadingSettings, StrandSettings
 from ...strands import StrandSet

@@ -16,7 +16,7 @@ from ...groom.roots import bind_roots
 from ...groom.weights import guide_weights
 from ...groom.widths import as_wide, with_widths
 from ...paint_flow import with_colors
-from ...pipeline import Rig
+from ...rig_flow import Rig
 from ...shading.drawn_strands import look_color, own_colors
 from ...shading.settings import ShadingSettings
 from ...strands import StrandSet

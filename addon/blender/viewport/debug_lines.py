@@ -21,8 +21,9 @@ from ...dynamics.colliders import (
 from ...dynamics.force_fields import ForceFields, felt
 from ...dynamics.settings import DynamicsSettings
 from ...dynamics.wind import Air, air_of
-from ...pipeline import carried_guides, root_normals, root_turns
+from ...motion_flow import carried_guides, root_turns
 from ...render import gpu_objects
+from ...rig_flow import root_normals
 from ...shading.lights import Light
 from ...strands.affine import moved
 from ..scene.forces import force_fields_of

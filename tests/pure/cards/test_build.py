@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from tiers import few_in_commits
 
-from hairloom.addon import card_flow, pipeline
+from hairloom.addon import card_flow, rig_flow
 from hairloom.addon.cards.atlas_settings import AtlasSettings
 from hairloom.addon.cards.build import (
     CardBuild,
@@ -58,7 +58,7 @@ def built(
     alpha: np.ndarray | None = None,
     **changed: object,
 ) -> CardBuild:
-    rig = pipeline.prepare(strands, None, GuideSettings(guide_count=40), place="hair")
+    rig = rig_flow.prepare(strands, None, GuideSettings(guide_count=40), place="hair")
     settings = CardSettings(**{"source": "clusters", "card_count": 30, **changed})  # type: ignore[arg-type]
     chosen = SettingsMap(settings, atlas, FEW_RAYS, DENSE)
     return result_of(card_flow.card_build_steps(rig, chosen, lambda _: alpha))
@@ -121,7 +121,7 @@ def test_crossed_cards_have_the_tile_and_group_of_their_pair() -> None:
 def test_guides_keep_their_groups() -> None:
     strands = falling(600, groups=3)
     build = built(strands, source="guides")
-    rig = pipeline.prepare(strands, None, GuideSettings(guide_count=40), place="hair")
+    rig = rig_flow.prepare(strands, None, GuideSettings(guide_count=40), place="hair")
     np.testing.assert_array_equal(build.finest.group, rig.strands.group[rig.guides])
 
 
@@ -181,7 +181,7 @@ def test_brows_are_the_outermost_layer_and_not_widened() -> None:
 
 
 def _groom(strands: StrandSet) -> CardGroom:
-    rig = pipeline.prepare(strands, None, GuideSettings(), place="hair")
+    rig = rig_flow.prepare(strands, None, GuideSettings(), place="hair")
     return card_flow.card_groom(rig)
 
 
@@ -238,7 +238,7 @@ def test_an_atlas_that_is_too_small_says_by_how_much() -> None:
 
 
 def test_alpha_is_asked_for_once_and_darkens_less_than_opaque_cards() -> None:
-    rig = pipeline.prepare(falling(900), None, GuideSettings(), place="hair")
+    rig = rig_flow.prepare(falling(900), None, GuideSettings(), place="hair")
     settings = CardSettings(source="clusters", card_count=30, levels=1)
     asked: list[CardBuild] = []
 
@@ -255,7 +255,7 @@ def test_alpha_is_asked_for_once_and_darkens_less_than_opaque_cards() -> None:
 
 
 def test_every_step_says_how_far_it_is() -> None:
-    rig = pipeline.prepare(falling(600), None, GuideSettings(), place="hair")
+    rig = rig_flow.prepare(falling(600), None, GuideSettings(), place="hair")
     settings = CardSettings(source="clusters", card_count=30, levels=2)
     groom = card_flow.card_groom(rig)  # so that rays find the occlusion
     steps = list(card_steps(groom, settings, MADE, FEW_RAYS, lambda _build: None))
@@ -291,7 +291,7 @@ def test_cards_that_are_clear_stay_in_the_order_of_their_distance() -> None:
 
 
 def test_notes_go_by_how_wide_strands_are_drawn() -> None:
-    rig = pipeline.prepare(falling(900), None, GuideSettings(), place="hair")
+    rig = rig_flow.prepare(falling(900), None, GuideSettings(), place="hair")
     settings = CardSettings(source="clusters", card_count=30)
     atlas = AtlasSettings(size="512", columns=8, rows=2)
 

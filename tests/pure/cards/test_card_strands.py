@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from hairloom.addon import card_flow, pipeline
+from hairloom.addon import card_flow, rig_flow
 from hairloom.addon.cards.atlas_settings import AtlasSettings
 from hairloom.addon.cards.card_strands import card_strands, row_count
 from hairloom.addon.cards.occlusion_settings import CardOcclusionSettings
@@ -44,7 +44,7 @@ def waving(count: int = 200, cv_count: int = 64) -> StrandSet:
 
 def test_cards_of_points_by_need_are_those_of_many_points() -> None:
     dense = waving()
-    rig = pipeline.prepare(dense, None, GuideSettings(cv_count=64), place="test")
+    rig = rig_flow.prepare(dense, None, GuideSettings(cv_count=64), place="test")
     uneven = with_needed_points(rig.strands, 16)
     assert not uneven.is_uniform and uneven.point_count < 0.9 * dense.point_count
     expected, found = (

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from guide_cards import build_cards
 
-from hairloom.addon import card_flow, pipeline
+from hairloom.addon import card_flow, motion_flow, rig_flow
 from hairloom.addon.cards.atlas_settings import AtlasSettings
 from hairloom.addon.cards.card_mesh import CardMesh
 from hairloom.addon.cards.follow import (
@@ -23,7 +23,7 @@ from hairloom.addon.cards.sort import card_of_vertex
 from hairloom.addon.cards.steps import result_of
 from hairloom.addon.groom.settings import GuideSettings
 from hairloom.addon.params import SettingsMap
-from hairloom.addon.pipeline import Pose
+from hairloom.addon.rig_flow import Pose
 from hairloom.addon.strands import StrandSet
 from hairloom.addon.strands.frames import tangents, transported_normals
 
@@ -203,14 +203,14 @@ def test_cards_of_a_rig_ride_as_its_strands_do() -> None:
         radius=np.full(120 * 12, 5e-5),
         group=np.repeat([3, 7], 60),
     )
-    rig = pipeline.prepare(strands, None, GuideSettings(guide_count=24), place="hair")
+    rig = rig_flow.prepare(strands, None, GuideSettings(guide_count=24), place="hair")
     settings = CardSettings(source="clusters", card_count=10)
     made, occlusion = AtlasSettings(source="made"), CardOcclusionSettings(rays=16)
     steps = card_flow.card_build_steps(rig, SettingsMap(settings, made, occlusion))
     mesh = result_of(steps).finest
     binding = card_flow.bound_cards(rig, mesh)
     pose = Pose(None, np.eye(4))
-    guides = pipeline.carried_guides(rig, pose)
+    guides = motion_flow.carried_guides(rig, pose)
     far = rig.strands.group[rig.guides] == 7
     guides[far, :, 1] += np.linspace(0.0, 0.05, guides.shape[1], dtype=np.float32)
     moved = card_flow.cards_at(rig, binding, pose, guides)

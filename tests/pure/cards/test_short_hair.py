@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hairloom.addon import card_flow, pipeline
+from hairloom.addon import card_flow, rig_flow
 from hairloom.addon.cards.atlas_settings import AtlasSettings
 from hairloom.addon.cards.build import CardBuild
 from hairloom.addon.cards.occlusion_settings import CardOcclusionSettings
@@ -39,7 +39,7 @@ def fur(length: float) -> StrandSet:
 
 
 def built(strands: StrandSet, settings: CardSettings) -> CardBuild:
-    rig = pipeline.prepare(strands, None, GuideSettings(guide_count=40), place="fur")
+    rig = rig_flow.prepare(strands, None, GuideSettings(guide_count=40), place="fur")
     chosen = SettingsMap(settings, AtlasSettings(source="made"), CardOcclusionSettings(rays=16))
     return result_of(card_flow.card_build_steps(rig, chosen))
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from hairloom.addon import card_flow, pipeline
+from hairloom.addon import card_flow, rig_flow
 from hairloom.addon.cards.occlusion import CardOccluder
 from hairloom.addon.groom.settings import GuideSettings
-from hairloom.addon.pipeline import Rig
+from hairloom.addon.rig_flow import Rig
 from hairloom.addon.shading.settings import StrandSettings
 from hairloom.addon.shading.volume.card_opacity import StrandArea
 from hairloom.addon.strands import StrandSet
@@ -24,7 +24,7 @@ def curtain(count: int, radius: float = 2.0e-4) -> Rig:
         radius=np.full(count * 8, radius),
         group=np.zeros(count, np.int64),
     )
-    return pipeline.prepare(strands, None, GuideSettings(guide_count=20), place="curtain")
+    return rig_flow.prepare(strands, None, GuideSettings(guide_count=20), place="curtain")
 
 
 def taken(occluder: CardOccluder) -> float:

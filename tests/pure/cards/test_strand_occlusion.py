@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from tiers import few_in_commits
 
-from hairloom.addon import card_flow, pipeline
+from hairloom.addon import card_flow, light_flow, rig_flow
 from hairloom.addon.cards.atlas_settings import AtlasSettings
 from hairloom.addon.cards.build import CardBuild, CardGroom, card_of_strand, card_steps
 from hairloom.addon.cards.card_mesh import CardMesh
@@ -20,7 +20,7 @@ from hairloom.addon.cards.steps import result_of
 from hairloom.addon.cards.strand_occlusion import strands_occlusion
 from hairloom.addon.groom.settings import GuideSettings
 from hairloom.addon.params import SettingsMap
-from hairloom.addon.pipeline import Rig
+from hairloom.addon.rig_flow import Rig
 from hairloom.addon.shading.ambient_settings import AmbientSettings
 from hairloom.addon.shading.kajiya_kay import strand_normal
 from tests.pure.cards.test_build import falling
@@ -31,7 +31,7 @@ CLUSTERS = CardSettings(source="clusters", card_count=40, levels=1, error=0.012)
 
 
 def rig_of(count: int) -> Rig:
-    return pipeline.prepare(falling(count), None, GuideSettings(guide_count=40), place="hair")
+    return rig_flow.prepare(falling(count), None, GuideSettings(guide_count=40), place="hair")
 
 
 def built(groom: CardGroom, settings: CardSettings, *others: CardOccluder) -> CardBuild:
@@ -88,7 +88,7 @@ def test_each_card_is_as_open_as_its_own_strands(settings: CardSettings) -> None
     """Against a loop over cards; the vertices of a card lie evenly along it."""
     rig = rig_of(900)
     dense = AmbientSettings(extinction=100.0)
-    shade = pipeline.rest_occlusion(rig, dense)
+    shade = light_flow.rest_occlusion(rig, dense)
     groom = replace(
         card_flow.card_groom(rig), occlusion=shade.reshape(rig.strands.strand_count, -1)
     )

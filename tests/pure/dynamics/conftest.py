@@ -158,7 +158,7 @@ class Scene:
     room: (guide_count, cv_count - 1) how much curls have to give, or None.
     painted: by what settings are multiplied at each guide, or None.
     is_combed: whether guides stay no farther from colliders than they are at first.
-    bowed: whether the ways within a frame are smooth, as the pipeline makes them.
+    bowed: whether the ways within a frame are smooth, as `motion_flow` makes them.
     """
 
     grid: np.ndarray

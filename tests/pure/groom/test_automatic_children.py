@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from tiers import few_in_commits
 
-from hairloom.addon import pipeline
+from hairloom.addon import rig_flow
 from hairloom.addon.arrays import Floats
 from hairloom.addon.groom.automatic_children import automatic
 from hairloom.addon.groom.children_settings import ChildrenSettings
@@ -49,12 +49,12 @@ def sheet(factor: float = 1.0) -> Surface:
     return Surface(np.stack([x, y, 0.0 * x], axis=-1).reshape(-1, 3), triangles)
 
 
-def rig_of(strands: StrandSet, head: Surface | None, method: str = "auto") -> pipeline.Rig:
+def rig_of(strands: StrandSet, head: Surface | None, method: str = "auto") -> rig_flow.Rig:
     children = ChildrenSettings(method=method)
-    return pipeline.prepare(strands, head, GUIDES, place="fur", children=children, widths="auto")
+    return rig_flow.prepare(strands, head, GUIDES, place="fur", children=children, widths="auto")
 
 
-def hits(rig: pipeline.Rig, rays: int = 400) -> Floats:
+def hits(rig: rig_flow.Rig, rays: int = 400) -> Floats:
     """How many strands each of some rays meets that go straight down to the middle, (rays,)."""
     place = np.random.default_rng(2).uniform(-0.25, 0.25, (rays, 2)) * SIDE
     grid = rig.strands.grid[..., :2].astype(np.float64)

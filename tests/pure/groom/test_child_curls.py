@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from flat_ground import guides_at, settings, sheet
 
-from hairloom.addon import pipeline
+from hairloom.addon import rig_flow
 from hairloom.addon.arrays import Floats
 from hairloom.addon.groom import children
 from hairloom.addon.groom.children import make_children
@@ -60,7 +60,7 @@ def test_curls_are_helices_around_the_path(curl: float, turn: float) -> None:
 @pytest.mark.parametrize(("curl", "turn"), [(0.02, 0.5), (0.03, 0.12), (0.02, 0.06), (0.05, 0.05)])
 def test_no_curl_loses_more_length_than_points_by_need_may(curl: float, turn: float) -> None:
     wanted = settings(curl=curl, curl_length=turn, strand_count=100)
-    rig = pipeline.prepare(
+    rig = rig_flow.prepare(
         standing(16), SURFACE, GuideSettings(cv_count=16), place="test", children=wanted
     )
     children = rig.strands.take(np.arange(64, rig.strands.strand_count))

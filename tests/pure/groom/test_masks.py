@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from small_wig import GUIDES, curves, sheet
 
-from hairloom.addon import pipeline
+from hairloom.addon import rig_flow
 from hairloom.addon.arrays import Floats
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.groom.children import make_children
@@ -53,8 +53,8 @@ def rig_of(
     masks: Masks = NO_MASKS,
     kept: Kept = NOTHING_KEPT,
     own: StrandSet | None = None,
-) -> pipeline.Rig:
-    return pipeline.prepare(
+) -> rig_flow.Rig:
+    return rig_flow.prepare(
         own or curves(), HEAD, GUIDES, place="a wig", children=settings, masks=masks, kept=kept
     )
 
@@ -63,7 +63,7 @@ def on_head(name: str, weights: Floats) -> Masks:
     return Masks({name: SurfaceMask.of_vertices(HEAD, weights)})
 
 
-def children(rig: pipeline.Rig) -> Floats:
+def children(rig: rig_flow.Rig) -> Floats:
     return rig.strands.grid[rig.own_count :]
 
 
@@ -189,7 +189,7 @@ def test_widths_are_multiplied_whatever_their_method() -> None:
     for method in ("own", "found"):
 
         def radius(masks: Masks, method: str = method) -> Floats:
-            rig = pipeline.prepare(
+            rig = rig_flow.prepare(
                 curves(), HEAD, GUIDES, place="a wig", children=BOLD, masks=masks, widths=method
             )
             return rig.strands.radius.reshape(rig.strands.strand_count, -1)[rig.own_count :, 0]

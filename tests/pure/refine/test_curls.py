@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from hairloom.addon import pipeline
+from hairloom.addon import motion_flow, rig_flow
 from hairloom.addon.groom.settings import GuideSettings
-from hairloom.addon.pipeline import Pose, Rig
 from hairloom.addon.refine.curls import CATCHING_UP, SLACK, drawn_out, seen
+from hairloom.addon.rig_flow import Pose, Rig
 from hairloom.addon.strands import StrandSet
 
 LENGTH, RADIUS, TURNS, POINTS = 0.2, 0.006, 15, 400
@@ -25,7 +25,7 @@ def coils(count: int = 3, straight: int = 0) -> Rig:
     grid[..., 0] += 0.03 * np.arange(count)[:, None]
     offsets, width = np.arange(count + 1) * POINTS, np.full(count * POINTS, 4e-5)
     strands = StrandSet(grid.reshape(-1, 3), offsets, width, np.zeros(count))
-    return pipeline.prepare(strands, None, GuideSettings(guide_count=count), place="coils")
+    return rig_flow.prepare(strands, None, GuideSettings(guide_count=count), place="coils")
 
 
 def on_its_axis(rig: Rig) -> Rig:
@@ -61,7 +61,7 @@ def radius_of(rig: Rig, points: np.ndarray) -> float:
 def test_a_coil_that_is_drawn_out_gets_as_thin_as_its_length_says(factor: float) -> None:
     """A helix of arc length s over height h has the radius sqrt(s^2 - h^2) / (2 pi n)."""
     rig = on_its_axis(coils())
-    found = pipeline.strands_at(rig, STILL, drawn(rig, factor))
+    found = motion_flow.strands_at(rig, STILL, drawn(rig, factor))
     rest = segments(rig, rig.strands.points)
     np.testing.assert_allclose(segments(rig, found), rest, rtol=5e-5)
     around = 2.0 * np.pi * TURNS
@@ -84,21 +84,21 @@ def test_turned_and_drawn_out_is_drawn_out_and_turned() -> None:
     guides = drawn(rig, 1.4)
     roots = rig.guide_grid[:, :1].astype(np.float64)
     turned = ((guides - roots) @ turn.T + roots).astype(np.float32)
-    found = pipeline.strands_at(rig, STILL, turned).reshape(3, -1, 3)
-    plain = pipeline.strands_at(rig, STILL, guides).reshape(3, -1, 3)
+    found = motion_flow.strands_at(rig, STILL, turned).reshape(3, -1, 3)
+    plain = motion_flow.strands_at(rig, STILL, guides).reshape(3, -1, 3)
     expected = (plain - plain[:, :1]) @ turn.T + plain[:, :1]
     np.testing.assert_allclose(found, expected, atol=1e-5 * LENGTH)
 
 
 def test_guides_that_are_off_by_what_their_solver_may_be_change_no_bit() -> None:
     rig = coils()
-    rest = pipeline.strands_at(rig, STILL, rig.guide_grid)
+    rest = motion_flow.strands_at(rig, STILL, rig.guide_grid)
     np.testing.assert_array_equal(rest, rig.strands.points)
     straight = on_its_axis(rig)
     assert straight.curl_room is not None
-    off = pipeline.strands_at(straight, STILL, drawn(straight, 1.0 + 0.9 * SLACK))
+    off = motion_flow.strands_at(straight, STILL, drawn(straight, 1.0 + 0.9 * SLACK))
     np.testing.assert_array_equal(off, rig.strands.points)
-    beyond = pipeline.strands_at(straight, STILL, drawn(straight, 1.0 + 4.0 * SLACK))
+    beyond = motion_flow.strands_at(straight, STILL, drawn(straight, 1.0 + 4.0 * SLACK))
     assert np.abs(beyond - rig.strands.points).max() > 3.0 * SLACK * LENGTH
 
 
@@ -107,7 +107,7 @@ def test_straight_hair_beside_curls_never_stretches() -> None:
     assert rig.curl_room is not None
     is_straight = rig.guides >= 2
     assert not rig.curl_room[is_straight].any() and rig.curl_room[~is_straight, 1:].min() > 1.0
-    found, first = pipeline.strands_at(rig, STILL, drawn(rig, 1.5)), rig.strands.offsets[2]
+    found, first = motion_flow.strands_at(rig, STILL, drawn(rig, 1.5)), rig.strands.offsets[2]
     np.testing.assert_array_equal(found[first:], rig.strands.points[first:])
     assert np.abs(found[:first] - rig.strands.points[:first]).max() > 0.3 * LENGTH
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hairloom.addon import pipeline
+from hairloom.addon import motion_flow
 from hairloom.addon.dynamics.colliders import (
     Collider,
     DistanceField,
@@ -16,7 +16,6 @@ from hairloom.addon.dynamics.colliders import (
 )
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.groom.weights import GuideWeights
-from hairloom.addon.pipeline import Pose, Rig
 from hairloom.addon.refine.lead_out import (
     NO_LEANS,
     SLACK,
@@ -26,6 +25,7 @@ from hairloom.addon.refine.lead_out import (
     clearance_at,
     lead_out,
 )
+from hairloom.addon.rig_flow import Pose, Rig
 from hairloom.addon.strands import StrandSet, Surface
 from hairloom.addon.strands.arc_length import steps
 
@@ -188,7 +188,7 @@ def test_a_strand_between_guides_that_part_goes_around() -> None:
     fractions = np.array([[1.0, 0.0, 0.0], [0.5, 0.0, 0.5], [0.0, 0.0, 1.0]])
     weights = GuideWeights(np.array([[0, 0, 1]] * 3), fractions)
     rig = Rig(strands, None, guides, lines[guides], weights, None)
-    motion = pipeline.begin(rig, rig.rest_pose)
+    motion = motion_flow.begin(rig, rig.rest_pose)
     before = np.eye(4)
     before[:3, 3] = 0.0, -0.2, -0.25
     settings = DynamicsSettings()
@@ -197,18 +197,18 @@ def test_a_strand_between_guides_that_part_goes_around() -> None:
         now[2, 3] += 0.01
         posed = (PosedCollider(BALL, before, now),)
         pose = Pose(None, np.eye(4))
-        motion = pipeline.advance(rig, motion, pose, posed, settings, np.zeros(3), 1.0 / 30.0)
+        motion = motion_flow.advance(rig, motion, pose, posed, settings, np.zeros(3), 1.0 / 30.0)
         before = now
-        points = pipeline.strands_and_led(rig, motion)[0]
+        points = motion_flow.strands_and_led(rig, motion)[0]
         depth = 0.1 - np.linalg.norm(points - now[:3, 3], axis=1)
         assert depth.max() < 1e-6
         np.testing.assert_allclose(
             steps(points, strands.offsets), steps(strands.points, strands.offsets), atol=1e-6
         )
-    led = pipeline.strands_and_led(rig, motion)[1]
-    unled = pipeline.strands_at(rig, motion.pose, motion.guides)
+    led = motion_flow.strands_and_led(rig, motion)[1]
+    unled = motion_flow.strands_at(rig, motion.pose, motion.guides)
     assert (0.1 - np.linalg.norm(unled - now[:3, 3], axis=1)).max() > 0.005
-    baked = pipeline.strands_at(rig, motion.pose, motion.guides, led)
+    baked = motion_flow.strands_at(rig, motion.pose, motion.guides, led)
     np.testing.assert_array_equal(baked, points)
 
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hairloom.addon import pipeline
+from hairloom.addon import rig_flow
 from hairloom.addon.dynamics.colliders import DistanceField
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.groom.children_settings import ChildrenSettings
 from hairloom.addon.groom.settings import GuideSettings
-from hairloom.addon.pipeline import Rig
 from hairloom.addon.refine.lead_out_at_rest import DEEP, led_out_at_rest
+from hairloom.addon.rig_flow import Rig
 from hairloom.addon.strands import StrandSet, Surface
 from hairloom.addon.strands.arc_length import steps
 
@@ -64,7 +64,7 @@ def strand_set(grid: np.ndarray) -> StrandSet:
 
 def made(ball: Surface, field: DistanceField | None) -> Rig:
     density = (ball.positions[:, 2] > 0.97 * RADIUS).astype(np.float32)
-    return pipeline.prepare(
+    return rig_flow.prepare(
         parted(),
         ball,
         GuideSettings(),

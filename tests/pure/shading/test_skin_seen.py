@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hairloom.addon import pipeline
+from hairloom.addon import light_flow, rig_flow
 from hairloom.addon.groom.settings import GuideSettings
 from hairloom.addon.shading.skin_seen import (
     GAPS,
@@ -208,8 +208,8 @@ def test_light_off_one_normal_is_that_of_a_matt_surface() -> None:
 
 
 def seen_at_rest(strands: StrandSet, head: Surface) -> np.ndarray | None:
-    rig = pipeline.prepare(strands, head, GuideSettings(), place="hair")
-    return pipeline.rest_skin_seen(rig, strands.points, pipeline.strand_axes(strands))
+    rig = rig_flow.prepare(strands, head, GuideSettings(), place="hair")
+    return light_flow.rest_skin_seen(rig, strands.points, light_flow.strand_axes(strands))
 
 
 def test_what_strands_see_turns_with_them() -> None:

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hairloom.addon import pipeline
+from hairloom.addon import rig_flow
 from hairloom.addon.groom.children_settings import ChildrenSettings
 from hairloom.addon.groom.settings import GuideSettings
 from hairloom.addon.strands import StrandSet, Surface
@@ -97,7 +97,7 @@ def test_children_mix_the_colours_of_their_guides(way: str) -> None:
     """By the very weights that they ride on; a third colour is nowhere."""
     children = ChildrenSettings(method=way, strand_count=300)
     settings = GuideSettings(guide_count=100, cv_count=4)
-    rig = pipeline.prepare(halves(), sheet(), settings, place="a wig", children=children)
+    rig = rig_flow.prepare(halves(), sheet(), settings, place="a wig", children=children)
     color = rig.strands.color_grid
     assert color is not None
     own = color[rig.guides, 0].astype(np.float64)
@@ -114,7 +114,7 @@ def test_children_of_a_guide_without_a_colour_have_their_other_guides() -> None:
     none = (np.nan,) * 3
     settings = GuideSettings(guide_count=100, cv_count=4)
     children = ChildrenSettings(method="multi", strand_count=300)
-    rig = pipeline.prepare(halves(RED, none), sheet(), settings, place="wig", children=children)
+    rig = rig_flow.prepare(halves(RED, none), sheet(), settings, place="wig", children=children)
     color = rig.strands.color_grid
     assert color is not None
     is_none = np.isnan(color).any(axis=(1, 2))

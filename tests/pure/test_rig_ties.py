@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hairloom.addon import pipeline
+from hairloom.addon import motion_flow, rig_flow
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.groom.holds import anchors_of
 from hairloom.addon.groom.settings import GuideSettings
 from hairloom.addon.groom.ties import Holders, Tie, TipSurface
-from hairloom.addon.pipeline import Pose, Rig
+from hairloom.addon.rig_flow import Pose, Rig
 from hairloom.addon.strands import StrandSet, Surface
 from hairloom.addon.strands.face import BROWS
 from hairloom.addon.strands.resample import resample
@@ -53,7 +53,7 @@ def rig_of(holders: Holders, **settings: int) -> Rig:
     chosen = GuideSettings(
         **{"guide_count": 40, "cv_count": CV_COUNT, "tip_distance": 0.03, **settings}
     )
-    return pipeline.prepare(ponytail(), None, chosen, place="hair", holders=holders)
+    return rig_flow.prepare(ponytail(), None, chosen, place="hair", holders=holders)
 
 
 def shaking(time: float, turn: float = 25.0) -> np.ndarray:
@@ -95,9 +95,9 @@ def lengths(strands: np.ndarray) -> np.ndarray:
 
 
 def played(rig: Rig, poses: list[Pose], settings: DynamicsSettings, fps: float):
-    motion = pipeline.begin(rig, poses[0])
+    motion = motion_flow.begin(rig, poses[0])
     for pose in poses[1:]:
-        motion = pipeline.advance(rig, motion, pose, (), settings, GRAVITY, 1.0 / fps)
+        motion = motion_flow.advance(rig, motion, pose, (), settings, GRAVITY, 1.0 / fps)
         yield motion
 
 
@@ -125,9 +125,9 @@ def test_all_strands_stay_in_a_ring_that_turns_with_the_head(holders: Holders) -
     poses = [pose_at(rig, shaking(frame / 24.0)) for frame in range(30)]
     rest, swung = lengths(rig.strands.grid), 0.0
     for motion in played(rig, poses, DynamicsSettings(), 24.0):
-        strands = grid(rig, pipeline.strands_and_led(rig, motion)[0])
+        strands = grid(rig, motion_flow.strands_and_led(rig, motion)[0])
         assert escape(rig, motion.pose, strands).max() < 1e-4
-        away = np.abs(strands - grid(rig, pipeline.strands_at_rest(rig, motion.pose)))
+        away = np.abs(strands - grid(rig, motion_flow.strands_at_rest(rig, motion.pose)))
         swung = max(swung, float(away.max()))
         assert np.isfinite(strands).all()
         assert np.abs(lengths(strands) / rest - 1.0).max() < 0.002
@@ -139,7 +139,7 @@ def test_hair_beyond_a_tie_follows_the_tie_and_not_the_head() -> None:
     rig = rig_of(Holders((tie(),)))
     lifted = np.eye(4)
     lifted[2, 3] = 0.02
-    style = pipeline.style_of_guides(rig, pose_at(rig, np.eye(4), lifted))
+    style = motion_flow.style_of_guides(rig, pose_at(rig, np.eye(4), lifted))
     rest = rig.strands.grid[rig.guides]
     held = np.unique(rig.guide_holds.strand)
     np.testing.assert_allclose((style - rest)[held][:, -1], [[0, 0, 0.02]] * len(held), atol=1e-6)
@@ -152,10 +152,10 @@ def test_hair_beyond_a_tie_follows_the_tie_and_not_the_head() -> None:
 def test_hair_at_rest_stays_as_it_is_to_the_last_bit() -> None:
     rig = rig_of(Holders((tie(),), TIPS))
     pose = pose_at(rig, np.eye(4))
-    np.testing.assert_array_equal(pipeline.strands_at_rest(rig, pose), rig.strands.points)
-    guides = pipeline.style_of_guides(rig, pose)
+    np.testing.assert_array_equal(motion_flow.strands_at_rest(rig, pose), rig.strands.points)
+    guides = motion_flow.style_of_guides(rig, pose)
     np.testing.assert_array_equal(guides, rig.strands.grid[rig.guides])
-    np.testing.assert_array_equal(pipeline.strands_at(rig, pose, guides), rig.strands.points)
+    np.testing.assert_array_equal(motion_flow.strands_at(rig, pose, guides), rig.strands.points)
 
 
 def test_a_tie_that_goes_away_in_mid_motion_lets_go() -> None:
@@ -163,7 +163,7 @@ def test_a_tie_that_goes_away_in_mid_motion_lets_go() -> None:
     poses = [pose_at(rig, shaking(frame / 24.0)) for frame in range(24)]
     gone = [replace(pose, anchors=np.full_like(pose.anchors, np.nan)) for pose in poses[12:]]
     motions = list(played(rig, poses[:12] + gone, DynamicsSettings(), 24.0))
-    ends = [grid(rig, pipeline.strands_and_led(rig, motion)[0]) for motion in motions]
+    ends = [grid(rig, motion_flow.strands_and_led(rig, motion)[0]) for motion in motions]
     assert all(np.isfinite(end).all() for end in ends)
     assert escape(rig, poses[11], ends[10]).max() < 1e-4
     assert escape(rig, poses[-1], ends[-1]).max() > 1e-3
@@ -179,7 +179,7 @@ def test_a_tie_that_is_torn_off_leaves_every_length() -> None:
         poses.append(pose_at(rig, np.eye(4), away))
     rest = lengths(rig.strands.grid[rig.guides])
     for motion in played(rig, poses, DynamicsSettings(), 24.0):
-        strands = grid(rig, pipeline.strands_and_led(rig, motion)[0])
+        strands = grid(rig, motion_flow.strands_and_led(rig, motion)[0])
         assert np.isfinite(strands).all()
         assert np.abs(lengths(motion.dynamics.grid) / rest - 1.0).max() < 0.005
 
@@ -200,12 +200,12 @@ def test_a_tie_without_hair_is_said_and_does_no_harm() -> None:
     far = Tie("Scrunchy", shape)
     rig = rig_of(Holders((far,)))
     assert len(rig.notes) == 1 and "Scrunchy" in rig.notes[0]
-    plain = pipeline.prepare(
+    plain = rig_flow.prepare(
         ponytail(), None, GuideSettings(guide_count=40, cv_count=24), place="hair"
     )
     np.testing.assert_array_equal(rig.guides, plain.guides)
     np.testing.assert_array_equal(rig.weights.weight, plain.weights.weight)
-    assert pipeline.held_cvs(rig, pose_at(rig, np.eye(4))) is None
+    assert motion_flow.held_cvs(rig, pose_at(rig, np.eye(4))) is None
 
 
 def test_the_end_of_a_braid_stays_together() -> None:
@@ -225,7 +225,7 @@ def test_the_end_of_a_braid_stays_together() -> None:
     shape[2, 3] = -0.297
     settings = GuideSettings(guide_count=20, cv_count=CV_COUNT)
     ball = Holders((Tie("Band", shape, True),))
-    rig = pipeline.prepare(strands, None, settings, place="braid", holders=ball)
+    rig = rig_flow.prepare(strands, None, settings, place="braid", holders=ball)
     assert rig.holds is not None and len(rig.holds.strand) == 90
     poses = []
     for frame in range(30):
@@ -234,7 +234,7 @@ def test_the_end_of_a_braid_stays_together() -> None:
         poses.append(pose_at(rig, np.eye(4), swung))
     rest = lengths(rig.strands.grid)
     for motion in played(rig, poses, DynamicsSettings(), 24.0):
-        now = grid(rig, pipeline.strands_and_led(rig, motion)[0])
+        now = grid(rig, motion_flow.strands_and_led(rig, motion)[0])
         assert escape(rig, motion.pose, now).max() < 1e-4
         assert np.abs(lengths(now) / rest - 1.0).max() < 0.002
         assert np.linalg.norm(now[:, -1] - now[:, -1].mean(axis=0), axis=1).max() < 0.008
@@ -256,7 +256,7 @@ def test_strange_strands_in_a_tie_do_no_harm() -> None:
     )
     settings = GuideSettings(cv_count=8, tip_distance=0.1)
     holders = Holders((tie(),), TIPS)
-    rig = pipeline.prepare(strands, None, settings, place="hair", holders=holders)
+    rig = rig_flow.prepare(strands, None, settings, place="hair", holders=holders)
     assert rig.holds is not None and len(rig.holds.strand) > 6
     poses = [pose_at(rig, shaking(frame / 24.0)) for frame in range(12)]
     shrunk = np.diag([0.0, 0.0, 0.0, 1.0])
@@ -265,7 +265,7 @@ def test_strange_strands_in_a_tie_do_no_harm() -> None:
         chosen = DynamicsSettings(length_solver=solver)
         for motion in played(rig, poses, chosen, 24.0):
             assert np.isfinite(motion.dynamics.position).all()
-            assert np.isfinite(pipeline.strands_and_led(rig, motion)[0]).all()
+            assert np.isfinite(motion_flow.strands_and_led(rig, motion)[0]).all()
 
 
 def test_brows_go_with_the_face() -> None:
@@ -277,30 +277,30 @@ def test_brows_go_with_the_face() -> None:
     group = np.where(np.arange(6) < 2, BROWS, 0)
     strands = StrandSet(grid.reshape(-1, 3), np.arange(7) * 8, np.full(48, 4e-5), group)
     settings = GuideSettings(guide_count=6, cv_count=8)
-    rig = pipeline.prepare(strands, None, settings, place="hair")
-    motion = pipeline.begin(rig, rig.rest_pose)
+    rig = rig_flow.prepare(strands, None, settings, place="hair")
+    motion = motion_flow.begin(rig, rig.rest_pose)
     for frame in range(12):
         pose = Pose(None, shaking((frame + 1) / 24.0))
-        motion = pipeline.advance(rig, motion, pose, (), DynamicsSettings(), GRAVITY, 1.0 / 24.0)
-        points = pipeline.strands_and_led(rig, motion)[0].reshape(6, 8, 3)
-        off = np.abs(points - pipeline.carried(rig, pose).reshape(6, 8, 3)).max(axis=(1, 2))
+        motion = motion_flow.advance(rig, motion, pose, (), DynamicsSettings(), GRAVITY, 1.0 / 24.0)
+        points = motion_flow.strands_and_led(rig, motion)[0].reshape(6, 8, 3)
+        off = np.abs(points - motion_flow.carried(rig, pose).reshape(6, 8, 3)).max(axis=(1, 2))
         assert off[:2].max() < 1e-6
     assert off[2:].min() > 0.001
-    alone = pipeline.prepare(strands.take(np.arange(2)), None, settings, place="brows")
-    assert pipeline.held_cvs(alone, alone.rest_pose) is None, "hair that is nothing else swings"
+    alone = rig_flow.prepare(strands.take(np.arange(2)), None, settings, place="brows")
+    assert motion_flow.held_cvs(alone, alone.rest_pose) is None, "hair that is nothing else swings"
 
 
 def test_brows_stay_held_where_ties_hold_other_hair() -> None:
     strands = ponytail(60)
     group = np.where(np.arange(60) < 6, BROWS, 0)
-    rig = pipeline.prepare(
+    rig = rig_flow.prepare(
         replace(strands, group=group),
         None,
         GuideSettings(guide_count=40, cv_count=CV_COUNT),
         place="hair",
         holders=Holders((tie(),)),
     )
-    held = pipeline.held_cvs(rig, pose_at(rig, np.eye(4)))
+    held = motion_flow.held_cvs(rig, pose_at(rig, np.eye(4)))
     is_face = rig.strands.group[rig.guides] == BROWS
     assert is_face.any() and held.is_held[is_face].all()
     assert held.is_held[~is_face].any() and not held.is_held[~is_face].all(axis=1).any()

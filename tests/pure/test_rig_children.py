@@ -1,4 +1,4 @@
-"""`pipeline.prepare` with children: what is a guide, what is a child, and what is said."""
+"""`rig_flow.prepare` with children: what is a guide, what is a child, and what is said."""
 
 from dataclasses import replace
 
@@ -7,15 +7,15 @@ import pytest
 from baby_hair import short_strands, wig
 from small_wig import GUIDES, curves, sheet
 
-from hairloom.addon import pipeline
+from hairloom.addon import motion_flow, rig_flow
 from hairloom.addon.card_flow import card_groom
 from hairloom.addon.cards.card_strands import card_strands
 from hairloom.addon.groom.children_settings import ChildrenSettings
 from hairloom.addon.strands import Surface
 
 
-def rig_of(children: ChildrenSettings | None, head: Surface | None) -> pipeline.Rig:
-    return pipeline.prepare(curves(), head, GUIDES, place="a wig", children=children)
+def rig_of(children: ChildrenSettings | None, head: Surface | None) -> rig_flow.Rig:
+    return rig_flow.prepare(curves(), head, GUIDES, place="a wig", children=children)
 
 
 def test_none_is_as_without_the_setting() -> None:
@@ -34,7 +34,7 @@ def test_an_artist_reads_which_curves_are_simulated() -> None:
     )
     more = rig_of(ChildrenSettings(method="multi", strand_count=2000), sheet())
     assert more.guides_line == f"{some.guides_line}. 2,000 children follow, too"
-    few = pipeline.prepare(curves(20), sheet(), GUIDES, place="a wig")
+    few = rig_flow.prepare(curves(20), sheet(), GUIDES, place="a wig")
     assert few.guides_line == "All 20 curves are simulated, with 6 points each"
 
 
@@ -56,12 +56,12 @@ def test_at_rest_nothing_moves_and_each_guide_moves_itself() -> None:
     rig = rig_of(ChildrenSettings(method="multi", strand_count=200), sheet())
     guides = rig.strands.grid[rig.guides]
     np.testing.assert_array_equal(
-        pipeline.strands_at(rig, rig.rest_pose, guides), rig.strands.points
+        motion_flow.strands_at(rig, rig.rest_pose, guides), rig.strands.points
     )
     steps = np.diff(guides, axis=1) + np.random.default_rng(3).normal(0.0, 0.01, (30, 5, 3))
     steps *= lengths(guides) / np.linalg.norm(steps, axis=2, keepdims=True)
     moved = np.concatenate([guides[:, :1], guides[:, :1] + steps.cumsum(axis=1)], axis=1)
-    now = pipeline.strands_at(rig, rig.rest_pose, moved.astype(np.float32))
+    now = motion_flow.strands_at(rig, rig.rest_pose, moved.astype(np.float32))
     now = now.reshape(rig.strands.grid.shape)
     np.testing.assert_allclose(now[rig.guides], moved, atol=1e-6)
     np.testing.assert_allclose(lengths(now), lengths(rig.strands.grid), atol=1e-7)
@@ -78,8 +78,8 @@ def test_a_head_and_guides_that_turn_as_one_turn_all_strands() -> None:
     turn = 2.0 * np.outer(axis, axis) - np.eye(3)
     shift = np.array([2.0, -1.0, 0.5])
     assert rig.head is not None
-    pose = pipeline.Pose((rig.head.positions @ turn.T + shift).astype(np.float32), np.eye(4))
-    now = pipeline.strands_at(rig, pose, (rig.guide_grid @ turn.T + shift).astype(np.float32))
+    pose = rig_flow.Pose((rig.head.positions @ turn.T + shift).astype(np.float32), np.eye(4))
+    now = motion_flow.strands_at(rig, pose, (rig.guide_grid @ turn.T + shift).astype(np.float32))
     error = np.abs(now - (rig.strands.points @ turn.T + shift)).max()
     assert error < 2e-5 * lengths(rig.strands.grid).sum(axis=1).min()
 
@@ -99,10 +99,10 @@ def test_without_a_head_there_are_no_children() -> None:
 def test_low_ranks_are_an_even_sparser_groom() -> None:
     """A quarter of the strands reaches every quarter of the sheet in about its share."""
     for children in (None, ChildrenSettings(method="multi", strand_count=700)):
-        rig = pipeline.prepare(
+        rig = rig_flow.prepare(
             curves(300 if children else 1000), sheet(), GUIDES, place="a wig", children=children
         )
-        rank = pipeline.strand_ranks(rig)
+        rank = rig_flow.strand_ranks(rig)
         assert sorted(rank) == pytest.approx(np.arange(1000) / 1000, abs=4e-3)
         few = rig.strands.roots[rank < 0.25]
         quarter = (few[:, 0] > 0.0) * 2 + (few[:, 1] > 0.0)
@@ -115,15 +115,15 @@ def test_children_keep_their_noise_when_others_come_or_go() -> None:
     """The seeds of the same roots are the same, wherever they stand among all; own ones count."""
     many, few = (ChildrenSettings(method="multi", strand_count=count) for count in (700, 300))
     rig, other = rig_of(many, sheet()), rig_of(few, sheet())
-    own, seeds = rig.own_count, pipeline.strand_seeds(rig)
+    own, seeds = rig.own_count, rig_flow.strand_seeds(rig)
     assert own is not None
     assert (seeds[:own] == np.arange(own)).all()
     assert len(np.unique(seeds[own:])) > 690
     assert seeds.max() < 1 << 24
     shuffled = rig.strands.take(np.append(np.arange(own), own + np.arange(700)[::-1]))
-    turned = pipeline.strand_seeds(replace(rig, strands=shuffled))
+    turned = rig_flow.strand_seeds(replace(rig, strands=shuffled))
     assert (turned[own:] == seeds[own:][::-1]).all()
-    assert (pipeline.strand_seeds(other) == seeds[: own + 300]).all()
+    assert (rig_flow.strand_seeds(other) == seeds[: own + 300]).all()
 
 
 def test_baby_hair_is_fine_where_widths_are_found() -> None:
@@ -132,7 +132,7 @@ def test_baby_hair_is_fine_where_widths_are_found() -> None:
 
     def widths(baby_hair: float) -> tuple[np.ndarray, np.ndarray]:
         children = replace(settings, baby_hair=baby_hair)
-        rig = pipeline.prepare(
+        rig = rig_flow.prepare(
             curves(), sheet(), GUIDES, place="a wig", children=children, widths="found"
         )
         assert rig.widths.is_found
@@ -151,5 +151,5 @@ def test_cards_are_made_from_all_hair_but_baby_hair() -> None:
     np.testing.assert_array_equal(groom.number, np.flatnonzero(~short_strands(rig)))
     expected = card_strands(rig.strands.take(groom.number))
     np.testing.assert_array_equal(groom.strands.points, expected.points)
-    np.testing.assert_array_equal(groom.root_normal, pipeline.root_normals(rig)[groom.number])
+    np.testing.assert_array_equal(groom.root_normal, rig_flow.root_normals(rig)[groom.number])
     np.testing.assert_array_equal(groom.strands.roots[groom.guides], rig.guide_grid[:, 0])

@@ -1,8 +1,8 @@
-"""`pipeline.prepare`: what is said of strands that need more points than there are."""
+"""`rig_flow.prepare`: what is said of strands that need more points than there are."""
 
 import numpy as np
 
-from hairloom.addon import pipeline
+from hairloom.addon import rig_flow
 from hairloom.addon.groom.settings import GuideSettings
 from hairloom.addon.strands import StrandSet
 
@@ -14,7 +14,7 @@ def notes_of(turns: float) -> tuple[str, ...]:
     coil = np.stack([0.008 * np.cos(angle), 0.008 * np.sin(angle), -0.25 * along], axis=1)
     points = (coil[None] + np.array([0.0, 0.1, 0.2])[:, None, None]).reshape(-1, 3)
     strands = StrandSet(points, np.arange(4) * 4000, np.full(12_000, 1e-4), np.zeros(3))
-    return pipeline.prepare(strands, None, GuideSettings(guide_count=3), place="coils").notes
+    return rig_flow.prepare(strands, None, GuideSettings(guide_count=3), place="coils").notes
 
 
 def test_too_many_turns_are_counted_with_what_they_lose() -> None:

@@ -11,7 +11,7 @@ import pytest
 from small_wig import curves, sheet, turned
 from tiers import few_in_commits
 
-from hairloom.addon import pipeline
+from hairloom.addon import rig_flow
 from hairloom.addon.dynamics.colliders import DistanceField
 from hairloom.addon.groom.children_settings import ChildrenSettings
 from hairloom.addon.groom.masks import Masks, SurfaceMask
@@ -85,8 +85,8 @@ def test_it_is_what_is_made_from_nothing(
     kept, field = Kept(), block()
     strands, density = curves(), np.ones(len(HEAD.positions), np.float32)
 
-    def made(kept: dict[str, Kept]) -> pipeline.Rig:
-        return pipeline.prepare(
+    def made(kept: dict[str, Kept]) -> rig_flow.Rig:
+        return rig_flow.prepare(
             strands,
             HEAD,
             GuideSettings(guide_count=guides, cv_count=8),

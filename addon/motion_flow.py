@@ -1,0 +1,407 @@
+"""The flow of a groom in motion: what roots carry, a frame of dynamics, all strands after it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from .arrays import Floats, Ints
+from .dynamics.clearance import GuideClearance, farthest_kept, guide_clearance
+from .dynamics.colliders import PosedCollider
+from .dynamics.constraints import PINNED
+from .dynamics.force_fields import NO_FIELDS, ForceFields
+from .dynamics.held import Held
+from .dynamics.painted import PaintedGuides, simulated_of
+from .dynamics.rigid_path import NOT_MOVED, Carrier, KnownStep
+from .dynamics.settings import DynamicsSettings
+from .dynamics.state import DynamicsState, rows_of, start
+from .dynamics.step import Drive, grid_at_frame_end
+from .dynamics.step import advance as advance_dynamics
+from .dynamics.turn import root_sample, rotation_from
+from .groom.holds import Holds
+from .groom.roots import RootFrames, follow, root_frames, root_motions
+from .refine.hold import hold
+from .refine.lead_out import (
+    NO_LEANS,
+    NOT_LED,
+    Clearance,
+    Leans,
+    LedOut,
+    clearance_at,
+    lead_out,
+)
+from .refine.ride import ride
+from .rig_flow import Pose, Rig
+from .strands.root_motions import RootMotions
+
+#: Guides, about, that tell whether their head has jumped.
+JUMP_GUIDES = 64
+
+
+@dataclass(frozen=True)
+class Motion:
+    """What one frame hands to the next.
+
+    guides: (guide_count, cv_count, 3) [m], simulated, with their roots in this pose.
+    carried_guides: the same without dynamics: their rest shape carried by the roots.
+    carried_earlier: the same one frame earlier; None at the start.
+    duration: of the last frame [s]; 0 at the start.
+    colliders: as they stand at its end.
+    clearance: how far strands stay from these; None before there are any.
+    guide_clearance: the same of guides.
+    leans: how strands were bent that were led out in the frame before.
+    begun: the pose in which it began, in which the dynamics knows the style.
+    """
+
+    dynamics: DynamicsState
+    guides: Floats
+    carried_guides: Floats
+    pose: Pose
+    carried_earlier: Floats | None = None
+    duration: float = 0.0
+    colliders: tuple[PosedCollider, ...] = ()
+    clearance: Clearance | None = None
+    guide_clearance: GuideClearance | None = None
+    leans: Leans = NO_LEANS
+    begun: Pose | None = None
+
+    def drive(
+        self,
+        target: Floats,
+        colliders: tuple[PosedCollider, ...],
+        gravity: Floats,
+        duration: float,
+        force_fields: ForceFields,
+        held: Held | None = None,
+        simulated: Floats | None = None,
+        painted: PaintedGuides | None = None,
+    ) -> Drive:
+        """What acts in a frame of `duration` [s] that carries the guides to `target`."""
+        return Drive(
+            self.carried_guides,
+            target,
+            colliders,
+            gravity,
+            self.carried_earlier if duration else None,
+            force_fields,
+            self.duration / duration if duration else 1.0,
+            held,
+            self.guide_clearance,
+            simulated,
+            painted,
+        )
+
+
+def carried(rig: Rig, pose: Pose) -> Floats:
+    """Rest shapes of all strands, each carried rigidly by its own root, (point_count, 3)."""
+    strands = rig.strands
+    return follow(strands.points, strands.offsets, motions_of(rig, pose))
+
+
+def carried_guides(rig: Rig, pose: Pose, precision: type = np.float32) -> Floats:
+    """The same of the guides, (guide_count, cv_count, 3)."""
+    return _carried_guides(rig, motions_of(rig, pose, rig.guides), precision)
+
+
+def _carried_guides(rig: Rig, motions: RootMotions, precision: type) -> Floats:
+    grid: Floats = rig.guide_grid.astype(precision)
+    offsets = np.arange(len(grid) + 1) * grid.shape[1]
+    return follow(grid.reshape(-1, 3), offsets, motions).reshape(grid.shape)
+
+
+def motions_of(rig: Rig, pose: Pose, chosen: Ints | slice = slice(None)) -> RootMotions:
+    """How the roots of some strands have moved since rest."""
+    if rig.head is None or pose.head_positions is None or rig.rest_frames is None:
+        return RootMotions.of_matrix(pose.matrix)
+    triangle, barycentric = rig.strands.root_triangle, rig.strands.root_barycentric
+    assert triangle is not None and barycentric is not None
+    now = root_frames(
+        pose.head_positions, rig.head.triangles, triangle[chosen], barycentric[chosen]
+    )
+    rest = RootFrames(rig.rest_frames.origin[chosen], rig.rest_frames.rotation[chosen])
+    return root_motions(rest, now)
+
+
+def style_of_guides(rig: Rig, pose: Pose) -> Floats:
+    """Rest shapes of the guides, carried by their roots and by what holds them, (guide_count,
+    cv_count, 3)."""
+    by_root = carried_guides(rig, pose)
+    holds = held_guides(rig, pose)
+    if holds is None or pose.anchors is None:
+        return by_root
+    return holds.carried(rig.guide_grid, by_root, pose.anchors)
+
+
+def held_guides(rig: Rig, pose: Pose) -> Holds | None:
+    """Where the guides are held in this pose; None: nowhere."""
+    holds = None if rig.guide_holds is None else rig.guide_holds.where(pose.anchors)
+    return None if holds is None or not len(holds.strand) else holds
+
+
+def held_cvs(rig: Rig, pose: Pose) -> Held | None:
+    """The same by CVs, as the dynamics takes it, with brows and lashes, which go with the face."""
+    holds = held_guides(rig, pose)
+    if holds is None:
+        return rig.held_face
+    is_held = holds.held_cvs(*rig.guide_grid.shape[:2])
+    return Held(is_held if rig.held_face is None else is_held | rig.held_face.is_held)
+
+
+def begin(rig: Rig, pose: Pose) -> Motion:
+    """Hair at rest in this pose."""
+    guides = style_of_guides(rig, pose)
+    state = start(guides, rig.curl_room, rig.strands_of_guides)
+    return Motion(state, guides, guides, pose, begun=pose)
+
+
+def with_style(rig: Rig, motion: Motion) -> Motion:
+    """A running motion whose guides return to the shapes and the lengths that this rig has.
+
+    Args:
+        rig: the same groom as before with curves of other shapes, see `style_flow`.
+    """
+    state, begun = motion.dynamics, motion.begun or motion.pose
+    style = start(style_of_guides(rig, begun), rig.curl_room, rig.strands_of_guides)
+    # distances in the settings stay what they are
+    rest = replace(style.rest, size=state.rest.size)
+    return replace(motion, dynamics=replace(state, rest=rest))
+
+
+def advance(
+    rig: Rig,
+    motion: Motion,
+    pose: Pose,
+    colliders: tuple[PosedCollider, ...],
+    settings: DynamicsSettings,
+    gravity: Floats,
+    duration: float,
+    force_fields: ForceFields = NO_FIELDS,
+    led: LedOut = NOT_LED,
+    painted: PaintedGuides | None = None,
+) -> Motion:
+    """One frame of motion: the roots go with the head, the dynamics moves the rest.
+
+    Args:
+        gravity: (3,) [m/s^2], world space.
+        duration: time since the motion's pose [s].
+        force_fields: of the scene.
+        led: the strands that were led out at this moment of the motion: from how they were bent
+            the next frame's are led.
+        painted: by what settings are multiplied at each guide; None: nothing is painted.
+    """
+    simulated = simulated_of(painted, settings, len(rig.guides))
+    target = style_of_guides(rig, pose)
+    motion = with_clearance(rig, motion, colliders, settings, simulated)
+    held = held_cvs(rig, pose)
+    drive = motion.drive(
+        target, colliders, gravity, duration, force_fields, held, simulated, painted
+    )
+    state = advance_dynamics(motion.dynamics, drive, settings, duration)
+    guides, before = grid_at_frame_end(state, drive, settings, duration), motion.carried_guides
+    return Motion(
+        state,
+        guides,
+        target,
+        pose,
+        before,
+        duration,
+        colliders,
+        motion.clearance,
+        motion.guide_clearance,
+        led.leans,
+        motion.begun,
+    )
+
+
+def has_jumped(
+    rig: Rig, motion: Motion, pose: Pose, settings: DynamicsSettings, duration: float
+) -> bool:
+    """Whether the head is elsewhere all of a sudden, as at a cut: since the motion's pose
+    it has gone much farther than in the frame before, or has turned far.
+
+    In the frame after a jump nobody can tell, as the speed is not known.
+    """
+    is_first = not motion.duration
+    if (motion.carried_earlier is None and not is_first) or not len(rig.guides):
+        return False
+    chosen = np.arange(0, len(rig.guides), max(len(rig.guides) // JUMP_GUIDES, 1))
+    roots = rig.guide_grid[chosen, :PINNED]
+    offsets = np.arange(len(chosen) + 1) * roots.shape[1]
+    motions = motions_of(rig, pose, rig.guides[chosen])
+    now = follow(roots.reshape(-1, 3), offsets, motions).reshape(-1, 3).astype(np.float64)
+    before = motion.carried_guides[chosen, :PINNED].reshape(-1, 3).astype(np.float64)
+    here = before.mean(axis=0)
+    displacement = now.mean(axis=0) - here
+    if motion.carried_earlier is not None:
+        earlier = motion.carried_earlier[chosen, :PINNED].reshape(-1, 3).mean(axis=0)
+        displacement = displacement - (here - earlier) * (duration / motion.duration)
+    extent = float(np.linalg.norm(np.ptp(rig.guide_grid.reshape(-1, 3), axis=0)))
+    if 0.0 < settings.jump_distance * extent < float(np.linalg.norm(displacement)):
+        return True
+    turn = rotation_from((before - here).T, np.ascontiguousarray(now.T))
+    angle = math.acos(min(max((float(np.trace(turn)) - 1.0) / 2.0, -1.0), 1.0))
+    return 0.0 < settings.jump_turn < angle
+
+
+def go_along(
+    rig: Rig,
+    motion: Motion,
+    pose: Pose,
+    colliders: tuple[PosedCollider, ...],
+    duration: float,
+) -> Motion:
+    """A frame in which hair goes along with its roots as it is, each guide rigidly.
+
+    Args:
+        duration: [s] of a jump, after which hair has no speed; 0: hair is frozen, and goes on with
+            the speed that it had.
+    """
+    target, state = style_of_guides(rig, pose), motion.dynamics
+    turn = root_turns(rig, pose) @ np.linalg.pinv(root_turns(rig, motion.pose))
+    root = state.grid[:, :1]
+
+    def taken_along(rows: Floats) -> Floats:
+        grid = rows.transpose(2, 1, 0)
+        moved = np.einsum("nij,nkj->nki", turn, grid - root) + target[:, :1]
+        return rows_of(moved.astype(np.float32), "dynamics")
+
+    position = taken_along(state.position)
+    previous = position if duration else taken_along(state.previous)
+    carried = NOT_MOVED
+    if not duration:
+        roots = Carrier.through(root_sample(motion.carried_guides), root_sample(target))
+        before, now = (place.turned(roots.path.now.rotation) for place in state.carried.places)
+        # hair goes to where its roots are at the frame's end
+        begun = replace(before, shift=before.shift - now.shift)
+        carried = KnownStep((begun, replace(now, shift=np.zeros(3))))
+    state = replace(
+        state, position=position, previous=previous, styles=(), push=None, carried=carried
+    )
+    return Motion(
+        state,
+        state.grid,
+        target,
+        pose,
+        None,
+        duration or motion.duration,
+        colliders,
+        motion.clearance,
+        motion.guide_clearance,
+        begun=motion.begun,
+    )
+
+
+def with_clearance(
+    rig: Rig,
+    motion: Motion,
+    colliders: tuple[PosedCollider, ...],
+    settings: DynamicsSettings,
+    simulated: Floats | None = None,
+) -> Motion:
+    """The motion that knows how far hair stays from colliders, from the first frame with any on.
+
+    Guides stay as far as their radius says, strands as far as guides do at their roots, but
+    neither farther than they were at that frame's begin, in their style and as their roots
+    carried them. Strands of which nothing is simulated go where their style goes.
+    """
+    size = motion.dynamics.rest.size
+    kept, reach = settings.radius_root * size, farthest_kept(settings, size)
+    before = tuple(posed.at_begin() for posed in colliders)
+    strands, guides = motion.clearance, motion.guide_clearance
+    if simulated is not None and not simulated.any():
+        strands = None
+    elif colliders and (strands is None or strands.kept != kept):
+        strands = strand_clearance(rig, motion.pose, before, kept)
+    if colliders and (guides is None or guides.reach != reach):
+        guides = guide_clearance(motion.carried_guides, before, reach)
+    return replace(motion, clearance=strands, guide_clearance=guides)
+
+
+def strand_clearance(
+    rig: Rig, pose: Pose, colliders: tuple[PosedCollider, ...], kept: float
+) -> Clearance:
+    """How far strands stay from colliders that stand still, by where their roots carry them now.
+
+    Args:
+        kept: [m], at most.
+    """
+    # of an unmoved rig what `carried` would give, bit for bit
+    points = rig.strands.points if _is_unmoved(rig, pose) else carried(rig, pose)
+    return clearance_at(points, rig.strands.offsets, colliders, kept)
+
+
+def strands_and_led(rig: Rig, motion: Motion) -> tuple[Floats, LedOut]:
+    """All strands at this moment of a running motion, (point_count, 3) [m], and those of them that
+    were led out of colliders."""
+    pose, offsets = motion.pose, rig.strands.offsets
+    points, motions = _ridden(rig, pose, motion.guides)
+    if motion.clearance is None:
+        return held_strands(rig, pose, points), NOT_LED
+    carry = partial(motions.carried, rig.strands.points)
+    leans = motion.leans.after(motion.duration, offsets)
+    led, leans = lead_out(points, carry, offsets, motion.colliders, motion.clearance, leans)
+    points = held_strands(rig, pose, points)
+    return points, LedOut.of(led, points, offsets, leans)
+
+
+def strands_at(rig: Rig, pose: Pose, guides_now: Floats, led: LedOut = NOT_LED) -> Floats:
+    """All strands riding on guides, (point_count, 3) [m], world space.
+
+    Args:
+        guides_now: (guide_count, cv_count, 3) [m], simulated or baked, world space.
+        led: strands that were led out of colliders.
+    """
+    points = _ridden(rig, pose, guides_now)[0]
+    points = held_strands(rig, pose, points)
+    led.put(points, rig.strands.offsets)
+    return points
+
+
+def _ridden(rig: Rig, pose: Pose, guides_now: Floats) -> tuple[Floats, RootMotions]:
+    """All strands riding on guides, and how their roots have moved."""
+    motions = motions_of(rig, pose)
+    # as precise as the guides are, so that those which their roots carry turn by exactly nothing
+    by_roots = _carried_guides(rig, motions.of(rig.guides), guides_now.dtype.type)
+    return ride(rig.strands.points, rig.riders, by_roots, guides_now, motions), motions
+
+
+def strands_at_rest(rig: Rig, pose: Pose) -> Floats:
+    """All strands in their style, in the shape of `strands_at`."""
+    if rig.holds is None and _is_unmoved(rig, pose):
+        return rig.strands.points  # as `carried` would, bit for bit
+    if held_guides(rig, pose) is None:
+        return held_strands(rig, pose, carried(rig, pose))  # guides at rest move nothing
+    return strands_at(rig, pose, style_of_guides(rig, pose))
+
+
+def _is_unmoved(rig: Rig, pose: Pose) -> bool:
+    """Whether the body is where it was when the rig was made."""
+    if rig.head is None or pose.head_positions is None:
+        return np.array_equal(pose.matrix, np.eye(4))
+    return np.array_equal(pose.head_positions, rig.head.positions)
+
+
+def held_strands(rig: Rig, pose: Pose, points: Floats) -> Floats:
+    """Strands (point_count, 3) that ride, brought to where they are held; in place."""
+    holds = None if rig.holds is None else rig.holds.where(pose.anchors)
+    if holds is None or pose.anchors is None or not len(holds.strand):
+        return points
+    hold(points, rig.strands.points, rig.strands.offsets, holds, pose.anchors)
+    return points
+
+
+def root_turns(rig: Rig, pose: Pose) -> Floats:
+    """How the body has turned the root of each guide since rest, (guide_count, 3, 3)."""
+    count, frames = len(rig.guides), rig.rest_frames
+    if rig.head is None or pose.head_positions is None or frames is None:
+        return np.broadcast_to(pose.matrix[:3, :3], (count, 3, 3))
+    triangle, barycentric = rig.strands.root_triangle, rig.strands.root_barycentric
+    assert triangle is not None and barycentric is not None
+    now = root_frames(
+        pose.head_positions, rig.head.triangles, triangle[rig.guides], barycentric[rig.guides]
+    )
+    turns: Floats = now.rotation @ frames.rotation[rig.guides].transpose(0, 2, 1)
+    return turns

@@ -1,0 +1,546 @@
+"""The flow of a groom that is made ready to move: roots, children, guides, weights, and what each
+strand needs to be drawn."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+
+from .arrays import Bools, Floats, Ints
+from .dynamics.colliders import DistanceField
+from .dynamics.held import Held
+from .errors import HairloomError
+from .groom.automatic_children import are_few, automatic
+from .groom.children import (
+    CHILD_POINTS,
+    FEWEST_CHILD_POINTS,
+    Children,
+    Growth,
+    make_children,
+)
+from .groom.children_settings import ChildrenSettings
+from .groom.counter_random import named, uniform
+from .groom.guides import choose_guides, grouped
+from .groom.holds import Holds
+from .groom.masks import NO_MASKS, Masks
+from .groom.partings import Partings
+from .groom.roots import RootFrames, RootHolds, bind_roots, root_frames
+from .groom.settings import GuideSettings
+from .groom.ties import NO_HOLDERS, Holders, find_holds, idle
+from .groom.weights import GuideWeights, guide_weights
+from .groom.widths import Widths, with_widths
+from .refine.lead_out_at_rest import led_out_at_rest
+from .refine.ride import Riders
+from .refine.thinning import even_ranks
+from .shading.strand_noise import SEED_LIMIT
+from .strands import StrandSet, Surface
+from .strands.arc_length import typical
+from .strands.center_lines import center_lines, curl_room
+from .strands.face import is_face_hair
+from .strands.join import joined
+from .strands.kept import NOTHING_KEPT, Kept
+from .strands.needed_points import LOST, MAX_POINTS, with_needed_points, with_own_points
+from .strands.resample import resample
+
+#: Of children that cannot be led out of the head, the part from which on a note says so.
+MANY_INSIDE = 0.01
+
+
+@dataclass(frozen=True)
+class Pose:
+    """Where the body is at one moment.
+
+    head_positions: (vertex_count, 3) [m], world space, or None for hair without a head.
+    matrix: (4, 4), moves rest world space to now; carries hair without a head, and colliders.
+    anchors: what holds hair beside its roots, see `groom.holds.anchors_of`; None: nothing does.
+    """
+
+    head_positions: Floats | None
+    matrix: Floats
+    anchors: Floats | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Grown:
+    """How the children of a rig have grown, so that those of combed curves can be shaped again.
+
+    parents: which of the artist's own strands they grew between. shapes: these, of one point count.
+    kept: which of the children that grew the rig has.
+    """
+
+    growth: Growth
+    parents: Ints
+    shapes: StrandSet
+    kept: Ints
+
+
+@dataclass(frozen=True)
+class Rig:
+    """A groom made ready to move: all strands, their guides and weights.
+
+    strands: as many points as each needs, world space at rest; bound when there is a head.
+    guides: (guide_count,) indices of the strands that are simulated.
+    guide_grid: (guide_count, cv_count, 3) [m], their centre lines, which are simulated.
+    rest_frames: of all strands, or None without a head.
+    notes: what the artist should know, each with its remedy.
+    own_count: how many strands, the first ones, are the artist's own; children follow in the order
+        in which they are grown. None: all.
+    widths: how wide the strands are, and why.
+    children_line: what automatic children there are, and why; empty where there are none.
+    holds: where strands are held by ties or by a surface; None: nowhere.
+    grown: how its children have grown; None without any, and where it comes from a bake.
+    baked_baby_hair: which strands are baby hair where it comes from a bake.
+    """
+
+    strands: StrandSet
+    head: Surface | None
+    guides: Ints
+    guide_grid: Floats
+    weights: GuideWeights
+    rest_frames: RootFrames | None
+    notes: tuple[str, ...] = ()
+    own_count: int | None = None
+    widths: Widths = field(default_factory=Widths)
+    children_line: str = ""
+    holds: Holds | None = None
+    grown: Grown | None = None
+    baked_baby_hair: Ints = field(default_factory=lambda: np.zeros(0, np.int32))
+
+    @property
+    def baby_hair(self) -> Ints:
+        """Which strands are short and fine hair of the hairline and of partings."""
+        if self.grown is None or self.own_count is None:
+            return self.baked_baby_hair
+        return self.own_count + np.flatnonzero(self.grown.growth.is_baby[self.grown.kept])
+
+    @property
+    def guides_line(self) -> str:
+        """Which curves are simulated and which follow, for an artist."""
+        own, guides = self.strands.strand_count - self.child_count, len(self.guides)
+        points = f"with {self.guide_grid.shape[1]} points each"
+        if guides == own:
+            line = f"All {own:,} curves are simulated, {points}"
+        else:
+            line = f"{guides:,} of {own:,} curves are simulated, {points}; the others follow"
+        if not self.child_count:
+            return line
+        return f"{line}. {self.child_count:,} children follow, too"
+
+    @cached_property
+    def guide_holds(self) -> Holds | None:
+        """The same of the guides alone, numbered as these, along their centre lines."""
+        if self.holds is None:
+            return None
+        own, cv_count = self.holds.of(self.guides), self.guide_grid.shape[1]
+        return own.on_lines(self.strands.take(self.guides), cv_count)
+
+    @cached_property
+    def held_face(self) -> Held | None:
+        """All of the brows and lashes among other hair: so short, they are too stiff to swing."""
+        is_face = is_face_hair(self.strands.group)
+        chosen = is_face[self.guides] & ~is_face.all()
+        if not chosen.any():
+            return None
+        return Held(np.repeat(chosen[:, None], self.guide_grid.shape[1], axis=1))
+
+    @cached_property
+    def curl_room(self) -> Floats | None:
+        """How much the curls of guides have to give, see `center_lines.curl_room`."""
+        return curl_room(self.strands.take(self.guides).lengths(), self.guide_grid)
+
+    @cached_property
+    def strands_of_guides(self) -> Floats:
+        """How many strands each guide stands for, (guide_count,): their parts that ride on it."""
+        guide, weight = self.weights.guide.ravel(), self.weights.weight.ravel()
+        return np.bincount(guide, weight, len(self.guides))
+
+    @property
+    def child_count(self) -> int:
+        own = self.own_count
+        return 0 if own is None else self.strands.strand_count - own
+
+    @cached_property
+    def root_holds(self) -> RootHolds | None:
+        """Which of the head's vertices hold roots; None without a head."""
+        return None if self.head is None else RootHolds.of(self.strands, self.head)
+
+    @property
+    def root_vertices(self) -> Ints:
+        """The head's vertices that hold roots, ascending; none without a head."""
+        return np.zeros(0, np.int32) if self.root_holds is None else self.root_holds.vertices
+
+    @cached_property
+    def riders(self) -> Riders:
+        return Riders.of(self.strands, self.guide_grid, self.weights, self.curl_room)
+
+    @cached_property
+    def rest_lengths(self) -> Floats:
+        """Of all strands, (strand_count,) [m]."""
+        return self.strands.lengths()
+
+    @property
+    def rest_pose(self) -> Pose:
+        return Pose(None if self.head is None else self.head.positions, np.eye(4))
+
+
+def prepare(
+    strands: StrandSet,
+    head: Surface | None,
+    settings: GuideSettings,
+    *,
+    place: str,
+    children: ChildrenSettings | None = None,
+    density: Floats | None = None,
+    masks: Masks = NO_MASKS,
+    widths: str = "own",
+    holders: Holders = NO_HOLDERS,
+    partings: Floats | None = None,
+    head_field: Callable[[], DistanceField | None] = lambda: None,
+    kept: Kept = NOTHING_KEPT,
+    is_animated: bool = False,
+) -> Rig:
+    """Bind strands to the head, choose the guides, weigh them for every strand, find all widths,
+    and what is held.
+
+    Args:
+        strands: world space at rest.
+        head: world space at rest, or None for hair that only follows its object.
+        place: names the groom in error messages.
+        children: None is none.
+        density: (vertex_count,) how densely children grow; None: wherever guides are near.
+        masks: by what the settings of children are multiplied on the head.
+        widths: one of `groom.widths.METHODS`.
+        holders: ties and a surface of tips, at rest.
+        partings: (n, 2, 3) [m] the straight pieces of lines on the head, at rest; None: no line.
+        head_field: is called if there are children: what they are led out of; None: of nothing.
+        kept: of the groom that was made last, which may be the same but for what an artist combs
+            or paints; it changes nothing but the time.
+        is_animated: whether the strands will have other shapes, so that all keep their own points.
+
+    Raises:
+        HairloomError: no strands, or a groom of another scale than the head.
+    """
+    if not strands.strand_count:
+        raise HairloomError(
+            "it has no strands that can be used", place=place, remedy="Choose hair that has strands"
+        )
+    bound, away = strands, 0.0
+    if head is not None:
+        held = bind_roots(strands, head, place=place)
+        bound, away = held.strands, held.looseness(head)
+    if is_animated:
+        own = with_own_points(bound, settings.cv_count)
+    else:
+        own = with_needed_points(bound, settings.cv_count)
+    lines = center_lines(bound, settings.cv_count)
+    reach = settings.tip_distance * _hair_length(own) if holders else 0.0
+    holds = find_holds(own, holders, reach)
+    kind = None if holds is None else holds.kinds(own.strand_count)
+    guides = choose_guides(lines, settings, kind)
+    guide_lines = lines.take(guides)
+    parted = None
+    if partings is not None and len(partings) and head is not None:
+        parted = Partings.of(partings, head)
+    guide_kind = None if kind is None else kind[guides]
+    weights = _weights(lines, guide_lines, kind, guide_kind, parted)
+    notes = (*_loose(away), *_lost_length(bound, own))
+    rig = Rig(own, head, guides, guide_lines.grid, weights, _frames(own, head), notes)
+    ground = _Ground(density, masks, parted, head_field, kept, is_animated)
+    if children is not None and children.method == "auto":
+        rig = _automatic(rig, children, ground, widths, place)
+    else:
+        if children is not None and children.method != "none":
+            rig = _with_children(rig, children, ground, place)
+        strands, found = with_widths(
+            rig.strands, widths, number=_numbers(rig), fineness=_fineness(rig), kept=kept
+        )
+        rig = replace(rig, strands=strands, widths=found)
+    if holds is None:
+        return rig
+    if rig.child_count:
+        holds = find_holds(rig.strands, holders, reach)
+    assert holds is not None
+    return replace(rig, holds=holds, notes=(*rig.notes, *idle(holds, holders)))
+
+
+def _loose(away: float) -> tuple[str, ...]:
+    """A note on roots that lie so far [m] from the surface; none where that is 0."""
+    if not away:
+        return ()
+    return (
+        f"its roots lie {1e3 * away:.3g} mm from the surface (median), so they move beside it. "
+        "Check unit, up axis and place of both, or press Snap to Surface.",
+    )
+
+
+@dataclass(frozen=True)
+class _Ground:
+    """What matters to children beside the artist's strands; the arguments of `prepare`."""
+
+    density: Floats | None
+    masks: Masks
+    partings: Partings | None
+    field: Callable[[], DistanceField | None]
+    kept: Kept
+    is_animated: bool
+
+
+def _numbers(rig: Rig) -> Ints | None:
+    """Which strands a rig has of those that it would have if no child were left out; None: all."""
+    if rig.grown is None or rig.own_count is None:
+        return None
+    return np.concatenate([np.arange(rig.own_count), rig.own_count + rig.grown.kept])
+
+
+def _fineness(rig: Rig) -> Floats | None:
+    """How wide each strand is in terms of the hair around it, (strand_count,); None: as that."""
+    if rig.grown is None or rig.own_count is None:
+        return None
+    return np.append(np.ones(rig.own_count), rig.grown.growth.fineness[rig.grown.kept])
+
+
+def _lost_length(strands: StrandSet, own: StrandSet) -> tuple[str, ...]:
+    """What is said where strands have not as many points as they need."""
+    kept = own.lengths() / np.maximum(strands.lengths(), np.float32(1.0e-30))
+    lost = 1.0 - kept[kept < 1.0 - LOST]
+    if not len(lost):
+        return ()
+    note = (
+        f"{len(lost):,} strands need more than {MAX_POINTS} points. They have that many, and lose"
+        f" up to {100.0 * float(lost.max()):.1f} % of their length. Use fewer turns."
+    )
+    return (note,)
+
+
+def _hair_length(strands: StrandSet) -> float:
+    return typical(strands.lengths())
+
+
+def _automatic(
+    rig: Rig,
+    settings: ChildrenSettings,
+    ground: _Ground,
+    widths: str,
+    place: str,
+) -> Rig:
+    """With as many children as cover the body, each as wide as the strands around it: those stand
+    for so much less.
+    """
+    hair = rig.strands.take(_parents(rig.strands))
+    settings, parts = automatic(hair, settings)
+    count, line = hair.strand_count, ""
+    if are_few(hair):
+        line = (
+            f"Children: none, since {count:,} curves may be guides or a part of the hair. Set"
+            " Method to Between Guides to fill the space between them"
+        )
+    if parts > 1.0 and rig.head is None:
+        parts, line = 1.0, "Children: none, since the hair has no surface on which they could grow"
+    own, found = with_widths(rig.strands, widths, parts, kept=ground.kept)
+    rig = replace(rig, strands=own, widths=found)
+    if parts > 1.0:
+        with_children = _with_children(rig, settings, ground, place)
+        rig = replace(with_children, widths=found)
+        line = (
+            f"Children: {rig.child_count:,} added, since {count:,} curves are too few for a body of"
+            " hair. Set Method to None to see the curves alone"
+        )
+    return replace(rig, children_line=line)
+
+
+def _weights(
+    strands: StrandSet,
+    guides: StrandSet,
+    kind: Ints | None = None,
+    guide_kind: Ints | None = None,
+    partings: Partings | None = None,
+) -> GuideWeights:
+    """Strands that are held follow guides that are held by the same."""
+    group, guide_group = strands.group, guides.group
+    if kind is not None and guide_kind is not None:
+        both = grouped(np.append(group, guide_group), np.append(kind, guide_kind))
+        group, guide_group = both[: len(kind)], both[len(kind) :]
+    return guide_weights(
+        strands.roots,
+        group,
+        guides.roots,
+        guide_group,
+        strand_grid=strands.grid,
+        guide_grid=guides.grid,
+        partings=partings,
+    )
+
+
+def _with_children(
+    rig: Rig,
+    settings: ChildrenSettings,
+    ground: _Ground,
+    place: str,
+) -> Rig:
+    """The artist's own strands, and children grown between them."""
+    own, head, kept = rig.strands, rig.head, ground.kept
+    if head is None:
+        note = (
+            "Children need a surface to grow from, so there are none. Give the hair a surface, or "
+            "set Children to None."
+        )
+        return replace(rig, notes=(*rig.notes, note))
+    parents, cv_count = _parents(own), rig.guide_grid.shape[1]
+    shapes, notes = _parent_shapes(own.take(parents), settings.strand_count)
+    made = make_children(
+        shapes,
+        head,
+        settings,
+        ground.density,
+        ground.partings,
+        ground.masks.of(parents),
+        place=place,
+        kept=kept,
+    )
+    made, chosen = _outside(made, ground.field(), _hair_length(shapes), kept)
+    if ground.is_animated:
+        children = with_own_points(made.strands, cv_count)
+    else:
+        children = with_needed_points(made.strands, cv_count, kept=kept)
+    strands = joined(own, children)
+    if len(rig.guides) < own.strand_count:
+        # shaped by their neighbours among all strands, they move as guides do
+        lines = center_lines(own.take(rig.guides), cv_count)
+        weights = _weights(_lines(made.strands, cv_count, kept), lines, partings=ground.partings)
+    else:
+        weights = replace(made.weights, guide=parents[made.weights.guide])
+    return Rig(
+        strands,
+        head,
+        rig.guides,
+        rig.guide_grid,
+        GuideWeights(
+            np.concatenate([rig.weights.guide, weights.guide]),
+            np.concatenate([rig.weights.weight, weights.weight]),
+        ),
+        _frames(strands, head),
+        (*rig.notes, *made.notes, *notes),
+        own_count=own.strand_count,
+        grown=Grown(made.growth, parents, shapes, chosen),
+    )
+
+
+def _lines(children: StrandSet, cv_count: int, kept: Kept) -> StrandSet:
+    """The centre lines of children, which are of one point count; their widths do not matter."""
+
+    def of(some: Ints) -> tuple[Floats]:
+        return (center_lines(children.take(some), cv_count).grid,)
+
+    (grid,) = kept.rows("lines", (cv_count,), (children.grid,), of)
+    return StrandSet(
+        grid.reshape(-1, 3),
+        np.arange(len(grid) + 1) * cv_count,
+        np.ones(len(grid) * cv_count),
+        children.group,
+    )
+
+
+def _outside(
+    made: Children, head: DistanceField | None, length: float, kept: Kept
+) -> tuple[Children, Ints]:
+    """Children that are led out of the head, without those that nothing leads out, and which of
+    all these are.
+
+    Args:
+        length: the hair's [m].
+    """
+    if head is None:
+        return made, np.arange(made.strands.strand_count)
+
+    def led_out(some: Ints) -> tuple[Floats, Bools]:
+        led, is_out = led_out_at_rest(made.strands.take(some), head, length)
+        return led.grid, is_out
+
+    grid, is_out = kept.rows("led out", (head, length), (made.strands.grid,), led_out)
+    led = made.strands.with_points(grid.reshape(-1, 3))
+    chosen, lost = np.flatnonzero(is_out), int((~is_out).sum())
+    notes = made.notes
+    if lost > MANY_INSIDE * len(is_out):
+        notes += (
+            f"{lost:,} of {len(is_out):,} children would lie in the surface, so they are left out."
+            " Comb the curves around them farther out.",
+        )
+    weights = GuideWeights(made.weights.guide[chosen], made.weights.weight[chosen])
+    return Children(led.take(chosen), weights, notes, made.growth), chosen
+
+
+def _parent_shapes(parents: StrandSet, child_count: int) -> tuple[StrandSet, tuple[str, ...]]:
+    """What children are mixed from, which takes equally many points: as many as the parent has
+    that has most, as long as all children have room for them.
+    """
+    needed = int(parents.point_counts.max(initial=2))
+    count = min(needed, max(CHILD_POINTS // max(child_count, 1), FEWEST_CHILD_POINTS))
+    if count >= needed:
+        return resample(parents, needed), ()
+    shapes = resample(parents, count)
+    kept = shapes.lengths().sum(dtype=np.float64) / parents.lengths().sum(dtype=np.float64)
+    note = (
+        f"{child_count:,} children of {needed} points do not fit into memory, so they have {count},"
+        f" and {100.0 * (1.0 - kept):.1f} % of the length of curls is lost. Use fewer children."
+    )
+    return shapes, (note,)
+
+
+def _parents(own: StrandSet) -> Ints:
+    """Which strands children grow between: of a head of hair, not its brows and lashes."""
+    is_face = is_face_hair(own.group)
+    return np.flatnonzero(~is_face | is_face.all()).astype(np.int32)
+
+
+def _frames(strands: StrandSet, head: Surface | None) -> RootFrames | None:
+    if head is None:
+        return None
+    assert strands.root_triangle is not None and strands.root_barycentric is not None
+    return root_frames(
+        head.positions, head.triangles, strands.root_triangle, strands.root_barycentric
+    )
+
+
+def strand_ranks(rig: Rig) -> Floats:
+    """Where each strand stands in an even order, (strand_count,) in 0 to 1: the strands of low
+    rank alone are the same hair, only sparser.
+
+    The artist's own strands and children each keep their share. Children come in the order in
+    which they were grown, which is such an order: one more of them changes no other's rank by much.
+    """
+    count = rig.strands.strand_count
+    own = count - rig.child_count
+    ranks = np.empty(count, np.float32)
+    ranks[:own] = even_ranks(rig.strands.roots[:own])
+    ranks[own:] = np.arange(rig.child_count) / max(rig.child_count, 1)
+    return ranks
+
+
+def strand_seeds(rig: Rig) -> Ints:
+    """What the noise of each strand depends on, (strand_count,) whole numbers below 2^24.
+
+    A child's is named by the place of its root, so that it keeps its own colour when another one
+    comes or goes.
+    """
+    strands = rig.strands
+    seeds = np.arange(strands.strand_count)
+    own = strands.strand_count - rig.child_count
+    if rig.child_count:
+        assert strands.root_triangle is not None and strands.root_barycentric is not None
+        place = strands.root_barycentric[own:].view(np.uint32)
+        key = named(strands.root_triangle[own:], place[:, 0], place[:, 1])
+        seeds[own:] = uniform(key, 0) * SEED_LIMIT
+    return seeds % SEED_LIMIT
+
+
+def root_normals(rig: Rig) -> Floats:
+    """The surface's normal under each root, (strand_count, 3); without a head, outwards."""
+    if rig.rest_frames is not None:
+        return np.ascontiguousarray(rig.rest_frames.rotation[:, :, 2])
+    outward = rig.strands.roots - rig.strands.points.mean(axis=0)
+    length = np.linalg.norm(outward, axis=1, keepdims=True)
+    up = np.array([0.0, 0.0, 1.0], np.float32)
+    return np.where(length > 0.0, outward / np.maximum(length, 1e-12), up).astype(np.float32)
