@@ -266,22 +266,19 @@ class Head:
         return rooted.of(self.strands(roots, locks, group), self.surface)
 
 
-def waved(
-    locks: np.ndarray, roots: Roots, height: np.ndarray, length: float, phase: np.ndarray
-) -> np.ndarray:
-    """Locks with waves that turn around them, as long hair has.
+def waved(locks: np.ndarray, height: np.ndarray, length: float, phase: np.ndarray) -> np.ndarray:
+    """Locks with waves that turn around them, as long hair has; those that lie over each other
+    wave at the same heights.
 
     Args:
         height: of the waves at each point from root to tip (cv_count,) [m].
         length: of one wave [m].
         phase: of each lock (n,) [rad].
     """
-    steps = np.linalg.norm(np.diff(locks, axis=1), axis=2)
-    reached = np.concatenate([np.zeros((len(locks), 1)), np.cumsum(steps, axis=1)], axis=1)
     ahead = unit(np.gradient(locks, axis=1))
     out = unit(locks * (1.0, 1.0, 0.0))
     across = unit(np.cross(ahead, out))
-    turn = 2.0 * np.pi * reached / length + phase[:, None]
+    turn = phase[:, None] - 2.0 * np.pi * locks[..., 2] / length
     offset = np.cos(turn)[..., None] * across + 0.6 * np.sin(turn)[..., None] * np.cross(
         across, ahead
     )

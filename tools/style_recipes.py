@@ -243,12 +243,19 @@ def slicked_back(head: Head) -> Any:
     )
 
 
+def side_of(roots: Roots, at: float) -> np.ndarray:
+    """To which side of a parting at x = `at` each lock goes, -1 to 1; none goes along its line."""
+    aside = roots.place[:, 0] - at
+    aside = np.copysign(np.maximum(np.abs(aside), 0.001), aside)
+    return np.clip(aside / spread(roots), -1.0, 1.0)
+
+
 def parted(at: float, back: float) -> Any:
     """Hair that falls to both sides of a parting at x = `at`, away from the face."""
 
     def flow(points: np.ndarray, roots: Roots, _reached: np.ndarray) -> np.ndarray:
         x, y, z = points.T
-        side = np.clip((roots.place[:, 0] - at) / spread(roots), -1.0, 1.0)
+        side = side_of(roots, at)
         on_top = ramp(0.05, 0.1, z) * ramp(0.078, 0.06, np.abs(x)) * ramp(0.115, 0.09, y)
         behind = ramp(-0.01, -0.07, y) * ramp(-0.16, -0.02, z)
         before_face = ramp(0.088, 0.066, np.abs(x)) * ramp(-0.03, -0.06, y)
@@ -267,15 +274,48 @@ def sides(roots: Roots, at: float) -> np.ndarray:
     return (roots.place[:, 0] > at).astype(np.int32)
 
 
+def parts(roots: Roots, at: float, in_front: np.ndarray | bool = False) -> np.ndarray:
+    """Groups on both sides of a parting that ends at the crown, before and behind the shoulders."""
+    down_back = (roots.place[:, 1] > 0.055) & ~np.asarray(in_front)
+    return np.where(down_back, 4, 2 * sides(roots, at) + in_front).astype(np.int32)
+
+
 def layers(most: float, per_length: float = 0.14) -> Callable[[np.ndarray], np.ndarray]:
     """How far hair keeps from the skin: what comes from further up lies over the rest."""
     return lambda reached: 0.002 + np.minimum(per_length * reached, most)
 
 
+def in_layers(roots: Roots, most: float, over: float = 0.08) -> Callable[[np.ndarray], np.ndarray]:
+    """How far hair keeps from the skin, after it has come `over` far: what grows further up lies
+    over the rest."""
+    layer = 0.25 + 0.55 * ramp(-0.06, 0.1, roots.height) + 0.2 * roots.random[:, 2]
+    return lambda reached: 0.002 + most * layer * np.minimum(reached / over, 1.0)
+
+
+def in_bundles(
+    head: Head, roots: Roots, locks: np.ndarray, group: np.ndarray, count: int, factor: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Locks drawn together towards their tips, as hair falls in bundles, and the bundle of each.
+
+    Args:
+        group: (n,) which never share a bundle.
+        count: of bundles.
+        factor: how near to each other tips come, 0 to 1.
+    """
+    middles = head.roots(count, "scalp", 3).place
+    nearest = np.linalg.norm(roots.place[:, None] - middles, axis=2).argmin(axis=1)
+    _, bundle = np.unique(group * len(middles) + nearest, return_inverse=True)
+    sums = np.zeros((bundle.max() + 1, *locks.shape[1:]))
+    np.add.at(sums, bundle, locks)
+    middle = (sums / np.bincount(bundle)[:, None, None])[bundle]
+    pull = factor * ramp(0.1, 1.0, np.linspace(0.0, 1.0, locks.shape[1]))
+    return locks + pull[None, :, None] * (middle - locks), bundle
+
+
 @recipe
 def bob(head: Head) -> Any:
     roots = head.roots(1600, "scalp")
-    falls, thick = parted(-0.022, 0.25), 0.6 + 0.8 * roots.random[:, 1]
+    falls = parted(-0.022, 0.25)
 
     def flow(points: np.ndarray, roots: Roots, reached: np.ndarray) -> np.ndarray:
         inward = ramp(-0.05, -0.1, points[:, 2])[:, None] * unit(points * (1.0, 1.0, 0.0))
@@ -286,18 +326,20 @@ def bob(head: Head) -> Any:
         flow,
         0.30,
         26,
-        lift=0.3,
+        lift=0.25,
         follow=0.55,
         hug=on_skull,
-        clearance=lambda s: 0.002 + thick * np.minimum(0.14 * s, 0.012),
+        clearance=in_layers(roots, 0.016, 0.11),
         over_ears=True,
     )
-    ragged = np.repeat(0.014 * roots.random[:, 0], locks.shape[1])
+    ragged = np.repeat(0.012 * roots.random[:, 0], locks.shape[1])
     locks = cut(locks, lambda p: p[:, 2] + 0.1 - ragged + 0.22 * np.minimum(-p[:, 1], 0.06))
+    group = parts(roots, -0.022)
+    locks, _ = in_bundles(head, roots, locks, group, 180, 0.25)
     return style(
         "Bob",
         50,
-        head.shapes(roots, locks, sides(roots, -0.012)),
+        head.shapes(roots, head.kept_out(locks, 0.003), group),
         "brown",
         children=children(
             28000, length_variation=0.1, clump=0.5, clump_size=30, frizz=0.004, parting=1.0
@@ -306,34 +348,84 @@ def bob(head: Head) -> Any:
     )
 
 
+def before_shoulders(roots: Roots) -> np.ndarray:
+    """Which locks fall before the shoulders and not behind: locks beside each other alike, and
+    without a line between them."""
+    x, y, z = 55.0 * roots.place.T
+    uneven = 0.012 * (np.sin(x + 1.3 * z) + np.sin(0.8 * y - 1.1 * z + 2.0))
+    return roots.place[:, 1] + uneven + 0.012 * (roots.random[:, 3] - 0.5) < 0.024
+
+
+def draped(at: float, in_front: np.ndarray) -> Any:
+    """Hair that is parted at x = `at`, falls in towards the neck, and then over the chest if it is
+    `in_front` (n,), or else down the back."""
+    falls = parted(at, 0.3)
+
+    def flow(points: np.ndarray, roots: Roots, reached: np.ndarray) -> np.ndarray:
+        x, y, z = points.T
+        low = ramp(-0.02, -0.12, z)[:, None]
+        # what grows further back lies nearer to the shoulder
+        rear = ramp(-0.06, 0.02, roots.place[:, 1])
+        side = np.where(roots.place[:, 0] > at, 1.0, -1.0)
+        beside = side * (0.045 + 0.03 * roots.random[:, 1] + 0.02 * rear)
+        to_x = np.where(in_front, beside, 0.72 * x)
+        to_y = np.where(in_front, 0.05 * rear - 0.065, 0.125)
+        aim = toward(9.0 * (to_x - x), 9.0 * (to_y - y), -1.0)
+        return (1.0 - low) * unit(falls(points, roots, reached)) + low * unit(aim)
+
+    return flow
+
+
 def long_locks(
-    head: Head, roots: Roots, length: Any, at: float = 0.0, volume: float = 0.013
+    head: Head,
+    roots: Roots,
+    in_front: np.ndarray,
+    hem: Any,
+    at: float = 0.0,
+    volume: float = 0.013,
+    over: float = 0.08,
 ) -> Any:
+    """Long hair over the shoulders, cut where it comes to this height `hem` (n,) [m]."""
     locks = head.combed(
         roots,
-        parted(at, 0.3),
-        length,
-        28,
+        draped(at, in_front),
+        0.42,
+        40,
         lift=0.25,
         follow=0.6,
         hug=on_skull,
-        clearance=layers(volume),
+        clearance=in_layers(roots, volume, over),
         over_ears=True,
     )
-    return head.settled(roots, locks, 1.5, over_ears=True)
+    ends = np.repeat(hem, locks.shape[1])
+    return evenly(cut(locks, lambda p: p[:, 2] - ends), 30)
+
+
+def hem_at(roots: Roots, in_front: np.ndarray, height: float, ragged: float) -> np.ndarray:
+    """Where locks end: a soft round line, from which single ones hang longer and shorter."""
+    line = height - 0.012 * ~in_front + 1.2 * roots.place[:, 0] ** 2
+    return line + ragged * (roots.random[:, 0] - 0.35)
 
 
 @recipe
 def long_straight(head: Head) -> Any:
     roots = head.roots(1500, "scalp")
-    length = 0.28 * (0.92 + 0.08 * roots.random[:, 0])
+    in_front = before_shoulders(roots)
+    group = parts(roots, 0.0, in_front)
+    locks = long_locks(head, roots, in_front, hem_at(roots, in_front, -0.225, 0.05))
+    locks, _ = in_bundles(head, roots, locks, group, 200, 0.35)
     return style(
         "Long and Straight",
         60,
-        head.shapes(roots, long_locks(head, roots, length), sides(roots, 0.0)),
+        head.shapes(roots, head.kept_out(locks, 0.003), group),
         "brown",
         children=children(
-            30000, length_variation=0.12, clump=0.4, clump_size=30, frizz=0.0015, parting=1.0
+            30000,
+            length_variation=0.12,
+            clump=0.4,
+            clump_size=30,
+            frizz=0.002,
+            parting=1.0,
         ),
         presets=("dynamics/soft",),
     )
@@ -342,21 +434,29 @@ def long_straight(head: Head) -> Any:
 @recipe
 def long_wavy(head: Head) -> Any:
     roots = head.roots(1500, "scalp")
-    length = 0.27 * (0.85 + 0.15 * roots.random[:, 0])
-    locks = long_locks(head, roots, length, -0.02, 0.02)
-    locks = evenly(locks, 40)
-    # locks beside each other wave alike
-    x, y, z = 60.0 * roots.place.T
-    phase = np.sin(x + 0.7 * z) + np.sin(1.1 * y - 0.6 * x) + 0.7 * roots.random[:, 2]
+    in_front = before_shoulders(roots)
+    group = parts(roots, -0.02, in_front)
+    hem = hem_at(roots, in_front, -0.23, 0.05)
+    locks = evenly(long_locks(head, roots, in_front, hem, -0.02, 0.017), 40)
+    locks, bundle = in_bundles(head, roots, locks, group, 130, 0.6)
+    # bundles beside each other wave nearly alike
+    x, y, z = 40.0 * roots.place.T
+    own = np.random.default_rng(2).random(bundle.max() + 1)[bundle]
+    phase = np.sin(x + 0.7 * z) + np.sin(1.1 * y - 0.6 * x) + 1.6 * own + 0.3 * roots.random[:, 2]
     s = np.linspace(0.0, 1.0, 40)
-    locks = waved(locks, roots, 0.0115 * ramp(0.15, 0.6, s), 0.068, phase)
+    locks = waved(locks, 0.011 * ramp(0.2, 0.65, s), 0.075, phase)
     return style(
         "Long and Wavy",
         70,
-        head.shapes(roots, head.kept_out(locks, 0.003), sides(roots, -0.02)),
+        head.shapes(roots, head.kept_out(locks, 0.003), group),
         "brown",
         children=children(
-            30000, length_variation=0.2, clump=0.65, clump_size=40, frizz=0.004, parting=1.0
+            30000,
+            length_variation=0.2,
+            clump=0.6,
+            clump_size=40,
+            frizz=0.003,
+            parting=1.0,
         ),
         presets=("dynamics/natural",),
     )
@@ -366,27 +466,49 @@ def long_wavy(head: Head) -> Any:
 def layered_fringe(head: Head) -> Any:
     roots = head.roots(1700, "scalp")
     x, y, z = roots.place.T
-    is_fringe = (y < -0.035) & (np.abs(x) < 0.046) & (z > 0.05)
-    length = np.where(is_fringe, 0.14, 0.17 + 0.06 * ramp(0.06, -0.03, z))
-    locks = long_locks(head, roots, length * (0.9 + 0.1 * roots.random[:, 0]), 0.0, 0.016)
+    # a triangle, whose point is behind the forehead
+    is_fringe = (np.abs(x) < np.minimum(0.008 - 1.1 * (y + 0.022), 0.06)) & (z > 0.035)
+    in_front = before_shoulders(roots)
+    group = np.where(is_fringe, 5, parts(roots, 0.0, in_front))
+    # three layers: what grows from the top ends further up, around the face most of all
+    uneven = np.sin(70.0 * x + 2.0) + np.sin(60.0 * y) + 1.2 * (roots.random[:, 1] - 0.5)
+    layer = np.digitize(uneven, (-0.3, 0.6))
+    hem = hem_at(roots, in_front, -0.215, 0.035) + 0.045 * layer * ramp(-0.01, 0.07, z)
+    hem += 0.06 * ramp(-0.045, -0.08, y)
+    locks = long_locks(head, roots, in_front, hem, 0.0, 0.016)
+    outward = unit(locks * (1.0, 1.0, 0.0))
+    locks = locks + 0.012 * ramp(0.7, 1.0, np.linspace(0.0, 1.0, 30))[:, None] * outward
     fringe = np.flatnonzero(is_fringe)
     some = roots.take(fringe)
 
     def ahead(points: np.ndarray, _roots: Roots, _reached: np.ndarray) -> np.ndarray:
-        return toward(3.0 * points[:, 0], -1.0 * ramp(-0.1, -0.08, points[:, 1]), -0.45)
+        return toward(5.0 * points[:, 0], -1.0 * ramp(-0.1, -0.08, points[:, 1]), -0.45)
 
     front = head.combed(
-        some, ahead, 0.14, 28, lift=0.4, follow=0.6, hug=on_skull, clearance=layers(0.010, 0.2)
+        some,
+        ahead,
+        0.16,
+        30,
+        lift=0.15,
+        follow=0.6,
+        hug=on_skull,
+        clearance=in_layers(some, 0.008),
     )
-    front = cut(front, lambda p: p[:, 2] - 0.022 + 3.5 * p[:, 0] ** 2)
-    locks[fringe] = front
+    ends = np.repeat(0.020 + 0.014 * (some.random[:, 0] - 0.5), front.shape[1])
+    locks[fringe] = cut(front, lambda p: p[:, 2] - ends + np.minimum(9.0 * p[:, 0] ** 2, 0.02))
+    locks, _ = in_bundles(head, roots, locks, group, 200, 0.45)
     return style(
         "Layered with Fringe",
         80,
-        head.shapes(roots, locks, np.where(is_fringe, 2, sides(roots, 0.0))),
+        head.shapes(roots, head.kept_out(locks, 0.003), group),
         "red",
         children=children(
-            30000, length_variation=0.25, clump=0.5, clump_size=30, frizz=0.003, parting=0.9
+            30000,
+            length_variation=0.2,
+            clump=0.5,
+            clump_size=30,
+            frizz=0.003,
+            parting=0.9,
         ),
         presets=("dynamics/natural",),
     )
@@ -395,29 +517,20 @@ def layered_fringe(head: Head) -> Any:
 @recipe
 def curls(head: Head) -> Any:
     roots = head.roots(1700, "scalp")
-    falls, middle = parted(-0.03, 0.3), np.array([0.0, 0.015, 0.0])
+    in_front = before_shoulders(roots)
     # shorter from the crown down, so that ends make a round outline
-    length = 0.125 + 0.06 * ramp(0.08, -0.02, roots.height)
-    length = length * (0.8 + 0.3 * roots.random[:, 0])
-    aside = ramp(0.0, 0.07, np.abs(roots.place[:, 0] + 0.03))
-
-    def flow(points: np.ndarray, roots: Roots, reached: np.ndarray) -> np.ndarray:
-        droop = ramp(0.01, 0.09, reached)
-        flat = 0.6 * ramp(0.06, 0.11, points[:, 2])
-        outward = (0.1 + 0.65 * aside) * (1.0 - 0.6 * droop) * (1.0 - flat)
-        return (0.55 + 0.45 * droop)[:, None] * unit(falls(points, roots, reached)) + outward[
-            :, None
-        ] * unit(points - middle)
-
-    locks = head.combed(
-        roots, flow, length, 20, lift=0.3 + 0.2 * aside, follow=0.5, clearance=layers(0.035, 0.6)
-    )
+    hem = hem_at(roots, in_front, -0.175, 0.09) + 0.05 * ramp(0.03, 0.1, roots.height)
+    locks = evenly(long_locks(head, roots, in_front, hem, -0.03, 0.034, 0.13), 22)
+    # they cross each other on their way
+    s = np.linspace(0.0, 1.0, 22)
+    turns = 2.0 * np.pi * (s[None, :, None] * 0.9 + roots.random[:, None, 1:])
+    locks += 0.014 * ramp(0.15, 0.8, s)[:, None] * (np.sin(turns) * (1.0, 1.0, 0.4))
     return style(
         "Curls",
         90,
-        head.shapes(roots, locks, sides(roots, -0.03)),
+        head.shapes(roots, head.kept_out(locks, 0.0125), parts(roots, -0.03, in_front)),
         "brown",
-        modifiers=(clumped(0.8, 0.015), curled(0.0075, 6.5, 0.12, 1.0, 2, apart=0.015)),
+        modifiers=(clumped(0.8, 0.015), curled(0.0075, 8.0, 0.2, 1.0, 2, apart=0.015)),
         children=children(
             18000, method="single", length_variation=0.15, clump=0.7, clump_size=10, frizz=0.004
         ),
@@ -451,21 +564,43 @@ def coils(head: Head) -> Any:
 @recipe
 def afro(head: Head) -> Any:
     roots = head.roots(2600, "scalp")
+    _, y, z = roots.place.T
+    before_ear = ramp(0.065, 0.015, z) * ramp(0.005, -0.015, y)
+    back = before_ear[:, None] * np.array([0.0, 0.9, 0.3])
 
-    def flow(points: np.ndarray, roots: Roots, _reached: np.ndarray) -> np.ndarray:
-        return unit(points - np.array([0.0, 0.015, 0.005])) + 0.5 * (roots.random[:, 1:] - 0.5)
+    def flow(points: np.ndarray, roots: Roots, reached: np.ndarray) -> np.ndarray:
+        # each lock wanders, so that none is a spike
+        wander = 40.0 * reached[:, None] + 2.0 * np.pi * roots.random[:, 1:]
+        return unit(points - np.array([0.0, 0.015, 0.0])) + back + 0.55 * np.sin(wander)
 
-    locks = head.combed(roots, flow, 0.11, 16, lift=0.6, follow=0.6, clearance=lambda s: 0.6 * s)
-    middle, axes = np.array([0.0, 0.02, 0.035]), np.array([0.135, 0.14, 0.135])
-    locks = cut(locks, lambda p: 1.0 - np.linalg.norm((p - middle) / axes, axis=1))
+    locks = head.combed(
+        roots,
+        flow,
+        0.12 - 0.095 * before_ear,
+        16,
+        lift=0.6,
+        follow=0.7,
+        clearance=lambda s: 0.6 * s,
+    )
+    middle = np.array([0.0, 0.022, 0.035])
+    # rounder than the head, less deep below its middle; tufts stand out of it and hang back
+    tuft = 0.012 * np.sin(90.0 * roots.place).sum(axis=1) + 0.09 * (roots.random[:, 0] - 0.6)
+
+    def far(p: np.ndarray) -> np.ndarray:
+        below = np.where(p[:, 2] < middle[2], 0.118, 0.13)
+        axes = np.stack([0 * below + 0.132, 0 * below + 0.136, below], axis=1)
+        return np.linalg.norm((p - middle) / axes, axis=1)
+
+    reach = np.repeat(np.maximum(1.0 + tuft, far(roots.place) + 0.12), 16)
+    locks = head.kept_out(cut(locks, lambda p: reach - far(p)), 0.005)
     return style(
         "Afro",
         110,
         head.shapes(roots, locks),
         "black",
-        modifiers=(curled(0.0032, 9.0, 0.05, 1.0, 3),),
+        modifiers=(curled(0.0036, 13.0, 0.06, 1.0, 3),),
         children=children(
-            18000, method="single", length_variation=0.12, clump=0.4, clump_size=6, frizz=0.02
+            18000, method="single", length_variation=0.15, clump=0.8, clump_size=7, frizz=0.03
         ),
         presets=("dynamics/stiff",),
     )
