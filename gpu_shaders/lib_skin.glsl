@@ -19,6 +19,8 @@ float skin_forward(vec3 forward)
 // It cannot have lost more to hair than to all there is; what meshes take has no colour.
 vec3 skin_colored(float soft, float tau, vec3 forward)
 {
+  // what is added at seams may leave less than nothing
+  soft = max(soft, 0.0);
   float mean = skin_forward(forward);
   float lost = -log(clamp(soft, 1.0e-6, 1.0)) / (1.0 - mean);
   return soft * exp(min(max(tau, 0.0), lost) * (forward - mean));

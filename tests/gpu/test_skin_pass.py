@@ -111,6 +111,24 @@ def test_the_blur_is_its_twins(softness: float) -> None:
         assert np.abs(found - expected)[layout.island >= 0].max() < 2e-5
 
 
+def test_the_light_that_hair_leaves_has_its_color(compute: Callable[..., np.ndarray]) -> None:
+    """Each colour is taken by its own part where nothing has spread; and none is below nought."""
+    forward = np.array([0.9, 0.35, 0.05])
+    depth = np.linspace(0.0, 12.0, 50)
+    mean = 1.0 - forward.mean()
+
+    def found(soft: np.ndarray) -> np.ndarray:
+        places = np.column_stack([soft, depth, 0.0 * depth, 0.0 * depth])[None]
+        forwards = np.broadcast_to([*forward, 0.0], (1, len(depth), 4))
+        textures = {"places": places.astype(np.float32), "forwards": forwards.astype(np.float32)}
+        return compute("skin_colored.glsl", (len(depth), 1), textures=textures)[0, :, :3]
+
+    expected = np.exp(-depth[:, None] * (1.0 - forward))
+    np.testing.assert_allclose(found(np.exp(-depth * mean)), expected, rtol=1e-3, atol=1e-6)
+    # what a seam's two sides have in common may be less than nothing
+    np.testing.assert_array_equal(found(np.full(50, -1.0e-3)), 0.0)
+
+
 def test_look_ups_and_closed_corners_are_their_twins(
     compute: Callable[..., np.ndarray], gpu_context: Any
 ) -> None:

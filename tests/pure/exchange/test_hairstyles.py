@@ -118,8 +118,8 @@ def changed(path: Path, **arrays: np.ndarray) -> None:
         {"counts": np.array([2.0, 7.0, 4.0])},
         {"root_uv": np.zeros((2, 2), np.float32)},
         {"root_uv": np.full((3, 2), np.nan, np.float32)},
-        {"steps": np.zeros((13, 3), np.int16)},
-        {"steps": np.zeros((2, 3, 12), np.uint8)},
+        {"differences": np.zeros((13, 3), np.int16)},
+        {"differences": np.zeros((2, 3, 12), np.uint8)},
         {"group": np.zeros((3, 1), np.int32)},
     ],
 )
