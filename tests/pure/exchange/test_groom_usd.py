@@ -530,7 +530,7 @@ def test_damaged_files_are_refused_or_read(tmp_path: Path, suffix: str, count: i
         [sys.executable, "-c", READ_ALL, tools, folder],
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=600,
         check=False,
     )
     told = ended.stdout.split("\n")[:-1]
