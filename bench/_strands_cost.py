@@ -163,7 +163,7 @@ class _SummedPass(RidePass):
 def _on_gpu(rig: Rig, rest: RootFrames, motions: Sequence[Motion]) -> tuple[float, float]:
     """Milliseconds of a frame in compute, of today's form and of the first round's."""
     ours, peer = (
-        form(rig.strands, rig.head, rig.guides, rig.guide_grid, rig.riders, rig.holds)
+        form(rig.strands, rig.root_holds, rig.guides, rig.guide_grid, rig.riders, rig.holds)
         for form in (RidePass, _SummedPass)
     )
     ours.leading.take(motions[0].clearance)
