@@ -125,27 +125,43 @@ def buzz_cut(head: Head) -> Any:
 @recipe
 def crop_fade(head: Head) -> Any:
     roots = head.roots(2000, "scalp")
-    z = roots.height
-    top = ramp(0.045, 0.082, z)
-    length = 0.0016 + 0.003 * ramp(-0.04, 0.02, z) + 0.009 * ramp(0.0, 0.06, z) + 0.022 * top
+    _, y, z = roots.place.T
+    top = ramp(0.056, 0.082, z + 0.012 * ramp(0.0, 0.09, y))
+    # from stubble at the ears and the neck, over what clippers leave, to the scissors' work
+    faded = z - 0.02 * ramp(0.075, 0.02, y)
+    short = 0.0006 + 0.0024 * ramp(-0.065, 0.02, faded) + 0.008 * ramp(0.005, 0.062, faded)
+    bundle = bundles(head, roots, (top > 0.4).astype(int), 420)
+    own = of_bundle(bundle)
+    on_top = 0.025 + 0.021 * ramp(0.05, -0.06, y) + 0.018 * (own[:, 0] - 0.5)
+    length = short + top * (on_top - short)
     length = length * (0.85 + 0.3 * roots.random[:, 0])
-    front = top * ramp(0.06, 0.02, roots.place[:, 1])
+    front = top * ramp(0.075, 0.035, y)
 
-    def flow(points: np.ndarray, roots: Roots, _reached: np.ndarray) -> np.ndarray:
-        ahead = toward(0.5 * (roots.random[:, 1] - 0.5), -1.0, 0.3)
-        return (1.0 - front)[:, None] * whorl(points, roots, _reached) + front[:, None] * ahead
+    def flow(points: np.ndarray, roots: Roots, reached: np.ndarray) -> np.ndarray:
+        aside = 0.35 + 1.3 * (own[:, 1] - 0.5)
+        ahead = unit(toward(aside, -1.0, 0.25 - 1.0 * ramp(0.005, 0.025, reached)))
+        return (1.0 - front)[:, None] * whorl(points, roots, reached) + front[:, None] * ahead
 
     locks = head.combed(
-        roots, flow, length, 8, lift=0.5 + 0.2 * front, follow=0.5, clearance=lambda s: 0.3 * s
+        roots,
+        flow,
+        length,
+        9,
+        lift=0.5 + 0.25 * top * own[:, 2],
+        follow=0.5,
+        hug=on_skull,
+        clearance=lambda s: 0.3 * np.minimum(s, 0.03) * (1.0 - top * (0.2 + 0.5 * own[:, 3])),
     )
+    locks = np.where((top > 0.4)[:, None, None], in_bundles(locks, bundle, 0.85), locks)
     return style(
         "Crop with Fade",
         20,
-        head.shapes(roots, locks),
-        "black",
+        head.shapes(roots, head.kept_out(locks, 0.0008)),
+        "brown",
         children=children(
-            50000, length_variation=0.3, clump=0.25, clump_size=10, frizz=0.03, scatter=0.3
+            50000, length_variation=0.3, clump=0.25, clump_size=8, frizz=0.015, scatter=0.2
         ),
+        shading={"melanin": 0.76},
         presets=("dynamics/stiff",),
     )
 
@@ -292,24 +308,35 @@ def in_layers(roots: Roots, most: float, over: float = 0.08) -> Callable[[np.nda
     return lambda reached: 0.002 + most * layer * np.minimum(reached / over, 1.0)
 
 
-def in_bundles(
-    head: Head, roots: Roots, locks: np.ndarray, group: np.ndarray, count: int, factor: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """Locks drawn together towards their tips, as hair falls in bundles, and the bundle of each.
+def bundles(head: Head, roots: Roots, group: np.ndarray, count: int) -> np.ndarray:
+    """The bundle of each lock (n,), as hair falls in bundles: those beside each other.
 
     Args:
         group: (n,) which never share a bundle.
         count: of bundles.
-        factor: how near to each other tips come, 0 to 1.
     """
     middles = head.roots(count, "scalp", 3).place
     nearest = np.linalg.norm(roots.place[:, None] - middles, axis=2).argmin(axis=1)
     _, bundle = np.unique(group * len(middles) + nearest, return_inverse=True)
+    return bundle
+
+
+def of_bundle(bundle: np.ndarray, seed: int = 2) -> np.ndarray:
+    """Numbers (n, 4) from 0 to 1 that the locks of a bundle (n,) have in common."""
+    return np.random.default_rng(seed).random((bundle.max() + 1, 4))[bundle]
+
+
+def in_bundles(locks: np.ndarray, bundle: np.ndarray, factor: float) -> np.ndarray:
+    """Locks drawn towards the middle of their bundle (n,), the nearer to their tips the more.
+
+    Args:
+        factor: how near to each other tips come, 0 to 1.
+    """
     sums = np.zeros((bundle.max() + 1, *locks.shape[1:]))
     np.add.at(sums, bundle, locks)
     middle = (sums / np.bincount(bundle)[:, None, None])[bundle]
     pull = factor * ramp(0.1, 1.0, np.linspace(0.0, 1.0, locks.shape[1]))
-    return locks + pull[None, :, None] * (middle - locks), bundle
+    return locks + pull[None, :, None] * (middle - locks)
 
 
 @recipe
@@ -335,7 +362,7 @@ def bob(head: Head) -> Any:
     ragged = np.repeat(0.012 * roots.random[:, 0], locks.shape[1])
     locks = cut(locks, lambda p: p[:, 2] + 0.1 - ragged + 0.22 * np.minimum(-p[:, 1], 0.06))
     group = parts(roots, -0.022)
-    locks, _ = in_bundles(head, roots, locks, group, 180, 0.25)
+    locks = in_bundles(locks, bundles(head, roots, group, 180), 0.25)
     return style(
         "Bob",
         50,
@@ -413,7 +440,7 @@ def long_straight(head: Head) -> Any:
     in_front = before_shoulders(roots)
     group = parts(roots, 0.0, in_front)
     locks = long_locks(head, roots, in_front, hem_at(roots, in_front, -0.225, 0.05))
-    locks, _ = in_bundles(head, roots, locks, group, 200, 0.35)
+    locks = in_bundles(locks, bundles(head, roots, group, 200), 0.35)
     return style(
         "Long and Straight",
         60,
@@ -438,7 +465,8 @@ def long_wavy(head: Head) -> Any:
     group = parts(roots, -0.02, in_front)
     hem = hem_at(roots, in_front, -0.23, 0.05)
     locks = evenly(long_locks(head, roots, in_front, hem, -0.02, 0.017), 40)
-    locks, bundle = in_bundles(head, roots, locks, group, 130, 0.6)
+    bundle = bundles(head, roots, group, 130)
+    locks = in_bundles(locks, bundle, 0.6)
     # bundles beside each other wave nearly alike
     x, y, z = 40.0 * roots.place.T
     own = np.random.default_rng(2).random(bundle.max() + 1)[bundle]
@@ -496,7 +524,7 @@ def layered_fringe(head: Head) -> Any:
     )
     ends = np.repeat(0.020 + 0.014 * (some.random[:, 0] - 0.5), front.shape[1])
     locks[fringe] = cut(front, lambda p: p[:, 2] - ends + np.minimum(9.0 * p[:, 0] ** 2, 0.02))
-    locks, _ = in_bundles(head, roots, locks, group, 200, 0.45)
+    locks = in_bundles(locks, bundles(head, roots, group, 200), 0.45)
     return style(
         "Layered with Fringe",
         80,
