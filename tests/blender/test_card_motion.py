@@ -292,7 +292,7 @@ def card_edits(motion: GuideMotion) -> CardEdits:
     return edits
 
 
-@pytest.mark.parametrize("kind", few_in_commits(["joints", "texture", "springs"], 2))
+@pytest.mark.parametrize("kind", few_in_commits(["joints", "texture", "springs"]))
 def test_edited_cards_move_too(
     motion: GuideMotion, card_edits: CardEdits, tmp_path: Path, kind: str
 ) -> None:

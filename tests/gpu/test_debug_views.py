@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from hair_ball import ball_mesh
+from tiers import few_in_commits
 
 from hairloom.addon.dynamics.colliders import CapsuleCollider, PosedCollider, SphereCollider
 from hairloom.addon.dynamics.colliders.distance_field import DistanceField
@@ -183,7 +184,8 @@ def test_stretch_is_red_where_segments_are_longer_and_blue_where_they_are_shorte
 
 
 @pytest.mark.parametrize(
-    ("kind", "error"), [("ball", 0.01), ("capsule and ball", 0.01), ("field", 0.15)]
+    ("kind", "error"),
+    few_in_commits(map(pytest.param, ("capsule and ball", "ball", "field"), (0.01, 0.01, 0.15))),
 )
 def test_depth_is_the_distance_from_colliders(
     frame: Any, front: Any, kind: str, error: float

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tiers import few_in_commits
 
 from hairloom.addon.cards.atlas_settings import AtlasSettings
 from hairloom.addon.cards.bake import sampled_maps
@@ -86,7 +87,10 @@ def built(
 
 
 @pytest.mark.alike
-@pytest.mark.parametrize(("budget", "layers"), [(30_000, 16), (12_000, 12), (3_000, 8), (600, 4)])
+@pytest.mark.parametrize(
+    ("budget", "layers"),
+    few_in_commits(map(pytest.param, (3_000, 30_000, 12_000, 600), (8, 16, 12, 4))),
+)
 def test_a_budget_is_met_in_triangles(budget: int, layers: int) -> None:
     strands, out = fur_on_ball()
     settings = replace(SHELLS, max_triangles=budget, shell_layers=layers, levels=2)
@@ -120,7 +124,7 @@ def test_layers_follow_the_combed_hair_from_the_inside_to_the_outside() -> None:
     assert (np.diff(mesh.along[back].mean(axis=1)) <= 0.0).all()
 
 
-@pytest.mark.parametrize("spread", [0.0, 0.5])
+@pytest.mark.parametrize("spread", few_in_commits([0.5, 0.0]))
 def test_from_above_layers_cover_what_strands_cover(spread: float) -> None:
     """Of strands at random, each of which covers its area, exp(-tau) is left open (Poisson), on the
     mean of all patterns."""

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tiers import few_in_commits
 
 from hairloom.addon.dynamics.reference.step import advance_slowly
 from hairloom.addon.dynamics.settings import DynamicsSettings
@@ -95,7 +96,9 @@ def test_it_fades_in_without_a_jerk(kit):
     np.testing.assert_allclose(states[1].grid, states[0].grid, atol=2e-4)
 
 
-@pytest.mark.parametrize("values", [WHOLE, {"inherit_location": 0.4}, {"inherit_rotation": 0.7}])
+@pytest.mark.parametrize(
+    "values", few_in_commits([WHOLE, {"inherit_location": 0.4}, {"inherit_rotation": 0.7}])
+)
 def test_equals_the_reference(kit, values):
     """With wind, drag and weight, in frames that substeps do not fit into."""
     settings = DynamicsSettings(
