@@ -267,22 +267,22 @@ class Head:
 
 
 def waved(locks: np.ndarray, height: np.ndarray, length: float, phase: np.ndarray) -> np.ndarray:
-    """Locks with waves that turn around them, as long hair has; those that lie over each other
-    wave at the same heights.
+    """Locks with flat waves from side to side over those below, as long hair has; those that lie
+    over each other wave at the same heights.
 
     Args:
-        height: of the waves at each point from root to tip (cv_count,) [m].
-        length: of one wave [m].
+        height: of the waves at each point (n, cv_count) [m].
+        length: of one wave, downwards [m].
         phase: of each lock (n,) [rad].
     """
     ahead = unit(np.gradient(locks, axis=1))
     out = unit(locks * (1.0, 1.0, 0.0))
     across = unit(np.cross(ahead, out))
     turn = phase[:, None] - 2.0 * np.pi * locks[..., 2] / length
-    offset = np.cos(turn)[..., None] * across + 0.6 * np.sin(turn)[..., None] * np.cross(
-        across, ahead
-    )
-    return locks + height[None, :, None] * offset
+    aside = np.sin(turn)[..., None] * across
+    # a lock twists a little where it turns back
+    off = 0.3 * np.sin(turn + 0.6 * np.pi)[..., None] * np.cross(across, ahead)
+    return locks + height[..., None] * (aside + off)
 
 
 def cut(locks: np.ndarray, inside: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:

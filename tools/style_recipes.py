@@ -199,29 +199,57 @@ def spread(roots: Roots) -> np.ndarray:
     return 0.0004 + 0.045 * ramp(0.0, 0.07, roots.place[:, 1])
 
 
+def swept_over(at: float, bundle: np.ndarray) -> Any:
+    """Hair that is combed from a parting at x = `at`, over the top and back, and down at the sides;
+    the locks of a bundle (n,) go their own way together."""
+    own = of_bundle(bundle)
+
+    def flow(points: np.ndarray, roots: Roots, reached: np.ndarray) -> np.ndarray:
+        x, y, z = points.T
+        side, behind, y_root = side_of(roots, at), ramp(0.05, 0.1, y), roots.place[:, 1]
+        on_top = ramp(0.055, 0.095, z) * ramp(0.075, 0.05, np.abs(x)) * ramp(0.1, 0.07, y)
+        over = on_top * (0.9 + 0.5 * (own[:, 1] - 0.5))
+        back = 0.4 + 0.3 * (own[:, 2] - 0.5) - 0.4 * behind
+        back = back + 0.7 * ramp(-0.04, -0.08, y_root) + 0.5 * ramp(0.0, 0.06, y_root)
+        down = (1.0 - on_top) * np.maximum(ramp(0.045, 0.07, np.abs(x)), behind)
+        return toward(side * over, back, 0.1 * on_top - 1.2 * down)
+
+    return flow
+
+
 @recipe
 def side_part(head: Head) -> Any:
+    at = -0.036
     roots = head.roots(1700, "scalp")
-    z = roots.height
-    length = 0.010 + 0.016 * ramp(-0.07, 0.02, z) + 0.07 * ramp(-0.01, 0.095, z) ** 1.5
+    x, y, z = roots.place.T
+    is_over = x > at
+    bundle = bundles(head, roots, is_over.astype(int), 260)
+    own = of_bundle(bundle)
+    top = ramp(0.055, 0.095, z) * np.where(is_over, 1.0, 0.3)
+    length = 0.006 + 0.008 * ramp(-0.075, 0.0, z) + 0.010 * ramp(-0.01, 0.07, z)
+    shorter = 0.02 * ramp(0.02, 0.09, y) + 0.025 * ramp(0.0, 0.06, x)
+    length = length + top * (0.062 + 0.02 * (own[:, 0] - 0.5) - shorter)
     length = length * short_at_ears(roots)
+    # the wave at the front stands up first
+    rise = top * ramp(0.0, -0.07, y)
     locks = head.combed(
         roots,
-        swept(-0.034, 0.35),
+        swept_over(at, bundle),
         length,
         14,
-        lift=0.25 + 0.2 * ramp(0.04, 0.09, z),
-        follow=0.75,
+        lift=0.2 + 0.2 * top + 0.25 * rise,
+        follow=0.7,
         hug=on_skull,
-        clearance=lambda s: 0.001 + 0.14 * np.minimum(s, 0.09),
+        clearance=lambda s: 0.001 + (0.12 + 0.28 * top + 0.15 * rise) * np.minimum(s, 0.03),
     )
+    locks = np.where((top > 0.2)[:, None, None], in_bundles(locks, bundle, 0.4), locks)
     return style(
         "Side Part",
         30,
-        head.shapes(roots, locks, sides(roots, -0.034)),
+        head.shapes(roots, head.kept_out(locks, 0.001), is_over.astype(np.int32)),
         "brown",
         children=children(
-            36000, length_variation=0.2, clump=0.35, clump_size=20, frizz=0.008, parting=0.9
+            36000, length_variation=0.2, clump=0.35, clump_size=16, frizz=0.006, parting=0.9
         ),
         presets=("dynamics/stiff",),
     )
@@ -346,7 +374,10 @@ def bob(head: Head) -> Any:
 
     def flow(points: np.ndarray, roots: Roots, reached: np.ndarray) -> np.ndarray:
         inward = ramp(-0.05, -0.1, points[:, 2])[:, None] * unit(points * (1.0, 1.0, 0.0))
-        return unit(falls(points, roots, reached)) - 0.5 * inward
+        # what grows at the forehead goes back first, so that it does not lie on it
+        first = ramp(-0.055, -0.07, roots.place[:, 1]) * ramp(0.06, 0.02, reached)
+        back = first[:, None] * np.array([0.0, 0.9, 0.8])
+        return unit(falls(points, roots, reached)) - 0.5 * inward + back
 
     locks = head.combed(
         roots,
@@ -463,16 +494,17 @@ def long_wavy(head: Head) -> Any:
     roots = head.roots(1500, "scalp")
     in_front = before_shoulders(roots)
     group = parts(roots, -0.02, in_front)
-    hem = hem_at(roots, in_front, -0.23, 0.05)
+    hem = hem_at(roots, in_front, -0.23, 0.07)
     locks = evenly(long_locks(head, roots, in_front, hem, -0.02, 0.017), 40)
-    bundle = bundles(head, roots, group, 130)
-    locks = in_bundles(locks, bundle, 0.6)
-    # bundles beside each other wave nearly alike
-    x, y, z = 40.0 * roots.place.T
-    own = np.random.default_rng(2).random(bundle.max() + 1)[bundle]
-    phase = np.sin(x + 0.7 * z) + np.sin(1.1 * y - 0.6 * x) + 1.6 * own + 0.3 * roots.random[:, 2]
-    s = np.linspace(0.0, 1.0, 40)
-    locks = waved(locks, 0.011 * ramp(0.2, 0.65, s), 0.075, phase)
+    bundle = bundles(head, roots, group, 110)
+    own = of_bundle(bundle)
+    locks = in_bundles(locks, bundle, 0.5)
+    # bundles beside each other wave nearly alike, and the further down the less so
+    x, y, z = 25.0 * roots.place.T
+    phase = np.sin(x + 0.7 * z) + np.sin(1.1 * y - 0.6 * x) + 2.4 * own[:, 0]
+    phase += 0.5 * (roots.random[:, 2] - 0.5)
+    wide = (0.7 + 0.5 * own[:, 1])[:, None] * ramp(0.05, -0.07, locks[..., 2])
+    locks = waved(locks, 0.0105 * wide, 0.095, phase)
     return style(
         "Long and Wavy",
         70,
@@ -480,9 +512,9 @@ def long_wavy(head: Head) -> Any:
         "brown",
         children=children(
             30000,
-            length_variation=0.2,
-            clump=0.6,
-            clump_size=40,
+            length_variation=0.3,
+            clump=0.45,
+            clump_size=30,
             frizz=0.003,
             parting=1.0,
         ),
@@ -568,22 +600,34 @@ def curls(head: Head) -> Any:
 
 @recipe
 def coils(head: Head) -> Any:
-    roots = head.roots(1500, "scalp")
-    length = 0.075 + 0.03 * roots.random[:, 0]
+    roots = head.roots(1200, "scalp")
+    _, y, z = roots.place.T
+    before_ear = ramp(0.065, 0.015, z) * ramp(0.005, -0.015, y)
+    back = before_ear[:, None] * np.array([0.0, 0.9, 0.3])
 
     def flow(points: np.ndarray, roots: Roots, reached: np.ndarray) -> np.ndarray:
-        droop = ramp(0.0, 0.09, reached)[:, None] * np.array([0.0, 0.0, -1.2])
-        return roots.normal + 0.3 * whorl(points, roots, reached) + droop
+        # each coil goes its own way, and hangs the further out the more
+        wander = 30.0 * reached[:, None] + 2.0 * np.pi * roots.random[:, 1:]
+        droop = ramp(0.01, 0.08, reached)[:, None] * np.array([0.0, 0.25, -1.1])
+        return unit(points - np.array([0.0, 0.015, 0.0])) + back + droop + 0.2 * np.sin(wander)
 
-    locks = head.combed(roots, flow, length, 13, lift=0.8, follow=0.5, clearance=layers(0.02, 0.4))
+    length = (0.075 + 0.045 * roots.random[:, 0]) * (1.0 - 0.6 * before_ear)
+    length = length * (1.0 - 0.5 * ramp(-0.02, -0.075, z) - 0.2 * ramp(-0.05, -0.085, y))
+    locks = head.combed(roots, flow, length, 15, lift=0.7, follow=0.6, clearance=layers(0.025, 0.5))
     return style(
         "Coils",
         100,
-        head.shapes(roots, locks),
+        head.shapes(roots, head.kept_out(locks, 0.005), np.arange(len(locks), dtype=np.int32)),
         "black",
-        modifiers=(curled(0.0042, 12.0, 0.01, 0.4, 3),),
+        modifiers=(curled(0.0040, 13.0, 0.02, 1.0, 3),),
         children=children(
-            20000, method="single", length_variation=0.1, clump=0.95, clump_size=13, frizz=0.002
+            18000,
+            method="single",
+            length_variation=0.05,
+            clump=0.92,
+            clump_along=(0.0, 0.9, 1.0, 1.0, 1.0),
+            clump_size=4,
+            frizz=0.001,
         ),
         presets=("dynamics/stiff",),
     )
@@ -660,32 +704,64 @@ def tube(line: np.ndarray, radius: np.ndarray, place: np.ndarray, across: np.nda
     )
 
 
+def loose_hairs(head: Head, roots: Roots, cv_count: int) -> np.ndarray:
+    """Short fine locks that no tie holds, as at the neck."""
+
+    def flow(points: np.ndarray, roots: Roots, reached: np.ndarray) -> np.ndarray:
+        wander = 3.0 * np.pi * (roots.random[:, 3] + reached / 0.035)
+        return toward(0.6 * np.sin(wander), 0.3 * np.cos(wander), -1.0)
+
+    length = 0.012 + 0.02 * roots.random[:, 0]
+    return head.combed(
+        roots, flow, length, cv_count, lift=0.25, clearance=lambda s: 0.0005 + 0.12 * s
+    )
+
+
 @recipe
 def ponytail(head: Head) -> Any:
     roots = head.roots(1500, "scalp")
+    x, _, z = roots.place.T
     place = section(roots, KNOT)
-    s = np.linspace(0.0, 1.0, 24)
-    # out of the tie, then down in an arc
-    turn = np.radians(22.0) - np.radians(108.0) * ramp(0.0, 0.42, s)
-    step = 0.27 / (len(s) - 1)
+    s = np.linspace(0.0, 1.0, 30)
+    # out of the tie, down in an arc, and at the end a little back again
+    turn = np.radians(25.0) - np.radians(118.0) * ramp(0.0, 0.45, s)
+    turn = turn + np.radians(30.0) * ramp(0.6, 1.0, s)
+    step = 0.30 / (len(s) - 1)
     walked = np.stack([0 * s, np.cos(turn), np.sin(turn)], axis=1) * step
     line = KNOT + np.concatenate([np.zeros((1, 3)), np.cumsum(walked[:-1], axis=0)])
-    radius = 0.009 + 0.023 * ramp(0.0, 0.4, s) - 0.008 * ramp(0.6, 1.0, s)
+    # it swells after the tie and tapers to a point
+    radius = 0.0075 + 0.024 * ramp(0.02, 0.4, s) - 0.022 * ramp(0.45, 1.0, s)
     tail = tube(line, radius, place, np.array([1.0, 0.0, 0.0]))
-    # tips taper, and no lock runs quite beside the next
-    loose = 0.010 * ramp(0.05, 0.7, s)[None, :, None]
-    tail = tail + loose * (roots.random[:, None, 1:] - 0.5)
-    tail = shortened(tail, (len(s) - 1) * (1.0 - 0.3 * roots.random[:, 0] ** 1.5))
+    # strands of other lengths, which wave and stray more towards their tips
+    phase = 2.0 * np.pi * roots.random[:, None, 1:]
+    waves = np.sin(2.0 * np.pi * 1.4 * s[None, :, None] + 0.25 * phase) + 0.6 * np.sin(
+        2.0 * np.pi * 2.1 * s[None, :, None] + phase
+    )
+    tail = tail + 0.0045 * ramp(0.1, 0.9, s)[None, :, None] * waves
+    tail = shortened(tail, (len(s) - 1) * (1.0 - 0.45 * roots.random[:, 0] ** 1.6))
+    # a lock from below the tie is wound around it
+    below = np.argsort(np.linalg.norm(roots.place - (KNOT - [0.0, 0.02, 0.03]), axis=1))[:26]
+    axis = walked[0] / step
+    other = np.cross(axis, [1.0, 0.0, 0.0])
+    along = np.linspace(0.0, 1.0, len(s))
+    angle = -0.5 * np.pi + 2.0 * np.pi * 2.3 * along
+    ring = np.cos(angle)[:, None] * [1.0, 0.0, 0.0] - np.sin(angle)[:, None] * other
+    rise = 0.001 + 0.009 * roots.random[below, 2][:, None] + 0.002 * along
+    tail[below] = KNOT + rise[..., None] * axis + 0.0105 * ring
     drawn = head.gathered(roots, tail[:, 0], 20)
-    locks = evenly(np.concatenate([drawn[:, :-1], tail], axis=1), 36)
-    locks = head.kept_out(locks)
+    locks = evenly(np.concatenate([drawn[:, :-1], tail], axis=1), 40)
+    at_edge = (z < -0.045) & (np.abs(x) < 0.04)
+    is_loose = at_edge & (roots.random[:, 3] < 0.07)
+    locks[is_loose] = loose_hairs(head, roots.take(np.flatnonzero(is_loose)), 40)
+    group = np.zeros(len(locks), np.int32)
+    group[below], group[is_loose] = 1, 2
     return style(
         "Ponytail",
         120,
-        head.shapes(roots, locks),
+        head.shapes(roots, head.kept_out(locks), group),
         "blond",
         children=children(
-            28000, length_variation=0.12, clump=0.3, clump_size=40, frizz=0.0012, parting=3.0
+            28000, length_variation=0.2, clump=0.4, clump_size=30, frizz=0.0015, parting=3.0
         ),
         presets=("dynamics/natural",),
     )
