@@ -45,6 +45,8 @@ REFERENCE = "the triangles of the colliders"
 FPS, SAMPLES = 60.0, 6
 #: of plates and fingers, guides that pass through; how deep they may be in a head [mm]
 AT_MOST = {"*_passed": 0, "*_demo_depth_worst_mm": 0.5, "*_fast_depth_worst_mm": 1.0}
+#: At which plates and fingers go [m/s].
+SPEEDS = (1.0, 2.0, 2.8, 4.0, 5.6)
 #: A head at 5 Hz and 5.6 m/s.
 FAST_RATE, FAST_SWAY = 5.0, 0.178
 Motion = Callable[[float], np.ndarray]
@@ -325,7 +327,7 @@ def figures(make: Callable[..., Form], asked: set[str]) -> dict[str, dict[str, f
         ("ear", ear),
     ):
         if not asked or "thin" in asked:
-            for speed in (1.0, 5.6):
+            for speed in SPEEDS:
                 found[f"{name}_{speed}"] = swung(solid(settings), make, settings, speed)
                 print(name, speed, found[f"{name}_{speed}"], flush=True)
     for name, made in (("sintel", sintel_rig), ("built_in", built_in_rig)):

@@ -285,6 +285,9 @@ void keep_outside()
 {
 #if CONTACT_SLOTS > 0
   int passes = frame.contact_passes;  // one at least
+#ifdef HAS_SHARP
+  passes *= part_fraction < 1.0 ? {{part_passes}} : 1;
+#endif
   bool is_off = true;
 #elif defined(RELAXATION)
   int passes = 0;
@@ -335,6 +338,85 @@ void keep_outside()
 #endif
 }
 
+#ifdef HAS_SHARP
+vec3 went[CV_COUNT];  // [m] that each CV has gone in parts, less what contacts took of its speed
+
+// To the begin of the substep. From here on `previous` says how far each CV goes in the next part.
+void begin_parts()
+{
+  for (int cv = 0; cv < CV_COUNT; cv++) {
+    vec3 path = (position[cv] - previous[cv]) * part_fraction;
+    position[cv] = previous[cv];
+    previous[cv] -= path;
+    went[cv] = vec3(0.0);
+  }
+}
+
+void begin_part(bool is_last)
+{
+  for (int cv = 0; cv < CV_COUNT; cv++) {
+    vec3 path = position[cv] - previous[cv];
+    previous[cv] = position[cv];
+    position[cv] += path;
+  }
+  if (is_last) {  // what is carried, without rounding
+    position[0] = style[0];
+    position[1] = style[1];
+    pin_held();
+  }
+}
+
+void end_part(bool is_last)
+{
+  for (int cv = 0; cv < CV_COUNT; cv++) {
+    went[cv] += position[cv] - previous[cv];
+    previous[cv] = is_last ? position[cv] - went[cv] : previous[cv];
+  }
+}
+#endif
+
+// Lengths and contacts of a substep; in parts, from its begin, where the guide meets something fast.
+void go_outside(int number)
+{
+#ifdef HAS_SHARP
+  int part = 0;
+  int count = 1;
+  part_begin = 0.0;
+  part_end = 1.0;
+  part_fraction = 1.0;
+  do {
+    if (count > 1) {
+      part_begin = float(part) * part_fraction;
+      part_end = float(part + 1) * part_fraction;
+      begin_part(part == count - 1);
+    }
+    keep_lengths(false);
+    find_contacts(number);
+    if (count == 1 && is_hurried) {
+      count = {{parts}};
+      part_fraction = 1.0 / float({{parts}});
+      begin_parts();
+    } else {
+      keep_outside();
+      absorb();
+      part++;
+      if (count > 1) {
+        end_part(part == count);
+      }
+    }
+  } while (part < count);
+#else
+  keep_lengths(false);
+#if CONTACT_SLOTS > 0
+  find_contacts(number);
+#endif
+  keep_outside();
+#if CONTACT_SLOTS > 0
+  absorb();
+#endif
+#endif
+}
+
 void do_substep(int number)
 {
   vec4 moment = texelFetch(moments, ivec2(0, number), 0);
@@ -373,14 +455,7 @@ void do_substep(int number)
 #endif
   restore_style();
   pin_held();
-  keep_lengths(false);
-#if CONTACT_SLOTS > 0
-  find_contacts(number);
-#endif
-  keep_outside();
-#if CONTACT_SLOTS > 0
-  absorb();
-#endif
+  go_outside(number);
 }
 
 void main()

@@ -25,6 +25,12 @@ vec4 between_origin[CONTACT_SLOTS][FREE_SIZE];
 float between_pushed[CONTACT_SLOTS][FREE_SIZE];
 float between_along[CONTACT_SLOTS][FREE_SIZE];  // its fraction of the segment
 vec3 between_normal[FREE_SIZE];  // at each free CV whose segments touch, else zero
+// Where a part of the substep begins and ends, as fractions of it, and how much of it that is; and
+// whether the contacts that were found last ask for parts.
+float part_begin;
+float part_end;
+float part_fraction;
+bool is_hurried;
 #endif
 
 struct Posed {
@@ -43,6 +49,11 @@ vec4 moment_texel(int substep, int collider, int texel)
   return texelFetch(moments, ivec2(first + texel, substep), 0);
 }
 
+vec3 moved(vec4 rows[3], vec4 point)
+{
+  return vec3(dot(rows[0], point), dot(rows[1], point), dot(rows[2], point));
+}
+
 Posed posed_at(int substep, int collider)
 {
   Posed posed;
@@ -56,13 +67,55 @@ Posed posed_at(int substep, int collider)
   posed.own = moment_texel(substep, collider, 6);
   posed.low_cell = moment_texel(substep, collider, 7);
   posed.sweep = moment_texel(substep, collider, 12);
+#ifdef HAS_SHARP
+  bool is_part = part_fraction < 1.0;
+  for (int row = 0; row < 3; row++) {
+    vec4 begin = posed.inverse_before[row];
+    vec4 end = posed.inverse[row];
+    posed.inverse[row] = is_part ? begin * (1.0 - part_end) + end * part_end : end;
+    posed.inverse_before[row] = is_part ? begin * (1.0 - part_begin) + end * part_begin : begin;
+    posed.change[row] *= part_fraction;
+  }
+  posed.sweep.w *= part_fraction;
+#endif
   return posed;
 }
 
-vec3 moved(vec4 rows[3], vec4 point)
+// How far [m] a point that is inside may be led out.
+float led_out(Posed posed)
 {
-  return vec3(dot(rows[0], point), dot(rows[1], point), dot(rows[2], point));
+#ifdef HAS_SHARP
+  return frame.led_out * part_fraction + posed.sweep.w;
+#else
+  return frame.led_out + posed.sweep.w;
+#endif
 }
+
+// From which distance on [m] a point that keeps another counts as touching.
+float touching_from(float kept)
+{
+#ifdef HAS_SHARP
+  return part_fraction < 1.0 ? 0.0 : kept;
+#else
+  return kept;
+#endif
+}
+
+#ifdef HAS_SHARP
+// Whether a path in the substep, as seen from a collider, is long.
+bool is_far(vec3 path)
+{
+  float far = frame.reach * {{fast_of_reach}} / float(CV_COUNT - 1);
+  return dot(path, path) > far * far;
+}
+
+// Twin of hurried_guides, of one collider.
+bool is_root_far(Posed posed)
+{
+  vec4 local = vec4(moved(posed.inverse, vec4(position[1], 1.0)), 1.0);
+  return posed.sweep.y > 0.0 && is_far(position[1] - previous[1] - moved(posed.change, local));
+}
+#endif
 
 // xyz the normal in the world of a gradient in object space; w what distances are multiplied by. The
 // gradient transforms by the inverse transposed, and its length says how much the distance is scaled
@@ -208,6 +261,9 @@ void distances_to(Posed posed, vec4 local[FREE_SIZE], out Found found[FREE_SIZE]
 
 void find_contacts_with(Posed posed)
 {
+#ifdef HAS_SHARP
+  bool root_is_far = is_root_far(posed);
+#endif
   Found found[FREE_SIZE];
   vec4 local[FREE_SIZE];
   for (int i = 0; i < FREE; i++) {
@@ -247,13 +303,16 @@ void find_contacts_with(Posed posed)
   }
 #endif
   for (int i = 0; i < FREE; i++) {
-    float reached = was[i] + frame.led_out + posed.sweep.w;
+    float reached = was[i] + led_out(posed);
     float offset = surface[i].w + min(radius[i], reached);
     float gap = offset - dot(surface[i].xyz, position[i + 2]);
     bool is_met = is_near[i] && (posed.sweep.y <= 0.0 || gap > -frame.reach);
     vec3 from = previous[i + 2] + moved(posed.change, local[i]);
-    float counts = reached >= radius[i] ? SKIN : NO_PLANE;
+    float counts = reached >= touching_from(radius[i]) ? SKIN : NO_PLANE;
     add_contact(i, is_met, vec4(surface[i].xyz, offset), vec4(from, counts));
+#ifdef HAS_SHARP
+    is_hurried = is_hurried || (root_is_far && is_met && is_far(position[i + 2] - from));
+#endif
   }
 }
 
@@ -340,13 +399,13 @@ Deepest deepest_between(Posed posed, int i)
     vec3 here = between(lower, upper, along);
     vec3 before = between(lower_before, upper_before, along);
     Met met = followed(posed, here, before, own_radius);
-    float reached = met.was + frame.led_out + posed.sweep.w;
+    float reached = met.was + led_out(posed);
     float offset = met.surface + min(kept[k], reached);
     float gap = offset - dot(met.normal, here);
     if (gap > least) {
       vec3 from = before + moved(posed.change, vec4(moved(posed.inverse, vec4(here, 1.0)), 1.0));
       least = gap;
-      deepest = Deepest(vec4(met.normal, offset), vec4(from, reached >= kept[k] ? SKIN : NO_PLANE), along);
+      deepest = Deepest(vec4(met.normal, offset), vec4(from, reached >= touching_from(kept[k]) ? SKIN : NO_PLANE), along);
     }
   }
   return deepest;
@@ -354,6 +413,7 @@ Deepest deepest_between(Posed posed, int i)
 
 void find_between_with(Posed posed)
 {
+  bool root_is_far = is_root_far(posed);
   Found found[FREE_SIZE];
   vec4 local[FREE_SIZE];
   for (int i = 0; i < FREE; i++) {
@@ -384,6 +444,8 @@ void find_between_with(Posed posed)
   for (int i = 0; i < FREE; i++) {
     bool is_met = deepest[i].along > 0.0;
     add_between(i, is_met, deepest[i].plane, deepest[i].origin, deepest[i].along);
+    vec3 path = between(position[i + 1], position[i + 2], deepest[i].along) - deepest[i].origin.xyz;
+    is_hurried = is_hurried || (root_is_far && is_met && is_far(path));
   }
 }
 #endif
@@ -400,6 +462,9 @@ void find_with(Posed posed)
 
 void find_contacts(int substep)
 {
+#ifdef HAS_SHARP
+  is_hurried = false;
+#endif
   for (int slot = 0; slot < CONTACT_SLOTS; slot++) {
     for (int i = 0; i < FREE; i++) {
       plane[slot][i] = vec4(0.0, 0.0, 0.0, NO_PLANE);

@@ -1,4 +1,4 @@
-"""Contacts: found once in a substep, solved as planes each time lengths and contacts alternate.
+"""Contacts: found once in a substep or a part of it, solved as planes in turn with lengths.
 
 A CV near a collider gets the plane of its nearest surface, moved out by the CV's own radius, which
 grows from root to tip (the "pearl" configuration of Nguyen and Donnelly 2005). What a plane asks
@@ -52,6 +52,10 @@ TRACE_STEPS = 12
 #: How much of its distance may be missing, as a fraction of it, before contacts and lengths are
 #: solved in turn once more, and how often that is.
 MAY_MISS, MORE_ROUNDS = np.float32(0.5), 10
+#: How many segments the root of a guide and a point that touches go in a substep, as seen from a
+#: collider, before the guide goes through it in parts; how many these are, and how much oftener
+#: contacts and lengths are solved in turn in each.
+FAST, PARTS, PART_PASSES = 0.5, 10, 2
 #: How often one CV is pushed by what a point near the other, which is pinned, asks for.
 MAX_WEIGHT = np.float32(2.0)
 #: Closer than this to its plane a CV counts as touching, so that lengths do not push it in; in
@@ -63,6 +67,7 @@ SKIN = 4.0e-4
 class Contacts:
     """Planes of one collider, m of them.
 
+    pose: of the collider.
     index: (m,) into the points that contacts were looked for.
     normal: (3, m) outwards, world. offset: (m,) [m], the point shall keep normal . x >= offset.
     origin: (3, m) world [m], where the point would be had it stayed with the collider.
@@ -72,6 +77,7 @@ class Contacts:
     slack: (m,) [m], how far it may be from its plane when the substep ends.
     """
 
+    pose: Pose
     index: Ints
     normal: Floats
     offset: Floats
@@ -101,6 +107,13 @@ class Contacts:
         away = np.maximum(dot_rows(self.normal, moved), np.float32(0.0))
         away *= self.push > 0.0
         self._add(previous, self.normal * away)
+
+    def far(self, position: Floats, farthest: float) -> Bools:
+        """Which of them (m,) have gone farther [m] in the substep, as seen from the collider."""
+        path = self._here(position)
+        path -= self.origin
+        result: Bools = dot_rows(path, path) > np.float32(farthest * farthest)
+        return result
 
     def missing(self, position: Floats) -> Bools:
         """Which of them (m,) are farther below their planes than they may be."""
@@ -302,6 +315,27 @@ def radius_of_all(
     return radius
 
 
+def hurried_guides(
+    contacts: list[Contacts], position: Floats, previous: Floats, size: float
+) -> Ints:
+    """Guides, rising, that go through a substep in parts: those that meet with their segments what
+    goes far as seen from their roots, and are not dragged along yet.
+
+    Args:
+        position, previous: (3, cv_count, n) world [m], a substep apart. size: of the hair [m].
+    """
+    (_, cv_count, guide_count), here = position.shape, position.reshape(3, -1)
+    spacing = spacing_of(size, cv_count)
+    farthest, root = FAST * spacing, PINNED - 1
+    found = [np.zeros(0, np.int64)]
+    for one in contacts:
+        if is_sharp(one.pose, spacing, size):
+            is_fast = _travel(one.pose, position[:, root], previous[:, root]) > farthest
+            guides = one.index[one.far(here, farthest)] % guide_count
+            found.append(guides[is_fast.take(guides)])
+    return np.unique(np.concatenate(found))
+
+
 def touched_by(contacts: list[Contacts], touching: list[Bools]) -> Touched | None:
     """Free CVs that touch, each with the normal of the last collider that it touches, or else that
     its segments touch; None where none does."""
@@ -367,9 +401,10 @@ def _contacts_with(
             reached.take(kept),
             own_radius.take(kept),
         )
-    is_out = reached >= own_radius
+    is_out = reached >= (0.0 if pose.is_part else own_radius)
     skin, slack = np.float32(SKIN * size), _slack(own_radius, is_out, size)
-    return Contacts(index, normal, offset, origin, is_out, skin, np.zeros_like(offset), slack)
+    push = np.zeros_like(offset)
+    return Contacts(pose, index, normal, offset, origin, is_out, skin, push, slack)
 
 
 def _slack(radius: Floats, is_out: Bools, size: float) -> Floats:
@@ -421,8 +456,9 @@ def _between_with(
     upper = upper.take(which % max(count, 1))
     weight_lower = (np.float32(1.0) - along) * (radius.take(upper - guide_count) > -np.inf)
     scale = weight_lower * weight_lower + along * along
-    is_out = reached >= wanted.take(which)
+    is_out = reached >= (0.0 if pose.is_part else wanted.take(which))
     return SegmentContacts(
+        pose,
         upper,
         chosen(normal, which),
         offset,

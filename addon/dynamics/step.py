@@ -9,7 +9,7 @@
         springs      curls give along themselves; the lengths that they leave are kept from there on
         style        global and local shape, one direct solve
         lengths      one direct solve, or relaxation
-        contacts     found once, then in turn:  push out  |  keep lengths
+        contacts     found, then in turn:  push out  |  keep lengths; again in parts at what is fast
         absorb       what was pushed out does not bounce
 
 References: Jakobsen 2001, "Advanced Character Physics"; Nguyen and Donnelly 2005, "Hair Animation
@@ -26,34 +26,19 @@ depend on the frame rate; `grid_at_frame_end` bridges it for drawing.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 
-from ..arrays import Floats, Ints
+from ..arrays import Floats
 from .blend import blended
 from .colliders import Pose, poses_through
-from .constraints import (
-    PINNED,
-    Touched,
-    finish_lengths,
-    hold_within_reach,
-    keep_lengths,
-    pin,
-    relax_lengths,
-)
-from .contacts import (
-    MORE_ROUNDS,
-    Contacts,
-    find_between,
-    find_contacts,
-    spacing_of,
-    touched_by,
-)
+from .constraints import PINNED, pin
 from .force_fields import along_strands, blow
 from .forces import brake, predict
 from .frame import Block, Drive, Frame, carried_after, check_drive, style_rows
+from .outside import Chain, Outside
 from .rigid_path import Carry
 from .schedule import due_substeps
 from .settings import DynamicsSettings
@@ -135,7 +120,9 @@ def _advance_block(
     """Position and previous position after these substeps; takes the arrays."""
     settings, rest, damped = frame.settings, block.rest, block.damped
     spare = np.empty_like(position)
-    chain = _Chain(rest.length, block.held, rest.size, settings)
+    chain = Chain(rest.length, block.held, rest.size, settings)
+    led_out = settings.depenetration_speed * rest.size * frame.dt
+    passes = settings.contact_passes if frame.drive.colliders else 0
     is_arc, begun = block.style.carrier is not None, None
     if is_arc:
         first = frame.place(numbers[0] - 1) if frame.inherits else None
@@ -169,7 +156,8 @@ def _advance_block(
         restore_style(position, style, rest.shape, block.matrix)
         pin(position, style, rest.length, block.held)
         chain.keep_lengths(position, None)
-        _keep_outside(position, previous, block, chain, frame, poses[number])
+        outside = Outside(chain, block.radius, block.between, poses[number], led_out, passes)
+        outside.keep(position, previous)
     return position, previous
 
 
@@ -229,87 +217,3 @@ def displacement_beside_root(time_left: float, drive: Drive, duration: float) ->
     displacement = drive.held.spread(displacement)
     displacement[~drive.held.is_held.any(axis=1)] = 0.0
     return displacement
-
-
-@dataclass(frozen=True)
-class _Chain:
-    """What keeps guides in one piece; length, held: see `Block`. size: of the hair [m]."""
-
-    length: Floats
-    held: Floats | None
-    size: float
-    settings: DynamicsSettings
-
-    def part(self, guides: Ints) -> _Chain:
-        held = None if self.held is None else self.held[:, guides]
-        return replace(self, length=self.length[:, guides], held=held)
-
-    def keep_lengths(self, position: Floats, touched: Touched | None) -> None:
-        if self.settings.length_solver == "direct":
-            keep_lengths(position, self.length, touched, self.held)
-            return
-        relax_lengths(position, self.length, self.held, self.settings.relaxations)
-        if self.settings.long_range:
-            hold_within_reach(position, self.length, self.held)
-
-
-def _keep_outside(
-    position: Floats, previous: Floats, block: Block, chain: _Chain, frame: Frame, poses: list[Pose]
-) -> None:
-    """Contacts and lengths in turn; lengths come last, and slide along what touches.
-
-    Guides that touch nothing take part, so that none depends on what others do.
-    """
-    settings, size = frame.settings, block.rest.size
-    here, was = (rows.reshape(3, -1) for rows in (position, previous))
-    led_out = settings.depenetration_speed * size * frame.dt
-    spacing = spacing_of(size, position.shape[1])
-    contacts = find_contacts(here, was, block.radius, poses, led_out, size, spacing)
-    guide_count = position.shape[2]
-    contacts += find_between(
-        here, was, block.radius, block.between, poses, led_out, size, guide_count
-    )
-    passes = settings.contact_passes if frame.drive.colliders else 0
-    _solve_in_turn(position, chain, contacts, passes)
-    _solve_again(position, chain, contacts)
-    for one in contacts:
-        one.absorb(here, was)
-
-
-def _solve_in_turn(position: Floats, chain: _Chain, contacts: list[Contacts], passes: int) -> None:
-    """Contacts and lengths, and lengths at last."""
-    touched, settings = None, chain.settings
-    here = position.reshape(3, -1)
-    for _ in range(passes):
-        touching = [one.push_out(here, settings.friction) for one in contacts]
-        touched = touched_by(contacts, touching)
-        chain.keep_lengths(position, touched)
-    if settings.length_solver == "direct":
-        tolerance, iterations = settings.length_tolerance, settings.length_iterations
-        length, held, size = chain.length, chain.held, chain.size
-        finish_lengths(position, length, touched, held, tolerance, iterations, size)
-
-
-def _solve_again(position: Floats, chain: _Chain, contacts: list[Contacts]) -> None:
-    """Once more in turn, for guides that their lengths have drawn into a collider."""
-    guide_count = position.shape[2]
-    guides = _missing(position, contacts)
-    for _ in range(MORE_ROUNDS):
-        if not guides.size:
-            return
-        some, own = (
-            position.take(guides, axis=2),
-            [one.part(guides, guide_count) for one in contacts],
-        )
-        _solve_in_turn(some, chain.part(guides), own, 1)
-        position[:, :, guides] = some
-        for one, part in zip(contacts, own, strict=True):
-            one.note(part, guides, guide_count)
-        guides = guides[_missing(some, own)]
-
-
-def _missing(position: Floats, contacts: list[Contacts]) -> Ints:
-    """Guides, rising, of which a CV or segment is farther below its plane than it may be."""
-    here, guide_count = position.reshape(3, -1), position.shape[2]
-    found = [one.index[one.missing(here)] % guide_count for one in contacts]
-    return np.unique(np.concatenate(found)) if found else np.zeros(0, np.int64)

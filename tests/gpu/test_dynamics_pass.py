@@ -107,7 +107,7 @@ class Scene:
     is_curled: bool = False
     fps: float = 60.0
     is_bent: bool = True
-    is_fast: bool = False  # colliders swing ten times as far
+    swing: float = 1.0  # colliders swing so many times as far
     is_combed: bool = False  # guides stay no farther from colliders than they are at first
     is_blended: bool = False  # not all of what is shown is simulated
     is_painted: bool = False  # each guide has its own numbers
@@ -146,9 +146,9 @@ class Scene:
 
     def colliders(self, frame: int) -> tuple[PosedCollider, ...]:
         earlier, before, now = (shaking((frame + k) / self.fps) for k in (-1, 0, 1))
-        if self.is_fast:
+        if self.swing != 1.0:
             for matrix in (earlier, before, now):
-                matrix[0, 3] *= 10.0
+                matrix[0, 3] *= self.swing
                 matrix[1, 3] = matrix[0, 3] * 0.5
         since = earlier if self.is_bent and frame else None
         still = np.eye(4)
@@ -311,7 +311,11 @@ AT_COLLIDERS = {
     "ball without friction": Scene({"friction": 0.0, **LIMP}, on_head=(BALL,)),
     "standing ball": Scene(standing=(IN_THE_WAY,)),
     "capsule": Scene(LIMP, on_head=(ROD,)),
-    "finger": Scene(guide_count=20, on_head=(FINGER,), is_fast=True),
+    "finger": Scene(guide_count=20, on_head=(FINGER,), swing=10.0),
+    # farther than a segment is long
+    "fast plate and finger": Scene(
+        guide_count=12, on_head=(plate_field(), FINGER), swing=20.0, is_held=True
+    ),
     "plate and finger": Scene(guide_count=12, on_head=(plate_field(), FINGER)),
     "set of balls": Scene(LIMP, on_head=(CLUSTER,)),
     "mesh field": Scene(LIMP, guide_count=24, on_head=(ball_field(0.095),)),
@@ -390,6 +394,29 @@ def assert_equal(scene: Scene, make_pass: Any, tolerance: float, seconds: float 
 @pytest.mark.parametrize("scene", few_by_name(IN_AIR, *SLOW_IN_AIR))
 def test_equals_numpy_in_air(make_pass: Any, scene: Scene) -> None:
     assert_equal(scene, make_pass, FREE)
+
+
+@pytest.mark.parametrize("speed", [3.5, 4.0])
+def test_equals_numpy_where_a_finger_is_drawn_through_hair(make_pass: Any, speed: float) -> None:
+    """All guides meet what goes farther in a substep than a segment is long."""
+    grid = np.zeros((6, 16, 3), np.float32)
+    grid[..., 0] = np.linspace(-0.05, 0.05, 6)[:, None]
+    grid[..., 2] = np.linspace(0.0, -0.25, 16)
+    finger = CapsuleCollider(np.array([-0.08, 0.0, 0.0]), np.array([0.08, 0.01, 0.0]), 0.008)
+    settings, places = DynamicsSettings(**TIGHT), []
+    for step in range(int(0.22 / speed * 180.0) + 1):
+        places.append(np.eye(4))
+        places[-1][:3, 3] = 0.0, -0.14 + step * speed / 180.0, -0.13
+    state = start(grid)
+    dynamics = make_pass(state)
+    for pair in pairwise(places):
+        posed = (PosedCollider(finger, *pair),)
+        drive = Drive(grid, grid, posed, np.array([0.0, 0.0, -9.81]))
+        state = advance(state, drive, settings, 1.0 / 180.0)
+        dynamics.advance(drive, settings, 1.0 / 180.0)
+        assert np.abs(dynamics.read().position - state.position).max() < TOUCHING
+        assert np.abs(dynamics.read().previous - state.previous).max() < TOUCHING
+    assert state.grid[:, 8, 1].min() > 0.04, "it was swept along"
 
 
 @pytest.mark.parametrize(

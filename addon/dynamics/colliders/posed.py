@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Protocol
 
@@ -185,6 +185,7 @@ class Pose:
     travel: [m], no point of it goes farther in the substep.
     matrix, matrix_before: (4, 4) float64, object to world at the substep's end and begin.
     swelling: see `PosedCollider`.
+    is_part: whether it is at the end of a part of the substep, see `part`.
     """
 
     collider: Collider
@@ -197,11 +198,35 @@ class Pose:
     matrix: Floats
     matrix_before: Floats
     swelling: float = 0.0
+    is_part: bool = False
 
     @cached_property
     def inverse_before(self) -> Floats:
         """(4, 4) float32, world to object at the substep's begin, or at its end if it was flat."""
         return inverse_or(self.matrix_before, self.matrix).astype(np.float32)
+
+    def part(self, number: int, count: int) -> Pose:
+        """In one of `count` equal parts of the substep.
+
+        Its inverse matrix goes straight from begin to end, which is nearly so, as it turns little.
+        """
+        begin, end = (self._inverse_at((number + more) / count) for more in (0, 1))
+        matrix, before = np.linalg.inv(end), np.linalg.inv(begin)
+        return replace(
+            self,
+            inverse=end.astype(np.float32),
+            displacement=self.displacement / np.float32(count),
+            radius=self.radius + self.travel,
+            matrix=matrix,
+            matrix_before=before,
+            swelling=self.swelling / count,
+            is_part=True,
+        )
+
+    def _inverse_at(self, fraction: float) -> Floats:
+        begin, end = inverse_or(self.matrix_before, self.matrix), np.linalg.inv(self.matrix)
+        result: Floats = begin * (1.0 - fraction) + end * fraction
+        return result
 
 
 def travels(displacement: Floats, center: Floats, radius: float) -> Floats:

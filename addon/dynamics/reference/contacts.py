@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from ..constraints import PINNED
 from ..contacts import (
     BETWEEN,
     BETWEEN_RADIUS,
+    FAST,
     MAX_WEIGHT,
     MAY_MISS,
     REACH,
@@ -49,6 +50,7 @@ class Plane:
     is_out: bool
     skin: float  # [m]
     slack: float  # [m]
+    path: float  # [m] that its point has gone, as seen from the collider
     along: float = 1.0
     weights: tuple[float, float] = (0.0, 1.0)
     push: float = 0.0
@@ -119,12 +121,15 @@ class Solid:
     """A collider in one substep."""
 
     posed: PosedCollider
-    before: Floats
+    change: Floats  # of its matrix
     now: Floats
     inverse: Floats
     inverse_before: Floats
+    scale: float  # the smallest
     seen: float  # [m^2], squared length of paths that need not be followed
     travel: float  # [m], no point of it goes farther
+    swelling: float  # [m]
+    is_part: bool = False
 
     @classmethod
     def of(cls, posed: PosedCollider, moment: Moment, size: float) -> Solid | None:
@@ -138,7 +143,28 @@ class Solid:
         change, (center, reach) = now - before, posed.collider.bounds
         travel = float(np.linalg.norm(change[:3, :3] @ center + change[:3, 3]))
         travel += reach * float(np.linalg.norm(change[:3, :3]))
-        return cls(posed, before, now, np.linalg.inv(now), np.linalg.inv(begin), seen, travel)
+        inverses = np.linalg.inv(now), np.linalg.inv(begin)
+        return cls(posed, change, now, *inverses, scale, seen, travel, posed.swelling)
+
+    def part(self, number: int, count: int) -> Solid:
+        """In one of `count` parts of the substep."""
+        begin, end = (
+            self.inverse_before * (1.0 - fraction) + self.inverse * fraction
+            for fraction in (number / count, (number + 1) / count)
+        )
+        return replace(
+            self,
+            change=self.change / count,
+            now=np.linalg.inv(end),
+            inverse=end,
+            inverse_before=begin,
+            swelling=self.swelling / count,
+            is_part=True,
+        )
+
+    def is_sharp(self, spacing: float) -> bool:
+        """Whether segments of this length [m] collide."""
+        return spacing**2 > self.seen
 
     def local(self, x: Floats) -> Floats:
         result: Floats = (self.inverse @ np.append(x, 1.0))[:3]
@@ -146,7 +172,7 @@ class Solid:
 
     def origin(self, x: Floats, previous: Floats) -> Floats:
         """Where it would be had it stayed with the collider."""
-        result: Floats = previous + ((self.now - self.before) @ np.append(self.local(x), 1.0))[:3]
+        result: Floats = previous + (self.change @ np.append(self.local(x), 1.0))[:3]
         return result
 
     def at(self, local: Floats) -> tuple[float, Floats]:
@@ -169,43 +195,49 @@ class Solid:
 
     def _met(self, begin: Floats, path: Floats, first: float, target: float) -> float:
         """Fraction of the way where it is no farther than the target; 1: nowhere."""
-        scale = float(np.linalg.svd(self.now[:3, :3], compute_uv=False)[-1])
-        length = float(np.linalg.norm(path)) * scale
+        length = float(np.linalg.norm(path)) * self.scale
         gone, distance = 0.0, first
         for _ in range(TRACE_STEPS):
             step = max(distance - target, length / TRACE_STEPS)
             if gone + step >= length:
                 return 1.0
             local = begin + path * ((gone + step) / length)
-            found = float(self.posed.collider.distance(local[:, None])[0][0]) * scale
+            found = float(self.posed.collider.distance(local[:, None])[0][0]) * self.scale
             if found < target:
                 return (gone + step * (distance - target) / (distance - found)) / length
             gone, distance = gone + step, found
         return 1.0
 
 
+def is_hurried(
+    solid: Solid, planes: list[Plane], x: Floats, previous: Floats, spacing: float
+) -> bool:
+    """Whether a guide with these planes goes through the substep in parts; see
+    `contacts.hurried_guides`."""
+    root, farthest = PINNED - 1, FAST * spacing
+    is_far = float(np.linalg.norm(x[root] - solid.origin(x[root], previous[root]))) > farthest
+    return solid.is_sharp(spacing) and is_far and any(plane.path > farthest for plane in planes)
+
+
 def planes_of(
-    posed: PosedCollider,
+    solid: Solid,
     x: Floats,
     previous: Floats,
     held: list[bool],
     settings: DynamicsSettings,
-    moment: Moment,
+    dt: float,
     size: float,
     clearance: Floats,
 ) -> tuple[list[Plane], list[Plane]]:
     """Planes for the CVs of x (cv_count, 3) near a collider, and for segments.
 
     Args:
-        size: the hair's [m].
+        dt: [s], how long the collider goes. size: the hair's [m].
         clearance: (cv_count, 1 + len(BETWEEN)) [m], what each keeps at most.
     """
-    solid = Solid.of(posed, moment, size)
-    if solid is None:
-        return [], []
     free = [cv for cv in range(PINNED, len(x)) if not held[cv]]
-    led_out = settings.depenetration_speed * size * moment.dt + posed.swelling
-    is_sharp = (size / (len(x) - 1)) ** 2 > solid.seen
+    led_out = settings.depenetration_speed * size * dt + solid.swelling
+    is_sharp = solid.is_sharp(size / (len(x) - 1))
     of_cvs, of_segments = [], []
     for cv in free:
         along = cv / (len(x) - 1)
@@ -246,8 +278,10 @@ def _plane_of_cv(
     offset = surface + min(radius, reached)
     if is_sharp and offset - normal @ x[cv] <= -REACH * size:
         return None
-    slack = max(radius * float(MAY_MISS), 2.0 * SKIN * size) if reached >= radius else np.inf
-    return Plane(cv, normal, offset, origin, reached >= radius, SKIN * size, slack)
+    is_out = reached >= (0.0 if solid.is_part else radius)
+    slack = max(radius * float(MAY_MISS), 2.0 * SKIN * size) if is_out else np.inf
+    gone = float(np.linalg.norm(path))
+    return Plane(cv, normal, offset, origin, is_out, SKIN * size, slack, gone)
 
 
 def _plane_between(
@@ -273,10 +307,11 @@ def _plane_between(
         lower = (1.0 - along) * is_loose
         scale = lower * lower + along * along
         weights = lower / scale, min(along / scale, float(MAX_WEIGHT))
-        is_out = was + led_out >= wanted
+        is_out = was + led_out >= (0.0 if solid.is_part else wanted)
         slack = max(wanted * float(MAY_MISS), 2.0 * SKIN * size) if is_out else np.inf
         origin = solid.origin(here, before)
-        plane = Plane(cv, normal, offset, origin, is_out, SKIN * size, slack, along, weights)
+        gone = float(np.linalg.norm(here - origin))
+        plane = Plane(cv, normal, offset, origin, is_out, SKIN * size, slack, gone, along, weights)
         if deepest is None or plane.gap(x) > deepest.gap(x):
             deepest = plane
     return deepest if deepest is not None and deepest.gap(x) > -REACH * size else None

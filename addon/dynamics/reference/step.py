@@ -17,7 +17,7 @@ from ...arrays import Floats
 from ...params.curve import along as curve_along
 from ..among import FELT_PER_SECOND
 from ..constraints import CONTACT_WEIGHT, HELD, HELD_SWEEPS, PINNED, ROUNDING
-from ..contacts import BETWEEN, MORE_ROUNDS
+from ..contacts import BETWEEN, MORE_ROUNDS, PART_PASSES, PARTS
 from ..frame import Frame, carried_after, inherits
 from ..rigid_path import Carry, Rigid
 from ..settings import DynamicsSettings
@@ -28,7 +28,15 @@ from ..trajectory import curvature
 from ..turn import best_rotation
 from ..wind import air_of
 from .among import Hair, feel_slowly
-from .contacts import Moment, Plane, is_deep, planes_of, push_out
+from .contacts import (
+    Moment,
+    Plane,
+    Solid,
+    is_deep,
+    is_hurried,
+    planes_of,
+    push_out,
+)
 from .force_fields import blown_slowly
 from .shape import frames, hold, jacobian_of
 
@@ -198,14 +206,29 @@ class _Guide:
         self._restore_style(style, settings, moment.dt)
         self._pin(style)
         self._keep_lengths({}, settings)
+        found = [Solid.of(posed, moment, self.size) for posed in drive.colliders]
+        solids = [solid for solid in found if solid is not None]
+        passes = settings.contact_passes if drive.colliders else 0
+        if not self._keep_outside(solids, settings, moment.dt, passes):
+            self._keep_outside_in_parts(solids, settings, moment.dt, passes)
+
+    def _keep_outside(
+        self, solids: list[Solid], settings: DynamicsSettings, dt: float, passes: int
+    ) -> bool:
+        """Contacts and lengths; False if that is not done, but shall be done in parts."""
         found = [
             planes_of(
-                posed, self.x, self.previous, self.held, settings, moment, self.size, self.clearance
+                solid, self.x, self.previous, self.held, settings, dt, self.size, self.clearance
             )
-            for posed in drive.colliders
+            for solid in solids
         ]
+        spacing = self.size / (len(self.x) - 1)
+        for solid, (of_cvs, of_segments) in zip(solids, found, strict=True):
+            own = of_cvs + of_segments
+            if not solid.is_part and is_hurried(solid, own, self.x, self.previous, spacing):
+                return False
         planes = [of_cvs for of_cvs, _ in found] + [of_segments for _, of_segments in found]
-        self._solve_in_turn(planes, settings, settings.contact_passes if drive.colliders else 0)
+        self._solve_in_turn(planes, settings, passes)
         for _ in range(MORE_ROUNDS):
             if not is_deep(planes, self.x):
                 break
@@ -213,6 +236,30 @@ class _Guide:
         for group in planes:
             for plane in group:
                 plane.absorb(self.x, self.previous)
+        return True
+
+    def _keep_outside_in_parts(
+        self,
+        solids: list[Solid],
+        settings: DynamicsSettings,
+        dt: float,
+        passes: int,
+    ) -> None:
+        end, path = self.x.copy(), (self.x - self.previous) / PARTS
+        went = np.zeros_like(path)
+        self.x = self.previous.copy()
+        for number in range(PARTS):
+            self.previous = self.x.copy()
+            self.x = self.x + path
+            if number == PARTS - 1:
+                carried = [*range(PINNED), *self._held_cvs()]
+                self.x[carried] = end[carried]
+            self._keep_lengths({}, settings)
+            solids_now = [solid.part(number, PARTS) for solid in solids]
+            self._keep_outside(solids_now, settings, dt / PARTS, passes * PART_PASSES)
+            path = self.x - self.previous
+            went += path
+        self.previous = self.x - went
 
     def _solve_in_turn(
         self, planes: list[list[Plane]], settings: DynamicsSettings, passes: int

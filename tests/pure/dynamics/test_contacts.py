@@ -138,6 +138,49 @@ def test_nothing_thin_passes_between_two_points(kit, kind):
     assert not behind
 
 
+def swept(kit, kind, speed, grid):
+    """How a plate of 1 cm or a finger of 16 mm goes 0.28 m through hanging hair: where it is and
+    the state after each substep, first of all at the begin."""
+    settings = DynamicsSettings()
+    thin = CapsuleCollider((-0.1, 0.0, 0.0), (0.1, 0.0, 0.0), 0.008)
+    if kind == "plate":
+        thin = DistanceField.from_surface(kit.box((0.2, 0.01, 0.12)), settings)
+    states, places = [start(grid)], [kit.translation(0.0, -0.14, -0.13)]
+    for step in range(1, int(0.28 / speed * 180.0) + 1):
+        places.append(kit.translation(0.0, -0.14 + step * speed / 180.0, -0.13))
+        drive = Drive(grid, grid, (PosedCollider(thin, *places[-2:]),), kit.EARTH)
+        states.append(advance(states[-1], drive, settings, 1.0 / 180.0))
+    return list(zip(places, states, strict=True))
+
+
+@pytest.mark.parametrize("speed", [4.0, 5.6])
+@pytest.mark.parametrize("kind", ["finger", "plate"])
+def test_nothing_thin_passes_however_fast(kit, kind, speed):
+    """It goes farther than it is thick in a substep; hair is drawn over it.
+
+    A point that went through has gone around its middle, by its own way and along its guide, once
+    more than it has turned about it.
+    """
+    grid = kit.straight(5, 16, 0.25) - np.float32([0.02, 0.0, 0.0])
+    seen = []
+    for place, state in swept(kit, kind, speed, grid):
+        points = kit.moved(np.linalg.inv(place), between(state.grid))[:, : -2 * 6]
+        seen.append(np.unwrap(np.arctan2(points[..., 2], points[..., 1])))
+        assert max_stretch(state) < 0.01
+    turned = np.diff(seen, axis=0)
+    turns = np.round(turned / (2.0 * np.pi))
+    assert not turns.any()
+    assert state.grid[:, 8, 1].min() > 0.08, "it was swept along"
+
+
+def test_what_meets_something_fast_goes_as_if_it_was_alone(kit):
+    grid = kit.straight(5, 16, 0.25) - np.float32([0.02, 0.0, 0.0])
+    grid[3] += np.float32([0.0, 0.4, 0.0])  # that one does not meet it
+    together = swept(kit, "finger", 5.6, grid)[-1][1]
+    alone = swept(kit, "finger", 5.6, grid[[1, 3]])[-1][1]
+    np.testing.assert_array_equal(together.position[..., [1, 3]], alone.position)
+
+
 def between(grid):
     """Points of all free segments, (guides, n, 3)."""
     share = np.linspace(0.0, 1.0, 6)[:, None]
@@ -301,12 +344,16 @@ def test_a_ball_without_volume_is_named(center, radius):
 
 
 def test_of_two_colliders_that_touch_a_cv_the_last_one_counts():
+    pose = PosedCollider(SphereCollider(np.zeros(3), 1.0), np.eye(4), np.eye(4)).poses(
+        [(0.0, 1.0)]
+    )[0]
+
     def contacts(index, way):
         count = len(index)
         normal = np.repeat(np.float32(way)[:, None], count, axis=1)
         rows, zero = np.zeros((3, count), np.float32), np.zeros(count, np.float32)
         return Contacts(
-            np.array(index), normal, zero, rows, zero == 0.0, np.float32(0.0), zero, zero
+            pose, np.array(index), normal, zero, rows, zero == 0.0, np.float32(0.0), zero, zero
         )
 
     both = [contacts([2, 5, 7], (1, 0, 0)), contacts([1, 5, 7, 9], (0, 1, 0))]

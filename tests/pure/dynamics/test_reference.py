@@ -210,8 +210,10 @@ def test_with_a_sphere_set_and_a_capsule(kit, shake, collider, bowed):
 
 @pytest.mark.parametrize("is_mesh", few_in_commits([True, False]))
 @pytest.mark.parametrize("is_combed", [False, True])
-def test_segments_at_what_is_thin_and_fast(kit, is_mesh, is_combed):
-    """It goes twice its own thickness in a substep; all find the same places on the segments."""
+@pytest.mark.parametrize("speed", [2.2, 6.5])
+def test_segments_at_what_is_thin_and_fast(kit, is_mesh, is_combed, speed):
+    """It goes twice its own thickness in a substep, or farther than a segment is long; all find the
+    same places on the segments."""
     settings = DynamicsSettings(**kit.LIMP | TIGHT | {"damping": 1.0, "collider_resolution": 24})
     if is_combed:
         settings = replace(settings, radius_root=0.02, radius_tip=0.08)
@@ -221,7 +223,7 @@ def test_segments_at_what_is_thin_and_fast(kit, is_mesh, is_combed):
     grid = kit.straight(4, 9, 0.25)
 
     def motion(time):
-        return kit.translation(0.02, -0.05 + 2.2 * time, -0.14) @ kit.rotation(0, 3.0 * time)
+        return kit.translation(0.02, -0.05 + speed * time, -0.14) @ kit.rotation(0, 3.0 * time)
 
     moving = [
         kit.Scene(grid, settings, motion, on_head=(thin,), advance=how)
