@@ -42,7 +42,7 @@ def steps():
     driver.enable_extension()
     bpy.context.preferences.view.filebrowser_display_type = "SCREEN"
     yield from nothing_yet()
-    yield from set_the_scene(distance=0.9)
+    yield from the_sample_scene()
     keep("window", [as_far_as_used((yield from whole_screen("window")))])
     bpy.ops.wm.read_homefile()  # panels that have been drawn stay closed
     yield
@@ -67,6 +67,17 @@ def nothing_yet():
     keep("start", [crop("start", *sidebar())])
 
 
+def the_sample_scene():
+    """At rest, and the window as an artist has it, but without the lines of its lights."""
+    show([SIDEBAR])
+    viewport().spaces.active.overlay.show_extras = False
+    with bpy.context.temp_override(area=viewport(), region=region("WINDOW")):
+        bpy.ops.hairloom.sample_scene("EXEC_DEFAULT", plays=False)
+    yield from until(lambda: not of_hairloom("long_work").running(), "the scene does not come")
+    yield from until(lambda: is_drawn(bpy.context.object), "the hair is not drawn")
+    yield from panels_beside_it()
+
+
 def set_the_scene(distance):
     """Hair on a ball, seen from so far [m], and the window as an artist has it."""
     show([SIDEBAR])
@@ -84,6 +95,10 @@ def set_the_scene(distance):
     hair.data.hairloom.shafts.use_shafts = True
     bpy.ops.hairloom.preview()
     yield from until(lambda: is_drawn(hair), "the hair is not drawn")
+    yield from panels_beside_it()
+
+
+def panels_beside_it():
     yield
     region("UI").tag_redraw()
     properties = next(a for a in bpy.context.screen.areas if a.type == "PROPERTIES")

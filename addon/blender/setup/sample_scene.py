@@ -26,14 +26,15 @@ _FRAMES = 96
 _TURNS = ((1, 0.0, 0.0), (20, 35.0, -4.0), (34, 20.0, 8.0), (56, -35.0, -4.0), (76, -10.0, 6.0))
 #: name -> position [m], power [W], side [m], colour
 _LIGHTS = {
-    "Key": ((-0.7, -0.9, 0.8), 14.0, 0.5, (1.0, 0.96, 0.9)),
-    "Fill": ((0.9, -0.7, 0.2), 6.0, 0.9, (0.85, 0.92, 1.0)),
-    "Rim": ((0.5, 0.9, 0.6), 6.0, 0.4, (1.0, 1.0, 1.0)),
+    "Key": ((-0.7, -0.9, 0.8), 24.0, 0.5, (1.0, 0.96, 0.9)),
+    "Fill": ((0.9, -0.7, 0.2), 8.0, 0.9, (0.85, 0.92, 1.0)),
+    "Rim": ((-0.8, 0.8, 0.3), 6.0, 0.4, (1.0, 1.0, 1.0)),
 }
 _CAMERA_AT, _LENS = (-0.34, -0.68, 0.02), 58.0
 #: below the centre of the head, since hair hangs down and shoulders are below
 _LOOKED_AT = Vector((0.0, 0.0, -0.07))
-_WORLD = (0.03, 0.034, 0.04, 1.0)
+_WORLD = (0.05, 0.058, 0.07, 1.0)
+_FILM_LOOK = "AgX - Medium High Contrast"
 #: long enough to swing
 _HAIR = GrowSettings(strand_count=6000, length=0.26)
 
@@ -65,6 +66,7 @@ def _scene_with_head(skin: str) -> tuple[bpy.types.Scene, bpy.types.Object]:
     scene.render.engine = ENGINE
     scene.render.resolution_x, scene.render.resolution_y = 800, 800
     scene.world = _world()
+    scene.view_settings.view_transform, scene.view_settings.look = "AgX", _FILM_LOOK
     scene.unit_settings.length_unit = "ADAPTIVE"  # hair has millimetres
     collection = scene.collection
     head = bust_object("Head", skin)
