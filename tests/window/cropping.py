@@ -46,14 +46,13 @@ def changed_box(before, now):
 
 def keep(name, pictures):
     """A picture of these beside each other, in as few colours as panels have; one of the whole
-    window is narrower instead."""
+    window is narrower, too."""
     files = [driver.screenshot_path(f"part_{name}-{number}") for number in range(len(pictures))]
     for file, each in zip(files, pictures, strict=True):
         file.write_bytes(screen.png(each))
     path = driver.screenshot_path(f"panel_{name}")
     beside = ["-background", GREY, "-gravity", "north", "+smush", str(GAP), "-strip"]
+    narrower = ["-resize", f"{WIDTH}x"] if name == "window" else []
     few = ["+dither", "-colors", str(COLOURS), f"png8:{path}"]
-    if name == "window":
-        few = ["-resize", f"{WIDTH}x", "-define", "png:compression-level=9", f"png24:{path}"]
-    subprocess.run(["convert", *map(str, files), *beside, *few], check=True)
+    subprocess.run(["convert", *map(str, files), *beside, *narrower, *few], check=True)
     made.add(name)
