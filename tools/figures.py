@@ -57,7 +57,7 @@ BENCHES: dict[str, Short] = {
     "contacts": Short("thin", "heads of hair"),
     "ties": Short(),
     "among": Short("--skip-cost", "what a frame costs"),
-    "endurance": Short("--runs 50 --minutes 0.2", "95 % of the runs, and most of the long shake"),
+    "endurance": Short("--runs 20 --minutes 0.2", "98 % of the runs, and most of the long shake"),
     "refinement": Short(),
     "shading": Short("cost reference glsl", "Cycles"),
     "volume": Short("cost transparency", "shadows, and Cycles"),
