@@ -202,7 +202,7 @@ class Pose:
 
     @cached_property
     def inverse_before(self) -> Floats:
-        """(4, 4) float32, world to object at the substep's begin, or at its end if it was flat."""
+        """(4, 4) float32, world to object at the substep's begin; see `inverse_or`."""
         return inverse_or(self.matrix_before, self.matrix).astype(np.float32)
 
     def part(self, number: int, count: int) -> Pose:
@@ -239,9 +239,11 @@ def travels(displacement: Floats, center: Floats, radius: float) -> Floats:
 
 
 def inverse_or(matrix: Floats, other: Floats) -> Floats:
-    """The inverse of a matrix (4, 4), or of the other one where it is flat."""
-    scales = np.linalg.svd(matrix[:3, :3], compute_uv=False)
-    result: Floats = np.linalg.inv(other if scales[-1] <= FLAT * scales[0] else matrix)
+    """The inverse of a matrix (4, 4), or of the other one, which is not flat, where it is flat or
+    turned against it by a right angle or more: else what lies between both inverses may be flat."""
+    turn = np.linalg.eigvals(np.linalg.inv(other)[:3, :3] @ matrix[:3, :3])
+    is_near = turn.real.min() > FLAT * np.abs(turn).max()
+    result: Floats = np.linalg.inv(matrix if is_near else other)
     return result
 
 

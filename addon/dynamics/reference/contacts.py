@@ -8,7 +8,7 @@ import numpy as np
 
 from ...arrays import Floats
 from ..colliders import PosedCollider
-from ..colliders.posed import FLAT
+from ..colliders.posed import FLAT, inverse_or
 from ..constraints import PINNED
 from ..contacts import (
     BETWEEN,
@@ -137,13 +137,12 @@ class Solid:
         before, now = posed.matrix_at(moment.begin), posed.matrix_at(moment.end)
         if np.linalg.cond(now[:3, :3]) >= 1.0 / FLAT:
             return None
-        begin = now if np.linalg.cond(before[:3, :3]) >= 1.0 / FLAT else before
         scale = float(np.linalg.svd(now[:3, :3], compute_uv=False)[-1])
         seen = short_squared(posed.collider.curve_radius * scale, size)
         change, (center, reach) = now - before, posed.collider.bounds
         travel = float(np.linalg.norm(change[:3, :3] @ center + change[:3, 3]))
         travel += reach * float(np.linalg.norm(change[:3, :3]))
-        inverses = np.linalg.inv(now), np.linalg.inv(begin)
+        inverses = np.linalg.inv(now), inverse_or(before, now)
         return cls(posed, change, now, *inverses, scale, seen, travel, posed.swelling)
 
     def part(self, number: int, count: int) -> Solid:

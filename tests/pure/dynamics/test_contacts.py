@@ -181,6 +181,18 @@ def test_what_meets_something_fast_goes_as_if_it_was_alone(kit):
     np.testing.assert_array_equal(together.position[..., [1, 3]], alone.position)
 
 
+@pytest.mark.parametrize("turn", [(-1.0, -1.0, 1.0), (-1.0, 1.0, 1.0)])
+def test_what_turns_round_in_one_substep_is_nowhere_flat(turn):
+    """By 180 degrees, or into its mirror image: halfway there is no inverse."""
+    after = np.diag([*turn, 1.0])
+    collider = CapsuleCollider((-0.1, 0.0, 0.0), (0.1, 0.0, 0.0), 0.008)
+    (pose,) = PosedCollider(collider, np.eye(4), after).poses([(0.0, 1.0)])
+    for number in range(10):
+        part = pose.part(number, 10)
+        np.testing.assert_allclose(part.matrix, after, atol=1e-6)
+        np.testing.assert_allclose(part.inverse_before, np.linalg.inv(after), atol=1e-6)
+
+
 def between(grid):
     """Points of all free segments, (guides, n, 3)."""
     share = np.linspace(0.0, 1.0, 6)[:, None]
