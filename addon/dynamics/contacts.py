@@ -53,8 +53,8 @@ TRACE_STEPS = 12
 #: solved in turn once more, and how often that is.
 MAY_MISS, MORE_ROUNDS = np.float32(0.5), 10
 #: How many segments the root of a guide and a point that touches go in a substep, as seen from a
-#: collider, before the guide goes through it in parts; how many these are, and how much oftener
-#: contacts and lengths are solved in turn in each.
+#: collider, before the guide goes through it in parts; how many these are, and how many times as
+#: often contacts and lengths are solved in turn in each.
 FAST, PARTS, PART_PASSES = 0.5, 10, 2
 #: How often one CV is pushed by what a point near the other, which is pinned, asks for.
 MAX_WEIGHT = np.float32(2.0)
