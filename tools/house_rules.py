@@ -126,7 +126,7 @@ def arrow_back(room: str, target: str) -> str:
 def imports_of(file: Path, addon: Path = ADDON) -> Iterator[tuple[int, str]]:
     """(line, name) of each import; a name inside the add-on starts with a dot."""
     package = file.relative_to(addon).parent.parts
-    for node in ast.walk(_tree(file)):
+    for node in _nodes(file):
         if isinstance(node, ast.Import):
             yield from ((node.lineno, alias.name) for alias in node.names)
         elif isinstance(node, ast.ImportFrom) and node.level == 0:
@@ -197,8 +197,9 @@ def import_circle(addon: Path = ADDON) -> list[str]:
 
 
 @cache
-def _tree(file: Path) -> ast.Module:
-    return ast.parse(file.read_text(encoding="utf-8"))
+def _nodes(file: Path) -> list[ast.AST]:
+    """All of a module's syntax, the module itself first."""
+    return list(ast.walk(ast.parse(file.read_text(encoding="utf-8"))))
 
 
 #: what changes a list, a dict or a set
@@ -215,7 +216,7 @@ def mutable_names(addon: Path = ADDON) -> list[str]:
     found = []
     for file in sorted(addon.rglob("*.py")):
         changed: set[str] = set()
-        for node in ast.walk(_tree(file)):
+        for node in _nodes(file):
             if isinstance(node, ast.Global):
                 changed.update(node.names)
             elif isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
@@ -226,7 +227,8 @@ def mutable_names(addon: Path = ADDON) -> list[str]:
                     changed.add(node.value.id)
             elif isinstance(node, ast.AugAssign) and isinstance(node.target, ast.Name):
                 changed.add(node.target.id)
-        found += [f"{file.relative_to(addon)}: {name}" for name in sorted(changed & _bound(file))]
+        changed &= _bound(file) if changed else set()
+        found += [f"{file.relative_to(addon)}: {name}" for name in sorted(changed)]
     return found
 
 
@@ -234,10 +236,12 @@ def _bound(file: Path) -> set[str]:
     """Names that the module itself binds, and none that a function has for itself."""
     bound: set[str] = set()
     own: set[str] = set()
-    for node in _tree(file).body:
+    module = _nodes(file)[0]
+    assert isinstance(module, ast.Module)
+    for node in module.body:
         targets = node.targets if isinstance(node, ast.Assign) else [getattr(node, "target", None)]
         bound.update(each.id for each in targets if isinstance(each, ast.Name))
-    for node in ast.walk(_tree(file)):
+    for node in _nodes(file):
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda):
             shared = {
                 n for each in ast.walk(node) if isinstance(each, ast.Global) for n in each.names
@@ -290,7 +294,7 @@ def unused_names(repository: Path = REPOSITORY) -> list[str]:
     used: Counter[str] = Counter()
     defined: list[tuple[str, str]] = []
     for file in sorted(addon.rglob("*.py")):
-        for node in ast.walk(_tree(file)):
+        for node in _nodes(file):
             if isinstance(node, ast.FunctionDef | ast.ClassDef):
                 defined.append((node.name, f"{file.relative_to(repository)}:{node.lineno}"))
             elif isinstance(node, ast.Name):
@@ -331,7 +335,7 @@ def files_that_list_sections(sections: dict[str, str], addon: Path = ADDON) -> l
     found = []
     for file in sorted(addon.rglob("*.py")):
         named: set[object] = set()
-        for node in ast.walk(_tree(file)):
+        for node in _nodes(file):
             if isinstance(node, ast.Constant):
                 named.add(node.value)
             elif isinstance(node, ast.Attribute):

@@ -41,7 +41,7 @@ from hairloom.addon.strands import Surface  # noqa: E402
 FRAMES, RATE = 31, 30.0
 PANDA_MOTION = Path(__file__).parent / "panda_motion.py"
 SETTINGS = SettingsMap(
-    CardSettings(source="guides", levels=2),
+    CardSettings(source="guides", levels=2, order_by="distance"),
     AtlasSettings(source="made"),
     TextureSettings(variant_width=32, height=64),
 )

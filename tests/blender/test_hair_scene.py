@@ -443,6 +443,7 @@ def test_a_lamp_throws_shafts_over_cycles_and_a_mesh_cuts_them(
     assert haze[middle, lamp - 40] < 0.5 * haze[middle - 40, lamp]
 
 
+@pytest.mark.slow(instead="test_a_window_throws_the_shafts_of_the_reference_cut_by_the_hair")
 @pytest.mark.parametrize("is_cropped", few_in_commits([True, False]))
 def test_a_render_region_has_the_shafts_of_what_it_shows(
     cycles: Any, hairy: Any, window: Any, tmp_path: Path, is_cropped: bool
@@ -460,6 +461,7 @@ def test_a_render_region_has_the_shafts_of_what_it_shows(
     assert is_cropped or not added[:34].any()
 
 
+@pytest.mark.slow(instead="test_a_lamp_throws_shafts_over_cycles_and_a_mesh_cuts_them")
 @pytest.mark.parametrize("engine", few_in_commits(["CYCLES", "HAIRLOOM"]))
 def test_an_orthographic_camera_sees_shafts_of_bright_things(
     cycles: Any, hairy: Any, window: Any, tmp_path: Path, engine: str

@@ -86,7 +86,7 @@ def fur_and_shells() -> tuple[Snapshot, Snapshot]:
 
 
 @pytest.mark.draws(light=False)
-@pytest.mark.parametrize("eighth", few_in_commits((0, 4, 1, 2, 3, 5, 6, 7), 2))
+@pytest.mark.parametrize("eighth", few_in_commits((0, 4, 1, 2, 3, 5, 6, 7)))
 def test_shells_cover_as_much_as_strands_from_eight_sides_in_their_colour(
     gpu_context: Any, fur_and_shells: tuple[Snapshot, Snapshot], eighth: int
 ) -> None:

@@ -23,7 +23,7 @@ def preview(new_hair, sphere, evaluated):
     hair.data.hairloom.cards.source = "guides"
     hair.data.hairloom.card_occlusion.rays = 4
     hair.data.hairloom.cards.order_by = "distance"
-    hair.data.hairloom.atlas.size = "512"
+    hair.data.hairloom.atlas.size = "256"
     hair.data.hairloom.card_drawing.shown_as = "cards"
     session = previews.start(hair, evaluated())
     yield hair, sphere, session

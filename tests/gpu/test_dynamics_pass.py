@@ -352,7 +352,11 @@ SHORT_AT_COLLIDERS = {
     f"{name}, 8 CVs": replace(AT_COLLIDERS[name], cv_count=8) for name in LONG_AT_COLLIDERS
 }
 SLOW_AT_COLLIDERS = ("64 CVs", "ball", "combed", "ball without friction", "set of balls")
-SLOW_AT_COLLIDERS += ("head and ball, 8 CVs", "combed at a plate and a finger, 8 CVs")
+SLOW_AT_COLLIDERS += (
+    "fast plate and finger",
+    "head and ball, 8 CVs",
+    "combed at a plate and a finger, 8 CVs",
+)
 SLOW_IN_AIR = ("64 CVs", "32 CVs", "blended and held", "half the force fields in wind")
 #: What two others do, each by itself.
 SLOW_IN_AIR += ("held curls", "curls with relaxation", "held at 24 frames a second")

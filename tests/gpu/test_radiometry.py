@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tiers import few_by_name
 
 from hairloom.addon.shading.lights import Light
 from hairloom.addon.strands import Surface
@@ -221,7 +222,14 @@ CASES = {
 }
 
 
-@pytest.mark.parametrize("case", CASES.values(), ids=CASES)
+#: What another has too.
+SLOW = (
+    *("spot: narrow, rim", "spot: ball with a radius", "area: square, far", "area: disk, near"),
+    *("area: ellipse, far", "area: disk of narrow spread, far", "ball of a given radiance"),
+)
+
+
+@pytest.mark.parametrize("case", few_by_name(CASES, *SLOW))
 def test_as_cycles_has_it(cycles: Any, case: tuple[str, dict[str, Any], Any]) -> None:
     """Within 1.5 % of the brightest, pixel by pixel, and 0.15 % of it on average.
 

@@ -20,7 +20,7 @@ from _random_runs import promises_length, random_run, reach_of, shaken
 SEEDS = (10, 15, 4, 1, 5, 7, 9, 12, 14, 17, 20, 32, 36)
 
 
-@pytest.mark.parametrize("seed", few_in_commits(SEEDS, 3))
+@pytest.mark.parametrize("seed", few_in_commits(SEEDS))
 def test_no_settings_and_colliders_break_the_hair(seed: int) -> None:
     run = random_run(seed)
     state = run.begin()

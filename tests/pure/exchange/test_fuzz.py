@@ -62,7 +62,7 @@ def test_damage_to_what_libraries_parse_is_told_too(kind: str) -> None:
     assert found["read"] + found["refused"] == FILES_APART
 
 
-@pytest.mark.parametrize("kind", few_in_commits(WRITTEN, 2))
+@pytest.mark.parametrize("kind", few_in_commits(WRITTEN))
 def test_a_killed_writer_leaves_the_old_file_or_the_new_one(kind: str) -> None:
     """And what it leaves beside goes with the next write."""
     found = report("kill_writes", kind, str(KILLS))
