@@ -8,6 +8,10 @@ seen from straight above. A strand's pieces follow one another from layer to lay
 above the layers show the strands themselves. At the hairline patches show fewer strands of a
 pattern.
 
+Of sparse hair few strands grow on a patch, some more or fewer by chance. So a pattern gets as many
+as grow on the same area of all patches that show it, and its strands the width by which they
+cover as much there.
+
 A piece that stands upright is a dot from above and a line from the side. A layer shows it by a
 length between the two.
 """
@@ -36,6 +40,9 @@ _PATTERNS, _KEPT, _BORDERS = 4, (1.0, 0.6, 0.3), (0.8, 0.45)
 _BY_CHANCE = 2.0
 #: How far around a patch strands are taken, as a fraction of its tile; strands of a tile at most.
 _AROUND, _MAX_STRANDS = 0.15, 2500
+#: Cells of a tile along each side in which one counts how much of it patches show; and points of a
+#: triangle, along each side.
+_SEEN_CELLS, _SEEN_POINTS = 8, 4
 #: Cells of a tile along each side, at most, of which empty ones are filled from others; and the
 #: strands that a cell should hold, so that chance leaves none empty.
 _MAX_CELLS, _PER_CELL = 5, 16.0
@@ -107,6 +114,10 @@ class Patches:
         made = cls(center, axes, extent, area, features, surface, of_triangle)
         return made, away - middle[patch]
 
+    def at(self, points: Floats) -> Ints:
+        """The patch nearest to each point, (len(points),)."""
+        return np.asarray(self.of_triangle[search_of(self.surface).closest(points).triangle])
+
 
 @dataclass(frozen=True, eq=False)
 class ShellPlan:
@@ -145,18 +156,18 @@ class ShellPlan:
 
     def pattern_of(self, patches: Patches) -> Ints:
         """The pattern that each patch shows, (patch_count,) int32."""
-        gap = ((patches.features[:, None] - self.features) ** 2).sum(axis=2)
-        pattern = gap.argmin(axis=1)
-        if self.thinned is not None:
-            kept = kept_steps(patches, self.roots, self.density)
-            pattern = np.where(kept > 0, len(self.features) - 1 + kept, pattern)
-        return pattern.astype(np.int32)
+        step = _kept_steps(patches, patches.at(self.roots), self.density)
+        return _pattern_of(patches, self.features, step)
 
 
-def kept_steps(patches: Patches, roots: Floats, density: float) -> Ints:
+def _pattern_of(patches: Patches, features: Floats, step: Ints) -> Ints:
+    gap = ((patches.features[:, None] - features) ** 2).sum(axis=2)
+    return np.where(step > 0, len(features) - 1 + step, gap.argmin(axis=1)).astype(np.int32)
+
+
+def _kept_steps(patches: Patches, patch_of_root: Ints, density: float) -> Ints:
     """Which of _KEPT each patch has, (patch_count,)."""
-    found = search_of(patches.surface).closest(roots).triangle
-    count = np.bincount(patches.of_triangle[found], minlength=len(patches.area))
+    count = np.bincount(patch_of_root, minlength=len(patches.area))
     expected = density * patches.area
     is_thin = count < expected - _BY_CHANCE * expected**0.5
     steps = np.digitize(-count / np.maximum(expected, _TINY), -np.array(_BORDERS), right=True)
@@ -182,33 +193,38 @@ def plan_shells(
     check_width(radius)
     roots = strands.roots.astype(np.float64)
     random = np.random.default_rng(settings.seed)
-    density = _usual_density(patches, roots)
-    step = kept_steps(patches, roots, density)
+    patch_of_root = patches.at(roots)
+    density = _usual_density(patches, patch_of_root)
+    step = _kept_steps(patches, patch_of_root, density)
     whole = np.flatnonzero(step == 0)
     whole = whole if len(whole) else np.arange(len(step))
     _, chosen = medoids(patches.features[whole], min(_PATTERNS, len(whole)), random)
     features = patches.features[whole[chosen]]
-    source, kept = list(whole[chosen]), [_KEPT[0]] * len(chosen)
+    source = list(whole[chosen])
     thinned = None
     if (step > 0).any():
         gap = ((patches.features[step > 0][:, None] - features) ** 2).sum(axis=2)
         thinned = int(np.bincount(gap.argmin(axis=1)).argmax())
         source += [source[thinned]] * (len(_KEPT) - 1)
-        kept += _KEPT[1:]
     half = 1.02 * float(np.quantile(patches.extent, 0.95))
+    length = strands.lengths()
+    covers = 2.0 * radius.mean(axis=1) * length
+    shows = _pattern_of(patches, features, step)
+    grown = _Grown.of(patches, shows, patch_of_root, covers, len(source))
     shown = [
-        _shown(patches, patch, half, fraction, density, roots, root_normal, random)
-        for patch, fraction in zip(source, kept, strict=True)
+        _shown(patches, patch, half, density, grown.density[p], roots, root_normal, random)
+        for p, patch in enumerate(source)
     ]
-    count = np.array([len(strand) for strand, _, _ in shown])
-    crowding = np.array([each[2] for each in shown])
-    used = np.concatenate([strand for strand, _, _ in shown])
-    pattern = np.repeat(np.arange(len(shown)), count)
-    thickness = _WIDER * settings.strand_width * crowding
+    used = np.concatenate([each.strand for each in shown])
+    pattern = np.repeat(np.arange(len(shown)), [len(each.strand) for each in shown])
+    wider = [
+        grown.cover[p] / _seen_cover(patches, np.flatnonzero(shows == p), half, each, covers)
+        for p, each in enumerate(shown)
+    ]
+    thickness = _WIDER * settings.strand_width * np.array(wider)
     texel = 2.0 * float(np.median(radius[used].mean(axis=1))) * thickness[0] / _STRAND_TEXELS
     fitted = _fitted(settings, layers * len(shown), 2.0 * half / texel)
     texels = _STRAND_TEXELS * fitted.inner_tile[0] * texel / (2.0 * half)
-    length = strands.lengths()[used]
     return ShellPlan(
         grid=fitted.grid,
         size=fitted.side,
@@ -218,10 +234,10 @@ def plan_shells(
         thinned=thinned,
         center=patches.center[source],
         axes=patches.axes[source],
-        reach=np.array([np.quantile(length[pattern == p], 0.9) for p in range(len(shown))]),
+        reach=np.array([np.quantile(length[used][pattern == p], 0.9) for p in range(len(shown))]),
         strands=used,
         pattern=pattern,
-        shift=np.concatenate([shift for _, shift, _ in shown]),
+        shift=np.concatenate([each.shift for each in shown]),
         thickness=thickness,
         density=density,
         roots=roots,
@@ -230,34 +246,105 @@ def plan_shells(
     )
 
 
-def _usual_density(patches: Patches, roots: Floats) -> float:
-    found = search_of(patches.surface).closest(roots).triangle
-    count = np.bincount(patches.of_triangle[found], minlength=len(patches.area))
+def _usual_density(patches: Patches, patch_of_root: Ints) -> float:
+    count = np.bincount(patch_of_root, minlength=len(patches.area))
     return float(np.median((count / np.maximum(patches.area, _TINY))[count > 0]))
+
+
+@dataclass(frozen=True, eq=False)
+class _Grown:
+    """What grows on all patches that show a pattern, (pattern_count,) each.
+
+    density: of roots [1/m^2]. cover: area of strands, were they flat, over that of skin.
+    """
+
+    density: Floats
+    cover: Floats
+
+    @classmethod
+    def of(
+        cls, patches: Patches, shows: Ints, patch_of_root: Ints, covers: Floats, count: int
+    ) -> _Grown:
+        skin = np.bincount(shows, patches.area, count)
+        pattern = shows[patch_of_root]
+        roots, area = np.bincount(pattern, minlength=count), np.bincount(pattern, covers, count)
+        # a pattern that no patch of this level shows, or without a root, is as thin as any
+        thin = len(covers) / patches.area.sum() * _KEPT[-1]
+        has_any = (skin > 0.0) & (roots > 0)
+        skin = np.where(has_any, skin, 1.0)
+        return cls(
+            np.where(has_any, roots / skin, thin),
+            np.where(has_any, area / skin, thin * covers.mean()),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class _Shown:
+    """The strands of a tile, (n,): their number, root and shift (n, 2) [m] in its plane."""
+
+    strand: Ints
+    root: Floats
+    shift: Floats
 
 
 def _shown(
     patches: Patches,
     patch: int,
     half: float,
-    fraction: float,
+    usual: float,
     density: float,
     roots: Floats,
     root_normal: Floats,
     random: np.random.Generator,
-) -> tuple[Ints, Floats, float]:
-    """The strands of a tile, how far aside each is shown, (n, 2) [m], and for how many
-    each stands."""
+) -> _Shown:
+    """Strands around a patch, as many as the density asks for; usual: of hair that is whole."""
     axes, away = patches.axes[patch], roots - patches.center[patch]
-    place = away @ axes[:2].T
-    is_near = (np.abs(place) <= (1.0 + _AROUND) * half).all(axis=1)
+    place, reach = away @ axes[:2].T, (1.0 + _AROUND) * half
+    is_near = (np.abs(place) <= reach).all(axis=1)
     is_near &= (np.abs(away @ axes[2]) <= half) & (root_normal @ axes[2] > 0.3)
     own = np.flatnonzero(is_near)
-    expected = density * (2.0 * (1.0 + _AROUND) * half) ** 2
-    every, shift = _filled(own, place[own], half, expected, random)
-    wanted = int(np.ceil(fraction * len(every)))
-    kept = np.sort(random.permutation(len(every))[: min(wanted, _MAX_STRANDS)])
-    return every[kept], shift[kept], wanted / len(kept)
+    own = own if len(own) else np.linalg.norm(away, axis=1).argmin(keepdims=True)
+    every, shift = _filled(own, place[own], half, usual * (2.0 * reach) ** 2, random)
+    wanted = int(np.clip(round(density * (2.0 * reach) ** 2), 1, _MAX_STRANDS))
+    kept = np.sort(random.permutation(len(every))[:wanted])
+    again = random.choice(every, wanted - len(kept))
+    moved = random.uniform(-reach, reach, (len(again), 2)) - place[again]
+    strand = np.concatenate([every[kept], again])
+    shift = np.concatenate([shift[kept], moved])
+    return _Shown(strand, place[strand] + shift, shift)
+
+
+def _seen_cover(
+    patches: Patches, chosen: Ints, half: float, shown: _Shown, covers: Floats
+) -> float:
+    """Area of a tile's strands over that of the skin, where these patches show the tile."""
+    reach = (1.0 + _AROUND) * half
+    if not len(chosen):
+        return float(covers[shown.strand].sum() / (2.0 * reach) ** 2)
+    is_seen = np.isin(patches.of_triangle, chosen)
+    patch = patches.of_triangle[is_seen]
+    corners = patches.surface.positions[patches.surface.triangles[is_seen]].astype(np.float64)
+    edge_a, edge_b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    step = (np.arange(_SEEN_POINTS) + 0.5) / _SEEN_POINTS
+    a, b = (each.ravel() for each in np.meshgrid(step, step))
+    a, b = np.where(a + b > 1.0, 1.0 - a, a), np.where(a + b > 1.0, 1.0 - b, b)
+    points = corners[:, :1] + a[:, None] * edge_a[:, None] + b[:, None] * edge_b[:, None]
+    place = np.einsum("tpi,tai->tpa", points - patches.center[patch, None], patches.axes[patch, :2])
+    place /= np.maximum(half, patches.extent[patch])[:, None, None]
+    area = np.repeat(np.linalg.norm(np.cross(edge_a, edge_b), axis=1), len(a))
+    seen = _in_cells(place.reshape(-1, 2), area)
+    cover = _in_cells(shown.root / half, covers[shown.strand])
+    cell = (2.0 * half / _SEEN_CELLS) ** 2
+    found = float((seen * cover).sum() / (seen.sum() * cell))
+    return found if found > 0.0 else float(covers[shown.strand].sum() / (2.0 * reach) ** 2)
+
+
+def _in_cells(place: Floats, values: Floats) -> Floats:
+    """The sum of values in each cell of a tile; places from -1 to 1 along both sides."""
+    cell = np.floor((place + 1.0) * (0.5 * _SEEN_CELLS)).astype(int)
+    is_inside = ((cell >= 0) & (cell < _SEEN_CELLS)).all(axis=1)
+    number = cell[is_inside] @ [_SEEN_CELLS, 1]
+    return np.bincount(number, values[is_inside], _SEEN_CELLS**2)
 
 
 def _filled(

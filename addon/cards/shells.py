@@ -40,8 +40,8 @@ SHORT, _TOO_LONG = 0.12, 0.4
 _FEWEST = 100
 #: Triangles of the finest level where no number is set.
 _TRIANGLES = 12_000
-#: Triangles of a patch, about.
-_PATCH = 2
+#: Triangles of a patch, about, and the strands on it, at least: fewer are no pattern.
+_PATCH, _PATCH_STRANDS = 2, 8
 #: The cosine by which a normal of the hair's volume must look out of the layer.
 _FRONT = 0.3
 
@@ -138,10 +138,10 @@ def build_shells(
     budget = settings.max_triangles or _TRIANGLES
     fine = fine_skin(head, strands.roots, _spacing(strands), budget // layers)
     skins = _skins(fine, head, budget, settings)
-    first = _Layered.of(skins[0], hair)
+    first = _Layered.of(skins[0], hair, strands.strand_count)
     plan = plan_shells(first.patches, strands, radius, root_normal, layers, atlas)
     center = strands.roots.mean(axis=0, dtype=np.float64)
-    made = [first, *(_Layered.of(skin, hair) for skin in skins[1:])]
+    made = [first, *(_Layered.of(skin, hair, strands.strand_count) for skin in skins[1:])]
     meshes = [each.mesh(plan, strands, center) for each in made]
     return Shells(
         tuple(CardLevel(mesh, skin.error) for mesh, skin in zip(meshes, skins, strict=True)),
@@ -191,10 +191,12 @@ class _Layered:
     place: Floats
 
     @classmethod
-    def of(cls, skin: ShellSkin, hair: ShortHair) -> _Layered:
+    def of(cls, skin: ShellSkin, hair: ShortHair, strand_count: int) -> _Layered:
         there = hair.around(skin.positions)
-        count = max(len(skin.triangles) // _PATCH, 1)
-        of_triangle = skin.patches(count, skin.positions + there.shift[:, 1::2].swapaxes(0, 1))
+        count = min(len(skin.triangles) // _PATCH, strand_count // _PATCH_STRANDS)
+        of_triangle = skin.patches(
+            max(count, 1), skin.positions + there.shift[:, 1::2].swapaxes(0, 1)
+        )
         key = of_triangle[:, None] * len(skin.positions) + skin.triangles
         keys, index = np.unique(key, return_inverse=True)
         patch, vertex = np.divmod(keys, len(skin.positions))

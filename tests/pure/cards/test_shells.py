@@ -60,9 +60,11 @@ def strands_of(root: np.ndarray, direction: np.ndarray, length: np.ndarray) -> S
     )
 
 
-def fur_on_square(count: int = 4000, lean: float = 0.6, spread: float = 0.0) -> StrandSet:
+def fur_on_square(
+    count: int = 4000, lean: float = 0.6, spread: float = 0.0, seed: int = 3
+) -> StrandSet:
     """Combed along x, `lean` of its length."""
-    random = np.random.default_rng(3)
+    random = np.random.default_rng(seed)
     root = np.concatenate([random.uniform(0.0, SIDE, (count, 2)), np.zeros((count, 1))], axis=1)
     direction = np.tile([lean, 0.0, np.sqrt(1.0 - lean**2)], (count, 1))
     return strands_of(root, direction, LENGTH * random.uniform(1.0 - spread, 1.0, count))
@@ -141,6 +143,27 @@ def test_from_above_layers_cover_what_strands_cover(spread: float) -> None:
     left = np.prod(1.0 - shown)
     flat_length = 0.6 * strands.lengths().mean()
     tau = strands.strand_count / SIDE**2 * WIDTH * flat_length
+    assert 1.0 - left == pytest.approx(1.0 - np.exp(-tau), rel=0.1)
+
+
+@pytest.mark.parametrize("seed", few_in_commits([0, 1, 2]))
+@pytest.mark.parametrize("count", [700, 2000])
+def test_sparse_hair_covers_as_much_however_few_strands_a_pattern_has(
+    count: int, seed: int
+) -> None:
+    """Every point of skin by what the textures have there, and not by what is planned."""
+    strands = replace(fur_on_square(count, spread=0.5, seed=seed), radius=np.full(count * 8, 4e-4))
+    made = built(strands, square())
+    plan, mesh = made.plan, made.levels[0].mesh
+    radius = strands.radius.reshape(count, -1)
+    alpha = sampled_maps(shell_strands(plan, strands.grid, radius, 0.0), plan.size).alpha
+    shares = np.random.default_rng(8).dirichlet((1.0, 1.0, 1.0), 12)
+    where = np.einsum("pc,tca->tpa", shares, mesh.uv[mesh.triangles]) * plan.size
+    column, row = np.moveaxis(np.clip(where.astype(int), 0, plan.size - 1), -1, 0)
+    shown = alpha[row, column].mean(axis=1).reshape(plan.layers, -1)
+    size = areas(mesh).reshape(plan.layers, -1)
+    left = np.prod(1.0 - (shown * size).sum(axis=1) / size.sum(axis=1))
+    tau = count / SIDE**2 * 0.9 * 8e-4 * 0.6 * strands.lengths().mean()
     assert 1.0 - left == pytest.approx(1.0 - np.exp(-tau), rel=0.1)
 
 
