@@ -54,7 +54,7 @@ void main()
   int total = 0;
   float depth = clip_from.z + clip_to.z;
 #if COUNTED
-  float widening = texelFetch(strand_widths, strand_texel(strand, 0, 1), 0).x;
+  float widening = texelFetch(strand_widths, counted_texel(strand), 0).x;
   float width_sum = 0.0, strand_long = 0.0, fragments = 0.0, thick_fragments = 0.0;
 #endif
 #if CULLING == {{culling_hidden}}
@@ -125,10 +125,10 @@ void main()
 #endif
 #if COUNTED
   vec4 wanted_by = vec4(width_sum / float(last), fragments, strand_long * EDGES, thick_fragments);
-  imageStore(asked, strand_texel(strand, 0, 1), wanted_by);
+  imageStore(asked, counted_texel(strand), wanted_by);
 #endif
 #if MODE == {{mode_fixed}}
   depth = 0.0;  // where no strand is left out there is one draw, in which strands keep their order
 #endif
-  imageStore(totals, strand_texel(strand, 0, 1), vec4(float(total), depth / float(span.count), 0.0, 0.0));
+  imageStore(totals, counted_texel(strand), vec4(float(total), depth / float(span.count), 0.0, 0.0));
 }

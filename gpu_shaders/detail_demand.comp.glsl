@@ -8,7 +8,7 @@ void main()
   if (strand >= strand_count) {
     return;
   }
-  ivec2 texel = strand_texel(strand, 0, 1);
+  ivec2 texel = counted_texel(strand);
   int pieces = int(texelFetch(totals, texel, 0).x);
   if (pieces == 0 || texelFetch(strand_widths, texel, 0).x <= 0.0) {
     return;

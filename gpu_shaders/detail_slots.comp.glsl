@@ -20,7 +20,7 @@ void main()
   if (strand >= strand_count) {
     return;
   }
-  ivec2 texel = strand_texel(strand, 0, 1);
+  ivec2 texel = counted_texel(strand);
   int pieces = int(texelFetch(totals, texel, 0).x);
   float width = texelFetch(strand_widths, texel, 0).x, half_width = texelFetch(asked, texel, 0).x;
   if (pieces == 0 || width <= 0.0) {
@@ -48,6 +48,6 @@ void main()
   int at = int(imageAtomicAdd(demand, ivec2(DEMAND_USED, 0), uint(count)));
   for (int number = 0; number < count; number++) {
     DetailSlot slot = DetailSlot(strand, number, count, pieces, width);
-    imageStore(slots, strand_texel(at + number, 0, 1), packed_slot(slot));
+    imageStore(slots, counted_texel(at + number), packed_slot(slot));
   }
 }

@@ -46,7 +46,7 @@ vec3 carried(StrandSpan span, int cv, int anchor)
 // Bring a strand to one hold; `before` is the last CV that is held so far. Returns the next such.
 int bring(StrandSpan span, int number, int before, float whole_length)
 {
-  vec2 hold = texelFetch(holds, strand_texel(number, 0, 1), 0).xy;  // place, anchor
+  vec2 hold = texelFetch(holds, counted_texel(number), 0).xy;  // place, anchor
   int first = int(hold.x);
   int after = min(first + 1, span.count - 1);
   vec3 target = carried(span, first, int(hold.y));
@@ -91,7 +91,7 @@ void main()
     return;
   }
   // x the strand, y its first hold, z how many it has
-  ivec3 own = ivec3(texelFetch(held_strands, strand_texel(held, 0, 1), 0).xyz);
+  ivec3 own = ivec3(texelFetch(held_strands, counted_texel(held), 0).xyz);
   StrandSpan span = strand_span(strand_spans, own.x);
   float whole_length = 0.0;
   for (int cv = 0; cv < span.count - 1; cv++) {

@@ -12,7 +12,8 @@
 //   IS_LED      leads them: writes `led_points`
 //   IS_PUT      copies these into cv_points, adds to `leans` how that has bent them
 //
-// Where drivers bear it, the first two are done as strands ride, see ride.comp.glsl.
+// Where drivers bear it, the first two are done as strands ride, see ride.comp.glsl, and the last three
+// are one program.
 // One invocation a strand, a block of strands in IS_COUNTED and IS_LISTED; in IS_BENT, IS_LED and IS_PUT
 // every lane_count-th of the strands that are too near.
 //
@@ -38,12 +39,12 @@
 #if defined(IS_COUNTED) || defined(IS_LISTED)
 bool is_near(int strand)
 {
-  return texelFetch(states, strand_texel(strand, 0, 1), 0).y > 0.5;
+  return texelFetch(states, counted_texel(strand), 0).y > 0.5;
 }
 #else
 vec3 riding_at(StrandSpan span, int point)
 {
-#if defined(IS_NEAR) || defined(IS_LED)
+#ifdef IS_NEAR
   return texelFetch(cv_points, span_texel(span, point), 0).xyz;
 #else
   return imageLoad(cv_points, span_texel(span, point)).xyz;
@@ -52,7 +53,7 @@ vec3 riding_at(StrandSpan span, int point)
 
 #include "lib_root_frame.glsl"
 
-#ifndef IS_BENT
+#if defined(IS_HELD) || defined(IS_NEAR) || defined(IS_LED) || defined(IS_PUT)
 // Where the root of a strand carries it.
 RootMotion motion_of(int strand)
 {
@@ -92,17 +93,17 @@ void take(int strand, StrandSpan span, int end)
     imageStore(cv_points, texel, vec4(place, riding.w));
   }
   // a strand that was bent in the frame before is led on from its root
-  bool was_bent = imageLoad(states, strand_texel(strand, 0, 1)).z > turned_back;
+  bool was_bent = imageLoad(states, counted_texel(strand)).z > turned_back;
   float is_moved = was_bent ? 2.0 : last > 0 ? 1.0 : 0.0;
   vec4 state = vec4(is_moved, was_bent ? 1.0 : 0.0, 0.0, 0.0);
-  imageStore(states, strand_texel(strand, 0, 1), state);
+  imageStore(states, counted_texel(strand), state);
 }
 #endif
 
 #ifdef IS_NEAR
 void take(int strand, StrandSpan span, int end)
 {
-  vec4 state = imageLoad(states, strand_texel(strand, 0, 1));
+  vec4 state = imageLoad(states, counted_texel(strand));
   RootMotion motion = motion_of(strand);
   Solid solid = solid_at(0);
   for (int point = max(first_point, 1); point < end && state.y < 0.5; point++) {
@@ -112,7 +113,30 @@ void take(int strand, StrandSpan span, int end)
     state.y = lack > {{lead_slack}} * kept ? float(point) : state.y;
   }
   state.x = state.y > 0.5 ? max(state.x, 1.0) : state.x;
-  imageStore(states, strand_texel(strand, 0, 1), state);
+  imageStore(states, counted_texel(strand), state);
+}
+#endif
+
+#ifdef IS_BENT
+void bend(int strand, StrandSpan span)
+{
+  int end = imageLoad(states, counted_texel(strand)).x > 1.5 ? span.count : 0;
+  vec3 shift = vec3(0.0);
+  vec3 riding_start = riding_at(span, 0);
+  for (int point = 0; point < end; point++) {
+    ivec2 texel = span_texel(span, point);
+    vec4 riding = imageLoad(cv_points, texel);
+    vec3 segment = riding.xyz - riding_start;
+    vec3 along = direction_of(segment);
+    vec3 lean = imageLoad(leans, texel).xyz;
+    lean *= max(1.0 - turned_back / max(length(lean), TINY), 0.0);
+    vec3 bent = at_length(vec3(0.0), along + lean, length(segment));
+    bool is_lean = lean != vec3(0.0);  // what is not bent stays bit for bit
+    shift += is_lean ? bent - segment : vec3(0.0);
+    imageStore(leans, texel, vec4(is_lean ? direction_of(bent) - along : vec3(0.0), 0.0));
+    imageStore(cv_points, texel, vec4(riding.xyz + shift, riding.w));
+    riding_start = riding.xyz;
+  }
 }
 #endif
 
@@ -126,19 +150,22 @@ vec3 direction(int number)
   return vec3(radius * cos(angle), radius * sin(angle), height);
 }
 
-// The end of a segment that is turned until it is out. `toward`: where its root carries it, of length
-// 1: tried as well, since that does not jump from frame to frame.
-vec3 turned_out(Solid solid, vec3 start, vec3 arm, float size, vec3 toward, float goal)
+// xyz: the end of a segment that is turned until it is out; w: by how much [m] it is nearer than `goal`
+// all the same. `toward`: where its root carries it, of length 1: tried as well, since that does not
+// jump from frame to frame.
+vec4 turned_out(Solid solid, vec3 start, vec3 arm, float size, vec3 toward, float goal)
 {
   arm /= max(size, TINY);
   vec3 out_of = vec3(0.0);
   float best = -1.0e30;
+  float left = 0.0;
   for (int number = -1; number < TRIES; number++) {
     vec3 tried = number < 0 ? toward : direction(number);
     float lack = goal - signed_distance(solid, start + size * tried, goal).w;
     // the nearest that leads out; if none does, the one that lacks least
     float worth = lack > 0.0 ? -2.0 - lack : dot(tried, arm);
     out_of = worth > best ? tried : out_of;
+    left = worth > best ? max(lack, 0.0) : left;
     best = max(worth, best);
   }
   float low = 0.0;
@@ -153,7 +180,7 @@ vec3 turned_out(Solid solid, vec3 start, vec3 arm, float size, vec3 toward, floa
       high = middle;
     }
   }
-  return at_length(start, arm + high * (out_of - arm), size);
+  return vec4(at_length(start, arm + high * (out_of - arm), size), high < 1.0 ? 0.0 : left);
 }
 
 // How far [m] the end of a segment goes straight out, so that it is out by `lack` [m] when it is back
@@ -186,8 +213,8 @@ vec4 led_out(Solid solid, vec3 start, vec3 segment, vec3 toward, float needed, f
       end = at_length(start, arm + found.xyz * going_out(arm, found.xyz, size, lack), size);
     }
   }
-  end = turned_out(solid, start, end - start, size, toward, goal);
-  return vec4(end, max(needed - signed_distance(solid, end, kept).w, 0.0));
+  vec4 turned = turned_out(solid, start, end - start, size, toward, goal);
+  return vec4(turned.xyz, max(turned.w - farther, 0.0));
 }
 
 // One attempt on some points of a strand from the first that is too near on.
@@ -220,9 +247,9 @@ void lead(StrandSpan span, int begin, int end, RootMotion motion, float farther,
   }
 }
 
-void take(int strand, StrandSpan span, int end)
+void lead_strand(int strand, StrandSpan span, int end)
 {
-  vec4 state = imageLoad(states, strand_texel(strand, 0, 1));
+  vec4 state = imageLoad(states, counted_texel(strand));
   if (state.y < 0.5 || state.w > 0.5) {
     return;
   }
@@ -239,24 +266,24 @@ void take(int strand, StrandSpan span, int end)
     lead(span, max(first_point, int(state.y)), end, motion, farther, state);
     state.w = end == span.count && state.z <= {{lead_slack}} * kept ? 1.0 : 0.0;
   }
-  imageStore(states, strand_texel(strand, 0, 1), state);
+  imageStore(states, counted_texel(strand), state);
 }
 #endif
 
 #ifdef IS_PUT
-void take(int strand, StrandSpan span, int end)
+void put(int strand, StrandSpan span)
 {
-  vec4 state = imageLoad(states, strand_texel(strand, 0, 1));
+  vec4 state = imageLoad(states, counted_texel(strand));
   RootMotion motion = motion_of(strand);
   bool is_stuck = state.z > kept;  // then it is as its root carries it
   bool was_bent = state.x > 1.5;
   vec3 riding_start = riding_at(span, 0);
   vec3 start = riding_start;
   float most = 0.0;
-  for (int point = 0; point < end; point++) {
+  for (int point = 0; point < span.count; point++) {
     ivec2 texel = span_texel(span, point);
     vec4 riding = imageLoad(cv_points, texel);
-    vec3 place = point < int(state.y) ? riding.xyz : texelFetch(led_points, texel, 0).xyz;
+    vec3 place = point < int(state.y) ? riding.xyz : imageLoad(led_points, texel).xyz;
     place = is_stuck ? carried_at(span, point, motion) : place;
     vec3 lean = direction_of(place - start) - direction_of(riding.xyz - riding_start);
     lean += was_bent ? imageLoad(leans, texel).xyz : vec3(0.0);
@@ -268,30 +295,7 @@ void take(int strand, StrandSpan span, int end)
   }
   state.x = 1.0;
   state.z = most > {{lead_upright}} && !is_stuck ? most : 0.0;
-  imageStore(states, strand_texel(strand, 0, 1), state);
-}
-#endif
-
-#ifdef IS_BENT
-void take(int strand, StrandSpan span, int end)
-{
-  end = texelFetch(states, strand_texel(strand, 0, 1), 0).x > 1.5 ? end : 0;
-  vec3 shift = vec3(0.0);
-  vec3 riding_start = riding_at(span, 0);
-  for (int point = 0; point < end; point++) {
-    ivec2 texel = span_texel(span, point);
-    vec4 riding = imageLoad(cv_points, texel);
-    vec3 segment = riding.xyz - riding_start;
-    vec3 along = direction_of(segment);
-    vec3 lean = imageLoad(leans, texel).xyz;
-    lean *= max(1.0 - turned_back / max(length(lean), TINY), 0.0);
-    vec3 bent = at_length(vec3(0.0), along + lean, length(segment));
-    bool is_lean = lean != vec3(0.0);  // what is not bent stays bit for bit
-    shift += is_lean ? bent - segment : vec3(0.0);
-    imageStore(leans, texel, vec4(is_lean ? direction_of(bent) - along : vec3(0.0), 0.0));
-    imageStore(cv_points, texel, vec4(riding.xyz + shift, riding.w));
-    riding_start = riding.xyz;
-  }
+  imageStore(states, counted_texel(strand), state);
 }
 #endif
 
@@ -302,16 +306,20 @@ void main()
   if (lane >= lane_count) {
     return;  // what it would do another one does
   }
-  int near_count = int(texelFetch(near_strands, strand_texel(strand_count, 0, 1), 0).x);
+  int near_count = int(texelFetch(near_strands, counted_texel(strand_count), 0).x);
   for (int number = lane; number < near_count; number += lane_count) {
-    int strand = int(texelFetch(near_strands, strand_texel(number, 0, 1), 0).x);
+    int strand = int(texelFetch(near_strands, counted_texel(number), 0).x);
     StrandSpan span = strand_span(strand_spans, strand);
+#ifdef IS_BENT
+    bend(strand, span);
+#endif
 #ifdef IS_LED
     if (first_point < span.count) {
-      take(strand, span, min(point_end, span.count));
+      lead_strand(strand, span, min(point_end, span.count));
     }
-#else
-    take(strand, span, span.count);
+#endif
+#ifdef IS_PUT
+    put(strand, span);
 #endif
   }
 }
@@ -327,7 +335,7 @@ void main()
   for (int strand = begin; strand < min(begin + BLOCK, strand_count); strand++) {
     count += is_near(strand) ? 1 : 0;
   }
-  imageStore(near_counts, strand_texel(block, 0, 1), vec4(float(count)));
+  imageStore(near_counts, counted_texel(block), vec4(float(count)));
 }
 #elif defined(IS_LISTED)
 void main()
@@ -339,17 +347,17 @@ void main()
   }
   int number = 0;
   for (int before = 0; before < block; before++) {
-    number += int(texelFetch(near_counts, strand_texel(before, 0, 1), 0).x);
+    number += int(texelFetch(near_counts, counted_texel(before), 0).x);
   }
   int end = min(begin + BLOCK, strand_count);
   for (int strand = begin; strand < end; strand++) {
     if (is_near(strand)) {
-      imageStore(near_strands, strand_texel(number, 0, 1), vec4(float(strand)));
+      imageStore(near_strands, counted_texel(number), vec4(float(strand)));
       number++;
     }
   }
   if (end == strand_count) {
-    imageStore(near_strands, strand_texel(strand_count, 0, 1), vec4(float(number)));
+    imageStore(near_strands, counted_texel(strand_count), vec4(float(number)));
   }
 }
 #else

@@ -51,9 +51,8 @@ struct Field {
 };
 
 // A texel holds the values of four nodes: this one and its neighbours along z, y, and both.
-vec4 nodes_at(Field field, ivec3 node)
+vec4 nodes_at(Field field, int index)
 {
-  int index = (node.x * field.nodes.y + node.y) * field.nodes.z + node.z;
   return texelFetch(fields,
                     ivec2(index % {{field_row}}, field.row + index / {{field_row}}), 0);
 }
@@ -67,8 +66,9 @@ Found distance_in(Field field, vec3 point)
   held = min(held, top - 1.0e-3);
   ivec3 node = ivec3(held);
   vec3 f = held - vec3(node);
-  vec4 near = nodes_at(field, node);
-  vec4 far = nodes_at(field, node + ivec3(1, 0, 0));
+  int index = (node.z * field.nodes.y + node.y) * field.nodes.x + node.x;
+  vec4 near = nodes_at(field, index);
+  vec4 far = nodes_at(field, index + 1);
   // along z, then y, then x; what is left over at each turn is a derivative
   vec4 dz = vec4(near.yw - near.xz, far.yw - far.xz);
   vec4 z = vec4(near.xz, far.xz) + f.z * dz;

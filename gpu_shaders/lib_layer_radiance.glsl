@@ -71,7 +71,7 @@ vec3 layer_radiance(int strand, float place)
   seen.beneath = beneath.xyz;
   seen.depth = beneath.w;
 #endif
-  uint seed = uint(texelFetch(strand_seeds, strand_texel(strand, 0, 1), 0).x);
+  uint seed = uint(texelFetch(strand_seeds, counted_texel(strand), 0).x);
   return strand_radiance(
       point, tangent, bend, radius, along, occlusion, openness, between, own, seen, seed);
 #endif

@@ -9,27 +9,27 @@ struct StrandSpan {
   int factors;  // first texel of its detail factors, counted through
 };
 
-// Of equally many texels a strand: strand s is row s % {{strand_rows}} of a texture, in column block
-// s / {{strand_rows}}.
+// Of equally many texels a strand, more than one: strand s is row s % {{strand_rows}} of a texture, in
+// column block s / {{strand_rows}}.
 ivec2 strand_texel(int strand, int cv, int cv_count)
 {
   return ivec2((strand / {{strand_rows}}) * cv_count + cv, strand % {{strand_rows}});
 }
 
+// Of texels that are counted through, row by row, as of one texel a strand.
+ivec2 counted_texel(int index)
+{
+  return ivec2(index % {{strand_rows}}, index / {{strand_rows}});
+}
+
 // Of points that differ in number from strand to strand; `spans` is the texture strand_spans.
 StrandSpan strand_span(sampler2D spans, int strand)
 {
-  ivec4 span = ivec4(texelFetch(spans, strand_texel(strand, 0, 1), 0));
+  ivec4 span = ivec4(texelFetch(spans, counted_texel(strand), 0));
   return StrandSpan(span.xy, span.z, span.w);
 }
 
 ivec2 span_texel(StrandSpan span, int cv)
 {
   return ivec2(span.first.x + cv, span.first.y);
-}
-
-// Texel `index` of those that are counted through, row by row.
-ivec2 counted_texel(int index)
-{
-  return ivec2(index % {{strand_rows}}, index / {{strand_rows}});
 }

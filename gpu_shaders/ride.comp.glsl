@@ -41,7 +41,7 @@ void main()
   vec3 per_meter = texelFetch(guide_weights, strand_texel(strand, 2, 3), 0).xyz;
 
   StrandSpan span = strand_span(strand_spans, strand);
-  vec4 rest = texelFetch(rest_points, span.first, 0);  // xyz position, w radius
+  vec4 rest = imageLoad(rest_points, span.first);  // xyz position, w radius
   vec3 displacement = vec3(0.0);
   for (int k = 0; k < 3; k++) {
     ivec2 shift = strand_texel(guide[k], segment_count, segment_count + 1);
@@ -51,7 +51,7 @@ void main()
   int held = span.factors;  // the last point that goes with the root
   displacement = held > 0 ? vec3(0.0) : displacement;
   // a strand that was bent in the frame before is led on from its root
-  bool was_bent = imageLoad(states, strand_texel(strand, 0, 1)).z > turned_back;
+  bool was_bent = imageLoad(states, counted_texel(strand)).z > turned_back;
   int first_near = was_bent ? 1 : 0;
   Solid solid = solid_at(0);
 #endif
@@ -60,7 +60,7 @@ void main()
     vec3 here = follow(rest.xyz, motion) + displacement;
     imageStore(cv_points, span_texel(span, point), vec4(here, rest.w));
 #ifdef HAS_CLEARANCE
-    float clearance = texelFetch(clearances, span_texel(span, point), 0).x;
+    float clearance = imageLoad(clearances, span_texel(span, point)).x;
     float wanted = min(clearance + length(displacement), kept);
     float lack = wanted - signed_distance(solid, here, kept).w;
     first_near = first_near == 0 && lack > {{lead_slack}} * kept ? point : first_near;
@@ -68,7 +68,7 @@ void main()
     if (point + 1 == span.count) {
       break;
     }
-    vec4 next = texelFetch(rest_points, span_texel(span, point + 1), 0);
+    vec4 next = imageLoad(rest_points, span_texel(span, point + 1));
     vec3 edge = next.xyz - rest.xyz;
     float size = length(edge);
     vec3 place = (reached + 0.5 * size) * per_meter;
@@ -102,6 +102,6 @@ void main()
   }
 #ifdef HAS_CLEARANCE
   float is_moved = was_bent ? 2.0 : held > 0 || first_near > 0 ? 1.0 : 0.0;
-  imageStore(states, strand_texel(strand, 0, 1), vec4(is_moved, float(first_near), 0.0, 0.0));
+  imageStore(states, counted_texel(strand), vec4(is_moved, float(first_near), 0.0, 0.0));
 #endif
 }

@@ -16,7 +16,7 @@ void main()
   if (guide >= guide_count) {
     return;
   }
-  int strand = int(texelFetch(guide_strands, strand_texel(guide, 0, 1), 0).x);
+  int strand = int(texelFetch(guide_strands, counted_texel(guide), 0).x);
   RootMotion motion = root_motion_at(root_motions, min(strand, mover_count - 1));
   vec4 rest = texelFetch(guide_points, strand_texel(guide, 0, segment_count + 1), 0);
   vec3 was = follow(rest.xyz, motion);

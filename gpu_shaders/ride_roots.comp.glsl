@@ -13,9 +13,9 @@ void main()
   // first texel: xyz the triangle's vertices; second: xy barycentric coordinates of b and c
   ivec3 corner = ivec3(texelFetch(root_holds, strand_texel(strand, 0, 2), 0).xyz);
   vec2 weight = texelFetch(root_holds, strand_texel(strand, 1, 2), 0).xy;
-  vec3 a = texelFetch(vertices, strand_texel(corner.x, 0, 1), 0).xyz;
-  vec3 b = texelFetch(vertices, strand_texel(corner.y, 0, 1), 0).xyz;
-  vec3 c = texelFetch(vertices, strand_texel(corner.z, 0, 1), 0).xyz;
+  vec3 a = texelFetch(vertices, counted_texel(corner.x), 0).xyz;
+  vec3 b = texelFetch(vertices, counted_texel(corner.y), 0).xyz;
+  vec3 c = texelFetch(vertices, counted_texel(corner.z), 0).xyz;
   RootFrame now = root_frame(a, b, c, weight);
 
   // frames, xyz of four texels: origin, tangent, bitangent, normal

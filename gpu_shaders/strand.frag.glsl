@@ -25,7 +25,7 @@ vec3 debug_color()
 #  if DEBUG == {{debug_occlusion}}
   return vec3(strand_along_and_occlusion.y);
 #  elif DEBUG == {{debug_guide}} || DEBUG == {{debug_group}}
-  return index_color(int(texelFetch(debug_numbers, strand_texel(strand_index, 0, 1), 0).x));
+  return index_color(int(texelFetch(debug_numbers, counted_texel(strand_index), 0).x));
 #  elif DEBUG == {{debug_stretch}}
   StrandSpan span = strand_span(strand_spans, strand_index);
   int segment = segment_of(span);

@@ -22,13 +22,13 @@ void main()
   float side = float(gl_VertexID & 1) * 2.0 - 1.0;
 #if ADAPTIVE
 #  if IN_SLOTS
-  DetailSlot slot = unpacked_slot(texelFetch(slots, strand_texel(gl_InstanceID, 0, 1), 0));
+  DetailSlot slot = unpacked_slot(texelFetch(slots, counted_texel(gl_InstanceID), 0));
   int strand = slot.strand, strand_pieces = slot.pieces;
   float widening = slot.widening;
   station = slot_station(slot, station, slot_pieces);
 #  else
   // x the strand, y its pieces, z factor of its width
-  vec4 drawn = texelFetch(order, strand_texel(first_instance + gl_InstanceID, 0, 1), 0);
+  vec4 drawn = texelFetch(order, counted_texel(first_instance + gl_InstanceID), 0);
   int strand = int(drawn.x), strand_pieces = int(drawn.y);
   float widening = drawn.z;
 #  endif
@@ -83,7 +83,7 @@ void main()
   strand_tangent = tangent;
   strand_along_and_occlusion = vec2(along, mix(from_look.x, to_look.x, u));
   strand_radius = radius * taper;
-  strand_seed = int(texelFetch(strand_seeds, strand_texel(strand, 0, 1), 0).x);
+  strand_seed = int(texelFetch(strand_seeds, counted_texel(strand), 0).x);
 #  ifdef OTHER_TAU
   strand_other_tau =
       mix(texelFetch(cv_other_tau, root_side, 0), texelFetch(cv_other_tau, tip_side, 0), u);

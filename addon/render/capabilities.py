@@ -98,6 +98,13 @@ def pair_format() -> str:
     return "RGBA32F" if gpu.platform.backend_type_get() == "METAL" else "RG32F"
 
 
+def reads_back() -> bool:
+    """Whether an invocation may read texels again that it has written. On Metal it would need a
+    fence (Metal Shading Language Specification, "Texture Functions"), which scripts cannot ask
+    for."""
+    return bool(gpu.platform.backend_type_get() != "METAL")
+
+
 def fails_in_idle_branches() -> bool:
     """Whether a program may crash in a branch that no pixel of a block takes: Mesa's Vulkan on the
     processor does where hashed strands are shaded."""

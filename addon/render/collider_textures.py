@@ -3,12 +3,14 @@
 rounds RGBA32F: two texels a round solid: xyz start [m], w radius; xyz axis to the end, w one
                 over its squared length, 0 for a ball. A set of balls is several of them.
 fields RGBA32F: a texel a node of a distance field [m]: its value and those of its neighbours
-                along z, along y, and along both. z runs fastest, then y; a field begins a row.
+                along z, along y, and along both. x runs fastest, then y, so that the two texels
+                that a look-up reads lie side by side; a field begins a row.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -106,6 +108,12 @@ class ColliderTextures:
             one.collider is other for one, other in zip(posed, self.colliders, strict=True)
         )
 
+    @cached_property
+    def rounds_of_distance(self) -> int:
+        """Rounds of loops that one look at all colliders takes."""
+        is_round = self.own[:, 0, 3] < 0.0
+        return len(self.own) + int(self.own[is_round, 0, 1].sum())
+
     @property
     def kinds(self) -> SolidKinds:
         return SolidKinds(self.rounds is not None, self.fields is not None, len(self.colliders) > 1)
@@ -113,9 +121,13 @@ class ColliderTextures:
     def solids(self, posed: tuple[PosedCollider, ...]) -> Any:
         """The texture `solids` of lib_signed_distance.glsl: all colliders at the frame's end.
 
-        It is RGBA32F, COLLIDER_TEXELS texels a collider in one row, as `moments` has them.
+        It is RGBA32F, COLLIDER_TEXELS texels a collider in one row, as `moments` has them, but for
+        those that say how they move.
         """
-        return texture_from(self.moments(posed, np.array([[0.0, 1.0]]), 0.0, 0.0, 2), "RGBA32F")
+        table = np.zeros((1, len(posed), COLLIDER_TEXELS, 4), np.float32)
+        for place, one in enumerate(posed):
+            self._stand(table, place, one.matrix_now[None])
+        return texture_from(table.reshape(1, -1, 4), "RGBA32F")
 
     def moments(
         self,
@@ -140,18 +152,13 @@ class ColliderTextures:
             size: [m] of the hair. cv_count: of a guide.
         """
         table = np.zeros((len(spans), len(posed), COLLIDER_TEXELS, 4), np.float32)
-        table[:, :, 6:8] = self.own
         moments: Any = spans.T[..., None, None]  # in matrix_at an array does for a number
         for place, one in enumerate(posed):
             before, now = one.matrix_at(moments)
-            table[:, place, 0:3] = np.linalg.inv(now)[:, :3]
+            self._stand(table, place, now)
             table[:, place, 3:6] = (now - before)[:, :3]
-            turned = now[:, :3, :3]
-            stretch = np.sqrt(np.einsum("nij,nij->n", turned, turned))  # no less than the largest
-            center, radius = self.bounds[place]
-            table[:, place, 8, :3] = turned @ center + now[:, :3, 3]
-            travel = travels(now - before, center, radius)
-            table[:, place, 8, 3] = radius * stretch + reach + travel
+            travel = travels(now - before, *self.bounds[place])
+            table[:, place, 8, 3] += reach + travel
             scales = np.linalg.svd(now[:, :3, :3], compute_uv=False)
             table[:, place, 9:12] = [
                 inverse_or(*pair)[:3] for pair in zip(before, now, strict=True)
@@ -165,6 +172,16 @@ class ColliderTextures:
             table[:, place, 12, 2] = scales[:, -1]
             table[:, place, 12, 3] = one.swelling
         return table.reshape(len(spans), -1, 4)
+
+    def _stand(self, table: Floats, place: int, now: Floats) -> None:
+        """Write into rows of a table of moments where a collider stands, (n, 4, 4) object to world,
+        and what it is."""
+        table[:, place, 0:3] = np.linalg.inv(now)[:, :3]
+        table[:, place, 6:8] = self.own[place]
+        turned, (center, radius) = now[:, :3, :3], self.bounds[place]
+        stretch = np.sqrt(np.einsum("nij,nij->n", turned, turned))  # no less than the largest
+        table[:, place, 8, :3] = turned @ center + now[:, :3, 3]
+        table[:, place, 8, 3] = radius * stretch
 
 
 class UploadedColliders:
@@ -216,7 +233,7 @@ def field_texels(values: Floats) -> Floats:
     padded = np.pad(values, ((0, 0), (0, 1), (0, 1)), mode="edge")
     corners = padded[:, :-1, :-1], padded[:, :-1, 1:], padded[:, 1:, :-1], padded[:, 1:, 1:]
     nodes = np.zeros((-(-values.size // FIELD_ROW) * FIELD_ROW, 4), np.float32)
-    nodes[: values.size] = np.stack(corners, axis=-1).reshape(-1, 4)
+    nodes[: values.size] = np.stack([corner.T for corner in corners], axis=-1).reshape(-1, 4)
     return nodes
 
 

@@ -15,7 +15,9 @@ textures in the layouts of `strand_layout`.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import gpu
@@ -33,6 +35,7 @@ from ..refine.lead_out import (
     LedOut,
 )
 from . import gpu_objects
+from .capabilities import reads_back
 from .collider_textures import ColliderTextures, SolidKinds, UploadedColliders
 from .shader_program import ShaderRecipe, program
 from .shader_source import LEAD_BLOCK
@@ -52,9 +55,14 @@ _STEPS = {
     "NEAR": (("states", "READ_WRITE"),),
     "COUNTED": (("near_counts", "WRITE"),),
     "LISTED": (("near_strands", "WRITE"),),
-    "BENT": (("cv_points", "READ_WRITE"), ("leans", "READ_WRITE")),
-    "LED": (("states", "READ_WRITE"), ("led_points", "READ_WRITE")),
-    "PUT": (("cv_points", "READ_WRITE"), ("states", "READ_WRITE"), ("leans", "READ_WRITE")),
+    "BENT": (("cv_points", "READ_WRITE"), ("states", "READ_WRITE"), ("leans", "READ_WRITE")),
+    "LED": (("cv_points", "READ_WRITE"), ("states", "READ_WRITE"), ("led_points", "READ_WRITE")),
+    "PUT": (
+        ("cv_points", "READ_WRITE"),
+        ("states", "READ_WRITE"),
+        ("leans", "READ_WRITE"),
+        ("led_points", "READ_WRITE"),
+    ),
 }
 _CARRYING = ("strand_spans", "rest_points", "root_motions")
 _TEXTURES = {
@@ -62,9 +70,9 @@ _TEXTURES = {
     "NEAR": (*_CARRYING, "cv_points", "clearances"),
     "COUNTED": ("states",),
     "LISTED": ("states", "near_counts"),
-    "BENT": ("strand_spans", "near_strands", "states"),
-    "LED": (*_CARRYING, "near_strands", "cv_points", "clearances"),
-    "PUT": (*_CARRYING, "near_strands", "led_points"),
+    "BENT": ("strand_spans", "near_strands"),
+    "LED": (*_CARRYING, "near_strands", "clearances"),
+    "PUT": (*_CARRYING, "near_strands"),
 }
 _OF_POINTS = ("mover_count", "first_point", "point_end")
 _INTEGERS = {
@@ -98,29 +106,35 @@ PUT_RECIPE = ShaderRecipe(
 )
 
 
-def lead_out_recipe(step: str, solids: SolidKinds | None) -> ShaderRecipe:
-    """The program of one step.
+@cache
+def lead_out_recipe(steps: tuple[str, ...], solids: SolidKinds | None) -> ShaderRecipe:
+    """The program of one step, or of several that follow each other for each strand.
 
     Args:
-        step: a key of _STEPS, see lead_out.comp.glsl.
+        steps: keys of _STEPS, see lead_out.comp.glsl.
         solids: the colliders that it asks; None: none.
     """
-    names, integers = _TEXTURES[step], ("strand_count", *_INTEGERS[step])
-    defines: tuple[tuple[str, int], ...] = ((f"IS_{step}", 1),)
+    defines = tuple((f"IS_{step}", 1) for step in steps)
+    names, integers = _of_all(_TEXTURES, steps), ("strand_count", *_of_all(_INTEGERS, steps))
     if solids is not None:
         names += solids.textures
         integers += solids.integers
         defines += solids.defines
     return ShaderRecipe(
-        name=f"lead_out_{step.lower()}",
+        name=f"lead_out_{'_'.join(steps).lower()}",
         compute="lead_out.comp.glsl",
         textures=tuple(("FLOAT_2D", name) for name in names),
-        images=tuple(("RGBA32F", name, access) for name, access in _STEPS[step]),
+        images=tuple(("RGBA32F", *image) for image in _of_all(_STEPS, steps)),
         integers=integers,
-        numbers=tuple(("FLOAT", name) for name in _NUMBERS.get(step, ())),
+        numbers=tuple(("FLOAT", name) for name in _of_all(_NUMBERS, steps)),
         group_size=_GROUP,
         defines=defines,
     )
+
+
+def _of_all(needs: Mapping[str, tuple[Any, ...]], steps: tuple[str, ...]) -> tuple[Any, ...]:
+    """What any of some steps needs, each once."""
+    return tuple(dict.fromkeys(need for step in steps for need in needs.get(step, ())))
 
 
 class LeadOutPass:
@@ -167,7 +181,7 @@ class LeadOutPass:
         for name, texture in (("rounds", solids.rounds), ("fields", solids.fields)):
             if texture is not None:
                 textures[name] = texture
-        rounds = int(self._layout.counts.max()) * (point_rounds + _rounds_of_distance(solids))
+        rounds = self._layout.longest * (point_rounds + solids.rounds_of_distance)
         kinds = solids.kinds
         return Seen(
             textures,
@@ -194,15 +208,18 @@ class LeadOutPass:
         integers = {"mover_count": mover_count, **seen.integers}
         numbers = {"kept": seen.kept, "turned_back": seen.turned_back}
         for step in (() if seen.at_once else ("HELD", "NEAR")) + ("COUNTED", "LISTED"):
-            self._run(step, textures, integers, numbers)
-        self._run("BENT", textures, integers, numbers)
-        # all attempts in one go where drivers bear it
-        is_short = self._points_at_once() >= ATTEMPTS * int(self._layout.counts.max())
+            self._run((step,), textures, integers, numbers)
+        is_short = self._points_at_once() >= ATTEMPTS * self._layout.longest
+        if is_short and reads_back():  # a dispatch costs as much as leading some strands
+            every = {**integers, "first_attempt": 0, "attempt_end": ATTEMPTS}
+            self._run(("BENT", "LED", "PUT"), textures, every, numbers)
+            return
+        self._run(("BENT",), textures, integers, numbers)
         for attempt in (0,) if is_short else range(ATTEMPTS):
             end = ATTEMPTS if is_short else attempt + 1
             now = {**integers, "first_attempt": attempt, "attempt_end": end}
-            self._run("LED", textures, now, numbers)
-        self._run("PUT", textures, integers, numbers)
+            self._run(("LED",), textures, now, numbers)
+        self._run(("PUT",), textures, integers, numbers)
 
     def put(self, cv_points: Any, led: LedOut) -> None:
         """Put strands where they were led to earlier, see `LedOut.put`.
@@ -261,19 +278,20 @@ class LeadOutPass:
 
     def _run(
         self,
-        step: str,
+        steps: tuple[str, ...],
         taken: dict[str, Any],
         integers: dict[str, int],
         numbers: dict[str, float],
     ) -> None:
-        """One step over all points of all strands, as many at once as drivers bear."""
+        """Some steps over all points of all strands, as many at once as drivers bear."""
         assert self._solids is not None
-        recipe = lead_out_recipe(step, self._solids.kinds if step in _ASKING else None)
+        is_asking = any(step in _ASKING for step in steps)
+        recipe = lead_out_recipe(steps, self._solids.kinds if is_asking else None)
         shader, count = program(recipe), self._layout.strand_count
-        invocations = -(-count // _INVOCATION.get(step, 1))
+        invocations = -(-count // _INVOCATION.get(steps[0], 1))
         known = integers | {"strand_count": count, "lane_count": invocations}
-        at_once = self._points_at_once() if step in _ASKING else _ROUNDS
-        end = int(self._layout.counts.max()) if "first_point" in recipe.integers else 1
+        at_once = self._points_at_once() if is_asking else _ROUNDS
+        end = self._layout.longest if "first_point" in recipe.integers else 1
         for first in range(0, end, at_once):
             known |= {"first_point": first, "point_end": first + at_once}
             shader.bind(
@@ -286,9 +304,10 @@ class LeadOutPass:
             gpu.shader.unbind()
 
     def _points_at_once(self) -> int:
-        """How many points of a strand one dispatch may lead."""
+        """How many points of a strand one dispatch may lead, with what bends it before and puts it
+        after that."""
         assert self._solids is not None
-        a_point = 1 + (SWEEPS + TRIES + HALVINGS + 4) * (1 + _rounds_of_distance(self._solids))
+        a_point = 2 + (SWEEPS + TRIES + HALVINGS + 4) * (1 + self._solids.rounds_of_distance)
         return max(_ROUNDS // (a_point * _INVOCATION["LED"]), 1)
 
 
@@ -309,12 +328,6 @@ class Seen:
     kept: float
     turned_back: float
     at_once: bool
-
-
-def _rounds_of_distance(solids: ColliderTextures) -> int:
-    """Rounds of loops that one look at all colliders takes."""
-    is_round = solids.own[:, 0, 3] < 0.0
-    return len(solids.own) + int(solids.own[is_round, 0, 1].sum())
 
 
 def _empty(size: tuple[int, int]) -> Any:

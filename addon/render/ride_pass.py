@@ -30,6 +30,7 @@ Whole numbers lie in them as floats, exact below 2^24.
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any
 
 import gpu
@@ -78,24 +79,28 @@ def _guides_recipe(*, curls: bool) -> ShaderRecipe:
     )
 
 
+@cache
 def _ride_recipe(*, curls: bool, solids: SolidKinds | None = None) -> ShaderRecipe:
     """The pass that moves strands, which may find who is too near to colliders."""
-    names = ["root_motions", "guide_weights", "rest_points", "strand_spans", "guide_turns"]
+    names = ["root_motions", "guide_weights", "strand_spans", "guide_turns"]
+    # what is read once needs no texture's cache, and drivers that have none load images sooner
+    images: tuple[tuple[str, ...], ...] = (
+        ("RGBA32F", "cv_points"),
+        ("RGBA32F", "rest_points", "READ"),
+    )
     names += ["guide_axes"] * curls
     defines: tuple[tuple[str, int], ...] = (("HAS_CURLS", 1),) if curls else ()
     integers = ["segment_count", "strand_count", "mover_count"]
     if solids is not None:
-        names += ["clearances", *solids.textures]
+        names += solids.textures
+        images += ("RGBA32F", "states", "READ_WRITE"), ("R32F", "clearances", "READ")
         defines += ("HAS_CLEARANCE", 1), *solids.defines
         integers += solids.integers
     return ShaderRecipe(
         name="ride",
         compute="ride.comp.glsl",
         textures=tuple(("FLOAT_2D", name) for name in names),
-        images=(
-            ("RGBA32F", "cv_points"),
-            *[("RGBA32F", "states", "READ_WRITE")] * (solids is not None),
-        ),
+        images=images,
         integers=tuple(integers),
         numbers=() if solids is None else (("FLOAT", "kept"), ("FLOAT", "turned_back")),
         group_size=(64, 1),
@@ -329,10 +334,11 @@ class RidePass:
         textures, count = self._textures, self._strands.strand_count
         is_curled = self._riders.gives is not None and turns == "guide_turns"
         seen = self.leading.begin(colliders, _POINT_ROUNDS, since)
-        taken = _named(textures, "root_motions", "guide_weights", "rest_points", "strand_spans")
+        taken = _named(textures, "root_motions", "guide_weights", "strand_spans")
         taken |= {"guide_turns": textures[turns]}
         taken |= _named(textures, "guide_axes") if is_curled else {}
-        images, solids = {"cv_points": self.points.texture}, None
+        images = {"cv_points": self.points.texture, **_named(textures, "rest_points")}
+        solids = None
         integers = {
             "segment_count": self._segment_count,
             "strand_count": count,
@@ -341,7 +347,8 @@ class RidePass:
         numbers = {}
         if seen is not None and seen.at_once:
             solids = seen.kinds
-            taken, images = taken | seen.textures, images | {"states": seen.states}
+            taken |= seen.textures
+            images |= {"states": seen.states, "clearances": taken.pop("clearances")}
             integers = integers | seen.integers
             numbers = {"kept": seen.kept, "turned_back": seen.turned_back}
         shader = program(_ride_recipe(curls=is_curled, solids=solids))

@@ -23,13 +23,18 @@ def strand_rows(values: Floats) -> Floats:
     """Per-CV values (strand_count, cv_count, channels) as texture rows, one a strand.
 
     Strand s lies in row s % 16384, from column (s // 16384) * cv_count on: beyond 16384 strands,
-    the largest texture side, further column blocks follow. Unused texels are 0.
+    the largest texture side, further column blocks follow. Unused texels are 0. Of one value a
+    strand, rows hold 16384 strands each: GPUs and processors fetch what lies side by side at once.
 
     Raises:
         ValueError: more strands than blocks of columns can hold.
     """
     strand_count, cv_count, channels = values.shape
-    width, _ = strand_rows_size(strand_count, cv_count)
+    width, height = strand_rows_size(strand_count, cv_count)
+    if cv_count == 1:
+        padded = np.zeros((height * width, channels), np.float32)
+        padded[:strand_count] = values[:, 0]
+        return padded.reshape(height, width, channels)
     if width == cv_count:
         return values
     blocks = width // cv_count
@@ -46,6 +51,8 @@ def strand_rows_size(strand_count: int, cv_count: int) -> tuple[int, int]:
         ValueError: more strands than blocks of columns can hold.
     """
     blocks = max(-(-strand_count // STRAND_ROWS), 1)
+    if cv_count == 1:
+        return min(max(strand_count, 1), STRAND_ROWS), blocks
     if blocks * cv_count > STRAND_ROWS:
         raise ValueError(f"{strand_count} strands of {cv_count} CVs do not fit a texture")
     return blocks * cv_count, strand_count if blocks == 1 else STRAND_ROWS
@@ -54,6 +61,8 @@ def strand_rows_size(strand_count: int, cv_count: int) -> tuple[int, int]:
 def from_strand_rows(pixels: Floats, strand_count: int, cv_count: int) -> Floats:
     """What `strand_rows` has laid out, again as (strand_count, cv_count, channels)."""
     height, width, channels = pixels.shape
+    if cv_count == 1:
+        return pixels.reshape(-1, 1, channels)[:strand_count]
     blocks = pixels.reshape(height, width // cv_count, cv_count, channels).swapaxes(0, 1)
     return blocks.reshape(-1, cv_count, channels)[:strand_count]
 
@@ -102,6 +111,11 @@ class StrandLayout:
     def counts(self) -> Ints:
         """Points of each strand, (strand_count,)."""
         return np.diff(self.offsets)
+
+    @cached_property
+    def longest(self) -> int:
+        """Points of the strand that has the most, 0 where there is none."""
+        return int(self.counts.max(initial=0))
 
     @cached_property
     def cv_count(self) -> int:

@@ -11,7 +11,7 @@ void main()
   if (cv >= cv_count || guide >= guide_count) {
     return;
   }
-  int strand = int(texelFetch(guide_strands, strand_texel(guide, 0, 1), 0).x);
+  int strand = int(texelFetch(guide_strands, counted_texel(guide), 0).x);
   RootMotion motion = root_motion_at(root_motions, strand);
   ivec2 texel = strand_texel(guide, cv, cv_count);
   vec3 rest = texelFetch(guide_points, texel, 0).xyz;

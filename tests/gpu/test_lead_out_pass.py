@@ -68,14 +68,22 @@ def with_held(clearance: Clearance, offsets: np.ndarray) -> Clearance:
     return Clearance(clearance.kept, np.where(is_held, -np.inf, clearance.points), held)
 
 
-@pytest.mark.parametrize(("fewest", "most"), [(16, 16), (2, 60)])
-def test_equals_numpy(fewest: int, most: int) -> None:
+@pytest.mark.parametrize(
+    ("fewest", "most", "reads_back"),
+    [(9, 9, True), (9, 9, False), (2, 60, True)],
+    ids=["at once", "as on Metal", "in parts"],
+)
+def test_equals_numpy(
+    monkeypatch: pytest.MonkeyPatch, fewest: int, most: int, reads_back: bool
+) -> None:
+    from hairloom.addon.render import lead_out_pass
     from hairloom.addon.render.collider_textures import UploadedColliders
     from hairloom.addon.render.lead_out_pass import LeadOutPass
     from hairloom.addon.render.ride_pass import matrix_motion
     from hairloom.addon.render.strand_layout import StrandLayout
     from hairloom.addon.render.textures import texture_from, texture_to_array
 
+    monkeypatch.setattr(lead_out_pass, "reads_back", lambda: reads_back)
     points, offsets = strands(600, fewest, most)
     layout = StrandLayout(offsets)
     texels = layout.pixels(np.column_stack([points, np.full(len(points), 1e-4)]))
