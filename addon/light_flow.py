@@ -31,7 +31,7 @@ from .shading.settings import StrandSettings
 from .shading.skin_seen import seen_by, skin_field
 from .strands import StrandSet
 from .strands.arc_length import even
-from .strands.frames import strand_tangents, volume_normal_rows
+from .strands.frames import strand_tangents, tangents_at, volume_normal_rows
 from .strands.kept import same_rows
 from .strands.vectors import cross_rows, dot_rows
 
@@ -41,8 +41,8 @@ AT_ONCE = 1 << 14
 type Axes = tuple[Floats, Floats, Floats]
 #: Strands, about, that stand in the way of light off far skin for all.
 SHADING_STRANDS = 6000
-#: Of coarse fields: cells along the longest side, cells in all, and those of the skin's.
-_COARSE_CELLS, _COARSE_MOST, _COARSE_SKIN = 24, 8_000, 20
+#: Of coarse fields: cells along the longest side, cells in all, those of the skin's, and strands.
+_COARSE_CELLS, _COARSE_MOST, _COARSE_SKIN, _COARSE_STRANDS = 24, 8_000, 20, 2000
 #: Quick light is looked up at one of this many points of a strand, and at its last one.
 _STRIDE = 4
 
@@ -154,16 +154,23 @@ def _put(light: HairLight, strands: StrandSet, chosen: Ints, own: HairLight) -> 
 def _looked_up(
     rig: Rig, settings: AmbientSettings, fields: LightFields, strands: StrandSet
 ) -> HairLight:
-    """Quick light of some of a rig's strands."""
+    """Quick light of some of a rig's strands: their own light at few points, and straight between
+    these."""
     chosen, before, part = _few_points(strands)
-    few = strands.points[chosen]
+    few, axes = strands.points[chosen], _few_axes(strands, chosen, rig.strands)
 
     def look(field: Field) -> Floats:
-        return _between(field.at(few), before, part)
+        return field.at(few)
 
-    axes = strand_axes(strands, rig.strands)
-    skin = _skin(axes, fields.skin, look)
-    return replace(_light(rig, settings, fields, axes, look, skin), is_quick=True)
+    light = _light(rig, settings, fields, axes, look, _skin(axes, fields.skin, look))
+    seen = light.skin_seen
+    return HairLight(
+        _between(light.occlusion[:, None], before, part)[:, 0],
+        _between(light.openness, before, part),
+        None if seen is None else _between(seen, before, part),
+        fields,
+        is_quick=True,
+    )
 
 
 _NO_LIGHT = HairLight(np.ones(0, np.float32), np.ones((0, 4), np.float32), None, None)
@@ -191,11 +198,11 @@ def _skin(axes: Axes, field: Field | None, look: Callable[[Field], Floats]) -> F
 
 
 def _coarse_fields(rig: Rig, settings: AmbientSettings) -> LightFields:
-    few, step = few_strands(rig.strands)
+    few, step = few_strands(rig.strands, _COARSE_STRANDS)
     cells = HairCells.of(few, rig.head, _COARSE_CELLS, _COARSE_MOST)
     sky = sky_field(cells, ambient_of(rig, settings).multiplied(extinction=step))
     open_field = openness_field(cells, step * rig.widths.extinction)
-    return LightFields(sky, open_field, rest_skin_field(rig, _COARSE_SKIN))
+    return LightFields(sky, open_field, rest_skin_field(rig, _COARSE_SKIN, _COARSE_STRANDS))
 
 
 def _few_points(strands: StrandSet) -> tuple[Ints, Ints, Floats]:
@@ -210,16 +217,25 @@ def _few_points(strands: StrandSet) -> tuple[Ints, Ints, Floats]:
 
 
 def _between(values: Floats, before: Ints, part: Floats) -> Floats:
-    """Of values at few points (k, few), those at all, (k, n)."""
-    found = np.empty((len(values), len(before)), np.float32)
-    last = values.shape[1] - 1
+    """Of values at few points (few, k), those at all, (n, k)."""
+    found = np.empty((len(before), values.shape[1]), np.float32)
+    last = len(values) - 1
     for first in range(0, len(before), AT_ONCE):
         some = slice(first, first + AT_ONCE)
         low, high = before[some], np.minimum(before[some] + 1, last)
-        for row, target in zip(values, found, strict=True):
-            one = row.take(low)
-            target[some] = one + part[some] * (row.take(high) - one)
+        one = values.take(low, axis=0)
+        target = np.subtract(values.take(high, axis=0), one, out=found[some])
+        target *= part[some, None]
+        target += one
     return found
+
+
+def _few_axes(strands: StrandSet, chosen: Ints, among: StrandSet) -> Axes:
+    """`strand_axes` at some of the points alone, (k,)."""
+    tangent = tangents_at(strands.points, strands.offsets, chosen)
+    away = np.ascontiguousarray(strands.points[chosen].T) - _middle(among)
+    normal = volume_normal_rows(away, tangent)
+    return tangent.T, normal.T, cross_rows(tangent, normal).T
 
 
 def rest_occlusion(rig: Rig, settings: AmbientSettings, points: Floats | None = None) -> Floats:
@@ -234,27 +250,28 @@ def rest_occlusion(rig: Rig, settings: AmbientSettings, points: Floats | None = 
     )
 
 
-def strand_axes(strands: StrandSet, among: StrandSet | None = None) -> Axes:
-    """Along the strand, along its normal of the hair's volume, and across both, at each point.
-
-    Args:
-        among: the whole hair; None: it is these strands.
-    """
-    roots = (among or strands).roots
+def strand_axes(strands: StrandSet) -> Axes:
+    """Along the strand, along its normal of the hair's volume, and across both, at each point."""
     axes = np.empty((3, 3, strands.point_count), np.float32)
-    count = max(strands.strand_count, 1)
-    center = roots.sum(axis=0, dtype=np.float64)[:, None] / max(len(roots), 1)
+    count, center = max(strands.strand_count, 1), _middle(strands)
     step = max(AT_ONCE * count // max(strands.point_count, 1), 1)
     for first in range(0, strands.strand_count, step):
         offsets = strands.offsets[first : first + step + 1]
         some = slice(offsets[0], offsets[-1])
         points = np.ascontiguousarray(strands.points[some].T)
         tangent = strand_tangents(points, offsets - offsets[0])
-        normal = volume_normal_rows(points - center.astype(np.float32), tangent)
+        normal = volume_normal_rows(points - center, tangent)
         for axis, rows in zip(axes, (tangent, normal, cross_rows(tangent, normal)), strict=True):
             axis[:, some] = rows
     tangent, normal, across = axes
     return tangent.T, normal.T, across.T
+
+
+def _middle(strands: StrandSet) -> Floats:
+    """Of the roots, (3, 1) float32 [m]."""
+    total = strands.roots.sum(axis=0, dtype=np.float64)[:, None]
+    middle: Floats = (total / max(strands.strand_count, 1)).astype(np.float32)
+    return middle
 
 
 def rest_skin_seen(rig: Rig, points: Floats, axes: Axes) -> Floats | None:
@@ -265,20 +282,22 @@ def rest_skin_seen(rig: Rig, points: Floats, axes: Axes) -> Floats | None:
     return None if field is None else skin_seen_by(axes, field.at(points))
 
 
-def rest_skin_field(rig: Rig, cell_count: int | None = None) -> Field | None:
+def rest_skin_field(
+    rig: Rig, cell_count: int | None = None, most: int = SHADING_STRANDS
+) -> Field | None:
     """What is seen of the head, see `skin_seen.skin_field`; None without a head."""
     if rig.head is None or not rig.strands.strand_count:
         return None
     # coarse cells do not tell each strand from the next
-    some, step = few_strands(rig.strands)
+    some, step = few_strands(rig.strands, most)
     radius = drawn_radius(some.radius, StrandSettings(), even(some.offsets))
     some = replace(some, radius=radius.astype(np.float32))
     return skin_field(some, rig.head, step * rig.widths.extinction, cell_count)
 
 
-def few_strands(strands: StrandSet) -> tuple[StrandSet, int]:
-    """Strands, about SHADING_STRANDS of them, and for how many each of these stands."""
-    step = -(-strands.strand_count // SHADING_STRANDS)
+def few_strands(strands: StrandSet, most: int) -> tuple[StrandSet, int]:
+    """Strands, about `most` of them, and for how many each of these stands."""
+    step = -(-strands.strand_count // most)
     return strands.take(np.arange(0, strands.strand_count, step)), step
 
 

@@ -188,24 +188,24 @@ def _middles(
 ) -> tuple[Ints, Floats]:
     """The middle of each member's clump (n,), and how far it draws the member, 0 to 1."""
     root = grid[:, 0]
-    middle, strength = member.copy(), np.zeros(len(member))
-    member_direction = directions(grid[member], root[member])
-    middle_direction = directions(grid[:middle_count], root[:middle_count])
     reach = _REACH * _apart(root[:middle_count], kept, f"{level}, apart")
+    near = np.zeros((len(member), _CANDIDATES), np.int64)
+    gap = np.full(near.shape, np.inf)  # where there are fewer
     for of_group, middles in by_group(group[member], group[:middle_count]):
         if not len(middles):
             continue
         name = f"{level}, group {group[middles[0]]}"
-        near, gap = kept.nearest(name, root[member[of_group]], root[middles], _CANDIDATES)
-        near = middles[near]
-        alike = likeness(member_direction[of_group, None], middle_direction[near], parting)
-        alike[gap > reach] = 0.0
-        if partings is not None:
-            alike[partings.crossed(root[member[of_group]], root[near])] = 0.0
-        best = (alike > 0.0).argmax(axis=1)[:, None]
-        middle[of_group] = np.take_along_axis(near, best, axis=1)[:, 0]
-        strength[of_group] = np.take_along_axis(alike, best, axis=1)[:, 0]
-    return middle, strength
+        found, away = kept.nearest(name, root[member[of_group]], root[middles], _CANDIDATES)
+        near[of_group, : found.shape[1]], gap[of_group, : found.shape[1]] = middles[found], away
+    member_direction = directions(grid[member], root[member])
+    middle_direction = directions(grid[:middle_count], root[:middle_count])
+    alike = likeness(member_direction[:, None], middle_direction[near], parting)
+    alike[(gap > reach) | np.isinf(gap)] = 0.0
+    if partings is not None:
+        alike[partings.crossed(root[member], root[near])] = 0.0
+    best = (alike > 0.0).argmax(axis=1)[:, None]
+    middle = np.where(np.isinf(gap[:, 0]), member, np.take_along_axis(near, best, axis=1)[:, 0])
+    return middle, np.take_along_axis(alike, best, axis=1)[:, 0]
 
 
 def _apart(root: Floats, kept: Kept, name: str) -> float:

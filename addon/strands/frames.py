@@ -39,6 +39,14 @@ def strand_tangents(points: Floats, offsets: Ints) -> Floats:
     return _unit_or_up(both)
 
 
+def tangents_at(points: Floats, offsets: Ints, chosen: Ints) -> Floats:
+    """`strand_tangents` of points (point_count, 3), rows (3, k) at some of them (k,)."""
+    strand = np.searchsorted(offsets, chosen, side="right") - 1
+    after = points.take(np.minimum(chosen + 1, offsets[strand + 1] - 1), axis=0)
+    after -= points.take(np.maximum(chosen - 1, offsets[strand]), axis=0)
+    return _unit_or_up(np.ascontiguousarray(after.T))
+
+
 def transported_normals(tangent: Floats, root_normal: Floats) -> Floats:
     """Normals carried from the root without twist, (..., cv_count, 3).
 

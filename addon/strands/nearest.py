@@ -9,8 +9,10 @@ from .side_by_side import THREADS, side_by_side
 
 #: Distances measured at once: few enough for the cache, many enough for numpy.
 _TABLE = 65_536
+#: So few are measured sooner than points are left out.
+_FEW = 4096
 #: Places of which a part goes to another thread.
-_MANY = 4096
+_MANY = 1024
 
 
 def nearest_points(places: Floats, among: Floats, count: int) -> tuple[Ints, Floats]:
@@ -47,16 +49,16 @@ def _search(own: Ints, place: Floats, point: Floats, index: Ints, distance: Floa
     kept = index.shape[1]
     # memory that is asked for again takes as long as what is done in it
     memory = np.empty((2, max(_TABLE, point.shape[1])))
-    parts: list[tuple[Ints, Ints]] = [(own, np.arange(point.shape[1]))]
+    parts = [(own, np.arange(point.shape[1]), point)]
     while parts:
-        own, possible = parts.pop()
+        own, possible, there = parts.pop()
         here = place.take(own, axis=1)
-        low, high = here.min(axis=1), here.max(axis=1)
-        possible, there = _possible(
-            point, possible, kept, (low + high) / 2.0, (high - low) / 2.0, memory
-        )
+        if len(own) * len(possible) > _FEW:
+            low, high = here.min(axis=1), here.max(axis=1)
+            is_near = _possible(there, kept, (low + high) / 2.0, (high - low) / 2.0, memory)
+            possible, there = possible.take(is_near), there.take(is_near, axis=1)
         if len(own) > 1 and len(own) * len(possible) > _TABLE:
-            parts += [(half, possible) for half in _halves(own, here)]
+            parts += [(half, possible, there) for half in _halves(own, here)]
             continue
         squared = _squared(here, there, memory)
         rows = np.arange(len(own))
@@ -88,14 +90,9 @@ def _squared(places: Floats, points: Floats, memory: Floats) -> Floats:
     return squared
 
 
-def _possible(
-    point: Floats, chosen: Ints, kept: int, center: Floats, half: Floats, memory: Floats
-) -> tuple[Ints, Floats]:
-    """Which of the chosen points may be among the `kept` nearest of any place in this box, and
-    where they are, (3, n)."""
-    there = point.take(chosen, axis=1)
+def _possible(there: Floats, kept: int, center: Floats, half: Floats, memory: Floats) -> Ints:
+    """Which of some points (3, n) may be among the `kept` nearest of any place in this box."""
     squared = _squared(center[:, None], there, memory)[0]
     nearest = np.sqrt(np.partition(squared, kept - 1)[kept - 1])
     reach = (nearest + 2.0 * np.sqrt((half**2).sum())) * (1.0 + 1e-9) + 1e-300
-    is_near = np.sqrt(squared, out=squared) <= reach
-    return chosen[is_near], there.compress(is_near, axis=1)
+    return np.flatnonzero(np.sqrt(squared, out=squared) <= reach)

@@ -65,7 +65,7 @@ def test_quick_light_is_the_fields_at_some_points_and_straight_between(rig: Rig)
     np.testing.assert_allclose(quick.occlusion[first + 2][is_shaded], mean[is_shaded], atol=1e-5)
     assert np.abs(quick.openness - light.openness).mean() < 0.05
     assert light.skin_seen is not None and quick.skin_seen is not None
-    assert np.abs(quick.skin_seen - light.skin_seen)[:, :7].mean() < 0.02
+    assert np.abs(quick.skin_seen - light.skin_seen)[:, :7].mean() < 0.025
 
 
 def test_strands_that_were_there_keep_their_light_wherever_they_are_in_the_order(rig: Rig) -> None:
