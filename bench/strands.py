@@ -9,6 +9,9 @@ what leading out adds to where strands ride changes from one frame to the next. 
 it is as far in one of 16 parts of the way between the two frames: the others go there steadily. It
 is a flip of leading out if where the strand rides does not jump as far in that part.
 
+Cards of Sintel's hair that ride on the guides in the demo's shake: how deep their vertices are,
+and how many cards have any that is deeper than a millimetre. They are not led out of the head.
+
 What it costs, of Sintel: see `_strands_cost`.
 
 Exit code 1: a limit is missed.
@@ -34,12 +37,16 @@ from hairloom.addon.arrays import Floats, Ints
 from hairloom.addon.blender.colliders.fields import field_of
 from hairloom.addon.blender.command_line.simulate_job import shake_matrix
 from hairloom.addon.blender.scene.built_in_head import built_in_head
+from hairloom.addon.card_flow import bound_cards, card_build_steps, cards_at
+from hairloom.addon.cards.sort import card_of_vertex
+from hairloom.addon.cards.steps import result_of
 from hairloom.addon.dynamics.colliders import Collider, PosedCollider
 from hairloom.addon.dynamics.colliders.signed_distance import signed_distance
 from hairloom.addon.dynamics.colliders.winding import winding_number
 from hairloom.addon.dynamics.measure import length_changes
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.motion_flow import Motion
+from hairloom.addon.params import SettingsMap
 from hairloom.addon.refine.lead_out import NOT_LED, LedOut
 from hairloom.addon.rig_flow import Pose, Rig
 from hairloom.addon.strands import StrandSet, Surface
@@ -287,6 +294,32 @@ def coil_figures(rig: Rig, made_of: StrandSet) -> dict[str, float]:
     }
 
 
+def card_figures(rig: Rig) -> dict[str, float]:
+    """How deep cards enter the head in the shake, each vertex by its worst frame; those that are in
+    it at rest do not count."""
+    assert rig.head is not None
+    collider = field_of(rig.head, DynamicsSettings(), place="head")
+    mesh = result_of(card_build_steps(rig, SettingsMap())).finest
+    binding, search = bound_cards(rig, mesh), ClosestPointSearch(rig.head)
+    were_inside = _inside(mesh.positions, np.eye(4), collider, rig.head)[0]
+    depth = np.zeros(len(mesh.positions))
+    for motion, matrix, _, _ in played(rig, collider, shake_at, FPS):
+        cards = cards_at(rig, binding, motion.pose, motion.guides)
+        index, local = _inside(cards.positions, matrix, collider, rig.head)
+        if len(index):
+            depth[index] = np.maximum(depth[index], search.closest(local).distance)
+    depth[were_inside] = 0.0
+    depth *= MEDIAN_LENGTH / np.median(lengths(rig.strands.points, rig.strands.offsets))
+    owner = card_of_vertex(mesh)
+    deepest = np.zeros(owner.max() + 1)
+    np.maximum.at(deepest, owner, depth)
+    return {
+        "card_deepest_mm": float(depth.max()) * 1000.0,
+        "card_vertices_deep_percent": 100.0 * float((depth > 0.001).mean()),
+        "cards_deep_percent": 100.0 * float((deepest[np.unique(owner)] > 0.001).mean()),
+    }
+
+
 def cost_of(rig: Rig) -> dict[str, float]:
     assert rig.head is not None
     collider = field_of(rig.head, DynamicsSettings(), place="head")
@@ -309,7 +342,7 @@ def main(names: list[str]) -> int:
         figures |= {"flips_of_fast_jumps_percent": fast["flips_of_jumps_percent"]}
         figures |= {"led_flips_of_fast_jumps_percent": fast["led_flips_of_jumps_percent"]}
         if name == "sintel":
-            figures |= cost_of(rig)
+            figures |= cost_of(rig) | card_figures(rig)
         if name == "coil":
             figures |= coil_figures(rig, pair[0])
         found |= {f"{name}_{key}": value for key, value in figures.items()}
