@@ -750,7 +750,8 @@ def ponytail(head: Head) -> Any:
     tail[below] = KNOT + rise[..., None] * axis + 0.0105 * ring
     drawn = head.gathered(roots, tail[:, 0], 20)
     locks = evenly(np.concatenate([drawn[:, :-1], tail], axis=1), 40)
-    at_edge = (z < -0.045) & (np.abs(x) < 0.04)
+    # beside the neck they would look like an earring from in front
+    at_edge = (z < -0.045) & (np.abs(x) < 0.024)
     is_loose = at_edge & (roots.random[:, 3] < 0.07)
     locks[is_loose] = loose_hairs(head, roots.take(np.flatnonzero(is_loose)), 40)
     group = np.zeros(len(locks), np.int32)
