@@ -9,6 +9,7 @@ from typing import Any
 import bpy
 import numpy as np
 import pytest
+from tiers import few_in_commits
 
 from hairloom.addon.blender.bakes.cache import Cache
 from hairloom.addon.blender.bakes.playback import rig_in
@@ -28,7 +29,7 @@ pytestmark = pytest.mark.draws(light=False)
 LAST = 8
 
 
-@pytest.fixture(params=["numpy", "compute"])
+@pytest.fixture(params=few_in_commits(["compute", "numpy"]))
 def moving(request: Any, gpu_context: Any, new_hair: Any, sphere: Any, tmp_path: Any) -> Any:
     """Hair on a head that turns, which nodes move, its style animated."""
     scene = bpy.context.scene

@@ -126,6 +126,7 @@ def test_a_baked_frame_is_drawn(file, tmp_path):
     picture, report = tmp_path / "hair.png", tmp_path / "report.json"
     arguments = ["render", "--scene", str(file), "--groom", "Hair", "--bake", "--width", "96"]
     arguments += ["--height", "72", "--samples", "1", "--output", str(picture)]
+    arguments += ["--set", "skin.skin_resolution=128"]
     drawn = {}
     for frame in (1, LAST):
         more = ["--frame", str(frame), "--report", str(report)]

@@ -288,7 +288,7 @@ def test_the_demo_writes_everything_the_report_names(tmp_path: Path, gpu_context
     small += ["--set", "atlas.size=512", "--set", "card_occlusion.rays=16"]
     # a software driver takes a minute to compile the shader that moves hair
     small += ["--set", "dynamics.device=numpy", "--set", "guides.cv_count=8"]
-    small += ["--set", "cards.order_by=distance"]
+    small += ["--set", "cards.order_by=distance", "--set", "skin.skin_resolution=128"]
     size = ["--width", "96", "--height", "72", "--samples", "1", "--seconds", "0.05"]
     assert command_line.run(["demo", *small, *size, "--output", str(tmp_path)]) == 0
     report = json.loads((tmp_path / "report.json").read_text())

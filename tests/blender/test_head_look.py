@@ -7,6 +7,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
+from tiers import few_in_commits
 
 from hairloom.addon.blender.command_line.inputs import Sources, read_inputs
 from hairloom.addon.blender.pictures.head_parts import head_parts
@@ -42,7 +43,7 @@ def cube(name: str, colors: list[tuple[float, float, float]]) -> bpy.types.Objec
     return obj
 
 
-@pytest.mark.parametrize("tone", ["light", "dark"])
+@pytest.mark.parametrize("tone", few_in_commits(["light", "dark"]))
 def test_the_bust_of_a_scene_looks_as_the_built_in_one(tone: str) -> None:
     """By the materials that it has there, whatever --skin says."""
     bust = bust_object("Bust in a scene", tone)

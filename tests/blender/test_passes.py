@@ -190,7 +190,6 @@ def test_names_and_coverages_are_those_of_cycles(
         assert np.abs(ours - theirs).mean() < 0.02
 
 
-@pytest.mark.slow(instead="test_blenders_cryptomatte_node_selects_what_hair_covers")
 def test_over_cycles_passes_are_of_hair_alone_and_follow_the_view_layer(
     stage: Any, sphere: Any, thick: Any, tmp_path: Path
 ) -> None:

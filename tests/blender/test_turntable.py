@@ -289,7 +289,7 @@ def test_a_picture_that_another_program_holds_keeps_all_and_the_new_ones(
     assert files == before
 
 
-@pytest.mark.parametrize("how", ["button", "verb"])
+@pytest.mark.parametrize("how", few_in_commits(["button", "verb"]))
 def test_a_gpu_without_memory_is_a_message(
     hair: bpy.types.Object, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, how: str, capfd: Any
 ) -> None:

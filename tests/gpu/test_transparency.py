@@ -141,7 +141,7 @@ def test_crossing_strands_are_those_sorted_in_numpy(
 ) -> None:
     """In perspective, up to dozens over each other, each of a colour that changes along it."""
     random = np.random.default_rng(7)
-    strands, brightness = crossing(250, random)
+    strands, brightness = crossing(160, random)
     camera = frame.Camera(
         frame.look_at((SIZE / 2, -150.0, SIZE / 2), (SIZE / 2, 0.0, SIZE / 2)),
         frame.perspective(0.6, 1.0, 50.0, 300.0),

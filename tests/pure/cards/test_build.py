@@ -86,7 +86,10 @@ def test_levels_share_one_atlas_and_all_that_is_known_of_cards(way: str, source:
 
 
 @pytest.mark.parametrize("factor", few_in_commits([2.0**-10, 2.0**10]))
-@pytest.mark.parametrize(("method", "source"), [("clusters", "baked"), ("guides", "made")])
+@pytest.mark.parametrize(
+    ("method", "source"),
+    few_in_commits([pytest.param("clusters", "baked"), pytest.param("guides", "made")]),
+)
 def test_cards_are_the_same_at_any_scale(method: str, source: str, factor: float) -> None:
     """Their number, shape, tiles, light and order."""
 

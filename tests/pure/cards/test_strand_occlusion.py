@@ -134,7 +134,7 @@ def test_other_grooms_shade_beside_that() -> None:
     np.testing.assert_allclose(shaded.occlusion, 0.6 * rays, rtol=1e-5)
 
 
-@pytest.mark.parametrize("way", ["clusters", "guides"])
+@pytest.mark.parametrize("way", few_in_commits(["guides", "clusters"]))
 def test_normals_are_those_of_strands_across_the_tangents_and_on_the_front(way: str) -> None:
     rig = rig_of(300)
     settings = SettingsMap(replace(CLUSTERS, source=way, levels=2), MADE, FEW_RAYS)

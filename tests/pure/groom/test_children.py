@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from flat_ground import guides_at, settings, sheet
+from tiers import few_in_commits
 
 from hairloom.addon.arrays import Floats
 from hairloom.addon.errors import HairloomError
@@ -438,7 +439,7 @@ def test_frizz_is_smooth_and_of_the_length_it_says(egg: Surface) -> None:
 # --- scale ---------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("factor", [2.0**-10, 2.0**10])
+@pytest.mark.parametrize("factor", few_in_commits([2.0**-10, 2.0**10]))
 @pytest.mark.parametrize("method", ["multi", "single"])
 def test_children_are_the_same_at_any_scale(
     egg: Surface, groomed: StrandSet, method: str, factor: float
