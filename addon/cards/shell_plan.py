@@ -33,9 +33,9 @@ from .bake_strands import FlatStrands
 from .shell_hair import ShortHair, between
 from .shell_skin import ShellSkin
 
-#: Patterns of whole hair, and which fractions of the strands others show; below the borders a
-#: patch has the next.
-_PATTERNS, _KEPT, _BORDERS = 4, (1.0, 0.6, 0.3), (0.8, 0.45)
+#: Patterns of whole hair; with less than these fractions of the usual strands a patch shows a
+#: thinner one, with as many as grow on such patches.
+_PATTERNS, _BORDERS = 4, (0.8, 0.45)
 #: Fewer strands than expected are none by chance from this many standard deviations on.
 _BY_CHANCE = 2.0
 #: How far around a patch strands are taken, as a fraction of its tile; strands of a tile at most.
@@ -156,7 +156,9 @@ class ShellPlan:
 
     def pattern_of(self, patches: Patches) -> Ints:
         """The pattern that each patch shows, (patch_count,) int32."""
-        step = _kept_steps(patches, patches.at(self.roots), self.density)
+        step = np.zeros(len(patches.area), int)
+        if self.thinned is not None:
+            step = _thin_steps(patches, patches.at(self.roots), self.density)
         return _pattern_of(patches, self.features, step)
 
 
@@ -165,8 +167,8 @@ def _pattern_of(patches: Patches, features: Floats, step: Ints) -> Ints:
     return np.where(step > 0, len(features) - 1 + step, gap.argmin(axis=1)).astype(np.int32)
 
 
-def _kept_steps(patches: Patches, patch_of_root: Ints, density: float) -> Ints:
-    """Which of _KEPT each patch has, (patch_count,)."""
+def _thin_steps(patches: Patches, patch_of_root: Ints, density: float) -> Ints:
+    """How many of _BORDERS each patch is below, (patch_count,)."""
     count = np.bincount(patch_of_root, minlength=len(patches.area))
     expected = density * patches.area
     is_thin = count < expected - _BY_CHANCE * expected**0.5
@@ -195,7 +197,7 @@ def plan_shells(
     random = np.random.default_rng(settings.seed)
     patch_of_root = patches.at(roots)
     density = _usual_density(patches, patch_of_root)
-    step = _kept_steps(patches, patch_of_root, density)
+    step = _thin_steps(patches, patch_of_root, density)
     whole = np.flatnonzero(step == 0)
     whole = whole if len(whole) else np.arange(len(step))
     _, chosen = medoids(patches.features[whole], min(_PATTERNS, len(whole)), random)
@@ -205,7 +207,7 @@ def plan_shells(
     if (step > 0).any():
         gap = ((patches.features[step > 0][:, None] - features) ** 2).sum(axis=2)
         thinned = int(np.bincount(gap.argmin(axis=1)).argmax())
-        source += [source[thinned]] * (len(_KEPT) - 1)
+        source += [source[thinned]] * len(_BORDERS)
     half = 1.02 * float(np.quantile(patches.extent, 0.95))
     length = strands.lengths()
     covers = 2.0 * radius.mean(axis=1) * length
@@ -268,8 +270,9 @@ class _Grown:
         skin = np.bincount(shows, patches.area, count)
         pattern = shows[patch_of_root]
         roots, area = np.bincount(pattern, minlength=count), np.bincount(pattern, covers, count)
-        # a pattern that no patch of this level shows, or without a root, is as thin as any
-        thin = len(covers) / patches.area.sum() * _KEPT[-1]
+        # a pattern that no patch of this level shows, or without a root, is as thin as patches are
+        # that just need one
+        thin = len(covers) / patches.area.sum() * _BORDERS[-1]
         has_any = (skin > 0.0) & (roots > 0)
         skin = np.where(has_any, skin, 1.0)
         return cls(

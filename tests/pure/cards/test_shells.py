@@ -12,7 +12,7 @@ from hairloom.addon.cards.atlas_settings import AtlasSettings
 from hairloom.addon.cards.bake import sampled_maps
 from hairloom.addon.cards.card_mesh import CardMesh
 from hairloom.addon.cards.settings import CardSettings
-from hairloom.addon.cards.shell_plan import shell_strands
+from hairloom.addon.cards.shell_plan import Patches, shell_strands
 from hairloom.addon.cards.shells import Shells, are_wanted, build_shells
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.strands import StrandSet, Surface
@@ -193,6 +193,16 @@ def test_fewer_strands_show_where_hair_is_thin() -> None:
     middle = mesh.positions[mesh.triangles].mean(axis=1)[:, 0]
     assert np.average(shown[middle < 0.5 * SIDE], weights=None) > 0.85
     assert np.average(shown[middle > 0.75 * SIDE], weights=None) < 0.55
+
+
+def test_without_thinner_patterns_thin_skin_of_a_coarser_level_shows_whole_ones() -> None:
+    plan = replace(built(fur_on_square(), square()).plan, features=np.zeros((4, 2)), thinned=None)
+    one = np.tile(np.eye(3), (2, 1, 1))
+    patches = Patches(
+        np.zeros((2, 3)), one, np.ones(2), np.ones(2), np.zeros((2, 2)), square(1), np.arange(2)
+    )
+    np.testing.assert_array_equal(plan.pattern_of(patches), [0, 0])
+    np.testing.assert_array_equal(replace(plan, thinned=0).pattern_of(patches), [5, 5])
 
 
 def test_automatic_makes_shells_of_short_hair_alone() -> None:
