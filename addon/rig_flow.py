@@ -62,6 +62,20 @@ class Pose:
     matrix: Floats
     anchors: Floats | None = None
 
+    def is_as(self, other: Pose) -> bool:
+        """Whether hair is carried to the same places, bit for bit."""
+        if not _are_same(self.anchors, other.anchors):
+            return False
+        if self.head_positions is None or other.head_positions is None:
+            return np.array_equal(self.matrix, other.matrix)
+        return np.array_equal(self.head_positions, other.head_positions)
+
+
+def _are_same(one: Floats | None, other: Floats | None) -> bool:
+    if one is None or other is None:
+        return one is other
+    return np.array_equal(one, other, equal_nan=True)
+
 
 @dataclass(frozen=True, eq=False)
 class Grown:

@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 import pytest
 from grids import grid_of
-from waiting import until
+from waiting import until, until_it_plays
 
 from hairloom.addon.blender.colliders import fields
 from hairloom.addon.blender.preview import previews, scene_events
@@ -139,9 +139,8 @@ def test_hair_that_waits_for_its_collider_is_at_rest_and_then_plays(
     assert previews.previews[session.uid].phase is Phase.WAITING
     assert grid_of(session) == pytest.approx(at_rest + [0.05, 0.0, 0.0], abs=2e-6)
     gate.set()
-    until_made()
-    previews.advance(evaluated(), FRAME)
-    assert session.is_playing and previews.previews[session.uid].phase is not Phase.WAITING
+    until_it_plays(session, evaluated, FRAME)
+    assert previews.previews[session.uid].phase is not Phase.WAITING
     sphere.location.x = 0.08
     evaluated()
     previews.advance(evaluated(), FRAME)
@@ -168,9 +167,7 @@ def test_a_collider_that_cannot_be_made_is_left_out_with_a_warning_as_ever(
     hair.hairloom.collider = bpy.context.object
     session = previews.start(hair, evaluated())
     previews.play(evaluated(), blocking=False)
-    until_made()
-    previews.advance(evaluated(), FRAME)
-    assert session.is_playing
+    until_it_plays(session, evaluated, FRAME)
     assert any("encloses no volume" in warning for warning in session.warnings)
 
 
@@ -185,10 +182,8 @@ def test_more_meshes_than_are_kept_are_all_waited_for(new_hair, sphere, evaluate
     hair.hairloom.collider_collection = colliders
     session = previews.start(hair, evaluated())
     previews.play(evaluated(), blocking=False)
-    for _ in range(2):
-        until_made()
-        previews.advance(evaluated(), FRAME)
-    assert session.is_playing and len(session.obstacles.parts) == fields.KEPT + 3
+    until_it_plays(session, evaluated, FRAME)
+    assert len(session.obstacles.parts) == fields.KEPT + 3
 
 
 def test_blenders_playback_waits_and_takes_over(new_hair, sphere, evaluated, extension):

@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 import pytest
 from grids import grid_of
-from waiting import take_steps_until, until
+from waiting import take_steps_until, until, until_it_plays
 
 from hairloom.addon import motion_flow, rig_flow
 from hairloom.addon.blender.bakes import playback
@@ -205,8 +205,8 @@ def test_play_waits_for_the_hair(hair, evaluated, gate):
         session.play(evaluated(), blocking=False)
     gate.set()
     arrive(session)
-    previews.advance(evaluated(), FRAME)
-    assert session.is_playing and len(grid_of(session)) == COUNT
+    until_it_plays(session, evaluated, FRAME)
+    assert len(grid_of(session)) == COUNT
 
 
 def test_play_begins_and_simulates_in_frames_of_their_own(hair, evaluated, gate):
@@ -214,8 +214,8 @@ def test_play_begins_and_simulates_in_frames_of_their_own(hair, evaluated, gate)
     previews.play(evaluated(), blocking=False)
     gate.set()
     arrive(session)
-    previews.advance(evaluated(), FRAME)
-    assert session.is_playing and session.solver.motion.clearance is not None
+    until_it_plays(session, evaluated, FRAME)
+    assert session.solver.motion.clearance is not None
     assert not session.solver.motion.duration, "it begins"
     previews.advance(evaluated(), FRAME)
     assert session.solver.motion.duration == FRAME
@@ -274,10 +274,9 @@ def test_old_hair_plays_until_the_new_is_made(playing, hair, evaluated, monkeypa
     assert np.abs(tips - at_rest).max() > 1e-3, "the hair did not swing"
 
 
-def test_hair_that_arrives_in_play_knows_how_far_it_stays_from_colliders(
-    playing, hair, evaluated, monkeypatch
-):
-    """Found beside the window's work, where it is the same as the next frame would find."""
+@pytest.fixture
+def contacts(monkeypatch):
+    """Of each clearance that is found: whether in a thread, and the clearance."""
     of_each, find = [], lead_out.clearance_at
 
     def recorded(*arguments):
@@ -285,14 +284,92 @@ def test_hair_that_arrives_in_play_knows_how_far_it_stays_from_colliders(
         of_each.append((is_beside, find(*arguments)))
         return of_each[-1][1]
 
-    previews.advance(evaluated(), FRAME)
     monkeypatch.setattr(motion_flow, "clearance_at", recorded)
+    return of_each
+
+
+def knows_contacts(session, contacts):
+    """Whether the contacts that were found once, beside the window's work, are those that hair at
+    rest would find here."""
+    ((is_beside, found),) = contacts
+    motion, settings = session.solver.motion, session.settings[DynamicsSettings]
+    begun = motion_flow.begin(session.rig, motion.pose)
+    standing = tuple(each.at_end() for each in session.posed)
+    expected = motion_flow.with_clearance(session.rig, begun, standing, settings)
+    contacts.pop()
+    assert np.isfinite(found.points).any()
+    np.testing.assert_array_equal(found.points, expected.clearance.points)
+    np.testing.assert_array_equal(found.held, expected.clearance.held)
+    np.testing.assert_array_equal(
+        motion.guide_clearance.distances, expected.guide_clearance.distances
+    )
+    return is_beside and motion.clearance is found
+
+
+def test_contacts_are_found_once_beside_the_work_of_the_window(
+    hair, evaluated, in_window, contacts
+):
+    session = previews.start(hair, evaluated())
+    arrive(session)
+    assert previews.play(evaluated(), blocking=False) == []
+    assert previews.previews[session.uid].phase is Phase.WAITING
+    until_it_plays(session, evaluated, FRAME)
+    previews.rest(evaluated(), keep_playing=True)
+    session.rest(evaluated())
+    assert knows_contacts(session, contacts)
+
+
+def test_play_does_not_wait_for_ever_for_a_body_that_moves(hair, evaluated, in_window, sphere):
+    session = previews.start(hair, evaluated())
+    arrive(session)
+    previews.play(evaluated(), blocking=False)
+
+    def moves_on():
+        sphere.location.x += 0.01
+        previews.advance(evaluated(), FRAME)
+        return session.is_playing
+
+    until(moves_on)
+    begun, alone = session.solver.motion, motion_flow.begin(session.rig, session.solver.pose)
+    expected = motion_flow.with_clearance(
+        session.rig, alone, session.posed, session.settings[DynamicsSettings]
+    )
+    np.testing.assert_array_equal(begun.clearance.points, expected.clearance.points)
+
+
+def test_a_frame_of_blenders_playback_is_not_put_off_for_contacts(hair, evaluated, in_window):
+    session = previews.start(hair, evaluated())
+    arrive(session)
+    session.make_fields(evaluated())
+    until(fields.are_made)
+    session.play(evaluated(), blocking=False, is_frame=True)
+    assert session.is_playing and session.solver.motion.clearance is not None
+
+
+def test_hair_that_begins_again_in_play_knows_how_far_it_stays_from_colliders(
+    playing, hair, evaluated, contacts
+):
+    previews.advance(evaluated(), FRAME)
+    contacts.clear()
+    hair.data.hairloom.guides.guide_count = 9
+    scene_events.catch_up(evaluated())
+    arrive(playing)
+    assert len(playing.rig.guides) == 9 and not playing.solver.motion.duration, "it begins again"
+    assert knows_contacts(playing, contacts)
+
+
+def test_hair_that_arrives_in_play_knows_how_far_it_stays_from_colliders(
+    playing, hair, evaluated, contacts
+):
+    """Found beside the window's work, where it is the same as the next frame would find."""
+    previews.advance(evaluated(), FRAME)
+    contacts.clear()
     hair.data.hairloom.children.strand_count = 3 * COUNT
     hair.data.hairloom.children.method = "multi"
     scene_events.catch_up(evaluated())
     arrive(playing)
     previews.advance(evaluated(), FRAME)
-    ((is_beside, found),) = of_each
+    ((is_beside, found),) = contacts
     assert is_beside and playing.solver.motion.clearance is found
     motion, settings = playing.solver.motion, playing.settings[DynamicsSettings]
     unknown = replace(motion, clearance=None)

@@ -5,6 +5,7 @@ from collections.abc import Callable
 from typing import Any
 
 from hairloom.addon.blender.base import latest_job
+from hairloom.addon.blender.preview import previews
 
 #: What a thread has to do is done by then [s], however slow the machine.
 PATIENCE_S = 120.0
@@ -18,6 +19,11 @@ def until(is_so: Callable[[], Any]) -> None:
     while not is_so():
         assert time.monotonic() < end, "it does not come"
         time.sleep(PAUSE_S)
+
+
+def until_it_plays(session: Any, evaluated: Callable[[], Any], duration: float) -> None:
+    """Ticks of Play's clock until this hair begins, which waits for its colliders."""
+    until(lambda: previews.advance(evaluated(), duration) or session.is_playing)
 
 
 def take_steps_until(is_so: Callable[[], Any]) -> None:

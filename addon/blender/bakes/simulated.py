@@ -47,14 +47,18 @@ class Simulated(Protocol):
     def rest(self, depsgraph: bpy.types.Depsgraph) -> None:
         """In its style, where its body is now, at no speed."""
 
-    def play(self, depsgraph: bpy.types.Depsgraph, *, blocking: bool = True) -> None:
+    def play(
+        self, depsgraph: bpy.types.Depsgraph, *, blocking: bool = True, is_frame: bool = False
+    ) -> None:
         """Get ready to be simulated, from rest.
 
         Args:
-            blocking: False: do not wait for the fields of colliders that are to be made.
+            blocking: False: do not wait for what is to be made first, such as fields of colliders.
+            is_frame: whether it begins in this very frame if it can: what takes less than a tenth
+                of a second is waited for all the same.
 
         Raises:
-            NotMadeYetError: a field is being made, and nobody waits; it is as at rest until then.
+            NotMadeYetError: something is being made, and nobody waits; it is as at rest until then.
         """
 
     def stop(self, depsgraph: bpy.types.Depsgraph) -> None:

@@ -142,6 +142,10 @@ class FieldPart:
             self._at = local, self._bent.at(local)
         return self._at[1], matrix
 
+    def take_bent(self, other: FieldPart) -> None:
+        """Go on with the last shape of a part that was made from the same mesh."""
+        self._bent, self._at = other._bent, other._at
+
     @cached_property
     def _near(self) -> Bools:
         """(vertex_count,) what is near the vertices that it is tracked by: how far hands move in a

@@ -84,7 +84,9 @@ class Reader:
     def _again(self, carrier: Carrier) -> FieldPart:
         assert self.known is not None
         known = self.known
-        return FieldPart(carrier, known.surface, known.distance, known.resolution)
+        made = FieldPart(carrier, known.surface, known.distance, known.resolution)
+        made.take_bent(known)
+        return made
 
     def _empty(self, body: Body, shape: str) -> Part | Ball:
         size, middle = self.obj.empty_display_size, np.zeros(3)

@@ -145,7 +145,7 @@ class Preview:
                     is_frame = self.phase is Phase.TIMELINE
                     if is_frame and not blocking and not fields.are_made():
                         raise NotMadeYetError
-                    session.play(depsgraph, blocking=blocking)
+                    session.play(depsgraph, blocking=blocking, is_frame=is_frame)
                 case Action.ADVANCE:
                     session.advance(depsgraph, duration)
                 case Action.REST:

@@ -74,8 +74,8 @@ class ComputeSolver:
     def size(self) -> float:
         return self._motion.dynamics.rest.size
 
-    def rest(self, pose: Pose) -> None:
-        self._take(motion_flow.begin(self._rig, pose))
+    def rest(self, pose: Pose, known: Motion | None = None) -> None:
+        self._take(known or motion_flow.begin(self._rig, pose))
         self._is_resting = True
 
     def meet(

@@ -72,7 +72,9 @@ class FinSession:
         if self.is_playing and self.obstacles is not None:
             self.obstacles.rest(depsgraph)
 
-    def play(self, depsgraph: bpy.types.Depsgraph, *, blocking: bool = True) -> None:
+    def play(
+        self, depsgraph: bpy.types.Depsgraph, *, blocking: bool = True, is_frame: bool = False
+    ) -> None:
         """Get ready to be simulated; the mesh as it arrives now is what edges keep."""
         obj = self._found()
         self._corners = corners_of(obj.data)

@@ -52,8 +52,8 @@ class NumpySolver:
     def size(self) -> float:
         return self._motion.dynamics.rest.size
 
-    def rest(self, pose: Pose) -> None:
-        self._take(motion_flow.begin(self._rig, pose))
+    def rest(self, pose: Pose, known: Motion | None = None) -> None:
+        self._take(known or motion_flow.begin(self._rig, pose))
         self._strands = motion_flow.strands_at_rest(self._rig, pose)
 
     def meet(

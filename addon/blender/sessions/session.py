@@ -18,6 +18,7 @@ from ...dynamics.figures import Figures, Measure
 from ...dynamics.settings import DynamicsSettings
 from ...dynamics.state import start
 from ...errors import HairloomError
+from ...motion_flow import Motion
 from ...paint_flow import painted
 from ...refine.lead_out import Clearance
 from ...render.snapshot import Snapshot
@@ -33,6 +34,7 @@ from ..colliders.obstacles import Obstacles
 from ..properties.groom_settings import GroomSettings
 from ..scene.forces import force_fields_of, gravity_of
 from ..scene.source import Source, dynamics_warnings, refuse_own_dynamics
+from .first_contacts import FirstContacts, Start
 from .groom_source import GroomSource
 from .measures import FrameTimes
 from .numpy_solver import NumpySolver
@@ -87,6 +89,7 @@ class Session:
         self.is_playing = False
         self.is_stale = False
         self._begun: tuple[Pose, tuple[PosedCollider, ...]] | None = None
+        self._contacts = FirstContacts()
         self._posed: tuple[PosedCollider, ...] = ()
         self._field_notes: tuple[str, ...] = ()
         self._styled: Rig | None = None
@@ -98,7 +101,7 @@ class Session:
         self.cards = self.picture.cards
         request = self._source.request
         made = build(request, is_drawn=is_drawn) if blocking else placeholder(request)
-        self._take(request, made, None, depsgraph)
+        self._take(_Built(request, made), None, depsgraph)
         if not blocking:
             self._begin()
 
@@ -201,8 +204,8 @@ class Session:
         if not self.is_playing or not self._posed:
             return None
         standing = tuple(each.at_end() for each in self._posed)
-        kept = self.settings[DynamicsSettings].radius_root * self.solver.size
-        return _Moment(self.solver.pose, standing, kept)
+        settings = self.settings[DynamicsSettings]
+        return _Moment(self.solver.pose, standing, settings, self.solver.size)
 
     @property
     def snapshot(self) -> Snapshot:
@@ -231,20 +234,13 @@ class Session:
         return self.solver.strands()
 
     def _take(
-        self,
-        request: BuildRequest,
-        groom: PreparedGroom,
-        before: PreparedGroom | None,
-        depsgraph: bpy.types.Depsgraph,
-        clearance: Clearance | None = None,
+        self, made: _Built, before: PreparedGroom | None, depsgraph: bpy.types.Depsgraph
     ) -> None:
         """Everything that depends on the strands and on the choice of guides.
 
         Hair that plays goes on, unless its guides are others now.
-
-        Args:
-            clearance: of these strands, where it is known; else the next frame finds it.
         """
+        request, groom = made.request, made.groom
         self._made = request, groom
         self.groom = groom
         self._source.accept(request)
@@ -252,8 +248,11 @@ class Session:
         goes_on = before is not None and self.is_playing and _same_guides(groom.rig, before.rig)
         if not is_same:
             # strands are others now, and guides go on
-            motion = replace(self.solver.motion, clearance=clearance) if goes_on else None
+            motion = replace(self.solver.motion, clearance=made.clearance) if goes_on else None
             self.solver = solver_of(groom.rig, self.settings[DynamicsSettings].device, motion)
+            self._contacts = FirstContacts()
+            if made.start is not None:
+                self._contacts.keep(*made.start)
             self._styled = None
             self._take_style(depsgraph)
         self.picture.take_groom(groom, self.settings, self.source.colors)
@@ -276,7 +275,7 @@ class Session:
             return
         made = self._job.take()
         if made is not None:
-            self._take(made.request, made.groom, self.groom, depsgraph, made.clearance)
+            self._take(made, self.groom, depsgraph)
             self.comb(depsgraph)  # a brush has gone on meanwhile
             self.color(depsgraph)
             self.paint(depsgraph)
@@ -316,14 +315,15 @@ class Session:
         self.is_stale = False
         if request is not None and blocking and not self.is_pending:
             groom = build(request, self._made, is_drawn=self._is_drawn)
-            self._take(request, groom, self.groom, depsgraph)
+            self._take(_Built(request, groom), self.groom, depsgraph)
             return
         self._color()
         self.take_settings()
         if request is not None:
             self._begin()
         elif self.groom is not self._made[1] and not self._job.is_pending:
-            self._take(*self._made, self.groom, depsgraph)  # combed, and back by an undo
+            made = _Built(*self._made)
+            self._take(made, self.groom, depsgraph)  # combed, and back by an undo
         if blocking:
             self.finish(depsgraph)
 
@@ -437,14 +437,18 @@ class Session:
             HairloomError: the hair or its head is gone, or the head's mesh is another one.
         """
         self._take_style(depsgraph)
-        self.solver.rest(self._pose(depsgraph))
-        self._begun, self.figures = None, None
+        pose, self._begun, self.figures = self._pose(depsgraph), None, None
         _, self._field_notes = force_fields_of(self.hair.found(), depsgraph)
-        if self.is_playing and self.obstacles is not None:
+        if not self.is_playing or self.obstacles is None:
+            self.solver.rest(pose)
+        else:
             self._posed = self.obstacles.rest(depsgraph)
-            self._begun = self.solver.pose, self._posed
+            self._begun = pose, self._posed
+            start = self._start(pose, self._posed)
+            self.solver.rest(pose, self._contacts.known(start))
             painted = self._source.painted_guides(self.rig)
-            self.solver.meet(self._posed, self.settings[DynamicsSettings], painted)
+            self.solver.meet(self._posed, start.settings, painted)
+            self._contacts.keep(start, self.solver.motion)
             rate = frame_rate(depsgraph.scene)
             for _ in range(self.settings[DynamicsSettings].pre_roll):
                 self._simulate(depsgraph, 1.0 / rate)
@@ -469,22 +473,20 @@ class Session:
         Raises:
             HairloomError: as `rest`.
         """
-        now, shown = self._pose(depsgraph), self.solver.pose
-        if not _same_anchors(now.anchors, shown.anchors):
-            return True
-        if now.head_positions is None or shown.head_positions is None:
-            return not np.array_equal(now.matrix, shown.matrix)
-        return not np.array_equal(now.head_positions, shown.head_positions)
+        return not self._pose(depsgraph).is_as(self.solver.pose)
 
-    def play(self, depsgraph: bpy.types.Depsgraph, *, blocking: bool = True) -> None:
+    def play(
+        self, depsgraph: bpy.types.Depsgraph, *, blocking: bool = True, is_frame: bool = False
+    ) -> None:
         """Get ready to simulate from the style on; makes the colliders, which can take a second.
 
         Args:
-            blocking: False: do not wait for the fields of colliders that are to be made.
+            blocking, is_frame: see `simulated.Simulated`.
 
         Raises:
             HairloomError: as `rest`, or Blender's own hair dynamics is on.
-            NotMadeYetError: a field, or all of the hair, is being made, and nobody waits.
+            NotMadeYetError: a field, all of the hair, or how far that stays from colliders is
+                being made, and nobody waits.
         """
         self.is_playing = False
         refuse_own_dynamics(self.hair.found())
@@ -494,8 +496,14 @@ class Session:
         self._read_obstacles(depsgraph, blocking=blocking)
         if not self.is_made:
             raise NotMadeYetError
+        if not blocking and not is_frame:
+            start = self._start(self._pose(depsgraph), self.solids(depsgraph))
+            self._contacts.find(start)
         self.is_playing = True
         self.rest(depsgraph)
+
+    def _start(self, pose: Pose, standing: tuple[PosedCollider, ...]) -> Start:
+        return Start(self.rig, pose, standing, self.settings[DynamicsSettings])
 
     def make_fields(self, depsgraph: bpy.types.Depsgraph) -> None:
         """Have the fields of its colliders made beside the window's work, so that Play finds them.
@@ -628,21 +636,26 @@ class Session:
 class _Moment:
     """A moment of hair that plays.
 
-    colliders: as they stand. kept: how far strands stay from them at most [m].
+    colliders: as they stand. size: see `Solver.size`.
     """
 
     pose: Pose
     colliders: tuple[PosedCollider, ...]
-    kept: float
+    settings: DynamicsSettings
+    size: float
 
 
 @dataclass(frozen=True, eq=False)
 class _Built:
-    """clearance: of hair that was playing when it was asked for; None: it was not."""
+    """Hair, and what it needs to play on if it was playing when it was asked for.
+
+    clearance: of its strands, if it goes on. start: else where it begins again, and its motion.
+    """
 
     request: BuildRequest
     groom: PreparedGroom
     clearance: Clearance | None = None
+    start: tuple[Start, Motion] | None = None
 
 
 def _build_in_thread(
@@ -654,18 +667,16 @@ def _build_in_thread(
     groom = build(request, before, is_drawn=True, is_quick=True, report=work.report)
     if moment is None or groom.rig is before[1].rig:
         return _Built(request, groom)
-    clearance = motion_flow.strand_clearance(groom.rig, moment.pose, moment.colliders, moment.kept)
+    if not _same_guides(groom.rig, before[1].rig):
+        start = Start(groom.rig, moment.pose, moment.colliders, moment.settings)
+        return _Built(request, groom, start=(start, start.motion()))
+    kept = moment.settings.radius_root * moment.size
+    clearance = motion_flow.strand_clearance(groom.rig, moment.pose, moment.colliders, kept)
     return _Built(request, groom, clearance)
 
 
 def _light_in_thread(work: ThreadWork[PreparedGroom], groom: PreparedGroom) -> PreparedGroom:
     return lit(groom, work.report)
-
-
-def _same_anchors(one: Floats | None, other: Floats | None) -> bool:
-    if one is None or other is None:
-        return one is other
-    return np.array_equal(one, other, equal_nan=True)
 
 
 def _same_guides(one: Rig, other: Rig) -> bool:

@@ -55,8 +55,12 @@ class Solver(Protocol):
     def size(self) -> float:
         """How long its guides were when the motion began, the median [m]."""
 
-    def rest(self, pose: Pose) -> None:
-        """Hair in its style, carried by the body, at no speed."""
+    def rest(self, pose: Pose, known: Motion | None = None) -> None:
+        """Hair in its style, carried by the body, at no speed.
+
+        Args:
+            known: this very motion, if it has been found already.
+        """
 
     def meet(
         self,

@@ -82,6 +82,11 @@ class PosedCollider:
         """Where it stands still at the frame's end."""
         return PosedCollider(self.collider, self.matrix_now, self.matrix_now)
 
+    def stands_as(self, other: PosedCollider) -> bool:
+        """Whether both are of the same collider, and stand at the same place at the frame's end."""
+        is_same = self.collider is other.collider
+        return is_same and np.array_equal(self.matrix_now, other.matrix_now)
+
     def matrix_at(self, moment: float) -> Floats:
         """Object to world (4, 4) float64 at `moment`, 0 the frame's begin and 1 its end."""
         before, displacement, bent = self._seen
