@@ -30,8 +30,9 @@ Whole numbers lie in them as floats, exact below 2^24.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from typing import Any, Self
 
 import gpu
 import numpy as np
@@ -113,6 +114,43 @@ GUIDES_RECIPE, CURLED_GUIDES_RECIPE = _guides_recipe(curls=False), _guides_recip
 _POINT_ROUNDS = 8
 
 
+@dataclass(frozen=True, eq=False)
+class RideTexels:
+    """What is uploaded of all strands, as it lies in its textures. A thread may make it, for which
+    the window's frame would wait.
+
+    rest_points, guide_weights, strand_spans, root_holds: as above; no root_holds without a head.
+    """
+
+    layout: StrandLayout
+    rest_points: Floats
+    guide_weights: Floats
+    strand_spans: Floats
+    root_holds: Floats | None
+
+    @classmethod
+    def of(cls, strands: StrandSet, root_holds: RootHolds | None, riders: Riders) -> Self:
+        """Args: as of RidePass."""
+        layout, held = StrandLayout(strands.offsets), None
+        if root_holds is not None:
+            held = np.zeros((strands.strand_count, 2, 4), np.float32)
+            held[:, 0, :3] = root_holds.corners
+            held[:, 1, :2] = root_holds.barycentric[:, 1:]
+            held = strand_rows(held)
+        spans = strand_rows(layout.spans[:, None])
+        return cls(layout, _rest_texels(layout, strands), _weight_texels(riders), spans, held)
+
+
+def _rest_texels(layout: StrandLayout, strands: StrandSet) -> Floats:
+    return layout.pixels(np.column_stack([strands.points, strands.radius]))
+
+
+def _weight_texels(riders: Riders) -> Floats:
+    weights = riders.weights
+    per_meter = riders.segments_per_meter[weights.guide] * riders.reach[:, None]
+    return strand_rows(_padded(np.stack([weights.guide, weights.weight, per_meter], axis=1)))
+
+
 class RidePass:
     """The strands of one groom on the GPU. Making one touches no GPU; `carry` and `ride` do.
 
@@ -124,6 +162,7 @@ class RidePass:
         riders: how the strands ride on them.
         holds: where strands are held by ties or by a surface; None: nowhere.
         colliders: where these are uploaded to; None: to a place of its own.
+        texels: of these strands, if they are made already.
 
     leading: what leads strands out of colliders.
     """
@@ -137,13 +176,15 @@ class RidePass:
         riders: Riders,
         holds: Holds | None = None,
         colliders: UploadedColliders | None = None,
+        texels: RideTexels | None = None,
     ) -> None:
-        self._strands = strands
+        self._strands, self._texels = strands, texels
         self._guides, self._guide_grid = guides, guide_grid
         self._riders = riders
         self._root_holds = root_holds
         self._root_mean = strands.roots.mean(axis=0, dtype=np.float64)
-        self.points = DevicePoints(StrandLayout(strands.offsets))
+        layout = StrandLayout(strands.offsets) if texels is None else texels.layout
+        self.points = DevicePoints(layout)
         self._held = None if holds is None else HoldPass(holds, self.points.layout)
         self.leading = LeadOutPass(self.points.layout, colliders or UploadedColliders())
         self.release()
@@ -154,8 +195,10 @@ class RidePass:
         """The same strands and guides have other shapes at rest from the next frame on."""
         self._strands, self._guide_grid, self._riders = strands, guide_grid, riders
         self._root_mean = strands.roots.mean(axis=0, dtype=np.float64)
+        self._texels = None
         if self._textures:
-            self._upload_style()
+            rest_points = _rest_texels(self.points.layout, strands)
+            self._upload_style(rest_points, _weight_texels(riders))
 
     def carry(
         self, head_positions: Floats | None, matrix: Floats, anchors: Floats | None = None
@@ -254,22 +297,21 @@ class RidePass:
     def _upload(self) -> None:
         """Everything that is constant, and the textures that the shaders write."""
         strands, textures = self._strands, self._textures
-        layout, count = self.points.layout, strands.strand_count
-        self._upload_style()
-        spans = strand_rows(layout.spans[:, None])
-        textures["strand_spans"] = texture_from(spans, "RGBA32F")
+        count, texels = strands.strand_count, self._texels
+        if texels is None:
+            texels = RideTexels.of(strands, self._root_holds, self._riders)
+        self._texels = None  # they lie on the GPU from now on
+        self._upload_style(texels.rest_points, texels.guide_weights)
+        textures["strand_spans"] = texture_from(texels.strand_spans, "RGBA32F")
         guide_strands = self._guides[:, None, None].astype(np.float32)
         textures["guide_strands"] = texture_from(strand_rows(guide_strands), "R32F")
         textures["guide_turns"] = _empty(*self._guide_grid.shape[:2])
         at_rest = np.zeros((*self._guide_grid.shape[:2], 4))
         at_rest[:, :-1, 3] = 1.0
         textures["rest_turns"] = texture_from(strand_rows(at_rest), "RGBA32F")
-        self.points.texture = _cleared(layout.size)
-        if self._root_holds is not None:
-            held = np.zeros((count, 2, 4), np.float32)
-            held[:, 0, :3] = self._root_holds.corners
-            held[:, 1, :2] = self._root_holds.barycentric[:, 1:]
-            textures["root_holds"] = texture_from(strand_rows(held), "RGBA32F")
+        self.points.texture = _cleared(self.points.layout.size)
+        if self._root_holds is not None and texels.root_holds is not None:
+            textures["root_holds"] = texture_from(texels.root_holds, "RGBA32F")
             textures["root_motions"] = _empty(count, 4)
             textures["frames"] = _empty(count, 4)
             textures["rest_frames"] = _empty(count, 4)
@@ -277,20 +319,20 @@ class RidePass:
             rest_frames = textures.pop("frames")
             textures |= {"frames": textures["rest_frames"], "rest_frames": rest_frames}
 
-    def _upload_style(self) -> None:
-        """What depends on the shapes at rest."""
-        strands, textures = self._strands, self._textures
-        points = np.column_stack([strands.points, strands.radius])
-        textures["rest_points"] = texture_from(self.points.layout.pixels(points), "RGBA32F")
+    def _upload_style(self, rest_points: Floats, guide_weights: Floats) -> None:
+        """What depends on the shapes at rest.
+
+        Args:
+            rest_points, guide_weights: texels of all strands.
+        """
+        textures = self._textures
+        textures["rest_points"] = texture_from(rest_points, "RGBA32F")
         points = _padded(self._guide_grid)
         if self._riders.gives is not None:
             points[:, :-1, 3] = self._riders.gives
             textures["guide_axes"] = _empty(*self._guide_grid.shape[:2])
         textures["guide_points"] = texture_from(strand_rows(points), "RGBA32F")
-        weights = self._riders.weights
-        per_meter = self._riders.segments_per_meter[weights.guide] * self._riders.reach[:, None]
-        riding = np.stack([weights.guide, weights.weight, per_meter], axis=1)
-        textures["guide_weights"] = texture_from(strand_rows(_padded(riding)), "RGBA32F")
+        textures["guide_weights"] = texture_from(guide_weights, "RGBA32F")
 
     def _run_roots(self, head_positions: Floats) -> None:
         assert self._root_holds is not None

@@ -29,6 +29,7 @@ from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.groom.settings import GuideSettings
 from hairloom.addon.refine import lead_out
+from hairloom.addon.render.ride_pass import RideTexels
 
 FRAME = 1.0 / 60.0
 COUNT = 60
@@ -108,6 +109,24 @@ def test_what_a_thread_makes_is_the_same_to_the_bit(hair, evaluated, in_window):
     assert np.array_equal(session.rig.weights.weight, alone.rig.weights.weight)
     assert np.array_equal(session.snapshot.occlusion, alone.light.occlusion)
     assert np.array_equal(session.snapshot.rank, alone.rank)
+
+
+@pytest.mark.usefixtures("gpu_context")
+def test_what_the_gpu_gets_of_strands_is_laid_out_in_the_thread(
+    hair, evaluated, in_window, monkeypatch
+):
+    laid_out, lay_out = [], RideTexels.of
+
+    def recorded(strands, *others):
+        is_beside = threading.current_thread() is not threading.main_thread()
+        laid_out.append((strands, is_beside))
+        return lay_out(strands, *others)
+
+    monkeypatch.setattr(RideTexels, "of", recorded)
+    session = previews.start(hair, evaluated())
+    arrive(session)
+    assert session.solver.form == "compute"
+    assert [beside for strands, beside in laid_out if strands is session.rig.strands] == [True]
 
 
 @pytest.fixture

@@ -129,6 +129,29 @@ def test_strands_ride_as_in_numpy_on_a_deformed_head() -> None:
     assert np.abs(ride.read() - motion_flow.carried(rig, pose)).max() < TOLERANCE
 
 
+def test_what_a_thread_has_laid_out_shows_the_same() -> None:
+    from hairloom.addon.render.ride_pass import RidePass, RideTexels
+
+    rig, taller = rig_on(ball(), 300), rig_on(ball(), 300, above=(0.002, 0.001, 0.003))
+    pose = deformed(rig.head)
+
+    def laid_out() -> Any:
+        texels = RideTexels.of(rig.strands, rig.root_holds, rig.riders)
+        own = rig.strands, rig.root_holds, rig.guides, rig.guide_grid, rig.riders
+        return RidePass(*own, texels=texels)
+
+    guides, ride = simulated(rig, pose), laid_out()
+    expected = shown(pass_of(rig), pose, guides)
+    assert np.array_equal(shown(ride, pose, guides), expected)
+    ride.release()
+    assert np.array_equal(shown(ride, pose, guides), expected), "after the GPU has lost it"
+    ride = laid_out()
+    ride.take_style(taller.strands, taller.guide_grid, taller.riders)
+    guides = simulated(taller, pose)
+    expected = shown(pass_of(taller), pose, guides)
+    assert np.array_equal(shown(ride, pose, guides), expected), "before it was uploaded"
+
+
 def test_more_strands_than_a_texture_has_rows() -> None:
     rig = rig_on(ball(), 16384 + 700, cv_count=3, guide_count=40)
     rig.guides[:2] = 16384, 16384 + 699

@@ -228,7 +228,7 @@ def loop_triangles(mesh: bpy.types.Mesh) -> tuple[Floats, Ints, Ints, Ints]:
 
 def _triangles(mesh: bpy.types.Mesh, matrix: Floats) -> tuple[Surface, Ints, Ints]:
     positions, triangles, corner, polygon = loop_triangles(mesh)
-    corner_uv = read_corner_uv(mesh) if len(triangles) else None
+    corner_uv = read_corner_uv(mesh, corner) if len(triangles) else None
     surface = Surface(positions, triangles, corner_uv).transformed(matrix)
     if np.linalg.det(matrix[:3, :3]) < 0.0:  # mirrored triangles have been turned over
         corner = corner[:, ::-1]

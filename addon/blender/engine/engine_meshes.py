@@ -12,7 +12,7 @@ from ...render.snapshot import MeshPictures, MeshSnapshot, Skin
 from ...strands import Surface
 from ...strands.affine import moved
 from ..scene.mesh_materials import MeshMaterial, material_of
-from ..scene.surfaces import read_corner_uv
+from ..scene.surfaces import read_corner_uv, triangle_loops
 
 #: types of objects that have faces; Blender hands out what texts and legacy curves become as meshes
 SOLID_TYPES = frozenset({"MESH", "META"})
@@ -55,7 +55,7 @@ def _split(
     if len(obj.material_slots) > 1:
         mesh.loop_triangles.foreach_get("material_index", slots)
     found = []
-    corner_uv = read_corner_uv(mesh)
+    corner_uv = read_corner_uv(mesh, triangle_loops(mesh))
     is_skin = is_head and corner_uv is not None
     head = Surface(positions, triangles, corner_uv) if is_skin else None
     for slot in np.unique(slots):

@@ -24,7 +24,7 @@ from ..base.objects import head_of
 from ..base.vertex_weights import at_corners, color_choices, image_names, is_color
 from .curves import read_own_curves
 from .masks import usable, usable_image
-from .surfaces import evaluated_mesh, read_corner_uv, read_surface
+from .surfaces import evaluated_mesh, read_corner_uv, read_surface, triangle_loops
 
 #: Colour spaces of images whose pixels Blender keeps as they are in scene-linear Rec. 709.
 _LINEAR = ("Linear Rec.709", "Non-Color")
@@ -127,7 +127,7 @@ def _of_attribute(mesh: bpy.types.Mesh, name: str, place: str) -> SurfaceColor |
 def _of_image(mesh: bpy.types.Mesh, name: str, place: str) -> ImageColor | None:
     if name not in image_names():
         return None
-    corner_uv = read_corner_uv(mesh)
+    corner_uv = read_corner_uv(mesh, triangle_loops(mesh))
     image = usable_image(name, corner_uv, place, instead="a colour attribute")
     assert corner_uv is not None
     (width, height), channels = image.size, image.channels

@@ -17,6 +17,7 @@ import numpy as np
 from ...arrays import Floats, Ints
 from ...errors import HairloomError
 from ...strands import Surface
+from ..base.attributes import read_attribute
 
 
 @dataclass
@@ -54,13 +55,14 @@ def read_surface(
     """
     with evaluated_mesh(obj, depsgraph, place) as mesh:
         mesh.calc_loop_triangles()
-        triangles = np.empty((len(mesh.loop_triangles), 3), np.int32)
-        mesh.loop_triangles.foreach_get("vertices", triangles.ravel())
-        if not len(triangles):
+        loops = triangle_loops(mesh)
+        if not len(loops):
             raise HairloomError(
                 "this mesh has no faces", place=place, remedy="Choose a mesh with faces"
             )
-        corner_uv = read_corner_uv(mesh)
+        # triangles would give their vertices one by one, this is a copy of all
+        triangles = read_attribute(mesh, ".corner_vert", "CORNER")[loops]
+        corner_uv = read_corner_uv(mesh, loops)
         if corner_uv is None and need_uv:
             raise HairloomError(
                 "this mesh has no UVs, so hair cannot be placed on its texture",
@@ -138,17 +140,25 @@ def evaluated_mesh(
 
 def _positions(mesh: bpy.types.Mesh) -> Floats:
     """(vertex_count, 3) float32, object space."""
-    positions = np.empty((len(mesh.vertices), 3), np.float32)
-    mesh.vertices.foreach_get("co", positions.ravel())
+    positions: Floats = read_attribute(mesh, "position", "POINT", 3)
     return positions
 
 
-def read_corner_uv(mesh: bpy.types.Mesh) -> Floats | None:
-    """UVs of the active map at each triangle's corners, (triangle_count, 3, 2), or None."""
+def triangle_loops(mesh: bpy.types.Mesh) -> Ints:
+    """The loops at each triangle's corners, (triangle_count, 3)."""
+    loops = np.empty((len(mesh.loop_triangles), 3), np.int32)
+    mesh.loop_triangles.foreach_get("loops", loops.ravel())
+    return loops
+
+
+def read_corner_uv(mesh: bpy.types.Mesh, loops: Ints) -> Floats | None:
+    """UVs of the active map at each triangle's corners, (triangle_count, 3, 2), or None.
+
+    Args:
+        loops: see `triangle_loops`.
+    """
     if mesh.uv_layers.active is None:
         return None
     uv = np.empty((len(mesh.loops), 2), np.float32)
     mesh.uv_layers.active.uv.foreach_get("vector", uv.ravel())
-    loops = np.empty((len(mesh.loop_triangles), 3), np.int32)
-    mesh.loop_triangles.foreach_get("loops", loops.ravel())
     return uv[loops]

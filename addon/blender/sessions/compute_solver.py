@@ -17,7 +17,7 @@ from ...motion_flow import Motion
 from ...refine.lead_out import NOT_LED, LedOut
 from ...render.collider_textures import UploadedColliders
 from ...render.dynamics_pass import DynamicsPass
-from ...render.ride_pass import RidePass
+from ...render.ride_pass import RidePass, RideTexels
 from ...render.snapshot import Snapshot
 from ...render.strand_layout import from_strand_rows
 from ...render.textures import texture_to_array
@@ -28,12 +28,17 @@ from .numpy_solver import carried_motion, let_go
 class ComputeSolver:
     """On the GPU. Textures come with the first frame that is simulated or shown.
 
+    Args:
+        texels: see `texels_of`.
+
     It keeps a motion whose dynamics are those from which the GPU started; what is newer lies there.
     """
 
     form = "compute"
 
-    def __init__(self, rig: Rig, motion: Motion | None = None) -> None:
+    def __init__(
+        self, rig: Rig, motion: Motion | None = None, texels: RideTexels | None = None
+    ) -> None:
         self._rig = rig
         self._motion = motion or motion_flow.begin(rig, rig.rest_pose)
         self._is_baked = False
@@ -51,6 +56,7 @@ class ComputeSolver:
             rig.riders,
             rig.holds,
             self._colliders,
+            texels,
         )
         self._ride.leading.take(self._motion.clearance)
 
@@ -199,3 +205,8 @@ class ComputeSolver:
             colliders = self._motion.colliders
             self._ride.ride(head, matrix, guides, anchors, colliders, self._led, self._since)
         self._is_drawn = True
+
+
+def texels_of(rig: Rig) -> RideTexels:
+    """What a solver will upload of this rig's strands, so that a thread may make it before."""
+    return RideTexels.of(rig.strands, rig.root_holds, rig.riders)

@@ -81,7 +81,7 @@ class GroomSource:
         self._parting_state = parting_state(hair)
         self.settings = GroomSettings.of(hair, depsgraph)
         self._kept = Kept()
-        self._read_motion_masks(self._canvas(self.source), depsgraph)
+        self._read_motion_masks(self._canvas(self.source), self.settings, depsgraph)
         self._style_warning = ""
         self._styled: _Styled | None = None
         self.request = BuildRequest(
@@ -174,7 +174,7 @@ class GroomSource:
         if _same(strands, before.strands, back):
             strands = before.strands
         canvas = self._canvas(replace(before, strands=strands, kept=read.kept))
-        self._read_motion_masks(canvas, depsgraph)
+        self._read_motion_masks(canvas, settings, depsgraph)
         density, warning = read_density(hair, canvas, depsgraph)
         masks, mask_warnings = canvas.masks(settings[ChildrenSettings], depsgraph)
         colors, color_warnings = read_source_colors(hair, strands, before.head, depsgraph)
@@ -352,9 +352,10 @@ class GroomSource:
         hair = self.hair.found()
         return Canvas(hair, head_of(hair), source.head, source.strands, source.kept, self._good)
 
-    def _read_motion_masks(self, canvas: Canvas, depsgraph: bpy.types.Depsgraph) -> None:
-        settings = GroomSettings.of(self.hair.found(), depsgraph)[DynamicsSettings]
-        masks, self._motion_warnings = canvas.masks(settings, depsgraph)
+    def _read_motion_masks(
+        self, canvas: Canvas, settings: GroomSettings, depsgraph: bpy.types.Depsgraph
+    ) -> None:
+        masks, self._motion_warnings = canvas.masks(settings[DynamicsSettings], depsgraph)
         if masks != self._motion_masks:
             self._motion_masks = masks
 

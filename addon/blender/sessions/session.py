@@ -21,6 +21,7 @@ from ...errors import HairloomError
 from ...motion_flow import Motion
 from ...paint_flow import painted
 from ...refine.lead_out import Clearance
+from ...render.ride_pass import RideTexels
 from ...render.snapshot import Snapshot
 from ...rig_flow import Pose, Rig
 from ...strands.arc_length import lengths
@@ -34,6 +35,7 @@ from ..colliders.obstacles import Obstacles
 from ..properties.groom_settings import GroomSettings
 from ..scene.forces import force_fields_of, gravity_of
 from ..scene.source import Source, dynamics_warnings, refuse_own_dynamics
+from .compute_solver import texels_of
 from .first_contacts import FirstContacts, Start
 from .groom_source import GroomSource
 from .measures import FrameTimes
@@ -195,9 +197,12 @@ class Session:
         """Have made what was requested last, once nothing else is being made."""
         request = self._source.request
         self._light_job.cancel()
-        self._job.want(
-            request, lambda: partial(_build_in_thread, request, self._made, self._moment())
-        )
+
+        def begin() -> Callable[[ThreadWork[_Built]], _Built]:
+            is_on_gpu = self.solver.form == "compute"
+            return partial(_build_in_thread, request, self._made, self._moment(), is_on_gpu)
+
+        self._job.want(request, begin)
 
     def _moment(self) -> _Moment | None:
         """That hair which is being made will go on from; None: it will begin at rest."""
@@ -249,7 +254,8 @@ class Session:
         if not is_same:
             # strands are others now, and guides go on
             motion = replace(self.solver.motion, clearance=made.clearance) if goes_on else None
-            self.solver = solver_of(groom.rig, self.settings[DynamicsSettings].device, motion)
+            form = self.settings[DynamicsSettings].device
+            self.solver = solver_of(groom.rig, form, motion, made.texels)
             self._contacts = FirstContacts()
             if made.start is not None:
                 self._contacts.keep(*made.start)
@@ -647,13 +653,16 @@ class _Moment:
 
 @dataclass(frozen=True, eq=False)
 class _Built:
-    """Hair, and what it needs to play on if it was playing when it was asked for.
+    """Hair, and what else was made of it beside the window's work.
 
-    clearance: of its strands, if it goes on. start: else where it begins again, and its motion.
+    texels: what the GPU gets of its strands.
+    clearance: of hair that was playing when it was asked for, if it goes on. start: else where it
+        begins again, and its motion.
     """
 
     request: BuildRequest
     groom: PreparedGroom
+    texels: RideTexels | None = None
     clearance: Clearance | None = None
     start: tuple[Start, Motion] | None = None
 
@@ -662,17 +671,21 @@ def _build_in_thread(
     request: BuildRequest,
     before: tuple[BuildRequest, PreparedGroom],
     moment: _Moment | None,
+    is_on_gpu: bool,
     work: ThreadWork[_Built],
 ) -> _Built:
     groom = build(request, before, is_drawn=True, is_quick=True, report=work.report)
-    if moment is None or groom.rig is before[1].rig:
+    if groom.rig is before[1].rig:
         return _Built(request, groom)
+    made = _Built(request, groom, texels_of(groom.rig) if is_on_gpu else None)
+    if moment is None:
+        return made
     if not _same_guides(groom.rig, before[1].rig):
         start = Start(groom.rig, moment.pose, moment.colliders, moment.settings)
-        return _Built(request, groom, start=(start, start.motion()))
+        return replace(made, start=(start, start.motion()))
     kept = moment.settings.radius_root * moment.size
     clearance = motion_flow.strand_clearance(groom.rig, moment.pose, moment.colliders, kept)
-    return _Built(request, groom, clearance)
+    return replace(made, clearance=clearance)
 
 
 def _light_in_thread(work: ThreadWork[PreparedGroom], groom: PreparedGroom) -> PreparedGroom:

@@ -22,6 +22,7 @@ from ...errors import HairloomError
 from ...groom.settings import GuideSettings
 from ...motion_flow import Motion
 from ...refine.lead_out import NOT_LED, LedOut
+from ...render.ride_pass import RideTexels
 from ...render.snapshot import Snapshot
 from ...rig_flow import Pose, Rig
 from ...strands import StrandSet
@@ -116,12 +117,15 @@ class Solver(Protocol):
         """The snapshot with the strands of this moment: an array, or a texture on the GPU."""
 
 
-def solver_of(rig: Rig, form: str, motion: Motion | None = None) -> Solver:
+def solver_of(
+    rig: Rig, form: str, motion: Motion | None = None, texels: RideTexels | None = None
+) -> Solver:
     """A solver for this groom.
 
     Args:
         form: "numpy", "compute", or "automatic": compute where it works, else numpy.
         motion: to go on from, of a solver for the same rig; None: from rest.
+        texels: see `texels_of`, if they are made already.
 
     Raises:
         HairloomError: "compute" where it does not work.
@@ -134,7 +138,7 @@ def solver_of(rig: Rig, form: str, motion: Motion | None = None) -> Solver:
             place="dynamics",
             remedy="Set Device to Automatic",
         )
-    return ComputeSolver(rig, motion)
+    return ComputeSolver(rig, motion, texels)
 
 
 def form_of(form: str) -> str:
