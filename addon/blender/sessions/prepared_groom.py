@@ -249,9 +249,9 @@ def _triangles_near(points: Floats, surface: Surface) -> Ints:
     """Those at the vertices that are nearest to any of these points."""
     middle = surface.positions.mean(axis=0)
     vertices, asked = surface.positions - middle, points - middle
-    away = (vertices**2).sum(axis=1) - 2.0 * asked @ vertices.T
+    away = (vertices**2).sum(axis=1)[:, None] - 2.0 * vertices @ asked.T
     is_near = np.zeros(len(vertices), bool)
-    is_near[away.argmin(axis=1)] = True
+    is_near[away.argmin(axis=0)] = True
     return np.flatnonzero(is_near[surface.triangles].any(axis=1))
 
 
