@@ -238,10 +238,8 @@ def test_a_mesh_that_an_armature_turns_and_its_object_carries(scene):
     np.testing.assert_allclose(posed.matrix_now, TURN @ Matrix.Rotation(0.5, 4, "Z"), atol=1e-5)
 
 
-@pytest.mark.slow
-def test_the_head_is_followed_at_its_roots_where_the_body_bends(scene):
-    """A long body whose upper half turns: its collider goes with the vertices at the top, in the
-    body's shape."""
+def long_body():
+    """A mesh whose upper half alone goes with its pose; and the pose."""
     bpy.ops.mesh.primitive_cylinder_add(radius=0.1, depth=2.0, vertices=16)
     body = bpy.context.object
     bpy.ops.object.mode_set(mode="EDIT")
@@ -250,6 +248,14 @@ def test_the_head_is_followed_at_its_roots_where_the_body_bends(scene):
     pose = rig(body)
     for vertex in body.data.vertices:
         body.vertex_groups["Bone"].add([vertex.index], float(vertex.co.z > 0.0), "REPLACE")
+    return body, pose
+
+
+@pytest.mark.slow
+def test_the_head_is_followed_at_its_roots_where_the_body_bends(scene):
+    """A long body whose upper half turns: its collider goes with the vertices at the top, in the
+    body's shape."""
+    body, pose = long_body()
     at_rest = read_surface(body, depsgraph(), need_uv=False, place="Body")
     roots = np.flatnonzero(at_rest.positions[:, 2] > 0.9)
     head = Body.at_rest(body, depsgraph())
@@ -280,6 +286,25 @@ def test_the_head_is_followed_at_its_roots_where_the_body_bends(scene):
 
 
 # --- what is used again
+
+
+def test_a_head_that_is_bent_as_before_has_the_same_field(scene):
+    body, pose = long_body()
+    at_rest = read_surface(body, depsgraph(), need_uv=False, place="Body")
+    head = Body.at_rest(body, depsgraph())
+    scene.owner.hairloom.collider_collection = None
+
+    def of(known):
+        return Obstacles.of(scene.owner, head, at_rest, COARSE, depsgraph(), known)
+
+    straight = of(None)
+    pose(Matrix.Rotation(0.3, 4, "X"))
+    (bent,) = moved(straight)
+    again = of(straight)
+    assert moved(again)[0].collider is bent.collider
+    assert bent.collider is not again.parts[0].distance
+    pose(Matrix.Rotation(0.4, 4, "X"))
+    assert moved(of(again))[0].collider is not bent.collider
 
 
 def test_fields_are_made_once_and_again_when_the_mesh_or_resolution_differs(scene):
