@@ -25,6 +25,7 @@ from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.groom.grow import grow, scalp_density
 from hairloom.addon.groom.settings import GrowSettings, GuideSettings
+from hairloom.addon.motion_flow import Motion
 from hairloom.addon.render.snapshot import Snapshot
 from hairloom.addon.rig_flow import Pose, Rig
 from hairloom.addon.strands import StrandSet
@@ -138,8 +139,8 @@ def test_strands_that_are_led_out_do_not_depend_on_who_looks(rig: Rig, poses: li
     low, high = rig.head.bounds()
     ball = SphereCollider(tuple((low + high) / 2.0), 0.55 * float(np.max(high - low)))
 
-    def play(solver: Any, *, looks: bool) -> np.ndarray:
-        solver.rest(rig.rest_pose)
+    def play(solver: Any, *, looks: bool, known: Motion | None = None) -> np.ndarray:
+        solver.rest(rig.rest_pose, known)
         for before, now in pairwise(poses[:8]):
             posed = (PosedCollider(ball, before.matrix, now.matrix),)
             solver.advance(now, posed, SETTINGS, GRAVITY, 1.0 / RATE)
@@ -153,6 +154,12 @@ def test_strands_that_are_led_out_do_not_depend_on_who_looks(rig: Rig, poses: li
         assert len(solver.led().strands) > 10
         np.testing.assert_array_equal(play(solver, looks=False), seen)
         np.testing.assert_array_equal(play(form(rig), looks=False), seen)
+        standing = (PosedCollider(ball, poses[0].matrix, poses[0].matrix),)
+        begun = motion_flow.begin(rig, rig.rest_pose)
+        known = motion_flow.with_clearance(rig, begun, standing, SETTINGS)
+        for looks in (True, False):
+            found = play(solver, looks=looks, known=known)
+            np.testing.assert_array_equal(found, seen, "how far they stay was known before")
 
 
 @pytest.mark.usefixtures("gpu_context")
