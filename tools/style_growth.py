@@ -6,12 +6,13 @@ middle of its skull. A lock is one guide; locks are (lock_count, cv_count, 3), r
 
 import importlib
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 from extension_loader import PACKAGE
+from mathutils.bvhtree import BVHTree
 
 UP = np.array([0.0, 0.0, 1.0])
 #: where hair grows away from in a whorl: the crown
@@ -60,6 +61,10 @@ class Roots:
     @property
     def side(self) -> np.ndarray:
         return np.sign(self.place[:, 0] + 1e-9)
+
+    def and_also(self, other: "Roots") -> "Roots":
+        both = ((getattr(self, each.name), getattr(other, each.name)) for each in fields(self))
+        return Roots(*map(np.concatenate, both))
 
     def take(self, index: np.ndarray) -> "Roots":
         return Roots(
@@ -118,6 +123,33 @@ class Head:
         normal = unit(np.einsum("nk,nkj->nj", found.barycentric, normal))
         random = np.random.default_rng(seed).random((len(place), 4))
         return Roots(place, normal, found.triangle, found.barycentric, random)
+
+    def roots_near(self, points: np.ndarray, seed: int = 1) -> Roots:
+        """Roots on the skin where it is nearest to points (n, 3)."""
+        search = of_addon("strands.closest_point").search_of(self.surface)
+        found = search.closest(points)
+        corners = self.surface.triangles[found.triangle]
+        normal = self.surface.vertex_normals()[corners].astype(float)
+        normal = unit(np.einsum("nk,nkj->nj", found.barycentric, normal))
+        random = np.random.default_rng(seed).random((len(points), 4))
+        return Roots(found.point, normal, found.triangle, found.barycentric, random)
+
+    def left_by(self, middle: np.ndarray, ray: np.ndarray) -> np.ndarray:
+        """Where rays (n, 3) from a place within the head leave it."""
+        hits = (self._tree.ray_cast(middle, direction)[0] for direction in ray)
+        return np.array(list(hits))
+
+    @cached_property
+    def _tree(self) -> Any:
+        return BVHTree.FromPolygons(
+            self.surface.positions.tolist(), self.surface.triangles.tolist()
+        )
+
+    def weight(self, roots: Roots, group: str) -> np.ndarray:
+        """A vertex group's weights at roots, (n,)."""
+        weights = self.weights[group][self.surface.triangles[roots.triangle]]
+        found: np.ndarray = (roots.barycentric * weights).sum(axis=1)
+        return found
 
     def combed(
         self,

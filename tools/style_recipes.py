@@ -8,6 +8,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from style_cells import parted_in_cells
 from style_growth import (
     CROWN,
     Head,
@@ -843,59 +844,96 @@ def braid(head: Head) -> Any:
     )
 
 
-BRAIDS = 110
+#: of box braids: how wide cells are, how thick the strands of a plait, how long one turn of it [m]
+CELL, THICK, PLAIT = 0.024, 0.003, 0.026
+
+
+def braid_lines(head: Head, bases: Roots, cv_count: int) -> np.ndarray:
+    """Where braids from these roots fall, (n, cv_count, 3): aside from a parting, and back."""
+    x, y, z = bases.place.T
+    length = 0.225 - 0.03 * ramp(0.02, 0.08, z) + 0.035 * ramp(-0.045, -0.06, y)
+    falls = parted(0.0, 0.45)
+    # those at the forehead and on the parting go back first, so that none falls over the eyes
+    first = 4.5 * ramp(-0.01, -0.05, y) + 4.0 * ramp(0.016, 0.004, np.abs(x))
+
+    def flow(points: np.ndarray, roots: Roots, reached: np.ndarray) -> np.ndarray:
+        back = first * ramp(-0.03, 0.03, points[:, 2])
+        return unit(falls(points, roots, reached)) + toward(0.0, back, 0.0)
+
+    lines = head.combed(
+        bases,
+        flow,
+        length,
+        32,
+        lift=0.3,
+        follow=0.6,
+        hug=on_skull,
+        clearance=lambda s: 0.003 + np.minimum(0.25 * s, 0.016),
+        over_ears=True,
+    )
+    return evenly(head.settled(bases, lines, 1.2, over_ears=True, radius_root=0.006), cv_count)
+
+
+def plaited(line: np.ndarray, strand: np.ndarray, place: np.ndarray) -> np.ndarray:
+    """Locks (n, m, 3) along a line (m, 3), in these strands of a plait (n,), 0 to 2.
+
+    Args:
+        place: (n, 2) in the strand's own round section, up to 1.
+    """
+    s = np.linspace(0.0, 1.0, len(line))
+    ahead = unit(np.gradient(line, axis=0))
+    out = unit(line - np.array([0.0, 0.015, 0.0]))
+    across = unit(np.cross(ahead, out))
+    out = np.cross(across, ahead)
+    length = np.linalg.norm(np.diff(line, axis=0), axis=1).sum()
+    turn = 2.0 * np.pi * (length / PLAIT * s + strand[:, None] / 3.0)
+    size = THICK * (1.0 - 0.3 * s) * ramp(-0.02, 0.05, s)
+    aside = size * (1.25 * np.sin(turn) + 0.75 * place[:, :1])
+    height = 0.7 * size * (np.sin(2.0 * turn) + place[:, 1:])
+    return line + aside[..., None] * across + height[..., None] * out
 
 
 @recipe
 def box_braids(head: Head) -> Any:
-    roots = head.roots(1430, "scalp")
-    middles = head.roots(BRAIDS, "scalp", 3)
-    of_braid = np.linalg.norm(roots.place[:, None] - middles.place, axis=2).argmin(axis=1)
-    length = 0.24 - 0.05 * ramp(0.02, 0.08, middles.height)
-    lines = head.combed(
-        middles,
-        parted(0.0, 0.45),
-        length,
-        32,
-        lift=0.5,
-        follow=0.5,
-        hug=on_skull,
-        clearance=lambda s: 0.004 + np.minimum(0.25 * s, 0.016),
-        over_ears=True,
-    )
-    lines = head.settled(middles, lines, 1.2, over_ears=True, radius_root=0.006)
-    cv_count, thick = 84, 0.0026
-    lines = evenly(lines, cv_count)
-    s = np.linspace(0.0, 1.0, cv_count)
-    woven, narrow = ramp(0.02, 0.06, s), 1.0 - 0.3 * s
-    part = np.floor(3.0 * roots.random[:, 0]).astype(np.int32) % 3
+    cells = parted_in_cells(head, CELL)
+    roots, count = cells.roots, cells.cell.max() + 1
+    sums = np.zeros((count, 3))
+    np.add.at(sums, cells.cell, roots.place)
+    bases = head.roots_near(sums / np.bincount(cells.cell)[:, None], 3)
+    lines = braid_lines(head, bases, 54)
     angle, far = 2.0 * np.pi * roots.random[:, 1], np.sqrt(roots.random[:, 2])
-    locks = np.empty((len(roots.place), cv_count, 3))
-    for lock, braid in enumerate(of_braid):
-        line = lines[braid]
-        ahead = unit(np.gradient(line, axis=0))
-        out = unit(line - np.array([0.0, 0.015, 0.0]))
-        across = unit(np.cross(ahead, out))
-        out = np.cross(across, ahead)
-        turn = 2.0 * np.pi * (length[braid] / 0.019 * s + part[lock] / 3.0)
-        aside = (
-            thick * narrow * woven * (1.25 * np.sin(turn) + 0.75 * far[lock] * np.cos(angle[lock]))
-        )
-        height = (
-            thick
-            * narrow
-            * woven
-            * (0.7 * np.sin(2.0 * turn) + 0.7 * far[lock] * np.sin(angle[lock]))
-        )
-        gathers = (1.0 - ramp(0.0, 0.045, s))[:, None] * (roots.place[lock] - line[0])
-        locks[lock] = line + aside[:, None] * across + height[:, None] * out + gathers
+    place = np.stack([far * np.cos(angle), far * np.sin(angle)], axis=1)
+    gather = 6
+    locks = np.empty((len(roots.place), gather + lines.shape[1], 3))
+    for braid, line in enumerate(lines):
+        own = cells.cell == braid
+        locks[own, gather:] = plaited(line, cells.section[own], place[own])
+    # hair leans to the border of its cell, and is then drawn over the skin to its braid
+    locks[:, 0] = roots.place
+    part = np.linspace(0.0, 1.0, gather)[None, :-1, None]
+    locks[:, 1:gather] = (1.0 - part) * cells.border[:, None] + part * locks[:, gather, None]
+    reached = np.zeros(len(locks))
+    for cv in range(1, gather + 1):
+        reached += np.linalg.norm(locks[:, cv] - locks[:, cv - 1], axis=1)
+        distance, outward = head.away(locks[:, cv])
+        lacking = np.minimum(0.0004 + 0.15 * reached, THICK) - distance
+        locks[:, cv] += lacking[:, None] * outward
     return style(
         "Box Braids",
         145,
-        head.shapes(roots, head.kept_out(locks), 3 * of_braid.astype(np.int32) + part),
+        head.shapes(
+            roots, head.kept_out(locks, 0.001), (3 * cells.cell + cells.section).astype(np.int32)
+        ),
         "black",
         children=children(
-            22000, method="single", length_variation=0.02, clump=0.2, clump_size=15, frizz=0.001
+            24000,
+            length_variation=0.02,
+            clump=0.7,
+            clump_along=(0.0, 1.0, 1.0, 1.0, 1.0),
+            clump_size=40,
+            frizz=0.001,
+            baby_hair=0.3,
+            parting=3.0,
         ),
         presets=("dynamics/natural",),
     )
