@@ -376,7 +376,7 @@ def bob(head: Head) -> Any:
     def flow(points: np.ndarray, roots: Roots, reached: np.ndarray) -> np.ndarray:
         inward = ramp(-0.05, -0.1, points[:, 2])[:, None] * unit(points * (1.0, 1.0, 0.0))
         # what grows at the forehead goes back first, so that it does not lie on it
-        first = ramp(-0.055, -0.07, roots.place[:, 1]) * ramp(0.06, 0.02, reached)
+        first = ramp(-0.02, -0.08, roots.place[:, 1]) * ramp(0.06, 0.02, reached)
         back = first[:, None] * np.array([0.0, 0.9, 0.8])
         return unit(falls(points, roots, reached)) - 0.5 * inward + back
 
@@ -495,16 +495,22 @@ def long_wavy(head: Head) -> Any:
     roots = head.roots(1500, "scalp")
     in_front = before_shoulders(roots)
     group = parts(roots, -0.02, in_front)
-    hem = hem_at(roots, in_front, -0.23, 0.07)
-    locks = evenly(long_locks(head, roots, in_front, hem, -0.02, 0.017), 40)
     bundle = bundles(head, roots, group, 110)
     own = of_bundle(bundle)
-    locks = in_bundles(locks, bundle, 0.5)
-    # bundles beside each other wave nearly alike, and the further down the less so
+    # bundles end at heights of their own, those from further up the higher
+    hem = hem_at(roots, in_front, -0.245, 0.05)
+    hem += (0.035 + 0.045 * ramp(-0.02, 0.09, roots.height)) * own[:, 3]
+    locks = evenly(long_locks(head, roots, in_front, hem, -0.02, 0.017), 40)
+    locks = in_bundles(locks, bundle, 0.72)
+    # some lie over others
+    low = ramp(0.05, -0.07, locks[..., 2])
+    over = 0.009 * own[:, 2, None] * low
+    locks = locks + over[..., None] * unit(locks * (1.0, 1.0, 0.0))
+    # bundles beside each other wave at about the same heights, but none like the next
     x, y, z = 25.0 * roots.place.T
-    phase = np.sin(x + 0.7 * z) + np.sin(1.1 * y - 0.6 * x) + 2.4 * own[:, 0]
+    phase = 0.7 * (np.sin(x + 0.7 * z) + np.sin(1.1 * y - 0.6 * x)) + 4.2 * own[:, 0]
     phase += 0.5 * (roots.random[:, 2] - 0.5)
-    wide = (0.7 + 0.5 * own[:, 1])[:, None] * ramp(0.05, -0.07, locks[..., 2])
+    wide = (0.65 + 0.6 * own[:, 1])[:, None] * low
     locks = waved(locks, 0.0105 * wide, 0.095, phase)
     return style(
         "Long and Wavy",
