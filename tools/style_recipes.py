@@ -950,17 +950,25 @@ def undercut(head: Head) -> Any:
     roots = head.roots(1900, "scalp")
     _, y, z = roots.place.T
     is_top = z - 0.25 * np.maximum(y - 0.06, 0.0) > 0.062
-    length = np.where(is_top, 0.10 + 0.015 * roots.random[:, 0], 0.0032)
+    # the further back hair grows, the shorter it is: its ends lie on the back of the head
+    long = 0.105 - 0.05 * ramp(-0.03, 0.08, y) + 0.022 * (roots.random[:, 0] - 0.5)
+    length = np.where(is_top, long, 0.0032)
     sides = head.combed(roots, whorl, length, 16, lift=0.6, clearance=lambda s: 0.3 * s)
+    over = swept(-0.045, 0.75)
+
+    def flow(points: np.ndarray, roots: Roots, reached: np.ndarray) -> np.ndarray:
+        behind = ramp(0.035, 0.085, points[:, 1])[:, None]
+        return (1.0 - behind) * unit(over(points, roots, reached)) + behind * [0.0, 0.25, -1.0]
+
     top = head.combed(
         roots,
-        swept(-0.045, 0.75),
+        flow,
         length,
         16,
         lift=0.45,
-        follow=0.6,
+        follow=0.7,
         hug=on_skull,
-        clearance=lambda s: 0.002 + 0.2 * np.minimum(s, 0.1),
+        clearance=lambda s: 0.002 + 0.2 * np.minimum(s, 0.03),
     )
     locks = np.where(is_top[:, None, None], top, sides)
     return style(
