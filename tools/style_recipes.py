@@ -932,7 +932,7 @@ def box_braids(head: Head) -> Any:
         ),
         "black",
         children=children(
-            24000,
+            22000,
             length_variation=0.02,
             clump=0.7,
             clump_along=(0.0, 1.0, 1.0, 1.0, 1.0),
