@@ -18,10 +18,11 @@ from .cards.occlusion import CardOccluder
 from .cards.occlusion_settings import CardOcclusionSettings
 from .cards.settings import CardSettings
 from .groom.weights import guide_weights
-from .light_flow import rest_occlusion
+from .light_flow import ambient_of, directional_light, rest_fields
 from .motion_flow import root_turns
 from .params import SettingsMap
 from .rig_flow import Pose, Rig, root_normals
+from .shading.ambient import occlusion_by
 from .shading.ambient_settings import AmbientSettings
 from .shading.drawn_strands import drawn_radius, own_colors
 from .shading.settings import ShadingSettings, StrandSettings
@@ -50,16 +51,23 @@ def card_build_steps(
     """
     groom = card_groom(rig, settings[StrandSettings])
     strands = groom.strands
-    occlusion = rest_occlusion(rig, settings[AmbientSettings], strands.points)
+    ambient = settings[AmbientSettings]
+    fields = rest_fields(rig, ambient)
+    occlusion = occlusion_by(fields.sky.at(strands.points)[0], ambient_of(rig, ambient))
+    light = directional_light(fields, strands.points)
     of_points = np.repeat(strands.group, strands.point_counts)
     color = own_colors(strands.color, of_points, settings[ShadingSettings])
     groom = replace(
         groom,
         strands=replace(strands, color=color),
         occlusion=occlusion.reshape(strands.strand_count, -1),
+        light=light.reshape(*strands.grid.shape[:2], -1),
     )
     sections = settings[CardSettings], settings[AtlasSettings], settings[CardOcclusionSettings]
-    return card_steps(groom, *sections, alpha_of, others, edits)
+    build = yield from card_steps(groom, *sections, alpha_of, others, edits)
+    if build.shell_layers:
+        build = replace(build, light=directional_light(fields, build.finest.positions))
+    return build
 
 
 def card_groom(rig: Rig, drawn: StrandSettings = _AS_THEY_ARE) -> CardGroom:

@@ -18,7 +18,6 @@ from .arrays import Floats, Ints
 from .rig_flow import Rig
 from .shading.ambient import (
     HairCells,
-    ambient_occlusion,
     occlusion_by,
     openness_field,
     skin_occlusion,
@@ -93,14 +92,26 @@ def rest_light(
         skin = beside.submit(
             lambda: _skin(axes, skin_field.result(), lambda field: field.at(points))
         )
-        cells = HairCells.of(strands, rig.head, settings.cell_count)
-        report()
-        sky = sky_field(cells, ambient_of(rig, settings))
-        report()
-        openness = openness_field(cells, rig.widths.extinction)
-        report()
-        fields = LightFields(sky, openness, skin_field.result())
+        fields = LightFields(*_sky_fields(rig, settings, report), skin_field.result())
         return _light(rig, settings, fields, axes, lambda field: field.at(points), skin.result())
+
+
+def rest_fields(rig: Rig, settings: AmbientSettings) -> LightFields:
+    """The fields of a rig with strands."""
+    return LightFields(*_sky_fields(rig, settings), rest_skin_field(rig))
+
+
+def _sky_fields(
+    rig: Rig, settings: AmbientSettings, report: Callable[[], None] = lambda: None
+) -> tuple[Field, Field]:
+    """The first two of `LightFields`."""
+    cells = HairCells.of(rig.strands, rig.head, settings.cell_count)
+    report()
+    sky = sky_field(cells, ambient_of(rig, settings))
+    report()
+    openness = openness_field(cells, rig.widths.extinction)
+    report()
+    return sky, openness
 
 
 def quick_light(
@@ -238,18 +249,6 @@ def _few_axes(strands: StrandSet, chosen: Ints, among: StrandSet) -> Axes:
     return tangent.T, normal.T, cross_rows(tangent, normal).T
 
 
-def rest_occlusion(rig: Rig, settings: AmbientSettings, points: Floats | None = None) -> Floats:
-    """Ambient occlusion of every point at rest, (point_count,), 1 where nothing shades.
-
-    Args:
-        points: (n, 3) [m] on the same strands; None is their own.
-    """
-    strands, settings = rig.strands, ambient_of(rig, settings)
-    return ambient_occlusion(
-        strands, strands.points if points is None else points, rig.head, settings
-    )
-
-
 def strand_axes(strands: StrandSet) -> Axes:
     """Along the strand, along its normal of the hair's volume, and across both, at each point."""
     axes = np.empty((3, 3, strands.point_count), np.float32)
@@ -274,12 +273,18 @@ def _middle(strands: StrandSet) -> Floats:
     return middle
 
 
-def rest_skin_seen(rig: Rig, points: Floats, axes: Axes) -> Floats | None:
-    """The skin that points (n, 3) see at rest, those of the strands or of cards in their place,
-    (n, 8), see `skin_seen_by`. None without a head.
-    """
-    field = rest_skin_field(rig)
-    return None if field is None else skin_seen_by(axes, field.at(points))
+def directional_light(fields: LightFields, points: Floats) -> Floats:
+    """What comes to points (n, 3) by direction, and off the skin, world space, (n, k): the means of
+    these over places are those of their light, see `light_by_axes`."""
+    found = [field.at(points) for field in (fields.openness, fields.skin) if field is not None]
+    return np.ascontiguousarray(np.concatenate(found).T)
+
+
+def light_by_axes(axes: Axes, light: Floats) -> tuple[Floats, Floats | None]:
+    """The openness (n, 4) and the skin seen (n, 8), as of `HairLight`, of `directional_light`."""
+    openness, skin = np.ascontiguousarray(light[:, :4]), np.ascontiguousarray(light[:, 4:].T)
+    openness[:, 1:] = by_axes(openness[:, 1:], axes)
+    return openness, skin_seen_by(axes, skin) if len(skin) else None
 
 
 def rest_skin_field(

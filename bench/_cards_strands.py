@@ -8,15 +8,14 @@ With deep shadows each has those of its own hair; without, what comes of ambient
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import lru_cache
 
 import numpy as np
 from _cards_groom import SETTINGS, sintel_rig
 from extension_loader import REPOSITORY
 
-from hairloom.addon import light_flow
 from hairloom.addon.blender.base.images import contact_sheet, write_png
 from hairloom.addon.blender.cards.build import (
+    BuiltCards,
     CardInputs,
     MappedCards,
     build_steps,
@@ -26,6 +25,7 @@ from hairloom.addon.blender.cards.build import (
 from hairloom.addon.blender.cards.show import without_strands
 from hairloom.addon.blender.properties.presets import named_preset
 from hairloom.addon.cards.steps import result_of
+from hairloom.addon.light_flow import HairLight, rest_light
 from hairloom.addon.params import SettingsMap
 from hairloom.addon.render.camera import Camera, look_at, perspective
 from hairloom.addon.render.card_snapshot import CardSnapshot
@@ -36,7 +36,6 @@ from hairloom.addon.rig_flow import Rig
 from hairloom.addon.shading.ambient_settings import AmbientSettings
 from hairloom.addon.shading.lights import Light
 from hairloom.addon.shading.settings import ShadingSettings, StrandSettings
-from hairloom.addon.shading.volume.card_opacity import StrandArea, card_shadow_area
 from hairloom.addon.shading.volume.settings import VolumeSettings
 
 SHEET = REPOSITORY / "out" / "cards_sheet.png"
@@ -56,13 +55,13 @@ def strands_figures() -> dict[str, float]:
         and of both widths, with shadows; color_difference_<look>_unshadowed: without.
     """
     rig = sintel_rig()
-    occlusion = light_flow.rest_occlusion(rig, AmbientSettings())
+    light = rest_light(rig, AmbientSettings())
     found: dict[str, float] = {"coverage_difference": 0.0}
     pictures: list[np.ndarray] = []
     for width in WIDTHS:
         made = _made(rig, width)
         for look in LOOKS:
-            strands = _strands(rig, look, width, occlusion)
+            strands = _strands(rig, look, width, light)
             cards = _as_cards(strands, _cards(rig, made, look, width))
             for shadows in SHADOWS:
                 rows = [_drawn(rig, hair, shadows) for hair in (strands, cards)]
@@ -89,19 +88,10 @@ def _made(rig: Rig, width: float) -> MappedCards:
 
 def _cards(rig: Rig, made: MappedCards, look: str, width: float) -> CardSnapshot:
     """The cards in a look, which changes nothing but their maps."""
-    settings, build = _settings(look, width), made.build
-    maps, mesh = card_maps(CardInputs(rig, settings), build, drawn_maps), build.finest
-    area = StrandArea.of(rig.strands)
-    shadow = card_shadow_area(mesh.positions, mesh.triangles, mesh.uv, maps.textures.alpha)
-    return CardSnapshot(
-        mesh,
-        maps.textures,
-        maps.has_tangent_map,
-        build.backs[0],
-        thickness=area.shadow_area(settings[StrandSettings]) / shadow,
-        is_view_compensated=maps.is_view_compensated,
-        skin_seen=light_flow.rest_skin_seen(rig, mesh.positions, mesh.axes),
-    )
+    settings = _settings(look, width)
+    maps = card_maps(CardInputs(rig, settings), made.build, drawn_maps)
+    built = BuiltCards.of(rig, replace(made, maps=maps))
+    return built.drawn(built.rest, settings)
 
 
 def _look(name: str) -> ShadingSettings:
@@ -110,26 +100,22 @@ def _look(name: str) -> ShadingSettings:
     return shading
 
 
-def _strands(rig: Rig, look: str, width: float, occlusion: np.ndarray) -> Snapshot:
+def _strands(rig: Rig, look: str, width: float, light: HairLight) -> Snapshot:
     strands = rig.strands
     assert rig.head is not None
     return Snapshot(
         points=strands.points,
         radius=strands.radius,
         layout=StrandLayout(strands.offsets),
-        occlusion=occlusion,
-        skin_seen=_skin_seen(rig),
+        occlusion=light.occlusion,
+        openness=light.openness,
+        skin_seen=light.skin_seen,
         meshes=(replace(MeshSnapshot.of(rig.head), is_holdout=True),),
         lights=(Light.sun(SUN, (1.0, 1.0, 1.0), STRENGTH),),
         ambient=WORLD,
         shading=_look(look),
         strand_settings=StrandSettings(fullness=width),
     )
-
-
-@lru_cache(maxsize=1)
-def _skin_seen(rig: Rig) -> np.ndarray | None:
-    return light_flow.rest_skin_seen(rig, rig.strands.points, light_flow.strand_axes(rig.strands))
 
 
 def _as_cards(hair: Snapshot, cards: CardSnapshot) -> Snapshot:

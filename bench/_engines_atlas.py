@@ -137,8 +137,7 @@ def _lit(inputs: CardInputs) -> Snapshot:
     rig = inputs.rig
     holes = () if rig.head is None else (replace(MeshSnapshot.of(rig.head), is_holdout=True),)
     ambient, settings = inputs.settings[AmbientSettings], inputs.settings
-    light = replace(rest_light(rig, ambient), skin_seen=None)
-    hair = snapshot_of(PreparedGroom(rig, ambient, light))
+    hair = snapshot_of(PreparedGroom(rig, ambient, rest_light(rig, ambient)))
     return replace(
         hair,
         shading=settings[ShadingSettings],

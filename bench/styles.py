@@ -14,6 +14,8 @@ fur, to Blender's monkey.
   strands have followed; paint_ms: a dab on the density of 20,000 children, until they stand where
   they are painted; paint_all_ms: all that follows from it; paint_light_ms: its own light; see
   `_combing`.
+- cards_coverage, cards_color: cards beside the strands, see `_styles_cards`. Only when asked for: a
+  minute for each style.
 
 Exit code 1: a limit is missed.
 
@@ -21,6 +23,7 @@ make bench NAME=styles
 tools/bench.py styles bob curls          some styles
 tools/bench.py styles fit                other heads alone
 tools/bench.py styles edit               editing alone
+tools/bench.py styles cards bob curls    cards of some styles, or of all of heads
 """
 
 from __future__ import annotations
@@ -37,6 +40,7 @@ import bpy
 import numpy as np
 from _combing import combed, painted, styled
 from _report import report, start
+from _styles_cards import card_figures
 from mathutils import Vector
 
 import hairloom
@@ -66,6 +70,8 @@ AT_MOST = {
     "edit_ms": 100.0,
     "paint_ms": 500.0,
     "fit_distance_mm": 0.5,
+    "*_cards_coverage_percent": 10.0,
+    "*_cards_color_percent": 10.0,
 }
 #: the most skin that shows inside of the hairline [%]
 BALD = 1.0
@@ -311,6 +317,13 @@ def main(names: list[str]) -> int:
     if not names or "edit" in names:
         hair = styled("curls")
         found |= {"edit_ms": combed(hair)["comb_ms"], **painted(hair)}
+    if "cards" in names:
+        own = [name for name, mask in zip(styles, masks, strict=True) if mask == "scalp"]
+        for name in [name for name in names if name != "cards"] or own:
+            figures = card_figures(name)
+            print(name, {key: round(value, 3) for key, value in figures.items()}, flush=True)
+            found |= {f"{name}_{key}": value for key, value in figures.items()}
+        return report(found, REFERENCE, at_most=at_most, at_least=AT_LEAST)
     parts = ("fit", "edit")
     for name in [name for name in names if name not in parts] or (styles if not names else []):
         rig, stood, lit, length_error = added(name)

@@ -35,7 +35,7 @@ void main()
 #  if VIEW_COMPENSATED
   alpha = view_compensated_alpha(alpha, across, tangent, to_eye);
 #  endif
-  vec3 card_axis = tangent, card_front = normal;
+  vec3 card_axis = tangent;
 #  if TANGENT_MAP
   vec3 texel = card_texel(tangent_texture, card_uv, steps, atlas_tiles).xyz;
   tangent = mapped_tangent(texel, tangent, normal, shading.shift_noise);
@@ -61,17 +61,14 @@ void main()
 #  endif
 
   SkinSeen seen = SkinSeen(card_received, card_beneath.xyz, card_beneath.w);
-  float own_alpha = texture_alpha;
-#  if LAYERED
-  // a texel shows a strand or none; what its layer is in the maps is the mean
-  own_alpha = card_texel_at(
-      alpha_texture, card_uv, float({{card_texture_levels}} - 1), atlas_tiles).x;
+  float lit_alpha = alpha;
+#  if SHADOWS
+  lit_alpha = card_texel_at(alpha_texture, card_uv, lit_level, atlas_tiles).x;
 #  endif
   vec3 radiance = vec3(0.0);
 #  if WORLD
-  vec4 openness = openness_by_occlusion(card_occlusion, normal);
   radiance = shading.ambient * hair_ambient(card_occlusion,
-                                            openness,
+                                            card_openness,
                                             tangent,
                                             normal,
                                             to_eye,
@@ -84,8 +81,14 @@ void main()
   for (int index = 0; index < int(lights.ambient_and_count.w); index++) {
     vec3 to_light, irradiance;
     light_at(lights, index, card_point, to_light, irradiance);
-    vec3 path = shadow_path_to_card(
-        index, card_point, own_alpha, to_light, across, card_axis, card_front);
+    vec3 path = shadow_path_to_card(index,
+                                    card_point,
+                                    lit_alpha,
+                                    to_light,
+                                    to_eye,
+                                    across,
+                                    card_axis,
+                                    card_depth);
     irradiance *= path.x < 0.0 ? card_occlusion : path.z;
     float level = 0.0;
 #  if MARSCHNER

@@ -11,10 +11,12 @@ void main()
   card_tangent = tangent;
   card_occlusion = occlusion;
   card_along = along;
+  card_depth = depth;
   // CardMesh.axes
   vec3 across = cross(tangent, normal);
   across /= max(length(across), 1.0e-12);
   vec3 ahead = cross(normal, across);
+  card_openness = vec4(openness.x, from_axes(openness.yzw, ahead, normal));
   card_received = vec4(received.x, from_axes(received.yzw, ahead, normal));
   card_beneath = vec4(from_axes(beneath.xyz, ahead, normal), beneath.w);
 #endif

@@ -43,12 +43,31 @@ float view_compensated_depth(vec3 across, vec3 tangent, vec3 direction)
   return {{mean_turn}} / max(hair_facing(across, tangent, direction), {{min_facing}});
 }
 
-// How much hair lies before and beyond the strand that is seen of such a card; `plane`: before and beyond
-// its plane by the map.
-vec2 among_strands(vec2 plane, float scale, float tau, float fraction, float front)
+// How far behind the front of a card's strands lies the one that is seen, as a fraction of their depth.
+float seen_depth(float seen)
 {
-  float few = max(tau, {{min_tau}});
-  float others = scale * (few / (1.0 - exp(-few)) - 1.0);
-  vec2 rest = max(plane - scale * tau * vec2(fraction, 1.0 - fraction), 0.0);
-  return rest + others * vec2(1.0 - front, front);
+  float few = clamp(seen, {{min_seen}}, {{max_seen}});
+  return 1.0 / few - 1.0 / (exp(few) - 1.0);
+}
+
+// tau of the other strands of a card before the one that is seen, and beyond it.
+vec2 own_strands(float seen, float own, float near, float front)
+{
+  float a = clamp(seen, {{min_seen}}, {{max_seen}}), b = clamp(own, 0.0, {{max_seen}});
+  b = abs(b - a) < {{apart}} * a ? (1.0 + {{apart}}) * a : b;
+  near = min(near, 1.0);
+  float left = 1.0 - near;
+  float before = exp(-a * near), behind = exp(-a * left), end = exp(-a);
+  float ahead = 1.0 - before + a / (a + b) * (before - end * exp(-b * left));
+  float back = a / (a - b) * (exp(-b * left) - behind) + behind - end;
+  float met = max(-log(mix(back, ahead, front) / (1.0 - end)), 0.0);
+  return vec2(met, max(own - met, 0.0));
+}
+
+// The same of short hair, of which one sees a tip beside others. tau: of the card, of which light meets
+// `own`.
+vec2 own_tips(float own, float tau, float front)
+{
+  float few = max(tau, {{min_seen}});
+  return own * (1.0 / (1.0 - exp(-few)) - 1.0 / few) * vec2(1.0 - front, front);
 }

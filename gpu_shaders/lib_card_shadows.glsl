@@ -1,26 +1,46 @@
 // What is in the way of a light to a card: all but the card itself, which is in the maps as well.
 //
-// Twin of among_strands in addon/shading/volume/card_opacity.py. Reads what lib_shadows.glsl reads.
+// Reads what lib_shadows.glsl reads.
 #include "lib_shadows.glsl"
 #include "lib_card_opacity.glsl"
 
 // As shadow_path, for a place of a card whose texture covers alpha. `across`: normal of its plane, of any
-// length. VIEW_COMPENSATED: for the foremost of its strands.
-vec3 shadow_path_to_card(
-    int index, vec3 point, float alpha, vec3 to_light, vec3 across, vec3 tangent, vec3 normal)
+// length. VIEW_COMPENSATED: to the strand that is seen, of those that fill this depth [m] about the plane;
+// 0: of short hair.
+vec3 shadow_path_to_card(int index,
+                         vec3 point,
+                         float alpha,
+                         vec3 to_light,
+                         vec3 to_eye,
+                         vec3 across,
+                         vec3 tangent,
+                         float depth)
 {
-  vec3 path = shadow_path(index, point);
-#if SHADOWS
-  if (path.x >= 0.0) {
-    float fraction = own_fraction(index, point), tau = card_optical_depth(alpha);
-    float scale = opacity.extinction * card_thickness;
+#if !SHADOWS
+  return shadow_path(index, point);
+#else
+  float tau = card_optical_depth(alpha), own = opacity.extinction * card_thickness * tau;
+  vec3 strand = point;
 #  if VIEW_COMPENSATED
-    scale *= view_compensated_depth(across, tangent, to_light);
-    path.xy = among_strands(path.xy, scale, tau, fraction, 0.5 + 0.5 * dot(normal, to_light));
+  float seen = own * view_compensated_depth(across, tangent, to_eye);
+  own *= view_compensated_depth(across, tangent, to_light);
+  vec3 front = across / max(length(across), 1.0e-30) * (dot(across, to_eye) < 0.0 ? -1.0 : 1.0);
+  strand += depth * (0.5 - seen_depth(seen)) * front;
+#  endif
+  vec3 path = shadow_path(index, strand);
+  if (path.x >= 0.0) {
+    float fraction = own_fraction(index, point, strand);
+#  if VIEW_COMPENSATED
+    float facing = dot(front, to_light);
+    float bias = opacity.bias / length(opacity.map_depth[index].xyz);
+    float near = bias * max(abs(facing), {{min_facing}}) / max(depth, {{min_depth}});
+    float ahead = clamp(0.5 + {{sidedness}} * facing, 0.0, 1.0);
+    vec2 others = depth > 0.0 ? own_strands(seen, own, near, ahead) : own_tips(own, tau, ahead);
+    path.xy = others + max(path.xy - own * vec2(fraction, 1.0 - fraction), 0.0);
 #  else
-    path.x = max(path.x - scale * fraction * tau, 0.0);
+    path.x = max(path.x - fraction * own, 0.0);
 #  endif
   }
-#endif
   return path;
+#endif
 }

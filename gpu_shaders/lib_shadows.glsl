@@ -75,12 +75,13 @@ vec3 light_left(vec3 path, vec3 forward)
 }
 
 #if SHADOWS
-// How much of a strand or card at a point counts towards tau there, since tau grows evenly through the
-// layer in which it lies. Twin of own_fraction in addon/shading/volume/opacity.py.
-float own_fraction(int light, vec3 point)
+// How much of a strand or card at a point counts towards tau at another, since tau grows evenly through
+// the layer in which it lies. Twin of own_fraction in addon/shading/volume/opacity.py.
+float own_fraction(int light, vec3 point, vec3 there)
 {
   vec3 place = map_place(opacity, light, point);
-  float depth = min(place.z, 1.0), bias = opacity.bias;
+  float depth = min(place.z, 1.0);
+  float bias = opacity.bias + place.z - map_place(opacity, light, there).z;
 #  if DEEP
   ivec2 texel_at = clamp(ivec2(place.xy * float(opacity.resolution)), 0, opacity.resolution - 1);
   LayerSpan span = layer_span(
@@ -111,7 +112,7 @@ vec3 shadow_path_to_strand(int index, vec3 point, vec3 tangent, float radius, fl
 #if SHADOWS
   if (path.x >= 0.0) {
     float own = opacity.extinction * hides * own_depth_at(opacity, index, point, tangent, radius);
-    float fraction = own_fraction(index, point);
+    float fraction = own_fraction(index, point, point);
     path.xy = max(path.xy - own * vec2(fraction, 1.0 - fraction), 0.0);
   }
 #endif

@@ -13,8 +13,7 @@
 void main()
 {
 #ifdef CARDS
-  vec4 steps = vec4(dFdx(card_uv), dFdy(card_uv));
-  float alpha = card_texel(alpha_texture, card_uv, steps, atlas_tiles).x;
+  float alpha = card_texel_at(alpha_texture, card_uv, lit_level, atlas_tiles).x;
   float strand_weight = card_thickness * card_optical_depth(alpha);
 #  if VIEW_COMPENSATED
   vec3 across = cross(dFdx(card_point), dFdy(card_point));

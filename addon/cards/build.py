@@ -31,8 +31,8 @@ from .shells import are_wanted, build_shells
 from .short_hair import fitted_to_length
 from .sort import VIEW_COUNT, CardOrders, SortBy, card_of_vertex, in_order, order_steps
 from .steps import map_progress
-from .strand_occlusion import strands_occlusion
 from .strip import Strips, UncutCards, guide_strips, scattered_tiles, strip_mesh
+from .taken_over import taken_over
 
 #: Directions from which coarser levels are looked at to be sorted.
 _COARSER_VIEWS = 16
@@ -56,6 +56,7 @@ class CardGroom:
     head: in the space of the strands, or None.
     occlusion: (strand_count, cv_count) ambient occlusion of the strands, which their cards take
         over; None lets rays find that of the cards.
+    light: (strand_count, cv_count, k) of the strands, see `taken_over.taken_over`, or None.
     """
 
     strands: StrandSet
@@ -65,6 +66,7 @@ class CardGroom:
     root_normal: Floats
     head: Surface | None
     occlusion: Floats | None = None
+    light: Floats | None = None
 
 
 @dataclass(frozen=True)
@@ -81,6 +83,8 @@ class CardBuild:
         `order_check.wrong_fraction`.
     order_notes: where that is much, what can be done.
     shape_notes: where cards are other ones than the settings ask for.
+    light, depth: of each vertex of the finest level, see `taken_over.TakenOver`; None where that
+        of the strands is not known.
     made: what was made, on record, world space; None where nothing is kept of it.
     edits: how many cards are as the artist left them; edit_notes: what is doubtful of these.
     """
@@ -93,6 +97,8 @@ class CardBuild:
     wrong_fraction: float = 0.0
     order_notes: tuple[str, ...] = ()
     shape_notes: tuple[str, ...] = ()
+    light: Floats | None = None
+    depth: Floats | None = None
     made: MadeCards | None = None
     edits: EditCounts = field(default_factory=EditCounts)
     edit_notes: tuple[str, ...] = ()
@@ -157,8 +163,9 @@ def card_steps(
         build = replace(build, edits=kept.counts, edit_notes=kept.notes)
     yield "Atlas"
     alpha = alpha_of(build)
-    shading = _occlusion_steps(groom, settings, build.finest, alpha, others, occlusion, kept)
-    finest = build.finest.with_occlusion((yield from _reported("Ambient occlusion", shading)))
+    shading = _occlusion_steps(groom, settings, build, alpha, others, occlusion, kept)
+    build = yield from _reported("Ambient occlusion", shading)
+    finest = build.finest
     shaded = (finest, *(with_occlusion_of(finest, level) for level in build.levels[1:]))
     orders = yield from _orders(shaded, groom.head, settings, alpha)
     yield "Check of the order"
@@ -242,31 +249,35 @@ def _order_notes(wrong: float, settings: CardSettings) -> tuple[str, ...]:
 def _occlusion_steps(
     groom: CardGroom,
     settings: CardSettings,
-    mesh: CardMesh,
+    build: CardBuild,
     alpha: Floats | None,
     others: Sequence[CardOccluder],
     occlusion: CardOcclusionSettings,
     kept: KeptCards | None,
-) -> Generator[float, None, Floats]:
-    """Of each vertex: that of the strands there, times what rays find of other grooms."""
+) -> Generator[float, None, CardBuild]:
+    """With that of the strands at each vertex, times what rays find of other grooms, in the finest
+    level; and their light."""
+    mesh = build.finest
     if not len(mesh.triangles):  # all cards were deleted
-        return np.ones(len(mesh.positions), np.float32)
+        return build
     if groom.occlusion is None:
         bodies = [] if groom.head is None else [groom.head]
-        return (
-            yield from occlusion_steps(
-                mesh, [CardOccluder(mesh, alpha), *others], bodies, occlusion
-            )
-        )
+        own = [CardOccluder(mesh, alpha), *others]
+        found = yield from occlusion_steps(mesh, own, bodies, occlusion)
+        return _with_finest(build, mesh.with_occlusion(found))
     # cards of the artist's own stand beside the strands of the nearest one
     on_strands = mesh if kept is None else replace(mesh, card=kept.model[mesh.card])
-    own = strands_occlusion(
-        on_strands, groom.strands.grid, groom.occlusion, card_of_strand(groom, settings)
-    )
-    shown = (1.0 - occlusion.strength * (1.0 - own)).astype(np.float32)
-    if not others:
-        return shown
-    return shown * (yield from occlusion_steps(mesh, others, [], occlusion))
+    card = card_of_strand(groom, settings)
+    taken = taken_over(on_strands, groom.strands.grid, groom.occlusion, groom.light, card)
+    shown: Floats = (1.0 - occlusion.strength * (1.0 - taken.occlusion)).astype(np.float32)
+    if others:
+        shown = shown * (yield from occlusion_steps(mesh, others, [], occlusion))
+    build = replace(build, light=taken.light, depth=taken.depth)
+    return _with_finest(build, mesh.with_occlusion(shown))
+
+
+def _with_finest(build: CardBuild, mesh: CardMesh) -> CardBuild:
+    return replace(build, levels=(mesh, *build.levels[1:]))
 
 
 def card_of_strand(groom: CardGroom, settings: CardSettings) -> Ints:

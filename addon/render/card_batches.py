@@ -13,13 +13,15 @@ from ..cards.sort import order_from
 from . import gpu_objects
 from .card_snapshot import CardSnapshot
 
-#: vertex attribute of a CardMesh -> its length; the last two of CardSnapshot.skin_seen
+#: vertex attribute -> its length: of a CardMesh, and the last four of a CardSnapshot
 ATTRIBUTES = {
     **{"position": 3, "normal": 3, "tangent": 3, "uv": 2, "occlusion": 1, "along": 1},
-    **{"received": 4, "beneath": 4},
+    **{"openness": 4, "received": 4, "beneath": 4, "depth": 1},
 }
 #: by CardMesh.axes: skin right beneath, as on a plane
 _PLANE = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0], np.float32)
+#: openness over occlusion where only that is known: to where hair looks
+_AWAY = np.array([0.5, 0.0, 0.5, 0.0], np.float32)
 
 
 @dataclass(eq=False)
@@ -96,13 +98,19 @@ class CardBatches:
 
 
 def _vertices(cards: CardSnapshot) -> Any:
-    mesh, seen = cards.mesh, cards.skin_seen
+    mesh, seen, openness, depth = cards.mesh, cards.skin_seen, cards.openness, cards.depth
     if seen is None:
         seen = np.broadcast_to(_PLANE, (len(mesh.positions), 8))
+    if openness is None:
+        openness = mesh.occlusion[:, None] * _AWAY
+    if depth is None:
+        depth = np.zeros(len(mesh.positions), np.float32)
     values = {
         "position": mesh.positions,
         "occlusion": mesh.occlusion[:, None],
         "along": mesh.along[:, None],
+        "openness": openness,
+        "depth": depth[:, None],
         "received": seen[:, :4],
         "beneath": seen[:, 4:],
     }

@@ -39,7 +39,7 @@ _LAYERS_RECIPE = ShaderRecipe(
     vertex="opacity_card.vert.glsl",
     fragment="opacity.frag.glsl",
     structs=("struct_opacity.glsl",),
-    numbers=(("FLOAT", "card_thickness"),),
+    numbers=(("FLOAT", "card_thickness"), ("FLOAT", "lit_level")),
     inputs=_INPUTS,
     varyings=_VARYINGS,
     defines=(("DEEP", 0), ("CARDS", 1), ("LAYERED", 0)),
@@ -67,6 +67,7 @@ class _Cards:
     thickness: float
     is_view_compensated: bool
     is_layered: bool
+    lit_level: int
 
     @property
     def feature(self) -> ShaderFeature:
@@ -85,7 +86,7 @@ class _Cards:
             _LAYERS_RECIPE,
             [*features, self.feature],
             self.blocks,
-            numbers={"card_thickness": self.thickness},
+            numbers={"card_thickness": self.thickness, "lit_level": self.lit_level},
         )
         self.batch.draw(shader.shader)
 
@@ -135,6 +136,7 @@ class CardOpacity:
             cards.thickness,
             cards.is_view_compensated,
             cards.is_layered,
+            cards.lit_level,
         )
         lights = kept_lights(snapshot.lights)
         return self._drawing.maps(

@@ -81,7 +81,8 @@ _SHADED_RECIPE = ShaderRecipe(
         ("smooth", "VEC3", "card_tangent"),
         ("smooth", "FLOAT", "card_occlusion"),
         ("smooth", "FLOAT", "card_along"),
-        *(("smooth", "VEC4", f"card_{name}") for name in ("received", "beneath")),
+        *(("smooth", "VEC4", f"card_{name}") for name in ("openness", "received", "beneath")),
+        ("smooth", "FLOAT", "card_depth"),
     ),
     outputs=(("VEC4", "color"),),
     defines=(
@@ -221,7 +222,11 @@ class CardPass:
             yield marschner_feature(snapshot)
         if maps is not None:
             yield maps.feature
-            yield ShaderFeature(numbers={"card_thickness": ("FLOAT", cards.thickness)})
+            numbers = {
+                "card_thickness": ("FLOAT", cards.thickness),
+                "lit_level": ("FLOAT", cards.lit_level),
+            }
+            yield ShaderFeature(numbers=numbers)
         if maps is not None and is_marschner and snapshot.volume.scattering:
             yield scattering_feature(snapshot)
 

@@ -45,7 +45,17 @@ from ..shading.microfacet import MIN_ROUGHNESS
 from ..shading.skin.diffusion import KERNEL_REACH, KERNEL_TAPS, SKIN_LIGHTS
 from ..shading.skin.layout import CLOSING
 from ..shading.skin_seen import GAPS, PART
-from ..shading.volume.card_opacity import MAX_ALPHA, MEAN_TURN, MIN_FACING, MIN_TAU, UPRIGHT_SHOWN
+from ..shading.volume.card_opacity import (
+    APART,
+    MAX_ALPHA,
+    MAX_SEEN,
+    MEAN_TURN,
+    MIN_DEPTH,
+    MIN_FACING,
+    MIN_SEEN,
+    SIDEDNESS,
+    UPRIGHT_SHOWN,
+)
 from ..shading.volume.dual import MIDPOINT, UNKNOWN_BEYOND
 from ..shading.volume.map_size import START_TEXELS
 from ..shading.volume.mesh_frames import MESH_FRAME_CAPACITY
@@ -195,7 +205,11 @@ CONSTANTS: Mapping[str, str] = MappingProxyType(
         "darkest": repr(DARKEST),
         "min_facing": repr(MIN_FACING),
         "mean_turn": repr(MEAN_TURN),
-        "min_tau": repr(MIN_TAU),
+        "min_seen": repr(MIN_SEEN),
+        "max_seen": repr(MAX_SEEN),
+        "apart": repr(APART),
+        "min_depth": repr(MIN_DEPTH),
+        "sidedness": repr(SIDEDNESS),
         "upright_shown": repr(UPRIGHT_SHOWN),
         "card_texture_levels": str(LEVELS),
         "card_texture_slack": str(SLACK),

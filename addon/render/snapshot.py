@@ -180,7 +180,7 @@ class Snapshot:
     occlusion: (point_count,) ambient light that arrives, 0 to 1; None is 1 everywhere.
     openness: (point_count, 4), how much of the world's light comes straight to each point, by
         direction, see ambient.openness_field; None is what occlusion and the hair's volume say.
-    skin_seen: (point_count, 8), the skin that each point sees, see light_flow.rest_skin_seen;
+    skin_seen: (point_count, 8), the skin that each point sees, see light_flow.skin_seen_by;
         None is skin right beneath, as under hair on a plane.
     color: (point_count, 3) scene-linear, the strands' own; None is the look's, and so is NaN, all
         along a strand. Counts where the look wants it, see drawn_strands.drawn_color.

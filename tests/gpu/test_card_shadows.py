@@ -142,6 +142,26 @@ def test_even_cards_shade_as_much_from_all_sides_of_their_strands(
 
 
 @pytest.mark.parametrize("form", FORMS)
+def test_locks_that_a_light_does_not_tell_apart_take_what_they_are(frame: Any, form: str) -> None:
+    """Sixteen locks across a card, some thirty times smaller than the map: the wall behind meets
+    their mean tau, not that of their mean alpha."""
+    stripes = np.tile(np.repeat([0.1, 0.9], 32), 8)
+    textures = textures_of(np.append(stripes, np.ones(512)))
+    textures = dataclasses.replace(textures, alpha=np.repeat(textures.alpha, 256, axis=0))
+    wall = card(1.0, 0.0, 0.6, (0.75, 0.75))
+    wall["normal"] = -wall["normal"]
+    far = card(9.0, 8.0, 0.6, (0.75, 0.75))
+    locks = card(0.0, 1.0, 0.0, (0.0, 0.5))
+    found, alone = (
+        drawn(frame, mesh_of(*cards), textures, of_form(form))[4:28, 4:28, 0]
+        for cards in ((locks, wall, far), (wall, far))
+    )
+    tau = 0.5 * -(np.log(0.1) + np.log(0.9))
+    assert -np.log(found / alone).mean() == pytest.approx(tau, rel=0.1)
+    assert tau > 1.5 * -np.log(0.5)
+
+
+@pytest.mark.parametrize("form", FORMS)
 def test_cards_shade_the_skin_and_a_mesh_shades_cards(frame: Any, form: str) -> None:
     def wall(y: float, low: float, high: float) -> Any:
         corners = np.array([[low, y, -1], [high, y, -1], [high, y, 2], [low, y, 2]], np.float32)

@@ -13,9 +13,11 @@ from hairloom.addon.shading.card_look import view_compensated_alpha
 from hairloom.addon.shading.card_texture import LEVELS, card_texel, packed_levels, wanted_level
 from hairloom.addon.shading.settings import ShadingSettings
 from hairloom.addon.shading.volume.card_opacity import (
-    among_strands,
     card_optical_depth,
     layer_facing,
+    own_strands,
+    own_tips,
+    seen_depth,
     view_compensated_depth,
 )
 
@@ -84,8 +86,15 @@ def test_level_and_slant(compute: Callable[..., np.ndarray]) -> None:
     level = wanted_level(steps[..., :2], steps[..., 2:], (96, 40))
     assert np.abs(found[..., 1] - level).max() < 1e-3
     assert (level > 1.0).mean() > 0.2
-    tau, parts = card_optical_depth(alpha), np.minimum(steps[..., 2:], 1.0)
-    scale = view_compensated_depth(normals, tangents, eyes)
-    among = among_strands(steps[..., 0], steps[..., 1], scale, tau, parts[..., 0], parts[..., 1])
-    assert found[..., 2:] == pytest.approx(np.stack(among, axis=-1), rel=1e-3, abs=1e-3)
-    assert np.ptp(among[0]) > 1.0
+    first, second, parts = steps[..., 0], steps[..., 1], np.minimum(steps[..., 2:], 1.0)
+    own = card_optical_depth(alpha) * view_compensated_depth(normals, tangents, eyes)
+    strands, tips = (
+        np.stack(each, axis=-1)
+        for each in (
+            own_strands(first, own, second, parts[..., 0]),
+            own_tips(own, card_optical_depth(alpha), parts[..., 1]),
+        )
+    )
+    among = strands + tips + seen_depth(first)[..., None]
+    assert found[..., 2:] == pytest.approx(among, rel=1e-3, abs=1e-3)
+    assert np.ptp(among) > 1.0

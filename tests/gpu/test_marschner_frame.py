@@ -122,7 +122,7 @@ def test_a_pixel_has_the_colour_of_the_reference(
     assert np.abs(found[..., :3] / expected - 1.0).max() < tolerance(2e-3, 4e-3)
 
 
-#: as light_flow.rest_skin_seen has it: received, beneath, depth
+#: as light_flow.skin_seen_by has it: received, beneath, depth
 SEEN = np.float32([0.6, 0.15, -0.8, 0.4, 0.1, 0.5, -0.2, 4.0])
 PLAIN = replace(
     ShadingSettings(model="marschner", pigment="melanin", melanin=0.4),

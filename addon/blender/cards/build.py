@@ -32,7 +32,7 @@ from ...cards.shell_plan import ShellPlan, shell_strands
 from ...cards.steps import map_progress, result_of
 from ...errors import HairloomError
 from ...exchange.textures.card_textures import of_one_size
-from ...light_flow import rest_skin_seen
+from ...light_flow import light_by_axes
 from ...paint_flow import colored
 from ...params import SettingsMap
 from ...render.atlas_pass import baked_maps, baking
@@ -351,21 +351,29 @@ class BuiltCards:
     def of(cls, rig: Rig, cards: MappedCards) -> BuiltCards:
         build, maps = cards.build, cards.maps
         mesh, strands, textures = build.finest, rig.strands, maps.textures
+        light = None if build.light is None else light_by_axes(mesh.axes, build.light)
+        openness, skin_seen = light or (None, None)
+        if build.shell_layers:  # their vertices stand above the hair that they show
+            openness = None
+        rest = CardSnapshot(
+            mesh,
+            textures,
+            maps.has_tangent_map,
+            build.backs[0],
+            is_view_compensated=maps.is_view_compensated or build.shell_layers > 0,
+            is_layered=build.shell_layers > 0,
+            base_color=maps.base_color,
+            openness=openness,
+            skin_seen=skin_seen,
+            depth=build.depth,
+        )
+        alpha, level = textures.alpha, rest.lit_level
         return cls(
             rig,
             bound_cards(rig, mesh),
-            CardSnapshot(
-                mesh,
-                textures,
-                maps.has_tangent_map,
-                build.backs[0],
-                is_view_compensated=maps.is_view_compensated or build.shell_layers > 0,
-                is_layered=build.shell_layers > 0,
-                base_color=maps.base_color,
-                skin_seen=rest_skin_seen(rig, mesh.positions, mesh.axes),
-            ),
+            rest,
             StrandArea.of(strands),
-            card_shadow_area(mesh.positions, mesh.triangles, mesh.uv, textures.alpha),
+            card_shadow_area(mesh.positions, mesh.triangles, mesh.uv, alpha, level),
             build.shell_layers,
             build.wrong_fraction,
             cards.notes,

@@ -7,8 +7,9 @@ stand for few strands too, so cards of a groom count by a thickness at which all
 throw as much shadow as its strands.
 
 Cards of baked strands have view-compensated alpha and count as strands do from all sides: turned
-about its strands a card gets narrower, they do not. And the strand that is seen is the foremost one
-of its card, so light from the front meets the others behind it, and light from behind before it.
+about its strands a card gets narrower, they do not. And its strands fill a depth: the one that is
+seen lies near the front of it, so light from the front meets few of the others before it, and light
+from behind most of them.
 
 Twin of gpu_shaders/lib_card_opacity.glsl and lib_card_shadows.glsl.
 """
@@ -32,8 +33,14 @@ MEAN_TURN = 2.0 / np.pi
 MIN_FACING = 0.1
 #: how much of an upright piece's length a layer of shells shows, squared
 UPRIGHT_SHOWN = 0.5
-#: fewer strands than that are as good as none [1]
-MIN_TAU = 1.0e-3
+#: of fewer strands than that any may be the one that is seen, and more are as good as a wall [1]
+MIN_SEEN, MAX_SEEN = 0.05, 60.0
+#: depth of strands below which they lie in a plane [m]
+MIN_DEPTH = 1.0e-5
+#: how fast what is before a strand changes with the side that light comes from, over |cos|
+SIDEDNESS = 2.0
+#: counts of strands are at least this part of them apart
+APART = 1.0e-3
 
 
 def card_optical_depth(alpha: Floats) -> Floats:
@@ -78,23 +85,54 @@ def view_compensated_depth(across: Floats, tangent: Floats, direction: Floats) -
     return factor
 
 
-def among_strands(
-    before: Floats, beyond: Floats, scale: Floats, tau: Floats, fraction: Floats, front: Floats
-) -> tuple[Floats, Floats]:
-    """How much hair lies before and beyond the strand that is seen of such a card, (...) each.
-
-    Where tau strands lie at random and one at least, it has tau / (1 - exp(-tau)) - 1 behind it.
+def seen_depth(seen: Floats) -> Floats:
+    """How far behind the front of a card's strands lies the one that is seen on the mean, (...), as
+    a fraction of their depth: an eye meets the first of strands at random.
 
     Args:
-        before, beyond: the plane of the card by the map, the card itself in them.
-        scale: what one strand of the card counts there. tau: of the card.
-        fraction: see own_fraction. front: fraction of its other strands that the light meets later.
+        seen: how many strands of the card an eye meets, tau.
     """
-    few = np.maximum(tau, MIN_TAU)
-    others = scale * (few / -np.expm1(-few) - 1.0)
-    met = np.maximum(before - scale * tau * fraction, 0.0) + others * (1.0 - front)
-    left = np.maximum(beyond - scale * tau * (1.0 - fraction), 0.0) + others * front
-    return met, left
+    few = np.clip(seen, MIN_SEEN, MAX_SEEN)
+    depth: Floats = 1.0 / few - 1.0 / np.expm1(few)
+    return depth
+
+
+def own_strands(seen: Floats, own: Floats, near: Floats, front: Floats) -> tuple[Floats, Floats]:
+    """tau of the other strands of a card before the one that is seen, and beyond it, (...) each.
+
+    Eye and light come different ways, so what is clear to the one is as full as the rest to the
+    other. The strand that is seen has a depth s with p(s) = seen exp(-seen s) / (1 - exp(-seen)).
+    The light that comes to it is the integral of p(s) exp(-own max(s - near, 0)), and from behind
+    of p(s) exp(-own max(1 - s - near, 0)).
+
+    Args:
+        seen, own: how many strands of the card an eye meets, and the light, tau.
+        near: how near to the one that is seen they do not count, as a fraction of their depth.
+        front: 1 where light comes from the eye's side of the card, 0 where from behind.
+    """
+    a, b = np.clip(seen, MIN_SEEN, MAX_SEEN), np.clip(own, 0.0, MAX_SEEN)
+    b = np.where(np.abs(b - a) < APART * a, (1.0 + APART) * a, b)
+    near = np.minimum(near, 1.0)
+    left = 1.0 - near
+    before, behind, end = np.exp(-a * near), np.exp(-a * left), np.exp(-a)
+    ahead = 1.0 - before + a / (a + b) * (before - end * np.exp(-b * left))
+    back = a / (a - b) * (np.exp(-b * left) - behind) + behind - end
+    met = np.maximum(-np.log((back + (ahead - back) * front) / (1.0 - end)), 0.0)
+    return met, np.maximum(own - met, 0.0)
+
+
+def own_tips(own: Floats, tau: Floats, front: Floats) -> tuple[Floats, Floats]:
+    """The same of short hair, of which one sees a tip, with the others beside it.
+
+    Where tau strands lie at random and one at least, it has tau / (1 - exp(-tau)) - 1 beside it.
+
+    Args:
+        own: how much of the card light meets. tau: of the card.
+        front: fraction of its other strands that the light meets later.
+    """
+    few = np.maximum(tau, MIN_SEEN)
+    others = own * (1.0 / -np.expm1(-few) - 1.0 / few)
+    return others * (1.0 - front), others * front
 
 
 @dataclass(frozen=True)
@@ -127,30 +165,47 @@ class StrandArea:
 _PLACES = (np.array([[4, 1, 1], [1, 4, 1], [1, 1, 4], [2, 2, 2]]) / 6.0).astype(np.float32)
 
 
-#: Texels that are one for a light, along each side: its map is about so much coarser than an atlas.
-_LIT_TEXELS = 4
+#: Of a layer of shells, which shows pieces of strands and no locks (measured: the short coat).
+SHELL_LIT_LEVEL = 2
+#: Levels by which a light's map is coarser than an atlas, about; and texels across a tile at least.
+_COARSER, _ACROSS = 3, 8
 
 
-def card_shadow_area(positions: Floats, triangles: Ints, uv: Floats, alpha: Floats) -> float:
+def lit_level(shape: tuple[int, ...], columns: int, rows: int) -> int:
+    """The level of a card's alpha from which its tau is taken for any light.
+
+    It is the same everywhere: of a coarser level, in which strands and gaps are mixed, tau is less.
+
+    Args:
+        shape: of the alpha, (height, width). columns, rows: of its tiles.
+    """
+    across = min(shape[0] // max(rows, 1), shape[1] // max(columns, 1))
+    return min(max((across // _ACROSS).bit_length() - 1, 0), _COARSER)
+
+
+def card_shadow_area(
+    positions: Floats, triangles: Ints, uv: Floats, alpha: Floats, level: int = 0
+) -> float:
     """What cards of thickness 1 would take of light from everywhere [m^2]: half of their area,
     as flat things, times tau.
 
     Args:
         positions: (vertex_count, 3) [m]. uv: (vertex_count, 2). alpha: (height, width).
+        level: see lit_level.
     """
     a, b, c = (positions[triangles[:, corner]] for corner in range(3))
     area = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
     at = np.einsum("pk,tkj->ptj", _PLACES, uv[triangles])
-    alpha = _coarser(_coarser(alpha, 0), 1)
+    alpha = _coarser(_coarser(alpha, 0, level), 1, level)
     size = np.array(alpha.shape)
     column, row = np.clip((at * size[::-1]).astype(np.int64), 0, size[::-1] - 1).transpose(2, 0, 1)
     tau = card_optical_depth(alpha[row, column]).mean(axis=0)
     return 0.5 * float((area * tau).sum(dtype=np.float64))
 
 
-def _coarser(alpha: Floats, axis: int) -> Floats:
-    """Means of this many texels along an axis, as mip maps have them."""
-    starts = np.arange(0, alpha.shape[axis], _LIT_TEXELS)
+def _coarser(alpha: Floats, axis: int, level: int) -> Floats:
+    """A level along an axis, as mip maps have it."""
+    starts = np.arange(0, alpha.shape[axis], 1 << level)
     texels = np.diff(np.append(starts, alpha.shape[axis]))
     sums = np.add.reduceat(alpha, starts, axis=axis, dtype=np.float32)
     means: Floats = sums / (texels[:, None] if axis == 0 else texels)

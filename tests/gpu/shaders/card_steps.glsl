@@ -9,9 +9,10 @@ void main()
       across.w, across.xyz, texelFetch(tangents, pixel, 0).xyz, texelFetch(eyes, pixel, 0).xyz);
   vec4 steps = texelFetch(steps_of, pixel, 0);
   ivec2 size = ivec2(96, 40);
-  float scale = view_compensated_depth(
-      across.xyz, texelFetch(tangents, pixel, 0).xyz, texelFetch(eyes, pixel, 0).xyz);
-  vec2 among = among_strands(
-      steps.xy, scale, card_optical_depth(across.w), min(steps.z, 1.0), min(steps.w, 1.0));
+  float own = card_optical_depth(across.w) *
+              view_compensated_depth(
+                  across.xyz, texelFetch(tangents, pixel, 0).xyz, texelFetch(eyes, pixel, 0).xyz);
+  vec2 among = own_strands(steps.x, own, steps.y, min(steps.z, 1.0)) + seen_depth(steps.x);
+  among += own_tips(own, card_optical_depth(across.w), min(steps.w, 1.0));
   imageStore(result, pixel, vec4(even, wanted_level(steps.xy, steps.zw, size), among));
 }

@@ -9,6 +9,7 @@ import pytest
 
 from hairloom.addon import light_flow, rig_flow
 from hairloom.addon.groom.settings import GuideSettings
+from hairloom.addon.shading.ambient_settings import AmbientSettings
 from hairloom.addon.shading.skin_seen import (
     GAPS,
     PART,
@@ -209,7 +210,7 @@ def test_light_off_one_normal_is_that_of_a_matt_surface() -> None:
 
 def seen_at_rest(strands: StrandSet, head: Surface) -> np.ndarray | None:
     rig = rig_flow.prepare(strands, head, GuideSettings(), place="hair")
-    return light_flow.rest_skin_seen(rig, strands.points, light_flow.strand_axes(strands))
+    return light_flow.rest_light(rig, AmbientSettings()).skin_seen
 
 
 def test_what_strands_see_turns_with_them() -> None:

@@ -10,10 +10,13 @@ from hairloom.addon.shading.volume.card_opacity import (
     MAX_ALPHA,
     MIN_FACING,
     StrandArea,
-    among_strands,
     card_optical_depth,
     card_shadow_area,
     layer_facing,
+    lit_level,
+    own_strands,
+    own_tips,
+    seen_depth,
     view_compensated_depth,
 )
 from hairloom.addon.shading.volume.opacity import (
@@ -92,8 +95,14 @@ def test_strands_thinner_than_what_lights_resolve_count_by_their_mean() -> None:
     alpha[:, 20:] = 0.25
     positions = np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [0.0, 3.0, 0.0]])
     uv = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
-    shadow_area = card_shadow_area(positions, np.array([[0, 1, 2]]), uv, alpha)
+    shadow_area = card_shadow_area(positions, np.array([[0, 1, 2]]), uv, alpha, level=2)
     assert shadow_area == pytest.approx(0.5 * 3.0 * card_optical_depth(np.float32(0.25)), rel=1e-5)
+
+
+def test_light_tells_no_level_apart_in_which_tiles_are_too_small() -> None:
+    assert lit_level((2048, 2048), columns=8, rows=4) == 3
+    assert lit_level((512, 2048), columns=2, rows=32) == 1
+    assert lit_level((2, 2), columns=1, rows=1) == lit_level((64, 64), columns=0, rows=40) == 0
 
 
 def test_even_cards_count_the_same_from_all_sides_of_their_strands() -> None:
@@ -123,15 +132,42 @@ def test_a_slab_of_hair_covers_what_its_strands_do_from_any_side() -> None:
     assert upright == pytest.approx(np.sqrt(0.5) / np.tan(angle[1:]))
 
 
+@pytest.mark.parametrize("seen", [0.05, 0.7, 3.0])
+@pytest.mark.parametrize("lit", [0.3, 3.0])
+@pytest.mark.parametrize("near", [0.0, 0.4, 1.0])
+def test_light_that_comes_to_the_strand_of_a_card_that_is_seen(
+    seen: float, lit: float, near: float
+) -> None:
+    """Against strands thrown at random into columns: an eye meets the first of its own, light those
+    of another; it comes from the front, from behind, from both sides."""
+    random = np.random.default_rng(0)
+    count = random.poisson(seen, 2_000_000)
+    first = 1.0 - random.random(len(count)) ** (1.0 / np.maximum(count, 1))
+    first = first[count > 0]
+    assert seen_depth(seen) == pytest.approx(first.mean(), abs=2e-3)
+    front, behind = (
+        np.exp(-lit * np.maximum(each - near, 0.0)).mean() for each in (first, 1.0 - first)
+    )
+    for side, light in ((1.0, front), (0.0, behind), (0.5, 0.5 * (front + behind))):
+        assert np.exp(-own_strands(seen, lit, near, side)[0]) == pytest.approx(light, abs=2e-3)
+
+
+def test_counts_that_are_out_of_the_ordinary() -> None:
+    """None, as many for the eye as for the light, and more than can be told apart."""
+    counts = np.array([0.0, 2.0, 1e9])
+    before, beyond = own_strands(counts, counts, 0.0, 1.0)
+    expected = np.array([0.0, -np.log(0.5 * (1.0 + np.exp(-2.0))), np.log(2.0)])
+    assert before == pytest.approx(expected, abs=2e-3)
+    assert before + beyond == pytest.approx(counts)
+
+
 @pytest.mark.parametrize("tau", [0.05, 0.7, 3.0])
-def test_other_strands_of_an_even_card_are_behind_the_one_that_is_seen(tau: float) -> None:
-    """Against strands thrown at random; light comes from the front, from behind, from aside."""
+def test_the_tips_beside_one_that_is_seen(tau: float) -> None:
+    """Against strands thrown at random, of which each counts 0.8; light comes from the front, from
+    behind, from aside."""
     count = np.random.default_rng(0).poisson(tau, 400_000)
-    others = (count[count > 0] - 1.0).mean()
+    others = 0.8 * (count[count > 0] - 1.0).mean()
     for front in (1.0, 0.0, 0.5):
-        before, beyond = among_strands(
-            2.0 + 0.8 * 0.3 * tau, 5.0 + 0.8 * 0.7 * tau, 0.8, tau, 0.3, front
-        )
-        assert before == pytest.approx(2.0 + 0.8 * others * (1.0 - front), abs=0.01)
-        assert beyond == pytest.approx(5.0 + 0.8 * others * front, abs=0.01)
-    assert among_strands(0.0, 0.0, 1.0, 0.0, 0.5, 0.5) == pytest.approx((0.0, 0.0), abs=1e-3)
+        found = own_tips(0.8 * tau, tau, front)
+        assert found == pytest.approx((others * (1.0 - front), others * front), abs=0.01)
+    assert own_tips(0.0, 0.0, 0.5) == (0.0, 0.0)

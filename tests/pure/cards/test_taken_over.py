@@ -17,7 +17,7 @@ from hairloom.addon.cards.occlusion_settings import CardOcclusionSettings
 from hairloom.addon.cards.settings import CardSettings
 from hairloom.addon.cards.sort import card_of_vertex
 from hairloom.addon.cards.steps import result_of
-from hairloom.addon.cards.strand_occlusion import strands_occlusion
+from hairloom.addon.cards.taken_over import TakenOver, taken_over
 from hairloom.addon.groom.settings import GuideSettings
 from hairloom.addon.params import SettingsMap
 from hairloom.addon.rig_flow import Rig
@@ -55,6 +55,12 @@ def ladder() -> CardMesh:
     )
 
 
+def of_two(grid: np.ndarray, light: np.ndarray | None = None) -> TakenOver:
+    """A card of two strands."""
+    occlusion = np.repeat([[0.2], [0.8]], 5, 1)
+    return taken_over(ladder(), grid, occlusion, light, np.array([0, 0]))
+
+
 def upright(x: float, y: float = 0.0) -> np.ndarray:
     return np.column_stack([np.full(5, x), np.full(5, y), np.linspace(0.0, 1.0, 5)])
 
@@ -66,21 +72,46 @@ def test_each_edge_has_the_occlusion_of_the_strand_that_runs_along_it(turn: floa
     occlusion = np.array([np.linspace(0.1, 0.3, 5), np.linspace(0.5, 0.9, 5), np.full(5, 7.0)])
     normal = np.tile([np.sin(turn), -np.cos(turn), 0.0], (6, 1))
     mesh = replace(ladder(), normal=normal)
-    found = strands_occlusion(mesh, grid, occlusion, np.array([0, 0, -1]))
+    found = taken_over(mesh, grid, occlusion, None, np.array([0, 0, -1])).occlusion
     np.testing.assert_allclose(found, [0.1, 0.5, 0.2, 0.7, 0.3, 0.9], rtol=1e-5)
 
 
 def test_strands_between_count_by_hat_functions() -> None:
     grid = np.stack([upright(-0.01), upright(0.005)])
-    found = strands_occlusion(ladder(), grid, np.repeat([[0.2], [0.8]], 5, 1), np.array([0, 0]))
+    found = of_two(grid).occlusion
     left = (1.0 * 0.2 + 0.25 * 0.8) / 1.25
     np.testing.assert_allclose(found, np.tile([left, 0.8], 3), rtol=1e-5)
 
 
 def test_a_card_whose_strands_are_all_elsewhere_has_their_mean() -> None:
     grid = np.stack([upright(-0.5), upright(0.7)])
-    found = strands_occlusion(ladder(), grid, np.repeat([[0.2], [0.8]], 5, 1), np.array([0, 0]))
+    found = of_two(grid).occlusion
     np.testing.assert_allclose(found, 0.5, rtol=1e-5)
+
+
+def test_light_is_that_of_strands_as_they_are_seen() -> None:
+    """One that sees three times as much of the sky is seen three times as often."""
+    grid = np.stack([upright(-0.5), upright(0.7)])
+    light = np.repeat([[[0.2, 1.0, -4.0]], [[0.6, 5.0, 4.0]]], 5, 1)
+    found = of_two(grid, light).light
+    np.testing.assert_allclose(found, np.tile([0.5, 4.0, 2.0], (6, 1)), rtol=1e-5)
+    hidden = of_two(grid, light * [0.0, 1.0, 1.0]).light
+    np.testing.assert_allclose(hidden, np.tile([0.0, 3.0, 0.0], (6, 1)), atol=1e-5)
+
+
+def test_depth_is_that_of_even_strands() -> None:
+    """Thrown evenly through 0.04 m, the normal is -y."""
+    heights = np.random.default_rng(3).uniform(-0.03, 0.01, 4000)
+    grid = np.stack([upright(0.0, y) for y in heights])
+    card = np.zeros(len(grid), int)
+    turned = replace(ladder(), normal=np.tile([0.0, -0.6, 0.8], (6, 1)))  # out of the plane
+    found = taken_over(turned, grid, np.ones(grid.shape[:2]), None, card)
+    np.testing.assert_allclose(found.depth, 0.04, rtol=0.02)
+    assert found.light is None
+    short = taken_over(ladder(), grid * [1.0, 6.0, 1.0], np.ones(grid.shape[:2]), None, card)
+    assert not short.depth.any()
+    flat = of_two(np.stack([upright(-0.01), upright(0.01)]))
+    np.testing.assert_allclose(flat.depth, 0.0, atol=1e-6)
 
 
 @pytest.mark.parametrize("settings", few_in_commits([CLUSTERS, replace(CLUSTERS, crossed=True)]))
@@ -88,7 +119,7 @@ def test_each_card_is_as_open_as_its_own_strands(settings: CardSettings) -> None
     """Against a loop over cards; the vertices of a card lie evenly along it."""
     rig = rig_of(900)
     dense = AmbientSettings(extinction=100.0)
-    shade = light_flow.rest_occlusion(rig, dense)
+    shade = light_flow.rest_light(rig, dense).occlusion
     groom = replace(
         card_flow.card_groom(rig), occlusion=shade.reshape(rig.strands.strand_count, -1)
     )

@@ -1,40 +1,75 @@
-"""Ambient occlusion of card vertices, taken over from the strands that the cards stand for.
+"""What card vertices take over from the strands that their cards stand for.
 
 A card lies in the middle of its strands, so what a place of it would see of the sky is not what
 they see. Each vertex has the mean of its card's strands at the same part of their way, of which
 near ones count most: as hat functions between the columns of vertices, so that what the card
 shows across is on the mean what the strands have.
+
+Of light the mean is over strands as they are seen: one that is hidden among others sends little of
+its light to an eye. The fraction of the sky that it sees says how often it is seen.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from ..arrays import Floats, Ints
+from ..strands.vectors import unit_or
 from .card_mesh import CardMesh
 from .sort import card_of_vertex
 
 #: Pairs of vertices and strands at work at the same time.
-_PAIRS = 1 << 20
+_PAIRS = 1 << 18
 #: Columns that lie closer count as this far apart [m].
 _MIN_WIDTH = 1.0e-12
+#: As often every strand is seen at least.
+_MIN_SEEN = 1.0e-6
+#: Hair is short unless it is this many times as long as its card is deep.
+_SLENDER = 8.0
+#: Of what is spread evenly, its extent over the root of its variance.
+_EXTENT = np.sqrt(12.0)
 
 
-def strands_occlusion(mesh: CardMesh, grid: Floats, occlusion: Floats, card: Ints) -> Floats:
-    """How open each vertex is, (vertex_count,) float32: 1 open, 0 shut in.
+@dataclass(frozen=True, eq=False)
+class TakenOver:
+    """Of each vertex of a mesh.
+
+    occlusion: (vertex_count,) float32, how open it is: 1 open, 0 shut in.
+    light: (vertex_count, k) float32, the mean of seen strands; None where that of strands is.
+    depth: (vertex_count,) float32 [m], how deep its strands lie along the normal: the extent of
+        even ones with the same variance. 0 where hair is so short that one sees its tips, which
+        lie side by side.
+    """
+
+    occlusion: Floats
+    light: Floats | None
+    depth: Floats
+
+
+def taken_over(
+    mesh: CardMesh, grid: Floats, occlusion: Floats, light: Floats | None, card: Ints
+) -> TakenOver:
+    """What a mesh takes over.
 
     Args:
         grid: (strand_count, cv_count, 3) [m], root first.
         occlusion: (strand_count, cv_count) of the strands.
+        light: (strand_count, cv_count, k) of the strands; the first value is the fraction of the
+            sky that is seen. None: nothing is known of it.
         card: (strand_count,) the card of each strand, from 0 without gaps; -1 without one. Cards of
             higher numbers stand for the same strands again, in the same order.
     """
+    length = np.linalg.norm(np.diff(grid, axis=1), axis=2).sum(axis=1)
     order = np.argsort(card, kind="stable")[np.count_nonzero(card < 0) :]
     count = np.bincount(card[order])
     start = np.cumsum(count) - count
     own = card_of_vertex(mesh) % len(count)
     side, reach = _rows(mesh)
-    found = np.ones(len(own), np.float32)
+    plane = unit_or(np.cross(side, mesh.tangent), mesh.normal)
+    occluded, depth = np.ones(len(own), np.float32), np.zeros(len(own), np.float32)
+    lit = None if light is None else np.zeros((len(own), light.shape[2]), np.float32)
     # vertices of cards with as many strands together, so that little is left empty
     vertices = np.argsort(count[own], kind="stable")
     first = 0
@@ -45,15 +80,29 @@ def strands_occlusion(mesh: CardMesh, grid: Floats, occlusion: Floats, card: Int
         place = np.arange(most)
         is_there = place < count[own[chosen], None]
         strand = order[start[own[chosen], None] + np.where(is_there, place, 0)]
-        away = _at(grid, strand, mesh.along[chosen]) - mesh.positions[chosen, None]
+        along = mesh.along[chosen]
+        away = _at(grid, strand, along) - mesh.positions[chosen, None]
         aside = np.abs(np.einsum("vsi,vi->vs", away, side[chosen]))
         weight = np.maximum(1.0 - aside / reach[chosen, None], 0.0) * is_there
         # where none is near, all count alike
         weight = np.where(weight.sum(axis=1, keepdims=True) > 0.0, weight, is_there)
-        values = _at(occlusion[..., None], strand, mesh.along[chosen])[..., 0]
-        found[chosen] = (weight * values).sum(axis=1) / weight.sum(axis=1)
+        occluded[chosen] = _mean(_at(occlusion[..., None], strand, along), weight)[:, 0]
+        height = np.einsum("vsi,vi->vs", away, plane[chosen])[..., None]
+        variance = _mean(height**2, weight) - _mean(height, weight) ** 2
+        extent = _EXTENT * np.sqrt(np.maximum(variance[:, 0], 0.0))
+        is_short = _mean(length[strand][..., None], weight)[:, 0] < _SLENDER * extent
+        depth[chosen] = np.where(is_short, 0.0, extent)
+        if light is not None and lit is not None:
+            values = _at(light, strand, along)
+            lit[chosen] = _mean(values, weight * np.maximum(values[..., 0], _MIN_SEEN))
         first += len(chosen)
-    return found
+    return TakenOver(occluded, lit, depth)
+
+
+def _mean(values: Floats, weight: Floats) -> Floats:
+    """Over strands, (vertices, k): values (vertices, strands, k), weights (vertices, strands)."""
+    mean: Floats = np.einsum("vsk,vs->vk", values, weight) / weight.sum(axis=1, keepdims=True)
+    return mean
 
 
 def _at(values: Floats, strand: Ints, along: Floats) -> Floats:
