@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import bpy
@@ -118,19 +119,31 @@ def _strand_texels(inputs: CardInputs, plan: AtlasPlan) -> float:
 
 
 def _of_fur(name: str, inputs: CardInputs, made: MappedCards) -> dict[str, float]:
-    strands = _lit(inputs)
-    cards = BuiltCards.of(inputs.rig, made)
-    drawn = replace(without_strands(strands), cards=cards.drawn(cards.rest, inputs.settings))
-    pictures = [_from_all_sides(inputs.rig, hair) for hair in (strands, drawn)]
-    shown = [_shown(each) for row in pictures for each in row]
-    write_png(OUTPUT / f"cards_{name}.png", contact_sheet(shown, len(SIDES)))
-    coverage, color = _differences(*pictures)
+    path = OUTPUT / f"cards_{name}.png"
+    coverage, color = beside_strands(inputs, BuiltCards.of(inputs.rig, made), SIDES, path)
     finest = made.build.finest
     return {
         "fur_triangles": len(finest.triangles) / finest.card_count,
         "fur_coverage_percent": 100.0 * coverage,
         "fur_color_percent": 100.0 * color,
     }
+
+
+def beside_strands(
+    inputs: CardInputs,
+    cards: BuiltCards,
+    sides: Sequence[tuple[float, float, float]],
+    path: Path,
+) -> tuple[float, float]:
+    """How far cards are from their strands in coverage and colour, see `_differences`; writes a
+    picture, strands above and cards below."""
+    strands = _lit(inputs)
+    drawn = replace(without_strands(strands), cards=cards.drawn(cards.rest, inputs.settings))
+    pictures = [_from_all_sides(inputs.rig, hair, sides) for hair in (strands, drawn)]
+    path.parent.mkdir(parents=True, exist_ok=True)
+    shown = [_shown(each) for row in pictures for each in row]
+    write_png(path, contact_sheet(shown, len(sides)))
+    return _differences(*pictures)
 
 
 def _lit(inputs: CardInputs) -> Snapshot:
@@ -150,7 +163,7 @@ def _lit(inputs: CardInputs) -> Snapshot:
 
 
 def _from_all_sides(
-    rig: Rig, hair: Snapshot, sides: Sequence[tuple[float, float, float]] = SIDES
+    rig: Rig, hair: Snapshot, sides: Sequence[tuple[float, float, float]]
 ) -> list[np.ndarray]:
     cameras = [frame_camera(rig.strands.bounds(), side, FIELD_OF_VIEW, 1.0) for side in sides]
     return [render_image(hair, camera, SIZE, SIZE, SAMPLES) for camera in cameras]

@@ -10,11 +10,9 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from _cards_strands import _differences
-from _engines_atlas import _added, _from_all_sides, _lit
+from _engines_atlas import OUTPUT, _added, beside_strands
 
 from hairloom.addon.blender.cards.build import BuiltCards
-from hairloom.addon.blender.cards.show import without_strands
 from hairloom.addon.cards.settings import CardSettings
 
 SIDES = tuple((np.sin(turn), -np.cos(turn), 0.25) for turn in 2.0 * np.pi * np.arange(8) / 8)
@@ -24,10 +22,8 @@ def shell_figures() -> dict[str, Any]:
     inputs = _added("short_coat")
     kind = replace(inputs.settings[CardSettings], kind="shells", levels=1)
     inputs = replace(inputs, settings=inputs.settings.with_settings(kind))
-    strands, made = _lit(inputs), BuiltCards.now(inputs)
-    drawn = replace(without_strands(strands), cards=made.drawn(made.rest, inputs.settings))
-    pictures = [_from_all_sides(inputs.rig, hair, SIDES) for hair in (strands, drawn)]
-    coverage, color = _differences(*pictures)
+    made = BuiltCards.now(inputs)
+    coverage, color = beside_strands(inputs, made, SIDES, OUTPUT / "shells_short_coat.png")
     return {
         "shells_triangles": len(made.rest.mesh.triangles),
         "shells_coverage_percent": 100.0 * coverage,

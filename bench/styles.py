@@ -317,15 +317,16 @@ def main(names: list[str]) -> int:
     if not names or "edit" in names:
         hair = styled("curls")
         found |= {"edit_ms": combed(hair)["comb_ms"], **painted(hair)}
+    parts = ("fit", "edit", "cards")
+    chosen = [name for name in names if name not in parts]
     if "cards" in names:
         own = [name for name, mask in zip(styles, masks, strict=True) if mask == "scalp"]
-        for name in [name for name in names if name != "cards"] or own:
+        for name in chosen or own:
             figures = card_figures(name)
             print(name, {key: round(value, 3) for key, value in figures.items()}, flush=True)
             found |= {f"{name}_{key}": value for key, value in figures.items()}
         return report(found, REFERENCE, at_most=at_most, at_least=AT_LEAST)
-    parts = ("fit", "edit")
-    for name in [name for name in names if name not in parts] or (styles if not names else []):
+    for name in chosen or (styles if not names else []):
         rig, stood, lit, length_error = added(name)
         head, group = rig.head, named_hairstyle(name).masks.get("children", "")
         assert head is not None

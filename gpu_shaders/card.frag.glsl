@@ -29,8 +29,7 @@ void main()
   vec3 to_eye = unit_or(view.eye.xyz - view.eye.w * card_point, normal);
   float along = card_along;
   vec4 steps = vec4(dFdx(card_uv), dFdy(card_uv));
-  float texture_alpha = card_texel(alpha_texture, card_uv, steps, atlas_tiles).x;
-  float alpha = texture_alpha;
+  float alpha = card_texel(alpha_texture, card_uv, steps, atlas_tiles).x;
   vec3 across = cross(dFdx(card_point), dFdy(card_point));
 #  if VIEW_COMPENSATED
   alpha = view_compensated_alpha(alpha, across, tangent, to_eye);

@@ -163,7 +163,7 @@ def card_steps(
         build = replace(build, edits=kept.counts, edit_notes=kept.notes)
     yield "Atlas"
     alpha = alpha_of(build)
-    shading = _occlusion_steps(groom, settings, build, alpha, others, occlusion, kept)
+    shading = _light_steps(groom, settings, build, alpha, others, occlusion, kept)
     build = yield from _reported("Ambient occlusion", shading)
     finest = build.finest
     shaded = (finest, *(with_occlusion_of(finest, level) for level in build.levels[1:]))
@@ -246,7 +246,7 @@ def _order_notes(wrong: float, settings: CardSettings) -> tuple[str, ...]:
     return (f"{wrong:.0%} of the hair's pixels blend in the wrong order: {remedy}",)
 
 
-def _occlusion_steps(
+def _light_steps(
     groom: CardGroom,
     settings: CardSettings,
     build: CardBuild,
@@ -255,8 +255,8 @@ def _occlusion_steps(
     occlusion: CardOcclusionSettings,
     kept: KeptCards | None,
 ) -> Generator[float, None, CardBuild]:
-    """With that of the strands at each vertex, times what rays find of other grooms, in the finest
-    level; and their light."""
+    """The build with the light that its finest level takes over of the strands, and their occlusion
+    times what rays find of other grooms."""
     mesh = build.finest
     if not len(mesh.triangles):  # all cards were deleted
         return build

@@ -10,6 +10,7 @@ import numpy as np
 from ..arrays import Floats, Ints
 from ..cards.card_mesh import CardMesh
 from ..cards.sort import order_from
+from ..shading.environment import openness_by_occlusion
 from . import gpu_objects
 from .card_snapshot import CardSnapshot
 
@@ -20,8 +21,8 @@ ATTRIBUTES = {
 }
 #: by CardMesh.axes: skin right beneath, as on a plane
 _PLANE = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0], np.float32)
-#: openness over occlusion where only that is known: to where hair looks
-_AWAY = np.array([0.5, 0.0, 0.5, 0.0], np.float32)
+#: by the same axes, to where hair looks
+_AWAY = np.array([0.0, 1.0, 0.0], np.float32)
 
 
 @dataclass(eq=False)
@@ -102,7 +103,7 @@ def _vertices(cards: CardSnapshot) -> Any:
     if seen is None:
         seen = np.broadcast_to(_PLANE, (len(mesh.positions), 8))
     if openness is None:
-        openness = mesh.occlusion[:, None] * _AWAY
+        openness = openness_by_occlusion(mesh.occlusion, _AWAY).astype(np.float32)
     if depth is None:
         depth = np.zeros(len(mesh.positions), np.float32)
     values = {

@@ -17,7 +17,7 @@ from hairloom.addon.shading.marschner.tables import PREVIEW_SIZE, marschner_tabl
 from hairloom.addon.shading.settings import ShadingSettings
 from hairloom.addon.shading.skin_seen import SkinSeen
 from hairloom.addon.shading.textures import HairTextures
-from hairloom.addon.shading.volume.card_opacity import MAX_ALPHA
+from hairloom.addon.shading.volume.card_opacity import MAX_ALPHA, own_strands
 from hairloom.addon.shading.volume.dual import fractions, fractions_at, off_far_skin
 from hairloom.addon.shading.volume.settings import VolumeSettings
 from hairloom.addon.strands import Surface
@@ -139,6 +139,56 @@ def test_even_cards_shade_as_much_from_all_sides_of_their_strands(
     left = 0.4 ** (2.0 / np.pi / np.cos(turn))
     assert found[1].min() > 0.01
     assert found[0] / found[1] == pytest.approx(left, rel=0.03)
+
+
+@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("depth", [0.0, 0.5])
+def test_other_strands_of_a_deep_card_are_before_the_one_that_is_seen(
+    frame: Any, form: str, depth: float
+) -> None:
+    """Of a card that faces eye and light: of long hair some of them, of short hair none."""
+    alpha, volume = 0.9, of_form(form, bias=1.0e-6)
+    deep = np.full(4, depth, np.float32)
+    mesh = mesh_of(card(0.0, 1.0, 1.0))
+    options: dict[str, Any] = {"lights": (SUN,), "ambient": (0.0, 0.0, 0.0), "shading": PLAIN}
+    even = {"is_view_compensated": True, "depth": deep}
+    shown, bare = (
+        frame.render_image(
+            snapshot_of(mesh, textures_of([alpha, alpha]), volume=each, cards=even, **options),
+            camera(frame),
+            SIZE,
+            SIZE,
+            1,
+        )[16, 8:24, 0]
+        for each in (volume, dataclasses.replace(volume, extinction=1.0e-6))
+    )
+    own = -np.log(1.0 - alpha) * 2.0 / np.pi
+    before, _ = own_strands(own, own, 0.0, 1.0)
+    expected = np.exp(-before) if depth else 1.0
+    assert shown / bare == pytest.approx(expected, rel=0.03)
+
+
+def test_light_is_looked_up_at_the_strand_that_is_seen(frame: Any) -> None:
+    """It comes from aside, past a small card: before the plane of a deep one, and behind the
+    foremost of its strands."""
+    mesh = mesh_of(card(0.0, 1.0, 1.0), card(0.0, 0.3, 0.8))
+    sun = Light.sun((1.0, 1.0, 0.0), (1.0, 1.0, 1.0), 3.0)
+    shade = []
+    for depth in (0.0, 6.0):
+        even = {"is_view_compensated": True, "depth": np.repeat(np.float32([depth, 0.0]), 4)}
+        snapshot = snapshot_of(
+            mesh,
+            textures_of([0.9, 0.9]),
+            volume=VolumeSettings(resolution=128, scattering=False, slices=24, shadows="slices"),
+            cards=even,
+            lights=(sun,),
+            ambient=(0.0, 0.0, 0.0),
+            shading=PLAIN,
+        )
+        row = frame.render_image(snapshot, camera(frame), 64, 64, 1)[32, :, 0]
+        shade.append(row[24:28].mean() / row[44:56].mean())
+    assert shade[0] < 0.6
+    assert shade[1] > 0.95
 
 
 @pytest.mark.parametrize("form", FORMS)

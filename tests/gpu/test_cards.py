@@ -112,10 +112,14 @@ def test_a_pixel_has_the_colour_of_the_reference(
     assert np.ptp(expected[..., 0]) > 0.02, "the light must vary"
 
 
-@pytest.mark.parametrize("color_noise", [0.5, 0.05, 0.9])
-def test_marschner_shades_cards_as_strands(frame: Any, front: Any, color_noise: float) -> None:
+@pytest.mark.parametrize(
+    ("color_noise", "sky"), [(0.5, None), (0.05, None), (0.9, None), (0.5, (0.4, 0.1, 0.2, -0.15))]
+)
+def test_marschner_shades_cards_as_strands(
+    frame: Any, front: Any, color_noise: float, sky: tuple[float, ...] | None
+) -> None:
     """A card has the colours of the reference of a strand in its place; its base texture says how
-    that strand's colour differs from the mean."""
+    that strand's colour differs from the mean. sky: its openness by its axes, if it is known."""
     from hairloom.addon.shading.environment import (
         CORNER_BLUR,
         Environment,
@@ -139,9 +143,11 @@ def test_marschner_shades_cards_as_strands(frame: Any, front: Any, color_noise: 
         for noise in (color_noise, 0.5)
     )
     tilt = 0.3
+    mesh = mesh_of(card((0.0, 0.0), (1.0, 1.0), 0.0, tilt=tilt))
     snapshot = snapshot_of(
-        mesh_of(card((0.0, 0.0), (1.0, 1.0), 0.0, tilt=tilt)),
+        mesh,
         constant(own / mean, noise=0.3, shift=0.7),
+        cards={} if sky is None else {"openness": np.tile(np.float32(sky), (4, 1))},
         lights=LIGHTS,
         ambient=AMBIENT,
         shading=look,
@@ -168,9 +174,13 @@ def test_marschner_shades_cards_as_strands(frame: Any, front: Any, color_noise: 
             absorption=absorption,
             shading=look,
         )
+        openness = openness_by_occlusion(occlusion, normal)
+        if sky is not None:
+            axes = np.stack([each[0] for each in mesh.axes])
+            openness = np.append(sky[0], np.array(sky[1:]) @ axes)
         expected = hair_ambient(
             Environment(AMBIENT),
-            openness_by_occlusion(occlusion, normal),
+            openness,
             lambda towards, path, lit=lit: lit(to_light=towards, level=level, tau=path[..., 0]),
         )
         for lamp in LIGHTS:
