@@ -2,39 +2,75 @@
 
 python tools/load_runs.py [RUNS] [BUSY]      ten runs beside two processes
 
-Prints how each ended and `N of RUNS passed`; keeps the number for `make bench NAME=house`.
+Prints how each ended. bench/load_runs.json keeps every run with its commit, and `make bench
+NAME=house` counts those that have passed since the last that failed: a run takes more than half
+an hour, so ten of them need not follow each other in one night.
 """
 
+import datetime
+import json
 import subprocess
 import sys
 import time
+from typing import TypedDict
 
 from extension_loader import REPOSITORY
-from timings import keep
 
+FILE = REPOSITORY / "bench" / "load_runs.json"
 BUSY = "while True: pass"
+
+
+class Run(TypedDict):
+    """One run: of which commit, when it ended, for how long, and its exit code."""
+
+    commit: str
+    date: str
+    minutes: float
+    code: int
+
+
+def kept() -> list[Run]:
+    """All runs that were made, the last at the end."""
+    found: list[Run] = json.loads(FILE.read_text()) if FILE.is_file() else []
+    return found
+
+
+def passed_in_a_row(runs: list[Run]) -> int:
+    """How many have passed since the last that failed."""
+    failed = [number for number, each in enumerate(runs, 1) if each["code"]]
+    return len(runs) - max(failed, default=0)
+
+
+def keep(run: Run) -> None:
+    rows = ",\n".join(json.dumps(each) for each in [*kept(), run])
+    FILE.write_text(f"[\n{rows}\n]\n")
+
+
+def commit() -> str:
+    asked = ["git", "rev-parse", "--short=8", "HEAD"]
+    return subprocess.check_output(asked, cwd=REPOSITORY, text=True).strip()
 
 
 def main(arguments: list[str]) -> int:
     runs, busy = (int(each) for each in (*arguments, *("10", "2")[len(arguments) :]))
     others = [subprocess.Popen([sys.executable, "-c", BUSY]) for _ in range(busy)]
-    logs, passed = REPOSITORY / "out" / "load_runs", 0
+    logs, codes = REPOSITORY / "out" / "load_runs", []
     logs.mkdir(parents=True, exist_ok=True)
     try:
         for number in range(1, runs + 1):
-            log, begin = logs / f"{number}.log", time.monotonic()
+            log, begin, of = logs / f"{number}.log", time.monotonic(), commit()
             with log.open("w") as stream:
-                run = subprocess.run([".ci/run"], cwd=REPOSITORY, stdout=stream, stderr=stream)
-            passed += run.returncode == 0
-            minutes = (time.monotonic() - begin) / 60.0
-            print(f"run {number}: exit code {run.returncode}, {minutes:.1f} minutes", flush=True)
+                ended = subprocess.run([".ci/run"], cwd=REPOSITORY, stdout=stream, stderr=stream)
+            minutes = round((time.monotonic() - begin) / 60.0, 1)
+            date = datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%d %H:%M")
+            keep(Run(commit=of, date=date, minutes=minutes, code=ended.returncode))
+            codes.append(ended.returncode)
+            print(f"run {number}: exit code {ended.returncode}, {minutes} minutes", flush=True)
     finally:
         for other in others:
             other.kill()
-    keep("load_runs_passed", passed)
-    keep("load_runs", runs)
-    print(f"{passed} of {runs} passed")
-    return int(passed < runs)
+    print(f"{codes.count(0)} of {runs} passed, {passed_in_a_row(kept())} in a row")
+    return int(any(codes))
 
 
 if __name__ == "__main__":
