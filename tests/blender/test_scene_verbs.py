@@ -11,6 +11,7 @@ import bpy
 import numpy as np
 import pytest
 
+from hairloom.addon.blender.bakes.guide_motion import BakedGuides
 from hairloom.addon.blender.cards.adopt import SortOptions, sort_mesh
 from hairloom.addon.blender.cards.mesh import reorder_faces
 from hairloom.addon.blender.colliders.spheres import fitted_collections
@@ -383,3 +384,32 @@ def test_a_render_of_a_scene_draws_its_hair(
     assert command_line.run([*simulated, *small, *output]) == 1
     said = capsys.readouterr().err
     assert "several objects: Fringe, Hair" in said and "--groom" in said
+
+
+@pytest.mark.parametrize("how", ["collection", "collider", "left out"])
+def test_a_shake_of_a_groom_stays_out_of_its_colliders(scene: Path, how: str) -> None:
+    """A ball in the midst of it: the shake begins, and hair is led out of it at a walk."""
+    middle, radius = np.array([0.0, 0.16, -0.05]), 0.06
+    bpy.ops.wm.open_mainfile(filepath=str(scene))
+    hair = bpy.data.objects["Hair"]
+    bpy.ops.mesh.primitive_uv_sphere_add(radius=radius, location=middle, segments=48, ring_count=24)
+    ball = bpy.context.active_object
+    ball.hairloom.collider_shape = "sphere"
+    if how == "collider":
+        hair.hairloom.collider = ball
+    else:
+        hair.hairloom.collider_collection = bpy.data.collections.new("Balls")
+        hair.hairloom.collider_collection.objects.link(ball)
+        ball.hide_viewport = how == "left out"
+    bpy.ops.wm.save_mainfile()
+    output = scene.with_name("baked")
+    soft = ["dynamics.style_root=2", "dynamics.style_tip=0.5", "dynamics.device=numpy"]
+    chosen = [part for each in soft for part in ("--set", each)]
+    simulated = ["simulate", "--scene", str(scene), "--groom", "Hair", "--seconds", "0.5", *chosen]
+    assert command_line.run([*simulated, "--output", str(output)]) == 0
+    motion, nearest = BakedGuides.in_folder(output), np.inf
+    for frame in motion.frames[-10:]:
+        pose, guides = motion.at(frame)
+        local = (guides - pose.matrix[:3, 3]) @ pose.matrix[:3, :3]
+        nearest = min(nearest, np.linalg.norm(local[:, 2:] - middle, axis=2).min())
+    assert (nearest > 0.999 * radius) == (how != "left out"), nearest

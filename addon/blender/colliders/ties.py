@@ -252,36 +252,6 @@ def remove_tie(hair: bpy.types.Object, name: str, scene: bpy.types.Scene) -> Non
     take_out(hair, "tie_collection", "Ties", name, scene)
 
 
-def copy_holders(
-    source: bpy.types.Object,
-    hair: bpy.types.Object,
-    head: bpy.types.Object,
-    scene: bpy.types.Scene,
-    depsgraph: bpy.types.Depsgraph,
-) -> None:
-    """Hold hair by what holds another groom where that is now, as children of a head that stands at
-    the origin."""
-    copies = {}
-    for obj in holders_of(source):
-        copy, matrix = obj.copy(), obj.evaluated_get(depsgraph).matrix_world.copy()
-        for attached in (copy.constraints, copy.modifiers):
-            attached.clear()
-        copy.animation_data_clear()
-        if obj.type == "MESH":
-            copy.data = bpy.data.meshes.new_from_object(obj.evaluated_get(depsgraph))
-        copy.parent, copy.parent_type, copy.matrix_basis = head, "OBJECT", matrix
-        copy.matrix_parent_inverse.identity()
-        scene.collection.objects.link(copy)
-        copies[obj] = copy
-    ties = [copies[obj] for obj in ties_of(source)]
-    if ties:
-        hair.hairloom.tie_collection = bpy.data.collections.new("Ties")
-        for tie in ties:
-            hair.hairloom.tie_collection.objects.link(tie)
-    hair.hairloom.tip_surface = copies.get(source.hairloom.tip_surface)
-    hair.hairloom.tip_group = source.hairloom.tip_group
-
-
 def held_by(
     hair: bpy.types.Object, ring: bpy.types.Object, depsgraph: bpy.types.Depsgraph
 ) -> tuple[int, int]:

@@ -20,7 +20,7 @@ from ...groom.masks import Mask, StrandMask, SurfaceMask, mask_names
 from ...strands import StrandSet, Surface
 from ..bakes.guide_motion import BakedGuides
 from ..base.attributes import set_attribute
-from ..colliders.ties import copy_holders
+from ..colliders.copies import StillCopies, copy_colliders, copy_holders
 from ..preview.bake import Bake
 from ..scene.curves import write_curves
 from ..scene.partings import copy_partings
@@ -97,6 +97,11 @@ def _scene_of(job: Job, inputs: Inputs) -> Iterator[bpy.types.Object]:
         assert inputs.head is not None, "simulate and demo refuse hair without a head"
         head = mesh_object("Head", inputs.head, scene)
         hair = write_curves("Hair", inputs.strands, head, scene.collection)
+        if named is not None and is_groom(named):
+            copies = StillCopies(head, scene, depsgraph)
+            copy_holders(named, hair, copies)
+            copy_colliders(named, bpy.data.objects.get(inputs.head_object or ""), hair, copies)
+            copy_partings(named, hair, head, scene, depsgraph)
         if job.sources.collider is not None and inputs.collider is not None:
             collider = mesh_object("Collider", inputs.collider, scene)
             collider.parent = head
@@ -108,9 +113,6 @@ def _scene_of(job: Job, inputs: Inputs) -> Iterator[bpy.types.Object]:
             names = mask_names(job.settings[kind])
             for of, mask in read_job_masks(job, inputs, kind).items():
                 _put_mask(mask, names[of], hair, inputs.strands)
-        if named is not None and is_groom(named):
-            copy_holders(named, hair, head, scene, depsgraph)
-            copy_partings(named, hair, head, scene, depsgraph)
         low, high = inputs.head.bounds()
         rate = float(job.options.frame_rate)
         shake(head, (low + high) / 2.0, round(job.options.seconds * rate), rate)
