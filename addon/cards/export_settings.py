@@ -76,7 +76,7 @@ class CardExportSettings(Settings):
     page_head: bool = toggle(
         True,
         label="Page Head",
-        description="Put the mesh that hair grows on into the web page, too",
+        description="Put the mesh that hair grows on into the web page, too, in its materials",
     )
     motion: str = choice(
         "none",

@@ -5,6 +5,8 @@ Textures go through OpenImageIO where this Python has it, else through Blender's
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import bpy
@@ -149,14 +151,47 @@ def save_coded_png(path: Path, coded: Floats, *, has_alpha: bool = True) -> None
     Raises:
         HairloomError: the folder or file cannot be written.
     """
-    height, width = coded.shape[:2]
-    image = bpy.data.images.new("Hairloom", width, height, alpha=has_alpha)
-    try:
-        image.pixels.foreach_set(np.ascontiguousarray(coded, np.float32).ravel())
+    with _image_of(coded, has_alpha=has_alpha) as image:
         image.file_format = "PNG"
         with atomic_write(path) as temporary:
             image.save(filepath=str(temporary))
             if not texture_files.has_its_end(temporary):
                 raise unwritable(path, DISK_FULL)
+
+
+def webp_of(path: Path, coded: Floats, side: int, quality: int) -> bytes:
+    """Values that are coded already, (height, width, 4) with row 0 at the bottom, as a small file.
+
+    Args:
+        path: it lies in the folder that this may use.
+        side: what is larger than this [pixels] is scaled down to it.
+        quality: up to 100.
+
+    Raises:
+        HairloomError: nothing can be written there.
+    """
+    height, width = coded.shape[:2]
+    scale = min(side / max(height, width), 1.0)
+    file = path.with_name(".picture.webp")
+    with _image_of(coded, has_alpha=bool((coded[..., 3] < 1.0).any())) as image:
+        if scale < 1.0:
+            image.scale(max(round(width * scale), 1), max(round(height * scale), 1))
+        image.file_format = "WEBP"
+        try:
+            image.save(filepath=str(file), quality=quality)
+            return file.read_bytes()
+        except (RuntimeError, OSError) as error:
+            raise unwritable(path, str(error)) from error
+        finally:
+            file.unlink(missing_ok=True)
+
+
+@contextmanager
+def _image_of(coded: Floats, *, has_alpha: bool) -> Iterator[bpy.types.Image]:
+    height, width = coded.shape[:2]
+    image = bpy.data.images.new("Hairloom", width, height, alpha=has_alpha)
+    try:
+        image.pixels.foreach_set(np.ascontiguousarray(coded, np.float32).ravel())
+        yield image
     finally:
         bpy.data.images.remove(image)

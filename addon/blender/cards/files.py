@@ -46,6 +46,8 @@ from ..base.outcome import Outcome
 from ..base.report import hairloom_version
 from ..base.thread_work import ThreadWork
 from ..scene.bone_weights import head_bone_of
+from ..scene.built_in_head import HeadLook
+from ..scene.head_look import look_below
 from .build import (
     CardInputs,
     CardMaps,
@@ -68,6 +70,7 @@ from .motion import (
     spring_motion_steps,
 )
 from .page import PAGE_AT_REST, check_page, write_page
+from .page_head import PageHead
 from .textures import (
     picture_files,
     png_of,
@@ -109,12 +112,14 @@ class CardOutput:
     format: one of exchange.card_formats by name; None goes by the file's suffix.
     name: of the hair in the file; None is the file's.
     head_bone: of the character, which carries springs; None where there is none.
+    head_look: how the head of a web page is drawn; None is plain skin.
     """
 
     format: str | None = None
     name: str | None = None
     settings: CardExportSettings = field(default_factory=CardExportSettings)
     head_bone: HeadBone | None = None
+    head_look: HeadLook | None = None
 
 
 @dataclass(frozen=True)
@@ -356,7 +361,9 @@ class _Writer:
         )
         if settings.page:
             with self.stage("write page"):
-                head = self.head if settings.page_head else None
+                head = None
+                if self.head is not None and settings.page_head:
+                    head = PageHead.of(path, self.head, self.output.head_look, self.file_format)
                 write_page(path, self._name, sidecar, self.made, shading, backs, head, settings)
             if self.motion.get("kind") in ("texture", "springs"):
                 notes += (PAGE_AT_REST,)
@@ -465,7 +472,8 @@ class CardExport:
         check_no_input(path, picture_files(hair.data.hairloom.card_images))
         rig, stale = (None, ()) if motion is None else (motion.rig, motion.notes)
         inputs, notes, dropped = read_inputs(hair, depsgraph, rig)
-        output = replace(output, head_bone=head_bone_of(hair, depsgraph, inputs.rig.strands))
+        bone = head_bone_of(hair, depsgraph, inputs.rig.strands)
+        output = replace(output, head_bone=bone, head_look=look_below(hair, inputs.rig.head))
         if levels is not None:
             cards = replace(inputs.settings[CardSettings], levels=levels)
             inputs = replace(inputs, settings=inputs.settings.with_settings(cards))

@@ -6,8 +6,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-
 from ...arrays import Floats, Ints
 from ...cards.export_settings import CardExportSettings
 from ...errors import HairloomError
@@ -18,8 +16,8 @@ from ...exchange.cards.page_asset import half_floats, sizes_of, small_glb, small
 from ...exchange.cards.sidecar import SUFFIX, CardFile, sidecar_text
 from ...exchange.cards.sidecar_texts import ROLES
 from ...shading.settings import ShadingSettings
-from ...strands import Surface
 from .build import CardMaps, MappedCards
+from .page_head import PageHead
 from .textures import look_tables, png_of
 
 PAGE_AT_REST = (
@@ -58,7 +56,7 @@ def write_page(
     made: MappedCards,
     shading: ShadingSettings,
     backs: Sequence[Ints],
-    head: Surface | None,
+    head: PageHead | None,
     settings: CardExportSettings,
 ) -> None:
     """Write NAME.html beside the files of an export, all of which are there but the sidecar.
@@ -94,7 +92,7 @@ def write_page(
         path.stem + SUFFIX: sidecar_text(own).encode(),
         "indices.bin": indices.content,
         **tables,
-        **_head_files(head, sidecar.format),
+        **({} if head is None else head.files),
     }
     levels = [
         {"triangles": len(each.triangles), "cards": each.card_count} for each in sidecar.levels
@@ -106,6 +104,7 @@ def write_page(
         path.name,
         files,
         levels,
+        [] if head is None else head.parts,
         _corners(sidecar),
         [
             {"title": _TITLES[role], "file": f"{role}.png", "meaning": ROLES[role][1]}
@@ -124,15 +123,6 @@ def _shown(maps: CardMaps) -> dict[str, Floats]:
 
 def _channels(values: Floats) -> str:
     return "rgb" if values.ndim == 3 else "r"
-
-
-def _head_files(head: Surface | None, file_format: CardFormat) -> dict[str, bytes]:
-    if head is None or not len(head.triangles):
-        return {}
-    return {
-        "head.positions": np.float32(file_format.placed(head.positions)).tobytes(),
-        "head.triangles": head.triangles.astype(np.uint32).tobytes(),
-    }
 
 
 def _corners(sidecar: CardFile) -> list[list[float]]:

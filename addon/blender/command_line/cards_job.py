@@ -22,6 +22,7 @@ from ..cards.files import CardOutput, WrittenCards, check_no_input, write_cards
 from ..cards.occluders import read_occluders
 from ..cards.textures import chosen_pictures, named_pictures
 from ..scene.bone_weights import head_bone_of
+from .inputs import look_of_head
 from .job_options import (
     add_bake_option,
     add_frames_option,
@@ -43,8 +44,9 @@ def cards(job: Job) -> None:
     check_not_read(path, options)
     settings = parameters_of(options, job.settings[CardExportSettings])
     check_no_input(path, [Path(argument.partition("=")[2]) for argument in options.texture])
-    output = CardOutput(options.format, settings=settings)
     rig, motion = _moving(job, settings)
+    look = look_of_head(job.sources, rig.head)
+    output = CardOutput(options.format, settings=settings, head_look=look)
     written_cards(job, path, rig, pictures, output, motion)
     finish(job, path)
 

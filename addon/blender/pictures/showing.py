@@ -13,12 +13,11 @@ from ...paint_flow import colored
 from ...rig_flow import Pose
 from ...shading.ambient_settings import AmbientSettings
 from ...shading.settings import ShadingSettings
-from ..base.objects import head_of
 from ..cards.edits import groom_edits
 from ..cards.textures import chosen_pictures
 from ..preview import previews
 from ..properties.groom_settings import GroomSettings
-from ..scene.head_look import head_look
+from ..scene.head_look import look_below
 from ..sessions.groom_source import GroomSource
 from ..sessions.prepared_groom import PreparedGroom, prepared, rig_of
 from ..sessions.session import Session
@@ -72,7 +71,5 @@ def file_name(name: str) -> str:
 
 def _studio(hair: bpy.types.Object, groom: PreparedGroom, settings: GroomSettings) -> Studio:
     pictures, _ = chosen_pictures(hair.data.hairloom.card_images)
-    head, surface = head_of(hair), groom.rig.head
-    name = None if head is None else head.name
     edits, _ = groom_edits(hair, bpy.context.evaluated_depsgraph_get())
-    return Studio(groom, settings, pictures, head_look(name, surface, "light"), edits)
+    return Studio(groom, settings, pictures, look_below(hair, groom.rig.head), edits)

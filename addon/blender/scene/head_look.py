@@ -10,13 +10,16 @@ import numpy as np
 from ...arrays import Ints
 from ...render.snapshot import SKIN, SKIN_ROUGHNESS, SKIN_SPECULAR
 from ...strands import Surface
+from ..base.objects import head_of
 from .built_in_head import HeadLook, built_in_head
 from .mesh_files import meshes_of_file
 from .mesh_materials import MeshMaterial, material_of
 from .surfaces import read_material_slots
 
 #: faces without a material, as of a head without any
-_PLAIN = MeshMaterial(SKIN, SKIN_SPECULAR, SKIN_ROUGHNESS)
+PLAIN = MeshMaterial(SKIN, SKIN_SPECULAR, SKIN_ROUGHNESS)
+#: of our bust in a scene, if it has lost its materials
+_TONE = "light"
 
 
 def head_look(name: str | None, head: Surface | None, tone: str) -> HeadLook | None:
@@ -38,6 +41,12 @@ def head_look(name: str | None, head: Surface | None, tone: str) -> HeadLook | N
         head.triangles, built_in.surface.triangles
     )
     return built_in.look(tone) if is_ours else None
+
+
+def look_below(hair: bpy.types.Object, head: Surface | None) -> HeadLook | None:
+    """The same of the head that this hair grows on."""
+    found = head_of(hair)
+    return head_look(None if found is None else found.name, head, _TONE)
 
 
 def _own_look(name: str | None) -> HeadLook | None:
@@ -65,7 +74,7 @@ def _look_of(meshes: list[bpy.types.Object]) -> HeadLook | None:
         slots = np.minimum(read_material_slots(mesh, depsgraph), len(materials) - 1)
         for slot in np.unique(slots).tolist():
             material = materials[slot]
-            known = _PLAIN if material is None else material_of(material)
+            known = PLAIN if material is None else material_of(material)
             parts.append((start + np.flatnonzero(slots == slot), known))
         start += len(slots)
     return tuple(parts)

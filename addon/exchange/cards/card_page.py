@@ -29,9 +29,9 @@ class CardPage:
 
     name: of the hair, any text. version: of Hairloom.
     mesh: the name of the GLB among the files. files: name -> its bytes, by the names that the
-        sidecar beside the GLB has; "head.positions" (float32) and "head.triangles" (uint32) are the
-        head's, if there is any.
+        sidecar beside the GLB has; those of a head are named "head.*".
     levels: triangles and cards of each, the finest first.
+    head: the materials of its triangles, one after the other; empty without one.
     corners: two opposite ones of what the first view shows, in the axes of the GLB.
     maps: title, file and meaning of each texture. sizes: rows of a table of two columns.
     """
@@ -41,6 +41,7 @@ class CardPage:
     mesh: str
     files: Mapping[str, bytes]
     levels: Sequence[Mapping[str, int]]
+    head: Sequence[Mapping[str, Any]]
     corners: Sequence[Sequence[float]]
     maps: Sequence[Mapping[str, str]]
     sizes: Sequence[tuple[str, str]]
@@ -60,6 +61,7 @@ def page_text(page: CardPage) -> str:
                 "mesh": page.mesh,
                 "files": {name: _packed(name, data) for name, data in page.files.items()},
                 "levels": list(page.levels),
+                "head": list(page.head),
                 "corners": [list(corner) for corner in page.corners],
                 "maps": list(page.maps),
                 "sizes": [list(row) for row in page.sizes],
@@ -93,8 +95,9 @@ def _script_safe(content: Any) -> str:
 
 
 def _packed(name: str, data: bytes) -> dict[str, Any]:
-    """A file as text; PNGs are compressed already."""
-    if name.endswith(".png"):
-        return {"type": "image/png", "data": base64.b64encode(data).decode()}
+    """A file as text; pictures are compressed already."""
+    kind = name.rpartition(".")[2]
+    if kind in ("png", "webp"):
+        return {"type": f"image/{kind}", "data": base64.b64encode(data).decode()}
     small = gzip.compress(data, 9, mtime=0)
     return {"type": "", "data": base64.b64encode(small).decode(), "gzip": True}

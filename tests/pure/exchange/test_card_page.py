@@ -47,6 +47,7 @@ def page(name: str = "Hair") -> CardPage:
         f"{name}.glb",
         {f"{name}.glb": bytes(range(256)), "base.png": b"picture"},
         [{"triangles": 8, "cards": 2}],
+        [],
         [[0.0, 0.0, 0.0], [1.0, 1.0, 1.0]],
         [{"title": name, "file": "base.png", "meaning": name}],
         [("Cards", name)],

@@ -135,16 +135,47 @@ async function unpacked(files) {
 }
 
 async function headOf(addresses) {
-  if (!addresses.has('head.positions')) return null;
-  const bytes = async (name) => (await fetch(addresses.get(name))).arrayBuffer();
+  if (!asset.head.length) return null;
+  const numbers = async (name, Kind) => new Kind(await (await fetch(addresses.get(`head.${name}`))).arrayBuffer());
   const geometry = new THREE.BufferGeometry();
-  const positions = new Float32Array(await bytes('head.positions'));
-  geometry.setAttribute('position', new THREE.BufferAttribute(positions, 3));
-  const triangles = new Uint32Array(await bytes('head.triangles'));
-  geometry.setIndex(new THREE.BufferAttribute(triangles, 1));
-  geometry.computeVertexNormals();
-  const material = new THREE.MeshStandardMaterial({ color: '#8d8079', roughness: 0.85, side: THREE.DoubleSide });
-  return new THREE.Mesh(geometry, material);
+  for (const [attribute, name, size] of [['position', 'positions', 3], ['normal', 'normals', 3], ['uv', 'uv', 2]]) {
+    if (!addresses.has(`head.${name}`)) continue;
+    geometry.setAttribute(attribute, new THREE.BufferAttribute(await numbers(name, Float32Array), size));
+  }
+  geometry.setIndex(new THREE.BufferAttribute(await numbers('triangles', Uint32Array), 1));
+  let begin = 0;
+  asset.head.forEach(({ triangles }, part) => {
+    geometry.addGroup(3 * begin, 3 * triangles, part);
+    begin += triangles;
+  });
+  const pictures = new Map();
+  for (const { picture } of asset.head) {
+    if (picture && !pictures.has(picture)) pictures.set(picture, await pictureOf(addresses.get(picture)));
+  }
+  return new THREE.Mesh(geometry, asset.head.map((part) => materialOf(part, pictures.get(part.picture))));
+}
+
+async function pictureOf(address) {
+  const picture = await new THREE.TextureLoader().loadAsync(address);
+  picture.colorSpace = THREE.SRGBColorSpace;
+  picture.wrapS = picture.wrapT = THREE.RepeatWrapping;
+  picture.anisotropy = 4;
+  return picture;
+}
+
+function materialOf({ color, emission, roughness, specular, alpha, transparency }, picture) {
+  const boundary = Math.sqrt(Math.min(specular, 0.16)); // that reflects this much: its index of refraction
+  return new THREE.MeshPhysicalMaterial({
+    color: picture ? '#ffffff' : new THREE.Color(...color),
+    map: picture ?? null,
+    emissive: new THREE.Color(...emission),
+    roughness,
+    ior: (1 + boundary) / (1 - boundary),
+    opacity: alpha,
+    alphaHash: transparency === 'hashed',
+    transparent: transparency === 'blended',
+    side: THREE.DoubleSide,
+  });
 }
 
 // The first view: the whole hair from the front, a little from its side and from above.
