@@ -7,8 +7,10 @@ import numpy as np
 import pytest
 from strand_files import hedgehog
 
+from hairloom.addon import motion_flow
 from hairloom.addon.blender.bakes import playback
 from hairloom.addon.blender.bakes.cache import Cache
+from hairloom.addon.blender.bakes.guide_motion import BakedGuides
 from hairloom.addon.blender.base.images import read_texture
 from hairloom.addon.blender.command_line import command_line
 from hairloom.addon.blender.pictures import studio
@@ -66,6 +68,28 @@ def test_frames_output_and_settings_are_chosen(file, tmp_path):
     dynamics = bpy.data.objects["Hair"].hairloom.dynamics
     assert dynamics.damping == 4.0 and dynamics.collider_resolution == 8
     assert list(dynamics.style_along) == pytest.approx([1, 0.5, 0.25, 0.1, 0])
+
+
+@pytest.mark.parametrize("verb", [["bake"], ["simulate", "--animated"], ["simulate"]])
+def test_only_selected_curves_move_by_themselves(file, tmp_path, verb):
+    """In a file that was saved with a selection; the others are exactly where their style is."""
+    bpy.ops.wm.open_mainfile(filepath=str(file))
+    curves = bpy.data.objects["Hair"].data
+    is_chosen = np.arange(len(curves.curves)) % 3 == 0
+    curves.attributes.new(".selection", "BOOLEAN", "CURVE").data.foreach_set("value", is_chosen)
+    bpy.ops.wm.save_mainfile()
+    soft = ("only_selected=true", "style_root=1", "style_tip=0.2", "sag_compensation=0")
+    chosen = [part for each in soft for part in ("--set", f"dynamics.{each}")]
+    place = ["--object", "Hair"] if verb == ["bake"] else ["--groom", "Hair", "--seconds", "0.2"]
+    output = ["--output", str(tmp_path / "out")]
+    assert command_line.run([*verb, "--scene", str(file), *place, *chosen, *output]) == 0
+    motion = BakedGuides.in_folder(tmp_path / "out")
+    pose, guides = motion.at(motion.frames[-1])
+    away = np.abs(guides - motion_flow.style_of_guides(motion.rig, pose)).max(axis=(1, 2))
+    is_chosen = is_chosen[motion.rig.guides]
+    assert is_chosen.any() and not is_chosen.all()
+    assert (away[is_chosen] > 1e-3).all()
+    assert (away[~is_chosen] == 0.0).all()
 
 
 def test_a_second_bake_shows_nothing_of_its_own_copies(file):
