@@ -204,7 +204,6 @@ def test_curls_of_a_giant_are_as_much_larger(head: bpy.types.Object) -> None:
 
 
 @pytest.mark.usefixtures("few")
-@pytest.mark.usefixtures("few")
 def test_from_nothing_there_is_a_head_with_brows_and_lashes() -> None:
     assert bpy.ops.hairloom.add_hairstyle(style="buzz_cut", plays=False) == {"FINISHED"}
     names = {obj.name for obj in bpy.data.objects}
