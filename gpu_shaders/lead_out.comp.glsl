@@ -191,40 +191,14 @@ float going_out(vec3 arm, vec3 outward, float size, float lack)
   return lack / max(1.0 - along * along, {{lead_steepest}});
 }
 
-// xyz: the end of a segment that is led out farther than it must be; w: by how much [m] it is nearer
-// than it must be all the same.
-vec4 led_out(Solid solid, vec3 start, vec3 segment, vec3 toward, float needed, float farther)
-{
-  float size = length(segment);
-  float goal = needed + farther;
-  vec3 end = start + segment;
-  for (int sweep = 0; sweep <= SWEEPS; sweep++) {
-    vec4 found = signed_distance(solid, end, kept + farther);
-    float lack = goal - found.w;
-    if (lack <= {{lead_slack}} * kept) {
-      return vec4(end, 0.0);
-    }
-    // from deep inside of a collider the way out changes its side
-    if (lack > {{lead_deepest}} * size) {
-      break;
-    }
-    if (sweep < SWEEPS) {
-      vec3 arm = end - start;
-      end = at_length(start, arm + found.xyz * going_out(arm, found.xyz, size, lack), size);
-    }
-  }
-  vec4 turned = turned_out(solid, start, end - start, size, toward, goal);
-  return vec4(turned.xyz, max(turned.w - farther, 0.0));
-}
-
-// One attempt on some points of a strand from the first that is too near on.
+// One attempt on some points of a strand from the first that is too near on, each farther out than it
+// must be.
 void lead(StrandSpan span, int begin, int end, RootMotion motion, float farther, inout vec4 state)
 {
   if (begin >= end) {
     return;
   }
-  vec3 riding_start = riding_at(span, begin - 1);
-  vec3 start = riding_start;
+  vec3 start = riding_at(span, begin - 1);
   if (begin == int(state.y)) {
     state.z = 0.0;
   }
@@ -232,19 +206,45 @@ void lead(StrandSpan span, int begin, int end, RootMotion motion, float farther,
     start = imageLoad(led_points, span_texel(span, begin - 1)).xyz;
   }
   Solid solid = solid_at(0);
-  vec3 carried_start = carried_at(span, begin - 1, motion);
-  for (int point = begin; point < end; point++) {
-    vec3 riding = riding_at(span, point);
-    vec3 carried = carried_at(span, point, motion);
-    vec3 toward = at_length(vec3(0.0), carried - carried_start, 1.0);
-    float goal = wanted_at(span, point, distance(riding, carried));
-    vec4 led = led_out(solid, start, riding - riding_start, toward, goal, farther);
-    state.z = max(state.z, led.w);
-    imageStore(led_points, span_texel(span, point), vec4(led.xyz, 0.0));
-    start = led.xyz;
-    riding_start = riding;
-    carried_start = carried;
-  }
+  int point = begin;
+  // point after point straight out, until one must turn: so strands side by side turn at once
+  do {
+    vec3 arm = vec3(0.0);
+    vec3 carried = vec3(0.0);
+    float size = 0.0;
+    float goal = 0.0;
+    int sweep = 0;
+    bool is_stuck = false;
+    do {
+      vec3 riding = riding_at(span, point);
+      vec3 segment = riding - riding_at(span, point - 1);
+      carried = carried_at(span, point, motion);
+      size = length(segment);
+      goal = wanted_at(span, point, distance(riding, carried)) + farther;
+      vec3 here = sweep > 0 ? at_length(start, arm, size) : start + segment;
+      vec4 found = signed_distance(solid, here, kept + farther);
+      float lack = goal - found.w;
+      bool is_out = lack <= {{lead_slack}} * kept;
+      // from deep inside of a collider the way out changes its side
+      is_stuck = !is_out && (sweep == SWEEPS || lack > {{lead_deepest}} * size);
+      arm = here - start;
+      arm += is_stuck ? vec3(0.0) : found.xyz * going_out(arm, found.xyz, size, lack);
+      if (is_out) {
+        imageStore(led_points, span_texel(span, point), vec4(here, 0.0));
+        start = here;
+        point++;
+      }
+      sweep = is_out ? 0 : sweep + 1;
+    } while (!is_stuck && point < end);
+    if (is_stuck) {
+      vec3 toward = carried - carried_at(span, point - 1, motion);
+      vec4 turned = turned_out(solid, start, arm, size, at_length(vec3(0.0), toward, 1.0), goal);
+      state.z = max(state.z, turned.w - farther);
+      imageStore(led_points, span_texel(span, point), vec4(turned.xyz, 0.0));
+      start = turned.xyz;
+      point++;
+    }
+  } while (point < end);
 }
 
 void lead_strand(int strand, StrandSpan span, int end)
@@ -302,12 +302,12 @@ void put(int strand, StrandSpan span)
 #if defined(IS_BENT) || defined(IS_LED) || defined(IS_PUT)
 void main()
 {
-  int lane = int(gl_GlobalInvocationID.x);
-  if (lane >= lane_count) {
-    return;  // what it would do another one does
-  }
+  int number = int(gl_GlobalInvocationID.x);
   int near_count = int(texelFetch(near_strands, counted_texel(strand_count), 0).x);
-  for (int number = lane; number < near_count; number += lane_count) {
+  if (number >= min(near_count, lane_count)) {
+    return;
+  }
+  do {
     int strand = int(texelFetch(near_strands, counted_texel(number), 0).x);
     StrandSpan span = strand_span(strand_spans, strand);
 #ifdef IS_BENT
@@ -321,7 +321,8 @@ void main()
 #ifdef IS_PUT
     put(strand, span);
 #endif
-  }
+    number += lane_count;
+  } while (number < near_count);
 }
 #elif defined(IS_COUNTED)
 void main()

@@ -15,18 +15,36 @@
 #include "lib_signed_distance.glsl"
 #endif
 
-// What guides have at their segments, at a place along one of them [segments]: how it has turned, or
-// where it points at rest and by how much it is longer.
-vec4 value_at(sampler2D values, int guide, float place)
+// Where a segment of a strand rides: on the way from the middle of one segment of a guide to that of the
+// next. Behind the last one there is a texel, too, of which nothing is taken.
+struct Seat {
+  ivec2 before;  // texel of the former
+  float fraction;
+};
+
+// At a place along a guide [segments].
+Seat seat_at(int guide, float place)
 {
-  float last = float(segment_count - 1);
-  float held = clamp(place - 0.5, 0.0, last);
+  float held = clamp(place - 0.5, 0.0, float(segment_count - 1));
   int before = int(held);
-  vec4 near = texelFetch(values, strand_texel(guide, before, segment_count + 1), 0);
-  int after = min(before + 1, segment_count - 1);
-  vec4 far = texelFetch(values, strand_texel(guide, after, segment_count + 1), 0);
-  return near + (held - float(before)) * (far - near);
+  return Seat(strand_texel(guide, before, segment_count + 1), held - float(before));
 }
+
+vec4 turn_at(Seat seat)
+{
+  vec4 near = imageLoad(guide_turns, seat.before);
+  vec4 far = imageLoad(guide_turns, seat.before + ivec2(1, 0));
+  return near + seat.fraction * (far - near);
+}
+
+#ifdef HAS_CURLS
+vec4 axis_at(Seat seat)
+{
+  vec4 near = imageLoad(guide_axes, seat.before);
+  vec4 far = imageLoad(guide_axes, seat.before + ivec2(1, 0));
+  return near + seat.fraction * (far - near);
+}
+#endif
 
 void main()
 {
@@ -45,7 +63,7 @@ void main()
   vec3 displacement = vec3(0.0);
   for (int k = 0; k < 3; k++) {
     ivec2 shift = strand_texel(guide[k], segment_count, segment_count + 1);
-    displacement += weight[k] * texelFetch(guide_turns, shift, 0).xyz;
+    displacement += weight[k] * imageLoad(guide_turns, shift).xyz;
   }
 #ifdef HAS_CLEARANCE
   int held = span.factors;  // the last point that goes with the root
@@ -55,8 +73,40 @@ void main()
   int first_near = was_bent ? 1 : 0;
   Solid solid = solid_at(0);
 #endif
+  imageStore(cv_points, span.first, vec4(follow(rest.xyz, motion) + displacement, rest.w));
   float reached = 0.0;
-  for (int point = 0; point < span.count; point++) {
+  int point = 0;
+  // a strand has a segment; software drivers go once through a loop that tests its condition first
+  do {
+    point++;
+    vec4 next = imageLoad(rest_points, span_texel(span, point));
+    vec3 edge = next.xyz - rest.xyz;
+    float size = length(edge);
+    vec3 place = (reached + 0.5 * size) * per_meter;
+    vec4 blend = weight.x * turn_at(seat_at(guide.x, place.x));
+    for (int k = 1; k < 3; k++) {
+      vec4 turn = turn_at(seat_at(guide[k], place[k]));
+      // of two quaternions of one rotation the nearer
+      blend += (dot(turn, blend) < 0.0 ? -weight[k] : weight[k]) * turn;
+    }
+    blend.w += dot(blend, blend) < {{reversed_turn}} ? 1.0 : 0.0;
+    vec3 carried = edge + motion.turn * edge;
+    vec3 change = vec3(0.0);
+#ifdef HAS_CURLS
+    vec4 axis = vec4(0.0);
+    for (int k = 0; k < 3; k++) {
+      axis += weight[k] * axis_at(seat_at(guide[k], place[k]));
+    }
+    change = drawn_out(carried, axis);
+    carried += change;
+#endif
+    change += turn_change(blend, carried);
+#ifdef HAS_CLEARANCE
+    change = point <= held ? vec3(0.0) : change;
+#endif
+    displacement += change;
+    reached += size;
+    rest = next;
     vec3 here = follow(rest.xyz, motion) + displacement;
     imageStore(cv_points, span_texel(span, point), vec4(here, rest.w));
 #ifdef HAS_CLEARANCE
@@ -65,41 +115,7 @@ void main()
     float lack = wanted - signed_distance(solid, here, kept).w;
     first_near = first_near == 0 && lack > {{lead_slack}} * kept ? point : first_near;
 #endif
-    if (point + 1 == span.count) {
-      break;
-    }
-    vec4 next = imageLoad(rest_points, span_texel(span, point + 1));
-    vec3 edge = next.xyz - rest.xyz;
-    float size = length(edge);
-    vec3 place = (reached + 0.5 * size) * per_meter;
-    vec4 blend = weight.x * value_at(guide_turns, guide.x, place.x);
-    for (int k = 1; k < 3; k++) {
-      vec4 turn = value_at(guide_turns, guide[k], place[k]);
-      // of two quaternions of one rotation the nearer
-      blend += (dot(turn, blend) < 0.0 ? -weight[k] : weight[k]) * turn;
-    }
-    blend.w += dot(blend, blend) < {{reversed_turn}} ? 1.0 : 0.0;
-    vec3 carried = edge + motion.turn * edge;
-#ifdef HAS_CURLS
-    vec4 axis = vec4(0.0);
-    for (int k = 0; k < 3; k++) {
-      axis += weight[k] * value_at(guide_axes, guide[k], place[k]);
-    }
-    vec3 drawn = drawn_out(carried, axis);
-#ifdef HAS_CLEARANCE
-    drawn = point < held ? vec3(0.0) : drawn;
-#endif
-    displacement += drawn;
-    carried += drawn;
-#endif
-#ifdef HAS_CLEARANCE
-    displacement += point < held ? vec3(0.0) : turn_change(blend, carried);
-#else
-    displacement += turn_change(blend, carried);
-#endif
-    reached += size;
-    rest = next;
-  }
+  } while (point + 1 < span.count);
 #ifdef HAS_CLEARANCE
   float is_moved = was_bent ? 2.0 : held > 0 || first_near > 0 ? 1.0 : 0.0;
   imageStore(states, counted_texel(strand), vec4(is_moved, float(first_near), 0.0, 0.0));

@@ -112,6 +112,8 @@ class ColliderTextures:
     def rounds_of_distance(self) -> int:
         """Rounds of loops that one look at all colliders takes."""
         is_round = self.own[:, 0, 3] < 0.0
+        if len(self.own) == 1 and not is_round.any():
+            return 0  # a grid alone is looked up without a loop
         return len(self.own) + int(self.own[is_round, 0, 1].sum())
 
     @property

@@ -85,7 +85,7 @@ _INTEGERS = {
     "PUT": ("mover_count", "lane_count"),
 }
 #: strands of an invocation, at most
-_INVOCATION = {"COUNTED": LEAD_BLOCK, "LISTED": LEAD_BLOCK, "BENT": 4, "LED": 4, "PUT": 4}
+_INVOCATION = {"COUNTED": LEAD_BLOCK, "LISTED": LEAD_BLOCK, "BENT": 8, "LED": 8, "PUT": 8}
 #: step -> its numbers
 _NUMBERS = {
     "HELD": ("turned_back",),
@@ -307,7 +307,7 @@ class LeadOutPass:
         """How many points of a strand one dispatch may lead, with what bends it before and puts it
         after that."""
         assert self._solids is not None
-        a_point = 2 + (SWEEPS + TRIES + HALVINGS + 4) * (1 + self._solids.rounds_of_distance)
+        a_point = 4 + (SWEEPS + TRIES + HALVINGS + 4) * (1 + self._solids.rounds_of_distance)
         return max(_ROUNDS // (a_point * _INVOCATION["LED"]), 1)
 
 

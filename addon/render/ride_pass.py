@@ -83,13 +83,14 @@ def _guides_recipe(*, curls: bool) -> ShaderRecipe:
 @cache
 def _ride_recipe(*, curls: bool, solids: SolidKinds | None = None) -> ShaderRecipe:
     """The pass that moves strands, which may find who is too near to colliders."""
-    names = ["root_motions", "guide_weights", "strand_spans", "guide_turns"]
-    # what is read once needs no texture's cache, and drivers that have none load images sooner
+    names = ["root_motions", "guide_weights", "strand_spans"]
+    # software drivers find a level of detail for each texel of a texture, but not of an image
     images: tuple[tuple[str, ...], ...] = (
         ("RGBA32F", "cv_points"),
         ("RGBA32F", "rest_points", "READ"),
+        ("RGBA32F", "guide_turns", "READ"),
+        *[("RGBA32F", "guide_axes", "READ")] * curls,
     )
-    names += ["guide_axes"] * curls
     defines: tuple[tuple[str, int], ...] = (("HAS_CURLS", 1),) if curls else ()
     integers = ["segment_count", "strand_count", "mover_count"]
     if solids is not None:
@@ -377,9 +378,9 @@ class RidePass:
         is_curled = self._riders.gives is not None and turns == "guide_turns"
         seen = self.leading.begin(colliders, _POINT_ROUNDS, since)
         taken = _named(textures, "root_motions", "guide_weights", "strand_spans")
-        taken |= {"guide_turns": textures[turns]}
-        taken |= _named(textures, "guide_axes") if is_curled else {}
         images = {"cv_points": self.points.texture, **_named(textures, "rest_points")}
+        images |= {"guide_turns": textures[turns]}
+        images |= _named(textures, "guide_axes") if is_curled else {}
         solids = None
         integers = {
             "segment_count": self._segment_count,
