@@ -7,25 +7,35 @@ from dataclasses import replace
 
 import numpy as np
 
-from .arrays import Floats
+from .arrays import Bools, Floats
 from .cards.atlas_settings import AtlasSettings
 from .cards.build import AlphaOf, CardBuild, CardGroom, card_steps, strand_occluder
 from .cards.card_mesh import CardMesh
 from .cards.card_strands import card_strands
+from .cards.contacts import CardClearance, CardContacts
 from .cards.edits import CardEdits
-from .cards.follow import CardBinding, bind_cards, card_lines, follow_guides
+from .cards.follow import (
+    CardBinding,
+    bind_cards,
+    card_lines,
+    carried_cards,
+    follow_guides,
+)
 from .cards.occlusion import CardOccluder
 from .cards.occlusion_settings import CardOcclusionSettings
 from .cards.settings import CardSettings
+from .dynamics.figures import CardFigures
+from .dynamics.measure import are_outside, length_changes, strand_depths
 from .groom.weights import guide_weights
 from .light_flow import ambient_of, directional_light, rest_fields
-from .motion_flow import root_turns
+from .motion_flow import carried_guides, root_turns
 from .params import SettingsMap
-from .rig_flow import Pose, Rig, root_normals
+from .rig_flow import Begun, Pose, Rig, Solids, root_normals
 from .shading.ambient import occlusion_by
 from .shading.ambient_settings import AmbientSettings
 from .shading.drawn_strands import drawn_radius, own_colors
 from .shading.settings import ShadingSettings, StrandSettings
+from .strands.arc_length import lengths
 
 _AS_THEY_ARE = StrandSettings()
 
@@ -102,5 +112,69 @@ def bound_cards(rig: Rig, mesh: CardMesh) -> CardBinding:
 
 
 def cards_at(rig: Rig, cards: CardBinding, pose: Pose, guides_now: Floats) -> CardMesh:
-    """Cards riding on guides, world space; arguments as of `strands_at`."""
-    return follow_guides(cards, guides_now, root_turns(rig, pose))
+    """Cards riding on guides, led out of the solids of the pose, world space; arguments as of
+    `strands_at`."""
+    contacts = None if pose.solids is None else _contacts(rig, cards, pose.solids)
+    return follow_guides(cards, guides_now, root_turns(rig, pose), contacts)
+
+
+def _contacts(rig: Rig, cards: CardBinding, solids: Solids) -> CardContacts | None:
+    """How far cards stay from their colliders is found once for a motion."""
+    colliders = solids.colliders
+    if not colliders or not solids.begun.colliders:
+        return None
+    for known, clearance in cards.met:
+        if known is solids.begun or known.is_as(solids.begun):
+            return CardContacts(colliders, clearance)
+    clearance = card_clearance(rig, cards, solids.begun)
+    cards.met[:] = [(solids.begun, clearance)]
+    return CardContacts(colliders, clearance)
+
+
+def card_clearance(rig: Rig, cards: CardBinding, begun: Begun) -> CardClearance:
+    """How far cards stay from colliders, by where their roots carry them as a motion begins."""
+    guides = carried_guides(rig, begun.pose)
+    spines, vertices = carried_cards(cards, guides, root_turns(rig, begun.pose))
+    standing = tuple(each.at_end() for each in begun.colliders)
+    return CardClearance.at(spines, vertices, cards.row, cards.offsets, standing, begun.kept)
+
+
+class CardMeasure:
+    """What is found of cards frame after frame, as `dynamics.figures.Measure` of strands."""
+
+    def __init__(self, rig: Rig, cards: CardBinding) -> None:
+        self._rig, self._cards = rig, cards
+        self._lengths = lengths(cards.lines(cards.mesh.positions), cards.offsets)
+        owner = cards.row_card[cards.row]
+        self._by_card = np.argsort(owner, kind="stable")
+        self._offsets = np.searchsorted(owner[self._by_card], np.arange(len(cards.guide) + 1))
+        self._were_outside: Bools | None = None
+        self._change, self._depth = (np.zeros(len(cards.guide)) for _ in range(2))
+
+    def add(self, mesh: CardMesh, solids: Solids | None) -> None:
+        """Take another frame into account.
+
+        Args:
+            solids: what cards are led out of in it; None: nothing.
+        """
+        if not len(self._cards.guide):
+            return
+        lines = self._cards.lines(mesh.positions)
+        change = length_changes(lines, self._cards.offsets, self._lengths)
+        np.maximum(self._change, change, out=self._change)
+        if solids is None:
+            return
+        if self._were_outside is None:
+            begun = solids.begun
+            guides = carried_guides(self._rig, begun.pose)
+            _, vertices = carried_cards(self._cards, guides, root_turns(self._rig, begun.pose))
+            standing = tuple(each.at_end() for each in begun.colliders)
+            self._were_outside = are_outside(vertices[self._by_card], standing)
+        points = mesh.positions[self._by_card]
+        depth = strand_depths(points, self._offsets, solids.colliders, self._were_outside)
+        np.maximum(self._depth, depth, out=self._depth)
+
+    @property
+    def figures(self) -> CardFigures:
+        """Of all frames so far."""
+        return CardFigures.of_frames(self._change, self._depth)

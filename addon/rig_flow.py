@@ -6,11 +6,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Protocol
 
 import numpy as np
 
 from .arrays import Bools, Floats, Ints
-from .dynamics.colliders import DistanceField
+from .dynamics.colliders import DistanceField, PosedCollider
 from .dynamics.held import Held
 from .errors import HairloomError
 from .groom.automatic_children import are_few, automatic
@@ -49,6 +50,46 @@ from .strands.resample import resample
 MANY_INSIDE = 0.01
 
 
+@dataclass(frozen=True, eq=False)
+class Begun:
+    """Where a motion began: from then on hair knows how far it stays from its colliders.
+
+    pose: of the body. colliders: as they stood. kept: how far hair stays from them at most [m].
+    """
+
+    pose: Pose
+    colliders: tuple[PosedCollider, ...]
+    kept: float
+
+    def is_as(self, other: Begun) -> bool:
+        """Whether hair knows the same from then on."""
+        return (
+            self.kept == other.kept
+            and self.pose.is_as(other.pose)
+            and len(self.colliders) == len(other.colliders)
+            and all(map(PosedCollider.stands_as, self.colliders, other.colliders))
+        )
+
+
+class Solids(Protocol):
+    """What hair stays out of at one moment of a motion."""
+
+    @property
+    def begun(self) -> Begun: ...
+
+    @property
+    def colliders(self) -> tuple[PosedCollider, ...]:
+        """As they stand at their frame's end."""
+
+
+@dataclass(frozen=True, eq=False)
+class SimulatedSolids:
+    """Those of a motion that is simulated; fulfils `Solids`."""
+
+    begun: Begun
+    colliders: tuple[PosedCollider, ...]
+
+
 @dataclass(frozen=True)
 class Pose:
     """Where the body is at one moment.
@@ -56,11 +97,13 @@ class Pose:
     head_positions: (vertex_count, 3) [m], world space, or None for hair without a head.
     matrix: (4, 4), moves rest world space to now; carries hair without a head, and colliders.
     anchors: what holds hair beside its roots, see `groom.holds.anchors_of`; None: nothing does.
+    solids: what cards are led out of; None: nothing, or nobody knows.
     """
 
     head_positions: Floats | None
     matrix: Floats
     anchors: Floats | None = None
+    solids: Solids | None = None
 
     def is_as(self, other: Pose) -> bool:
         """Whether hair is carried to the same places, bit for bit."""

@@ -9,8 +9,10 @@ what leading out adds to where strands ride changes from one frame to the next. 
 it is as far in one of 16 parts of the way between the two frames: the others go there steadily. It
 is a flip of leading out if where the strand rides does not jump as far in that part.
 
-Cards of Sintel's hair that ride on the guides in the demo's shake: how deep their vertices are,
-and how many cards have any that is deeper than a millimetre. They are not led out of the head.
+Cards of Sintel's hair that ride on the guides in the demo's shake: how deep vertices are that were
+outside at rest, and how many cards have any that is deeper than a millimetre; how much deeper the
+others are than at rest; and by how much cards change their lengths, along their middles, and rows
+their widths.
 
 What it costs, of Sintel: see `_strands_cost`.
 
@@ -25,6 +27,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator
 from dataclasses import replace
+from time import perf_counter
 from typing import Any
 
 import numpy as np
@@ -38,6 +41,8 @@ from hairloom.addon.blender.colliders.fields import field_of
 from hairloom.addon.blender.command_line.simulate_job import shake_matrix
 from hairloom.addon.blender.scene.built_in_head import built_in_head
 from hairloom.addon.card_flow import bound_cards, card_build_steps, cards_at
+from hairloom.addon.cards.card_mesh import CardMesh
+from hairloom.addon.cards.follow import CardBinding
 from hairloom.addon.cards.sort import card_of_vertex
 from hairloom.addon.cards.steps import result_of
 from hairloom.addon.dynamics.colliders import Collider, PosedCollider
@@ -48,7 +53,7 @@ from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.motion_flow import Motion
 from hairloom.addon.params import SettingsMap
 from hairloom.addon.refine.lead_out import NOT_LED, LedOut
-from hairloom.addon.rig_flow import Pose, Rig
+from hairloom.addon.rig_flow import Begun, Pose, Rig, SimulatedSolids
 from hairloom.addon.strands import StrandSet, Surface
 from hairloom.addon.strands.arc_length import lengths, steps
 from hairloom.addon.strands.closest_point import ClosestPointSearch
@@ -70,6 +75,11 @@ AT_MOST = {
     "depth_worst_mm": 0.5,
     "strands_inside_percent": 0.0,
     "depth_fast_worst_mm": 1.0,
+    "card_deepest_mm": 0.5,
+    "cards_deep_percent": 0.0,
+    "card_length_p99_percent": 0.2,
+    "card_length_worst_percent": 1.0,
+    "card_cost_ratio": 3.0,
     "rigid_turn_error": 1.0e-5,
     "rest_error": 0.0,
     "coil_radius_error_percent": 2.0,
@@ -295,29 +305,89 @@ def coil_figures(rig: Rig, made_of: StrandSet) -> dict[str, float]:
 
 
 def card_figures(rig: Rig) -> dict[str, float]:
-    """How deep cards enter the head in the shake, each vertex by its worst frame; those that are in
-    it at rest do not count."""
+    """Of cards in the shake, each vertex and each card by its worst frame."""
     assert rig.head is not None
     collider = field_of(rig.head, DynamicsSettings(), place="head")
     mesh = result_of(card_build_steps(rig, SettingsMap())).finest
-    binding, search = bound_cards(rig, mesh), ClosestPointSearch(rig.head)
-    were_inside = _inside(mesh.positions, np.eye(4), collider, rig.head)[0]
-    depth = np.zeros(len(mesh.positions))
+    cards, search = bound_cards(rig, mesh), ClosestPointSearch(rig.head)
+    depth, deeper = np.zeros((2, len(mesh.positions)))
+    inside, local = _inside(mesh.positions, np.eye(4), collider, rig.head)
+    at_rest = np.zeros(len(mesh.positions))
+    at_rest[inside] = search.closest(local).distance
+    lines, rows = _middle_lines(mesh, cards), _row_edges(mesh, cards)
+    length, width = lengths(mesh.positions[lines], cards.offsets), _sizes(mesh.positions, rows)
+    longer, wider = np.zeros(len(length)), np.zeros(len(width))
+    begun, costs = None, []
     for motion, matrix, _, _ in played(rig, collider, shake_at, FPS):
-        cards = cards_at(rig, binding, motion.pose, motion.guides)
-        index, local = _inside(cards.positions, matrix, collider, rig.head)
+        if begun is None:
+            assert motion.clearance is not None
+            standing = (PosedCollider(collider, np.eye(4), np.eye(4)),)
+            begun = Begun(rig.rest_pose, standing, motion.clearance.kept)
+        pose = replace(motion.pose, solids=SimulatedSolids(begun, motion.colliders))
+        now, cost = _timed(rig, cards, (motion.pose, pose), motion.guides)
+        costs.append(cost)
+        index, local = _inside(now, matrix, collider, rig.head)
         if len(index):
-            depth[index] = np.maximum(depth[index], search.closest(local).distance)
-    depth[were_inside] = 0.0
-    depth *= MEDIAN_LENGTH / np.median(lengths(rig.strands.points, rig.strands.offsets))
+            found = search.closest(local).distance
+            np.maximum.at(depth, index, found)
+            np.maximum.at(deeper, index, found - at_rest[index])
+        change = length_changes(now[lines], cards.offsets, length)
+        np.maximum(longer, change, out=longer)
+        np.maximum(wider, np.abs(_sizes(now, rows) / width - 1.0), out=wider)
+    depth[inside] = 0.0
+    scale = MEDIAN_LENGTH / np.median(lengths(rig.strands.points, rig.strands.offsets))
+    depth, deeper = depth * scale, deeper * scale
     owner = card_of_vertex(mesh)
     deepest = np.zeros(owner.max() + 1)
     np.maximum.at(deepest, owner, depth)
+    riding, led = np.median(costs, axis=0)
     return {
         "card_deepest_mm": float(depth.max()) * 1000.0,
         "card_vertices_deep_percent": 100.0 * float((depth > 0.001).mean()),
         "cards_deep_percent": 100.0 * float((deepest[np.unique(owner)] > 0.001).mean()),
+        "card_deeper_than_at_rest_mm": float(deeper.max()) * 1000.0,
+        "card_vertices_deeper_percent": 100.0 * float((deeper > 0.0005).mean()),
+        "card_length_p99_percent": 100.0 * float(np.quantile(longer, 0.99)),
+        "card_length_worst_percent": 100.0 * float(longer.max()),
+        "card_width_p99_percent": 100.0 * float(np.quantile(wider, 0.99)),
+        "card_width_worst_percent": 100.0 * float(wider.max()),
+        "card_ride_ms": 1000.0 * float(riding),
+        "card_ride_and_lead_ms": 1000.0 * float(led),
+        "card_cost_ratio": float(led / riding),
     }
+
+
+def _timed(
+    rig: Rig, cards: CardBinding, poses: tuple[Pose, Pose], guides: Floats
+) -> tuple[Floats, tuple[float, float]]:
+    """The vertices in the second pose, and how long each takes [s], the better of two."""
+    times = np.zeros((2, 2))
+    for turn in np.ndindex(2, 2):
+        begin = perf_counter()
+        mesh = cards_at(rig, cards, poses[turn[1]], guides)
+        times[turn] = perf_counter() - begin
+    return mesh.positions, tuple(times.min(axis=0))
+
+
+def _middle_lines(mesh: CardMesh, cards: CardBinding) -> Ints:
+    """Of each row the vertex in its middle: Sintel's cards have three in a row."""
+    order = np.lexsort((mesh.uv[:, 0], cards.row))
+    count = np.bincount(cards.row)
+    assert (count % 2 == 1).all()
+    middles: Ints = order[np.cumsum(count) - count + count // 2]
+    return middles
+
+
+def _row_edges(mesh: CardMesh, cards: CardBinding) -> Ints:
+    """Edges of triangles within rows, (n, 2)."""
+    pairs = np.concatenate([mesh.triangles[:, sides] for sides in ((0, 1), (1, 2), (2, 0))])
+    within = pairs[cards.row[pairs[:, 0]] == cards.row[pairs[:, 1]]]
+    return np.unique(np.sort(within, axis=1), axis=0)
+
+
+def _sizes(points: Floats, edges: Ints) -> Floats:
+    ways = (points[edges[:, 1]] - points[edges[:, 0]]).astype(np.float64)
+    return np.linalg.norm(ways, axis=1)
 
 
 def cost_of(rig: Rig) -> dict[str, float]:

@@ -74,7 +74,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "dynamics": {"params", "strands"},
     "refine": {"params", "strands", "dynamics"},
     "shading": {"params", "strands"},
-    "cards": {"params", "strands", "refine"},
+    "cards": {"params", "strands", "dynamics", "refine"},
     "exchange": {
         "params",
         "strands",

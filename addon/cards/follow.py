@@ -1,10 +1,10 @@
 """Cards that ride on guides: bound at rest, carried as whole strips.
 
-A card has a bone: the mixture of its guides at rest, moved to its root. It rides as strands do, so
-it keeps its length, unless the curls that the card shows are drawn out. It has a frame that does
-not twist from root to tip (Bishop 1975). A row of the card (its vertices at one place along it)
-keeps its place in that frame. So strips bend and do not shear, a row stays as wide as it was, and
-nothing twists but what the root turns.
+A card has a spine: the middles of its rows, which are its vertices at one place along it. It rides
+as strands do, so it keeps its length, unless the curls that the card shows are drawn out. Each row
+turns with the spine there, by the least rotations from root to tip (Bishop 1975). So strips bend
+and do not shear, a row stays as wide as it was, and nothing twists but what the root turns. What
+would stand in a collider is led out, see `contacts`.
 
 Vectors lie as planes here, (3, ...): that is several times as fast.
 
@@ -13,24 +13,26 @@ Limitation: guides that wind around each other do not twist the card between the
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
 from ..arrays import Floats, Ints
-from ..refine.ride import Riders, ride
+from ..refine.ride import Riders, ride, turns_along
 from ..strands import StrandSet
 from ..strands.affine import moved
-from ..strands.vectors import cross_rows, dot_rows, unit_rows
+from ..strands.vectors import dot_rows, unit_rows
 from .card_mesh import CardMesh
+from .contacts import CardClearance, CardContacts
 from .sort import card_of_vertex
 
 #: How far along a card its first row may reach.
 _ROOT_ROW = 1.0e-4
-#: Vectors shorter than this [m, or of unit ones] have no direction.
+#: A direction that is the mean of two shorter than this [m, or of unit ones] is none.
 _SHORTEST = 1.0e-12
-#: Added to 1 + cos between two ways, which is 0 where the second is the first reversed.
-_REVERSED = 1.0e-6
+#: Roots that have turned by less than this have not.
+_UNTURNED = 1.0e-5
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,13 +43,13 @@ class CardBinding:
     guide, weight: (n, k) for each of n cards: indices of its guides, and weights of sum 1.
     guides: (guide_count, cv_count, 3) [m] at rest.
     root: (3, n) from the mixture of the guides' roots to the card's root [m].
-    bone: (3, cv_count, n) from its root [m] at rest. riders: all bones on the guides.
-    heading, side: (3, n) unit vectors of the bone's first frame at rest.
-    row: (vertex_count,) which row each vertex lies in.
-    row_card, row_cv: (row_count,) the card of each row, and the CV before it; row_share: how far
-        it lies towards the next one.
-    local: (3, 3, vertex_count) in the frame of the row at rest: the way from the bone [m], the
-        normal, and the tangent.
+    middle: (2, row_count) the vertices between which the middle of each row is.
+    spine: (row_count, 3) float32 [m] at rest, that of card c is spine[offsets[c]:offsets[c + 1]].
+    riders: all spines on the guides.
+    headings: (3, longest, n) unit directions of spines at their rows, the last one repeated.
+    place: (row_count,) where the row lies in these, as if they were flat.
+    row: (vertex_count,) which row each vertex lies in. arms: (3, vertex_count) from there [m].
+    met: where the last motion began in which it was led out of colliders, and its clearance.
     """
 
     mesh: CardMesh
@@ -55,15 +57,26 @@ class CardBinding:
     weight: Floats
     guides: Floats
     root: Floats
-    bone: Floats
+    middle: Ints
+    spine: Floats
+    offsets: Ints
     riders: Riders
-    heading: Floats
-    side: Floats
+    headings: Floats
+    place: Ints
     row: Ints
-    row_card: Ints
-    row_cv: Ints
-    row_fraction: Floats
-    local: Floats
+    arms: Floats
+    met: list[tuple[Any, CardClearance]] = field(default_factory=list)
+
+    @property
+    def row_card(self) -> Ints:
+        """(row_count,) the card of each row."""
+        cards: Ints = self.place % max(len(self.guide), 1)
+        return cards
+
+    def lines(self, positions: Floats) -> Floats:
+        """The middles of all rows (row_count, 3) of vertices that are now here."""
+        middles: Floats = positions[self.middle].mean(axis=0)
+        return middles
 
 
 def card_lines(mesh: CardMesh) -> tuple[Ints, Floats]:
@@ -99,69 +112,82 @@ def bind_cards(
         guide, weight: (n, k) for the cards of `card_lines`, in its order.
         room: (guide_count, cv_count - 1), see `center_lines.curl_room`; None: no curls.
     """
-    used, lines = card_lines(mesh)
-    mixed = _mixed(guides, guide, weight)
-    root = lines[:, 0].T - mixed[:, 0]
-    bone = mixed + root[:, None]
-    place = np.zeros(int(used.max(initial=0)) + 1, np.int64)
-    place[used] = np.arange(len(used))
-    owner = place[card_of_vertex(mesh)]
-    rows, row = np.unique(
-        np.stack([owner, mesh.along.view(np.int32)], axis=1), axis=0, return_inverse=True
-    )
-    along = np.ascontiguousarray(rows[:, 1], np.int32).view(np.float32)
-    at = np.clip(along, 0.0, 1.0) * (bone.shape[1] - 1)
-    before = np.minimum(at.astype(np.int64), bone.shape[1] - 2)
-    headings = _headings(bone)
-    side = _across(headings[:, 0])
-    binding = CardBinding(
+    used = np.unique(mesh.card)
+    number = np.zeros(int(used.max(initial=0)) + 1, np.int64)
+    number[used] = np.arange(len(used))
+    owner = number[card_of_vertex(mesh)]
+    keys = np.stack([owner, mesh.along.view(np.int32)], axis=1)
+    drawn = np.unique(mesh.triangles)
+    own_rows, own_row = np.unique(keys[drawn], axis=0, return_inverse=True)
+    rows, row_drawn = _with_ends(own_rows, own_row.reshape(-1))
+    row_card, middle = rows[:, 0], drawn[_middles(mesh.uv[drawn, 0], row_drawn, len(rows))]
+    row: Ints = np.zeros(len(owner), np.int64)  # of vertices without triangles any
+    row[drawn] = row_drawn
+    weights = _Weights(np.asarray(guide), np.asarray(weight, np.float32))
+    spine = mesh.positions[middle].mean(axis=0)
+    offsets: Ints = np.searchsorted(row_card, np.arange(len(used) + 1))
+    longest = int(np.diff(offsets).max(initial=1))
+    place = (np.arange(len(row_card)) - offsets[row_card]) * max(len(used), 1) + row_card
+    grid = _padded(offsets, longest)
+    return CardBinding(
         mesh,
-        guide,
-        np.asarray(weight, np.float32),
+        weights.guide,
+        weights.weight,
         np.asarray(guides, np.float32),
-        root,
-        bone - bone[:, :1],
-        _riders(bone, guides, _Weights(guide, np.asarray(weight, np.float32)), room),
-        headings[:, 0],
-        side,
-        row.reshape(-1),
-        rows[:, 0].astype(np.int64),
-        before,
-        (at - before).astype(np.float32),
-        np.zeros((3, 3, 0), np.float32),
+        spine[offsets[:-1]].T - _mixed(guides[:, :1], weights)[:, 0],
+        middle,
+        spine,
+        offsets,
+        _riders(spine, offsets, guides, weights, room),
+        _headings(spine, offsets)[:, grid],
+        place,
+        row,
+        np.ascontiguousarray((mesh.positions - (spine[row] if len(spine) else 0.0)).T),
     )
-    places, frame = _rows(binding, bone, headings, side, np.ones(len(used), np.float32))
-    arms = mesh.positions.T - places[:, binding.row]
-    vectors = np.stack([arms, mesh.normal.T, mesh.tangent.T])
-    local = np.einsum("fav,cav->cfv", frame[:, :, binding.row], vectors)
-    return replace(binding, local=local.astype(np.float32))
 
 
-def follow_guides(binding: CardBinding, guides: Floats, turn: Floats) -> CardMesh:
+def follow_guides(
+    binding: CardBinding, guides: Floats, turn: Floats, contacts: CardContacts | None = None
+) -> CardMesh:
     """The cards where their guides are now; what does not move is the same arrays.
 
     Args:
         guides: (guide_count, cv_count, 3) [m] now.
         turn: (guide_count, 3, 3), how the body has turned each guide's root since rest.
+        contacts: what they are led out of; None: nothing.
     """
-    if not len(binding.guide):
-        return binding.mesh
     turns = np.asarray(turn, np.float32)
+    if not len(binding.guide) or _is_at_rest(binding, guides, turns):
+        return binding.mesh
     first = turns[binding.guide[:, 0]]
-    volume = np.linalg.det(first)
-    bone = _ridden(binding, np.asarray(guides, np.float32), turns)
-    headings = _headings(bone)
-    was = unit_rows(np.einsum("nij,jn->in", first, binding.heading))
-    side = np.einsum("nij,jn->in", first, binding.side)
-    side = _perpendicular(_turned(side, was, headings[:, 0]), headings[:, 0])
-    places, frame = _rows(binding, bone, headings, side, np.sign(volume))
-    at = np.take(places, binding.row, axis=1, mode="clip")
-    frame = np.take(frame, binding.row, axis=2, mode="clip")
-    size = np.cbrt(np.abs(volume))[binding.row_card][binding.row]
-    arms, normal, tangent = (_placed(frame, local) for local in binding.local)
-    positions = np.multiply(arms, size[:, None], out=arms)
-    positions += at.T
+    carried = _carried_spine(binding, guides, first)
+    spine = _ridden(binding, carried, np.asarray(guides, np.float32), turns)
+    if contacts is not None:
+        contacts.lead_spines(spine, carried, binding.offsets)
+    frames = _frames(binding, spine, first)
+    # of the root, which has turned
+    size = np.cbrt(np.abs(np.linalg.det(first)))[binding.row_card]
+    of_vertices = np.take(frames, binding.row, axis=2, mode="clip")
+    positions = _placed(of_vertices, binding.arms)
+    middles = spine[binding.row]
+    positions += middles
+    of_vertices /= np.maximum(size, np.float32(_SHORTEST))[binding.row]
+    normal, tangent = (
+        _placed(of_vertices, each.T) for each in (binding.mesh.normal, binding.mesh.tangent)
+    )
+    if contacts is not None:
+        arms = _carried_arms(binding, first)
+        away = np.linalg.norm(spine - carried, axis=1)[binding.row]
+        contacts.lead_arms(positions, (normal, tangent), middles, arms, away)
     return replace(binding.mesh, positions=positions, normal=normal, tangent=tangent)
+
+
+def carried_cards(binding: CardBinding, guides: Floats, turn: Floats) -> tuple[Floats, Floats]:
+    """Spines (row_count, 3) and vertices (vertex_count, 3) where roots alone carry them [m];
+    arguments as of `follow_guides`."""
+    first = np.asarray(turn, np.float32)[binding.guide[:, 0]]
+    spine = _carried_spine(binding, guides, first)
+    return spine, spine[binding.row] + _carried_arms(binding, first)
 
 
 def moved_mesh(mesh: CardMesh, matrix: Floats) -> CardMesh:
@@ -190,122 +216,124 @@ class _Weights:
     weight: Floats
 
 
-def _riders(bone: Floats, guides: Floats, weights: _Weights, room: Floats | None) -> Riders:
-    """Bones (3, cv_count, n) on their guides."""
-    _, cv_count, count = bone.shape
-    points = bone.transpose(2, 1, 0).reshape(-1, 3)
-    offsets = np.arange(count + 1) * cv_count
-    strands = StrandSet(points, offsets, np.zeros(len(points)), np.zeros(count, int))
+def _with_ends(rows: Ints, row: Ints) -> tuple[Ints, Ints]:
+    """The rows (row_count, 2) and which of them each vertex lies in, with a second one, where the
+    first is, for cards that have one alone: a spine is a strand, of two points or more."""
+    single = np.flatnonzero(np.bincount(rows[:, 0]) == 1)
+    at = np.searchsorted(rows[:, 0], single)
+    shift = np.searchsorted(at, np.arange(len(rows)))
+    return np.insert(rows, at + 1, rows[at], axis=0), row + shift[row]
+
+
+def _middles(across: Floats, row: Ints, count: int) -> Ints:
+    """Of each row its middle vertex across the card, twice, or those beside its middle; (2, n).
+    A row without vertices has those of the one before.
+
+    Args:
+        across: (m,) where vertices are across their cards. row: (m,) theirs.
+    """
+    order, sizes = np.lexsort((across, row)), np.bincount(row, minlength=count)
+    begins = np.cumsum(sizes) - sizes
+    begins, sizes = (np.where(sizes == 0, np.roll(of, 1), of) for of in (begins, sizes))
+    return np.stack([order[begins + (sizes - 1) // 2], order[begins + sizes // 2]])
+
+
+def _padded(offsets: Ints, longest: int) -> Ints:
+    """(longest, n) the rows of each card, the last one repeated."""
+    rows: Ints = np.minimum(offsets[:-1] + np.arange(longest)[:, None], offsets[1:] - 1)
+    return rows
+
+
+def _riders(
+    spine: Floats, offsets: Ints, guides: Floats, weights: _Weights, room: Floats | None
+) -> Riders:
+    count = len(offsets) - 1
+    strands = StrandSet(spine, offsets, np.zeros(len(spine)), np.zeros(count, int))
     return replace(Riders.of(strands, guides, weights, room), are_lines=True)
 
 
-def _ridden(binding: CardBinding, guides: Floats, turns: Floats) -> Floats:
-    """The bones now, (3, cv_count, n)."""
-    first = turns[binding.guide[:, 0]]
-    root = _mixed(guides[:, :1], binding.guide, binding.weight)[:, 0]
-    root += np.einsum("nij,jn->in", first, binding.root)
-    carried = np.einsum("nij,jcn->nci", first, binding.bone) + root.T[:, None]
+def _carried_spine(binding: CardBinding, guides: Floats, first: Floats) -> Floats:
+    """Spines where roots carry them, (row_count, 3) float32.
+
+    Args:
+        first: (n, 3, 3), how the root of each card has turned.
+    """
+    weights = _Weights(binding.guide, binding.weight)
+    root = _mixed(guides[:, :1], weights)[:, 0].T + np.einsum("nij,jn->ni", first, binding.root)
+    card = binding.row_card
+    bone = binding.spine - binding.spine[binding.offsets[:-1]][card]
+    carried = np.einsum("rij,rj->ri", first[card], bone) + root[card]
+    return np.asarray(carried, np.float32)
+
+
+def _carried_arms(binding: CardBinding, first: Floats) -> Floats:
+    """Vertices from their rows' middles where roots carry them, (vertex_count, 3)."""
+    owner = binding.row_card[binding.row]
+    return _placed(np.ascontiguousarray(first.transpose(1, 2, 0))[:, :, owner], binding.arms)
+
+
+def _ridden(binding: CardBinding, carried: Floats, guides: Floats, turns: Floats) -> Floats:
+    """The spines now, (row_count, 3)."""
     rest = binding.guides
     by_root = guides[:, :1] + np.einsum("gij,gcj->gci", turns, rest - rest[:, :1])
-    ridden = ride(carried.reshape(-1, 3), binding.riders, by_root, guides)
-    return np.ascontiguousarray(ridden.reshape(carried.shape).transpose(2, 1, 0))
+    return ride(carried, binding.riders, by_root, guides)
+
+
+def _frames(binding: CardBinding, spine: Floats, first: Floats) -> Floats:
+    """How each row has turned since rest, (3, 3, row_count): with its root first, then with its
+    spine, (row_count, 3)."""
+    before = np.einsum("nij,jkn->ikn", first, binding.headings)
+    length = np.sqrt(dot_rows(before, before))
+    before /= np.maximum(length, np.float32(_SHORTEST))
+    grid = _padded(binding.offsets, before.shape[1])
+    turn = turns_along(before, _headings(spine, binding.offsets)[:, grid])
+    x, y, z, w = turn.reshape(4, -1)[:, binding.place]
+    turned = np.empty((3, 3, len(spine)), np.float32)
+    for axis, (a, b, c) in enumerate(((x, y, z), (y, z, x), (z, x, y))):
+        one, two = (axis + 1) % 3, (axis + 2) % 3
+        turned[axis, axis] = 1.0 - 2.0 * (b * b + c * c)
+        turned[axis, one] = 2.0 * (a * b - w * c)
+        turned[axis, two] = 2.0 * (a * c + w * b)
+    result: Floats = np.einsum("ijr,rjk->ikr", turned, first[binding.row_card])
+    return np.asarray(result, np.float32)
 
 
 def _placed(frame: Floats, local: Floats) -> Floats:
-    """Vectors in frames (3, 3, n) as they are in the world, (n, 3)."""
+    """Vectors (3, n) turned by matrices (3, 3, n), (n, 3)."""
     vectors = np.empty((local.shape[1], 3), np.float32)
     for axis in range(3):
-        part = frame[0, axis] * local[0]
-        part += frame[1, axis] * local[1]
-        part += frame[2, axis] * local[2]
+        part = frame[axis, 0] * local[0]
+        part += frame[axis, 1] * local[1]
+        part += frame[axis, 2] * local[2]
         vectors[:, axis] = part
     return vectors
 
 
-def _rows(
-    binding: CardBinding, bone: Floats, headings: Floats, side: Floats, hand: Floats
-) -> tuple[Floats, Floats]:
-    """Places of all rows (3, row_count), and their frames: way, side and up, (3, 3, row_count).
-
-    Args:
-        bone, headings: (3, cv_count, n). side: (3, n) at the root.
-        hand: (n,) -1 for mirrored cards.
-    """
-    heading = unit_rows(_on_rows(headings, binding))
-    across = _perpendicular(_on_rows(_transported(headings, side), binding), heading)
-    up = cross_rows(heading, across) * hand[binding.row_card].astype(np.float32)
-    return _on_rows(bone, binding), np.stack([heading, across, up])
-
-
-def _on_rows(of_cvs: Floats, binding: CardBinding) -> Floats:
-    """Values (3, cv_count, n) of bones at the rows of their cards, straight between CVs."""
-    flat = of_cvs.reshape(3, -1)
-    count = of_cvs.shape[2]
-    before = binding.row_cv * count + binding.row_card
-    values = np.take(flat, before, axis=1, mode="clip")
-    further = np.take(flat, before + count, axis=1, mode="clip")
-    further -= values
-    further *= binding.row_fraction
-    values += further
-    return values
-
-
-def _transported(headings: Floats, side: Floats) -> Floats:
-    """The side at the root carried along without twist, (3, cv_count, n), as
-    strands.frames.transported_normals does.
-    """
-    sides = np.empty_like(headings)
-    sides[:, 0] = side
-    for cv in range(1, headings.shape[1]):
-        turned = _turned(sides[:, cv - 1], headings[:, cv - 1], headings[:, cv])
-        sides[:, cv] = _perpendicular(turned, headings[:, cv])
-    return sides
-
-
-def _turned(vector: Floats, one: Floats, other: Floats) -> Floats:
-    """Vectors across `one`, by the least turn that takes `one` to `other`: v - (v . b)(a + b) /
-    (1 + a . b), which is Rodrigues' formula for them; (3, n) each.
-    """
-    fraction = dot_rows(vector, other) / (1.0 + dot_rows(one, other) + np.float32(_REVERSED))
-    return vector - (one + other) * fraction
-
-
-def _mixed(guides: Floats, guide: Ints, weight: Floats) -> Floats:
+def _mixed(guides: Floats, weights: _Weights) -> Floats:
     """Guides mixed, (3, cv_count, n) float32."""
     grid = np.ascontiguousarray(np.asarray(guides, np.float32).transpose(2, 1, 0))
-    mixed = np.zeros((*grid.shape[:2], len(guide)), np.float32)
-    for column in range(guide.shape[1]):
-        mixed += grid[:, :, guide[:, column]] * np.asarray(weight[:, column], np.float32)
+    mixed = np.zeros((*grid.shape[:2], len(weights.guide)), np.float32)
+    for column in range(weights.guide.shape[1]):
+        mixed += grid[:, :, weights.guide[:, column]] * weights.weight[:, column]
     return mixed
 
 
-def _headings(bone: Floats) -> Floats:
-    """Unit directions from root to tip at the CVs, (3, cv_count, n): those of strands.frames."""
-    step = bone[:, 1:] - bone[:, :-1]
-    headings = np.concatenate([step[:, :1], step[:, 1:] + step[:, :-1], step[:, -1:]], axis=1)
+def _headings(spine: Floats, offsets: Ints) -> Floats:
+    """Unit directions from root to tip at the rows, (3, row_count): those of strands.frames; 0
+    where there is none."""
+    step = np.zeros((3, len(spine) + 1), np.float32)
+    step[:, 1:-1] = np.diff(spine, axis=0).T
+    step[:, offsets] = 0.0  # from one card to the next
+    headings = step[:, 1:] + step[:, :-1]
     length = np.sqrt(dot_rows(headings, headings))
     is_short = length < _SHORTEST
-    headings /= np.maximum(length, np.float32(_SHORTEST))
-    if is_short.any():
-        headings[:, 0, is_short[0]] = np.array([[0.0], [0.0], [1.0]], np.float32)
-        for cv in range(1, headings.shape[1]):
-            headings[:, cv, is_short[cv]] = headings[:, cv - 1, is_short[cv]]
+    headings /= np.where(is_short, np.float32(1.0), length)
+    headings[:, is_short] = 0.0
     return headings
 
 
-def _perpendicular(vector: Floats, heading: Floats) -> Floats:
-    """The unit part across unit vectors, (3, n); any one across where they are parallel."""
-    across = vector - heading * dot_rows(vector, heading)
-    length = np.sqrt(dot_rows(across, across))
-    is_short = length < np.float32(1.0e-5)
-    across /= np.maximum(length, np.float32(1.0e-5))
-    if is_short.any():
-        across[:, is_short] = _across(heading[:, is_short])
-    return across
-
-
-def _across(heading: Floats) -> Floats:
-    """Unit vectors across unit vectors, (3, n)."""
-    axis = np.zeros_like(heading)
-    axis[np.abs(heading).argmin(axis=0), np.arange(heading.shape[1])] = 1.0
-    return unit_rows(axis - heading * dot_rows(axis, heading))
+def _is_at_rest(binding: CardBinding, guides: Floats, turns: Floats) -> bool:
+    """Whether guides are as at rest, to the bit."""
+    if not np.array_equal(guides, binding.guides):
+        return False
+    return bool(np.abs(turns - np.eye(3, dtype=np.float32)).max(initial=0.0) < _UNTURNED)

@@ -74,23 +74,36 @@ class Figures:
         """For a panel: of all strands the worst, the 99th percentile, and how many are over 1 % or
         1 mm; of guides the worst."""
         return (
-            ("All Strands", "Worst", "99 %", "Over 1"),
-            (
-                "Stretch",
-                _percent(self.strands_stretch_max_percent),
-                _percent(self.strands_stretch_p99_percent),
-                _percent(self.strands_stretched_percent),
-            ),
-            (
-                "Penetration",
-                _length(self.strands_penetration_max_mm),
-                _length(self.strands_penetration_p99_mm),
-                _percent(self.strands_inside_percent),
-            ),
+            *_table("All Strands", tuple(asdict(self).values())[2:]),
             ("Guides", "Worst", "", ""),
             ("Stretch", _percent(self.stretch_max_percent), "", ""),
             ("Penetration", _length(self.penetration_max_mm), "", ""),
         )
+
+
+@dataclass(frozen=True)
+class CardFigures:
+    """The same of cards that ride: of their middle lines, and of their vertices."""
+
+    cards_stretch_max_percent: float = 0.0
+    cards_stretch_p99_percent: float = 0.0
+    cards_stretched_percent: float = 0.0
+    cards_penetration_max_mm: float = 0.0
+    cards_penetration_p99_mm: float = 0.0
+    cards_inside_percent: float = 0.0
+
+    @classmethod
+    def of_frames(cls, change: Floats, depth: Floats) -> Self:
+        """Each card by its worst frame, see `length_changes` and `strand_depths`."""
+        return cls(*map(_rounded, _spread(change, depth)))
+
+    def as_dict(self) -> dict[str, float]:
+        return asdict(self)
+
+    @property
+    def table(self) -> tuple[tuple[str, str, str, str], ...]:
+        """For a panel, as `Figures.table`."""
+        return _table("Cards", tuple(asdict(self).values()))
 
 
 def blank_table() -> tuple[tuple[str, ...], ...]:
@@ -100,6 +113,35 @@ def blank_table() -> tuple[tuple[str, ...], ...]:
         is_header = values[0] == "Worst"
         rows.append((name, *(each if is_header else each and "-" for each in values)))
     return tuple(rows)
+
+
+def _table(name: str, spread: tuple[float, ...]) -> tuple[tuple[str, str, str, str], ...]:
+    """The rows of a table for what `_spread` gives."""
+    stretch, depth = spread[:3], spread[3:]
+    return (
+        (name, "Worst", "99 %", "Over 1"),
+        ("Stretch", _percent(stretch[0]), _percent(stretch[1]), _percent(stretch[2])),
+        ("Penetration", _length(depth[0]), _length(depth[1]), _percent(depth[2])),
+    )
+
+
+def _spread(change: Floats, depth: Floats) -> tuple[float, ...]:
+    """The worst, the 99th percentile and how many are over the limit: of changes of length, a
+    fraction, and of depths [m], in percent and millimetres; 0 of nothing."""
+    if not len(change):
+        return (0.0,) * 6
+    return (
+        100.0 * float(change.max()),
+        100.0 * float(np.quantile(change, 0.99)),
+        100.0 * float((change > STRETCHED).mean()),
+        1000.0 * float(depth.max()),
+        1000.0 * float(np.quantile(depth, 0.99)),
+        100.0 * float((depth > INSIDE).mean()),
+    )
+
+
+def _rounded(value: float) -> float:
+    return round(float(value), 4) + 0.0  # without -0.0
 
 
 def _percent(value: float) -> str:
@@ -156,15 +198,5 @@ class Measure:
     @property
     def figures(self) -> Figures:
         """Of all frames so far."""
-        change, depth = self._change, self._depth
-        found = (
-            100.0 * self._stretch,
-            1000.0 * self._penetration,
-            100.0 * change.max(initial=0.0),
-            100.0 * np.quantile(change, 0.99) if len(change) else 0.0,
-            100.0 * (change > STRETCHED).mean() if len(change) else 0.0,
-            1000.0 * depth.max(initial=0.0),
-            1000.0 * np.quantile(depth, 0.99) if len(depth) else 0.0,
-            100.0 * (depth > INSIDE).mean() if len(depth) else 0.0,
-        )
-        return Figures(*(round(float(value), 4) + 0.0 for value in found))  # without -0.0
+        found = 100.0 * self._stretch, 1000.0 * self._penetration
+        return Figures(*map(_rounded, (*found, *_spread(self._change, self._depth))))

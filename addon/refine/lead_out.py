@@ -112,6 +112,12 @@ class Clearance:
     held: Ints
     _held_parts: HeldParts | None = None
 
+    def holding(self, points: Ints, offsets: Ints) -> Clearance:
+        """The same where strands go with their roots up to these points (n,) at least."""
+        held, owner = self.held.copy(), _owners(points, offsets)
+        np.maximum.at(held, owner, (points - offsets[owner]).astype(np.int32))
+        return Clearance(self.kept, _free_up_to(held, self.points, offsets), held)
+
     def held_parts(self, offsets: Ints) -> HeldParts:
         """Of all strands, which never have other points: found once."""
         if self._held_parts is None:
@@ -228,12 +234,15 @@ def clearance_at(
     """
     distance, _ = signed_distance(points, colliders, kept)
     distance[offsets[:-1]] = np.inf
-    deep = beside_meshes(points, distance, colliders, kept)
-    owner, held = _owners(deep, offsets), np.zeros(len(offsets) - 1, np.int32)
-    np.maximum.at(held, owner, deep - offsets[owner])
-    number = np.arange(len(points)) - np.repeat(offsets[:-1], np.diff(offsets))
-    distance[number <= np.repeat(held, np.diff(offsets))] = -np.inf
-    return Clearance(kept, distance, held)
+    none = Clearance(kept, distance, np.zeros(len(offsets) - 1, np.int32))
+    return none.holding(beside_meshes(points, distance, colliders, kept), offsets)
+
+
+def _free_up_to(held: Ints, distance: Floats, offsets: Ints) -> Floats:
+    """The distances (point_count,), but -inf of each strand's points up to `held`."""
+    number = np.arange(len(distance)) - np.repeat(offsets[:-1], np.diff(offsets))
+    is_held = number <= np.repeat(held, np.diff(offsets))
+    return np.where(is_held, np.float32(-np.inf), distance)
 
 
 def beside_meshes(

@@ -197,16 +197,20 @@ def guide_turns(rest: Floats, now: Floats) -> Floats:
     Args:
         rest, now: (guide_count, cv_count, 3) [m].
     """
-    before, after = _directions(rest), _directions(now)
+    return turns_along(_directions(rest), _directions(now))
+
+
+def turns_along(before: Floats, after: Floats) -> Floats:
+    """The same of directions one after the other, (3, m, n) unit vectors or 0: (4, m, n)."""
     has_none = ~(before.any(axis=0) & after.any(axis=0))
     turns = np.empty((4, *before.shape[1:]), np.float32)
     turn = np.zeros((4, before.shape[2]), np.float32)
     turn[3] = 1.0
-    for segment in range(before.shape[1]):
-        # further: from where the turns before have brought this segment to where it is
-        here = before[:, segment] + turn_change(turn, before[:, segment])
-        turn = _product(minimal_rotation(here, after[:, segment], has_none[segment]), turn)
-        turns[:, segment] = turn
+    for number in range(before.shape[1]):
+        # further: from where the turns before have brought this direction to where it is
+        here = before[:, number] + turn_change(turn, before[:, number])
+        turn = _product(minimal_rotation(here, after[:, number], has_none[number]), turn)
+        turns[:, number] = turn
     return turns
 
 

@@ -1,4 +1,4 @@
-"""Measure: stretch and penetration of the strands, in the panels."""
+"""Measure: stretch and penetration of strands and cards, in the panels."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ _NAMES = 0.34
 
 
 class HAIRLOOM_OT_measure(bpy.types.Operator):
-    """Measure how far the strands stretch and how deep they are in colliders, as they are now. A
-    bake measures all of its frames by itself"""
+    """Measure how far strands, and cards if they are shown, stretch and how deep they are in
+    colliders, as they are now. A bake measures all of its frames by itself"""
 
     bl_idname = "hairloom.measure"
     bl_label = "Measure"
@@ -57,6 +57,8 @@ def draw_measure(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
     lines = layout.column(align=True)
     lines.active = not is_old
     draw_figures(lines, table_of(None if session is None else session.figures))
+    if session is not None and session.card_figures is not None:
+        draw_figures(lines, session.card_figures.table)
 
 
 def draw_figures(column: bpy.types.UILayout, table: Iterable[Sequence[str]]) -> None:

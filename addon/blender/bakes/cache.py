@@ -34,13 +34,14 @@ from ...exchange.files.atomic import check_folder_place, remedy_for, write_bytes
 from ...exchange.files.moving import flush, flush_names
 from ...exchange.files.names import length_remark
 from ...exchange.files.stale_temp_files import MARK, is_stale, is_temporary, mark
+from .baked_solids import LISTS
 from .simulated import Arrays
 
 #: Of what a bake holds, other than what `layout` says. 2: strands may have points of their own.
 #: 3: frames hold the strands that were led out of colliders.
 VERSION = 3
 #: Arrays that may have another length in each frame.
-_LISTS = frozenset({"led_strands", "led_points"})
+_LISTS = frozenset({"led_strands", "led_points"}) | LISTS
 FACTS, CONSTANTS = "cache.json", "constants.npz"
 _OURS = re.compile(r"cache\.json|constants\.npz|frame_-?\d{5,7}\.npz")
 _FRAMES = re.compile(rf"frames-{MARK}")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Protocol, Self
 
@@ -86,8 +86,9 @@ class BakedGuides:
         return self.cache.facts.frame_rate
 
     def at(self, frame: int) -> tuple[Pose, Floats]:
-        arrays = self.cache.frame(frame)
-        return playback.rig_in(self.cache).pose(arrays), arrays["guides"]
+        arrays, solids = self.cache.frame(frame), playback.solids_in(self.cache, frame)
+        pose = playback.rig_in(self.cache).pose(arrays)
+        return replace(pose, solids=solids), arrays["guides"]
 
     def strands(self, frame: int) -> tuple[Pose, Floats]:
         """The pose, and all strands (point_count, 3) [m, world]."""

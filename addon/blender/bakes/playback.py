@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -15,10 +16,11 @@ import numpy as np
 
 from ...arrays import Floats
 from ...errors import HairloomError
-from ...rig_flow import Pose
+from ...rig_flow import Pose, Solids
 from ..scene.fin_modifier import clear, fin_modifier, has_fins, show
 from .bake_settings import absolute, folder_of
 from .baked_rig import BakedRig, rig_of
+from .baked_solids import BakedSolids, solids_between
 from .cache import FACTS, Cache
 from .simulated import Arrays
 
@@ -26,7 +28,8 @@ from .simulated import Arrays
 class _Known:
     """What is kept of bakes, by folder.
 
-    caches: which file of facts it was, and the bake. rigs: of which bake, and its rig.
+    caches: which file of facts it was, and the bake. rigs: of which bake, and its rig. solids: of
+    which bake, and its colliders.
     problems: why a bake cannot be shown in renders; reported once.
     lock: renders read bakes in their own thread.
     """
@@ -35,6 +38,7 @@ class _Known:
         self.lock = threading.RLock()
         self.caches: dict[Path, tuple[tuple[int, int], Cache]] = {}
         self.rigs: dict[Path, tuple[Cache, BakedRig]] = {}
+        self.solids: dict[Path, tuple[Cache, BakedSolids | None]] = {}
         self.problems: dict[Path, str] = {}
         self.is_rendering = False
 
@@ -54,6 +58,7 @@ def cache_in(folder: Path) -> Cache | None:
         except OSError:
             _known.caches.pop(folder, None)
             _known.rigs.pop(folder, None)
+            _known.solids.pop(folder, None)
             return None
         written = facts.st_mtime_ns, facts.st_ino
         if folder not in _known.caches or _known.caches[folder][0] != written:
@@ -85,6 +90,31 @@ def rig_in(cache: Cache) -> BakedRig:
         return known[1]
 
 
+def solids_in(
+    cache: Cache, frame: int, subframe: float = 0.0, *, blocking: bool = True
+) -> Solids | None:
+    """What the hair of a groom stayed out of, in time as `strands_in`; None where its bake does not
+    say.
+
+    Args:
+        blocking: see `BakedSolids.at`.
+
+    Raises:
+        HairloomError: the bake is damaged.
+    """
+    with _known.lock:
+        known = _known.solids.get(cache.folder)
+        if known is None or known[0] is not cache:
+            known = _known.solids[cache.folder] = cache, BakedSolids.of(cache.constants())
+    if known[1] is None:
+        return None
+    here, there = _frames_beside(cache, frame, subframe)
+    arrays = cache.frame(here)
+    if here != there:
+        arrays = solids_between(arrays, cache.frame(there), subframe)
+    return known[1].at(arrays, blocking=blocking)
+
+
 def strands_in(cache: Cache, frame: int, subframe: float = 0.0) -> Floats:
     """All strands of a groom, (point_count, 3) world [m].
 
@@ -109,34 +139,41 @@ def guides_in(cache: Cache, frame: int, subframe: float = 0.0) -> Floats:
 def _between(
     cache: Cache, frame: int, subframe: float, points_of: Callable[[Arrays], Floats]
 ) -> Floats:
-    facts = cache.facts
-    here = points_of(cache.frame(min(max(frame, facts.first), facts.last)))
-    if not subframe or not facts.first <= frame < facts.last:
+    first, last = _frames_beside(cache, frame, subframe)
+    here = points_of(cache.frame(first))
+    if first == last:
         return here
-    there = points_of(cache.frame(frame + 1))
-    between: Floats = here + (there - here) * np.float32(subframe)
+    between: Floats = here + (points_of(cache.frame(last)) - here) * np.float32(subframe)
     return between
 
 
+def _frames_beside(cache: Cache, frame: int, subframe: float) -> tuple[int, int]:
+    """The baked frames between which a moment is; twice the same where it is in one."""
+    facts = cache.facts
+    here = min(max(frame, facts.first), facts.last)
+    return here, here + bool(subframe and facts.first <= frame < facts.last)
+
+
 def pose_in(cache: Cache, frame: int, subframe: float = 0.0) -> Pose:
-    """Where the body of a groom was; in time as `strands_in`.
+    """Where the body of a groom was, and what its hair stayed out of; in time as `strands_in`.
 
     Raises:
         HairloomError: the bake is damaged.
     """
-    facts, rig = cache.facts, rig_in(cache)
-    here = rig.pose(cache.frame(min(max(frame, facts.first), facts.last)))
-    if not subframe or not facts.first <= frame < facts.last:
-        return here
-    there = rig.pose(cache.frame(frame + 1))
+    rig, (first, last) = rig_in(cache), _frames_beside(cache, frame, subframe)
+    here, solids = rig.pose(cache.frame(first)), solids_in(cache, frame, subframe)
+    if first == last:
+        return replace(here, solids=solids)
+    there = rig.pose(cache.frame(last))
     matrix = here.matrix + (there.matrix - here.matrix) * subframe
     anchors = here.anchors
     if anchors is not None and there.anchors is not None:
         anchors = anchors + (there.anchors - anchors) * np.float32(subframe)
     if here.head_positions is None or there.head_positions is None:
-        return Pose(None, matrix, anchors)
+        return Pose(None, matrix, anchors, solids)
     displacement = there.head_positions - here.head_positions
-    return Pose(here.head_positions + displacement * np.float32(subframe), matrix, anchors)
+    head = here.head_positions + displacement * np.float32(subframe)
+    return Pose(head, matrix, anchors, solids)
 
 
 def show_fins(scene: bpy.types.Scene) -> None:
@@ -234,13 +271,13 @@ def needs_copies() -> bool:
 
 def drop(folder: Path) -> None:
     """The bake in this folder is gone, or another one."""
-    for known in (_known.caches, _known.rigs, _known.problems):
+    for known in (_known.caches, _known.rigs, _known.solids, _known.problems):
         known.pop(folder, None)
 
 
 def forget() -> None:
     """Keep no bake in memory."""
-    for known in (_known.caches, _known.rigs, _known.problems):
+    for known in (_known.caches, _known.rigs, _known.solids, _known.problems):
         known.clear()
     _known.is_rendering = False
 

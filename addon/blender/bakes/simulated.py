@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...params import Settings
+from ...rig_flow import Solids
 
 type Arrays = dict[str, NDArray[Any]]
 type Hashed = NDArray[Any] | Settings | str | float | None
@@ -73,8 +74,12 @@ class Simulated(Protocol):
     def recorded(self) -> Arrays:
         """This frame."""
 
-    def show_recorded(self, frame: Arrays) -> None:
-        """Show a frame of a bake in place of what was simulated."""
+    def show_recorded(self, frame: Arrays, solids: Solids | None = None) -> None:
+        """Show a frame of a bake in place of what was simulated.
+
+        Args:
+            solids: what hair stayed out of in it, where that is known.
+        """
 
     def rig_hash(self, depsgraph: bpy.types.Depsgraph) -> str:
         """Hashes of what a bake depends on in all its frames."""

@@ -20,6 +20,7 @@ from ...cards.joints import CardTracks
 from ...cards.settings import CardSettings
 from ...cards.steps import map_progress, result_of
 from ...cards.vertex_animation import motion_layout
+from ...dynamics.figures import CardFigures
 from ...errors import HairloomError
 from ...exchange.cards.card_formats import GLB, USD, CardFormat, format_of
 from ...exchange.cards.card_page import PAGE_SUFFIX
@@ -127,7 +128,7 @@ class WrittenCards:
     """What was written. files: the mesh first, the sidecar last.
 
     notes: what the artist should know, each with its remedy.
-    motion: what the sidecar says of it; empty without any.
+    motion: what the sidecar says of it; empty without any. figures: of this motion.
     """
 
     build: CardBuild
@@ -135,6 +136,7 @@ class WrittenCards:
     files: tuple[Path, ...]
     notes: tuple[str, ...]
     motion: Mapping[str, Any] = field(default_factory=dict)
+    figures: CardFigures | None = None
 
     @property
     def levels(self) -> tuple[CardMesh, ...]:
@@ -230,12 +232,12 @@ def file_steps(
     files = (path.name, *beside, path.stem + SUFFIX)
     paths = tuple(path.with_name(name) for name in files)
     notes = (*made.notes, *said)
-    return WrittenCards(made.build, made.maps, paths, notes, writer.motion)
+    return WrittenCards(made.build, made.maps, paths, notes, writer.motion, writer.figures)
 
 
 @dataclass(eq=False)
 class _Writer:
-    """Writes all files into the folder of `path`. motion: what the sidecar says of it."""
+    """Writes all files into the folder of `path`. motion, figures: see `WrittenCards`."""
 
     path: Path
     made: MappedCards
@@ -245,6 +247,7 @@ class _Writer:
     stage: Stage
     head: Surface | None = None
     motion: Mapping[str, Any] = field(default_factory=dict)
+    figures: CardFigures | None = None
 
     def steps(self, motion: GuideMotion | None) -> FileSteps[tuple[str, ...]]:
         """Gives back what the artist should know."""
@@ -265,7 +268,7 @@ class _Writer:
         with self.stage("move cards"):
             steps = moved_cards(motion, levels, space="head", with_directions=False)
             moved = yield from map_progress(steps, lambda fraction: ("Moving the cards", fraction))
-        kind = settings.motion
+        kind, self.figures = settings.motion, moved.figures
         with self.stage(f"fit {kind}"):
             skeleton = yield from map_progress(
                 self._fitting(moved.tracks, motion.rig.head),
@@ -293,6 +296,7 @@ class _Writer:
         with self.stage("move cards"):
             steps = moved_cards(motion, levels, space=settings.motion_space, with_directions=True)
             moved = yield from map_progress(steps, lambda fraction: ("Moving the cards", fraction))
+        self.figures = moved.figures
         yield "Writing", None
         texture = TextureMotion.of(moved, settings, self.file_format, str(self.path))
         with self.stage("write motion texture"):

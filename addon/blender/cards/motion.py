@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ...arrays import Floats
-from ...card_flow import bound_cards, cards_at
+from ...card_flow import CardMeasure, bound_cards, cards_at
 from ...cards.card_mesh import CardMesh
 from ...cards.export_settings import CardExportSettings
 from ...cards.joint_keys import between_keys, chain_keys, keys_of
@@ -26,6 +26,7 @@ from ...cards.vertex_animation import (
     rounding,
     vertex_texels,
 )
+from ...dynamics.figures import CardFigures
 from ...dynamics.fitting.settings import SphereFitSettings
 from ...dynamics.fitting.sphere_fit import fit_spheres
 from ...errors import HairloomError
@@ -48,9 +49,13 @@ _FEWEST_FRAMES = 2
 
 @dataclass(frozen=True, eq=False)
 class MovedCards:
-    """tracks, and if they are wanted the normals and the tangents, as `CardTracks.moved`."""
+    """tracks, and if they are wanted the normals and the tangents, as `CardTracks.moved`.
+
+    figures: of the finest level.
+    """
 
     tracks: CardTracks
+    figures: CardFigures
     normals: tuple[Floats, ...] = ()
     tangents: tuple[Floats, ...] = ()
 
@@ -91,6 +96,7 @@ def moved_cards(
     """
     rig, count = motion.rig, len(motion.frames)
     bound = [bound_cards(rig, mesh) for mesh in levels]
+    measure = CardMeasure(rig, bound[0])
     names = ("positions", "normal", "tangent") if with_directions else ("positions",)
     arrays = {
         name: tuple(np.empty((len(mesh.positions), count, 3), np.float32) for mesh in levels)
@@ -107,6 +113,8 @@ def moved_cards(
         back = np.eye(4) if space == "world" else carrier[number]
         for level, binding in enumerate(bound):
             mesh = cards_at(rig, binding, pose, guides)
+            if not level:
+                measure.add(mesh, pose.solids)
             for name in names:
                 offset = back[:3, 3] if name == "positions" else 0.0
                 arrays[name][level][:, number] = (getattr(mesh, name) - offset) @ back[:3, :3]
@@ -122,7 +130,8 @@ def moved_cards(
         motion.frames[0],
         motion.frame_rate,
     )
-    return MovedCards(tracks, arrays.get("normal", ()), arrays.get("tangent", ()))
+    directions = (arrays.get(name, ()) for name in ("normal", "tangent"))
+    return MovedCards(tracks, measure.figures, *directions)
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,14 +14,16 @@ import bpy
 import numpy as np
 
 from ...arrays import Floats
+from ...card_flow import CardMeasure
 from ...cards.edits import CardEdits
 from ...cards.occlusion_settings import CardOcclusionSettings
+from ...dynamics.figures import CardFigures
 from ...errors import HairloomError
 from ...params import SettingsMap
 from ...render.card_snapshot import CardSnapshot
 from ...render.snapshot import Snapshot
 from ...render.strand_layout import NO_STRANDS
-from ...rig_flow import Pose, Rig
+from ...rig_flow import Pose, Rig, Solids
 from ..base import latest_job
 from ..base.latest_job import LatestJob, Work
 from ..properties.groom_settings import GroomSettings
@@ -168,6 +170,21 @@ class ShownCards:
         elif self._shown is not None:
             self._shown = built.drawn(self._shown, settings)
         return self._shown
+
+    def figures(self, solids: Solids | None) -> CardFigures | None:
+        """How long and how deep the cards are that are shown; None without any.
+
+        Args:
+            solids: what they are led out of; None: nothing.
+        """
+        built, shown = self._built, self._shown
+        if built is None or shown is None:
+            return None
+        if shown.mesh.triangles is not built.binding.mesh.triangles:  # others are shown as yet
+            return None
+        measure = CardMeasure(built.rig, built.binding)
+        measure.add(shown.mesh, solids)
+        return measure.figures
 
     def forget(self) -> None:
         """Strands are shown; cards that are on their way are not waited for."""

@@ -102,6 +102,11 @@ class Obstacles:
         lost = (*self._unusable.values(), *self._failed.values())
         return tuple(dict.fromkeys([*lost, *self._doubtful, *seen]))
 
+    @property
+    def meshes(self) -> tuple[Surface, ...]:
+        """Those that collide as meshes, at rest."""
+        return tuple(part.surface for part in self.parts if isinstance(part, FieldPart))
+
     def move(self, depsgraph: bpy.types.Depsgraph, duration: float) -> tuple[PosedCollider, ...]:
         """Move to the present pose within `duration` [s]; returns the trajectories.
 

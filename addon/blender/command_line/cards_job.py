@@ -99,6 +99,8 @@ def written_cards(
         print(edits.line, flush=True)
     if written.motion:
         report.facts["card_motion"] = dict(written.motion)
+    if written.figures is not None:
+        report.facts.update(written.figures.as_dict())
     print(order_line(written.build.wrong_fraction), flush=True)
     tell_notes(list(written.notes), report)
     for file in written.files:

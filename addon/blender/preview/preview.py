@@ -229,7 +229,8 @@ class Preview:
                 self.act(Event.SAME, depsgraph)
             return False
         try:
-            self.session.show_recorded(cache.frame(frame))
+            solids = playback.solids_in(cache, frame, blocking=latest_job.is_blocking())
+            self.session.show_recorded(cache.frame(frame), solids)
         except HairloomError as error:
             self.bake_problem = str(error)
             return False

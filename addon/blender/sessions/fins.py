@@ -16,6 +16,7 @@ from ...dynamics.cloth.state import ClothState, start_cloth
 from ...dynamics.cloth.step import advance_cloth, cloth_at_frame_end
 from ...dynamics.step import Drive
 from ...errors import HairloomError
+from ...rig_flow import Solids
 from ..bakes.groom_hashes import collider_places, collider_shapes, frame_rate, mesh_parts
 from ..bakes.simulated import CLOTH_VERSION, Arrays, hashes
 from ..base.objects import Body, matrix_of, objects_in
@@ -147,8 +148,8 @@ class FinSession:
         """The vertices of this frame, (vertex_count, 3) float32, object space."""
         return {"position": self._shown.copy()}
 
-    def show_recorded(self, frame: Arrays) -> None:
-        """See `simulated.Simulated`.
+    def show_recorded(self, frame: Arrays, solids: Solids | None = None) -> None:
+        """See `simulated.Simulated`; cloth is led out of nothing.
 
         Raises:
             HairloomError: the frame is of another mesh.

@@ -14,7 +14,7 @@ from ... import motion_flow
 from ...arrays import Floats
 from ...comb_flow import combed
 from ...dynamics.colliders import PosedCollider
-from ...dynamics.figures import Figures, Measure
+from ...dynamics.figures import CardFigures, Figures, Measure
 from ...dynamics.settings import DynamicsSettings
 from ...dynamics.state import start
 from ...errors import HairloomError
@@ -23,9 +23,11 @@ from ...paint_flow import painted
 from ...refine.lead_out import Clearance
 from ...render.ride_pass import RideTexels
 from ...render.snapshot import Snapshot
-from ...rig_flow import Pose, Rig
+from ...rig_flow import Begun, Pose, Rig, SimulatedSolids, Solids
+from ...strands import Surface
 from ...strands.arc_length import lengths
 from ..bakes.baked_rig import BakedRig, frame_arrays, led_in, rig_arrays
+from ..bakes.baked_solids import solid_arrays, solid_constants
 from ..bakes.groom_hashes import frame_rate
 from ..bakes.simulated import Arrays
 from ..base.latest_job import LatestJob
@@ -50,8 +52,8 @@ class Session:
 
     uid, hair, head: of its objects.
     groom: what it was made into; a placeholder until the first hair is made in a thread.
-    figures: as measured last since the hair was at rest. are_figures_current: whether it has not
-        moved since.
+    figures, card_figures: as measured last since the hair was at rest; of cards only where they are
+        shown. are_figures_current: whether it has not moved since.
 
     Args:
         hair: a hair curves object.
@@ -90,12 +92,14 @@ class Session:
         self.obstacles: Obstacles | None = None
         self.is_playing = False
         self.is_stale = False
-        self._begun: tuple[Pose, tuple[PosedCollider, ...]] | None = None
+        self._begun: Begun | None = None
+        self._is_recorded = False
         self._contacts = FirstContacts()
         self._posed: tuple[PosedCollider, ...] = ()
         self._field_notes: tuple[str, ...] = ()
         self._styled: Rig | None = None
         self.figures: Figures | None = None
+        self.card_figures: CardFigures | None = None
         self.are_figures_current = False
         self.picture = GroomPicture(
             self.hair.found, is_drawn=is_drawn, arrived=partial(arrived, self)
@@ -179,8 +183,12 @@ class Session:
         return self._source.has_other_partings()
 
     def constants(self) -> Arrays:
-        """See `baked_rig.rig_arrays`."""
-        return rig_arrays(self.groom.rig, self._source.rests)
+        """See `baked_rig.rig_arrays` and `baked_solids.solid_constants`."""
+        arrays = rig_arrays(self.groom.rig, self._source.rests)
+        if self._begun is None:
+            return arrays
+        settings = self.settings[DynamicsSettings]
+        return arrays | solid_constants(self._begun, self._collider_meshes, settings)
 
     def rig_hash(self, depsgraph: bpy.types.Depsgraph) -> str:
         """See `simulated.Simulated`."""
@@ -443,15 +451,17 @@ class Session:
             HairloomError: the hair or its head is gone, or the head's mesh is another one.
         """
         self._take_style(depsgraph)
-        pose, self._begun, self.figures = self._pose(depsgraph), None, None
+        pose, self.figures, self.card_figures = self._pose(depsgraph), None, None
+        self._begun, self._is_recorded = None, False
         _, self._field_notes = force_fields_of(self.hair.found(), depsgraph)
         if not self.is_playing or self.obstacles is None:
             self.solver.rest(pose)
         else:
             self._posed = self.obstacles.rest(depsgraph)
-            self._begun = pose, self._posed
             start = self._start(pose, self._posed)
             self.solver.rest(pose, self._contacts.known(start))
+            kept = start.settings.radius_root * self.solver.size
+            self._begun = Begun(pose, self._posed, kept)
             painted = self._source.painted_guides(self.rig)
             self.solver.meet(self._posed, start.settings, painted)
             self._contacts.keep(start, self.solver.motion)
@@ -543,6 +553,7 @@ class Session:
             HairloomError: as `rest`.
         """
         with self.times.measured("simulation"):
+            self._is_recorded = False
             self._take_style(depsgraph)
             scale = self.settings[DynamicsSettings].time_scale
             if scale:
@@ -572,12 +583,12 @@ class Session:
         measure = self.new_measure()
         self.measure_into(measure)
         self.figures, self.are_figures_current = measure.figures, True
+        self.card_figures = self.cards.figures(self._solids)
 
     def new_measure(self) -> Measure:
         """For the frames from rest on; while it is simulated."""
         assert self._begun is not None, "it is simulated"
-        pose, posed = self._begun
-        rig = self.rig
+        pose, posed, rig = self._begun.pose, self._begun.colliders, self.rig
         guides = start(motion_flow.carried_guides(rig, pose), rig.curl_room)
         return Measure(guides, motion_flow.carried(rig, pose), rig.strands.offsets, posed)
 
@@ -611,12 +622,17 @@ class Session:
         return () if self.obstacles is None else self.obstacles.standing(depsgraph)
 
     def recorded(self) -> Arrays:
-        """See `baked_rig.frame_arrays`."""
+        """See `baked_rig.frame_arrays` and `baked_solids.solid_arrays`."""
         guides, led = self.solver.guides(), self.solver.led()
         styled = self.rig if self.settings[DynamicsSettings].animated_style else None
-        return frame_arrays(self.solver.pose, guides, led, styled)
+        arrays = frame_arrays(self.solver.pose, guides, led, styled)
+        return arrays | solid_arrays(self._posed, self._collider_meshes)
 
-    def show_recorded(self, frame: Arrays) -> None:
+    @property
+    def _collider_meshes(self) -> tuple[Surface, ...]:
+        return () if self.obstacles is None else self.obstacles.meshes
+
+    def show_recorded(self, frame: Arrays, solids: Solids | None = None) -> None:
         """Hair as it was recorded, on the head as that was.
 
         Raises:
@@ -630,12 +646,21 @@ class Session:
                 remedy="Bake again, or delete the bake",
             )
         self._go_by(baked.styled(frame))
-        self.solver.carry(baked.pose(frame), frame["guides"], led_in(frame))
+        pose = replace(baked.pose(frame), solids=solids)
+        self.solver.carry(pose, frame["guides"], led_in(frame))
+        self._is_recorded = True
         self._show()
 
     def _show(self) -> None:
         self.are_figures_current = False
-        self.picture.show(self.rig, self.solver, self.settings)
+        self.picture.show(self.rig, self.solver, self.settings, self._solids)
+
+    @property
+    def _solids(self) -> Solids | None:
+        """What cards are led out of."""
+        if self._is_recorded:
+            return self.solver.pose.solids
+        return None if self._begun is None else SimulatedSolids(self._begun, self._posed)
 
 
 @dataclass(frozen=True, eq=False)

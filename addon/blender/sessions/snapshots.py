@@ -18,7 +18,7 @@ from ...refine.settings import DetailSettings
 from ...render.hair_ball import HairBall
 from ...render.snapshot import SECTIONS, Snapshot
 from ...render.strand_layout import StrandLayout
-from ...rig_flow import Pose, Rig, strand_seeds
+from ...rig_flow import Pose, Rig, Solids, strand_seeds
 from ...shading.coat import is_coated
 from ...shading.marschner.look import fibre_of
 from ...shading.marschner.tables import DEFAULT_SIZE, PREVIEW_SIZE, shape_of
@@ -205,9 +205,11 @@ class GroomPicture:
         )
         self._light_warnings = (*light_warnings(depsgraph), *world_notes(depsgraph.scene))
 
-    def show(self, rig: Rig, solver: Solver, settings: GroomSettings) -> None:
-        """The hair where the solver has it."""
-        pose, spheres = solver.pose, None
+    def show(
+        self, rig: Rig, solver: Solver, settings: GroomSettings, solids: Solids | None
+    ) -> None:
+        """The hair where the solver has it, with cards led out of these; None: of nothing."""
+        pose, spheres = replace(solver.pose, solids=solids), None
         known = None if self._groom is None else self._groom.occluders
         if known is not None and settings[DetailSettings].culling == "hidden":
             spheres = known.at(pose)

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...arrays import Bools, Floats, Ints
+from ...strands.closest_point import search_of
 from .distance_field import DistanceField
 from .posed import (
     Pose,
@@ -127,3 +128,18 @@ def are_outside_meshes(points: Floats, colliders: Sequence[PosedCollider]) -> Bo
         else:
             result &= world_distance(pose, local)[0] > 0.0
     return result
+
+
+def mesh_distance(points: Floats, colliders: Sequence[PosedCollider]) -> Floats:
+    """The same distances (n,) to meshes themselves, of points (n, 3) world. Slow, so for few."""
+    rows = np.ascontiguousarray(np.asarray(points, np.float32).T)
+    nearest = np.full(rows.shape[1], np.inf, np.float32)
+    for pose in poses_now(colliders) if rows.size else ():
+        local = transform_points(pose.inverse, rows)
+        distance, _ = world_distance(pose, local, FLATTEST)
+        if isinstance(pose.collider, DistanceField) and pose.collider.surface is not None:
+            found = search_of(pose.collider.surface).closest(local.T).distance
+            found = found.astype(np.float32) * np.float32(pose.scale)
+            distance = np.where(pose.collider.are_outside(local), found, -found)
+        np.minimum(nearest, distance, out=nearest)
+    return nearest

@@ -1,0 +1,228 @@
+"""What hair stayed out of in a bake, as arrays and back, so that its cards are led out of the same.
+
+    mesh_0_positions, mesh_0_triangles, ...  of meshes at rest, once; their fields are made again
+    solids          (k, 4) int32: of each collider its kind, which mesh, and which rows beside
+    solid_matrices  (k, 4, 4) to world space
+    solid_balls     (n, 4) float32: center and radius of balls; a rod has two
+    solid_shapes    (m, 3) float32: vertices of meshes that are bent, in the space of the mesh
+
+The same arrays with `begun_` before their names are of where the motion began.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Self
+
+import numpy as np
+
+from ...arrays import Floats
+from ...dynamics.colliders import (
+    CapsuleCollider,
+    Collider,
+    DistanceField,
+    PosedCollider,
+    SphereCollider,
+    SphereSetCollider,
+)
+from ...dynamics.colliders.bent_field import BentField
+from ...dynamics.settings import DynamicsSettings
+from ...errors import HairloomError
+from ...rig_flow import Begun, Pose, Solids
+from ...strands import Surface
+from ..colliders.fields import NotMadeYetError, field_of
+from .simulated import Arrays
+
+_BALL, _ROD, _BALLS, _MESH = range(4)
+_BEGUN = "begun_"
+#: arrays that may have another length in each frame
+LISTS = frozenset({"solids", "solid_matrices", "solid_balls", "solid_shapes"})
+
+
+def solid_constants(begun: Begun, meshes: Sequence[Surface], settings: DynamicsSettings) -> Arrays:
+    """What all frames share.
+
+    Args:
+        meshes: of all colliders that are any, at rest.
+    """
+    arrays: Arrays = {
+        "kept": np.array(begun.kept),
+        "collider_resolution": np.array(settings.collider_resolution),
+        f"{_BEGUN}matrix": np.asarray(begun.pose.matrix, np.float64),
+    }
+    for name, array in (("head", begun.pose.head_positions), ("anchors", begun.pose.anchors)):
+        if array is not None:
+            arrays[_BEGUN + name] = array
+    for number, mesh in enumerate(meshes):
+        arrays[f"mesh_{number}_positions"] = mesh.positions
+        arrays[f"mesh_{number}_triangles"] = mesh.triangles
+    found = solid_arrays(begun.colliders, meshes)
+    return arrays | {_BEGUN + name: array for name, array in found.items()}
+
+
+def solid_arrays(colliders: Sequence[PosedCollider], meshes: Sequence[Surface]) -> Arrays:
+    """Colliders as they stand at their frame's end; meshes as of `solid_constants`."""
+    solids: list[tuple[int, int, int, int]] = []
+    balls: list[Floats] = [np.zeros((0, 4))]
+    shapes: list[Floats] = [np.zeros((0, 3))]
+    for posed in colliders:
+        collider = posed.collider
+        if isinstance(collider, DistanceField):
+            number, shape = _shape_of(collider, meshes)
+            solids.append((_MESH, number, sum(map(len, shapes)), len(shape)))
+            shapes.append(shape)
+            continue
+        if isinstance(collider, SphereCollider):
+            kind, rows = _BALL, _rows([collider.center], [collider.radius])
+        elif isinstance(collider, CapsuleCollider):
+            kind, rows = _ROD, _rows([collider.start, collider.end], [collider.radius] * 2)
+        else:
+            assert isinstance(collider, SphereSetCollider)
+            kind, rows = _BALLS, _rows(collider.centers, collider.radii)
+        solids.append((kind, 0, sum(map(len, balls)), len(rows)))
+        balls.append(rows)
+    matrices = [posed.matrix_now for posed in colliders]
+    return {
+        "solids": np.array(solids, np.int32).reshape(-1, 4),
+        "solid_matrices": np.array(matrices, np.float64).reshape(-1, 4, 4),
+        "solid_balls": np.concatenate(balls).astype(np.float32),
+        "solid_shapes": np.concatenate(shapes).astype(np.float32),
+    }
+
+
+def _rows(centers: Sequence[Floats] | Floats, radii: Sequence[float] | Floats) -> Floats:
+    """Balls, (n, 4)."""
+    return np.concatenate([np.asarray(centers), np.asarray(radii)[:, None]], axis=1)
+
+
+def solids_between(frame: Arrays, there: Arrays, fraction: float) -> Arrays:
+    """The arrays of `solid_arrays` between two frames, straight; those of the first one where
+    something came or went."""
+    if "solids" not in frame or not np.array_equal(frame["solids"], there["solids"]):
+        return frame
+    moving = LISTS - {"solids"}
+    return frame | {name: frame[name] + (there[name] - frame[name]) * fraction for name in moving}
+
+
+def _shape_of(field: DistanceField, meshes: Sequence[Surface]) -> tuple[int, Floats]:
+    """Which of some meshes a field is of, and its vertices, none where it is at rest."""
+    assert field.surface is not None, "fields of scenes know their meshes"
+    shape = field.surface.positions
+    alike = (
+        (float(np.abs(mesh.positions - shape).max(initial=0.0)), number)
+        for number, mesh in enumerate(meshes)
+        if mesh.positions.shape == shape.shape
+    )
+    away, number = min(alike)
+    return number, shape if away else shape[:0]
+
+
+@dataclass(frozen=True, eq=False)
+class BakedSolids:
+    """The colliders of a bake; their fields are made when the first frame asks for them.
+
+    constants: of the bake.
+    """
+
+    constants: Arrays
+
+    @classmethod
+    def of(cls, constants: Arrays) -> Self | None:
+        """None of a bake without colliders, or of a version that did not keep them."""
+        return cls(constants) if f"{_BEGUN}solids" in constants else None
+
+    def at(self, frame: Arrays, *, blocking: bool) -> Solids | None:
+        """Those of a frame.
+
+        Args:
+            blocking: False: nothing is led out until all fields are made.
+        """
+        return _FrameSolids(self, frame, blocking) if "solids" in frame else None
+
+    @cached_property
+    def begun(self) -> Begun:
+        """Where the motion began.
+
+        Raises:
+            HairloomError: the bake is damaged, or a mesh cannot be a collider.
+        """
+        known = self.constants
+        try:
+            own = {name: known[_BEGUN + name] for name in LISTS}
+            head, anchors = (known.get(_BEGUN + name) for name in ("head", "anchors"))
+            pose = Pose(head, known[f"{_BEGUN}matrix"], anchors)
+            kept = float(known["kept"])
+        except (KeyError, ValueError, TypeError) as error:
+            raise _damaged(error) from error
+        return Begun(pose, self.colliders(own, blocking=True), kept)
+
+    def colliders(self, frame: Arrays, *, blocking: bool) -> tuple[PosedCollider, ...]:
+        """As they stand in a frame.
+
+        Raises:
+            HairloomError: as `begun`.
+            NotMadeYetError: a field is being made, and nobody waits.
+        """
+        try:
+            solids, matrices = frame["solids"].tolist(), frame["solid_matrices"]
+            return tuple(
+                PosedCollider(self._collider(row, frame, blocking), matrix, matrix)
+                for row, matrix in zip(solids, matrices, strict=True)
+            )
+        except (KeyError, ValueError, IndexError) as error:
+            raise _damaged(error) from error
+
+    def _collider(self, row: list[int], frame: Arrays, blocking: bool) -> Collider:
+        kind, mesh, first, count = row
+        if kind == _MESH:
+            shape = frame["solid_shapes"][first : first + count]
+            bent = self._bent(mesh, blocking)
+            return bent.at(shape) if count else bent.field
+        rows = frame["solid_balls"][first : first + count]
+        if kind == _BALL:
+            return SphereCollider(rows[0, :3], float(rows[0, 3]))
+        if kind == _ROD:
+            return CapsuleCollider(rows[0, :3], rows[1, :3], float(rows[0, 3]))
+        return SphereSetCollider(rows[:, :3], rows[:, 3])
+
+    def _bent(self, number: int, blocking: bool) -> BentField:
+        """The field of a mesh, which may bend."""
+        if number not in self._fields:
+            named = (self.constants[f"mesh_{number}_{name}"] for name in ("positions", "triangles"))
+            surface = Surface(*named)
+            settings = DynamicsSettings(
+                collider_resolution=int(self.constants["collider_resolution"])
+            )
+            field = field_of(surface, settings, place="bake", blocking=blocking)
+            self._fields[number] = BentField(field, surface)
+        return self._fields[number]
+
+    @cached_property
+    def _fields(self) -> dict[int, BentField]:
+        return {}
+
+
+@dataclass(frozen=True, eq=False)
+class _FrameSolids:
+    """Fulfils `Solids`."""
+
+    bake: BakedSolids
+    frame: Arrays
+    is_blocking: bool
+
+    @property
+    def begun(self) -> Begun:
+        return self.bake.begun
+
+    @cached_property
+    def colliders(self) -> tuple[PosedCollider, ...]:
+        try:
+            return self.bake.colliders(self.frame, blocking=self.is_blocking)
+        except NotMadeYetError:
+            return ()
+
+
+def _damaged(error: Exception) -> HairloomError:
+    return HairloomError(f"its colliders are damaged ({error})", place="bake", remedy="Bake again")

@@ -1,0 +1,146 @@
+"""Cards that ride, led out of colliders as strands are: their spines, then the arms of their rows.
+
+A spine is a strand, so it is led as one, and every row goes along as it is. Where a vertex of a row
+is in a collider all the same, its arm is led out, the way from the spine to it: a strand of two
+points, whose root stays on the spine. So a card keeps its length and its width. It bends along its
+spine where it lies against something round, as a lock of hair does.
+
+What was in a collider when the motion began may stay as deep as it was where its root carries it,
+see `refine.lead_out`. Unlike strands, cards know nothing of the frame before: those of a bake are
+made in any order.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import Floats, Ints
+from ..dynamics.colliders import PosedCollider, signed_distance
+from ..dynamics.colliders.signed_distance import mesh_distance, nearer_than, poses_now
+from ..refine.lead_out import DEEP, Clearance, clearance_at, lead_out
+from ..refine.ride import minimal_rotation, turn_change
+from ..strands.vectors import dot_rows
+
+#: An arm that is shorter than this part of the distance that is kept leads nowhere.
+_SHORTEST_ARM = 0.5
+_TINY = np.float32(1.0e-30)
+
+
+@dataclass(frozen=True, eq=False)
+class CardClearance:
+    """How far cards stay from colliders where their roots carry them.
+
+    spines: of all spines. vertices: of all vertices.
+    """
+
+    spines: Clearance
+    vertices: Clearance
+
+    @classmethod
+    def at(
+        cls,
+        spines: Floats,
+        vertices: Floats,
+        row: Ints,
+        offsets: Ints,
+        colliders: tuple[PosedCollider, ...],
+        kept: float,
+    ) -> CardClearance:
+        """That of a motion which begins now.
+
+        Args:
+            spines, vertices: (row_count, 3) and (vertex_count, 3) world [m], where roots carry
+                them.
+            row: (vertex_count,), which row each vertex lies in.
+            offsets: (n + 1,), the spine of card c is spines[offsets[c]:offsets[c + 1]].
+            kept: [m].
+        """
+        distance, _ = signed_distance(vertices, colliders, kept)
+        deep = (distance < -DEEP * kept).nonzero()[0]
+        # in its grid, a collider is thicker there, and does not tell which way is out
+        is_thicker = mesh_distance(vertices[deep], colliders) > distance[deep] + DEEP * kept
+        beside = deep[is_thicker]
+        distance[beside] = -np.inf
+        of_spines = clearance_at(spines, offsets, colliders, kept)
+        # a row turns as the ways to both rows beside it do
+        rows = np.minimum(row[beside] + 1, offsets[1:][_owners(row[beside], offsets)] - 1)
+        of_vertices = Clearance(kept, distance, np.zeros(len(vertices), np.int32))
+        return cls(of_spines.holding(rows, offsets), of_vertices)
+
+
+@dataclass(frozen=True, eq=False)
+class CardContacts:
+    """What the cards of one moment are led out of."""
+
+    colliders: tuple[PosedCollider, ...]
+    clearance: CardClearance
+
+    def lead_spines(self, spines: Floats, carried: Floats, offsets: Ints) -> None:
+        """In place.
+
+        Args:
+            spines, carried: (row_count, 3) world [m], where they ride, and where roots carry them.
+        """
+        self._lead(spines, carried, offsets, self.clearance.spines)
+
+    def lead_arms(
+        self,
+        positions: Floats,
+        directions: tuple[Floats, ...],
+        middles: Floats,
+        arms: Floats,
+        away: Floats,
+    ) -> None:
+        """In place.
+
+        Args:
+            positions: (vertex_count, 3) world [m]. directions: unit vectors of these, which turn
+                with their arms.
+            middles: (vertex_count, 3), of their rows.
+            arms: (vertex_count, 3), from there, as their roots turn them.
+            away: (vertex_count,) [m], how far the middles are from where roots carry them.
+        """
+        vertices = self.clearance.vertices
+        near = nearer_than(positions, poses_now(self.colliders), vertices.reach)[0]
+        long, arm = _SHORTEST_ARM * vertices.kept, arms[near].T
+        near = near[dot_rows(arm, arm) > long * long]
+        if not len(near):
+            return
+        # roots and tips by turns
+        roots, offsets = middles[near], 2 * np.arange(len(near) + 1)
+        points, carried = (
+            np.stack([roots, tips], axis=1).reshape(-1, 3)
+            for tips in (positions[near], roots + arms[near])
+        )
+        distance = np.full((len(near), 2), -np.inf, np.float32)
+        # how far the row has gone as a whole counts too
+        distance[:, 1] = vertices.points[near] + away[near]
+        clearance = Clearance(vertices.kept, distance.ravel(), np.zeros(len(near), np.int32))
+        led = self._lead(points, carried, offsets, clearance)
+        chosen, tips = near[led], points[2 * led + 1]
+        was, now = _unit(positions[chosen] - roots[led]), _unit(tips - roots[led])
+        turn = minimal_rotation(was, now, np.zeros(len(led), bool))
+        for vectors in directions:
+            vectors[chosen] += turn_change(turn, vectors[chosen].T).T
+        positions[chosen] = tips
+
+    def _lead(self, points: Floats, carried: Floats, offsets: Ints, clearance: Clearance) -> Ints:
+        def carry(index: Ints, _owners: Ints) -> Floats:
+            places: Floats = carried[index]
+            return places
+
+        return lead_out(points, carry, offsets, self.colliders, clearance)[0]
+
+
+def _owners(rows: Ints, offsets: Ints) -> Ints:
+    """Which cards rows belong to."""
+    return np.searchsorted(offsets, rows, side="right") - 1
+
+
+def _unit(vectors: Floats) -> Floats:
+    """(n, 3) as planes of unit vectors, (3, n)."""
+    rows = np.ascontiguousarray(vectors.T)
+    rows /= np.maximum(np.sqrt(dot_rows(rows, rows)), _TINY)
+    return rows
