@@ -11,8 +11,8 @@ is a flip of leading out if where the strand rides does not jump as far in that 
 
 Cards of Sintel's hair that ride on the guides in the demo's shake: how deep vertices are that were
 outside at rest, and how many cards have any that is deeper than a millimetre; how much deeper the
-others are than at rest; and by how much cards change their lengths, along their middles, and rows
-their widths.
+others are than at rest; by how much cards change their lengths, along their middles, and rows their
+widths; how far rows fold; and how many cards leading out has jump, as of strands.
 
 What it costs, of Sintel: see `_strands_cost`.
 
@@ -77,6 +77,7 @@ AT_MOST = {
     "depth_fast_worst_mm": 1.0,
     "card_deepest_mm": 0.5,
     "cards_deep_percent": 0.0,
+    "card_deeper_than_at_rest_mm": 0.5,
     "card_length_p99_percent": 0.2,
     "card_length_worst_percent": 1.0,
     "card_cost_ratio": 3.0,
@@ -316,16 +317,23 @@ def card_figures(rig: Rig) -> dict[str, float]:
     at_rest[inside] = search.closest(local).distance
     lines, rows = _middle_lines(mesh, cards), _row_edges(mesh, cards)
     length, width = lengths(mesh.positions[lines], cards.offsets), _sizes(mesh.positions, rows)
-    longer, wider = np.zeros(len(length)), np.zeros(len(width))
-    begun, costs = None, []
+    longer, wider, folded = (np.zeros(len(each)) for each in (length, width, length))
+    straight = _folds(mesh.positions, rows, lines)
+    scale = MEDIAN_LENGTH / np.median(lengths(rig.strands.points, rig.strands.offsets))
+    owner, begun, costs, jumped = card_of_vertex(mesh), None, [], []
+    correction = np.zeros_like(mesh.positions)
     for motion, matrix, _, _ in played(rig, collider, shake_at, FPS):
         if begun is None:
             assert motion.clearance is not None
             standing = (PosedCollider(collider, np.eye(4), np.eye(4)),)
             begun = Begun(rig.rest_pose, standing, motion.clearance.kept)
         pose = replace(motion.pose, solids=SimulatedSolids(begun, motion.colliders))
-        now, cost = _timed(rig, cards, (motion.pose, pose), motion.guides)
+        (riding, now), cost = _timed(rig, cards, (motion.pose, pose), motion.guides)
         costs.append(cost)
+        before, correction = correction, now - riding
+        jumps = np.zeros(owner.max() + 1)
+        np.maximum.at(jumps, owner, np.linalg.norm(correction - before, axis=1) * scale)
+        jumped.append(jumps[np.unique(owner)])
         index, local = _inside(now, matrix, collider, rig.head)
         if len(index):
             found = search.closest(local).distance
@@ -334,13 +342,13 @@ def card_figures(rig: Rig) -> dict[str, float]:
         change = length_changes(now[lines], cards.offsets, length)
         np.maximum(longer, change, out=longer)
         np.maximum(wider, np.abs(_sizes(now, rows) / width - 1.0), out=wider)
+        fold = _folds(now, rows, lines) - straight
+        np.maximum(folded, np.maximum.reduceat(fold, cards.offsets[:-1]), out=folded)
     depth[inside] = 0.0
-    scale = MEDIAN_LENGTH / np.median(lengths(rig.strands.points, rig.strands.offsets))
     depth, deeper = depth * scale, deeper * scale
-    owner = card_of_vertex(mesh)
     deepest = np.zeros(owner.max() + 1)
     np.maximum.at(deepest, owner, depth)
-    riding, led = np.median(costs, axis=0)
+    alone, led = np.median(costs, axis=0)
     return {
         "card_deepest_mm": float(depth.max()) * 1000.0,
         "card_vertices_deep_percent": 100.0 * float((depth > 0.001).mean()),
@@ -351,22 +359,26 @@ def card_figures(rig: Rig) -> dict[str, float]:
         "card_length_worst_percent": 100.0 * float(longer.max()),
         "card_width_p99_percent": 100.0 * float(np.quantile(wider, 0.99)),
         "card_width_worst_percent": 100.0 * float(wider.max()),
-        "card_ride_ms": 1000.0 * float(riding),
+        "card_fold_p99_degrees": float(np.quantile(folded, 0.99)),
+        "card_fold_worst_degrees": float(folded.max()),
+        "card_jump_worst_mm": 1000.0 * float(np.max(jumped)),
+        "cards_jump_percent": 100.0 * float((np.array(jumped) > JUMP).mean()),
+        "card_ride_ms": 1000.0 * float(alone),
         "card_ride_and_lead_ms": 1000.0 * float(led),
-        "card_cost_ratio": float(led / riding),
+        "card_cost_ratio": float(led / alone),
     }
 
 
 def _timed(
     rig: Rig, cards: CardBinding, poses: tuple[Pose, Pose], guides: Floats
-) -> tuple[Floats, tuple[float, float]]:
-    """The vertices in the second pose, and how long each takes [s], the better of two."""
-    times = np.zeros((2, 2))
+) -> tuple[list[Floats], Floats]:
+    """The vertices in both poses, and how long each takes [s], the better of two."""
+    times, found = np.zeros((2, 2)), [cards.mesh.positions] * 2
     for turn in np.ndindex(2, 2):
         begin = perf_counter()
-        mesh = cards_at(rig, cards, poses[turn[1]], guides)
+        found[turn[1]] = cards_at(rig, cards, poses[turn[1]], guides).positions
         times[turn] = perf_counter() - begin
-    return mesh.positions, tuple(times.min(axis=0))
+    return found, times.min(axis=0)
 
 
 def _middle_lines(mesh: CardMesh, cards: CardBinding) -> Ints:
@@ -383,6 +395,23 @@ def _row_edges(mesh: CardMesh, cards: CardBinding) -> Ints:
     pairs = np.concatenate([mesh.triangles[:, sides] for sides in ((0, 1), (1, 2), (2, 0))])
     within = pairs[cards.row[pairs[:, 0]] == cards.row[pairs[:, 1]]]
     return np.unique(np.sort(within, axis=1), axis=0)
+
+
+def _folds(points: Floats, edges: Ints, lines: Ints) -> Floats:
+    """By how much the halves of each row turn from each other [degrees], (row_count,).
+
+    Args:
+        edges: see `_row_edges`; two a row. lines: see `_middle_lines`.
+    """
+    row = np.full(len(points), -1)
+    row[lines] = np.arange(len(lines))
+    other, middle = edges[:, 0], edges[:, 1]
+    other, middle = np.where(row[other] >= 0, (middle, other), (other, middle))
+    ways = (points[other] - points[middle]).astype(np.float64)
+    ways /= np.linalg.norm(ways, axis=1, keepdims=True)
+    pairs = ways[np.argsort(row[middle], kind="stable")].reshape(len(lines), 2, 3)
+    cosine = -(pairs[:, 0] * pairs[:, 1]).sum(axis=1)
+    return np.asarray(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))))
 
 
 def _sizes(points: Floats, edges: Ints) -> Floats:
