@@ -40,7 +40,13 @@ def test_the_command_line_writes_a_bake(tmp_path: Path, capfd: Any) -> None:
     assert "--motion" in capfd.readouterr().err
     assert command_line.run([*arguments, *moving, "--bake", bake, "--frames", "2", "99"]) == 1
     assert "frames 0 to 12" in capfd.readouterr().err
-    assert command_line.run([*arguments, *moving, "--bake", bake, "--frames", "2", "9"]) == 0
+    report = ["--report", str(tmp_path / "report.json")]
+    some = ["--bake", bake, "--frames", "2", "9"]
+    assert command_line.run([*arguments, *moving, *some, *report]) == 0
+    facts = json.loads((tmp_path / "report.json").read_text("utf-8"))
+    assert 0.0 <= facts["cards_stretch_max_percent"] < 0.1
+    assert 0.0 <= facts["cards_penetration_p99_mm"] <= facts["cards_penetration_max_mm"] < 0.5
+    assert facts["cards_inside_percent"] == facts["cards_stretched_percent"] == 0.0
     told = json.loads((tmp_path / "hair.hairloom.json").read_text("utf-8"))["motion"]
     assert told["frames"] == {"first": 2, "count": 8, "rate": 60.0}
     assert told["chains"] <= 4
