@@ -3,7 +3,7 @@
     mesh_0_positions, mesh_0_triangles, ...  of meshes at rest, once; their fields are made again
     solids          (k, 4) int32: of each collider its kind, which mesh, and which rows beside
     solid_matrices  (k, 4, 4) to world space
-    solid_balls     (n, 4) float32: center and radius of balls; a rod has two
+    solid_balls     (n, 4) float32: center and radius of balls; a capsule has two
     solid_shapes    (m, 3) float32: vertices of meshes that are bent, in the space of the mesh
 
 The same arrays with `begun_` before their names are of where the motion began.
@@ -35,7 +35,7 @@ from ...strands import Surface
 from ..colliders.fields import NotMadeYetError, field_of
 from .simulated import Arrays
 
-_BALL, _ROD, _BALLS, _MESH = range(4)
+_BALL, _CAPSULE, _BALLS, _MESH = range(4)
 _BEGUN = "begun_"
 #: arrays that may have another length in each frame
 LISTS = frozenset({"solids", "solid_matrices", "solid_balls", "solid_shapes"})
@@ -77,7 +77,7 @@ def solid_arrays(colliders: Sequence[PosedCollider], meshes: Sequence[Surface]) 
         if isinstance(collider, SphereCollider):
             kind, rows = _BALL, _rows([collider.center], [collider.radius])
         elif isinstance(collider, CapsuleCollider):
-            kind, rows = _ROD, _rows([collider.start, collider.end], [collider.radius] * 2)
+            kind, rows = _CAPSULE, _rows([collider.start, collider.end], [collider.radius] * 2)
         else:
             assert isinstance(collider, SphereSetCollider)
             kind, rows = _BALLS, _rows(collider.centers, collider.radii)
@@ -183,7 +183,7 @@ class BakedSolids:
         rows = frame["solid_balls"][first : first + count]
         if kind == _BALL:
             return SphereCollider(rows[0, :3], float(rows[0, 3]))
-        if kind == _ROD:
+        if kind == _CAPSULE:
             return CapsuleCollider(rows[0, :3], rows[1, :3], float(rows[0, 3]))
         return SphereSetCollider(rows[:, :3], rows[:, 3])
 
