@@ -279,13 +279,13 @@ def lead_out(
     leans.bend(points, offsets)
     index, distance, outward = nearer_than(points, poses, clearance.reach)
     owner = _owners(index, offsets)
-    away = _size(points[index] - carry(index, owner))
-    wanted = np.minimum(clearance.points[index] + away, np.float32(kept))
+    away = _size(points.take(index, axis=0) - carry(index, owner))
+    wanted = np.minimum(clearance.points.take(index) + away, np.float32(kept))
     is_near = distance < wanted - np.float32(SLACK * kept)
     strands, first = np.unique(owner[is_near], return_index=True)
     bent = np.union1d(leans.strands, strands)
     every = points_of(bent, offsets)
-    ridden = points[every]
+    ridden = points.take(every, axis=0)
     ridden[np.searchsorted(every, leaning)] = upright
     if len(strands):
         first = is_near.nonzero()[0][first]
@@ -294,7 +294,7 @@ def lead_out(
         points[near.index], is_lost = _led(near, kept, poses)
         lost = np.searchsorted(every, near.index[is_lost])
         ridden[lost] = points[every[lost]]  # which way they were bent is no matter
-    return np.union1d(held, bent), Leans.between(bent, ridden, points[every], offsets)
+    return np.union1d(held, bent), Leans.between(bent, ridden, points.take(every, axis=0), offsets)
 
 
 def _owners(index: Ints, offsets: Ints) -> Ints:
@@ -306,8 +306,8 @@ def _hold(points: Floats, carry: Carry, offsets: Ints, clearance: Clearance) -> 
     """Bring what goes with its root there, in place, and along what comes after it, in its shape;
     and which strands (n,) have such a part."""
     held = clearance.held_parts(offsets)
-    shift = carry(held.index, held.owners) - points[held.index]
-    points[held.every] += shift[held.along]
+    shift = carry(held.index, held.owners) - points.take(held.index, axis=0)
+    points[held.every] += shift.take(held.along, axis=0)
     return held.strands
 
 
@@ -371,8 +371,8 @@ class _Near:
         """
         counts = np.diff(offsets)[strands]
         ends, index = np.cumsum(counts), points_of(strands, offsets)
-        some, carried = points[index], carry(index, np.repeat(strands, counts))
-        wanted = clearance.points[index] + _size(some - carried)
+        some, carried = points.take(index, axis=0), carry(index, np.repeat(strands, counts))
+        wanted = clearance.points.take(index) + _size(some - carried)
         return cls(
             ends - counts,
             ends,

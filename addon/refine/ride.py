@@ -166,7 +166,8 @@ def ride(
         guide_now: (guide_count, cv_count, 3), guides as simulated.
         motions: of the strands' roots to now; None: they have not moved, or `points` have already.
     """
-    moved = np.array(points, np.float32)
+    points = np.asarray(points, np.float32)
+    moved = np.empty_like(points)
     if not len(moved):
         return moved
     turns = guide_turns(guide_rest, guide_now)
@@ -174,16 +175,18 @@ def ride(
     axes = None if riders.gives is None else guide_axes(guide_rest, guide_now, riders.gives)
     axes = None if axes is None else _with_steps(axes)
     shifts = np.asarray(guide_now[:, 0] - guide_rest[:, 0], np.float32)
+    have_left = bool(shifts.any())
     for block, seats in riders.blocks:
-        rest = block.planes(moved)
+        rest = block.planes(points)
         if motions is not None:  # to the bit as `groom.roots.follow` does
             rest += motions.change(rest, block.strands)
-        change, edge = np.zeros_like(rest), rest[:, 1:] - rest[:, :-1]
-        if shifts.any():
+        change, edge = np.empty_like(rest), rest[:, 1:] - rest[:, :-1]
+        change[:, 0] = 0.0
+        if have_left:
             for guide, weight in zip(seats.guide, seats.weight, strict=True):
                 change[:, 0] += weight * shifts[guide].T
-        are_small = bool(is_small[seats.guide].all())
-        _turn(edge, change[:, 1:], riders.are_lines, seats, table, are_small, axes)
+        wide = (~is_small[seats.guide].all(axis=0)).nonzero()[0]
+        change[:, 1:] = _turned(edge, riders.are_lines, seats, table, wide, axes)
         _sum(change)
         change += rest
         block.put(moved, change)
@@ -259,10 +262,7 @@ def _directions(grid: Floats) -> Floats:
 
 def _dot(one: Floats, other: Floats) -> Floats:
     """Of quaternions (4, ...)."""
-    total: Floats = one[0] * other[0]
-    for axis in (1, 2, 3):
-        total += one[axis] * other[axis]
-    return total
+    return np.asarray(np.einsum("i...,i...->...", one, other))
 
 
 def _product(left: Floats, right: Floats) -> Floats:
@@ -283,38 +283,45 @@ def _with_steps(values: Floats) -> Floats:
     return table
 
 
-def _turn(
+def _turned(
     edge: Floats,
-    change: Floats,
     are_lines: bool,
     seats: Seats,
     table: Floats,
-    are_small: bool,
+    wide: Ints,
     axes: Floats | None,
-) -> None:
-    """Add to `change` what turning and drawing out add to segments (3, count - 1, n)."""
+) -> Floats:
+    """What turning and drawing out add to segments (3, count - 1, n); takes `edge` for it.
+
+    Args:
+        wide: which of the strands have a guide that turns by a right angle or more.
+    """
     blend: Floats | None = None
     axis = None if axes is None else np.zeros((4, *edge.shape[1:]), np.float32)
     for weight, before, fraction in seats.each():
         turn = _between(table, before, fraction)
+        turn *= weight
         if axes is not None and axis is not None:
             here = _between(axes, before, fraction)
             here *= weight
             axis += here
         if blend is None:
             blend = turn
-            blend *= weight
-        else:  # of two quaternions of one rotation the nearer
-            turn *= weight if are_small else np.copysign(weight, _dot(turn, blend))
-            blend += turn
+            continue
+        if len(wide):  # of two quaternions of one rotation the nearer
+            some = turn[..., wide]
+            turn[..., wide] = some * np.copysign(np.float32(1.0), _dot(some, blend[..., wide]))
+        blend += turn
     assert blend is not None
-    if not are_small:
-        blend[3] += _dot(blend, blend) < REVERSED  # opposite turns that leave nothing
-    if axis is not None and axis[3].any():
-        drawn = edge * axis[3] if are_lines else drawn_out(edge, axis)
-        edge += drawn
-        change += drawn
-    change += turn_change(blend, edge)
+    if len(wide):  # opposite turns that leave nothing
+        some = blend[..., wide]
+        blend[3][:, wide] += _dot(some, some) < REVERSED
+    if axis is None or not axis[3].any():
+        return turn_change(blend, edge)
+    drawn = edge * axis[3] if are_lines else drawn_out(edge, axis)
+    edge += drawn
+    drawn += turn_change(blend, edge)
+    return drawn
 
 
 def _between(table: Floats, before: Ints, fraction: Floats) -> Floats:

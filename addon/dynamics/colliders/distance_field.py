@@ -142,9 +142,10 @@ class DistanceField:
         x *= least.shape[2]
         x += z
         kept = (least.ravel().take(x) < limit).nonzero()[0]
-        _, beyond = self._split(self._in_cells(points.take(kept, axis=1)))
-        outside = np.abs(beyond).max(axis=0)  # along one axis
-        result: Ints = kept[outside * np.float32(self.cell) <= np.maximum(limit.take(kept), 0.0)]
+        some, low = points.take(kept, axis=1), self.low[:, None]
+        high = low + self._top * np.float32(self.cell)
+        outside = np.maximum(low - some, some - high).max(axis=0)  # along one axis
+        result: Ints = kept[outside <= np.maximum(limit.take(kept), 0.0)]
         return result
 
     def distance(self, points: Floats) -> tuple[Floats, Floats]:

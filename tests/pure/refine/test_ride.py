@@ -251,16 +251,19 @@ def test_guides_that_turn_against_each_other_by_half_a_turn() -> None:
 
 
 def test_guides_that_came_to_one_direction_from_two_sides_agree() -> None:
-    """One has turned by 200 degrees, the other by 160 the other way: the same rotation."""
-    straight = walks(2, 16, 2, straying=0.0)
+    """One has turned by 200 degrees, the other by 160 the other way: the same rotation. A strand
+    beside theirs rides on a guide at rest."""
+    straight = walks(3, 16, 2, straying=0.0)
     now = straight.copy()
     for guide, end in enumerate((200.0, -160.0)):
         angle = np.radians(end) * np.arange(1, 16) / 15.0
         steps = SPACING * np.stack([np.sin(angle), 0.0 * angle, -np.cos(angle)], axis=1)
         now[guide, 1:] = now[guide, 0] + steps.cumsum(axis=0)
-    weights = GuideWeights(np.int32([[0, 1, 1]]), np.float32([[0.5, 0.5, 0.0]]))
-    found = rode(straight[:1], weights, straight, now)
-    assert np.diff(found[0], axis=0)[-1] == pytest.approx(np.diff(now[0], axis=0)[-1], abs=1e-5)
+    guide, weight = [[2, 2, 2], [0, 1, 1]], [[1.0, 0.0, 0.0], [0.5, 0.5, 0.0]]
+    weights = GuideWeights(np.int32(guide), np.float32(weight))
+    found = rode(straight[[2, 0]], weights, straight, now)
+    assert np.diff(found[1], axis=0)[-1] == pytest.approx(np.diff(now[0], axis=0)[-1], abs=1e-5)
+    assert np.array_equal(found[0], straight[2])
 
 
 @pytest.mark.parametrize("strand_count", [0, 1, 700, 2500])
