@@ -8,7 +8,6 @@ from __future__ import annotations
 import tempfile
 import time
 from dataclasses import replace
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -33,7 +32,7 @@ from hairloom.addon.dynamics.colliders import DistanceField, PosedCollider  # no
 from hairloom.addon.dynamics.settings import DynamicsSettings  # noqa: E402
 from hairloom.addon.exchange.cards.card_formats import GLB  # noqa: E402
 from hairloom.addon.params import SettingsMap  # noqa: E402
-from hairloom.addon.rig_flow import Rig  # noqa: E402
+from hairloom.addon.rig_flow import Begun, Rig, SimulatedSolids  # noqa: E402
 
 RATE = 60.0
 
@@ -84,19 +83,25 @@ def motion_figures(seconds: float) -> dict[str, float]:
 
 
 def shaken(rig: Rig, seconds: float) -> MadeMotion:
-    """Simulated by numpy through the shake."""
+    """Simulated by numpy through the shake; cards are led out of the head, as in a bake."""
     assert rig.head is not None
     settings = DynamicsSettings()
     collider = DistanceField.from_surface(rig.head, settings, place="Sintel")
-    poses = shaken_poses(rig, round(seconds * RATE) + 1, RATE)
-    motion = motion_flow.begin(rig, poses[0])
-    guides, earlier = [motion.guides], None
-    for before, now in pairwise(poses):
-        since = None if earlier is None else earlier.matrix
-        posed = (PosedCollider(collider, before.matrix, now.matrix, since),)
-        motion = motion_flow.advance(rig, motion, now, posed, settings, GRAVITY, 1.0 / RATE)
+    first, *later = shaken_poses(rig, round(seconds * RATE) + 1, RATE)
+    motion = motion_flow.begin(rig, first)
+    standing = PosedCollider(collider, first.matrix, first.matrix)
+    guides, posed, before, earlier = [motion.guides], [(standing,)], first, None
+    for now in later:
+        posed.append((PosedCollider(collider, before.matrix, now.matrix, earlier),))
+        motion = motion_flow.advance(rig, motion, now, posed[-1], settings, GRAVITY, 1.0 / RATE)
         guides.append(motion.guides)
-        earlier = before
+        earlier, before = before.matrix, now
+    assert motion.clearance is not None
+    begun = Begun(first, posed[0], motion.clearance.kept)
+    poses = [
+        replace(pose, solids=SimulatedSolids(begun, colliders))
+        for pose, colliders in zip((first, *later), posed, strict=True)
+    ]
     return MadeMotion(rig, range(len(poses)), RATE, lambda frame: (poses[frame], guides[frame]))
 
 

@@ -71,7 +71,7 @@ BENCHES: dict[str, Short] = {
     "engine": Short("shafts", "stills, skin, and animations"),
     "picture": Short("soft_shadows", "hair over EEVEE and Cycles, blur and environments"),
     "cards": Short("order", "building, atlases, occlusion, passes, and strands"),
-    "engines": Short("page", "other programs, springs, levels and atlases"),
+    "engines": Short("page springs", "other programs, levels and atlases"),
     "exchange": Short("usd", "Alembic, motion, kills and damaged files"),
     "faults": Short("runs 40", "most of the faults"),
     "house": Short(),

@@ -2,12 +2,12 @@
 
 Cards that move alike share a chain, as those of baked joints do (`joint_chains`), but bones turn
 only: a vertex is weighted to two neighbouring bones of its own chain, one of another one, and the
-head. Chains are added while they bring something.
+head. There are as many as bring something.
 """
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -34,8 +34,9 @@ from .spring_fit import spring_fit
 #: Joints in a chain that are tried, and chains, the fewest first.
 _JOINTS = (2, 3, 4, 5, 7)
 _CHAINS = (1, 2, 4, 8, 12, 16, 24, 32, 48, 64, 96, 128)
-#: Chains go on being added while a step takes at least this fraction of the error away.
-_WORTH = 0.03
+#: By this fraction an error may be larger than the least where fewer joints do; and by how much,
+#: of the hair's length, errors differ unseen.
+_WORTH, _UNSEEN = 0.03, 1.0e-4
 #: Frames and vertices that skins are learnt from, and vertices that are placed at once.
 _LEARNT_FRAMES = 24
 _LEARNT_VERTICES = 4000
@@ -73,6 +74,15 @@ class _Choice:
     joints: int
 
 
+@dataclass(frozen=True)
+class Tried[Choice]:
+    """How many joints something has, and how far it is from the simulation [m]."""
+
+    joints: int
+    error: float
+    choice: Choice
+
+
 def spring_steps(tracks: CardTracks, most: int, balls: Balls) -> Generator[float, None, SpringRig]:
     """The fewest joints that move the cards nearly as well as `most` would.
 
@@ -84,23 +94,14 @@ def spring_steps(tracks: CardTracks, most: int, balls: Balls) -> Generator[float
     """
     learnt = _Learnt.of(tracks)
     yield 0.1
-    best, least = None, np.inf
-    for joints in _JOINTS:
-        before = np.inf
-        for count in _CHAINS:
-            if count > 1 and count * joints + 1 > most:
-                count = (most - 1) // joints
+    tried: list[Tried[_Choice]] = []
+    for number, joints in enumerate(_JOINTS):
+        counts = {min(count, max((most - 1) // joints, 1)) for count in _CHAINS}
+        for count in sorted(counts):
             choice = learnt.choice(count, joints)
-            error = learnt.error(choice)
-            if error > before * (1.0 - _WORTH):
-                break
-            before = error
-            if error < least * (1.0 - _WORTH):
-                best, least = choice, error
-            if (count + 1) * joints + 1 > most:
-                break
-        yield 0.1 + 0.3 * joints / _JOINTS[-1]
-    assert best is not None, "one chain is always tried"
+            tried.append(Tried(count * joints, learnt.error(choice), choice))
+            yield 0.1 + 0.3 * (number + count / max(counts)) / len(_JOINTS)
+    best = fewest_joints(tried, _UNSEEN * tracks.hair_length)
     chains, hit_radius = _colliding(best.rest, balls)
     fit = spring_fit(chains, best.places, tracks.carrier, tracks.frame_rate, hit_radius)
     found = yield from _part(fit, 0.4, 0.9)
@@ -110,6 +111,18 @@ def spring_steps(tracks: CardTracks, most: int, balls: Balls) -> Generator[float
     miss = spring_error(tracks, chains.rest, moved, skins)
     yield 1.0
     return SpringRig(chains, found.values, skins, found.error, miss)
+
+
+def fewest_joints[Choice](tried: Sequence[Tried[Choice]], unseen: float) -> Choice:
+    """Of all that were tried the one with the fewest joints that is nearly as near as the nearest,
+    wherever between them more brought nothing.
+
+    Args:
+        unseen: errors that differ by less count as equal [m].
+    """
+    least = min(each.error for each in tried)
+    enough = [each for each in tried if each.error <= least * (1.0 + _WORTH) + unseen]
+    return min(enough, key=lambda each: (each.joints, each.error)).choice
 
 
 def spring_error(

@@ -21,7 +21,7 @@ from hairloom.addon.cards.spring_bones import (
     stepped,
     turns_to,
 )
-from hairloom.addon.cards.spring_chains import spring_steps
+from hairloom.addon.cards.spring_chains import Tried, fewest_joints, spring_steps
 from hairloom.addon.cards.spring_fit import spring_fit
 from hairloom.addon.cards.steps import result_of
 
@@ -191,6 +191,20 @@ def moving_cards(swing: float) -> CardTracks:
     return CardTracks(
         (mesh,), (moved.astype(np.float32),), head, 0.15, guides[:, 0].mean(axis=0), 0, STEP_RATE
     )
+
+
+@pytest.mark.parametrize(
+    ("errors", "best"),
+    [
+        ({3: 6.0, 5: 5.9, 9: 6.1, 119: 1.6}, 119),  # a step that brings nothing ends no search
+        ({3: 6.0, 9: 1.61, 119: 1.6}, 9),
+        ({3: 1e-9, 9: 0.0}, 3),
+        ({3: 2.0, 9: 1.0, 119: 3.0}, 9),
+    ],
+)
+def test_the_fewest_joints_that_do_are_chosen(errors: dict[int, float], best: int) -> None:
+    tried = [Tried(joints, error, joints) for joints, error in errors.items()]
+    assert fewest_joints(tried, 1e-6) == best
 
 
 def test_what_swings_as_one_needs_one_chain() -> None:
