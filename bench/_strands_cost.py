@@ -30,7 +30,7 @@ from hairloom.addon.render.strand_layout import strand_rows_size
 from hairloom.addon.rig_flow import Pose, Rig
 
 SHADERS = Path(__file__).parent / "shaders"
-ROUNDS, EVERY, CHUNK = 9, 4, 512
+ROUNDS, EVERY, CHUNK = 40, 4, 512
 
 
 def cost_figures(rig: Rig, motions: Sequence[Motion]) -> dict[str, float]:
