@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import ast
 import re
-from pathlib import Path
 
 import figures
 import pytest
@@ -102,48 +100,3 @@ def test_arguments_are_words_that_benchmarks_know() -> None:
         )
         for word in re.findall(r"--[a-z-]+", short.arguments):
             assert f'"{word}"' in family, (name, word)
-
-
-def names_in(path: Path) -> set[str]:
-    """What can be imported from a module: all that its outermost statements bind."""
-    found: set[str] = set()
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        match node:
-            case ast.FunctionDef(name=name) | ast.ClassDef(name=name):
-                found.add(name)
-            case ast.Import(names=names) | ast.ImportFrom(names=names):
-                found |= {(each.asname or each.name).split(".")[0] for each in names}
-            case ast.Name(id=name, ctx=ast.Store()) | ast.TypeAlias(name=ast.Name(id=name)):
-                found.add(name)
-    return found
-
-
-def module_file(name: str, folder: Path) -> Path | None:
-    """The file of a module of ours; None of others."""
-    if name.startswith("hairloom"):
-        base = figures.REPOSITORY.joinpath(*name.split(".")[1:])
-        return base / "__init__.py" if base.is_dir() else base.with_suffix(".py")
-    found = [each / f"{name}.py" for each in (folder, figures.REPOSITORY / "tools")]
-    return next((path for path in found if path.is_file()), None)
-
-
-@pytest.mark.parametrize("folder", ["bench", "tools"])
-def test_what_benchmarks_and_tools_import_is_there(folder: str) -> None:
-    """Nobody runs them for days, so a name that was changed is noticed here."""
-    lacking, asked = [], 0
-    for path in sorted((figures.REPOSITORY / folder).glob("*.py")):
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            if not isinstance(node, ast.ImportFrom) or node.module is None:
-                continue
-            module = module_file(node.module, path.parent)
-            if module is None:
-                continue
-            asked += 1
-            known = names_in(module) if module.is_file() else set()
-            for each in node.names:
-                below = module.parent / f"{each.name}.py", module.parent / each.name
-                is_module = module.name == "__init__.py" and any(it.exists() for it in below)
-                if each.name not in known and not is_module:
-                    lacking.append(f"{path.name}: {node.module}.{each.name}")
-    assert lacking == []
-    assert asked > 20
