@@ -70,6 +70,7 @@ def test_frames_output_and_settings_are_chosen(file, tmp_path):
     assert list(dynamics.style_along) == pytest.approx([1, 0.5, 0.25, 0.1, 0])
 
 
+@pytest.mark.alike
 @pytest.mark.parametrize("verb", [["bake"], ["simulate", "--animated"], ["simulate"]])
 def test_only_selected_curves_move_by_themselves(file, tmp_path, verb):
     """In a file that was saved with a selection; the others are exactly where their style is."""

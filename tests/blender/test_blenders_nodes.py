@@ -47,6 +47,7 @@ def farthest_from(points: np.ndarray, line: np.ndarray) -> float:
     return float(np.linalg.norm(points[:, None] - nearest, axis=-1).min(axis=1).max())
 
 
+@pytest.mark.alike
 @pytest.mark.draws(light=False)
 @pytest.mark.parametrize("nodes", NODES)
 def test_what_blenders_nodes_make_is_drawn(

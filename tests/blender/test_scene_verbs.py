@@ -386,6 +386,7 @@ def test_a_render_of_a_scene_draws_its_hair(
     assert "several objects: Fringe, Hair" in said and "--groom" in said
 
 
+@pytest.mark.alike
 @pytest.mark.parametrize("how", ["collection", "collider", "left out"])
 def test_a_shake_of_a_groom_stays_out_of_its_colliders(scene: Path, how: str) -> None:
     """A ball in the midst of it: the shake begins, and hair is led out of it at a walk."""
