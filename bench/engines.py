@@ -54,14 +54,16 @@ AT_LEAST = {"*opaque_percent": 25.0, "*strand_texels": 1.5}
 
 def main(arguments: list[str]) -> int:
     start()
-    part, *names = arguments or [""]
+    known = (*PARTS, "levels", "atlas")
+    parts = [each for each in arguments if each in known] or known
+    names = [each for each in arguments if each not in known]
     found: dict[str, Any] = {}
     for name, figures in PARTS.items():
-        if part in ("", name):
+        if name in parts:
             found |= figures()
-    if part in ("", "levels"):
+    if "levels" in parts:
         found |= level_figures(names)
-    if part in ("", "atlas"):
+    if "atlas" in parts:
         found |= atlas_figures(names)
     return report(found, REFERENCE, at_most=AT_MOST, at_least=AT_LEAST)
 

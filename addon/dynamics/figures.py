@@ -106,10 +106,10 @@ class CardFigures:
         return _table("Cards", tuple(asdict(self).values()))
 
 
-def blank_table() -> tuple[tuple[str, ...], ...]:
-    """The table of what nobody has measured yet, as large as that of any figures."""
+def blank_table(kind: type[Figures] | type[CardFigures]) -> tuple[tuple[str, ...], ...]:
+    """The table of what nobody has measured yet, as large as that of any figures of this kind."""
     rows = []
-    for name, *values in Figures().table:
+    for name, *values in kind().table:
         is_header = values[0] == "Worst"
         rows.append((name, *(each if is_header else each and "-" for each in values)))
     return tuple(rows)

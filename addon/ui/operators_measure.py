@@ -8,7 +8,7 @@ import bpy
 
 from ..blender.base.redraw import redraw_panels
 from ..blender.preview import previews
-from ..blender.sessions.measures import table_of
+from ..blender.sessions.measures import card_table_of, table_of
 from ..blender.sessions.session import Session
 from .drawing import draw_button
 from .reports import reporting
@@ -57,8 +57,7 @@ def draw_measure(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
     lines = layout.column(align=True)
     lines.active = not is_old
     draw_figures(lines, table_of(None if session is None else session.figures))
-    if session is not None and session.card_figures is not None:
-        draw_figures(lines, session.card_figures.table)
+    draw_figures(lines, card_table_of(None if session is None else session.card_figures))
 
 
 def draw_figures(column: bpy.types.UILayout, table: Iterable[Sequence[str]]) -> None:

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ...dynamics.figures import Figures, blank_table
+from ...dynamics.figures import CardFigures, Figures, blank_table
 
 #: The median of this many frames is reported, and only of those not older than this [s].
 _REPORTED, _LATEST = 15, 10.0
@@ -81,4 +81,9 @@ def _collect(thing: Any, seen: dict[int, int]) -> None:
 
 def table_of(figures: Figures | None) -> tuple[tuple[str, ...], ...]:
     """For a panel, as large where nothing was measured."""
-    return blank_table() if figures is None else figures.table
+    return blank_table(Figures) if figures is None else figures.table
+
+
+def card_table_of(figures: CardFigures | None) -> tuple[tuple[str, ...], ...]:
+    """The same of cards."""
+    return blank_table(CardFigures) if figures is None else figures.table

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from hairloom.addon.dynamics.colliders import DistanceField, PosedCollider, SphereCollider
-from hairloom.addon.dynamics.figures import Figures, Measure
+from hairloom.addon.dynamics.figures import CardFigures, Figures, Measure, blank_table
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.dynamics.state import start
 from hairloom.addon.strands import Surface
@@ -123,3 +123,12 @@ def test_nothing_is_deeper_in_a_thin_mesh_than_that_is_thick(kit):
     add(measure, grid, (PosedCollider(field, matrix, matrix),))
     found = measure.figures.strands_penetration_max_mm
     assert 3.0 < found < 5.5, "half of its thickness is 5 mm"
+
+
+@pytest.mark.parametrize("kind", [Figures, CardFigures])
+def test_what_was_not_measured_takes_as_much_room(kind: type[Figures] | type[CardFigures]) -> None:
+    """A panel keeps its height when it is measured."""
+    blank, table = blank_table(kind), kind().table
+    assert [len(row) for row in blank] == [len(row) for row in table]
+    assert [row[0] for row in blank] == [row[0] for row in table]
+    assert not any(any(letter.isdigit() for letter in text) for row in blank[1:3] for text in row)
