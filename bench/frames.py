@@ -13,6 +13,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
+from functools import partial
 from itertools import count
 from typing import Any
 
@@ -25,6 +26,7 @@ from gpu_calls import gpu_calls
 from hairloom.addon.groom.grow import grow, scalp_density
 from hairloom.addon.groom.settings import GrowSettings
 from hairloom.addon.render.camera import Camera, frame_camera
+from hairloom.addon.render.groom_pass import GroomPass
 from hairloom.addon.render.kept_picture import KeptPicture
 from hairloom.addon.render.snapshot import Snapshot
 from hairloom.addon.render.strand_layers import is_software
@@ -58,6 +60,7 @@ def main() -> int:
         **stage.still_figures(),
         **stage.orbit_figures(),
         **stage.two_view_figures(),
+        **stage.groom_figures(),
     }
     return report(found, REFERENCE, at_most=AT_MOST)
 
@@ -185,6 +188,37 @@ class Stage:
 
         in_one, in_two = self.least(one, two)
         return {"two_views_ratio": in_two / in_one}
+
+    def groom_figures(self) -> dict[str, float]:
+        """Two and four grooms that play in one place and shade each other, beside the same grooms
+        that each shade only themselves."""
+        found: dict[str, float] = {}
+        for number in (2, 4):
+            kinds = [[GroomPass() for _ in range(number)] for _ in range(2)]
+            alone, shared = self.least(
+                *(
+                    partial(self._draw_grooms, kind, is_shared)
+                    for kind, is_shared in zip(kinds, (False, True), strict=True)
+                )
+            )
+            found |= {
+                f"grooms_{number}_ms": 1000.0 * shared,
+                f"grooms_{number}_ratio": shared / alone,
+            }
+        return found
+
+    def _draw_grooms(self, passes: list[GroomPass], is_shared: bool) -> None:
+        camera = self.camera(0.0)
+        lights = three_point_lights(camera.view)
+        hair = [replace(self.hair(), lights=lights) for _ in passes]
+        maps = {
+            index: own.maps(each, view=0)
+            for index, (own, each) in enumerate(zip(passes, hair, strict=True))
+            if is_shared
+        }
+        for index, (own, each) in enumerate(zip(passes, hair, strict=True)):
+            others = own.others(index, each, maps)
+            self.draw(own.strands, each, 0.0, others=others, is_moving=True)
 
     def least(self, *works: Callable[[], None]) -> list[float]:
         """[s] of each, the least of all rounds but the first, in which they take turns."""

@@ -37,7 +37,8 @@ ui/operators_preview.py start_preview
           groom/guides.py choose_guides
           groom/weights.py guide_weights
     blender/viewport/overlay.py show
-      render/strand_pass.py StrandPass
+      render/groom_pass.py GroomPass
+        render/strand_pass.py StrandPass
 """,
     "2. Curves to cards file": """
 ui/operators_card_export.py HAIRLOOM_OT_export_cards
@@ -68,7 +69,8 @@ blender/preview/handlers.py register
               dynamics/step.py advance
     blender/preview/previews.py attempt
       blender/viewport/overlay.py show
-        render/strand_pass.py StrandPass
+        render/groom_pass.py GroomPass
+          render/strand_pass.py StrandPass
 """,
 }
 #: colours of floors: the window, Blender, the GPU, pure Python

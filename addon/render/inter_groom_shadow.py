@@ -48,6 +48,7 @@ class InterGroomShadow:
         self._blocks: list[UniformBlocks] = []
         self._found: Any = None
         self._made_of: tuple[Any, ...] = ()
+        self._kept: Sequence[tuple[int, OpacityMaps]] = ()  # so that their ids are of nothing else
 
     def at(
         self,

@@ -17,11 +17,10 @@ from . import gpu_memory
 from .accumulation import Target
 from .bright_pass import plain
 from .camera import Camera
-from .card_pass import CardPass
+from .groom_pass import GroomPass
 from .hair_on_meshes import HairOnMeshes
 from .hashed_alpha import shifts
 from .holdout import Holdout
-from .inter_groom_shadow import may_shade
 from .mesh_pass import MeshPass
 from .mesh_places import MeshPlaces, Placed
 from .mesh_shadows import MeshShadowPass
@@ -30,7 +29,6 @@ from .opacity_maps import OpacityMaps
 from .scene_snapshot import SceneSnapshot, shaded_by
 from .shafts_pass import finish_with_shafts, shafts_apart
 from .snapshot import MeshSnapshot, Snapshot
-from .strand_pass import StrandPass
 from .textures import texture_to_array
 
 type Rgba = tuple[float, float, float, float]
@@ -64,8 +62,7 @@ class ScenePass:
     """Keeps a scene on the GPU from draw to draw; making one touches no GPU."""
 
     def __init__(self) -> None:
-        self._strand_passes: dict[Hashable, StrandPass] = {}
-        self._card_passes: dict[Hashable, CardPass] = {}
+        self._grooms: dict[Hashable, GroomPass] = {}
         self._mesh_passes: dict[Hashable, MeshPass] = {}
         self._mesh_shadows, self._hair_on_meshes = MeshShadowPass(), HairOnMeshes()
         self._placed = MeshPlaces()
@@ -141,17 +138,12 @@ class ScenePass:
         """What is in the way of light in each groom; grooms that are no longer there are let go."""
         self._forget_but(scene)
         lit = {groom.key: scene.lit(groom) for groom in scene.grooms}
-        return {
-            key: self._strands(key).opacity(groom) or self._cards(key).opacity(groom)
-            for key, groom in lit.items()
-        }
+        return {key: self._groom(key).maps(groom) for key, groom in lit.items()}
 
     @property
     def notes(self) -> tuple[str, ...]:
         """What the artist should know of the last draw, each with its remedy."""
-        of_strands = (each.statistics.notes for each in self._strand_passes.values())
-        of_cards = (each.notes for each in self._card_passes.values())
-        return tuple(dict.fromkeys(chain(*of_strands, *of_cards)))
+        return tuple(dict.fromkeys(chain(*(each.notes for each in self._grooms.values()))))
 
     def nearest(
         self, scene: SceneSnapshot, camera: Camera, target: Target, size: tuple[int, int]
@@ -172,8 +164,8 @@ class ScenePass:
                 target.clear_color(_NOTHING)
                 with target.drawing():
                     opaque = _opaque(scene.lit(drawn))
-                    self._strands(drawn.key).draw(opaque, camera, *size, content="places")
-                    self._cards(drawn.key).draw_depth(drawn.snapshot, camera, *size)
+                    self._groom(drawn.key).strands.draw(opaque, camera, *size, content="places")
+                    self._groom(drawn.key).cards.draw_depth(drawn.snapshot, camera, *size)
                 before, depth = depth, target.depths()
                 here, found = depth < before, texture_to_array(target.color)
                 is_strand = here & (found[..., 3] > 0.0)
@@ -217,7 +209,7 @@ class ScenePass:
             with target.drawing():
                 for drawn in (each for each in scene.grooms if not each.is_holdout):
                     snapshot = scene.lit(drawn)
-                    self._strands(drawn.key).draw(snapshot, camera, *size, content="tangents")
+                    self._groom(drawn.key).strands.draw(snapshot, camera, *size, content="tangents")
             return texture_to_array(target.color)[..., :3].copy()
 
     def coverages(
@@ -240,8 +232,8 @@ class ScenePass:
                 target.clear_color(_NOTHING)
                 with target.drawing():
                     snapshot = scene.lit(drawn)
-                    self._strands(drawn.key).draw(snapshot, camera, *size, content="tangents")
-                    self._cards(drawn.key).draw(snapshot, camera, *size)
+                    self._groom(drawn.key).strands.draw(snapshot, camera, *size, content="tangents")
+                    self._groom(drawn.key).cards.draw(snapshot, camera, *size)
                 alphas.append(texture_to_array(target.color)[..., 3].copy())
         found: dict[str, Floats] = {}
         left = np.ones(mesh.shape, np.float32)
@@ -267,26 +259,13 @@ class ScenePass:
         """These grooms alone, in the order of the scene."""
         grooms = [(key, groom) for key, groom in lit.items() if key in keys]
         for key, groom in grooms:
-            others = self._others(key, groom, maps)
-            self._strands(key).draw(groom, camera, *size, others=others)
+            own = self._groom(key)
+            own.strands.draw(groom, camera, *size, others=own.others(key, groom, maps))
         for key, groom in grooms:
-            self._cards(key).draw(groom, camera, *size, opacity=maps[key])
+            self._groom(key).cards.draw(groom, camera, *size, opacity=maps[key])
 
-    def _others(
-        self, key: Hashable, groom: Snapshot, maps: dict[Hashable, OpacityMaps | None]
-    ) -> list[OpacityMaps]:
-        """Those of all other grooms whose shadow may fall on this one."""
-        others = [each for other, each in maps.items() if other != key and each is not None]
-        if not others or not groom.strand_count:
-            return []
-        ball = self._strands(key).ball(groom)
-        return [each for each in others if may_shade(each, ball)]
-
-    def _strands(self, key: Hashable) -> StrandPass:
-        return self._strand_passes.setdefault(key, StrandPass())
-
-    def _cards(self, key: Hashable) -> CardPass:
-        return self._card_passes.setdefault(key, CardPass())
+    def _groom(self, key: Hashable) -> GroomPass:
+        return self._grooms.setdefault(key, GroomPass())
 
     def _draw_meshes(
         self,
@@ -330,7 +309,7 @@ class ScenePass:
     def _forget_but(self, scene: SceneSnapshot) -> None:
         """Let go of grooms that are no longer there."""
         keys = {groom.key for groom in scene.grooms}
-        for passes in (self._strand_passes, self._card_passes, self._mesh_passes):
+        for passes in (self._grooms, self._mesh_passes):
             for key in set(passes) - keys - {None}:
                 del passes[key]
 

@@ -96,10 +96,14 @@ class Statistics:
 
 @dataclass(eq=False)
 class _Lit:
-    """What draws the maps of one light. light: None before the first."""
+    """What draws the maps of one light. light: None before the first.
+
+    between: what other grooms have in the way of it.
+    """
 
     light: tuple[Light, ...] | None = None
     opacity: OpacityPass = field(default_factory=OpacityPass)
+    between: InterGroomShadow = field(default_factory=InterGroomShadow)
 
 
 @dataclass(eq=False)
@@ -200,6 +204,8 @@ class StrandPass:
         maps = None
         if content == "light" and not is_debug:
             maps = self.opacity(snapshot, view=view, is_turning=is_turning)
+        if content == "light" and not others:
+            own.lit.between.release()  # else maps of grooms that are gone stay
         drawing = StrandDrawing(
             order=order,
             ribbon=self._ribbons.of,
@@ -210,7 +216,7 @@ class StrandPass:
                 self._curves(snapshot),
             ),
             shading=(
-                tuple(self._shading(snapshot, maps, others))
+                tuple(self._shading(snapshot, maps, own.lit.between, others))
                 if content == "light"
                 else (self._tangents(snapshot),)
             ),
@@ -307,7 +313,7 @@ class StrandPass:
         """Let go of all that lies on the GPU; the next draw uploads again."""
         self._blocks = UniformBlocks()
         self._views = {}
-        self._ball, self._between = HairBall(), InterGroomShadow()
+        self._ball = HairBall()
         self._colliders = UploadedColliders()
         self._textures: dict[str, Any] = {}
         self._uploaded: dict[str, tuple[Any, ...]] = {}
@@ -336,7 +342,11 @@ class StrandPass:
         return {name: ("FLOAT_2D", self._textures[name]) for name in names}
 
     def _shading(
-        self, snapshot: Snapshot, maps: OpacityMaps | None, others: Sequence[OpacityMaps]
+        self,
+        snapshot: Snapshot,
+        maps: OpacityMaps | None,
+        between: InterGroomShadow,
+        others: Sequence[OpacityMaps],
     ) -> Iterator[ShaderFeature]:
         """What all programs that shade these strands have.
 
@@ -365,17 +375,17 @@ class StrandPass:
             if "cv_received" in self._textures:
                 yield self._skin_feature()
         if others:
-            yield self._inter_groom_feature(others, len(snapshot.lights))
+            yield self._inter_groom_feature(between, others, len(snapshot.lights))
 
     def _inter_groom_feature(
-        self, others: Sequence[OpacityMaps], light_count: int
+        self, between: InterGroomShadow, others: Sequence[OpacityMaps], light_count: int
     ) -> ShaderFeature:
         """What a program has that knows of more hair in the way than its maps hold, by CV."""
         points, grooms = self._textures["cv_points"], [(NOBODY, other) for other in others]
-        between = self._between.at(points, self._points_serial, grooms, light_count)
+        found = between.at(points, self._points_serial, grooms, light_count)
         return ShaderFeature(
             name="others",
-            textures={"cv_other_tau": ("FLOAT_2D", between)},
+            textures={"cv_other_tau": ("FLOAT_2D", found)},
             varyings=(("smooth", "VEC4", "strand_other_tau"),),
             defines={"OTHER_TAU": 1},
         )

@@ -15,7 +15,7 @@ Colours are scene-linear Rec.709. Shadows are no matter of the lights.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -244,6 +244,14 @@ _STUDIO = (
     ((-0.9, 0.1, 0.5), (0.80, 0.90, 1.0), 1.6),
     ((-0.5, 0.55, -0.9), (1.0, 0.97, 0.93), 2.4),
 )
+
+
+def brightest(lights: Iterable[Light], place: Floats) -> tuple[Light, ...]:
+    """Those that are brightest at a place, (3,) [m], brightest first; as many as shaders know."""
+    at = np.asarray(place, np.float64)
+    strengths = [(light, float(light_irradiance(light, at).sum())) for light in lights]
+    in_order = sorted(strengths, key=lambda each: -each[1])
+    return tuple(light for light, _ in in_order[:LIGHT_CAPACITY])
 
 
 def kept_lights(lights: Sequence[Light]) -> list[Light]:

@@ -128,7 +128,7 @@ def test_the_preview_is_drawn_without_atomics(
         target.sized(96, 96).clear((0.0, 0.0, 0.0, 0.0))
         with target.drawing():
             shown.draw_body_shadow(camera)
-            shown.draw(camera, None, is_moving=False)
+            shown.draw(camera, {}, None, is_moving=False)
         pictures.append(texture_to_array(target.color))
     layers, hashed = pictures
     assert (layers[..., 3] > 0.1).mean() > 0.05 and not np.array_equal(layers, hashed)

@@ -151,7 +151,7 @@ def drawn_afresh(label, *, with_maps=False):
         view.picture.forget()
     if with_maps:
         for each in of_hairloom("overlay")._overlay.drawn.values():
-            each.strand_pass.forget_views(frozenset())
+            each.hair.strands.forget_views(frozenset())
     return (yield from pixels_at_rest(label))
 
 

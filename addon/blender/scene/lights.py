@@ -11,7 +11,7 @@ from mathutils import Matrix
 
 from ...arrays import Floats
 from ...shading.area_lights import Panel
-from ...shading.lights import LIGHT_CAPACITY, Cone, Light, light_irradiance
+from ...shading.lights import LIGHT_CAPACITY, Cone, Light, brightest
 
 type Color = tuple[float, float, float]
 
@@ -28,8 +28,7 @@ def read_lights(
         center: (3,) [m], world space.
         suns: those of the world.
     """
-    lights = [*_lights(depsgraph), *suns]
-    return tuple(sorted(lights, key=lambda light: -_strength(light, center))[:LIGHT_CAPACITY])
+    return brightest([*_lights(depsgraph), *suns], center)
 
 
 def light_warnings(depsgraph: bpy.types.Depsgraph) -> tuple[str, ...]:
@@ -172,10 +171,6 @@ def _emission(data: bpy.types.Light) -> Floats:
         return np.ones(3)
     color, strength = node.inputs["Color"], node.inputs["Strength"]
     return np.array(color.default_value[:3]) * strength.default_value
-
-
-def _strength(light: Light, center: Floats) -> float:
-    return float(light_irradiance(light, np.asarray(center, np.float64)).sum())
 
 
 def _node(tree: bpy.types.NodeTree | None, kind: str) -> bpy.types.Node | None:

@@ -30,13 +30,18 @@ class FrameTimes:
         self._times = {part: deque[tuple[float, float]](maxlen=_KEPT) for part in PARTS}
 
     @contextmanager
-    def measured(self, part: str) -> Iterator[None]:
+    def measured(self, part: str, *, goes_on: bool = False) -> Iterator[None]:
         """Time what runs inside, as a part of a frame; of a GPU's work only its handing over
-        counts."""
+        counts.
+
+        Args:
+            goes_on: more of what was measured last.
+        """
         begin = time.perf_counter()
         yield
-        end = time.perf_counter()
-        self._times[part].append((end, end - begin))
+        end, known = time.perf_counter(), self._times[part]
+        before = known.pop()[1] if goes_on else 0.0
+        known.append((end, end - begin + before))
 
     def milliseconds(self, part: str) -> float | None:
         """The median of the last frames; None where there were none lately."""

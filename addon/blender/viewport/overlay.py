@@ -7,8 +7,9 @@ Drawing itself never reads a data-block: all it asks Blender for is which view i
 from __future__ import annotations
 
 import traceback
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import chain
 from typing import Any
 
 import bpy
@@ -19,16 +20,16 @@ from ...render import gpu_memory
 from ...render.body_shadow import BodyShadow
 from ...render.camera import Camera
 from ...render.capabilities import capabilities
-from ...render.card_pass import CardPass
 from ...render.display import Display
+from ...render.groom_pass import GroomPass
 from ...render.kept_picture import KeptPicture
 from ...render.opacity_maps import OpacityMaps
 from ...render.scene_pass import ONE_AT_A_TIME
 from ...render.scene_snapshot import SceneSnapshot
 from ...render.snapshot import Snapshot
-from ...render.strand_pass import Statistics, StrandPass, drawn_transparency
+from ...render.strand_pass import Statistics, drawn_transparency
 from ...shading.environment import Environment, world_suns
-from ...shading.lights import Light, three_point_lights
+from ...shading.lights import Light, brightest, three_point_lights
 from ..base.objects import LayerKey, is_solid, layer_key, layers_with, spaces_without
 from ..base.redraw import redraw_panels, redraw_views
 from ..cards.show import as_shown, without_strands
@@ -89,8 +90,7 @@ class Drawn:
     """One groom that is drawn, and what draws it; without GPU until the first draw."""
 
     drawing: Drawing
-    strand_pass: StrandPass = field(default_factory=StrandPass)
-    card_pass: CardPass = field(default_factory=CardPass)
+    hair: GroomPass = field(default_factory=GroomPass)
     shadow: BodyShadow = field(default_factory=BodyShadow)
 
 
@@ -226,7 +226,7 @@ def _draw_strands(context: Any) -> None:
         if view.picture.is_of(marks):
             view.picture.show()
             for uid, counted in view.counted.items():
-                _overlay.drawn[uid].strand_pass.statistics = counted
+                _overlay.drawn[uid].hair.strands.statistics = counted
             was_shown_again(view, context.space_data.shading)
         else:
             _draw_afresh(view, camera, shown, marks)
@@ -235,7 +235,7 @@ def _draw_strands(context: Any) -> None:
 
 def _draw_afresh(view: View, camera: Camera, shown: list[_Shown], marks: tuple[Any, ...]) -> None:
     """All grooms into the view that is being drawn, and into its picture if that can be kept."""
-    forget_closed_views(each.strand_pass for each in _overlay.drawn.values())
+    forget_closed_views(each.hair.strands for each in _overlay.drawn.values())
     can_be_kept = all(each.can_be_kept for each in shown) and not gpu_memory.is_short()
     picture = view.picture if can_be_kept else None
     if picture is None:
@@ -243,11 +243,16 @@ def _draw_afresh(view: View, camera: Camera, shown: list[_Shown], marks: tuple[A
     else:
         picture.begin()
     is_moving = view.moves_to(marks)
+    maps: dict[Hashable, OpacityMaps | None] = {}
+    if len(shown) > 1:  # hair that is alone asks for its maps when it is drawn
+        for each in shown:
+            with each.drawing.times.measured("drawing"):
+                maps[each.uid] = each.maps()
     for each in shown:
-        with each.drawing.times.measured("drawing"):
-            each.draw(camera, picture, is_moving=is_moving)
-    view.is_behind = any(each.drawn.strand_pass.is_behind(view.address) for each in shown)
-    view.counted = {each.uid: each.drawn.strand_pass.statistics for each in shown}
+        with each.drawing.times.measured("drawing", goes_on=bool(maps)):
+            each.draw(camera, maps, picture, is_moving=is_moving)
+    view.is_behind = any(each.drawn.hair.strands.is_behind(view.address) for each in shown)
+    view.counted = {each.uid: each.drawn.hair.strands.statistics for each in shown}
     if picture is not None and not view.is_behind:
         picture.marks = marks
 
@@ -290,61 +295,71 @@ class _Shown:
         is_plain = snapshot.cards is None and snapshot.debug_view == "none"
         return is_plain and drawn_transparency(snapshot.strand_settings) == "layers"
 
-    @property
-    def _card_maps(self) -> OpacityMaps | None:
-        has_cards = self.snapshot.cards is not None
-        return self.drawn.card_pass.opacity(self.snapshot) if has_cards else None
+    def maps(self) -> OpacityMaps | None:
+        """As of GroomPass."""
+        hair, snapshot = self.drawn.hair, self.snapshot
+        return hair.maps(snapshot, view=self.address, is_turning=self.is_turning)
 
     def draw_body_shadow(self, camera: Camera) -> None:
         """Before all hair: it lies on what Blender has drawn."""
         if not self.shades_body:
             return
-        maps = self._card_maps or self.drawn.strand_pass.opacity(
-            self.snapshot, view=self.address, is_turning=self.is_turning
-        )
+        maps = self.maps()
         if maps is not None:
             _, _, width, height = gpu.state.viewport_get()
             shadow = self.drawn.shadow
             shadow.draw(self.snapshot, maps, camera, width, height, display=self.display)
 
-    def draw(self, camera: Camera, picture: KeptPicture | None, *, is_moving: bool) -> None:
-        """Its hair; strands go into the picture as well."""
+    def draw(
+        self,
+        camera: Camera,
+        maps: Mapping[Hashable, OpacityMaps | None],
+        picture: KeptPicture | None,
+        *,
+        is_moving: bool,
+    ) -> None:
+        """Its hair; strands go into the picture as well.
+
+        Args:
+            maps: of all hair in the view, by session number.
+        """
         _, _, width, height = gpu.state.viewport_get()
-        snapshot, display, drawn = self.snapshot, self.display, self.drawn
-        drawn.strand_pass.draw(
+        snapshot, display, hair = self.snapshot, self.display, self.drawn.hair
+        hair.strands.draw(
             snapshot,
             camera,
             width,
             height,
             output="viewport",
             display=display,
+            others=hair.others(self.uid, snapshot, maps),
             view=self.address,
             is_turning=self.is_turning,
             is_moving=is_moving,
             picture=picture,
         )
-        drawn.card_pass.draw(
+        hair.cards.draw(
             snapshot,
             camera,
             width,
             height,
-            opacity=self._card_maps,
+            opacity=hair.cards.opacity(snapshot),
             output="viewport",
             display=display,
         )
 
 
 def _shown_now(context: Any, camera: Camera, *, has_turned: bool) -> Iterator[_Shown]:
-    """All grooms of the view that is being drawn."""
+    """All grooms of the view that is being drawn; cards last, as they are blended."""
     space = context.space_data
     address, studio = space.as_pointer(), three_point_lights(camera.view)
     display = view_transform.display_of(space.shading, context.scene)
-    for uid, drawing in shown_in(context):
-        snapshot = drawing.snapshot
+    found = sorted(shown_in(context), key=lambda each: each[1].snapshot.cards is not None)
+    snapshots = _in_one_light([lit(each.snapshot, space.shading, studio) for _, each in found])
+    for (uid, drawing), snapshot in zip(found, snapshots, strict=True):
         sees_all = is_seen_through(space.shading) or address in drawing.bare_in
         if sees_all:
             snapshot = with_all_strands(snapshot)
-        snapshot = lit(snapshot, space.shading, studio)
         yield _Shown(
             uid,
             _overlay.drawn[uid],
@@ -357,6 +372,17 @@ def _shown_now(context: Any, camera: Camera, *, has_turned: bool) -> Iterator[_S
             is_turning=has_turned and snapshot.lights is studio,
             sees_all=sees_all,
         )
+
+
+def _in_one_light(snapshots: Sequence[Snapshot]) -> list[Snapshot]:
+    """By the same lights in the same order, since grooms ask each other's maps by a light's number.
+    Of more lights than shine in a view each groom knows those that are brightest at its own hair.
+    """
+    if all(each.lights == snapshots[0].lights for each in snapshots):
+        return list(snapshots)
+    known = dict.fromkeys(chain.from_iterable(each.lights for each in snapshots))
+    lights = brightest(known, np.mean([each.center for each in snapshots], axis=0))
+    return [replace(each, lights=lights) for each in snapshots]
 
 
 def _camera(view: Any) -> Camera:
@@ -392,20 +418,20 @@ def _counts_of(drawn: Drawn) -> str:
     drawing = drawn.drawing
     if drawing.card_counts:
         return card_counts_line(drawing.counts_of, drawing.guide_count, drawing.card_counts)
-    strand_count, drawn_now = drawing.snapshot.strand_count, drawn.strand_pass.statistics
+    strand_count, drawn_now = drawing.snapshot.strand_count, drawn.hair.strands.statistics
     return counts_line(drawing.counts_of, drawing.guide_count, strand_count, drawn_now)
 
 
 def statistics_of(uid: int) -> Statistics:
     """What was drawn of a groom in the last view; nothing before the first."""
     drawn = _overlay.drawn.get(uid)
-    return Statistics() if drawn is None else drawn.strand_pass.statistics
+    return Statistics() if drawn is None else drawn.hair.strands.statistics
 
 
 def notes_of(uid: int) -> tuple[str, ...]:
     """What the artist should know of how a groom was drawn in the last view."""
     drawn = _overlay.drawn.get(uid)
-    return () if drawn is None else (*drawn.strand_pass.statistics.notes, *drawn.card_pass.notes)
+    return () if drawn is None else drawn.hair.notes
 
 
 def drawn() -> frozenset[int]:

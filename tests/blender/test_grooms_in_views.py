@@ -1,0 +1,276 @@
+"""Grooms in one 3D view shade each other, as in a render and as theory says."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+bpy = pytest.importorskip("bpy", reason="these tests need Blender or the bpy module")
+
+from flat_cards import card, constant, mesh_of, snapshot_of  # noqa: E402
+from gpu_calls import gpu_calls  # noqa: E402
+
+from hairloom.addon.blender.viewport import overlay, views  # noqa: E402
+from hairloom.addon.render import gpu_objects  # noqa: E402
+from hairloom.addon.render.accumulation import Target  # noqa: E402
+from hairloom.addon.render.camera import Camera, look_at, orthographic  # noqa: E402
+from hairloom.addon.render.scene_pass import ScenePass  # noqa: E402
+from hairloom.addon.render.scene_snapshot import DrawnGroom, SceneSnapshot  # noqa: E402
+from hairloom.addon.render.snapshot import Snapshot  # noqa: E402
+from hairloom.addon.render.textures import texture_to_array  # noqa: E402
+from hairloom.addon.shading.lights import Light, brightest  # noqa: E402
+from hairloom.addon.shading.settings import ShadingSettings, StrandSettings  # noqa: E402
+from hairloom.addon.shading.volume.settings import VolumeSettings  # noqa: E402
+
+pytestmark = [pytest.mark.draws, pytest.mark.usefixtures("gpu_context", "extension")]
+
+SIZE, ADDRESS = 64, 7
+NOTHING = (0.0, 0.0, 0.0, 0.0)
+OPAQUE = StrandSettings(tip_width=1.0, transparency="none")
+LOOK = ShadingSettings(model="kajiya_kay", base_color=(0.3, 0.3, 0.3))
+VOLUME = VolumeSettings(resolution=256, layers=8, strand_fraction=1.0, bias=0.0, scattering=False)
+SUN = Light.sun((0.0, 0.0, -1.0), (1.0, 1.0, 1.0), 2.0)
+ASIDE = Light.sun((0.6, 0.2, -1.0), (1.0, 0.8, 0.6), 1.0)
+CAMERA = Camera(
+    look_at((0.0, -0.8, 0.5), (0.0, 0.0, 0.05), up=(0.0, 0.0, 1.0)),
+    orthographic(0.4, 1.0, 0.0, 3.0),
+)
+
+
+def sheet(
+    height: float, count: int, radius: float = 2.0e-4, seed: int = 1, **changes: Any
+) -> Snapshot:
+    """Level strands side by side at about one height, 0.4 m wide, of which the sun goes straight
+    through."""
+    random = np.random.default_rng(seed)
+    strands = np.zeros((count, 6, 3), np.float32)
+    strands[..., 0] = np.linspace(-0.2, 0.2, 6)
+    strands[..., 1] = 0.4 * ((np.arange(count) + 0.5) / count - 0.5)[:, None]
+    strands[..., 2] = height + random.uniform(0.0, 0.005, (count, 1))
+    made = Snapshot(
+        strands,
+        np.full(strands.shape[:2], radius, np.float32),
+        shading=LOOK,
+        strand_settings=OPAQUE,
+        volume=VOLUME,
+        lights=(SUN, ASIDE),
+        ambient=(0.0, 0.0, 0.0),
+        volume_center=np.array([0.0, 0.0, -1.0]),
+    )
+    return replace(made, **changes)
+
+
+class SmallView:
+    """A 3D view of SIZE pixels of this scene, as Blender hands it to who draws into it."""
+
+    def __init__(self) -> None:
+        spaces = (
+            area.spaces.active
+            for screen in bpy.data.screens
+            for area in screen.areas
+            if area.type == "VIEW_3D"
+        )
+        self.space = next(spaces)
+        self.space.shading.type = "MATERIAL"
+        self.space.shading.use_scene_lights = self.space.shading.use_scene_world = True
+        bpy.context.scene.view_settings.view_transform = "Standard"
+        region_data = SimpleNamespace(
+            as_pointer=lambda: ADDRESS,
+            view_matrix=CAMERA.view,
+            window_matrix=CAMERA.projection,
+            use_clip_planes=False,
+        )
+        self.context = SimpleNamespace(
+            scene=bpy.context.scene,
+            view_layer=bpy.context.view_layer,
+            space_data=self.space,
+            region_data=region_data,
+            mode="OBJECT",
+        )
+        self.target = Target()
+
+    def shows(self, **grooms: Snapshot | None) -> np.ndarray:
+        """What is drawn of these grooms, (SIZE, SIZE, 4); None is one that is hidden."""
+        numbers = {name: number for number, name in enumerate(sorted(grooms), start=1)}
+        for uid in set(overlay._overlay.drawn) - set(numbers.values()):
+            overlay.drop(uid)
+        for name, groom in grooms.items():
+            if groom is None:
+                overlay.hide(numbers[name])
+            else:
+                known = overlay.drawing_of(numbers[name])
+                if known is None or known.snapshot is not groom or not known.is_visible:
+                    overlay.show(numbers[name], overlay.Drawing(groom))
+        return self.drawn()
+
+    def drawn(self) -> np.ndarray:
+        self.target.sized(SIZE, SIZE).clear(NOTHING)
+        with self.target.drawing():
+            overlay._draw_strands(self.context)
+        return texture_to_array(self.target.color)
+
+
+@pytest.fixture
+def view(monkeypatch: pytest.MonkeyPatch) -> Iterator[SmallView]:
+    monkeypatch.setattr(views, "_addresses", lambda: iter((ADDRESS,)))  # no window shows it
+    overlay._overlay.drawn.clear()
+    yield SmallView()
+    overlay._overlay.drawn.clear()
+    views.forget_views()
+
+
+def row_of(height: float, y: float) -> int:
+    """Where it is seen in the view."""
+    seen = CAMERA.projection @ CAMERA.view @ np.array([0.0, y, height, 1.0])
+    return int(0.5 * SIZE * (1.0 + seen[1]))
+
+
+def shown_in(view: SmallView) -> list[Any]:
+    return list(overlay._shown_now(view.context, CAMERA, has_turned=False))
+
+
+def of_render(*grooms: Snapshot) -> np.ndarray:
+    """One sample of the same by the render engine, scene-linear."""
+    drawn = tuple(DrawnGroom(number, each) for number, each in enumerate(grooms))
+    scene = SceneSnapshot(grooms=drawn, lights=grooms[0].lights, ambient=grooms[0].ambient)
+    target = Target()
+    ScenePass().draw(scene, CAMERA, target, (SIZE, SIZE), NOTHING)
+    return texture_to_array(target.color)
+
+
+def code_of(radiance: np.ndarray) -> np.ndarray:
+    """What Blender shows by its view transform Standard, 0 to 1."""
+    light = np.clip(radiance, 0.0, 1.0)
+    curved = 1.055 * np.maximum(light, 0.0031308) ** (1.0 / 2.4) - 0.055
+    return np.where(light <= 0.0031308, 12.92 * light, curved)
+
+
+def radiance_of(written: np.ndarray) -> np.ndarray:
+    """Of what a view was given, the radiance that it shows."""
+    code = np.maximum(written, 0.0) ** (1.0 / 2.2)
+    return np.where(code <= 0.04045, code / 12.92, ((code + 0.055) / 1.055) ** 2.4)
+
+
+FORMS = {
+    "deep": ({}, {}, {}),
+    "slices": ({"shadows": "slices"}, {"shadows": "slices"}, {"shadows": "slices"}),
+    "mixed": ({"shadows": "slices", "layers": 16}, {}, {"shadows": "none"}),
+}
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_hair_has_the_colours_of_a_render(view: SmallView, form: str) -> None:
+    """Three grooms above each other, opaque, so that each pixel is of one strand."""
+    changes = [replace(VOLUME, **each) for each in FORMS[form]]
+    low, middle, high = (
+        sheet(height, 400, seed=seed, volume=volume)
+        for seed, (height, volume) in enumerate(zip((0.0, 0.06, 0.12), changes, strict=True))
+    )
+    found = view.shows(a=low, b=middle, c=high)
+    rendered = of_render(low, middle, high)
+    assert (found[..., 3] == rendered[..., 3]).all() and rendered[..., 3].mean() > 0.3
+    shown = np.maximum(found[..., :3], 0.0) ** (1.0 / 2.2)
+    assert np.abs(shown - code_of(rendered[..., :3])).max() < 1.0 / 255.0
+    alone = view.shows(a=low)
+    assert np.abs(found - alone)[alone[..., 3] > 0.0].max() > 0.1
+
+
+@pytest.mark.parametrize("shadows", ["deep", "slices"])
+def test_light_after_a_groom_is_what_beers_law_says(view: SmallView, shadows: str) -> None:
+    """A sheet of strands that cover half of the light's way, above a strand of another groom:
+    exp(-1/2) of the sun arrives there."""
+    volume = replace(VOLUME, shadows=shadows, layers=16, resolution=64)
+    dim = Light.sun((0.0, 0.0, -1.0), (1.0, 1.0, 1.0), 0.5)  # nothing is brighter than white
+    few = sheet(0.0, 12, radius=1.0e-3, volume=volume, lights=(dim,))
+    above = sheet(0.1, 400, radius=2.5e-4, volume=volume, lights=(dim,))
+    alone, both = (
+        radiance_of(view.shows(**grooms)[..., :3])
+        for grooms in ({"a": few}, {"a": few, "b": above})
+    )
+    rows = row_of(0.0, -0.2), row_of(0.1, -0.2)  # of the lower sheet alone, before the upper one
+    middle = slice(rows[0] + 1, rows[1] - 1), slice(SIZE // 4, -SIZE // 4)
+    seen = alone[middle].min(axis=2) > 0.0
+    assert seen.sum() > 40 and alone.max() < 0.9
+    left = both[middle][seen] / alone[middle][seen]
+    assert np.ptp(left) < 0.1
+    assert left.mean() == pytest.approx(np.exp(-0.5), abs=0.02)
+
+
+def test_what_happens_to_one_groom_is_seen_on_the_others(view: SmallView) -> None:
+    """A view keeps its picture until another groom moves, is hidden or goes."""
+    layered = replace(OPAQUE, transparency="layers")
+    low = sheet(0.0, 400, strand_settings=layered)
+    high = sheet(0.1, 400, seed=2, strand_settings=layered)
+    moved = replace(high, points=high.points + np.float32([0.15, 0.0, 0.0]))
+    view.shows(a=low, b=high)
+    both, again = view.drawn(), []
+    calls = gpu_calls(lambda: again.append(view.drawn()))
+    assert calls["draws"] == 2 and not calls.get("dispatches"), "nothing is looked up"
+    np.testing.assert_allclose(again[0], both, atol=1.0 / 510.0)
+    below = slice(0, row_of(0.1, -0.2) - 1)  # of the lower groom alone
+    for name, grooms in (
+        ("moved", {"a": low, "b": moved}),
+        ("back", {"a": low, "b": high}),
+        ("hidden", {"a": low, "b": None}),
+        ("shown", {"a": low, "b": high}),
+        ("gone", {"a": low}),
+    ):
+        view.shows(**grooms)
+        found = view.drawn()  # comes to rest
+        kept = {key: each for key, each in grooms.items() if each is not None}
+        views.forget_views()
+        overlay._overlay.drawn.clear()
+        afresh = view.shows(**kept)
+        np.testing.assert_allclose(found, afresh, atol=1.0 / 255.0, err_msg=name)
+        is_same = np.abs(found - both)[below].max() < 1.0 / 255.0
+        assert is_same == (name in ("back", "shown")), name
+
+
+def test_the_maps_of_a_groom_go_with_it(view: SmallView) -> None:
+    low, high = sheet(0.0, 400), sheet(0.1, 400, seed=2)
+    view.shows(a=low)
+    gpu_objects.free_unused()
+    before = gpu_objects.bytes_in_use()
+    view.shows(a=low, b=high)
+    gpu_objects.free_unused()
+    assert gpu_objects.bytes_in_use() > before + (1 << 20)
+    view.shows(a=low)
+    gpu_objects.free_unused()
+    assert gpu_objects.bytes_in_use() == before
+
+
+def test_cards_of_one_groom_shade_strands_of_another_and_are_drawn_last(view: SmallView) -> None:
+    """As in a render: half the light, below a card that covers half."""
+    dim = Light.sun((0.0, 0.0, -1.0), (1.0, 1.0, 1.0), 0.5)
+    few = sheet(0.0, 12, radius=1.0e-3, lights=(dim,))
+    flat = card((-0.2, -0.2), (0.2, 0.2), 0.0)
+    for name in ("positions", "normal", "tangent"):
+        flat[name] = flat[name] @ np.float64([[1, 0, 0], [0, 0, 1], [0, -1, 0]])
+    flat["positions"][:, 2] = 0.1
+    above = snapshot_of(mesh_of(flat), constant(alpha=0.5), volume=VOLUME, lights=(dim,))
+    above = replace(above, shading=LOOK, ambient=few.ambient)
+    alone, both = (
+        radiance_of(view.shows(**grooms)[..., :3])
+        for grooms in ({"b": few}, {"b": few, "a": above})
+    )
+    below = slice(row_of(0.0, -0.2) + 1, row_of(0.1, -0.2) - 1), slice(SIZE // 4, -SIZE // 4)
+    seen = alone[below].min(axis=2) > 0.0
+    assert (both[below][seen] / alone[below][seen]).mean() == pytest.approx(0.5, abs=0.03)
+    rendered = of_render(few, above)
+    np.testing.assert_allclose(both[below], rendered[below][..., :3], atol=1.0e-3)
+    assert [each.uid for each in shown_in(view)] == [2, 1], "cards blend over strands"
+
+
+def test_grooms_far_apart_know_the_same_lights() -> None:
+    """Of ten lamps each groom knows the eight that are brightest at its own hair."""
+    lamps = [Light.point((float(x), 0.0, 0.5), (1.0, 1.0, 1.0), 10.0) for x in range(10)]
+    ends = [sheet(0.0, 4, lights=brightest(lamps, np.array([x, 0.0, 0.0]))) for x in (0.0, 9.0)]
+    assert ends[0].lights != ends[1].lights
+    lit = overlay._in_one_light(ends)
+    assert lit[0].lights == lit[1].lights == brightest(lamps, ends[0].center)
+    assert overlay._in_one_light(ends[:1]) == ends[:1]
