@@ -3,6 +3,9 @@
 `make_real_flip` compares the sample scene, rendered by Hairloom with the settings that ship, with
 the same scene after *Make Real*: Blender's own curves, drawn again. FLIP is Andersson et al.'s
 (2020), over the pixels that hair changes. `make_real_seconds` is processor time.
+`real_light_percent` is how much more or less light, by channel, Cycles finds on these curves with
+their material than Hairloom did on the hair that they were, over all pixels of hair, for the worst
+of three colours.
 
 `comb_ms` is a stroke on long straight hair of 20,000 children until all strands have followed,
 `comb_all_ms` until the rest has come, `comb_light_ms` until that has its own light, `comb_undo_ms`
@@ -14,6 +17,7 @@ hearing Esc; see `_jobs`.
 
 make bench NAME=seat                some five minutes
 tools/bench.py seat comb            combing alone
+tools/bench.py seat real            Make Real, and its hair in Cycles, alone
 tools/bench.py seat grow            growing alone
 tools/bench.py seat jobs            long jobs alone
 """
@@ -38,9 +42,10 @@ from hairloom.addon.blender.base.parts import at_once
 from hairloom.addon.blender.setup.sample_scene import add_sample_scene
 from hairloom.addon.blender.strands.make_real import make_real
 
-REFERENCE = "the same scene before Make Real"
+REFERENCE = "the same scene before Make Real; Cycles"
 AT_MOST = {
     "make_real_flip": 0.05,
+    "real_light_percent": 25.0,
     "comb_ms": 100.0,
     "comb_undo_ms": 100.0,
     "comb_all_ms": 1000.0,
@@ -50,7 +55,11 @@ AT_MOST = {
 SIZE = 480
 #: what else is compared, without a limit: a look with all that a colour for each strand has to hold
 TINTED = {"tip_tint": 0.5, "grey_fraction": 0.1}
-_CHANGED = 0.01
+#: what hair changes where it is: as a picture shows it, and in light
+_CHANGED, _SEEN = 0.01, 0.03
+#: of Make Real in Cycles: width and height of a picture, samples of ours, paths a pixel, bounces
+CYCLES_SIZE, SAMPLES, PATHS, BOUNCES = 200, 4, 32, 64
+LOOKS = "black", "brown", "blond"
 
 
 def main(parts: list[str]) -> int:
@@ -63,21 +72,22 @@ def main(parts: list[str]) -> int:
         found |= edited()
     if "jobs" in parts or not parts:
         found |= silent()
-    if not parts:
+    if "real" in parts or not parts:
         found |= _figures({})
         found |= {f"{name}_tinted": value for name, value in _figures(TINTED).items()}
+        lights = {name: _light_in_cycles(name) for name in LOOKS}
+        found |= {f"real_light_percent_{name}": value for name, value in lights.items()}
+        found["real_light_percent"] = max(lights.values())
     return report(found, REFERENCE, at_most=AT_MOST)
 
 
 def _figures(look: dict[str, float]) -> dict[str, float]:
-    scene, hair = at_once(add_sample_scene(("looks/brown",), "light"))
+    scene, hair = _sample("brown", SIZE)
     for name, value in look.items():
         setattr(hair.data.hairloom.shading, name, value)
-    scene.render.resolution_x = scene.render.resolution_y = SIZE
     before = _picture(scene)
     began = time.process_time()
-    with bpy.context.temp_override(scene=scene, view_layer=scene.view_layers[0]):
-        ((real, _),) = at_once(make_real([hair], scene.view_layers[0].depsgraph))
+    real = _made_real(scene, hair)
     seconds = time.process_time() - began
     after = _picture(scene)
     real.hide_render = True
@@ -90,18 +100,48 @@ def _figures(look: dict[str, float]) -> dict[str, float]:
     }
 
 
-def _picture(scene: bpy.types.Scene) -> np.ndarray:
-    """As an artist sees it, (SIZE, SIZE, 3)."""
-    scene.render.image_settings.file_format = "PNG"
+def _light_in_cycles(look: str) -> float:
+    """The worst channel's difference of light between Hairloom and Cycles [%]."""
+    scene, hair = _sample(look, CYCLES_SIZE)
+    scene.hairloom.picture.samples = SAMPLES
+    ours = _picture(scene, "OPEN_EXR")
+    hair.hide_render = True
+    is_hair = np.abs(ours - _picture(scene, "OPEN_EXR")).max(axis=-1) > _SEEN
+    _made_real(scene, hair)
+    scene.render.engine, cycles = "CYCLES", scene.cycles
+    cycles.samples, cycles.sample_clamp_indirect, cycles.use_denoising = PATHS, 0.0, False
+    cycles.max_bounces = cycles.diffuse_bounces = BOUNCES
+    cycles.glossy_bounces = cycles.transmission_bounces = BOUNCES
+    ratio = _picture(scene, "OPEN_EXR")[is_hair].mean(axis=0) / ours[is_hair].mean(axis=0)
+    return float(100.0 * np.abs(ratio - 1.0).max())
+
+
+def _sample(look: str, size: int) -> tuple[bpy.types.Scene, bpy.types.Object]:
+    """The sample scene in this look, to be drawn so large."""
+    scene, hair = at_once(add_sample_scene((f"looks/{look}",), "light"))
+    scene.render.resolution_x = scene.render.resolution_y = size
+    return scene, hair
+
+
+def _made_real(scene: bpy.types.Scene, hair: bpy.types.Object) -> bpy.types.Object:
+    with bpy.context.temp_override(scene=scene, view_layer=scene.view_layers[0]):
+        ((real, _),) = at_once(make_real([hair], scene.view_layers[0].depsgraph))
+    return real
+
+
+def _picture(scene: bpy.types.Scene, kind: str = "PNG") -> np.ndarray:
+    """(SIZE, SIZE, 3): as an artist sees it, or linear light as OPEN_EXR."""
+    scene.render.image_settings.file_format = kind
     with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "picture.png"
-        scene.render.filepath = str(path)
+        path = Path(folder) / "picture"
+        scene.render.filepath, scene.render.use_file_extension = str(path), False
         bpy.ops.render.render(write_still=True, scene=scene.name)
         image = bpy.data.images.load(str(path), check_existing=False)
+        width, height = image.size
         pixels = np.empty(len(image.pixels), np.float32)
         image.pixels.foreach_get(pixels)
         bpy.data.images.remove(image)
-    return np.ascontiguousarray(pixels.reshape(SIZE, SIZE, -1)[..., :3])
+    return np.ascontiguousarray(pixels.reshape(height, width, -1)[..., :3])
 
 
 sys.exit(main(sys.argv[1:]))

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from hairloom.addon.parameters import ALL_SETTINGS
+from hairloom.addon.params.preset import read_any_preset
 from hairloom.addon.shading.marschner.look import root_absorption
 from hairloom.addon.shading.marschner.pigment import (
     color_absorption,
@@ -20,6 +23,8 @@ from hairloom.addon.shading.marschner.principled import (
     settings_from,
 )
 from hairloom.addon.shading.settings import ShadingSettings
+
+LOOKS = Path(__file__).parents[2] / "presets" / "looks"
 
 
 @pytest.mark.parametrize("radial", [0.05, 0.3, 0.6])
@@ -188,7 +193,27 @@ def test_what_the_node_cannot_do_is_said() -> None:
     uneven = ShadingSettings(width_tt=math.radians(1.0), width_trt=math.radians(20.0))
     assert any("one Roughness" in note for note in hair_from(uneven)[1])
     assert any("offsets" in note for note in hair_from(ShadingSettings(offset_trt=0.1))[1])
-    strong, notes = hair_from(ShadingSettings(strength_r=1.5))
-    assert strong.model == "HUANG" and strong.reflection == 1.0
+    strong, notes = hair_from(ShadingSettings(strength_trt=1.5))
+    assert strong.model == "CHIANG" and any("Second Strength became 1" in note for note in notes)
+    weak, notes = hair_from(ShadingSettings(strength_r=1.5, strength_tt=0.4))
+    assert weak.model == "HUANG" and (weak.reflection, weak.transmission) == (1.0, 0.4)
     assert any("taken down to 1" in note for note in notes)
     assert hair_from(ShadingSettings())[1] == ()
+
+
+def test_a_stronger_first_highlight_is_a_higher_index_of_refraction() -> None:
+    """Fresnel at right angles; Cycles knows no other strength of Chiang's first highlight."""
+
+    def reflectance(index: float) -> float:
+        return ((index - 1.0) / (index + 1.0)) ** 2
+
+    before = ShadingSettings(index_of_refraction=1.55, strength_r=1.3)
+    hair, notes = hair_from(before)
+    assert hair.model == "CHIANG" and notes == ()
+    assert reflectance(hair.ior) == pytest.approx(1.3 * reflectance(1.55))
+
+
+@pytest.mark.parametrize("path", sorted(LOOKS.glob("*.json")), ids=lambda path: path.stem)
+def test_no_look_that_ships_needs_huangs_model(path: Path) -> None:
+    """In Cycles it is darker than our pictures by a third; Chiang's is as bright."""
+    assert hair_from(read_any_preset(path, ALL_SETTINGS).settings)[0].model == "CHIANG"
