@@ -1,19 +1,20 @@
 // Hair's shadow on meshes that Blender has drawn: how much of the light hair leaves, as black that
 // lies over the finished picture.
 //
-// What a colour of the picture becomes depends on its view transform; a middle grey stands for all.
+// What a colour of the picture becomes depends on its view transform; skin stands for all.
+// Blender lays what is drawn over its picture by the powers 2.2 of code values, see lib_output.glsl.
 #include "lib_lights.glsl"
 #include "lib_environment.glsl"
 #include "lib_shadows.glsl"
 #include "lib_output.glsl"
 
-const float MIDDLE_GREY = 0.18, NO_LIGHT = 1.0e-4;
+const float NO_LIGHT = 1.0e-4;
 
-// Brightness on the screen of a matt grey surface in this light.
+// Brightness on the screen of a matt body in this light.
 float shown(vec3 radiance)
 {
-  vec3 code = pow(output_encoded(MIDDLE_GREY * radiance, {{output_viewport}}), vec3(1.0 / 2.2));
-  return dot(code, vec3(0.2126, 0.7152, 0.0722));
+  vec3 written = output_encoded(body_color * radiance, {{output_viewport}});
+  return dot(written, vec3(0.2126, 0.7152, 0.0722));
 }
 
 void main()

@@ -4,9 +4,9 @@ The meshes that throw shadows on the hair (Snapshot.casters) are drawn once more
 covers the picture by as much as hair takes of its light: of each light by its map, over all light
 that reaches the place. Where another mesh is nearer nothing is drawn.
 
-Limitations: it darkens the finished picture, for which a matt grey surface stands, so that a
-highlight on skin is darkened as its colour is. Two sheets of a mesh closer together than 0.05 % of
-their distance to the eye are darkened twice.
+Limitations: it darkens the finished picture, for which matt skin stands, so that a highlight is
+darkened as its colour is, and white cloth by a view transform too much. Two sheets of a mesh closer
+together than 0.05 % of their distance to the eye are darkened twice.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from .display import Display
 from .feature_programs import UniformBlocks, bound
 from .marschner_textures import under_hair_feature
 from .opacity_maps import OpacityMaps
+from .shader_feature import ShaderFeature
 from .shader_program import ShaderRecipe, released_with_shaders
 from .snapshot import Caster, Snapshot, surface_of
 from .textures import drawing_state
@@ -66,6 +67,7 @@ class BodyShadow:
             view_feature(camera, width, height),
             lights_feature(snapshot),
             under_hair_feature(snapshot, maps),
+            ShaderFeature(numbers={"body_color": ("VEC3", snapshot.skin_color)}),
             *([] if display is None else [display.feature]),
         ]
         for _, batch in self._batches:

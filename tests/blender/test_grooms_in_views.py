@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -14,6 +13,7 @@ bpy = pytest.importorskip("bpy", reason="these tests need Blender or the bpy mod
 
 from flat_cards import card, constant, mesh_of, snapshot_of  # noqa: E402
 from gpu_calls import gpu_calls  # noqa: E402
+from small_view import ADDRESS, NOTHING, SIZE, SmallView  # noqa: E402
 
 from hairloom.addon.blender.viewport import overlay, views  # noqa: E402
 from hairloom.addon.render import gpu_objects  # noqa: E402
@@ -26,11 +26,10 @@ from hairloom.addon.render.textures import texture_to_array  # noqa: E402
 from hairloom.addon.shading.lights import Light, brightest  # noqa: E402
 from hairloom.addon.shading.settings import ShadingSettings, StrandSettings  # noqa: E402
 from hairloom.addon.shading.volume.settings import VolumeSettings  # noqa: E402
+from hairloom.addon.strands import Surface  # noqa: E402
 
 pytestmark = [pytest.mark.draws, pytest.mark.usefixtures("gpu_context", "extension")]
 
-SIZE, ADDRESS = 64, 7
-NOTHING = (0.0, 0.0, 0.0, 0.0)
 OPAQUE = StrandSettings(tip_width=1.0, transparency="none")
 LOOK = ShadingSettings(model="kajiya_kay", base_color=(0.3, 0.3, 0.3))
 VOLUME = VolumeSettings(resolution=256, layers=8, strand_fraction=1.0, bias=0.0, scattering=False)
@@ -65,61 +64,11 @@ def sheet(
     return replace(made, **changes)
 
 
-class SmallView:
-    """A 3D view of SIZE pixels of this scene, as Blender hands it to who draws into it."""
-
-    def __init__(self) -> None:
-        spaces = (
-            area.spaces.active
-            for screen in bpy.data.screens
-            for area in screen.areas
-            if area.type == "VIEW_3D"
-        )
-        self.space = next(spaces)
-        self.space.shading.type = "MATERIAL"
-        self.space.shading.use_scene_lights = self.space.shading.use_scene_world = True
-        bpy.context.scene.view_settings.view_transform = "Standard"
-        region_data = SimpleNamespace(
-            as_pointer=lambda: ADDRESS,
-            view_matrix=CAMERA.view,
-            window_matrix=CAMERA.projection,
-            use_clip_planes=False,
-        )
-        self.context = SimpleNamespace(
-            scene=bpy.context.scene,
-            view_layer=bpy.context.view_layer,
-            space_data=self.space,
-            region_data=region_data,
-            mode="OBJECT",
-        )
-        self.target = Target()
-
-    def shows(self, **grooms: Snapshot | None) -> np.ndarray:
-        """What is drawn of these grooms, (SIZE, SIZE, 4); None is one that is hidden."""
-        numbers = {name: number for number, name in enumerate(sorted(grooms), start=1)}
-        for uid in set(overlay._overlay.drawn) - set(numbers.values()):
-            overlay.drop(uid)
-        for name, groom in grooms.items():
-            if groom is None:
-                overlay.hide(numbers[name])
-            else:
-                known = overlay.drawing_of(numbers[name])
-                if known is None or known.snapshot is not groom or not known.is_visible:
-                    overlay.show(numbers[name], overlay.Drawing(groom))
-        return self.drawn()
-
-    def drawn(self) -> np.ndarray:
-        self.target.sized(SIZE, SIZE).clear(NOTHING)
-        with self.target.drawing():
-            overlay._draw_strands(self.context)
-        return texture_to_array(self.target.color)
-
-
 @pytest.fixture
 def view(monkeypatch: pytest.MonkeyPatch) -> Iterator[SmallView]:
     monkeypatch.setattr(views, "_addresses", lambda: iter((ADDRESS,)))  # no window shows it
     overlay._overlay.drawn.clear()
-    yield SmallView()
+    yield SmallView(CAMERA)
     overlay._overlay.drawn.clear()
     views.forget_views()
 
@@ -274,3 +223,27 @@ def test_grooms_far_apart_know_the_same_lights() -> None:
     lit = overlay._in_one_light(ends)
     assert lit[0].lights == lit[1].lights == brightest(lamps, ends[0].center)
     assert overlay._in_one_light(ends[:1]) == ends[:1]
+
+
+@pytest.mark.parametrize(("left", "engine"), [(0.0, "BLENDER_EEVEE"), (1.0, "CYCLES")])
+def test_without_overlays_hair_is_there_and_its_head_hides_it(
+    view: SmallView, left: float, engine: str
+) -> None:
+    """EEVEE leaves no depths then, and Cycles those of nothing."""
+    hair = sheet(0.0, 400)
+    corners = np.float32([[-1, -0.05, -1], [0, -0.05, -1], [0, -0.05, 1], [-1, -0.05, 1]])
+    wall = Surface(corners, np.int32([[0, 1, 2], [0, 2, 3]]))  # in the left half, amid the hair
+    all_hair = view.shows(a=hair)[..., 3]
+    view.context.scene.render.engine = engine
+    view.space.shading.type = "RENDERED"
+    view.space.overlay.show_overlays, view.depth = False, left
+    overlay.show(1, overlay.Drawing(hair, head=wall))
+    found = view.drawn()[..., 3]
+    middle, before = SIZE // 2, row_of(0.0, -0.05)
+    assert (found[:, middle + 1 :] == all_hair[:, middle + 1 :]).all()
+    assert found[: before - 1, : middle - 1].mean() > 0.5, "before the wall"
+    assert (found[before + 2 :, : middle - 1] == 0.0).all() and all_hair[before + 2 :].max() > 0.0
+    overlay.show(1, overlay.Drawing(hair, head=wall, bare_in=frozenset({view.space.as_pointer()})))
+    assert (view.drawn()[..., 3] == all_hair).all(), "a head that is not shown hides nothing"
+    view.space.overlay.show_overlays, view.depth = True, 0.0
+    assert view.drawn()[..., 3].max() == 0.0, "Blender's own depths count"

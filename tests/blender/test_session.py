@@ -192,6 +192,7 @@ def test_blenders_own_strands_are_hidden_in_the_evaluated_copy_only(preview, eva
 
 def test_blenders_own_strands_throw_no_shadow_where_ours_lies_on_the_head(preview, evaluated):
     hair, _, session = preview
+    assert not hair.evaluated_get(evaluated()).visible_shadow, "from the start"
     for shadows, on_body, throws in (
         ("deep", True, False),
         ("deep", False, True),
@@ -203,6 +204,13 @@ def test_blenders_own_strands_throw_no_shadow_where_ours_lies_on_the_head(previe
         assert hair.evaluated_get(evaluated()).visible_shadow is throws
     assert hair.visible_shadow
     previews.stop(session)
+    assert hair.evaluated_get(evaluated()).visible_shadow
+
+
+def test_hair_on_no_head_keeps_the_shadow_of_blenders_own_strands(new_hair, evaluated):
+    hair = new_hair()
+    previews.start(hair, evaluated())
+    assert hair.data.hairloom.volume.on_body
     assert hair.evaluated_get(evaluated()).visible_shadow
 
 

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from hairloom.addon.render.snapshot import SKIN
 from hairloom.addon.shading.lights import Light
 from hairloom.addon.shading.marschner.look import fibre_of
 from hairloom.addon.shading.marschner.tables import PREVIEW_SIZE, marschner_tables
@@ -77,16 +78,18 @@ def shadow(
     return picture[..., 0]
 
 
-def encoded(radiance: Any) -> Any:
-    return 1.055 * radiance ** (1.0 / 2.4) - 0.055
+def shown(light: Any) -> Any:
+    """How bright skin is in this light, (..., 3) or one number: by the power 2.2 of code values, as
+    Blender lays what is drawn over its picture."""
+    code = 1.055 * (light * np.array(SKIN) / np.pi) ** (1.0 / 2.4) - 0.055
+    return code**2.2 @ [0.2126, 0.7152, 0.0722]
 
 
 @pytest.mark.parametrize("shadows", ["slices", "deep"])
 def test_skin_is_as_much_darker_on_the_screen_as_hair_leaves_of_its_light(shadows: str) -> None:
     """Beneath strands that cover half of it; beside them it is as it was."""
     found = shadow(SUN, shadows=shadows)
-    grey = 0.18 * 3.0 / np.pi
-    expected = encoded(grey * np.exp(-0.5)) / encoded(grey)
+    expected = shown(3.0 * np.exp(-0.5)) / shown(3.0)
     assert found[30:34, 30:34].mean() == pytest.approx(expected, abs=0.04)
     assert found[30:34, 2:8].min() > 0.99
 
@@ -96,12 +99,11 @@ def test_the_shadow_is_lighter_by_what_hair_sends_on() -> None:
     black, found = (
         float(shadow(SUN, shading=shading)[30:34, 30:34].mean()) for shading in (BLACK, blond)
     )
-    grey = 0.18 * 3.0 / np.pi
     tau = np.linspace(0.0, 2.0, 2001)
-    tau = np.interp(-black, -encoded(grey * np.exp(-tau)) / encoded(grey), tau)
+    tau = np.interp(-black, -shown(3.0 * np.exp(-tau[:, None])) / shown(3.0), tau)
     sides = fractions(marschner_tables(fibre_of(blond), PREVIEW_SIZE))
     left = np.exp(-tau * (1.0 - mean_forward(sides.forward, blond)))
-    expected = encoded(grey * left) @ [0.2126, 0.7152, 0.0722] / encoded(grey)
+    expected = shown(3.0 * left) / shown(3.0)
     assert found == pytest.approx(expected, abs=0.01)
     assert found > black + 0.05
 

@@ -33,6 +33,8 @@ def steps():
     driver.enable_extension()
     yield from set_the_scene()
     yield from hair_shades_the_head()
+    yield from full_shadow_is_as_dark_as_without_the_light()
+    yield from hair_is_there_without_overlays()
     yield from layers_are_shown()
     assert of_hairloom("overlay").failure() == ""
 
@@ -42,6 +44,10 @@ def set_the_scene():
     bpy.context.scene.render.engine = "BLENDER_EEVEE"
     head = new_head(segments=48, ring_count=24)
     bpy.ops.object.shade_smooth()
+    head.data.materials.append(bpy.data.materials.new("Skin"))
+    skin = head.data.materials[0].node_tree.nodes["Principled BSDF"].inputs
+    skin["Base Color"].default_value = (0.55, 0.38, 0.31, 1.0)
+    skin["Specular IOR Level"].default_value = 0.0
     group = head.vertex_groups.new(name="Crown")
     crown = [each.index for each in head.data.vertices if each.co.z > 0.075]
     group.add(crown, 1.0, "REPLACE")
@@ -56,8 +62,7 @@ def set_the_scene():
     bpy.data.objects["Hair"].select_set(True)
     bpy.data.objects["Hair"].data.hairloom.shading.model = "marschner"
     bpy.data.objects["Hair"].data.hairloom.strands.fullness = 3.0
-    volume().shadows = "deep"
-    volume().on_body = True
+    assert volume().shadows == "deep" and volume().on_body
     shading = viewport().spaces.active.shading
     shading.type = "MATERIAL"
     shading.use_scene_lights = shading.use_scene_world = True
@@ -102,6 +107,42 @@ def hair_shades_the_head():
     bare = yield from pixels_at_rest("hidden_head_bare")
     assert changed(hidden, bare, 0.05) < 1e-3
     bpy.data.objects["Head"].hide_set(False)
+    yield
+
+
+def full_shadow_is_as_dark_as_without_the_light():
+    """Where hair takes all of the sun, EEVEE's own picture without a sun is what is left."""
+    bpy.ops.object.select_all(action="DESELECT")  # no outlines
+    volume().extinction, volume().on_body = 100.0, True
+    shaded = yield from pixels_at_rest("full")
+    volume().on_body = False
+    sun = bpy.data.objects["Sun"]
+    sun.data.use_shadow = False
+    lit = yield from pixels_at_rest("full_lit")
+    sun.hide_set(True)
+    dark = yield from pixels_at_rest("full_dark")
+    sun.hide_set(False)
+    volume().extinction, volume().on_body, sun.data.use_shadow = 1.0, True, True
+    taken, missing = (lit - shaded).mean(axis=2), (lit - dark).mean(axis=2)
+    # of the head; hair is dark, and itself shaded
+    is_full = (lit.mean(axis=2) > 0.45) & (missing > 0.2) & (taken > 0.75 * missing)
+    away = np.abs(shaded - dark)[is_full].mean()
+    assert is_full.sum() > 50 and away < 0.04, (is_full.sum(), away)
+
+
+def hair_is_there_without_overlays():
+    """Behind the head it is not: EEVEE leaves no depths without overlays."""
+    overlays = viewport().spaces.active.overlay
+    with_overlays = yield from pixels_at_rest("with_overlays")
+    overlays.show_overlays = False
+    found = yield from pixels_at_rest("without_overlays")
+    # lines of what is selected are gone
+    assert changed(with_overlays, found, 0.05) < 0.05
+    bpy.data.objects["Head"].hide_set(True)
+    bald = yield from pixels_at_rest("without_overlays_and_head")
+    assert changed(found, bald, 0.05) > 0.02
+    bpy.data.objects["Head"].hide_set(False)
+    overlays.show_overlays = True
     yield
 
 

@@ -340,8 +340,8 @@ def publish(preview: Preview, depsgraph: bpy.types.Depsgraph) -> None:
     # them, and not before they are made; an overlay that has failed shows nothing
     is_replaced = (hair.mode == "OBJECT" or is_combed(hair)) and not overlay.failure()
     hides = is_replaced and hair.hairloom.hide_original and session.is_made
-    volume = session.settings[VolumeSettings]
-    has_own_shadow = volume.on_body and volume.shadows != "none"
+    # without a head ours lies nowhere, and there are casters only where it has a shadow
+    has_own_shadow = session.settings[VolumeSettings].on_body and bool(session.snapshot.casters)
     show_originals(hair, depsgraph, show=not hides, has_own_shadow=has_own_shadow)
 
 

@@ -226,6 +226,11 @@ class Session:
         return self.picture.snapshot
 
     @property
+    def posed_head(self) -> Surface | None:
+        """What hair grows on, where it is shown, world space."""
+        return self.picture.head
+
+    @property
     def warnings(self) -> tuple[str, ...]:
         """What the artist should know about hair, head, children, colliders and lights."""
         hair = self.hair.handle.find()

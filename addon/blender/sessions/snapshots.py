@@ -100,6 +100,8 @@ class GroomPicture:
     """
 
     snapshot: Snapshot
+    #: what it grows on, as it is posed, world space
+    head: Surface | None = None
 
     def __init__(
         self,
@@ -213,10 +215,12 @@ class GroomPicture:
         known = None if self._groom is None else self._groom.occluders
         if known is not None and settings[DetailSettings].culling == "hidden":
             spheres = known.at(pose)
+        self.head = _head(rig, pose)
+        is_shadowed = settings[VolumeSettings].shadows != "none"
         self.snapshot = replace(
             solver.shown(self.snapshot),
             occluder_spheres=spheres,
-            casters=_casters(rig, pose, settings),
+            casters=() if self.head is None or not is_shadowed else (self.head,),
             cards=self.cards.now(self._painted(rig), pose, solver.guides, settings.sections),
         )
 
@@ -226,12 +230,8 @@ def _with_color(rig: Rig, color: Floats | None) -> Rig:
     return rig if strands.color is color else replace(rig, strands=replace(strands, color=color))
 
 
-def _casters(rig: Rig, pose: Pose, settings: GroomSettings) -> tuple[Surface, ...]:
-    """The head as it is posed, where its shadow is wanted."""
-    if (
-        rig.head is None
-        or pose.head_positions is None
-        or settings[VolumeSettings].shadows == "none"
-    ):
-        return ()
-    return (Surface(pose.head_positions, rig.head.triangles),)
+def _head(rig: Rig, pose: Pose) -> Surface | None:
+    """As it is posed, world space."""
+    if rig.head is None or pose.head_positions is None:
+        return None
+    return Surface(pose.head_positions, rig.head.triangles)

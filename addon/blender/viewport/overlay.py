@@ -24,12 +24,14 @@ from ...render.display import Display
 from ...render.groom_pass import GroomPass
 from ...render.kept_picture import KeptPicture
 from ...render.opacity_maps import OpacityMaps
+from ...render.own_depth import OwnDepth
 from ...render.scene_pass import ONE_AT_A_TIME
 from ...render.scene_snapshot import SceneSnapshot
 from ...render.snapshot import Snapshot
 from ...render.strand_pass import Statistics, drawn_transparency
 from ...shading.environment import Environment, world_suns
 from ...shading.lights import Light, brightest, three_point_lights
+from ...strands import Surface
 from ..base.objects import LayerKey, is_solid, layer_key, layers_with, spaces_without
 from ..base.redraw import redraw_panels, redraw_views
 from ..cards.show import as_shown, without_strands
@@ -42,6 +44,7 @@ from . import view_transform
 from .debug_lines import Lines, debug_lines_of, draw_lines
 from .overlay_text import card_counts_line, counts_line, draw_graphs, write_lines
 from .views import (
+    STEADY,
     View,
     forget_closed_views,
     forget_views,
@@ -59,6 +62,7 @@ class Drawing:
     is_made: whether there is hair yet.
     seen_in: the view layers that show it; None is all.
     hidden_in: addresses of the 3D views that do not show it.
+    head: what it grows on, world space.
     bare_in: of those that do not show its head, which hides nothing there.
     card_counts: cards, triangles and vertices where it is shown as cards.
     counts_of: the name under which its counts are written; empty: they are not.
@@ -72,6 +76,7 @@ class Drawing:
     is_made: bool = True
     seen_in: frozenset[LayerKey] | None = None
     hidden_in: frozenset[int] = frozenset()
+    head: Surface | None = None
     bare_in: frozenset[int] = frozenset()
     guide_count: int = 0
     card_counts: tuple[int, ...] = ()
@@ -97,13 +102,15 @@ class Drawn:
 class _Overlay:
     """All that is drawn.
 
-    drawn: by session number of the hair. handles: of the draw handlers, while there are any.
+    drawn: by session number of the hair. depth: of heads, where Blender has none.
+    handles: of the draw handlers, while there are any.
     failure: why it has stopped drawing; empty while all is well.
     layers: the view layers that windows showed when a view was drawn last.
     """
 
     def __init__(self) -> None:
         self.drawn: dict[int, Drawn] = {}
+        self.depth = OwnDepth()
         self.handles: tuple[Any, ...] = ()
         self.failure = ""
         self.layers: frozenset[LayerKey] = frozenset()
@@ -138,6 +145,7 @@ def read_drawing(
         is_made=session.is_made,
         seen_in=seen_in,
         hidden_in=spaces_without(hair),
+        head=session.posed_head,
         bare_in=frozenset() if head is None else spaces_without(head),
         guide_count=len(session.rig.guides),
         card_counts=session.cards.counts if snapshot.cards is not None else (),
@@ -221,6 +229,8 @@ def _draw_strands(context: Any) -> None:
         return
     marks = (*view_marks(context, camera), *(mark for each in shown for mark in each.marks))
     with ONE_AT_A_TIME, gpu_memory.shared_by(len(shown)):
+        if has_no_depths(context):
+            _draw_depth(context.space_data.as_pointer(), camera, shown)
         for each in shown:
             each.draw_body_shadow(camera)
         if view.picture.is_of(marks):
@@ -231,6 +241,14 @@ def _draw_strands(context: Any) -> None:
         else:
             _draw_afresh(view, camera, shown, marks)
             was_drawn(view)
+
+
+def _draw_depth(address: int, camera: Camera, shown: Sequence[_Shown]) -> None:
+    """Of what is known to be in the way of hair: the heads that it grows on, if they are shown."""
+    _, _, width, height = gpu.state.viewport_get()
+    drawings = [each.drawing for each in shown if address not in each.drawing.bare_in]
+    heads = [each.head for each in drawings if each.head is not None]
+    _overlay.depth.draw(heads, camera, width, height)
 
 
 def _draw_afresh(view: View, camera: Camera, shown: list[_Shown], marks: tuple[Any, ...]) -> None:
@@ -463,6 +481,16 @@ def shown_in(context: Any) -> list[tuple[int, Drawing]]:
     ]
 
 
+def has_no_depths(context: Any) -> bool:
+    """Whether a view has no depths of what is in it: but for Solid and its like, Blender finds them
+    for overlays alone. Without these they are 0 everywhere, or 1, or of what was there before.
+    """
+    shading, is_bare = context.space_data.shading, not context.space_data.overlay.show_overlays
+    kind = shading.type
+    is_plain = kind == "RENDERED" and context.scene.render.engine == "BLENDER_WORKBENCH"
+    return is_bare and kind not in STEADY and not is_plain
+
+
 def is_seen_through(shading: Any) -> bool:
     """Whether a view shows what is behind heads."""
     return shading.type == "WIREFRAME" or (shading.type == "SOLID" and shading.show_xray)
@@ -512,6 +540,7 @@ def _remove_handlers() -> None:
     for handle in _overlay.handles:
         bpy.types.SpaceView3D.draw_handler_remove(handle, "WINDOW")
     _overlay.handles = ()
+    _overlay.depth.release()
     forget_layers()
     forget_views()
 

@@ -112,10 +112,10 @@ class VolumeSettings(Settings):
         shown_when=when("volume.shadows", "deep", "slices"),
     )
     on_body: bool = toggle(
-        False,
+        True,
         label="Shadow on Surface",
-        description="In 3D views with scene lights, moving hair shades the head that Blender "
-        "draws, instead of Blender's own strands at rest, which shade all meshes",
+        description="In 3D views with scene lights, hair as it is shown shades the head that "
+        "Blender draws. Off: Blender's own strands do, as they are at rest, and all other meshes",
         shown_when=when("volume.shadows", "deep", "slices"),
     )
     scattering: bool = toggle(
