@@ -48,6 +48,8 @@ AT_MOST = {
     "orbit_solid_ratio": 0.6,
     "two_views_ratio": 2.1,
     "draws_per_groom": 40,
+    "grooms_2_ratio": 1.2,
+    "grooms_4_ratio": 1.3,
 }
 
 

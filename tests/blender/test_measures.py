@@ -33,6 +33,15 @@ def test_a_frame_of_many_seconds_has_both_its_parts(monkeypatch):
     assert times.line == "simulation 1000.0 ms   drawing 12000.0 ms"
 
 
+def test_what_goes_on_is_of_the_same_frame(monkeypatch):
+    now, times = [0.0], measures.FrameTimes()
+    monkeypatch.setattr(measures.time, "perf_counter", lambda: now[0])
+    for spent, goes_on in ((0.002, False), (0.003, True), (0.002, False), (0.003, True)):
+        with times.measured("drawing", goes_on=goes_on):
+            now[0] += spent
+    assert times.history("drawing") == pytest.approx([5.0, 5.0])
+
+
 def test_an_array_counts_once_and_a_view_is_its_array():
     @dataclass
     class Held:
