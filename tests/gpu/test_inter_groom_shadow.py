@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from gpu_calls import gpu_calls
 
 from hairloom.addon.render.camera import Camera, look_at, orthographic
 from hairloom.addon.render.scene_snapshot import DrawnGroom, SceneSnapshot
@@ -206,6 +207,37 @@ def test_light_from_each_side_may_shade_and_none_without_light(gpu_context: Any)
         (Ball(np.array([0.0, 0.0, 1.0]), 0.8), (SUN,), True),
     ):
         assert may_shade(maps(*lights), ball) == is_reached, (ball, lights)
+
+
+def test_views_in_other_light_keep_what_lies_between(gpu_context: Any) -> None:
+    """Two views in turn look nothing up again, until the other hair moves."""
+    from hairloom.addon.render.accumulation import Target
+    from hairloom.addon.render.groom_pass import GroomPass
+
+    light = {"a": (SUN,), "b": (Light.sun((0.3, 0.0, -1.0), (1.0, 1.0, 1.0), 3.0),)}
+    low, high = groom("low", sheet(0.1)).snapshot, groom("high", sheet(0.3, seed=2)).snapshot
+    passes, target = {"low": GroomPass(), "high": GroomPass()}, Target()
+
+    def dispatches(view: str, above: Snapshot) -> int:
+        lit = {"low": replace(low, lights=light[view]), "high": replace(above, lights=light[view])}
+        maps = {key: passes[key].maps(each, view=view) for key, each in lit.items()}
+        others = passes["low"].others("low", lit["low"], maps)
+        assert others == [maps["high"]]
+
+        def draw() -> None:
+            passes["low"].strands.draw(lit["low"], CAMERA, SIZE, SIZE, others=others, view=view)
+
+        target.sized(SIZE, SIZE).clear((0.0, 0.0, 0.0, 0.0))
+        with target.drawing():
+            return int(gpu_calls(draw)["dispatches"])
+
+    first = [dispatches(view, high) for view in "ab"]
+    again = [dispatches(view, high) for view in "abab"]
+    assert len(set(again)) == 1 and all(each > again[0] for each in first)
+    moved = replace(high, points=high.points + np.float32(0.01))
+    assert [dispatches(view, moved) for view in "abab"] == [
+        *(again[0] + 1, again[0] + 1, again[0], again[0])
+    ]
 
 
 def test_masks_hold_what_alpha_shows(gpu_context: Any, compute: Callable[..., Any]) -> None:
