@@ -137,6 +137,9 @@ class Parameter:
             return "Use the name of a colour attribute of the surface, or of an image"
         if self.hard_range:
             low, high = self.hard_range
+            if self.unit == "angle":
+                ends = f"{math.degrees(low):g} to {math.degrees(high):g} degrees"
+                return f"Use {ends}, which is {low:g} to {high:g} here"
             return f"Use a value from {low:g} to {high:g} (default {self.default})"
         return f"Use a {self.kind} (default {self.default})"
 

@@ -7,7 +7,6 @@ import pytest
 
 from hairloom.addon.blender.bakes import cache
 from hairloom.addon.blender.bakes.cache import Cache, CacheWriter, Facts
-from hairloom.addon.blender.command_line.overrides import overrides
 from hairloom.addon.errors import HairloomError
 
 
@@ -95,8 +94,3 @@ def test_bytes_by_chance_in_a_bake_are_told_or_read(bake):
             assert error.remedy and str(bake) in error.place
         path.write_bytes(whole[path])
     assert 150 < told < 300
-
-
-@pytest.mark.parametrize("text", ["[" * 200_000, "9" * 5000, '{"a":' * 50_000])
-def test_a_value_of_the_command_line_that_json_refuses_is_a_text(text):
-    assert overrides([f"guides.guide_count={text}"], "guides") == {"guide_count": text}

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import math
+import re
 from typing import Any
 
 from ...errors import HairloomError
@@ -27,11 +29,27 @@ def overrides(assignments: list[str], section: str) -> dict[str, Any]:
     return values
 
 
+#: A number as people write it, .5 and 1. among them, which JSON refuses; perhaps in degrees.
+_NUMBER = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?)(deg|°)?", re.IGNORECASE)
+
+
 def plain_value(text: str) -> Any:
-    """A JSON value, several with commas (a colour or a curve), or the text itself (a choice)."""
+    """A JSON value, a number, several with commas (a colour or a curve), or the text itself (a
+    choice). An angle is in radians, or in degrees where `deg` follows it.
+    """
     for content in (text, f"[{text}]"):
         try:
             return json.loads(content)
         except (ValueError, RecursionError):
             continue
-    return text
+    numbers = [_NUMBER.fullmatch(each.strip()) for each in text.split(",")]
+    if not all(numbers):
+        return text
+    values = [_number(*each.groups()) for each in numbers if each]
+    if not all(map(math.isfinite, values)):
+        return text
+    return values if len(values) > 1 else values[0]
+
+
+def _number(digits: str, unit: str | None) -> float:
+    return math.radians(float(digits)) if unit else float(digits)
