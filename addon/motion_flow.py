@@ -14,12 +14,13 @@ from .dynamics.colliders import PosedCollider
 from .dynamics.constraints import PINNED
 from .dynamics.force_fields import NO_FIELDS, ForceFields
 from .dynamics.held import Held
+from .dynamics.neighbours import Steps, Style, alone
 from .dynamics.painted import PaintedGuides, simulated_of
 from .dynamics.rigid_path import NOT_MOVED, Carrier, KnownStep
 from .dynamics.settings import DynamicsSettings
 from .dynamics.state import DynamicsState, rows_of, start
 from .dynamics.step import Drive, grid_at_frame_end
-from .dynamics.step import advance as advance_dynamics
+from .dynamics.step import steps as dynamics_steps
 from .dynamics.turn import root_sample, rotation_from
 from .groom.holds import Holds
 from .groom.roots import RootFrames, follow, root_frames, root_motions
@@ -182,7 +183,40 @@ def advance(
     led: LedOut = NOT_LED,
     painted: PaintedGuides | None = None,
 ) -> Motion:
-    """One frame of motion: the roots go with the head, the dynamics moves the rest.
+    """One frame of motion: the roots go with the head, the dynamics moves the rest; without other
+    grooms.
+
+    Args: as those of `steps`.
+    """
+    return alone(
+        steps(
+            rig,
+            motion,
+            pose,
+            colliders,
+            settings,
+            gravity,
+            duration,
+            force_fields,
+            led,
+            painted,
+        )
+    )
+
+
+def steps(
+    rig: Rig,
+    motion: Motion,
+    pose: Pose,
+    colliders: tuple[PosedCollider, ...],
+    settings: DynamicsSettings,
+    gravity: Floats,
+    duration: float,
+    force_fields: ForceFields = NO_FIELDS,
+    led: LedOut = NOT_LED,
+    painted: PaintedGuides | None = None,
+) -> Steps[Motion]:
+    """The same with other grooms, see `dynamics.neighbours`.
 
     Args:
         gravity: (3,) [m/s^2], world space.
@@ -199,7 +233,7 @@ def advance(
     drive = motion.drive(
         target, colliders, gravity, duration, force_fields, held, simulated, painted
     )
-    state = advance_dynamics(motion.dynamics, drive, settings, duration)
+    state = yield from dynamics_steps(motion.dynamics, drive, settings, duration)
     guides, before = grid_at_frame_end(state, drive, settings, duration), motion.carried_guides
     return Motion(
         state,
@@ -292,6 +326,31 @@ def go_along(
         motion.guide_clearance,
         begun=motion.begun,
     )
+
+
+def style_seen(rig: Rig, pose: Pose, source: Rig) -> Style:
+    """The groom's style in this pose, as other grooms see it.
+
+    Args:
+        source: the same groom as it was read, where its style is animated.
+    """
+    return Style(partial(style_of_guides, rig, pose), source.hair_of_guides, source)
+
+
+def reach(rig: Rig, pose: Pose) -> tuple[Floats, float]:
+    """A ball in which all guides are in this pose, however they swing: its middle (3,) and its
+    radius [m]."""
+    if not len(rig.guides):
+        return np.zeros(3), 0.0
+    chosen = np.arange(0, len(rig.guides), max(len(rig.guides) // JUMP_GUIDES, 1))
+    offsets = np.arange(len(chosen) + 1) * PINNED
+    motions = motions_of(rig, pose, rig.guides[chosen])
+    at_rest = rig.guide_grid[chosen, :PINNED]
+    now = follow(at_rest.reshape(-1, 3), offsets, motions).reshape(at_rest.shape)
+    first, last = (float(np.linalg.norm(np.diff(grid, axis=1))) for grid in (at_rest, now))
+    middle, radius = rig.reach
+    moved = (now[:, 0].astype(np.float64) - at_rest[:, 0]).mean(axis=0)
+    return middle + moved, radius * (last / first if first else 1.0)
 
 
 def with_clearance(

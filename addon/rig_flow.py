@@ -13,6 +13,7 @@ import numpy as np
 from .arrays import Bools, Floats, Ints
 from .dynamics.colliders import DistanceField, PosedCollider
 from .dynamics.held import Held
+from .dynamics.neighbours import hair_of
 from .errors import HairloomError
 from .groom.automatic_children import are_few, automatic
 from .groom.children import (
@@ -213,6 +214,19 @@ class Rig:
         """How many strands each guide stands for, (guide_count,): their parts that ride on it."""
         guide, weight = self.weights.guide.ravel(), self.weights.weight.ravel()
         return np.bincount(guide, weight, len(self.guides))
+
+    @cached_property
+    def hair_of_guides(self) -> Floats:
+        """See `dynamics.neighbours.hair_of`."""
+        return hair_of(self.guide_grid, self.strands_of_guides)
+
+    @cached_property
+    def reach(self) -> tuple[Floats, float]:
+        """The middle (3,) of the guides' roots at rest, and how far any guide gets from it [m]."""
+        middle = self.guide_grid[:, 0].mean(axis=0, dtype=np.float64)
+        away = np.linalg.norm(self.guide_grid[:, 0] - middle, axis=1)
+        lengths = np.linalg.norm(np.diff(self.guide_grid, axis=1), axis=2).sum(axis=1)
+        return middle, float((away + lengths).max())
 
     @property
     def child_count(self) -> int:

@@ -8,6 +8,11 @@ volume_kept_bent     the same over a shoulder, a capsule that comes under it in 
 rest_motion_mm       how much farther from its style hair at rest is after 10 s than with Volume 0
 crossing_percent     of two locks side by side that swing against each other, 1 m/s at the tips: how
                      many strands are on the other's side, in the worst frame
+crossing_across_percent   the same where each lock is a groom of its own
+halves_apart_mm      of a ponytail on a head that sways, cut into two grooms: how far its strands
+                     are from where they are in one, the mean over a second; without: where the two
+                     do not feel each other
+cost_ratio_two_*     a frame of a groom cut in two that feel each other over one of the whole
 cost_ratio_*         a frame at 24 a second with Volume over one without, on a head that sways, with
                      its mesh as collider; each frame by the least of several rounds in turn
 field_error          force fields of every kind, shape and falloff beside Blender's particles: the
@@ -26,6 +31,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -38,6 +44,7 @@ from _report import report
 from _report import start as start_bench
 from _shaken_head import Shake, guides_on, new_head, surface_of
 from _style_follow import style_follow
+from grooms_together import Groom, play_frame
 
 from hairloom.addon import register, unregister
 from hairloom.addon.dynamics.colliders import CapsuleCollider, DistanceField, PosedCollider
@@ -45,6 +52,7 @@ from hairloom.addon.dynamics.force_fields import Falloff, ForceField, ForceField
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.dynamics.state import DynamicsState, start
 from hairloom.addon.dynamics.step import Drive, advance
+from hairloom.addon.render.dynamics_pass import DynamicsPass
 
 GRAVITY = np.array([0.0, 0.0, -9.81])
 FPS, GUIDES, CVS, SECONDS = 24.0, 762, 16, 2.0
@@ -66,6 +74,8 @@ AT_LEAST = {"volume_kept": 0.8, "volume_kept_bent": 0.8}
 AT_MOST = {
     "rest_motion_mm": 0.01,
     "crossing_percent": 5.0,
+    "crossing_across_percent": 5.0,
+    "halves_apart_mm": 0.5,
     "field_error": 0.01,
     "style_follow_mm": 0.1,
     "cost_ratio_*": 1.6,
@@ -81,7 +91,7 @@ def main() -> int:
     start_bench()
     found: dict[str, object] = {"guides": GUIDES}
     found |= in_blender()
-    found |= volumes() | {"rest_motion_mm": rest_motion()} | crossings()
+    found |= volumes() | {"rest_motion_mm": rest_motion()} | crossings() | halves()
     if not asked.skip_cost:
         for name, count in SIZES.items():
             found |= costs(name, count)
@@ -171,23 +181,53 @@ def in_blender() -> dict[str, object]:
 
 
 def crossings() -> dict[str, object]:
+    """Two locks of one groom, and of two."""
+    grid, side = tail(240, 0.012, 0.012, 0.25), np.repeat([-1.0, 1.0], 120)
+    grid[..., 0] += (0.015 * side)[:, None].astype(np.float32)
+    apart = (slice(0, 120), slice(120, 240))
     found = {}
-    for end, volume in (("", VOLUME), ("_without", 0.0)):
-        grid, side = tail(240, 0.012, 0.012, 0.25), np.repeat([-1.0, 1.0], 120)
-        grid[..., 0] += (0.015 * side)[:, None].astype(np.float32)
-        state = start(grid)
-        previous, dt = state.position.copy(), 1.0 / DynamicsSettings().substep_rate
-        previous[0] += np.linspace(0.0, 1.0, CVS)[:, None] * side * SWING * dt
-        state = replace(state, previous=previous, substep=dt)
-        worst = 0.0
-        for _ in range(round(SECONDS * FPS)):
-            state = advance(
-                state, Drive(grid, grid, (), GRAVITY), DynamicsSettings(volume=volume), 1.0 / FPS
-            )
-            beyond = state.grid[:, CVS // 2 :, 0].mean(axis=1) * side
-            worst = max(worst, float((beyond < -0.002).mean()))
-        found[f"crossing_percent{end}"] = round(100.0 * worst, 1)
+    for name, parts in (("crossing", (slice(0, 240),)), ("crossing_across", apart)):
+        for end, volume in (("", VOLUME), ("_without", 0.0)):
+            settings = DynamicsSettings(volume=volume)
+            grooms = [
+                Groom(grid[part], settings, state=swinging(grid[part], side[part]))
+                for part in parts
+            ]
+            worst = 0.0
+            for _ in range(round(SECONDS * FPS)):
+                play_frame(grooms, [grid[part] for part in parts], 1.0 / FPS)
+                ends = np.concatenate([groom.state.grid for groom in grooms])
+                beyond = ends[:, CVS // 2 :, 0].mean(axis=1) * side
+                worst = max(worst, float((beyond < -0.002).mean()))
+            found[f"{name}_percent{end}"] = round(100.0 * worst, 1)
     return found
+
+
+def swinging(grid: np.ndarray, side: np.ndarray) -> DynamicsState:
+    """Strands that swing against those on the other side."""
+    state, dt = start(grid), 1.0 / DynamicsSettings().substep_rate
+    previous = state.position.copy()
+    previous[0] += np.linspace(0.0, 1.0, CVS)[:, None] * side * SWING * dt
+    return replace(state, previous=previous, substep=dt)
+
+
+def halves() -> dict[str, object]:
+    grid, settings = tail(GUIDES), DynamicsSettings(volume=VOLUME, **SOFT)
+    whole, none = [Groom(grid, settings)], frozenset[int]()
+    cut, unfelt = ([Groom(grid[first::2], settings) for first in (0, 1)] for _ in range(2))
+    away: dict[str, list[float]] = {"": [], "_without": []}
+    for frame in range(round(FPS)):
+        x = 0.05 * np.sin(2.0 * np.pi * (frame + 1) / FPS)
+        target = grid + np.float32([x, 0.0, 0.0])
+        play_frame(whole, [target], 1.0 / FPS)
+        for end, grooms, near in (("", cut, None), ("_without", unfelt, [none, none])):
+            play_frame(grooms, [target[0::2], target[1::2]], 1.0 / FPS, near)
+            for first, groom in enumerate(grooms):
+                off = groom.state.grid - whole[0].state.grid[first::2]
+                away[end].append(float(np.linalg.norm(off, axis=2).mean()))
+    return {
+        f"halves_apart_mm{end}": round(1e3 * float(np.mean(far)), 3) for end, far in away.items()
+    }
 
 
 def costs(name: str, count: int) -> dict[str, object]:
@@ -222,7 +262,28 @@ def costs(name: str, count: int) -> dict[str, object]:
         )
         found[f"cost_ratio_{form}_{name}"] = round(with_it / without, 2)
         found[f"field_cost_ratio_{form}_{name}"] = round(with_fields / without, 2)
+        found[f"cost_ratio_two_{form}_{name}"] = cost_of_two(form, guides.grid, ROUNDS[name])
     return found
+
+
+def cost_of_two(form: str, grid: np.ndarray, rounds: int) -> float:
+    """Without a collider, of which each groom has its own."""
+    settings, frames, times = DynamicsSettings(volume=0.5), 8, []
+    for _ in range(rounds):
+        for parts in ((slice(0, None),), (slice(0, None, 2), slice(1, None, 2))):
+            make = DynamicsPass if form == "compute" else None
+            grooms = [Groom(grid[part], settings, make_pass=make) for part in parts]
+            took = []
+            for frame in range(frames):
+                target = grid + np.float32([0.01 * np.sin(frame), 0.0, 0.0])
+                begin = time.perf_counter()
+                play_frame(grooms, [target[part] for part in parts], 1.0 / FPS)
+                for groom in grooms:
+                    groom.wait()
+                took.append(time.perf_counter() - begin)
+            times.append(took[2:])
+    one, two = (np.min(times[first::2], axis=0).mean() for first in (0, 1))
+    return round(float(two / one), 2)
 
 
 def draw(folder: Path) -> None:

@@ -13,9 +13,7 @@ void main()
   vec3 before = vec3(texelFetch(previous_positions, texel, 0).xy, here.w);
   AmongCv cv = among_cv(among, here.xyz, before);
   lanes = among_lanes(among, cv.motion, texelFetch(hair_at_rest, texel, 0).z);
-  ivec3 counts = among.counts.xyz;
-  ivec3 cell = among_wrapped(cv.low + ivec3(greaterThanEqual(cv.part, vec3(0.5))), counts);
-  vec2 place = (vec2(cell.x * counts.z + cell.z, cell.y) + 0.5) / vec2(counts.x * counts.z, counts.y);
+  ivec3 cell = cv.low + ivec3(greaterThanEqual(cv.part, vec3(0.5)));
   gl_PointSize = 1.0;
-  gl_Position = vec4(2.0 * place - 1.0, 0.0, 1.0);
+  gl_Position = among_place(among, among_wrapped(cell, among.counts.xyz));
 }

@@ -15,12 +15,18 @@ float along_row(vec4 row, vec3 beside)
   return row.x * beside.x + row.y * beside.y + row.z * beside.z;
 }
 
+// From the world to cells.
+vec3 among_cells(Among among, vec3 point)
+{
+  vec3 beside = point - among.middle.xyz;
+  vec3 cells = vec3(along_row(among.into_x, beside), along_row(among.into_y, beside), along_row(among.into_z, beside));
+  return cells + vec3(among.into_x.w, among.into_y.w, among.into_z.w);
+}
+
 AmongCv among_cv(Among among, vec3 here, vec3 before)
 {
   vec3 motion = (here - before) * among.speed_ratio;
-  vec3 beside = here + motion * among.ahead - among.middle.xyz;
-  vec3 cells = vec3(along_row(among.into_x, beside), along_row(among.into_y, beside), along_row(among.into_z, beside));
-  cells += vec3(among.into_x.w, among.into_y.w, among.into_z.w);
+  vec3 cells = among_cells(among, here + motion * among.ahead);
   vec3 corner = floor(cells);
   return AmongCv(motion, ivec3(corner), cells - corner);
 }
@@ -36,6 +42,14 @@ vec4 among_lanes(Among among, vec3 motion, float mass)
 ivec3 among_wrapped(ivec3 cell, ivec3 counts)
 {
   return cell - counts * ivec3(floor((vec3(cell) + 0.5) / vec3(counts)));
+}
+
+// Where a point is drawn that adds to a cell.
+vec4 among_place(Among among, ivec3 cell)
+{
+  ivec3 counts = among.counts.xyz;
+  vec2 place = (vec2(cell.x * counts.z + cell.z, cell.y) + 0.5) / vec2(counts.x * counts.z, counts.y);
+  return vec4(2.0 * place - 1.0, 0.0, 1.0);
 }
 
 int among_before(int cell, int count)

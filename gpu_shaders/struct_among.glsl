@@ -10,4 +10,5 @@ struct Among {
   float whole;        // whole parts of a metre of motion
   float ahead;        // substeps of its motion ahead that a CV counts
   float unused;
+  ivec4 low;          // xyz the lowest cell in which other hair counts
 };

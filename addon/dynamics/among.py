@@ -16,13 +16,17 @@ A cell sums whole numbers, so its sums depend on no order. The grid wraps around
 anywhere, and places that are a whole grid apart share their cells. It is as large as the groom at
 rest, so at rest none do.
 
+Other grooms leave their CVs in this grid too, see `neighbours`, as far as they are in the cells
+around this one's own. It is as large as the groom is then, so that none of theirs counts elsewhere.
+
 `reference/among.py` holds the same, one CV after the other; gpu_shaders/among_*.glsl are its twins.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -55,6 +59,8 @@ AHEAD = 0.75
 #: How many times more friction there is where the density is twice what it was: locks that meet
 #: stop.
 PRESSED = 15.0
+#: Cells beyond the groom's own in which other hair acts on it; and by how many cells a grid grows.
+REACHED, GROWN = 2, 4
 #: What divides nothing [cells' worth of hair].
 TINY = 1.0e-6
 
@@ -65,6 +71,7 @@ class HairGrid:
 
     cell: how wide [m]. counts: (3,) of cells. middle: (3,) float64 world [m], of the roots.
     mass: (guide_count,) whole float32, MASS for a guide that stands for as many strands as most.
+    unit: metres of hair that a CV of mass 1 stands for.
     density: (cv_count, guide_count) float32 of the others at each CV.
     full: the same, the density above which a CV is crowded; others are compared with it.
     """
@@ -73,43 +80,66 @@ class HairGrid:
     counts: tuple[int, int, int]
     middle: Floats
     mass: Floats
+    unit: float
     density: Floats
     full: Floats
 
     @classmethod
-    def at_rest(cls, position: Floats, size: float, strands: Floats | None) -> HairGrid:
+    def at_rest(
+        cls, position: Floats, size: float, strands: Floats | None, others: Others | None = None
+    ) -> HairGrid:
         """Args:
         position: (3, cv_count, guide_count) world [m].
         size: the hair's length [m].
         strands: (guide_count,) how many each guide stands for; None: equally many.
+        others: hair of others there; None: there is none.
         """
         middle = position[:, 0].mean(axis=1, dtype=np.float64)
         mass = _masses(strands, position.shape[2])
+        unit = hair_of_cvs(strands, size, *position.shape[1:]).mean() / MASS
         points = position.reshape(3, -1)
         extent = np.ptp(points, axis=1)
-        cell = _cell_of(points, extent, size)
+        cell = _cell_of(points if others is None else others.among(points), extent, size)
         x, y, z = np.minimum(np.ceil(extent / cell) + 2, SIDE).astype(int).tolist()
-        bare = cls(cell, (x, y, z), middle, mass, position[0], position[0])
-        density = Felt.of(
-            bare, bare.place(np.eye(3), middle), position, np.zeros_like(position)
-        ).density
+        bare = cls(cell, (x, y, z), middle, mass, float(unit), position[0], position[0])
+        place = bare.place(np.eye(3), middle)
+        place = place if others is None else place.around(points)
+        density = Felt.of(bare, place, position, np.zeros_like(position), others).density
         full = np.maximum(density, np.float32(max(THIN * float(np.median(density)), TINY)))
-        return cls(cell, bare.counts, middle, mass, density, full)
+        return replace(bare, density=density, full=full)
 
     def place(self, turn: Floats, middle: Floats) -> Place:
         """Where the grid stands as the groom has turned, and its roots' middle has gone."""
         return Place(
             np.asarray(middle, np.float32),
             (np.asarray(turn, np.float64).T / self.cell).astype(np.float32),
+            self.counts,
         )
 
 
 @dataclass(frozen=True)
 class Place:
-    """middle: (3,) float32 world [m]. into: (3, 3) float32, from the world to cells."""
+    """Where a grid stands.
+
+    middle: (3,) float32 world [m]. into: (3, 3) float32, from the world to cells.
+    counts: (3,) of cells. low: the lowest one in which other hair counts.
+    """
 
     middle: Floats
     into: Floats
+    counts: tuple[int, int, int]
+    low: tuple[int, int, int] = (0, 0, 0)
+
+    def around(self, points: Floats) -> Place:
+        """The same with cells enough for all that acts on a groom at these points (3, n) world
+        [m]."""
+        cells = self.cells(points)
+        low = np.floor(cells.min(axis=1)).astype(int) - REACHED
+        high = np.floor(cells.max(axis=1)).astype(int) + REACHED + 1
+        counts = np.minimum(-(-(high - low) // GROWN) * GROWN, SIDE)
+        x, y, z = np.maximum(counts, self.counts).tolist()
+        first, second, third = low.tolist()
+        return replace(self, counts=(x, y, z), low=(first, second, third))
 
     def cells(self, points: Floats) -> Floats:
         """Points (3, ...) world [m] in cells."""
@@ -157,16 +187,20 @@ class Strength:
 class Among:
     """How hair feels other hair in a frame.
 
+    turn: (3, 3) of the groom since rest.
     first: its first substep, counted since the start.
     volume: (guide_count,) float32, by which the setting is multiplied where it is painted; None: it
         is not.
+    others: other hair that is near; None: there is none.
     """
 
     grid: HairGrid
     place: Place
+    turn: Floats
     strength: Strength
     first: int
     volume: Floats | None = None
+    others: Others | None = None
 
     def is_due(self, number: int) -> bool:
         """Whether hair feels before this substep of the frame."""
@@ -177,9 +211,64 @@ class Among:
         cuts = [0, *(number for number in range(1, count) if self.is_due(number)), count]
         return [range(*ends) for ends in pairwise(cuts)]
 
+    def beside(self, other: Neighbours | None) -> Among:
+        """The same where other hair is near."""
+        if other is None:
+            return self
+        place = other.grid.place(self.turn, self.place.middle).around(other.own)
+        return replace(self, grid=other.grid, place=place, others=other.others)
+
     def feel(self, position: Floats, previous: Floats) -> tuple[Floats, Floats]:
         """See `feel`."""
-        return feel(self.grid, self.place, self.strength, position, previous, self.volume)
+        return feel(
+            self.grid, self.place, self.strength, position, previous, self.volume, self.others
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Others:
+    """CVs of other hair.
+
+    here: (3, n) float32 world [m], where they count. step: how they move in a substep.
+    mass: (n,) whole float32, see `HairGrid`.
+    """
+
+    here: Floats
+    step: Floats
+    mass: Floats
+
+    @classmethod
+    def of(cls, parts: Sequence[Others]) -> Others:
+        """All of them as one; there is at least one."""
+        rows = ((part.here, part.step, part.mass) for part in parts)
+        return cls(*(np.concatenate(each, axis=-1) for each in zip(*rows, strict=True)))
+
+    def near(self, points: Floats, distance: float) -> Others:
+        """Those that are at most this far [m] from the box around points (3, n)."""
+        low, high = (_beside(end(axis=1), points) for end in (points.min, points.max))
+        is_near = ((self.here >= low - distance) & (self.here <= high + distance)).all(axis=0)
+        if is_near.all():
+            return self
+        chosen = np.flatnonzero(is_near)
+        here, step = (rows.take(chosen, axis=1) for rows in (self.here, self.step))
+        return Others(here, step, self.mass[chosen])
+
+    def among(self, points: Floats) -> Floats:
+        """Points (3, n) and those that are in the box around them."""
+        return np.concatenate([points, self.near(points, 0.0).here], axis=1)
+
+
+@dataclass(frozen=True, eq=False)
+class Neighbours:
+    """What a groom feels of others at a moment.
+
+    grid: its own, in which they are at rest. others: as far ahead as its own CVs count.
+    own: (3, n) float32 world [m], where these count.
+    """
+
+    grid: HairGrid
+    others: Others
+    own: Floats
 
 
 def feel(
@@ -189,14 +278,18 @@ def feel(
     position: Floats,
     previous: Floats,
     volume: Floats | None = None,
+    others: Others | None = None,
 ) -> tuple[Floats, Floats]:
     """What friction takes from the motion of each CV at once, and what pressure and cohesion add in
     each substep until hair feels again; both (3, cv_count, guide_count) [m].
 
     Pressure that bears weight acts evenly: at once, it would throw the hair up and let it fall.
+
+    Args:
+        others: as far ahead as these CVs count.
     """
     motion = position - previous
-    felt = Felt.of(grid, place, position + motion * np.float32(strength.ahead), motion)
+    felt = Felt.of(grid, place, position + motion * np.float32(strength.ahead), motion, others)
     ratio = felt.density / grid.full
     over = np.clip(ratio - np.float32(1.0 + SLACK), 0.0, 1.0)
     under = np.clip(grid.density / grid.full - ratio - np.float32(SLACK), 0.0, 1.0)
@@ -226,14 +319,23 @@ class Felt:
     motion: Floats
 
     @classmethod
-    def of(cls, grid: HairGrid, place: Place, position: Floats, motion: Floats) -> Felt:
+    def of(
+        cls,
+        grid: HairGrid,
+        place: Place,
+        position: Floats,
+        motion: Floats,
+        others: Others | None = None,
+    ) -> Felt:
         mass = np.broadcast_to(grid.mass, position.shape[1:]).reshape(-1)
         across = whole_motion(motion.reshape(3, -1), grid.cell) * mass
         part = place.cells(position.reshape(3, -1))
         corner = np.floor(part)
         part -= corner
-        low = _wrapped(corner, grid.counts)
-        sums = _sums(low, part, (mass, *across), grid.counts)
+        low = _wrapped(corner, place.counts)
+        sums = _sums(low, part, (mass, *across), place.counts)
+        if others is not None:
+            sums += others_in(place, others, grid.cell)
         found = _between(_fields(sums), low, part)
         own, steep = own_part(part)
         density = found[:, 0] - own * mass
@@ -242,6 +344,18 @@ class Felt:
         moving *= np.float32(grid.cell / MOTION) / np.maximum(density, np.float32(TINY))
         vectors = (rows.reshape(position.shape) for rows in (gradient, moving))
         return cls(density.reshape(position.shape[1:]), *vectors)
+
+
+def others_in(place: Place, others: Others, cell: float) -> Floats:
+    """What other hair leaves in the cells, see `_sums`: of what is in those around the groom."""
+    part = place.cells(others.here)
+    nearest = np.floor(part + np.float32(0.5))
+    low, counts = (np.array(each, np.float32)[:, None] for each in (place.low, place.counts))
+    mass = others.mass * ((nearest >= low) & (nearest < low + counts)).all(axis=0)
+    corner = np.floor(part)
+    part -= corner
+    across = whole_motion(others.step, cell) * mass
+    return _sums(_wrapped(corner, place.counts), part, (mass, *across), place.counts)
 
 
 def own_part(part: Floats) -> tuple[Floats, Floats]:
@@ -356,6 +470,17 @@ def _between(fields: Floats, low: Ints, part: Floats) -> Floats:
                 here *= each[:, None]
                 found += here
     return found
+
+
+def hair_of_cvs(strands: Floats | None, size: float, cv_count: int, guide_count: int) -> Floats:
+    """Metres of hair that each CV of a guide stands for, (guide_count,).
+
+    Args:
+        strands: see `HairGrid.at_rest`. size: the hair's length [m].
+    """
+    if strands is None or not strands.any():
+        strands = np.ones(guide_count)
+    return strands * (size / max(cv_count - 1, 1))
 
 
 def _masses(strands: Floats | None, guide_count: int) -> Floats:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -17,6 +18,7 @@ from .contacts import BETWEEN, BETWEEN_RADIUS, radius_of_all
 from .force_fields import NO_FIELDS, ForceFields
 from .forces import Damped, combed_gravity, felt_gravity
 from .held import Held
+from .neighbours import Stop
 from .painted import PaintedFrame, PaintedGuides, painted_frame
 from .rigid_path import CarriedPath, Carrier, Carry, KnownStep, LastStep, Rigid
 from .settings import DynamicsSettings
@@ -254,6 +256,13 @@ class Frame:
         """The substeps that guides may go through one guide after the other."""
         return [range(count)] if self.among is None else self.among.pieces(count)
 
+    def stop(self, rest: Rest, number: int, read: Callable[[], tuple[Floats, Floats]]) -> Stop:
+        """Before this substep hair is to feel hair; see `Stop`."""
+        assert self.among is not None, "it feels"
+        step = self.dt / self.duration
+        ahead = self.among.strength.ahead * step
+        return Stop(self.span(number)[0], step, ahead, rest, self.drive.target_before, read)
+
     @property
     def inherits(self) -> bool:
         """See `inherits`."""
@@ -314,7 +323,7 @@ def _among(
     grid = state.rest.hair_grid
     ends = [target[:, 0].mean(axis=0, dtype=np.float64) for target in drive.targets[:2]]
     place = grid.place(turn, (ends[0] + ends[1]) / 2.0)
-    return Among(grid, place, strength, round(state.time / dt), volume)
+    return Among(grid, place, turn, strength, round(state.time / dt), volume)
 
 
 @dataclass(frozen=True)

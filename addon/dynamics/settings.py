@@ -152,8 +152,9 @@ class DynamicsSettings(MotionSettings):
     volume: float = number(
         0.0,
         label="Volume",
-        description="How much hair feels other hair: it keeps its volume and its locks, and "
-        "neighbours move together. At rest it changes nothing; 0 is hair that passes through hair",
+        description="How much hair feels other hair, of its own groom and of others: it keeps its "
+        "volume and its locks, and neighbours move together. At rest it changes nothing; 0 is hair "
+        "that passes through hair",
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),
         unit="factor",

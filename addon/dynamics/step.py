@@ -27,6 +27,7 @@ depend on the frame rate; `grid_at_frame_end` bridges it for drawing.
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -38,6 +39,7 @@ from .constraints import PINNED, pin
 from .force_fields import along_strands, blow
 from .forces import brake, predict
 from .frame import Block, Drive, Frame, carried_after, check_drive, style_rows
+from .neighbours import Steps, alone
 from .outside import Chain, Outside
 from .rigid_path import Carry
 from .schedule import due_substeps
@@ -45,7 +47,7 @@ from .settings import DynamicsSettings
 from .state import DynamicsState
 from .style import restore_style
 
-__all__ = ["Drive", "advance", "displacement_beside_root", "grid_at_frame_end"]
+__all__ = ["Drive", "advance", "displacement_beside_root", "grid_at_frame_end", "steps"]
 
 #: Guides that are advanced together, at most. Fewer, and numpy's calls cost more than the numbers;
 #: more, and the arrays of a substep leave the cache.
@@ -60,6 +62,13 @@ def advance(
     Raises:
         HairloomError: a drive that does not fit the state or is not finite, or a bad duration.
     """
+    return alone(steps(state, drive, settings, duration))
+
+
+def steps(
+    state: DynamicsState, drive: Drive, settings: DynamicsSettings, duration: float
+) -> Steps[DynamicsState]:
+    """As `advance`, with other hair."""
     dt = 1.0 / settings.substep_rate
     longest = settings.longest_frame
     duration, count, left = due_substeps(state.time_left, duration, longest, dt)
@@ -78,7 +87,9 @@ def advance(
     push = None if frame.among is None else state.push
     for numbers in pieces:
         if frame.among is not None and (push is None or frame.among.is_due(numbers[0])):
-            taken, push = frame.among.feel(position, previous)
+            other = yield frame.stop(state.rest, numbers[0], partial(_copies, position, previous))
+            among = frame.among.beside(other)
+            taken, push = among.feel(position, previous)
             previous += taken
         for guides, block in zip(slices, blocks, strict=True):
             here, before = position[:, :, guides].copy(), previous[:, :, guides].copy()
@@ -89,6 +100,10 @@ def advance(
     time = state.time + count * dt
     carried = carried_after(state, frame, drive, settings, count)
     return DynamicsState(position, previous, state.rest, dt, left, time, styles, push, carried)
+
+
+def _copies(position: Floats, previous: Floats) -> tuple[Floats, Floats]:
+    return position.copy(), previous.copy()
 
 
 def _previous(state: DynamicsState, dt: float) -> Floats:

@@ -7,6 +7,9 @@
     densities      RGBA32F: the same smoothed
     gradients      RGBA32F: xyz how the smoothed mass grows along each axis
 
+    other_places, other_steps   RGBA32F, a texel a CV of other hair: where it counts and its mass,
+                   and how it moves in a substep
+
 CVs are drawn as points that blending adds up, which needs no atomics. Sums are exact as long as
 they fit into the 24 bits of a float.
 """
@@ -20,7 +23,7 @@ import gpu
 import numpy as np
 
 from ..arrays import Floats
-from ..dynamics.among import BEGIN, MOTION, Among, HairGrid
+from ..dynamics.among import BEGIN, MOTION, Among, HairGrid, Others
 from . import gpu_objects
 from .ribbons import Ribbons
 from .shader_program import ShaderRecipe, program
@@ -28,6 +31,7 @@ from .strand_layout import strand_rows
 from .textures import UniformBlock, drawing_into, drawing_state, texture_from
 
 _GROUP = (16, 4)
+_FEWEST = 1024
 
 
 @lru_cache(maxsize=32)
@@ -46,6 +50,17 @@ def deposit_recipe(cv_count: int) -> ShaderRecipe:
         defines=(("CV_COUNT", cv_count),),
     )
 
+
+OTHERS_RECIPE = ShaderRecipe(
+    name="among_others",
+    vertex="among_others.vert.glsl",
+    fragment="among_deposit.frag.glsl",
+    structs=("struct_among.glsl",),
+    blocks=(("Among", "among"),),
+    textures=(("FLOAT_2D", "other_places"), ("FLOAT_2D", "other_steps")),
+    varyings=(("flat", "VEC4", "lanes"),),
+    outputs=(("VEC4", "cell_sums"),),
+)
 
 FIELDS_RECIPE = ShaderRecipe(
     name="among_fields",
@@ -87,6 +102,7 @@ class AmongPass:
         self._block, self._points = UniformBlock(), Ribbons()
         self._grid: HairGrid | None = None
         self._volume: Floats | None = None
+        self._counts: tuple[int, int, int] | None = None
         self._textures: dict[str, Any] = {}
         self._target: Any = None
 
@@ -100,9 +116,13 @@ class AmongPass:
         """
         if among.grid is not self._grid or among.volume is not self._volume:
             self._make(among.grid, among.volume)
+        if among.place.counts != self._counts:
+            self._make_cells(among.place.counts)
         cv_count, guide_count = among.grid.density.shape
-        x, y, z = among.grid.counts
+        x, y, z = among.place.counts
         block = self._block.holding(_block_of(among, speed_ratio))
+        if among.others is not None:
+            self._textures |= _textures_of(among.others)
         textures = {**guides, **self._textures}
         with (
             drawing_into(self._target),
@@ -111,6 +131,9 @@ class AmongPass:
             self._target.clear(color=(0.0, 0.0, 0.0, 0.0))
             shader = _bound(deposit_recipe(cv_count), block, textures)
             self._points.points(guide_count * cv_count).draw(shader)
+            if among.others is not None:
+                shader = _bound(OTHERS_RECIPE, block, textures)
+                self._points.points(_room_for(len(among.others.mass))).draw(shader)
         for recipe, size in (
             (FIELDS_RECIPE, (x * z, y)),
             (feel_recipe(cv_count, pairs), (cv_count, guide_count)),
@@ -126,12 +149,29 @@ class AmongPass:
         mass = np.broadcast_to(grid.mass, grid.density.shape)
         part = np.broadcast_to(np.float32(1.0) if volume is None else volume, mass.shape)
         numbers = np.stack([grid.density.T, grid.full.T, mass.T, part.T], axis=-1)
-        x, y, z = grid.counts
-        self._textures = {"hair_at_rest": texture_from(strand_rows(numbers), "RGBA32F")}
+        self._textures["hair_at_rest"] = texture_from(strand_rows(numbers), "RGBA32F")
+        self._grid, self._volume = grid, volume
+
+    def _make_cells(self, counts: tuple[int, int, int]) -> None:
+        x, y, z = counts
         for name in ("cell_sums", "densities", "gradients"):
             self._textures[name] = gpu_objects.texture((x * z, y), format="RGBA32F")
         self._target = gpu_objects.framebuffer(color_slots=(self._textures["cell_sums"],))
-        self._grid, self._volume = grid, volume
+        self._counts = counts
+
+
+def _room_for(count: int) -> int:
+    """As many texels as are drawn for CVs of other hair, so that few numbers occur."""
+    return max(1 << max(count - 1, 0).bit_length(), _FEWEST)
+
+
+def _textures_of(others: Others) -> dict[str, Any]:
+    count = len(others.mass)
+    places, steps = np.zeros((2, _room_for(count), 1, 4), np.float32)
+    places[:count, 0, :3], places[:count, 0, 3] = others.here.T, others.mass
+    steps[:count, 0, :3] = others.step.T
+    found = {"other_places": places, "other_steps": steps}
+    return {name: texture_from(strand_rows(rows), "RGBA32F") for name, rows in found.items()}
 
 
 def _bound(recipe: ShaderRecipe, block: Any, textures: dict[str, Any]) -> Any:
@@ -147,11 +187,12 @@ def _bound(recipe: ShaderRecipe, block: Any, textures: dict[str, Any]) -> Any:
 def _block_of(among: Among, speed_ratio: float) -> Floats:
     """`Among` of gpu_shaders/struct_among.glsl in std140, float32."""
     grid, place, strength = among.grid, among.place, among.strength
-    values = np.zeros((7, 4), np.float32)
-    values[0].view(np.int32)[:] = (*grid.counts, grid.density.shape[1])
+    values = np.zeros((8, 4), np.float32)
+    values[0].view(np.int32)[:] = (*place.counts, grid.density.shape[1])
     values[1] = (*place.middle, grid.cell)
     values[2:5, :3], values[2:5, 3] = place.into, BEGIN
     scale = strength.scale(grid.cell)
     values[5] = strength.push, strength.pull, strength.friction, scale
     values[6, :3] = speed_ratio, MOTION / grid.cell, strength.ahead
+    values[7].view(np.int32)[:3] = place.low
     return values.ravel()

@@ -39,7 +39,7 @@ driver is seven times slower for each CV, as it unrolls no loop that long.
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any
 
 import gpu
@@ -51,6 +51,7 @@ from ..dynamics.constraints import PINNED
 from ..dynamics.contacts import REACH
 from ..dynamics.frame import Drive, Frame, carried_after, check_drive
 from ..dynamics.held import Held
+from ..dynamics.neighbours import Steps, alone
 from ..dynamics.painted import PaintedFrame
 from ..dynamics.schedule import due_substeps
 from ..dynamics.settings import DynamicsSettings
@@ -184,6 +185,10 @@ class DynamicsPass:
             HairloomError: as step.advance; or a collider that the GPU cannot have.
             ShaderError: the shader does not compile here.
         """
+        alone(self.steps(drive, settings, duration))
+
+    def steps(self, drive: Drive, settings: DynamicsSettings, duration: float) -> Steps[None]:
+        """As `advance`, with other hair."""
         state, dt, longest = self._state, 1.0 / settings.substep_rate, settings.longest_frame
         duration, count, left = due_substeps(state.time_left, duration, longest, dt)
         check_drive(state, drive, tuple(style for style, _ in self._styles))
@@ -193,7 +198,7 @@ class DynamicsPass:
             frame = Frame.of(state, drive, settings, duration, dt) if count else None
             carried = carried_after(state, frame, drive, settings, count)
             if frame is not None:
-                self._advance(frame, count, dt / state.substep if state.substep else 1.0)
+                yield from self._steps(frame, count, dt / state.substep if state.substep else 1.0)
             self._is_bridged = left > 0.0 or not count or drive.simulated is not None
             if self._is_bridged:
                 left_over = replace(state, time_left=left, carried=carried)
@@ -216,16 +221,23 @@ class DynamicsPass:
     def read(self) -> DynamicsState:
         """The state as it is now, read back; step.advance and another pass can go on from it."""
         if "positions" in self._textures:
-            here, beside = (self._grid(name) for name in ("positions", "previous_positions"))
-            previous = np.concatenate([beside[..., :2], here[..., 3:]], axis=-1)
+            position, previous = self._read_moving(1.0)
             push = as_rows(self._grid("pushes")[..., :3]) if self._is_pushed else None
-            self._state = replace(
-                self._state,
-                position=as_rows(here[..., :3]),
-                previous=as_rows(previous),
-                push=push,
-            )
+            self._state = replace(self._state, position=position, previous=previous, push=push)
         return self._state
+
+    def _read_moving(self, speed_ratio: float) -> tuple[Floats, Floats]:
+        """Where the CVs are and were in the substep before, in the shape of the state's.
+
+        Args:
+            speed_ratio: of a substep to the one before it.
+        """
+        here, beside = (self._grid(name) for name in ("positions", "previous_positions"))
+        position = as_rows(here[..., :3])
+        previous = as_rows(np.concatenate([beside[..., :2], here[..., 3:]], axis=-1))
+        if speed_ratio != 1.0:
+            previous = position - (position - previous) * np.float32(speed_ratio)
+        return position, previous
 
     def release(self) -> None:
         """Let go of all that lies on the GPU; goes on from the state that was read last."""
@@ -284,7 +296,7 @@ class DynamicsPass:
         known = (texture for other, texture in self._styles if other is style)
         return next(known, None) or points_texture(style)
 
-    def _advance(self, frame: Frame, count: int, speed_ratio: float) -> None:
+    def _steps(self, frame: Frame, count: int, speed_ratio: float) -> Steps[None]:
         """All substeps of a frame; the first is `speed_ratio` as long as the one before it."""
         self._is_pushed &= frame.among is not None
         if frame.painted is not self._painted:
@@ -293,7 +305,9 @@ class DynamicsPass:
             first, end = numbers[0], numbers[-1] + 1
             if frame.among is not None and (frame.among.is_due(first) or not self._is_pushed):
                 ratio = 1.0 if first else speed_ratio
-                self._among.feel(frame.among, self._textures, ratio, pair_format())
+                read = partial(self._read_moving, ratio)
+                among = frame.among.beside((yield frame.stop(self._state.rest, first, read)))
+                self._among.feel(among, self._textures, ratio, pair_format())
                 self._is_pushed = True
             for begin in range(first, end, SUBSTEPS_AT_ONCE):
                 part = min(end - begin, SUBSTEPS_AT_ONCE)

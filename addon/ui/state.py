@@ -10,7 +10,7 @@ import bpy
 from ..blender.base.gpu_choices import memory_in_use, memory_problem
 from ..blender.base.outcome import dropped_phrase
 from ..blender.preview import previews as registry
-from ..blender.preview.diagnostics import instances_note, issues_of
+from ..blender.preview.diagnostics import instances_note, issues_of, unfelt_note
 from ..blender.preview.phases import Phase
 from ..blender.preview.previews import previews
 from ..blender.sessions.measures import PARTS, array_bytes
@@ -128,7 +128,8 @@ def problems_of(hair: bpy.types.Object, session: Session | None) -> tuple[Proble
     reported = {issue.instead_of for issue in issues}
     problems = previews[session.uid].problems
     machine = memory_problem(), view_transform.problem()
-    others = filter(None, (problems, *machine, instances_note(hair), *notes_of(session.uid)))
+    left_out = instances_note(hair), unfelt_note(session)
+    others = filter(None, (problems, *machine, *left_out, *notes_of(session.uid)))
     for warning in dict.fromkeys((*session.warnings, *others)):
         if warning not in reported:
             found.append(Problem(warning.removeprefix(f"{hair.name}: ")))

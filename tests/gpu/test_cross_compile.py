@@ -58,6 +58,7 @@ ALL = (
     "tests/gpu/test_card_shadows.py::test_even_cards_shade_as_much_from_all_sides_of_their_strands",
     "tests/gpu/test_debug_views.py::test_the_detail_view_shows_factors_by_colour",
     "tests/gpu/test_dynamics_pass.py::test_hair_among_hair_equals_numpy",
+    "tests/gpu/test_dynamics_pass.py::test_grooms_that_feel_each_other_equal_numpy",
     "tests/gpu/test_frame.py::test_positive_shift_moves_the_highlight_to_the_tips",
     "tests/gpu/test_hold_pass.py::test_equals_numpy",
     "tests/gpu/test_inter_groom_shadow.py::test_a_mesh_has_the_shadow_of_all_grooms",

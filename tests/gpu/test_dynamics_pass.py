@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from grooms_together import Groom, play_frame
 from tiers import few_by_name
 
 from hairloom.addon.dynamics.clearance import GuideClearance, farthest_kept, guide_clearance
@@ -505,6 +506,27 @@ AMONG_OTHERS = {
 @pytest.mark.parametrize("scene", few_by_name(AMONG_OTHERS, "bundle", "painted"))
 def test_hair_among_hair_equals_numpy(make_pass: Any, scene: Scene) -> None:
     assert_equal(scene, make_pass, TOUCHING)
+
+
+def test_grooms_that_feel_each_other_equal_numpy(make_pass: Any) -> None:
+    """Two halves of a bundle, of which one is on the GPU, or both are; each beside itself alone."""
+    scene, seconds = Bundle(FALLING, fps=24.0), 0.25
+    targets = [scene.carried(number) for number in range(round(seconds * scene.fps) + 1)]
+    halves, ends = (slice(0, None, 2), slice(1, None, 2)), {}
+    for forms in ((None, None), (make_pass, make_pass), (make_pass, None), ()):
+        kinds = forms or (None, None)
+        grooms = [
+            Groom(targets[0][half], scene.settings, make_pass=form)
+            for half, form in zip(halves, kinds, strict=True)
+        ]
+        for target in targets[1:]:
+            near = None if forms else (frozenset(), frozenset())
+            play_frame(grooms, [target[half] for half in halves], 1.0 / scene.fps, near)
+        ends[forms] = np.stack([groom.state.position for groom in grooms])
+    by_numpy, *others, alone = ends.values()
+    assert np.abs(alone - by_numpy).max() > 0.005
+    for found in others:
+        assert np.abs(found - by_numpy).max() < TOUCHING
 
 
 def test_hair_among_hair_is_elsewhere_than_alone() -> None:

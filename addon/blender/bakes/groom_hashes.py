@@ -61,6 +61,9 @@ def groom_rig_hash(
     dynamics = settings[DynamicsSettings]
     if dynamics.animated_style:
         grown["style"] = ("animated",)
+    others = _other_grooms(hair, scene) if dynamics.volume > 0.0 else ()
+    if others:
+        grown["other_grooms"] = others
     if mask_names(dynamics):
         grown["paint"] = _paint(hair, head, *mask_names(dynamics).values())
     return hashes(
@@ -96,6 +99,18 @@ def groom_frame_hash(
         **({"style": style} if style else {}),
         forces=(gravity_of(depsgraph.scene), force_fields_of(hair, depsgraph)[0].table),
     )
+
+
+def _other_grooms(hair: bpy.types.Object, scene: bpy.types.Scene) -> tuple[Hashed, ...]:
+    """The grooms that this one may feel, wherever they are."""
+    parts: list[Hashed] = []
+    for other in sorted(scene.objects, key=lambda obj: obj.name):
+        is_groom = other.type == "CURVES" and not other.data.hairloom.baked_in
+        if is_groom and other != hair and not other.hide_render:
+            settings = GroomSettings.of(other)
+            parts += [other.name, settings[GuideSettings], settings[ChildrenSettings]]
+            parts += [_dynamics(other), *_curves_parts(other)]
+    return tuple(parts)
 
 
 def _style(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> tuple[Floats | Ints, ...]:

@@ -7,6 +7,7 @@ that is cancelled or fails leaves the one before as it was.
 from __future__ import annotations
 
 from collections.abc import Generator, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -34,7 +35,9 @@ from ..scene.fin_modifier import clear, fin_modifier
 from ..scene.source import check_density
 from ..sessions.fins import FinSession
 from ..sessions.session import Session
+from ..sessions.together import Together
 from . import previews
+from .bystanders import Bystanders
 
 
 @dataclass
@@ -50,8 +53,13 @@ class _Part:
     notes: tuple[str, ...] = ()
     measure: Measure | None = None
 
+    def groom_in(self, frame: int) -> Session | None:
+        """Its session, if it is a groom that has begun, and this frame is one of its own."""
+        session = self.session
+        return session if frame in self.frames and isinstance(session, Session) else None
+
     def go(self, frame: int, depsgraph: bpy.types.Depsgraph) -> None:
-        """Simulate and write this frame, if it is one of its own."""
+        """Simulate this frame, if it is one of its own."""
         if frame not in self.frames:
             return
         if self.writer is None or self.session is None:
@@ -67,7 +75,15 @@ class _Part:
             if isinstance(session, Session):
                 session.take_settings()  # those that are animated
             session.advance(depsgraph, 1.0 / frame_rate(depsgraph.scene))
-            if isinstance(session, Session) and self.measure is not None:
+
+    def write(self, frame: int, depsgraph: bpy.types.Depsgraph) -> None:
+        """This frame, if it is one of its own and all have come to its end."""
+        session = self.session
+        if frame not in self.frames or self.writer is None or session is None:
+            return
+        if isinstance(session, Session):
+            session.finish_frame()
+            if frame > self.frames.start and self.measure is not None:
                 session.measure_into(self.measure)
         self.writer.add(frame, session.recorded(), session.frame_hash(depsgraph))
 
@@ -188,19 +204,24 @@ class Bake:
             self._show()
 
     def _frames(self, scene: bpy.types.Scene) -> Iterator[int]:
+        bystanders = Bystanders()
         for done, frame in enumerate(range(self._first, self._last + 1), start=1):
             scene.frame_set(frame)
             depsgraph = bpy.context.evaluated_depsgraph_get()
-            for part in self.parts:
-                try:
-                    part.go(frame, depsgraph)
-                except HairloomError as error:
-                    raise HairloomError(
-                        f"{error.problem} (in frame {frame}); nothing was baked",
-                        place=error.place,
-                        remedy=error.remedy,
-                    ) from error
+            with _named(frame):
+                with Together([*self._grooms_in(frame), *bystanders.values()]) as together:
+                    for part in self.parts:
+                        part.go(frame, depsgraph)
+                    bystanders.move(depsgraph)
+                    together.go_on()
+                for part in self.parts:
+                    part.write(frame, depsgraph)
+                bystanders.join(self._grooms_in(frame), depsgraph)
             yield done
+
+    def _grooms_in(self, frame: int) -> list[Session]:
+        found = (part.groom_in(frame) for part in self.parts)
+        return [groom for groom in found if groom is not None]
 
     def _publish(self) -> None:
         """All of them take the places of those before, or none does."""
@@ -222,6 +243,19 @@ class Bake:
             obj = part.handle.find()
             if obj is not None:
                 previews.bake_changed(obj, depsgraph)
+
+
+@contextmanager
+def _named(frame: int) -> Iterator[None]:
+    """What goes wrong says in which frame."""
+    try:
+        yield
+    except HairloomError as error:
+        raise HairloomError(
+            f"{error.problem} (in frame {frame}); nothing was baked",
+            place=error.place,
+            remedy=error.remedy,
+        ) from error
 
 
 def simulated_for(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Simulated:

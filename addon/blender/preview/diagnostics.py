@@ -16,6 +16,7 @@ from ..scene.source import dynamics_warnings, own_dynamics
 from ..scene.surfaces import read_positions
 from ..sessions.session import Session
 from . import previews
+from .bystanders import near_to
 
 #: Scales that differ by less are rounding.
 _UNEVEN = 1.01
@@ -95,6 +96,16 @@ def instances_note(hair: bpy.types.Object) -> str:
     if any(each.is_instance and each.object.original == hair for each in looked_at):
         return "Instances of it have no hair in the preview; they have it in renders"
     return ""
+
+
+def unfelt_note(session: Session) -> str:
+    """Which hair the preview leaves out that a bake would feel; "" if there is none. Quick enough
+    to ask at every redraw."""
+    near = near_to([session], bpy.context.view_layer.depsgraph)
+    names = [obj.name for obj in near if previews.session_of(obj) is None]
+    if not names:
+        return ""
+    return f"{', '.join(names)}: near, but not previewed; Play does not feel it, a bake does"
 
 
 def _may_instance(obj: bpy.types.Object) -> bool:

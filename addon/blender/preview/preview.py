@@ -158,6 +158,15 @@ class Preview:
             self.phase, session.is_playing = Phase.REST, False
             raise
 
+    def finish_frame(self, depsgraph: bpy.types.Depsgraph) -> None:
+        """After a frame that its groom has gone through with others."""
+        assert self.groom is not None, "fins go alone"
+        try:
+            self.groom.finish_frame()
+        except HairloomError as error:
+            self.act(Event.FAILED, depsgraph)
+            self.problem = str(error)
+
     def release(self) -> None:
         """The timeline moves it no longer, until it takes it up again."""
         self.frame = None

@@ -6,7 +6,8 @@ See `scene_events` for what follows from Blender's events, `phases` for what a p
 from __future__ import annotations
 
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import partial
 
 import bpy
@@ -25,6 +26,7 @@ from ..base.originals import all_depsgraphs, refresh_views, show_originals
 from ..base.redraw import redraw_panels, redraw_views, refresh_panels
 from ..colliders import fields
 from ..sessions.session import Session
+from ..sessions.together import Together
 from ..viewport import overlay
 from ..viewport.debug_lines import is_combed
 from .phases import Event, Phase
@@ -232,12 +234,26 @@ def begin(session: Simulated, depsgraph: bpy.types.Depsgraph, *, blocking: bool)
 
 def advance(depsgraph: bpy.types.Depsgraph, duration: float) -> None:
     """Simulate the time [s] that has passed since the last call."""
-    for preview in tuple(previews.values()):
-        if preview.phase is Phase.WAITING and preview.is_made and fields.are_made():
-            # its first frame is the next tick's, so that neither holds the window up for long
-            attempt(preview, depsgraph, partial(_begin, preview, depsgraph))
-        elif preview.phase is Phase.FREE and not previews.is_paused:
-            attempt(preview, depsgraph, partial(preview.go, Event.TICK, depsgraph, duration))
+    with together(depsgraph):
+        for preview in tuple(previews.values()):
+            if preview.phase is Phase.WAITING and preview.is_made and fields.are_made():
+                # its first frame is the next tick's, so that neither holds the window up for long
+                attempt(preview, depsgraph, partial(_begin, preview, depsgraph))
+            elif preview.phase is Phase.FREE and not previews.is_paused:
+                attempt(preview, depsgraph, partial(preview.go, Event.TICK, depsgraph, duration))
+
+
+@contextmanager
+def together(depsgraph: bpy.types.Depsgraph) -> Iterator[None]:
+    """A frame of all previewed grooms of the scene: those that feel each other go on at its end."""
+    scene = depsgraph.scene
+    here = [each for each in sessions() if not is_elsewhere(each.uid, each.name, scene)]
+    with Together([] if is_interrupted() else here) as frame:
+        yield
+        for session in frame.go_on():
+            preview = previews.get(session.uid)
+            if preview is not None and preview.session is session:
+                attempt(preview, depsgraph, partial(preview.finish_frame, depsgraph))
 
 
 def _begin(preview: Preview, depsgraph: bpy.types.Depsgraph) -> None:

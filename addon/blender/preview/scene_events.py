@@ -131,8 +131,9 @@ def frame_changed(depsgraph: bpy.types.Depsgraph) -> None:
     again at every frame.
     """
     _, _, light_changed = changes(depsgraph)
-    for preview in tuple(previews.values()):
-        attempt(preview, depsgraph, partial(_go, preview, depsgraph, light_changed))
+    with registry.together(depsgraph):
+        for preview in tuple(previews.values()):
+            attempt(preview, depsgraph, partial(_go, preview, depsgraph, light_changed))
 
 
 def _go(preview: Preview, depsgraph: bpy.types.Depsgraph, light_changed: bool) -> None:

@@ -11,6 +11,7 @@ from ... import motion_flow
 from ...arrays import Floats
 from ...dynamics.colliders import PosedCollider
 from ...dynamics.force_fields import NO_FIELDS, ForceFields
+from ...dynamics.neighbours import Steps, alone
 from ...dynamics.painted import PaintedGuides, simulated_of
 from ...dynamics.settings import DynamicsSettings
 from ...motion_flow import Motion
@@ -106,6 +107,18 @@ class ComputeSolver:
         force_fields: ForceFields = NO_FIELDS,
         painted: PaintedGuides | None = None,
     ) -> None:
+        alone(self.steps(pose, colliders, settings, gravity, duration, force_fields, painted))
+
+    def steps(
+        self,
+        pose: Pose,
+        colliders: tuple[PosedCollider, ...],
+        settings: DynamicsSettings,
+        gravity: Floats,
+        duration: float,
+        force_fields: ForceFields = NO_FIELDS,
+        painted: PaintedGuides | None = None,
+    ) -> Steps[None]:
         simulated = simulated_of(painted, settings, len(self._rig.guides))
         if self._is_baked:
             self._take(self.motion)
@@ -121,7 +134,7 @@ class ComputeSolver:
         drive = motion.drive(
             target, colliders, gravity, duration, force_fields, held, simulated, painted
         )
-        self._dynamics.advance(drive, settings, duration)
+        yield from self._dynamics.steps(drive, settings, duration)
         self._motion = replace(
             motion,
             carried_guides=target,

@@ -11,6 +11,7 @@ from ... import motion_flow
 from ...arrays import Floats
 from ...dynamics.colliders import PosedCollider
 from ...dynamics.force_fields import NO_FIELDS, ForceFields
+from ...dynamics.neighbours import Steps, alone
 from ...dynamics.painted import PaintedGuides, simulated_of
 from ...dynamics.settings import DynamicsSettings
 from ...dynamics.state import rows_of
@@ -77,22 +78,33 @@ class NumpySolver:
         force_fields: ForceFields = NO_FIELDS,
         painted: PaintedGuides | None = None,
     ) -> None:
+        alone(self.steps(pose, colliders, settings, gravity, duration, force_fields, painted))
+
+    def steps(
+        self,
+        pose: Pose,
+        colliders: tuple[PosedCollider, ...],
+        settings: DynamicsSettings,
+        gravity: Floats,
+        duration: float,
+        force_fields: ForceFields = NO_FIELDS,
+        painted: PaintedGuides | None = None,
+    ) -> Steps[None]:
         # what was not shown counts too: motion does not depend on who looks
         led = NOT_LED if self._motion.clearance is None else self.led()
-        self._take(
-            motion_flow.advance(
-                self._rig,
-                self.motion,
-                pose,
-                colliders,
-                settings,
-                gravity,
-                duration,
-                force_fields,
-                led,
-                painted,
-            )
+        motion = yield from motion_flow.steps(
+            self._rig,
+            self.motion,
+            pose,
+            colliders,
+            settings,
+            gravity,
+            duration,
+            force_fields,
+            led,
+            painted,
         )
+        self._take(motion)
 
     def take_style(self, rig: Rig) -> None:
         if self._motion.clearance is not None:

@@ -15,6 +15,7 @@ from ...arrays import Floats
 from ...comb_flow import combed
 from ...dynamics.colliders import PosedCollider
 from ...dynamics.figures import CardFigures, Figures, Measure
+from ...dynamics.neighbours import KnownHair, Steps, Style, alone
 from ...dynamics.settings import DynamicsSettings
 from ...dynamics.state import start
 from ...errors import HairloomError
@@ -52,6 +53,9 @@ class Session:
 
     uid, hair, head: of its objects.
     groom: what it was made into; a placeholder until the first hair is made in a thread.
+    known_hair: what it knows of other grooms.
+    has_company: whether it goes through a frame with others, see `together`: what it will do is in
+        `waiting` then. failure: what went wrong in it.
     figures, card_figures: as measured last since the hair was at rest; of cards only where they are
         shown. are_figures_current: whether it has not moved since.
 
@@ -98,6 +102,10 @@ class Session:
         self._posed: tuple[PosedCollider, ...] = ()
         self._field_notes: tuple[str, ...] = ()
         self._styled: Rig | None = None
+        self.known_hair = KnownHair()
+        self.has_company = False
+        self.waiting: Steps[None] | None = None
+        self.failure: Exception | None = None
         self.figures: Figures | None = None
         self.card_figures: CardFigures | None = None
         self.are_figures_current = False
@@ -457,7 +465,7 @@ class Session:
         """
         self._take_style(depsgraph)
         pose, self.figures, self.card_figures = self._pose(depsgraph), None, None
-        self._begun, self._is_recorded = None, False
+        self._begun, self._is_recorded, self.known_hair = None, False, KnownHair()
         _, self._field_notes = force_fields_of(self.hair.found(), depsgraph)
         if not self.is_playing or self.obstacles is None:
             self.solver.rest(pose)
@@ -472,7 +480,7 @@ class Session:
             self._contacts.keep(start, self.solver.motion)
             rate = frame_rate(depsgraph.scene)
             for _ in range(self.settings[DynamicsSettings].pre_roll):
-                self._simulate(depsgraph, 1.0 / rate)
+                alone(self._simulate(depsgraph, 1.0 / rate))
         self._show()
 
     def _take_style(self, depsgraph: bpy.types.Depsgraph) -> None:
@@ -557,17 +565,59 @@ class Session:
         Raises:
             HairloomError: as `rest`.
         """
+        steps = self._steps(depsgraph, duration)
+        if self.has_company:
+            self.waiting = steps
+        else:
+            alone(steps)
+
+    def finish_frame(self) -> None:
+        """After a frame with others.
+
+        Raises:
+            HairloomError: what went wrong in it.
+        """
+        failure, self.failure = self.failure, None
+        if failure is not None:
+            raise failure
+
+    def _steps(self, depsgraph: bpy.types.Depsgraph, duration: float) -> Steps[None]:
+        """See `advance`. With others it takes as long as all of them."""
         with self.times.measured("simulation"):
             self._is_recorded = False
             self._take_style(depsgraph)
             scale = self.settings[DynamicsSettings].time_scale
             if scale:
-                self._simulate(depsgraph, duration * scale)
+                yield from self._simulate(depsgraph, duration * scale)
             else:
                 self._go_along(depsgraph, self._pose(depsgraph), 0.0)
             self._show()
 
-    def _simulate(self, depsgraph: bpy.types.Depsgraph, duration: float) -> None:
+    @property
+    def feels_hair(self) -> bool:
+        """Whether its hair feels other hair."""
+        return self.settings[DynamicsSettings].volume > 0.0
+
+    @property
+    def is_felt(self) -> bool:
+        """See `together.Felt`."""
+        hair = self.hair.handle.find()
+        return self.is_made and hair is not None and not hair.hide_render
+
+    @property
+    def pose(self) -> Pose:
+        """Where the body is in what is shown."""
+        return self.solver.pose
+
+    def guides(self) -> Floats:
+        """As they are shown, (guide_count, cv_count, 3) [m, world]; reads back from a GPU."""
+        return self.solver.guides()
+
+    def style_seen(self) -> Style:
+        """See `motion_flow.style_seen`."""
+        return motion_flow.style_seen(self.rig, self.solver.pose, self.groom.rig)
+
+    def _simulate(self, depsgraph: bpy.types.Depsgraph, duration: float) -> Steps[None]:
         """A frame of this duration of the hair's time [s]."""
         pose, settings = self._pose(depsgraph), self.settings[DynamicsSettings]
         if self.solver.has_jumped(pose, settings, duration):
@@ -576,7 +626,8 @@ class Session:
         self._posed = () if self.obstacles is None else self.obstacles.move(depsgraph, duration)
         fields, self._field_notes = force_fields_of(self.hair.found(), depsgraph)
         gravity, painted = gravity_of(depsgraph.scene), self._source.painted_guides(self.rig)
-        self.solver.advance(pose, self._posed, settings, gravity, duration, fields, painted)
+        steps = self.solver.steps(pose, self._posed, settings, gravity, duration, fields, painted)
+        yield from steps
 
     def _go_along(self, depsgraph: bpy.types.Depsgraph, pose: Pose, duration: float) -> None:
         """A frame in which hair goes with its head as it is; see `motion_flow.go_along`."""

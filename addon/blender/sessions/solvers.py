@@ -16,6 +16,7 @@ from ... import rig_flow
 from ...arrays import Floats
 from ...dynamics.colliders import PosedCollider
 from ...dynamics.force_fields import NO_FIELDS, ForceFields
+from ...dynamics.neighbours import Steps
 from ...dynamics.painted import PaintedGuides
 from ...dynamics.settings import DynamicsSettings
 from ...errors import HairloomError
@@ -83,6 +84,18 @@ class Solver(Protocol):
         painted: PaintedGuides | None = None,
     ) -> None:
         """One frame of motion, as motion_flow.advance."""
+
+    def steps(
+        self,
+        pose: Pose,
+        colliders: tuple[PosedCollider, ...],
+        settings: DynamicsSettings,
+        gravity: Floats,
+        duration: float,
+        force_fields: ForceFields = NO_FIELDS,
+        painted: PaintedGuides | None = None,
+    ) -> Steps[None]:
+        """The same with other grooms, as motion_flow.steps."""
 
     def take_style(self, rig: Rig) -> None:
         """Go by this rig in the next frame: the same groom with curves of other shapes, see

@@ -28,20 +28,44 @@ from ..among import (
 
 
 @dataclass(frozen=True)
+class Beside:
+    """CVs of other grooms, (m, 3) float64 world [m], as far ahead as these count.
+
+    motion: (m, 3) in a substep. mass: (m,) see `HairGrid`.
+    """
+
+    here: Floats
+    motion: Floats
+    mass: Floats
+
+
+#: Cells of a grid that does not begin again.
+NO_END = 1_000_000
+NONE_BESIDE = Beside(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0))
+
+
+@dataclass(frozen=True)
 class Hair:
     """All CVs at one moment, (n, 3) float64 world [m]. turn: (3, 3) of the groom since rest.
 
-    middle: (3,) of its roots.
+    middle: (3,) of its roots. others: of other grooms, none by default.
     """
 
     here: Floats
     motion: Floats
     turn: Floats
     middle: Floats
+    others: Beside = NONE_BESIDE
 
 
 def feel_slowly(
-    grid: HairGrid, rest: Floats, hair: Hair, volume: Floats, dt: float, substeps: int
+    grid: HairGrid,
+    rest: Floats,
+    hair: Hair,
+    volume: Floats,
+    dt: float,
+    substeps: int,
+    others_at_rest: Beside = NONE_BESIDE,
 ) -> tuple[Floats, Floats]:
     """What `among.feel` does, as (n, 3) [m].
 
@@ -49,7 +73,7 @@ def feel_slowly(
         rest: (n, 3) where all CVs were at rest. volume: (n,), the setting at each.
     """
     mass = np.tile(grid.mass.astype(np.float64)[:, None], (1, len(rest) // len(grid.mass))).ravel()
-    still = Hair(rest, np.zeros_like(rest), np.eye(3), grid.middle)
+    still = Hair(rest, np.zeros_like(rest), np.eye(3), grid.middle, others_at_rest)
     at_rest = [_others(grid, still, mass, cv, 0.0)[0] for cv in range(len(rest))]
     crowded = np.maximum(at_rest, THIN * np.median(at_rest))
     taken, push = np.zeros_like(rest), np.zeros_like(rest)
@@ -72,8 +96,15 @@ def _others(
     grid: HairGrid, hair: Hair, mass: Floats, cv: int, ahead: float
 ) -> tuple[float, Floats, Floats]:
     """Density, its gradient [1 / cell] and mean motion [m] of all others at a CV."""
-    places = (hair.here + hair.motion * ahead - hair.middle) @ hair.turn / grid.cell + BEGIN
-    steps = hair.motion * MOTION / grid.cell
+    here = np.concatenate([hair.here + hair.motion * ahead, hair.others.here])
+    motion, mass = (
+        np.concatenate(both)
+        for both in ((hair.motion, hair.others.motion), (mass, hair.others.mass))
+    )
+    # beside others a grid has cells enough for the groom wherever it is
+    counts = (NO_END,) * 3 if len(hair.others.mass) else grid.counts
+    places = (here - hair.middle) @ hair.turn / grid.cell + BEGIN
+    steps = motion * MOTION / grid.cell
     whole = np.rint(np.clip(steps, -FASTEST * MOTION, FASTEST * MOTION)) * grid.cell / MOTION
     density, gradient, moving = 0.0, np.zeros(3), np.zeros(3)
     for other in range(len(places)):
@@ -82,7 +113,7 @@ def _others(
         nearest_middle = np.floor(places[other] + 0.5)
         near = [
             _along(float(apart), count)
-            for apart, count in zip(places[cv] - nearest_middle, grid.counts, strict=True)
+            for apart, count in zip(places[cv] - nearest_middle, counts, strict=True)
         ]
         (x, slope_x), (y, slope_y), (z, slope_z) = near
         density += mass[other] * x * y * z

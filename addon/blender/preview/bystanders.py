@@ -1,0 +1,121 @@
+"""Grooms that are not baked now, but felt by those that are: as in their own bakes, or at rest."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+
+from ... import motion_flow
+from ...arrays import Floats
+from ...dynamics.neighbours import Style
+from ...rig_flow import Pose, Rig
+from ..bakes import playback
+from ..bakes.baked_rig import BakedRig
+from ..base.objects import head_of, matrix_of, objects_in
+from ..sessions.groom_source import GroomSource
+from ..sessions.prepared_groom import build
+from ..sessions.session import Session
+from .preview import rig_for
+
+
+class Bystander:
+    """One of them; fulfils `together.Felt`.
+
+    Raises:
+        HairloomError: no hair curves, none that can be used, or of another scale than the head.
+    """
+
+    def __init__(self, hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> None:
+        self._source = GroomSource(hair, depsgraph)
+        self._source.use_bake(rig_for(hair, depsgraph.scene))
+        self._own = build(self._source.request, is_drawn=False).rig
+        self.uid = int(hair.session_uid)
+        self.move(depsgraph)
+
+    @property
+    def is_felt(self) -> bool:
+        """See `together.Felt`."""
+        hair = self._source.hair.handle.find()
+        return hair is not None and not hair.hide_render
+
+    def move(self, depsgraph: bpy.types.Depsgraph) -> None:
+        """To the scene's frame.
+
+        Raises:
+            HairloomError: it or its head is gone or broken, or its bake is.
+        """
+        hair, frame = self._source.hair.found(), depsgraph.scene.frame_current
+        cache = playback.cache_of(hair) if hair.hairloom.bake.is_shown else None
+        if cache is not None and cache.holds(frame):
+            baked, arrays = BakedRig(self._own, self._source.rests), cache.frame(frame)
+            if baked.fits(arrays):
+                self.rig: Rig = baked.styled(arrays)
+                self.pose: Pose = baked.pose(arrays)
+                self._guides: Floats = arrays["guides"]
+                return
+        self.rig, self.pose = self._own, self._source.pose(self._own, depsgraph)
+        self._guides = motion_flow.style_of_guides(self.rig, self.pose)
+
+    def guides(self) -> Floats:
+        """See `together.Felt`."""
+        return self._guides
+
+    def style_seen(self) -> Style:
+        """See `motion_flow.style_seen`."""
+        return motion_flow.style_seen(self.rig, self.pose, self._own)
+
+
+class Bystanders(dict[int, Bystander]):
+    """Those of a bake, by session number of their objects, once they may be near to it."""
+
+    def join(self, sessions: list[Session], depsgraph: bpy.types.Depsgraph) -> None:
+        """All that these may feel and that are none of them.
+
+        Raises:
+            HairloomError: as `Bystander`.
+        """
+        for session in sessions:
+            self.pop(session.uid, None)
+        for obj in near_to(sessions, depsgraph):
+            if obj.session_uid not in self:
+                self[obj.session_uid] = Bystander(obj, depsgraph)
+
+    def move(self, depsgraph: bpy.types.Depsgraph) -> None:
+        """All of them to the scene's frame.
+
+        Raises:
+            HairloomError: as `Bystander.move`.
+        """
+        for each in self.values():
+            each.move(depsgraph)
+
+
+def near_to(sessions: list[Session], depsgraph: bpy.types.Depsgraph) -> list[bpy.types.Object]:
+    """Other grooms of the view layer that these may feel; quick enough to ask at every redraw."""
+    feeling = [session.hair.found() for session in sessions if session.feels_hair]
+    balls = [_ball(hair, depsgraph) for hair in feeling]
+    found, uids = [], {session.uid for session in sessions}
+    for obj in objects_in(depsgraph.view_layer) if balls else ():
+        is_groom = obj.type == "CURVES" and not obj.data.hairloom.baked_in
+        if is_groom and not obj.hide_render and obj.session_uid not in uids:
+            middle, radius = _ball(obj, depsgraph)
+            if any(np.linalg.norm(place - middle) <= radius + reach for place, reach in balls):
+                found.append(obj)
+    return found
+
+
+def _ball(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> tuple[Floats, float]:
+    """One in which its hair is now, however that swings: its middle (3,) and its radius [m]."""
+    corners = _corners(hair, depsgraph)
+    reach = float(np.linalg.norm(np.ptp(corners, axis=0)))
+    head = head_of(hair)
+    if head is not None:
+        corners = _corners(head, depsgraph)
+    return corners.mean(axis=0), reach + float(np.linalg.norm(np.ptp(corners, axis=0))) / 2.0
+
+
+def _corners(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Floats:
+    """Of its box as evaluated, (8, 3) world [m]."""
+    matrix = matrix_of(obj, depsgraph)
+    corners = np.array(obj.evaluated_get(depsgraph).bound_box, np.float64)
+    return corners @ matrix[:3, :3].T + matrix[:3, 3]

@@ -1,0 +1,142 @@
+"""Grooms that feel each other go through a frame together, see `dynamics.neighbours`.
+
+    with Together(sessions) as frame:
+        ...                 each session is moved as if it were alone; one that feels others waits
+        frame.go_on()       those that have waited go on, all at once
+
+What is not simulated, plays a bake or feels nothing goes straight from where it was to where it is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from types import TracebackType
+from typing import Protocol, Self
+
+import numpy as np
+
+from ... import motion_flow
+from ...arrays import Floats
+from ...dynamics.neighbours import Mover, Straight, Style, go_together
+from ...rig_flow import Pose, Rig
+from .session import Session
+
+
+class Felt(Protocol):
+    """A groom that others may feel.
+
+    uid: of its object.
+    """
+
+    uid: int
+
+    @property
+    def is_felt(self) -> bool:
+        """Whether it counts: hair that renders leave out does not."""
+
+    @property
+    def rig(self) -> Rig: ...
+
+    @property
+    def pose(self) -> Pose:
+        """Where its body was when it was moved last."""
+
+    def guides(self) -> Floats:
+        """Where they are, (guide_count, cv_count, 3) [m, world]."""
+
+    def style_seen(self) -> Style:
+        """See `motion_flow.style_seen`."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Begin:
+    """A groom at the frame's begin.
+
+    reach: how far [m] its hair gets from a middle. near: what others it feels, by number.
+    """
+
+    groom: Felt
+    style: Style
+    guides: Floats
+    reach: float
+    near: frozenset[int]
+
+    @property
+    def mover(self) -> Mover:
+        """The groom in the frame, once all have been moved that do not wait."""
+        groom = self.groom
+        straight = Straight(self.guides, groom.guides, self.reach)
+        if not isinstance(groom, Session):
+            return Mover(groom.uid, self.style, straight)
+        waiting, known = groom.waiting, groom.known_hair
+        return Mover(groom.uid, self.style, straight, waiting, self.near, known)
+
+
+class Together:
+    """A frame of these grooms, from where they are now."""
+
+    def __init__(self, grooms: Iterable[Felt]) -> None:
+        self._begun = _begun([groom for groom in grooms if groom.is_felt])
+
+    @property
+    def _sessions(self) -> list[Session]:
+        return [each.groom for each in self._begun if isinstance(each.groom, Session)]
+
+    def __enter__(self) -> Self:
+        for begun in self._begun:
+            if begun.near and isinstance(begun.groom, Session):
+                begun.groom.has_company = True
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        for session in self._sessions:
+            session.has_company, session.waiting = False, None
+
+    def go_on(self) -> list[Session]:
+        """Bring those that wait to the frame's end; returns them. `Session.finish_frame` is to
+        come."""
+        waiting = [session for session in self._sessions if session.waiting is not None]
+        if waiting:
+            movers = {begun.groom.uid: begun.mover for begun in self._begun}
+            go_together(tuple(movers.values()))
+            for session in waiting:
+                mover = movers[session.uid]
+                session.known_hair, session.failure = mover.known, mover.error
+        return waiting
+
+
+def _begun(grooms: list[Felt]) -> list[_Begin]:
+    """Those that feel others, and those that they feel."""
+    feeling = {each.uid for each in grooms if isinstance(each, Session) and each.feels_hair}
+    if not feeling or len(grooms) < 2:
+        return []
+    balls = {each.uid: motion_flow.reach(each.rig, each.pose) for each in grooms}
+    near = {uid: _touching(uid, balls) for uid in feeling}
+    taking_part = frozenset().union(*near.values(), (uid for uid in near if near[uid]))
+    return [
+        _Begin(
+            each,
+            each.style_seen(),
+            each.guides(),
+            balls[each.uid][1],
+            near.get(each.uid, frozenset()),
+        )
+        for each in grooms
+        if each.uid in taking_part
+    ]
+
+
+def _touching(uid: int, balls: dict[int, tuple[Floats, float]]) -> frozenset[int]:
+    """The numbers of other balls, a middle and a radius, that touch this one."""
+    middle, radius = balls[uid]
+    return frozenset(
+        other
+        for other, (place, reach) in balls.items()
+        if other != uid and float(np.linalg.norm(place - middle)) <= radius + reach
+    )

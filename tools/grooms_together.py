@@ -1,0 +1,101 @@
+"""Grooms of guides that go through frames together, for tests and benchmarks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from hairloom.addon.dynamics.neighbours import (
+    KnownHair,
+    Mover,
+    Steps,
+    Straight,
+    Style,
+    go_together,
+    hair_of,
+)
+from hairloom.addon.dynamics.settings import DynamicsSettings
+from hairloom.addon.dynamics.state import DynamicsState, start
+from hairloom.addon.dynamics.step import Drive, steps
+
+EARTH = np.array([0.0, 0.0, -9.81])
+
+
+class Groom:
+    """Guides in motion.
+
+    Args:
+        grid: at rest, (guide_count, cv_count, 3) [m]. settings: None: it is not simulated.
+        state: from which it goes on; None: from rest.
+        make_pass: gives a DynamicsPass of a state; None: numpy.
+        gravity: in terms of the earth's.
+    """
+
+    def __init__(
+        self,
+        grid: np.ndarray,
+        settings: DynamicsSettings | None,
+        *,
+        state: DynamicsState | None = None,
+        make_pass: Callable[[DynamicsState], Any] | None = None,
+        gravity: float = 1.0,
+    ) -> None:
+        self.grid = self.style = grid
+        self.settings, self.known = settings, KnownHair()
+        self.gravity = EARTH * gravity
+        self._state = start(grid) if state is None else state
+        self.hair = hair_of(grid, np.ones(len(grid)))
+        self._pass = None if make_pass is None else make_pass(self._state)
+
+    @property
+    def state(self) -> DynamicsState:
+        return self._state if self._pass is None else self._pass.read()
+
+    def wait(self) -> None:
+        """Until the GPU has come to the frame's end, and its guides are here."""
+        if self._pass is not None:
+            self._pass.read()
+
+    def mover(
+        self, number: int, target: np.ndarray, duration: float, near: frozenset[int]
+    ) -> Mover:
+        style = Style(partial(getattr, self, "style"), self.hair, self.grid)
+        straight = Straight(self.style, partial(np.asarray, target))
+        steps = None if self.settings is None else self._steps(self.settings, target, duration)
+        return Mover(number, style, straight, steps, near, self.known)
+
+    def _steps(
+        self, settings: DynamicsSettings, target: np.ndarray, duration: float
+    ) -> Steps[None]:
+        drive = Drive(self.style, target, (), self.gravity)
+        if self._pass is None:
+            self._state = yield from steps(self._state, drive, settings, duration)
+        else:
+            yield from self._pass.steps(drive, settings, duration)
+
+
+def play_frame(
+    grooms: Sequence[Groom],
+    targets: Sequence[np.ndarray],
+    duration: float,
+    near: Sequence[frozenset[int]] | None = None,
+) -> None:
+    """Through a frame, in which their styles go to these targets.
+
+    Args:
+        near: of each groom, the numbers of those that it feels; None: all others.
+    """
+    numbers = frozenset(range(len(grooms)))
+    near = near or [numbers - {number} for number in numbers]
+    movers = [
+        groom.mover(number, target, duration, near[number])
+        for number, (groom, target) in enumerate(zip(grooms, targets, strict=True))
+    ]
+    go_together(movers)
+    for groom, mover, target in zip(grooms, movers, targets, strict=True):
+        if mover.error is not None:
+            raise mover.error
+        groom.known, groom.style = mover.known, target
