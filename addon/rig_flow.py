@@ -594,10 +594,12 @@ def strand_seeds(rig: Rig) -> Ints:
     """What the noise of each strand depends on, (strand_count,) whole numbers below 2^24.
 
     A child's is named by the place of its root, so that it keeps its own colour when another one
-    comes or goes.
+    comes or goes; an artist's strand has the seed that it was made with, or its number.
     """
     strands = rig.strands
     seeds = np.arange(strands.strand_count)
+    if strands.seed is not None:
+        seeds = np.where(strands.seed == 0, seeds, strands.seed)
     own = strands.strand_count - rig.child_count
     if rig.child_count:
         assert strands.root_triangle is not None and strands.root_barycentric is not None

@@ -38,6 +38,7 @@ def clean(
     group: Ints | None = None,
     root_uv: Floats | None = None,
     color: Floats | None = None,
+    seed: Ints | None = None,
     unfit: Mapping[str, Bools] = MappingProxyType({}),
 ) -> Cleaned:
     """Make a `StrandSet` from curves of any origin.
@@ -50,6 +51,7 @@ def clean(
         group: (curve_count,); absent: one group, 0.
         root_uv: (curve_count, 2); values that are not finite become 0.
         color: (point_count, 3) scene-linear; see `usable_colors`.
+        seed: (curve_count,); see `StrandSet`.
         unfit: reason -> (curve_count,) which curves cannot be used for it, whatever their points.
     """
     points = np.asarray(points, np.float32).reshape(-1, 3)
@@ -59,7 +61,7 @@ def clean(
     color = None if color is None else usable_colors(color, offsets)
     if not unfit and radius is not None and _are_sound(points, offsets, radius, root_uv):
         group = np.zeros(curve_count, np.int32) if group is None else group
-        strands = StrandSet(points, offsets, radius, group, root_uv, color=color)
+        strands = StrandSet(points, offsets, radius, group, root_uv, color=color, seed=seed)
         return Cleaned(strands, {}, np.arange(curve_count))
 
     faults = {
@@ -89,6 +91,7 @@ def clean(
         root_uv=None if root_uv is None else np.nan_to_num(root_uv, posinf=0, neginf=0)[kept],
         has_widths=radius is not None and bool(are_widths(np.asarray(radius)).any()),
         color=None if color is None else color[point_kept],
+        seed=None if seed is None else np.asarray(seed)[kept],
     )
     return Cleaned(strands, dropped, kept)
 

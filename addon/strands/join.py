@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from ..arrays import Ints
 from .colors import joined_colors
 from .strand_set import StrandSet
 
@@ -16,9 +17,17 @@ def joined(one: StrandSet, other: StrandSet) -> StrandSet:
     for name in ("points", "radius", "group", "root_uv", "root_triangle", "root_barycentric"):
         parts = [getattr(one, name), getattr(other, name)]
         both[name] = None if any(part is None for part in parts) else np.concatenate(parts)
+    seed = None
+    if one.seed is not None or other.seed is not None:
+        seed = np.concatenate([_seeds(one), _seeds(other)])
     return StrandSet(
         offsets=np.concatenate([one.offsets, other.offsets[1:] + one.offsets[-1]]),
         has_widths=one.has_widths and other.has_widths,
         color=joined_colors([one, other]),
+        seed=seed,
         **both,
     )
+
+
+def _seeds(strands: StrandSet) -> Ints:
+    return np.zeros(strands.strand_count, np.int32) if strands.seed is None else strands.seed

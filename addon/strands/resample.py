@@ -38,6 +38,7 @@ def evenly_spaced(strands: StrandSet, cv_count: int) -> StrandSet:
         strands.root_barycentric,
         color,
         strands.has_widths,
+        strands.seed,
     )
 
 

@@ -34,6 +34,7 @@ class StrandSet:
     root_barycentric: (strand_count, 3) float32, or None when unbound.
     color: (point_count, 3) float32 scene-linear, the hair's own; None where it has none, NaN all
         along strands that have none.
+    seed: (strand_count,) int32, what the noise of a strand depends on; 0 is its number, as is None.
     has_widths: whether the radii are the groom's own; else they are `DEFAULT_RADIUS`.
 
     Raises:
@@ -50,6 +51,7 @@ class StrandSet:
     root_barycentric: Floats | None = None
     color: Floats | None = None
     has_widths: bool = True
+    seed: Ints | None = None
 
     def __post_init__(self) -> None:
         for name, dtype in _DTYPES.items():
@@ -76,6 +78,7 @@ class StrandSet:
             "root_triangle": (strands,),
             "root_barycentric": (strands, 3),
             "color": (points, 3),
+            "seed": (strands,),
         }
         for name, shape in expected.items():
             value = getattr(self, name)
@@ -186,8 +189,9 @@ _DTYPES = {
     "root_triangle": np.int32,
     "root_barycentric": np.float32,
     "color": np.float32,
+    "seed": np.int32,
 }
-_PER_STRAND = ("group", "root_uv", "root_triangle", "root_barycentric")
+_PER_STRAND = ("group", "root_uv", "root_triangle", "root_barycentric", "seed")
 assert {*_DTYPES, "has_widths"} == {field.name for field in fields(StrandSet)}
 
 

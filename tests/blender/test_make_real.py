@@ -13,8 +13,11 @@ import pytest
 from engine_stage import add_ball, picture
 from strand_files import hedgehog
 
+from hairloom.addon.blender.bakes.baked_rig import RestMatrices, rig_arrays
+from hairloom.addon.blender.bakes.baked_rig import rig_of as baked_rig_of
 from hairloom.addon.blender.colliders.rigs import rig_of
 from hairloom.addon.blender.scene.source import read_source
+from hairloom.addon.rig_flow import strand_seeds
 from hairloom.addon.strands import StrandSet
 
 RED = (0.8, 0.02, 0.03)
@@ -50,10 +53,23 @@ def test_every_strand_is_there_at_its_place(hair: Any) -> None:
     assert real.parent == hair.parent and real.data.surface == hair.data.surface
 
 
+def test_every_strand_keeps_its_noise(hair: Any) -> None:
+    """Also as a file has it, beside curves that Blender has made since, and from a bake."""
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    seeds = strand_seeds(rig_of(hair, read_source(hair, depsgraph)))
+    assert (np.diff(seeds) != 1).any(), "children have others than their numbers"
+    real = made_real()
+    real.data.add_curves([2])
+    real.data.position_data[len(real.data.points) - 1].vector = (0.0, 0.0, 0.3)
+    rig = rig_of(real, read_source(real, bpy.context.evaluated_depsgraph_get()))
+    assert strand_seeds(rig).tolist() == [*seeds, len(seeds)]
+    baked = baked_rig_of(rig_arrays(rig, RestMatrices(np.eye(4), np.eye(4))), "bake").rig
+    np.testing.assert_array_equal(strand_seeds(baked), strand_seeds(rig))
+
+
 @pytest.mark.slow
 def test_it_is_drawn_as_the_hair_was(hair: Any, stage: Any, tmp_path: Path) -> None:
-    """By our own engine: the very same picture, but for noise of each strand's own."""
-    hair.data.hairloom.shading.shift_noise = hair.data.hairloom.shading.sparkle = 0.0
+    """By our own engine: the very same picture."""
     add_ball(0.1)
     light = bpy.data.objects.new("Sun", bpy.data.lights.new("Sun", "SUN"))
     stage.collection.objects.link(light)

@@ -138,6 +138,8 @@ def rig_arrays(rig: Rig, rests: RestMatrices) -> Arrays:
         arrays["root_uv"] = strands.root_uv
     if strands.color is not None:
         arrays["color"] = strands.color
+    if strands.seed is not None:
+        arrays["seed"] = strands.seed
     if rig.head is not None and rests.head is not None:
         assert strands.root_triangle is not None and strands.root_barycentric is not None
         arrays |= {
@@ -227,6 +229,7 @@ def _rig_of(arrays: Arrays) -> BakedRig:
         root_triangle=arrays.get("root_triangle"),
         root_barycentric=arrays.get("root_barycentric"),
         color=arrays.get("color"),
+        seed=arrays.get("seed"),
     )
     _check_indices(arrays["guides"], strands.strand_count)
     _check_indices(arrays["weight_guide"], len(arrays["guides"]))

@@ -20,6 +20,8 @@ from ..base.attributes import read_attribute, set_attribute
 GROUP_ATTRIBUTES = ("groom_group_id", "group")
 #: The attribute of Blender's own importers, per point or per curve.
 COLOR_ATTRIBUTE = "color"
+#: The attribute of curves that says what the noise of a strand depends on, see `StrandSet.seed`.
+SEED_ATTRIBUTE = "strand_seed"
 _REMEDIES = {
     "CURVE": "Convert them: Object > Convert > Curves (hair)",
     "MESH": "Select hair curves; particle hair converts by Object > Convert > Curves (hair)",
@@ -76,6 +78,7 @@ def _read(curves: bpy.types.Curves, matrix: Floats, points: Floats | None = None
         group=group,
         root_uv=read_attribute(curves, "surface_uv_coordinate", "CURVE", 2),
         color=_colors(curves),
+        seed=_seeds(curves),
     )
 
 
@@ -141,6 +144,8 @@ def fill_curves(curves: bpy.types.Curves, strands: StrandSet) -> None:
         set_attribute(curves, GROUP_ATTRIBUTES[0], "CURVE", strands.group)
     if strands.root_uv is not None:
         set_attribute(curves, "surface_uv_coordinate", "CURVE", strands.root_uv)
+    if strands.seed is not None:
+        set_attribute(curves, SEED_ATTRIBUTE, "CURVE", strands.seed)
     set_colors(curves, strands)
 
 
@@ -179,6 +184,12 @@ def _colors(curves: bpy.types.Curves) -> Floats | None:
             return None
         colors = np.repeat(of_curves, np.diff(curve_offsets(curves)), axis=0)
     return np.ascontiguousarray(colors[:, :3])
+
+
+def _seeds(curves: bpy.types.Curves) -> Ints | None:
+    """(curve_count,), 0 where Blender has made a curve since; None without any."""
+    seeds = read_attribute(curves, SEED_ATTRIBUTE, "CURVE")
+    return seeds if seeds is not None and seeds.dtype.kind == "i" else None
 
 
 def curve_offsets(curves: bpy.types.Curves) -> Ints:

@@ -17,6 +17,7 @@ from ...parameters import ALL_SETTINGS, sections_of
 from ...rig_flow import Rig, strand_seeds
 from ...shading.drawn_strands import drawn_radius, strand_colors
 from ...shading.settings import ShadingSettings, StrandSettings
+from ...shading.strand_noise import SEED_LIMIT
 from ...strands import StrandSet
 from ...strands.arc_length import along
 from ..base.objects import head_of
@@ -90,11 +91,12 @@ def _drawn(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Parts[_Dra
 
 
 def _coloured(rig: Rig, source: Source, settings: GroomSettings) -> StrandSet:
-    """With the widths and colours that they are drawn with."""
+    """With the widths, colours and noise that they are drawn with."""
     strands = with_colors(rig.strands, source.colors, settings[ShadingSettings])
     place, counts = along(strands.points, strands.offsets), strands.point_counts
+    seed = strand_seeds(rig)
     color = strand_colors(
-        np.repeat(strand_seeds(rig), counts),
+        np.repeat(seed, counts),
         place,
         settings[ShadingSettings],
         strands.color,
@@ -105,6 +107,7 @@ def _coloured(rig: Rig, source: Source, settings: GroomSettings) -> StrandSet:
         radius=drawn_radius(strands.radius, settings[StrandSettings], place),
         color=np.clip(color, 0.0, 1.0),
         has_widths=True,
+        seed=np.where(seed == 0, SEED_LIMIT, seed),  # which is 0 again, where 0 is a number
     )
 
 
