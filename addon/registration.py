@@ -18,6 +18,7 @@ from .blender.scene import look_materials
 from .blender.strands import growing
 from .ui import (
     engine_panels,
+    gizmos,
     help,
     long_work,
     menus,
@@ -97,6 +98,7 @@ CLASSES: tuple[type[Any], ...] = (
     *operators_hairstyles.CLASSES,
     *menus.CLASSES,
     *panels.CLASSES,
+    *gizmos.CLASSES,
     *operators_fins.CLASSES,
     *operators_adopted.CLASSES,
     *operators_bake.FIN_CLASSES,

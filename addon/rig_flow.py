@@ -248,6 +248,12 @@ class Rig:
         return Riders.of(self.strands, self.guide_grid, self.weights, self.curl_room)
 
     @cached_property
+    def radius(self) -> float:
+        """Half of the diagonal of the box around all strands at rest [m]."""
+        low, high = self.strands.bounds()
+        return float(np.linalg.norm(high - low)) / 2.0
+
+    @cached_property
     def rest_lengths(self) -> Floats:
         """Of all strands, (strand_count,) [m]."""
         return self.strands.lengths()

@@ -40,6 +40,7 @@ MODULES = {
     "engine": "blender.engine.engine",
     "export_check": "ui.operators_export_check",
     "fin_modifier": "blender.scene.fin_modifier",
+    "gizmos": "ui.gizmos",
     "groom_file": "exchange.groom",
     "growing": "blender.strands.growing",
     "hair_file": "exchange.hair_file",

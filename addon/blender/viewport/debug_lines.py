@@ -88,7 +88,7 @@ def debug_lines_of(
         combed = (guide_lines(session),)
     if not wanted:
         return combed
-    points = session.snapshot.root_center, _radius(session)
+    points = session.snapshot.root_center, session.rig.radius
     made = {
         "colliders": lambda: collider_lines(session, depsgraph),
         "wind": lambda: np.concatenate(
@@ -128,12 +128,6 @@ def guide_lines(session: Session) -> Lines:
     )
 
 
-def _radius(session: Session) -> float:
-    """Of the hair at rest [m]."""
-    low, high = session.rig.strands.bounds()
-    return float(np.linalg.norm(high - low)) / 2.0
-
-
 def collider_lines(session: Session, depsgraph: bpy.types.Depsgraph) -> Floats:
     """(2n, 3): all that the groom collides with, where it is now; none before they are made."""
     solids = session.solids(depsgraph)
@@ -156,13 +150,18 @@ def shape_lines(collider: Collider) -> Floats:
     return _box(low, high)
 
 
+def wind_length(radius: float) -> float:
+    """Of the arrow of a wind of 1 m/s [m], for hair of this radius [m]."""
+    return 2.0 * radius / _BRISK
+
+
 def wind_lines(air: Air | None, center: Floats, radius: float) -> Floats:
     """An arrow from the hair's middle in the direction of the wind, (2n, 3); none in still air."""
     if air is None:
         return np.zeros((0, 3))
     speed = float(np.linalg.norm(air.velocity))
     along = air.velocity.astype(np.float64) / speed
-    length = 2.0 * radius * speed / _BRISK
+    length = wind_length(radius) * speed
     tip = center + length * along
     lines = [center, tip]
     for side in _across(along):

@@ -1,0 +1,162 @@
+"""Handles in the 3D view for what is easier to show than to type: the wind that the overlay *Wind*
+draws, and the size of Empties that hold hair as ties or collide with it.
+
+Blender itself moves those Empties and the curves of partings, and drags the strength of force
+fields.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+import numpy as np
+from mathutils import Euler, Matrix, Vector
+
+from ..blender.base.objects import objects_in
+from ..blender.colliders.obstacles import shape_of, sources_of
+from ..blender.colliders.ties import ties_of
+from ..blender.preview import previews
+from ..blender.viewport.debug_lines import COLORS, wind_length
+
+#: radius of a ring, in terms of Blender's size of gizmos
+RING = 1.3
+#: an arrow's head or a box in the same terms; lines in pixels
+_HANDLE, _LINE = 1.2, 2.0
+
+
+class _OfActive:
+    """Base of handles of the active object, before bpy.types.GizmoGroup: seen where Blender shows
+    its own."""
+
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "WINDOW"
+    bl_options = {"3D", "PERSISTENT"}
+
+    @classmethod
+    def poll(cls: Any, context: bpy.types.Context) -> bool:
+        obj = context.active_object
+        if obj is None or context.mode != "OBJECT" or not obj.is_editable:
+            return False
+        is_shown = context.space_data.show_gizmo_context and obj.visible_get()
+        return bool(is_shown and cls.has_handles(obj, context))
+
+
+class HAIRLOOM_GGT_wind(_OfActive, bpy.types.GizmoGroup):
+    """Speed, direction and elevation of the wind of previewed hair, where its overlay is shown"""
+
+    bl_label = "Wind"
+
+    @staticmethod
+    def has_handles(obj: bpy.types.Object, _context: bpy.types.Context) -> bool:
+        is_shown = obj.type == "CURVES" and "wind" in obj.hairloom.shown_overlays
+        return is_shown and previews.session_of(obj) is not None
+
+    def setup(self, _context: bpy.types.Context) -> None:
+        self.speed = _arrow(self, "NORMAL", COLORS["wind"])
+        self.turns = {}
+        for name in ("wind_direction", "wind_elevation"):
+            dial = self.turns[name] = self.gizmos.new("GIZMO_GT_dial_3d")
+            dial.scale_basis, dial.use_draw_value = RING, True
+            _prepare(dial, COLORS["wind"])
+
+    def refresh(self, context: bpy.types.Context) -> None:
+        """The hair that is active now."""
+        hair = context.active_object
+        for name, dial in self.turns.items():
+            dial.target_set_prop("offset", hair.hairloom.dynamics, name)
+        self.speed.target_set_handler("offset", get=_arrow_length, set=_set_arrow_length)
+
+    def draw_prepare(self, context: bpy.types.Context) -> None:
+        """Where the hair is now."""
+        session = previews.session_of(context.active_object)
+        assert session is not None, "poll has looked"
+        wind = context.active_object.hairloom.dynamics
+        place = Matrix.Translation(session.snapshot.root_center.tolist())
+        turned = Euler((0.0, 0.0, wind.wind_direction)).to_matrix().to_4x4()
+        # Blender counts a dial's angle clockwise around its z: these point down, and to the side
+        down, aside = (Euler((x, 0.0, 0.0)).to_matrix().to_4x4() for x in (np.pi, -np.pi / 2.0))
+        along = turned @ Euler((0.0, np.pi / 2.0 - wind.wind_elevation, 0.0)).to_matrix().to_4x4()
+        self.speed.matrix_basis = place @ along
+        self.turns["wind_direction"].matrix_basis = place @ down
+        self.turns["wind_elevation"].matrix_basis = place @ turned @ aside
+
+
+class HAIRLOOM_GGT_empty_size(_OfActive, bpy.types.GizmoGroup):
+    """Size of an Empty that holds hair as a tie, or collides with it"""
+
+    bl_label = "Size of Tie or Collider"
+
+    @staticmethod
+    def has_handles(obj: bpy.types.Object, context: bpy.types.Context) -> bool:
+        return obj.type == "EMPTY" and any(
+            obj in ties_of(owner) or obj in sources_of(owner, None)
+            for owner in objects_in(context.view_layer)
+        )
+
+    def setup(self, _context: bpy.types.Context) -> None:
+        self.size = _arrow(self, "BOX", COLORS["colliders"])
+
+    def refresh(self, _context: bpy.types.Context) -> None:
+        """The Empty that is active now."""
+        self.size.target_set_handler("offset", get=_size, set=_set_size)
+
+    def draw_prepare(self, context: bpy.types.Context) -> None:
+        """Where the Empty is now."""
+        empty = context.active_object
+        axis = _size_axis(empty).normalized()
+        turned = Vector((0.0, 0.0, 1.0)).rotation_difference(axis).to_matrix().to_4x4()
+        self.size.matrix_basis = Matrix.Translation(empty.matrix_world.translation) @ turned
+
+
+def _arrow(group: bpy.types.GizmoGroup, style: str, color: tuple[float, ...]) -> bpy.types.Gizmo:
+    """A handle that is dragged along its z axis, without a stem."""
+    arrow = group.gizmos.new("GIZMO_GT_arrow_3d")
+    arrow.draw_style, arrow.length, arrow.use_draw_value = style, 0.0, True
+    arrow.scale_basis = _HANDLE
+    _prepare(arrow, color)
+    return arrow
+
+
+def _prepare(gizmo: bpy.types.Gizmo, color: tuple[float, ...]) -> None:
+    gizmo.color, gizmo.alpha = color[:3], 0.7
+    gizmo.color_highlight, gizmo.alpha_highlight = (1.0, 1.0, 1.0), 1.0
+    gizmo.line_width, gizmo.use_undo = _LINE, True
+
+
+def _arrow_length() -> float:
+    """As the overlay draws the wind [m]."""
+    hair = bpy.context.active_object
+    return float(hair.hairloom.dynamics.wind_speed * _length_per_speed(hair))
+
+
+def _set_arrow_length(length: float) -> None:
+    hair = bpy.context.active_object
+    hair.hairloom.dynamics.wind_speed = length / _length_per_speed(hair)
+
+
+def _length_per_speed(hair: bpy.types.Object) -> float:
+    session = previews.session_of(hair)
+    assert session is not None, "poll has looked"
+    return wind_length(session.rig.radius)
+
+
+def _size_axis(empty: bpy.types.Object) -> Vector:
+    """World space, as long as the Empty's display size of 1."""
+    return empty.matrix_world.col[2 if shape_of(empty) == "capsule" else 0].to_3d()
+
+
+def _size() -> float:
+    """The distance of its border from its middle [m]."""
+    empty = bpy.context.active_object
+    return float(empty.empty_display_size * _size_axis(empty).length)
+
+
+def _set_size(distance: float) -> None:
+    empty = bpy.context.active_object
+    length = _size_axis(empty).length
+    if length > 0.0:
+        empty.empty_display_size = distance / length
+
+
+CLASSES = (HAIRLOOM_GGT_wind, HAIRLOOM_GGT_empty_size)
