@@ -64,6 +64,7 @@ def draw_preview(layout: bpy.types.UILayout, context: bpy.types.Context) -> None
     idle = "Uses Hairloom" if session is not None else ""
     if not draw_progress(layout, HAIRLOOM_OT_use_groom):
         draw_button(layout, "hairloom.use_groom", idle, icon="OUTLINER_OB_CURVES")
+    draw_more(layout)
     if hair.hairloom.hairstyle:
         row = layout.row(align=True)
         if not draw_progress(row, HAIRLOOM_OT_place_landmarks):
@@ -97,6 +98,15 @@ def draw_start(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     if not draw_progress(column, HAIRLOOM_OT_sample_scene):
         column.operator("hairloom.sample_scene", text="Sample Scene", icon="SCENE_DATA")
     column.menu("HAIRLOOM_MT_import", text="Import", icon="IMPORT")
+
+
+def draw_more(layout: bpy.types.UILayout) -> None:
+    """How to get more hair on the same head, such as a hairstyle to its brows."""
+    row = layout.row(align=True)
+    if any(draw_progress(row, each) for each in (HAIRLOOM_OT_add_groom, HAIRLOOM_OT_add_hairstyle)):
+        return
+    draw_button(row, "hairloom.add_groom", "No Head", "Add Hair", icon="ADD")
+    draw_button(row, "hairloom.choose_hairstyle", icon="USER")
 
 
 class HAIRLOOM_PT_sidebar(bpy.types.Panel):

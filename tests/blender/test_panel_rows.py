@@ -31,6 +31,7 @@ from hairloom.addon.ui import (
     sections,
     state,
 )
+from hairloom.addon.ui.selection import make_active
 
 pytestmark = pytest.mark.usefixtures("extension")
 #: [pixels] of the sidebar and of Properties, as Blender opens them
@@ -62,6 +63,8 @@ JOBS = (
     operators_mirror.HAIRLOOM_OT_mirror_hair,
     operators_partings.HAIRLOOM_OT_comb_parting,
     operators_start.HAIRLOOM_OT_use_groom,
+    operators_start.HAIRLOOM_OT_add_groom,
+    operators_hairstyles.HAIRLOOM_OT_add_hairstyle,
     operators_trim.HAIRLOOM_OT_trim_to_shape,
     operators_card_export.HAIRLOOM_OT_export_cards,
     operators_grow.HAIRLOOM_OT_grow_again,
@@ -166,6 +169,28 @@ def test_nothing_below_moves_whatever_happens_to_the_hair(hair, monkeypatch, tmp
         found = {key: each for key, each in heights.items() if key[1] == width and each != wanted}
         assert found == {}, f"not {wanted}"
     assert len(heights) == (11 + len(JOBS)) * len(WIDTHS)
+
+
+def test_a_head_that_has_brows_gets_hair_from_the_same_panel():
+    """Whether brows or head are selected; without either the button says why it does nothing."""
+    bpy.ops.hairloom.add_hairstyle(style="brows", plays=False)
+    brows = bpy.context.object
+    head = brows.data.surface
+    for chosen in (brows, head):
+        make_active(bpy.context, [chosen])
+        layout = Layout([])
+        panels.draw_preview(layout, context_of(280))
+        texts = [text for text, _ in layout.texts]
+        assert "Add Hair" in texts and "hairloom.choose_hairstyle" in texts
+        before = set(bpy.data.objects)
+        assert bpy.ops.hairloom.add_groom(strand_count=50, plays=False) == {"FINISHED"}
+        (made,) = set(bpy.data.objects) - before
+        assert made.type == "CURVES" and made.data.surface == head
+    make_active(bpy.context, [])
+    bpy.context.view_layer.objects.active = None
+    layout = Layout([])
+    panels.draw_more(layout)
+    assert "No Head" in [text for text, _ in layout.texts]
 
 
 def test_no_label_is_cut(extension):
