@@ -12,6 +12,7 @@ from ..blender.preview.bake import bakeable
 from ..blender.strands.export_check import ExportCheck
 from ..exchange.strand_export_settings import StrandExportSettings
 from ..exchange.strand_formats import STRAND_FORMATS, StrandFormat
+from .long_work import LongWork, Steps, in_parts
 from .messages import draw_lines
 from .reports import tell, waiting
 from .selection import chosen_hair, needs_hair
@@ -20,11 +21,10 @@ from .selection import chosen_hair, needs_hair
 _check: ExportCheck | None = None
 
 
-def begin(hair: list[bpy.types.Object]) -> ExportCheck:
+def begin(of: ExportCheck) -> None:
     """A file browser or popup opens for this hair."""
     global _check
-    _check = ExportCheck.of(hair)
-    return _check
+    _check = of
 
 
 def end(of: ExportCheck | None = None) -> None:
@@ -77,12 +77,16 @@ def draw(layout: bpy.types.UILayout, context: bpy.types.Context, panel: str) -> 
         draw_lines(column, context, warning, severity)
 
 
+def _choice(engine: str) -> tuple[StrandFormat, StrandExportSettings]:
+    """What "format engine" means."""
+    name, _, layout = engine.partition(" ")
+    (kind,) = (each for each in STRAND_FORMATS if each.name == name)
+    return kind, StrandExportSettings(engine=layout) if layout else StrandExportSettings()
+
+
 def _look(operator: Any, context: bpy.types.Context) -> None:
     """Look at the hair as the chosen engine will."""
-    name, _, engine = operator.engine.partition(" ")
-    (kind,) = (each for each in STRAND_FORMATS if each.name == name)
-    settings = StrandExportSettings(engine=engine) if engine else StrandExportSettings()
-    refresh(context, kind, settings)
+    refresh(context, *_choice(operator.engine))
 
 
 def _engines() -> list[tuple[str, str, str]]:
@@ -96,26 +100,51 @@ def _engines() -> list[tuple[str, str, str]]:
     ]
 
 
-class HAIRLOOM_OT_check_export(bpy.types.Operator):
-    """Say what an engine will see of the hair, and write nothing"""
+_ENGINE = {
+    "name": "For",
+    "description": "Which engine, and by which file",
+    "items": _engines(),
+    "default": _engines()[0][0],
+}
+
+
+class HAIRLOOM_OT_check_export(LongWork, bpy.types.Operator):
+    """Say what an engine will see of the hair, and write nothing. Esc cancels"""
 
     bl_idname = "hairloom.check_export"
     bl_label = "Check for Export"
 
-    engine: EnumProperty(
-        name="For",
-        description="Which engine, and by which file",
-        items=_engines(),
-        update=_look,
-    )
+    __annotations__ = {"engine": EnumProperty(**_ENGINE)}
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return needs_hair(cls, context)
+        return cls.is_free() and needs_hair(cls, context)
+
+    def steps(self, context: bpy.types.Context) -> Steps[None]:
+        own = ExportCheck.of(writable(chosen_hair(context)))
+        reading = own.reading(context.evaluated_depsgraph_get(), *_choice(self.engine))
+        yield from in_parts(reading)
+        begin(own)
+        if not bpy.app.background and self.options.is_invoke:
+            bpy.ops.hairloom.show_export_check("INVOKE_DEFAULT", engine=self.engine)
+            return
+        _look(self, context)
+        tell(self, Outcome("; ".join(own.lines), {}, tuple(own.warnings)))
+        end(own)
+
+
+class HAIRLOOM_OT_show_export_check(bpy.types.Operator):
+    """Show what an engine will see of the hair that was read"""
+
+    bl_idname = "hairloom.show_export_check"
+    bl_label = "Check for Export"
+    bl_options = {"INTERNAL"}
+
+    __annotations__ = {"engine": EnumProperty(**_ENGINE, update=_look)}
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
         """A popup that only shows; what it offers is the export itself."""
-        self.own = begin(writable(chosen_hair(context)))
+        self.own = _check
         _look(self, context)
         return context.window_manager.invoke_popup(self, width=440)
 
@@ -131,15 +160,11 @@ class HAIRLOOM_OT_check_export(bpy.types.Operator):
         if engine:
             export.engine = engine
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        own = begin(writable(chosen_hair(context)))
-        _look(self, context)
-        tell(self, Outcome("; ".join(own.lines), {}, tuple(own.warnings)))
-        end(own)
+    def execute(self, _context: bpy.types.Context) -> set[str]:
         return {"FINISHED"}
 
     def cancel(self, _context: bpy.types.Context) -> None:
         end(self.own)
 
 
-CLASSES = (HAIRLOOM_OT_check_export,)
+CLASSES = (HAIRLOOM_OT_check_export, HAIRLOOM_OT_show_export_check)

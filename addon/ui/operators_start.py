@@ -135,7 +135,8 @@ class HAIRLOOM_OT_use_groom(LongWork, bpy.types.Operator):
 
     def steps(self, context: bpy.types.Context) -> Steps[None]:
         chosen, taken, problems = preferences(context), [], []
-        for hair in chosen_hair(context):
+        grooms = chosen_hair(context)
+        for hair in grooms:
             yield Progress("Reading the hair")
             name, depsgraph = hair.name, context.evaluated_depsgraph_get()
             taking = take_over(hair, depsgraph, chosen_presets(chosen))
@@ -152,6 +153,8 @@ class HAIRLOOM_OT_use_groom(LongWork, bpy.types.Operator):
         if not taken:
             raise problems[0]
         yield from beginning(self, context, taken, plays=chosen.plays)
+        if len(grooms) > 1:
+            report(self, "INFO", f"Hairloom took {len(taken)} of {len(grooms)} grooms")
 
 
 class HAIRLOOM_OT_convert_particles(LongWork, bpy.types.Operator):

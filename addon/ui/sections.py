@@ -17,6 +17,7 @@ from .messages import draw_lines
 from .operators_bake import draw_bake
 from .operators_card_export import HAIRLOOM_OT_export_cards
 from .operators_colliders import draw_colliders
+from .operators_export_check import HAIRLOOM_OT_check_export
 from .operators_flow import draw_flow
 from .operators_grow import draw_grow
 from .operators_make_real import HAIRLOOM_OT_make_real
@@ -165,7 +166,8 @@ def draw_export(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
     if not draw_progress(layout, HAIRLOOM_OT_export_cards):
         layout.operator("hairloom.export_cards", icon="EXPORT")
     layout.menu("HAIRLOOM_MT_export_strands", icon="EXPORT")
-    layout.operator("hairloom.check_export", icon="CHECKMARK")
+    if not draw_progress(layout, HAIRLOOM_OT_check_export):
+        layout.operator("hairloom.check_export", icon="CHECKMARK")
     if not draw_progress(layout, HAIRLOOM_OT_make_real):
         draw_button(layout, "hairloom.make_real", icon="OUTLINER_OB_CURVES")
     idle = "No Reports Yet"

@@ -15,6 +15,7 @@ from ..blender.bakes.bake_settings import frame_range
 from ..blender.base.file_names import file_stem, files_of
 from ..blender.base.outcome import Outcome
 from ..blender.properties.properties import property_annotations, settings_of
+from ..blender.strands.export_check import ExportCheck
 from ..blender.strands.strand_export import StrandExport
 from ..errors import HairloomError
 from ..exchange.strand_export_settings import USUAL, StrandExportSettings
@@ -96,7 +97,7 @@ class StrandExportOperator(LongWork, ExportHelper):
         if hair and not self.filepath:
             folder = Path(bpy.data.filepath).parent if bpy.data.filepath else Path()
             self.properties.filepath = str(folder / (file_stem(hair[0].name) + self.filename_ext))
-        export_check.begin(hair)
+        export_check.begin(ExportCheck.of(hair))
         self._refresh(context)
         return super().invoke(context, event)
 

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from grids import grid_of
 
+from hairloom.addon.blender.base.outcome import past_reports
 from hairloom.addon.blender.base.parts import at_once
 from hairloom.addon.blender.preview import previews, scene_events
 from hairloom.addon.blender.properties.presets import named_preset
@@ -176,6 +177,21 @@ def test_hair_that_has_a_look_keeps_it(new_hair, sphere):
     assert hair.data.hairloom.shading.base_color[:] == pytest.approx((0.1, 0.2, 0.3))
     with pytest.raises(RuntimeError, match="does not preview yet"):
         bpy.ops.hairloom.use_groom()
+
+
+def test_all_selected_hair_is_taken_and_counted(new_hair, sphere):
+    """Though one of it cannot be used."""
+    hair = [new_hair(sphere) for _ in range(2)]
+    curves = bpy.data.hair_curves.new("Empty")
+    empty = bpy.data.objects.new("Empty", curves)
+    bpy.context.collection.objects.link(empty)
+    for obj in (*hair, empty):
+        obj.select_set(True)
+    bpy.context.view_layer.objects.active = empty
+    with pytest.raises(RuntimeError, match="Empty"):
+        bpy.ops.hairloom.use_groom()
+    assert {each.name for each in previews.sessions()} == {each.name for each in hair}
+    assert "Hairloom took 2 of 3 grooms" in [each.text for each in past_reports]
 
 
 def test_hair_without_curves_and_surface_says_what_to_do():

@@ -15,6 +15,7 @@ from hairloom.addon.blender.base.parts import Part, at_once, together
 from hairloom.addon.blender.scene.curves import curve_points
 from hairloom.addon.ui import (
     operators_colliders,
+    operators_export_check,
     operators_flow,
     operators_hairstyles,
     operators_mirror,
@@ -67,6 +68,7 @@ JOBS = {
         chosen,
         "Looking for landmarks",
     ),
+    "check": (operators_export_check.HAIRLOOM_OT_check_export, chosen, "Making strands"),
     "take_over": (operators_start.HAIRLOOM_OT_use_groom, chosen, "Reading the hair"),
 }
 

@@ -35,6 +35,7 @@ WINDOW_ONLY = {
     "fin_reset",
     "choose_hairstyle",
     "show_settings",
+    "show_export_check",
     # what is selected in Edit Mode
     "card_width",
     "card_twist",

@@ -209,6 +209,7 @@ def popup(name, operator, **settings):
     before = yield from whole_screen(f"before_{name}")
     with bpy.context.temp_override(area=viewport(), region=view):
         getattr(bpy.ops.hairloom, operator)("INVOKE_DEFAULT", **settings)
+    yield from until(lambda: not of_hairloom("long_work").running(), f"{operator} does not end")
     yield
     screen = yield from whole_screen(f"part_{name}")
     keep(name, [screen[changed_box(before, screen)]])

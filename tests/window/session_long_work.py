@@ -51,6 +51,7 @@ def steps():
     for work in (
         from_a_dialog,
         undone_in_mid_work,
+        into_a_popup,
         from_the_file_browser,
         cards_in_motion,
         another_file_in_mid_work,
@@ -154,6 +155,31 @@ def undone_in_mid_work():
     bpy.ops.ed.redo()
     yield
     assert np.array_equal(order(), after)
+
+
+def check():
+    choose(bpy.data.objects["Hair"])
+    with bpy.context.temp_override(area=viewport(), region=region("WINDOW")):
+        asked = bpy.ops.hairloom.check_export("INVOKE_DEFAULT", engine="alembic unreal")
+    assert asked == {"RUNNING_MODAL"} and running() == "Check for Export"
+    assert told() == "Making strands"
+
+
+def into_a_popup():
+    """What was read is let go by Esc while it is read, and by Esc in the popup."""
+    seen = of_hairloom("export_check").count
+    check()
+    yield from press("ESC")
+    yield from until(lambda: not running(), "Esc does not cancel the check")
+    assert seen() == 0, "a check that was cancelled goes on"
+    check()
+    yield from until(lambda: not running(), "the check does not end")
+    assert seen() == 1, "no popup shows what was read"
+    yield
+    driver.screenshot("checked")
+    yield from press("ESC")
+    yield from until(lambda: seen() == 0, "the check goes on unseen")
+    yield
 
 
 def turntable(frames):

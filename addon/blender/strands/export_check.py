@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass, field
+from functools import partial
 
 import bpy
 
@@ -12,10 +14,15 @@ from ...exchange.joined_grooms import joined_grooms
 from ...exchange.strand_check import check_lines, check_strands
 from ...exchange.strand_export_settings import StrandExportSettings
 from ...exchange.strand_formats import StrandFormat
+from ...rig_flow import Rig
 from ..bakes import playback
 from ..bakes.stale_bakes import changed_since
 from ..base.objects import Handle
-from .read_hair import ExportRequest, still_hair
+from ..base.parts import Part, Parts
+from ..colliders.rigs import rig_from
+from ..properties.groom_settings import GroomSettings
+from ..scene.source import Source, read_source
+from .read_hair import ExportRequest, needs_rig, still_hair
 from .strand_export import request_of
 
 
@@ -30,12 +37,31 @@ class ExportCheck:
     lines: list[str] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
     _read: dict[ExportRequest, tuple[Groom, tuple[str, ...]]] = field(default_factory=dict)
+    _made: dict[int, tuple[Source, Rig]] = field(default_factory=dict)
     _stale: dict[int, tuple[str, ...]] = field(default_factory=dict)
     _checked: tuple[StrandFormat, StrandExportSettings] | None = None
 
     @classmethod
     def of(cls, hair: list[bpy.types.Object]) -> ExportCheck:
         return cls([Handle.of(each) for each in hair])
+
+    def reading(
+        self,
+        depsgraph: bpy.types.Depsgraph,
+        kind: StrandFormat,
+        settings: StrandExportSettings,
+    ) -> Parts[None]:
+        """What takes long of the first `refresh`, and of those for other formats."""
+        request = request_of(kind, settings)
+        for hair in filter(None, [each.find() for each in self.hair]):
+            uid, name = hair.session_uid, hair.name
+            if not needs_rig(hair, request):
+                continue
+            sections = GroomSettings.of(hair).sections
+            with suppress(HairloomError):  # which `refresh` meets as well, and keeps
+                source = read_source(hair, depsgraph)
+                make = partial(rig_from, source, sections, place=name)
+                self._made[uid] = source, (yield Part("Making strands", make))
 
     def refresh(
         self,
@@ -70,7 +96,10 @@ class ExportCheck:
             found = [hair for hair in (each.find() for each in self.hair) if hair is not None]
             if not found:
                 raise HairloomError("it is gone", place="hair", remedy="Export again")
-            outs = [still_hair(each, depsgraph, request) for each in found]
+            outs = [
+                still_hair(each, depsgraph, request, self._made.get(each.session_uid))
+                for each in found
+            ]
             groom, lost = joined_grooms([out.groom for out in outs], found[0].name)
             notes = dict.fromkeys([note for out in outs for note in out.notes])
             self._read[request] = groom, (*notes, *lost)

@@ -71,19 +71,32 @@ class ExportStrands:
         return np.concatenate([seen, seen[self.copied]]) if len(self.copied) else seen
 
 
+def needs_rig(hair: bpy.types.Object, request: ExportRequest) -> bool:
+    """Whether `still_hair` may have to make the hair ready, which takes long."""
+    return hair.data.hairloom.children.method != "none" or request.guides
+
+
 def still_hair(
-    hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph, request: ExportRequest
+    hair: bpy.types.Object,
+    depsgraph: bpy.types.Depsgraph,
+    request: ExportRequest,
+    known: tuple[Source, Rig] | None = None,
 ) -> ExportStrands:
     """All strands after the modifiers, with their own points; or guides and children if there are.
 
     Guides that the hair has marked stay; else there are copies of those that Hairloom chooses.
 
+    Args:
+        known: the same hair as it was read and made ready before.
+
     Raises:
         HairloomError: no hair that can be used, or one of another scale than its head.
     """
-    source = read_source(hair, depsgraph)
-    rig = rig_of(hair, source) if hair.data.hairloom.children.method != "none" else None
-    if rig is not None and rig.own_count is not None:
+    source, rig = (read_source(hair, depsgraph), None) if known is None else known
+    has_children = hair.data.hairloom.children.method != "none"
+    if has_children and rig is None:
+        rig = rig_of(hair, source)
+    if has_children and rig is not None and rig.own_count is not None:
         strands = with_colors(rig.strands, source.colors, _look(hair))
         groom = Groom(strands, hair.name, group_names=group_names(hair))
         out = replace(_out(groom, rig, request, _look(hair)), has_children=True)
