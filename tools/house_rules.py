@@ -281,7 +281,7 @@ _OF_BLENDER |= {
     "render",
 }
 _OF_BLENDER |= {"update", "update_render_passes", "view_draw", "view_update", "filter_items"}
-_OF_BLENDER |= {"update_script_node", "draw_item"}
+_OF_BLENDER |= {"update_script_node", "draw_item", "setup", "draw_prepare"}
 
 
 def unused_names(repository: Path = REPOSITORY) -> list[str]:

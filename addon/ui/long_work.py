@@ -65,6 +65,10 @@ class LongWork:
         """
         raise NotImplementedError
 
+    def follow(self, context: bpy.types.Context) -> None:
+        """What comes in the window once the work has ended and other work may begin: a popup that
+        offers some."""
+
     @classmethod
     def is_free(cls: Any) -> bool:
         """For `poll`: whether no other long operator runs; the greyed button says which does."""
@@ -88,6 +92,7 @@ class LongWork:
             try:
                 first = next(steps)
             except StopIteration:
+                self.follow(context)
                 return {"FINISHED"}
         _running = _Running(self, steps, context.window)
         _running.tell(first)
@@ -109,6 +114,8 @@ class LongWork:
         finally:
             if result != {"RUNNING_MODAL"}:
                 stop()
+        if result == {"FINISHED"}:
+            self.follow(context)
         return result
 
     @reporting

@@ -126,11 +126,13 @@ class HAIRLOOM_OT_check_export(LongWork, bpy.types.Operator):
         yield from in_parts(reading)
         begin(own)
         if not bpy.app.background and self.options.is_invoke:
-            bpy.ops.hairloom.show_export_check("INVOKE_DEFAULT", engine=self.engine)
             return
         _look(self, context)
         tell(self, Outcome("; ".join(own.lines), {}, tuple(own.warnings)))
         end(own)
+
+    def follow(self, _context: bpy.types.Context) -> None:
+        bpy.ops.hairloom.show_export_check("INVOKE_DEFAULT", engine=self.engine)
 
 
 class HAIRLOOM_OT_show_export_check(bpy.types.Operator):

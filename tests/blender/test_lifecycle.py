@@ -147,7 +147,7 @@ def test_handlers_survive_loading_a_file(extension):
 
 
 def test_every_class_has_a_name_of_ours():
-    kinds = ("PG", "OT", "PT", "FH", "MT", "RE", "AP", "UL")
+    kinds = ("PG", "OT", "PT", "FH", "MT", "RE", "AP", "UL", "GGT")
     for each in registration.CLASSES:
         assert each.__name__.startswith(tuple(f"HAIRLOOM_{kind}_" for kind in kinds))
     assert {*groups.CLASSES} <= {*registration.CLASSES}
