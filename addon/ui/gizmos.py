@@ -14,7 +14,8 @@ import numpy as np
 from mathutils import Euler, Matrix, Vector
 
 from ..blender.base.objects import objects_in
-from ..blender.colliders.obstacles import shape_of, sources_of
+from ..blender.colliders.obstacle_reader import sized_axis
+from ..blender.colliders.obstacles import sources_of
 from ..blender.colliders.ties import ties_of
 from ..blender.preview import previews
 from ..blender.viewport.debug_lines import COLORS, wind_length
@@ -143,7 +144,7 @@ def _length_per_speed(hair: bpy.types.Object) -> float:
 
 def _size_axis(empty: bpy.types.Object) -> Vector:
     """World space, as long as the Empty's display size of 1."""
-    return empty.matrix_world.col[2 if shape_of(empty) == "capsule" else 0].to_3d()
+    return empty.matrix_world.col[sized_axis(empty)].to_3d()
 
 
 def _size() -> float:

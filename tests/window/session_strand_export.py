@@ -111,6 +111,7 @@ def the_check_alone():
     check, sidebar = of_hairloom("export_check"), region("UI")
     for y in range(sidebar.y + 6, sidebar.y + sidebar.height, 12):
         yield from click(sidebar.x + sidebar.width // 2, y)
+        yield from until(lambda: running() != "Check for Export", "the check does not end")
         if check.count():
             break
         yield from press("ESC")

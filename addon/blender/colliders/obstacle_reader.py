@@ -117,6 +117,11 @@ def shape_of(obj: bpy.types.Object) -> str:
     return "sphere" if obj.type == "EMPTY" and obj.empty_display_type == "SPHERE" else "none"
 
 
+def sized_axis(empty: bpy.types.Object) -> int:
+    """Along which of its axes the border of an Empty is a display size away from its middle."""
+    return 2 if shape_of(empty) == "capsule" else 0
+
+
 def _ball_or_part(carrier: Carrier, ball: Ball) -> Part | Ball:
     """Round balls form a set; a ball that its scale makes an ellipsoid is a part of its own."""
     if is_round(carrier.body.rest):
