@@ -105,7 +105,7 @@ def draw_more(layout: bpy.types.UILayout) -> None:
     row = layout.row(align=True)
     if any(draw_progress(row, each) for each in (HAIRLOOM_OT_add_groom, HAIRLOOM_OT_add_hairstyle)):
         return
-    draw_button(row, "hairloom.add_groom", "No Head", "Add Hair", icon="ADD")
+    draw_button(row, "hairloom.add_groom", "Select a Head", "Add Hair", icon="ADD")
     draw_button(row, "hairloom.choose_hairstyle", icon="USER")
 
 

@@ -192,7 +192,7 @@ def test_a_head_that_has_brows_gets_hair_from_the_same_panel():
     bpy.context.view_layer.objects.active = None
     layout = Layout([])
     panels.draw_more(layout)
-    assert "No Head" in [text for text, _ in layout.texts]
+    assert "Select a Head" in [text for text, _ in layout.texts]
 
 
 def test_no_label_is_cut(extension):
