@@ -18,6 +18,8 @@ from ..blender.colliders.obstacle_reader import sized_axis
 from ..blender.colliders.obstacles import sources_of
 from ..blender.colliders.ties import ties_of
 from ..blender.preview import previews
+from ..blender.scene.fin_modifier import has_fins
+from ..blender.sessions.fins import fins_in
 from ..blender.viewport.debug_lines import COLORS, wind_length
 
 #: radius of a ring, in terms of Blender's size of gizmos
@@ -92,7 +94,7 @@ class HAIRLOOM_GGT_empty_size(_OfActive, bpy.types.GizmoGroup):
     def has_handles(obj: bpy.types.Object, context: bpy.types.Context) -> bool:
         return obj.type == "EMPTY" and any(
             obj in ties_of(owner) or obj in sources_of(owner, None)
-            for owner in objects_in(context.view_layer)
+            for owner in _simulated_in(context.view_layer)
         )
 
     def setup(self, _context: bpy.types.Context) -> None:
@@ -108,6 +110,12 @@ class HAIRLOOM_GGT_empty_size(_OfActive, bpy.types.GizmoGroup):
         axis = _size_axis(empty).normalized()
         turned = Vector((0.0, 0.0, 1.0)).rotation_difference(axis).to_matrix().to_4x4()
         self.size.matrix_basis = Matrix.Translation(empty.matrix_world.translation) @ turned
+
+
+def _simulated_in(layer: bpy.types.ViewLayer) -> list[bpy.types.Object]:
+    """What Empties may hold or stop."""
+    hair = [obj for obj in objects_in(layer) if obj.type == "CURVES"]
+    return hair + fins_in(layer) if has_fins() else hair
 
 
 def _arrow(group: bpy.types.GizmoGroup, style: str, color: tuple[float, ...]) -> bpy.types.Gizmo:

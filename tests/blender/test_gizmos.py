@@ -139,6 +139,20 @@ def test_only_what_holds_or_stops_hair_has_a_size_to_drag(
     assert not is_there(kind)
 
 
+def test_so_has_what_stops_cloth(sphere: Any) -> None:
+    empty, group = bpy.data.objects.new("Empty", None), bpy.data.collections.new("Group")
+    bpy.context.scene.collection.children.link(group)
+    group.objects.link(empty)
+    make_active(sphere)
+    sphere.select_set(True)
+    bpy.ops.hairloom.fin_add()
+    sphere.hairloom.collider_collection = group
+    make_active(empty)
+    assert is_there(gizmos.HAIRLOOM_GGT_empty_size)
+    bpy.data.objects.remove(sphere)
+    assert not is_there(gizmos.HAIRLOOM_GGT_empty_size)
+
+
 @pytest.mark.parametrize(
     ("shown_as", "shape", "axis"),
     [("CIRCLE", "automatic", 0), ("SPHERE", "automatic", 0), ("ARROWS", "capsule", 2)],
