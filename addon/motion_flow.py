@@ -43,6 +43,31 @@ JUMP_GUIDES = 64
 
 
 @dataclass(frozen=True)
+class FrameInput:
+    """What a groom meets in one frame.
+
+    pose: at the frame's end.
+    colliders: with their way during the frame.
+    gravity: (3,) [m/s^2], world space.
+    duration: time since the motion's pose [s].
+    force_fields: of the scene.
+    painted: by what settings are multiplied at each guide; None: nothing is painted.
+    """
+
+    pose: Pose
+    colliders: tuple[PosedCollider, ...]
+    settings: DynamicsSettings
+    gravity: Floats
+    duration: float
+    force_fields: ForceFields = NO_FIELDS
+    painted: PaintedGuides | None = None
+
+    def simulated(self, guide_count: int) -> Floats | None:
+        """How much of each guide is simulated, see `Drive`."""
+        return simulated_of(self.painted, self.settings, guide_count)
+
+
+@dataclass(frozen=True)
 class Motion:
     """What one frame hands to the next.
 
@@ -69,30 +94,20 @@ class Motion:
     leans: Leans = NO_LEANS
     begun: Pose | None = None
 
-    def drive(
-        self,
-        target: Floats,
-        colliders: tuple[PosedCollider, ...],
-        gravity: Floats,
-        duration: float,
-        force_fields: ForceFields,
-        held: Held | None = None,
-        simulated: Floats | None = None,
-        painted: PaintedGuides | None = None,
-    ) -> Drive:
-        """What acts in a frame of `duration` [s] that carries the guides to `target`."""
+    def drive(self, frame: FrameInput, target: Floats, held: Held | None) -> Drive:
+        """What acts in a frame that carries the guides to `target`."""
         return Drive(
             self.carried_guides,
             target,
-            colliders,
-            gravity,
-            self.carried_earlier if duration else None,
-            force_fields,
-            self.duration / duration if duration else 1.0,
+            frame.colliders,
+            frame.gravity,
+            self.carried_earlier if frame.duration else None,
+            frame.force_fields,
+            self.duration / frame.duration if frame.duration else 1.0,
             held,
             self.guide_clearance,
-            simulated,
-            painted,
+            frame.simulated(len(target)),
+            frame.painted,
         )
 
 
@@ -171,78 +186,39 @@ def with_style(rig: Rig, motion: Motion) -> Motion:
     return replace(motion, dynamics=replace(state, rest=rest))
 
 
-def advance(
-    rig: Rig,
-    motion: Motion,
-    pose: Pose,
-    colliders: tuple[PosedCollider, ...],
-    settings: DynamicsSettings,
-    gravity: Floats,
-    duration: float,
-    force_fields: ForceFields = NO_FIELDS,
-    led: LedOut = NOT_LED,
-    painted: PaintedGuides | None = None,
-) -> Motion:
+def advance(rig: Rig, motion: Motion, frame: FrameInput, led: LedOut = NOT_LED) -> Motion:
     """One frame of motion: the roots go with the head, the dynamics moves the rest; without other
     grooms.
 
-    Args: as those of `steps`.
+    Args:
+        led: see `steps`.
     """
-    return alone(
-        steps(
-            rig,
-            motion,
-            pose,
-            colliders,
-            settings,
-            gravity,
-            duration,
-            force_fields,
-            led,
-            painted,
-        )
-    )
+    return alone(steps(rig, motion, frame, led))
 
 
-def steps(
-    rig: Rig,
-    motion: Motion,
-    pose: Pose,
-    colliders: tuple[PosedCollider, ...],
-    settings: DynamicsSettings,
-    gravity: Floats,
-    duration: float,
-    force_fields: ForceFields = NO_FIELDS,
-    led: LedOut = NOT_LED,
-    painted: PaintedGuides | None = None,
-) -> Steps[Motion]:
+def steps(rig: Rig, motion: Motion, frame: FrameInput, led: LedOut = NOT_LED) -> Steps[Motion]:
     """The same with other grooms, see `dynamics.neighbours`.
 
     Args:
-        gravity: (3,) [m/s^2], world space.
-        duration: time since the motion's pose [s].
-        force_fields: of the scene.
         led: the strands that were led out at this moment of the motion: from how they were bent
             the next frame's are led.
-        painted: by what settings are multiplied at each guide; None: nothing is painted.
     """
-    simulated = simulated_of(painted, settings, len(rig.guides))
-    target = style_of_guides(rig, pose)
-    motion = with_clearance(rig, motion, colliders, settings, simulated)
-    held = held_cvs(rig, pose)
-    drive = motion.drive(
-        target, colliders, gravity, duration, force_fields, held, simulated, painted
+    settings, duration = frame.settings, frame.duration
+    target = style_of_guides(rig, frame.pose)
+    motion = with_clearance(
+        rig, motion, frame.colliders, settings, frame.simulated(len(rig.guides))
     )
+    drive = motion.drive(frame, target, held_cvs(rig, frame.pose))
     state = yield from dynamics_steps(motion.dynamics, drive, settings, duration)
     guides, before = grid_at_frame_end(state, drive, settings, duration), motion.carried_guides
     return Motion(
         state,
         guides,
         target,
-        pose,
+        frame.pose,
         before,
         duration,
-        colliders,
+        frame.colliders,
         motion.clearance,
         motion.guide_clearance,
         led.leans,

@@ -16,6 +16,7 @@ from .dynamics.colliders import DistanceField, PosedCollider
 from .dynamics.settings import DynamicsSettings
 from .dynamics.settle_settings import SettleSettings
 from .groom.settings import GuideSettings
+from .motion_flow import FrameInput
 from .refine.lead_out_at_rest import led_out_at_rest
 from .rig_flow import Pose, Rig
 from .strands import StrandSet
@@ -59,11 +60,12 @@ def settle(
     still = _STILL * float(np.median(rig.rest_lengths))
     motion = motion_flow.begin(rig, pose)
     frame_count = round(settings.seconds / _FRAME)
-    for frame in range(frame_count):
+    frame = FrameInput(pose, colliders, falling, gravity, _FRAME)
+    for number in range(frame_count):
         before = motion.guides
-        motion = motion_flow.advance(rig, motion, pose, colliders, falling, gravity, _FRAME)
-        yield (frame + 1) / frame_count
-        if frame >= _FEWEST and np.abs(motion.guides - before).max(initial=0.0) < still:
+        motion = motion_flow.advance(rig, motion, frame)
+        yield (number + 1) / frame_count
+        if number >= _FEWEST and np.abs(motion.guides - before).max(initial=0.0) < still:
             break
     return motion_flow.strands_and_led(rig, motion)[0]
 

@@ -93,7 +93,9 @@ def shaken(rig: Rig, seconds: float) -> MadeMotion:
     guides, posed, before, earlier = [motion.guides], [(standing,)], first, None
     for now in later:
         posed.append((PosedCollider(collider, before.matrix, now.matrix, earlier),))
-        motion = motion_flow.advance(rig, motion, now, posed[-1], settings, GRAVITY, 1.0 / RATE)
+        motion = motion_flow.advance(
+            rig, motion, motion_flow.FrameInput(now, posed[-1], settings, GRAVITY, 1.0 / RATE)
+        )
         guides.append(motion.guides)
         earlier, before = before.matrix, now
     assert motion.clearance is not None

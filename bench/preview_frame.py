@@ -24,6 +24,7 @@ from shaken import GRAVITY, shaken_poses
 
 from hairloom.addon import motion_flow, rig_flow
 from hairloom.addon.blender.sessions.compute_solver import ComputeSolver
+from hairloom.addon.dynamics.neighbours import alone
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.groom.grow import grow, scalp_density
 from hairloom.addon.groom.settings import GrowSettings, GuideSettings
@@ -73,7 +74,7 @@ class Lines:
 
 def simulated(solver: ComputeSolver, pose: rig_flow.Pose) -> None:
     """A frame of dynamics; the guides are read back, 0.05 ms, so that it is over."""
-    solver.advance(pose, (), DynamicsSettings(), GRAVITY, 1.0 / 60.0)
+    alone(solver.steps(motion_flow.FrameInput(pose, (), DynamicsSettings(), GRAVITY, 1.0 / 60.0)))
     solver.guides()
 
 
@@ -118,7 +119,7 @@ def main() -> int:
         motion = watch.measure(
             "simulate_ms",
             lambda m=motion, p=pose: motion_flow.advance(
-                rig, m, p, (), DynamicsSettings(), GRAVITY, 1.0 / 60.0
+                rig, m, motion_flow.FrameInput(p, (), DynamicsSettings(), GRAVITY, 1.0 / 60.0)
             ),
         )
         points = watch.measure(

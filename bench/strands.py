@@ -135,12 +135,10 @@ def played(
         motion = motion_flow.advance(
             rig,
             motion,
-            pose_of(rig, matrix),
-            posed,
-            DynamicsSettings(),
-            GRAVITY,
-            1.0 / fps,
-            led=led,
+            motion_flow.FrameInput(
+                pose_of(rig, matrix), posed, DynamicsSettings(), GRAVITY, 1.0 / fps
+            ),
+            led,
         )
         earlier, before = before, matrix
         points, led = motion_flow.strands_and_led(rig, motion)

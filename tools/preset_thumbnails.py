@@ -42,7 +42,9 @@ def moved(rig: Any, dynamics: Any) -> tuple[Any, Any]:
     motion = motion_flow.begin(rig, turned(rig, angles[0]))
     for angle in angles[1:]:
         pose = turned(rig, angle)
-        motion = motion_flow.advance(rig, motion, pose, (), dynamics, GRAVITY, DURATION)
+        motion = motion_flow.advance(
+            rig, motion, motion_flow.FrameInput(pose, (), dynamics, GRAVITY, DURATION)
+        )
     return motion.pose, motion_flow.strands_and_led(rig, motion)[0]
 
 

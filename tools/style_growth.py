@@ -239,7 +239,7 @@ class Head:
         solid = self.with_ears_covered if over_ears else (self.collider,)
         for _ in range(round(seconds / FRAME)):
             motion = motion_flow.advance(
-                rig, motion, rig.rest_pose, solid, dynamics, GRAVITY, FRAME
+                rig, motion, motion_flow.FrameInput(rig.rest_pose, solid, dynamics, GRAVITY, FRAME)
             )
         fallen = locks.copy()
         fallen[rig.guides] = motion.guides

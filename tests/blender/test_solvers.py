@@ -21,11 +21,12 @@ from hairloom.addon.blender.sessions.compute_solver import ComputeSolver
 from hairloom.addon.blender.sessions.numpy_solver import NumpySolver
 from hairloom.addon.dynamics.colliders import PosedCollider, SphereCollider
 from hairloom.addon.dynamics.measure import length_changes
+from hairloom.addon.dynamics.neighbours import alone
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.groom.grow import grow, scalp_density
 from hairloom.addon.groom.settings import GrowSettings, GuideSettings
-from hairloom.addon.motion_flow import Motion
+from hairloom.addon.motion_flow import FrameInput, Motion
 from hairloom.addon.render.snapshot import Snapshot
 from hairloom.addon.rig_flow import Pose, Rig
 from hairloom.addon.strands import StrandSet
@@ -52,7 +53,7 @@ def poses(rig: Rig) -> list[Pose]:
 
 def advance(solver: Any, poses: list[Pose], settings: DynamicsSettings = SETTINGS) -> None:
     for pose in poses:
-        solver.advance(pose, (), settings, GRAVITY, 1.0 / RATE)
+        alone(solver.steps(FrameInput(pose, (), settings, GRAVITY, 1.0 / RATE)))
 
 
 def agree(found: np.ndarray, expected: np.ndarray, share: float = 1.0) -> bool:
@@ -67,7 +68,9 @@ def test_numpy_is_the_pipeline(rig: Rig, poses: list[Pose]) -> None:
     assert np.array_equal(solver.strands(), rig.strands.points)
     motion = motion_flow.begin(rig, rig.rest_pose)
     for pose in poses[1:6]:
-        motion = motion_flow.advance(rig, motion, pose, (), SETTINGS, GRAVITY, 1.0 / RATE)
+        motion = motion_flow.advance(
+            rig, motion, FrameInput(pose, (), SETTINGS, GRAVITY, 1.0 / RATE)
+        )
     advance(solver, poses[1:6])
     assert solver.pose is poses[5]
     assert np.array_equal(solver.guides(), motion.guides)
@@ -123,7 +126,9 @@ def test_coils_bounce_alike_and_keep_their_lengths() -> None:
     heights = []
     for frame in range(1, 90):
         for solver in both:
-            solver.advance(pose(frame), (), DynamicsSettings(), GRAVITY, 1.0 / RATE)
+            alone(
+                solver.steps(FrameInput(pose(frame), (), DynamicsSettings(), GRAVITY, 1.0 / RATE))
+            )
         found = numpy.strands()
         heights.append(float(np.ptp(found[: offsets[1], 2])))
         if frame % 10 == 0:
@@ -143,7 +148,7 @@ def test_strands_that_are_led_out_do_not_depend_on_who_looks(rig: Rig, poses: li
         solver.rest(rig.rest_pose, known)
         for before, now in pairwise(poses[:8]):
             posed = (PosedCollider(ball, before.matrix, now.matrix),)
-            solver.advance(now, posed, SETTINGS, GRAVITY, 1.0 / RATE)
+            alone(solver.steps(FrameInput(now, posed, SETTINGS, GRAVITY, 1.0 / RATE)))
             if looks:
                 solver.strands()
         return solver.strands()
@@ -190,7 +195,7 @@ def test_baked_guides_are_shown_and_let_go(rig: Rig, poses: list[Pose], form: st
     assert solver.pose is pose
     assert np.array_equal(solver.guides(), baked)
     assert np.abs(solver.strands() - source.strands()).max() < 1.0e-6
-    solver.advance(pose, (), SETTINGS, np.zeros(3), 1.0 / RATE)
+    alone(solver.steps(FrameInput(pose, (), SETTINGS, np.zeros(3), 1.0 / RATE)))
     kept = np.abs(solver.guides() - baked).max()
     assert 0.0 < kept < 0.05, "they go towards their style, at first at no speed"
     with pytest.raises(HairloomError, match="Bake again"):

@@ -10,6 +10,7 @@ from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.groom.holds import anchors_of
 from hairloom.addon.groom.settings import GuideSettings
 from hairloom.addon.groom.ties import Holders, Tie, TipSurface
+from hairloom.addon.motion_flow import FrameInput
 from hairloom.addon.rig_flow import Pose, Rig
 from hairloom.addon.strands import StrandSet, Surface
 from hairloom.addon.strands.face import BROWS
@@ -97,7 +98,9 @@ def lengths(strands: np.ndarray) -> np.ndarray:
 def played(rig: Rig, poses: list[Pose], settings: DynamicsSettings, fps: float):
     motion = motion_flow.begin(rig, poses[0])
     for pose in poses[1:]:
-        motion = motion_flow.advance(rig, motion, pose, (), settings, GRAVITY, 1.0 / fps)
+        motion = motion_flow.advance(
+            rig, motion, FrameInput(pose, (), settings, GRAVITY, 1.0 / fps)
+        )
         yield motion
 
 
@@ -281,7 +284,9 @@ def test_brows_go_with_the_face() -> None:
     motion = motion_flow.begin(rig, rig.rest_pose)
     for frame in range(12):
         pose = Pose(None, shaking((frame + 1) / 24.0))
-        motion = motion_flow.advance(rig, motion, pose, (), DynamicsSettings(), GRAVITY, 1.0 / 24.0)
+        motion = motion_flow.advance(
+            rig, motion, FrameInput(pose, (), DynamicsSettings(), GRAVITY, 1.0 / 24.0)
+        )
         points = motion_flow.strands_and_led(rig, motion)[0].reshape(6, 8, 3)
         off = np.abs(points - motion_flow.carried(rig, pose).reshape(6, 8, 3)).max(axis=(1, 2))
         assert off[:2].max() < 1e-6

@@ -12,6 +12,7 @@ from hairloom.addon import motion_flow, rig_flow
 from hairloom.addon.dynamics.painted import PaintedGuides
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.groom.children_settings import ChildrenSettings
+from hairloom.addon.motion_flow import FrameInput
 from hairloom.addon.rig_flow import Pose, Rig
 from hairloom.addon.strands import StrandSet
 from hairloom.addon.style_flow import at_rest, styled
@@ -91,7 +92,11 @@ def test_hair_comes_to_rest_in_another_style_as_if_it_had_begun_there() -> None:
     there = motion_flow.begin(now, rig.rest_pose)
     for _ in range(48):
         other, there = (
-            motion_flow.advance(now, motion, rig.rest_pose, (), settings, GRAVITY, 1.0 / 24.0)
+            motion_flow.advance(
+                now,
+                motion,
+                FrameInput(rig.rest_pose, (), settings, GRAVITY, 1.0 / 24.0),
+            )
             for motion in (other, there)
         )
     assert np.abs(other.guides - there.guides).max() < 1e-4
@@ -109,7 +114,9 @@ def test_nothing_of_it_is_simulated_at_0_and_all_of_it_at_1() -> None:
     def shown(simulated: np.ndarray | None) -> np.ndarray:
         painted = None if simulated is None else PaintedGuides({"simulated": simulated[None]})
         motion = motion_flow.advance(
-            rig, begun, pose, (), DynamicsSettings(), GRAVITY, 0.04, painted=painted
+            rig,
+            begun,
+            FrameInput(pose, (), DynamicsSettings(), GRAVITY, 0.04, painted=painted),
         )
         return motion.guides
 

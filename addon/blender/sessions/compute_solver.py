@@ -10,11 +10,10 @@ import numpy as np
 from ... import motion_flow
 from ...arrays import Floats
 from ...dynamics.colliders import PosedCollider
-from ...dynamics.force_fields import NO_FIELDS, ForceFields
-from ...dynamics.neighbours import Steps, alone
+from ...dynamics.neighbours import Steps
 from ...dynamics.painted import PaintedGuides, simulated_of
 from ...dynamics.settings import DynamicsSettings
-from ...motion_flow import Motion
+from ...motion_flow import FrameInput, Motion
 from ...refine.lead_out import NOT_LED, LedOut
 from ...render.collider_textures import UploadedColliders
 from ...render.dynamics_pass import DynamicsPass
@@ -97,51 +96,26 @@ class ComputeSolver:
         )
         self._ride.leading.take(self._motion.clearance)
 
-    def advance(
-        self,
-        pose: Pose,
-        colliders: tuple[PosedCollider, ...],
-        settings: DynamicsSettings,
-        gravity: Floats,
-        duration: float,
-        force_fields: ForceFields = NO_FIELDS,
-        painted: PaintedGuides | None = None,
-    ) -> None:
-        alone(self.steps(pose, colliders, settings, gravity, duration, force_fields, painted))
-
-    def steps(
-        self,
-        pose: Pose,
-        colliders: tuple[PosedCollider, ...],
-        settings: DynamicsSettings,
-        gravity: Floats,
-        duration: float,
-        force_fields: ForceFields = NO_FIELDS,
-        painted: PaintedGuides | None = None,
-    ) -> Steps[None]:
-        simulated = simulated_of(painted, settings, len(self._rig.guides))
+    def steps(self, frame: FrameInput) -> Steps[None]:
         if self._is_baked:
             self._take(self.motion)
         if self._motion.clearance is not None and not self._is_resting:
             self._draw()  # what was not shown counts too: motion does not depend on who looks
-            self._since = duration
-        self.meet(colliders, settings, painted)
+            self._since = frame.duration
+        self.meet(frame.colliders, frame.settings, frame.painted)
         motion = self._motion
         if self._dynamics is None:
             self._dynamics = DynamicsPass(motion.dynamics, self._colliders)
-        rig = self._rig
-        target, held = motion_flow.style_of_guides(rig, pose), motion_flow.held_cvs(rig, pose)
-        drive = motion.drive(
-            target, colliders, gravity, duration, force_fields, held, simulated, painted
-        )
-        yield from self._dynamics.steps(drive, settings, duration)
+        target = motion_flow.style_of_guides(self._rig, frame.pose)
+        drive = motion.drive(frame, target, motion_flow.held_cvs(self._rig, frame.pose))
+        yield from self._dynamics.steps(drive, frame.settings, frame.duration)
         self._motion = replace(
             motion,
             carried_guides=target,
-            pose=pose,
+            pose=frame.pose,
             carried_earlier=motion.carried_guides,
-            duration=duration,
-            colliders=colliders,
+            duration=frame.duration,
+            colliders=frame.colliders,
         )
         self._is_resting = self._is_drawn = False
 

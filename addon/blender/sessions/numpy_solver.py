@@ -10,13 +10,12 @@ import numpy as np
 from ... import motion_flow
 from ...arrays import Floats
 from ...dynamics.colliders import PosedCollider
-from ...dynamics.force_fields import NO_FIELDS, ForceFields
-from ...dynamics.neighbours import Steps, alone
+from ...dynamics.neighbours import Steps
 from ...dynamics.painted import PaintedGuides, simulated_of
 from ...dynamics.settings import DynamicsSettings
 from ...dynamics.state import rows_of
 from ...errors import HairloomError
-from ...motion_flow import Motion
+from ...motion_flow import FrameInput, Motion
 from ...refine.lead_out import NOT_LED, LedOut
 from ...render.snapshot import Snapshot
 from ...rig_flow import Pose, Rig
@@ -68,42 +67,10 @@ class NumpySolver:
             self._rig, self._motion, colliders, settings, simulated
         )
 
-    def advance(
-        self,
-        pose: Pose,
-        colliders: tuple[PosedCollider, ...],
-        settings: DynamicsSettings,
-        gravity: Floats,
-        duration: float,
-        force_fields: ForceFields = NO_FIELDS,
-        painted: PaintedGuides | None = None,
-    ) -> None:
-        alone(self.steps(pose, colliders, settings, gravity, duration, force_fields, painted))
-
-    def steps(
-        self,
-        pose: Pose,
-        colliders: tuple[PosedCollider, ...],
-        settings: DynamicsSettings,
-        gravity: Floats,
-        duration: float,
-        force_fields: ForceFields = NO_FIELDS,
-        painted: PaintedGuides | None = None,
-    ) -> Steps[None]:
+    def steps(self, frame: FrameInput) -> Steps[None]:
         # what was not shown counts too: motion does not depend on who looks
         led = NOT_LED if self._motion.clearance is None else self.led()
-        motion = yield from motion_flow.steps(
-            self._rig,
-            self.motion,
-            pose,
-            colliders,
-            settings,
-            gravity,
-            duration,
-            force_fields,
-            led,
-            painted,
-        )
+        motion = yield from motion_flow.steps(self._rig, self.motion, frame, led)
         self._take(motion)
 
     def take_style(self, rig: Rig) -> None:

@@ -19,7 +19,7 @@ from ...dynamics.neighbours import KnownHair, Steps, Style, alone
 from ...dynamics.settings import DynamicsSettings
 from ...dynamics.state import start
 from ...errors import HairloomError
-from ...motion_flow import Motion
+from ...motion_flow import FrameInput, Motion
 from ...paint_flow import painted
 from ...refine.lead_out import Clearance
 from ...render.ride_pass import RideTexels
@@ -626,8 +626,8 @@ class Session:
         self._posed = () if self.obstacles is None else self.obstacles.move(depsgraph, duration)
         fields, self._field_notes = force_fields_of(self.hair.found(), depsgraph)
         gravity, painted = gravity_of(depsgraph.scene), self._source.painted_guides(self.rig)
-        steps = self.solver.steps(pose, self._posed, settings, gravity, duration, fields, painted)
-        yield from steps
+        frame = FrameInput(pose, self._posed, settings, gravity, duration, fields, painted)
+        yield from self.solver.steps(frame)
 
     def _go_along(self, depsgraph: bpy.types.Depsgraph, pose: Pose, duration: float) -> None:
         """A frame in which hair goes with its head as it is; see `motion_flow.go_along`."""

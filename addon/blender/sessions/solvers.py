@@ -15,13 +15,12 @@ import numpy as np
 from ... import rig_flow
 from ...arrays import Floats
 from ...dynamics.colliders import PosedCollider
-from ...dynamics.force_fields import NO_FIELDS, ForceFields
-from ...dynamics.neighbours import Steps
+from ...dynamics.neighbours import Steps, alone
 from ...dynamics.painted import PaintedGuides
 from ...dynamics.settings import DynamicsSettings
 from ...errors import HairloomError
 from ...groom.settings import GuideSettings
-from ...motion_flow import Motion
+from ...motion_flow import FrameInput, Motion
 from ...refine.lead_out import NOT_LED, LedOut
 from ...render.ride_pass import RideTexels
 from ...render.snapshot import Snapshot
@@ -73,29 +72,8 @@ class Solver(Protocol):
         """Find how far hair stays from colliders, see `motion_flow.with_clearance`; what
         has not met them does so when it advances."""
 
-    def advance(
-        self,
-        pose: Pose,
-        colliders: tuple[PosedCollider, ...],
-        settings: DynamicsSettings,
-        gravity: Floats,
-        duration: float,
-        force_fields: ForceFields = NO_FIELDS,
-        painted: PaintedGuides | None = None,
-    ) -> None:
-        """One frame of motion, as motion_flow.advance."""
-
-    def steps(
-        self,
-        pose: Pose,
-        colliders: tuple[PosedCollider, ...],
-        settings: DynamicsSettings,
-        gravity: Floats,
-        duration: float,
-        force_fields: ForceFields = NO_FIELDS,
-        painted: PaintedGuides | None = None,
-    ) -> Steps[None]:
-        """The same with other grooms, as motion_flow.steps."""
+    def steps(self, frame: FrameInput) -> Steps[None]:
+        """One frame of motion, as motion_flow.steps."""
 
     def take_style(self, rig: Rig) -> None:
         """Go by this rig in the next frame: the same groom with curves of other shapes, see
@@ -204,10 +182,11 @@ def _tried_out() -> str:
     rig = rig_flow.prepare(strands, None, GuideSettings(), place="a few strands")
     moved = np.eye(4)
     moved[:3, 3] = 0.01
+    frame = FrameInput(Pose(None, moved), (), DynamicsSettings(), np.array([0, 0, -9.81]), 0.04)
     ends = []
     try:
         for solver in (NumpySolver(rig), ComputeSolver(rig)):
-            solver.advance(Pose(None, moved), (), DynamicsSettings(), np.array([0, 0, -9.81]), 0.04)
+            alone(solver.steps(frame))
             ends.append(solver.strands())
     except Exception as error:  # a driver may fail at any point, each with an error of its own
         return f"{type(error).__name__}: {error}"

@@ -19,8 +19,10 @@ import gpu
 import numpy as np
 
 from ... import rig_flow
+from ...dynamics.neighbours import alone
 from ...dynamics.settings import DynamicsSettings
 from ...groom.settings import GuideSettings
+from ...motion_flow import FrameInput
 from ...render import gpu_objects
 from ...render.accumulation import Target
 from ...render.camera import Camera, frame_camera
@@ -105,7 +107,8 @@ class _Bench:
         self.moments += 1
         moved = np.eye(4)
         moved[0, 3] = 0.02 * np.sin(0.3 * self.moments)
-        self.solver.advance(Pose(None, moved), (), DynamicsSettings(), _GRAVITY, _FRAME)
+        frame = FrameInput(Pose(None, moved), (), DynamicsSettings(), _GRAVITY, _FRAME)
+        alone(self.solver.steps(frame))
         self.shown()
 
     def shown(self) -> Snapshot:

@@ -16,6 +16,7 @@ from hairloom.addon.dynamics.colliders import (
 )
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.groom.weights import GuideWeights
+from hairloom.addon.motion_flow import FrameInput
 from hairloom.addon.refine.lead_out import (
     NO_LEANS,
     SLACK,
@@ -197,7 +198,9 @@ def test_a_strand_between_guides_that_part_goes_around() -> None:
         now[2, 3] += 0.01
         posed = (PosedCollider(BALL, before, now),)
         pose = Pose(None, np.eye(4))
-        motion = motion_flow.advance(rig, motion, pose, posed, settings, np.zeros(3), 1.0 / 30.0)
+        motion = motion_flow.advance(
+            rig, motion, FrameInput(pose, posed, settings, np.zeros(3), 1.0 / 30.0)
+        )
         before = now
         points = motion_flow.strands_and_led(rig, motion)[0]
         depth = 0.1 - np.linalg.norm(points - now[:3, 3], axis=1)
