@@ -62,10 +62,6 @@ class FrameInput:
     force_fields: ForceFields = NO_FIELDS
     painted: PaintedGuides | None = None
 
-    def simulated(self, guide_count: int) -> Floats | None:
-        """How much of each guide is simulated, see `Drive`."""
-        return simulated_of(self.painted, self.settings, guide_count)
-
 
 @dataclass(frozen=True)
 class Motion:
@@ -106,7 +102,7 @@ class Motion:
             self.duration / frame.duration if frame.duration else 1.0,
             held,
             self.guide_clearance,
-            frame.simulated(len(target)),
+            simulated_of(frame.painted, frame.settings, len(target)),
             frame.painted,
         )
 
@@ -205,9 +201,7 @@ def steps(rig: Rig, motion: Motion, frame: FrameInput, led: LedOut = NOT_LED) ->
     """
     settings, duration = frame.settings, frame.duration
     target = style_of_guides(rig, frame.pose)
-    motion = with_clearance(
-        rig, motion, frame.colliders, settings, frame.simulated(len(rig.guides))
-    )
+    motion = with_clearance(rig, motion, frame.colliders, settings, frame.painted)
     drive = motion.drive(frame, target, held_cvs(rig, frame.pose))
     state = yield from dynamics_steps(motion.dynamics, drive, settings, duration)
     guides, before = grid_at_frame_end(state, drive, settings, duration), motion.carried_guides
@@ -334,7 +328,7 @@ def with_clearance(
     motion: Motion,
     colliders: tuple[PosedCollider, ...],
     settings: DynamicsSettings,
-    simulated: Floats | None = None,
+    painted: PaintedGuides | None = None,
 ) -> Motion:
     """The motion that knows how far hair stays from colliders, from the first frame with any on.
 
@@ -342,7 +336,7 @@ def with_clearance(
     neither farther than they were at that frame's begin, in their style and as their roots
     carried them. Strands of which nothing is simulated go where their style goes.
     """
-    size = motion.dynamics.rest.size
+    simulated, size = simulated_of(painted, settings, len(rig.guides)), motion.dynamics.rest.size
     kept, reach = settings.radius_root * size, farthest_kept(settings, size)
     before = tuple(posed.at_begin() for posed in colliders)
     strands, guides = motion.clearance, motion.guide_clearance

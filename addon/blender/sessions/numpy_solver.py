@@ -11,7 +11,7 @@ from ... import motion_flow
 from ...arrays import Floats
 from ...dynamics.colliders import PosedCollider
 from ...dynamics.neighbours import Steps
-from ...dynamics.painted import PaintedGuides, simulated_of
+from ...dynamics.painted import PaintedGuides
 from ...dynamics.settings import DynamicsSettings
 from ...dynamics.state import rows_of
 from ...errors import HairloomError
@@ -62,9 +62,8 @@ class NumpySolver:
         settings: DynamicsSettings,
         painted: PaintedGuides | None = None,
     ) -> None:
-        simulated = simulated_of(painted, settings, len(self._rig.guides))
         self._motion = motion_flow.with_clearance(
-            self._rig, self._motion, colliders, settings, simulated
+            self._rig, self._motion, colliders, settings, painted
         )
 
     def steps(self, frame: FrameInput) -> Steps[None]:
