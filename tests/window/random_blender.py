@@ -84,9 +84,9 @@ def rename(dice):
     obj = dice.object()
     name = dice.pick(["Hair", "Head", "Hairöß", "x" * 63, "a/b:c"])
     dice.note(f"{obj.name} -> {name}")
-    obj.name = name
-    if obj.data is not None:
-        obj.data.name = name
+    for each in filter(None, (obj, obj.data)):
+        if each.is_editable:  # what is linked is not
+            each.name = name
     step("rename")
 
 

@@ -114,7 +114,7 @@ def keep_a_preset(dice):
 
 @action(2)
 def out_and_in_again(dice):
-    formats = {"tfx": "tfx", "hair": "hair", "alembic": "abc", "usd": "usda"}
+    formats = {"tressfx": "tfx", "hair": "hair", "alembic": "abc", "usd": "usda"}
     kind, suffix = dice.pick(formats.items())
     select(dice.object("CURVES"))
     path = str(dice.folder / f"strands.{suffix}")
