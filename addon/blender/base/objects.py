@@ -7,6 +7,7 @@ number survives.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import bpy
 import numpy as np
@@ -99,14 +100,13 @@ def head_of(hair: bpy.types.Object) -> bpy.types.Object | None:
 
 def is_solid(obj: bpy.types.Object) -> bool:
     """Whether 3D views draw it as a solid object that hides what is behind it."""
-    # an area's local view would count: Blender asks the 3D view of the context, if there is one
-    with bpy.context.temp_override(area=None):
+    with _without_area():
         return bool(obj.visible_get() and obj.display_type in {"SOLID", "TEXTURED"})
 
 
 def layers_with(obj: bpy.types.Object) -> frozenset[LayerKey]:
     """The view layers of all scenes that show an object; local view is not considered."""
-    with bpy.context.temp_override(area=None):  # see is_solid
+    with _without_area():
         return frozenset(
             layer_key(scene, layer)
             for scene in bpy.data.scenes
@@ -147,3 +147,12 @@ def is_on_screen(uid: int, name: str) -> bool:
     """Whether an object is in the scene of any window."""
     scenes = {window.scene for window in bpy.context.window_manager.windows}
     return not all(is_elsewhere(uid, name, scene) for scene in scenes)
+
+
+def _without_area() -> Any:
+    """An area's local view would count: Blender asks the 3D view of the context, if there is one.
+
+    While a file browser comes or goes, its area has no member at all, and `temp_override` of the
+    context is None; its type still has it.
+    """
+    return bpy.types.Context.temp_override(bpy.context, area=None)
