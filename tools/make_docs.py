@@ -83,8 +83,8 @@ def make_pictures() -> None:
         ties = [sys.executable, str(REPOSITORY / "tools" / "bench.py"), "ties"]
         subprocess.run([*ties, "--strands", "3000", "--pictures", folder], check=True)
         write_small(Path(folder) / "ties_shake.png", IMAGES / "ponytail.jpg")
-    tools = ("refinement", "preset", "shading", "volume", "engine", "quick_start", "styling")
-    tools += ("hairstyle", "web_page", "tutorial", "cards", "shells")
+    tools = ("refinement", "preset", "shading", "volume", "engine", "styling")
+    tools += ("hairstyle", "web_page", "tutorial", "cards", "shells", "motion")
     for name in (*(f"{each}_pictures" for each in tools), "preset_thumbnails"):
         tool = [sys.executable, str(REPOSITORY / "tools" / f"{name}.py")]
         subprocess.run([*tool, str(IMAGES)], check=True)
