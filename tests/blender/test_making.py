@@ -88,6 +88,19 @@ def test_a_preview_shows_blenders_strands_until_its_own_are_made(hair, evaluated
     assert shown(session).snapshot.strand_count == COUNT and is_box(hair, evaluated)
 
 
+@pytest.mark.parametrize("view", ["stretch", "depth"])
+def test_hair_that_is_being_made_may_be_coloured_by_what_it_has_not_yet(
+    view, hair, evaluated, gate
+):
+    hair.hairloom.debug_view = view
+    session = previews.start(hair, evaluated())
+    assert shown(session).snapshot.strand_count == 0
+    gate.set()
+    arrive(session)
+    assert shown(session).snapshot.debug_view == view
+    assert shown(session).snapshot.strand_count == COUNT
+
+
 def test_cancel_ends_the_preview_of_hair_that_is_being_made(hair, evaluated, gate):
     session = previews.start(hair, evaluated())
     hair.select_set(True)

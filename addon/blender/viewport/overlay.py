@@ -134,7 +134,7 @@ def read_drawing(
         head = session.head.handle.find()
     if head is None or not is_solid(head):
         snapshot = with_all_strands(snapshot)
-    if snapshot.debug_view == "stretch":
+    if snapshot.debug_view == "stretch" and len(snapshot.points):
         snapshot = replace(snapshot, rest=session.rest_points())
     elif snapshot.debug_view == "depth":
         snapshot = replace(snapshot, solids=session.solids(depsgraph))
