@@ -47,12 +47,20 @@ TESTS_LIMIT_S = 3600
 SESSION_LIMIT_S = float(os.environ.get("HAIRLOOM_SESSION_LIMIT", "1800"))
 #: For a commit each session plays on one backend: these on Vulkan, for they look at what is drawn.
 ON_VULKAN = ("cards", "engine", "look", "shadows", "random", "still_views")
-#: What is played where all is. One makes pictures of the documentation, one waits for minutes, and
-#: eight draw for minutes what others look at too: light and shadows `engine` and `shadows`, what
-#: cuts Play short `random` and `everyday`, work that is cancelled `long_work`, the hair that is
-#: drawn from near and far `layers`, Esc in a turntable `long_work`, the options in a file browser
-#: `import`, and what is moved by hand and undone `combing` and `growing`.
+#: The tutorials, each on one backend wherever it is played: what may differ, others look at. They
+#: take minutes, as a person does; a commit walks their steps as Python, by test_tutorials.
+TUTORIALS = {
+    "tutorial_cards_into_godot": "vulkan",
+    "tutorial_look_like_cycles": "opengl",
+}
+#: What is played where all is, beside the tutorials. One makes pictures of the documentation, one
+#: waits for minutes, and eight draw for minutes what others look at too: light and shadows
+#: `engine` and `shadows`, what cuts Play short `random` and `everyday`, work that is cancelled
+#: `long_work`, the hair that is drawn from near and far `layers`, Esc in a turntable `long_work`,
+#: the options in a file browser `import`, and what is moved by hand and undone `combing` and
+#: `growing`.
 NOT_IN_COMMITS = (
+    *TUTORIALS,
     "guide_pictures",
     "autosave",
     "body_shadow",
@@ -73,6 +81,7 @@ _ON_SMALL = (
     *("long_work", "look", "motion", "selection", "shadows", "views"),
 )
 SCREENS = {f"session_{name}": _SMALL for name in _ON_SMALL} | {
+    **{f"session_{name}": "1024x900x24" for name in TUTORIALS},
     "session_engine": _LARGE,
     "session_everyday": _LARGE,
     "session_guide_pictures": "1600x1500x24",
@@ -306,7 +315,7 @@ def jobs_of(sessions: list[Path], *, is_commit: bool, with_tests: bool) -> list[
         jobs += [partial(run_tests, backend, tests[backend]) for backend in reversed(BACKENDS)]
     for script in sessions:
         name = script.stem.removeprefix("session_")
-        chosen = BACKENDS
+        chosen = (TUTORIALS[name],) if name in TUTORIALS else BACKENDS
         if is_commit:
             chosen = () if name in NOT_IN_COMMITS else BACKENDS[name in ON_VULKAN :][:1]
         for backend in chosen:

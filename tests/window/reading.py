@@ -1,0 +1,143 @@
+"""Eyes that read: where on the screen words stand, found by how Blender's own font draws them.
+
+So a session clicks what is written on a page of the documentation, where it is shown, and fails
+when it is called otherwise.
+"""
+
+from collections.abc import Iterator
+from functools import cache
+from typing import Any
+
+import blf
+import bpy
+import gpu
+import numpy as np
+import screen
+from driver import until
+from mathutils import Matrix
+
+#: how much a place is like the words, from -1 to 1, to be read as them; menus underline a letter
+ALIKE = 0.9
+#: [pixels] around words that belong to them; and where other words of the same line would end and
+#: begin: on the left checkboxes are nearer than those would be
+MARGIN, BEFORE, AFTER = 1, 3, 5
+#: share of the contrast of letters with which the space beside them may differ
+BLANK = 0.3
+#: [levels of 255] what differs by less is no letter
+FAINT = 6.0
+
+#: left, bottom, width, height, in pixels of the window
+Box = tuple[int, int, int, int]
+
+
+@cache
+def _drawn(words: str, is_turned: bool) -> np.ndarray:
+    """How much of each pixel letters cover, (height, width), top row first."""
+    size = bpy.context.preferences.ui_styles[0].widget.points
+    blf.size(0, size * bpy.context.preferences.system.ui_scale)
+    width, height = int(blf.dimensions(0, words)[0]) + 24, 40
+    buffer = gpu.types.GPUOffScreen(width, height)
+    with buffer.bind():
+        frame = gpu.state.active_framebuffer_get()
+        frame.clear(color=(0.0, 0.0, 0.0, 1.0))
+        with gpu.matrix.push_pop(), gpu.matrix.push_pop_projection():
+            gpu.matrix.load_matrix(Matrix.Identity(4))
+            to_clip = Matrix.Diagonal((2.0 / width, 2.0 / height, -1.0, 1.0))
+            to_clip.translation = (-1.0, -1.0, 0.0)
+            gpu.matrix.load_projection_matrix(to_clip)
+            blf.color(0, 1.0, 1.0, 1.0, 1.0)
+            blf.position(0, 12.0, 16.0, 0.0)
+            blf.draw(0, words)
+        read = frame.read_color(0, 0, width, height, 4, 0, "UBYTE")
+        read.dimensions = width * height * 4
+        letters = np.array(read, np.float64).reshape(height, width, 4)[::-1, :, 0]
+    buffer.free()
+    rows, columns = (np.flatnonzero(letters.max(axis=axis)) for axis in (1, 0))
+    assert len(rows), f"'{words}' has no letters"
+    part = letters[
+        rows[0] - MARGIN : rows[-1] + MARGIN + 1, columns[0] - MARGIN : columns[-1] + MARGIN + 1
+    ]
+    return np.rot90(part, -1) if is_turned else part
+
+
+def _likeness(shown: np.ndarray, letters: np.ndarray) -> np.ndarray:
+    """Normalized cross-correlation: for each place of the upper left corner, from -1 to 1."""
+    (height, width), (rows, columns) = shown.shape, letters.shape
+    pattern = letters - letters.mean()
+    pattern /= np.sqrt((pattern**2).sum())
+    spectrum = np.fft.rfft2(shown) * np.fft.rfft2(pattern[::-1, ::-1], shown.shape)
+    matched = np.fft.irfft2(spectrum, shown.shape)[rows - 1 :, columns - 1 :]
+
+    def summed(values: np.ndarray) -> np.ndarray:
+        sums = np.zeros((height + 1, width + 1))
+        sums[1:, 1:] = values.cumsum(0).cumsum(1)
+        return (
+            sums[rows:, columns:]
+            - sums[:-rows, columns:]
+            - sums[rows:, :-columns]
+            + sums[:-rows, :-columns]
+        )
+
+    count = rows * columns
+    deviation = summed(shown**2) - summed(shown) ** 2 / count
+    return matched / np.sqrt(np.maximum(deviation, count * FAINT**2))
+
+
+def _is_apart(shown: np.ndarray, letters: np.ndarray, y: int, x: int, is_turned: bool) -> bool:
+    """Whether words at a place are no part of longer ones."""
+    if is_turned:
+        shown, letters, y, x = shown.T, letters.T, x, y
+    rows, columns = letters.shape
+    lines = shown[y : y + rows]
+    contrast = np.polyfit(letters.ravel(), lines[:, x : x + columns].ravel(), 1)[0] * 255.0
+    ground = np.median(lines[:, x : x + columns])
+    beside = np.hstack((lines[:, max(x - BEFORE, 0) : x], lines[:, x + columns :][:, :AFTER]))
+    return bool(np.abs(beside - ground).max(initial=0.0) < BLANK * abs(contrast))
+
+
+def seen(words: str, box: Box, *, is_turned: bool = False) -> list[tuple[float, int, int]]:
+    """Where words stand in a part of the window: likeness, x and y of their middle; best first."""
+    left, bottom, width, height = box
+    top = screen.size()[1] - (bottom + height)
+    shown = screen.part(left, top, width, height).astype(np.float64).mean(axis=2)
+    letters = _drawn(words, is_turned)
+    rows, columns = letters.shape
+    if rows > height or columns > width:
+        return []
+    likeness = np.abs(_likeness(shown, letters))
+    found = []
+    for y, x in np.argwhere(likeness > ALIKE):
+        if not _is_apart(shown, letters, int(y), int(x), is_turned):
+            continue
+        middle = left + int(x) + columns // 2, bottom + height - int(y) - rows // 2
+        found.append((float(likeness[y, x]), *middle))
+    best: list[tuple[float, int, int]] = []
+    for each in sorted(found, reverse=True):  # once each
+        if all(abs(each[1] - other[1]) > 4 or abs(each[2] - other[2]) > 4 for other in best):
+            best.append(each)
+    return best
+
+
+def width_of(words: str) -> int:
+    """[pixels] from the first letter to the last."""
+    return int(_drawn(words, False).shape[1]) - 2 * MARGIN
+
+
+def whole_window() -> Box:
+    return 0, 0, bpy.context.window.width, bpy.context.window.height
+
+
+def box_of(region: Any) -> Box:
+    return region.x, region.y, region.width, region.height
+
+
+def read(words: str, box: Box | None = None, **how: bool) -> Iterator[int]:
+    """Where words stand, once they are there: x and y of their middle."""
+    found: list[tuple[float, int, int]] = []
+
+    def is_there() -> bool:
+        found[:] = seen(words, box or whole_window(), **how)
+        return bool(found)
+
+    yield from until(is_there, f"'{words}' is not to be read")
+    return found[0][1:]

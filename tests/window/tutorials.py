@@ -1,0 +1,371 @@
+"""A page of docs/tutorials as a person plays it, who reads a step and does it with mouse and keys.
+
+What is clicked is named by words that stand in the step, and found where the window shows them.
+"""
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import bpy
+import driver
+import numpy as np
+import screen
+from artist import file_browser, hair_is_made, press, redrawn, region
+from driver import of_hairloom, until
+from reading import Box, box_of, read, seen, whole_window, width_of
+
+PAGES = Path(__file__).resolve().parents[2] / "docs" / "tutorials"
+#: [pixels] around words where a menu that opens has changed the screen
+AROUND = 20
+#: [pixels] by how much the Properties editor is made wider
+WIDER = 160
+#: where in a panel fields are, and the picture of a preset: shares of its width
+FIELD, PICTURE = 0.7, 0.15
+#: [pixels] from *Save* up to the middle of that picture
+ABOVE_SAVE = 20
+#: Blender's names of keys
+_DIGITS = ("ZERO", "ONE", "TWO", "THREE", "FOUR", "FIVE", "SIX", "SEVEN", "EIGHT", "NINE")
+KEYS = {str(number): name for number, name in enumerate(_DIGITS)} | {".": "PERIOD", "_": "MINUS"}
+#: [pixels] from the checkbox of a panel to its name
+CHECKBOX = 11
+#: [levels of 255] two drawings of the same differ by less
+SAME = 8
+
+
+class Page:
+    """The steps of a page, each as its words without marks, and the one that is being done."""
+
+    def __init__(self, name: str) -> None:
+        text = (PAGES / f"{name}.md").read_text(encoding="utf-8").partition("\nMore: ")[0]
+        text = text.partition("\nNext: ")[0]
+        found = re.split(r"^\d\. ", text, flags=re.M)[1:]
+        self.steps = [" ".join(each.replace("*", "").split()) for each in found]
+        self._number = 0
+
+    def begin(self) -> Iterator[int]:
+        """What docs/tutorials/README.md asks for."""
+        yield from press("ESC")  # the splash screen
+        driver.enable_extension()
+        preferences = bpy.context.preferences.view
+        preferences.filebrowser_display_type = "SCREEN"  # all in the one window that is looked at
+        preferences.render_display_type = "AREA"
+        view = middle(box_of(region("WINDOW")))
+        yield from key("N", *view)
+        yield from until(lambda: region("UI").width > 1, "N does not open the sidebar")
+        yield from click(*(yield from read("Hairloom", box_of(region("UI")), is_turned=True)))
+        yield from widen_properties()
+
+    def step(self, number: int) -> None:
+        assert number == self._number + 1, "steps are done in their order"
+        self._number = number
+
+    def end(self) -> None:
+        assert self._number == len(self.steps), f"step {self._number + 1} is left out"
+
+    def says(self, words: str) -> str:
+        step = self.steps[self._number - 1]
+        assert words in step, f"step {self._number} does not say '{words}'"
+        return words
+
+    def click(self, words: str, box: Box | None = None, **how: Any) -> Iterator[int]:
+        """Words of this step, where they are shown."""
+        yield from click(*(yield from read(self.says(words), box, **how)))
+
+    def menu(self, words: str, box: Box) -> Iterator[int]:
+        """Words of this step with > between them: the first is in this part of the window."""
+        first, *others = self.says(words).split(" > ")
+        before = screen.pixels()
+        yield from click(*(yield from read(first, box)))
+        yield from chosen(others, before)
+
+    def right_click(self, words: str, x: int, y: int) -> Iterator[int]:
+        """And what is chosen in the menu that comes up there."""
+        before = screen.pixels()
+        yield from click(x, y, "RIGHTMOUSE")
+        yield from chosen(self.says(words).split(" > "), before)
+
+    def sample_scene(self) -> Iterator[int]:
+        """Its menu entry; Esc stops its motion."""
+        own = bpy.context.window.scene
+        path = "Add > Curve > Hairloom Sample Scene"
+        yield from self.menu(path, box_of(region("HEADER")))
+        yield from until(lambda: bpy.context.window.scene != own, "no sample scene comes")
+        yield from until(lambda: bpy.context.screen.is_animation_playing, "nothing plays")
+        yield from until(lambda: bpy.context.scene.frame_current > 1, "the playhead stands")
+        self.says("Press Esc")
+        yield from key("ESC", *in_view())
+        yield from until(lambda: not bpy.context.screen.is_animation_playing, "it plays on")
+        yield from still()
+
+    def press(self, button: str, area: Any, kind: str = "WINDOW") -> Iterator[int]:
+        """A button, for which the area is scrolled."""
+        yield from click(*(yield from scrolled(self.says(button), area, kind)))
+
+    def mode(self, now: str, other: str) -> Iterator[int]:
+        """Another mode, chosen where the header shows the one that is on."""
+        before = screen.pixels()
+        yield from click(*(yield from read(now, box_of(region("HEADER")))))
+        yield from chosen([self.says(other)], before)
+
+    def open(self, panel: str, area: Any, kind: str = "WINDOW") -> Iterator[int]:
+        """A click on the name of a panel that is closed."""
+        yield from click(*(yield from scrolled(self.says(panel), area, kind)))
+        yield
+
+    def enter(
+        self, label: str, value: str, path: str, area: Any, kind: str = "WINDOW"
+    ) -> Iterator[int]:
+        """A value into the field beside a label; path: how its property's data path ends."""
+        x, y = yield from beside(self.says(label), path, area, kind)
+        yield from entered(value, x, y)
+        yield
+
+    def choose(
+        self, label: str, entry: str, path: str, area: Any, kind: str = "WINDOW"
+    ) -> Iterator[int]:
+        """An entry of the list beside a label, which the step need not name; path as in `enter`."""
+        before = screen.pixels()
+        yield from click(*(yield from beside(label, path, area, kind)))
+        yield from chosen([self.says(entry)], before)
+        yield
+
+    def tick(self, panel: str, area: Any) -> Iterator[int]:
+        """The checkbox before a panel's name."""
+        x, y = yield from scrolled(self.says(panel), area)
+        yield from click(x - width_of(panel) // 2 - CHECKBOX, y)
+        yield
+
+    def render(self) -> Iterator[int]:
+        """F12, until the picture is there."""
+        done: list[bool] = []
+        handlers = bpy.app.handlers.render_complete
+        handlers.append(lambda *_: done.append(True))
+        self.says("F12")
+        yield from key("F12", *in_view())
+        yield from until(lambda: done, "nothing is rendered")
+        handlers.pop()
+        yield
+
+    def picture(self, panel: str, entry: str, area: Any, kind: str = "WINDOW") -> Iterator[int]:
+        """One of the pictures that come up where that of a panel is clicked, left of *Save*."""
+        self.says("picture")
+        _, header = yield from scrolled(self.says(panel), area, kind)
+        part = part_of(area, kind)
+        save = max(y for _, _, y in seen("Save", box_of(part)) if y < header)
+        before = screen.pixels()
+        yield from click(part.x + int(PICTURE * part.width), save + ABOVE_SAVE)
+        yield from chosen([self.says(entry)], before)
+        yield
+
+
+def middle(box: Box) -> tuple[int, int]:
+    left, bottom, width, height = box
+    return left + width // 2, bottom + height // 2
+
+
+def move(x: int, y: int, count: int = 2) -> Iterator[int]:
+    """The mouse to a place, where it rests for this many events until Blender has noticed."""
+    for _ in range(count):
+        bpy.context.window.event_simulate("MOUSEMOVE", "NOTHING", x=x, y=y)
+        yield 1
+
+
+def click(x: int, y: int, button: str = "LEFTMOUSE", **held: bool) -> Iterator[int]:
+    """A button of the mouse at a place."""
+    yield from move(x, y)
+    for value in ("PRESS", "RELEASE"):
+        bpy.context.window.event_simulate(button, value, x=x, y=y, **held)
+        yield 1
+    yield 1
+
+
+def drag(start: tuple[int, int], end: tuple[int, int], count: int = 8) -> Iterator[int]:
+    """The left mouse button held from one place to another."""
+    yield from move(*start)
+    window, (x, y) = bpy.context.window, start
+    window.event_simulate("LEFTMOUSE", "PRESS", x=x, y=y)
+    yield 1
+    for number in range(1, count + 1):
+        x, y = (a + (b - a) * number // count for a, b in zip(start, end, strict=True))
+        window.event_simulate("MOUSEMOVE", "NOTHING", x=x, y=y)
+        yield 1
+    window.event_simulate("LEFTMOUSE", "RELEASE", x=x, y=y)
+    yield 1
+
+
+def still() -> Iterator[int]:
+    """Until no work goes on and the hair is there."""
+    yield from until(lambda: not of_hairloom("long_work").running(), "the work does not end")
+    yield from hair_is_made()
+    yield
+
+
+def key(name: str, x: int, y: int, **held: bool) -> Iterator[int]:
+    """A key while the mouse is at a place."""
+    yield from move(x, y)
+    for value in ("PRESS", "RELEASE"):
+        bpy.context.window.event_simulate(name, value, x=x, y=y, **held)
+        yield 1
+
+
+def come_up(words: str, before: np.ndarray, box: Box | None = None) -> Iterator[int]:
+    """Where words are shown that were not there before: those of a menu that has opened."""
+    found: list[tuple[int, int]] = []
+
+    def is_there() -> bool:
+        now, height = screen.pixels(), len(before)
+        differs = np.abs(now.astype(int) - before).max(axis=2) > SAME
+        for _, x, y in seen(words, box or whole_window()):
+            row = height - y
+            around = differs[max(row - 4, 0) : row + 4, max(x - AROUND, 0) : x + AROUND]
+            if around.mean() > 0.3:
+                found.append((x, y))
+        return bool(found)
+
+    yield from until(is_there, f"'{words}' does not come up")
+    return found[0]
+
+
+def chosen(entries: list[str], before: np.ndarray) -> Iterator[int]:
+    """Entries of menus, each of which opens the next; before: the screen without any."""
+    for each in entries:
+        x, y = yield from come_up(each, before)
+        before = screen.pixels()
+        yield from click(x, y)
+
+
+def typed(text: str, x: int, y: int) -> Iterator[int]:
+    """Letters and digits, one after the other."""
+    for letter in text:
+        window, name = bpy.context.window, KEYS.get(letter, letter.upper())
+        window.event_simulate(name, "PRESS", unicode=letter, x=x, y=y)
+        yield 1
+        window.event_simulate(name, "RELEASE", x=x, y=y)
+        yield 1
+
+
+def entered(text: str, x: int, y: int) -> Iterator[int]:
+    """A value into the field under the mouse: a click selects the one that is there."""
+    yield from click(x, y)
+    yield from typed(text, x, y)
+    yield from key("RET", x, y)
+
+
+def scrolled(words: str, area: Any, kind: str = "WINDOW") -> Iterator[int]:
+    """Where words are shown in an area, which is scrolled until they are."""
+    part = part_of(area, kind)
+    for wheel in (None, "WHEELUPMOUSE", "WHEELDOWNMOUSE"):
+        for _ in range(1 if wheel is None else 100):
+            if found := seen(words, box_of(part)):
+                return found[0][1:]
+            if wheel is not None and not (yield from turned(wheel, part)):
+                break
+    raise AssertionError(f"'{words}' is nowhere in the {area.type} editor")
+
+
+def turned(wheel: str, part: Any) -> Iterator[int]:
+    """Turns the mouse wheel over a region; whether that has moved anything."""
+    before, (x, y) = _part(screen.pixels(), part), middle(box_of(part))
+    yield from move(x, y)
+    for _ in range(3):
+        bpy.context.window.event_simulate(wheel, "PRESS", x=x, y=y)
+        yield 1
+    yield
+    return not np.array_equal(_part(screen.pixels(), part), before)
+
+
+def _part(pixels: np.ndarray, part: Any) -> np.ndarray:
+    left, bottom, width, height = box_of(part)
+    top = len(pixels) - bottom - height
+    return pixels[top : top + height, left : left + width]
+
+
+def beside(label: str, path: str, area: Any, kind: str = "WINDOW") -> Iterator[int]:
+    """Where the field of a property is that has this label."""
+    part = part_of(area, kind)
+    x = part.x + int(FIELD * part.width)
+
+    def heights() -> list[int]:
+        return sorted((y for _, _, y in seen(label, box_of(part))), reverse=True)
+
+    tried = set()
+    for wheel in (None, "WHEELUPMOUSE", "WHEELDOWNMOUSE"):
+        for _ in range(1 if wheel is None else 100):
+            for y in heights():
+                yield from move(x, y, count=5)
+                with bpy.context.temp_override(area=area, region=part):
+                    found = bpy.context.property
+                tried.add(found[1] if found else None)
+                if found is not None and found[1].endswith(path):
+                    return x, y
+            if wheel is not None and not (yield from turned(wheel, part)):
+                break
+    raise AssertionError(f"'{label}' stands beside {tried}, not {path}")
+
+
+def part_of(area: Any, kind: str) -> Any:
+    return next(each for each in area.regions if each.type == kind)
+
+
+def in_view() -> tuple[int, int]:
+    """A place in the viewport where no hair is."""
+    view = region("WINDOW")
+    return view.x + view.width // 4, view.y + view.height // 6
+
+
+def lowest(words: str, area: Any) -> Iterator[int]:
+    """Of words that are shown several times in an area, as a button below a panel's name."""
+    yield from scrolled(words, area)
+    places = seen(words, box_of(part_of(area, "WINDOW")))
+    return min((y, x) for _, x, y in places)[::-1]
+
+
+def area_of(kind: str) -> Any:
+    return next(area for area in bpy.context.window.screen.areas if area.type == kind)
+
+
+def properties() -> Any:
+    return area_of("PROPERTIES")
+
+
+def save_the_file() -> Iterator[int]:
+    """Where Blender proposes, under the name that it proposes."""
+    yield from key("S", *in_view(), ctrl=True)
+    yield from until(lambda: file_browser() is not None, "no file browser opens")
+    yield from redrawn(file_browser())
+    yield from key("RET", *middle(box_of(file_browser())))
+    yield from until(lambda: file_browser() is None, "the file browser stays")
+    yield
+    assert bpy.data.filepath, "the file is not saved"
+
+
+def widen_properties() -> Iterator[int]:
+    """Drags its edge into the viewport: no label is cut there, and hair is drawn faster."""
+    area = properties()
+    before, y = area.width, area.y + area.height // 2
+    yield from drag((area.x - 1, y), (area.x - 1 - WIDER, y))
+    yield
+    assert properties().width > before, "the edge does not follow the mouse"
+
+
+def open_tab(name: str) -> Iterator[int]:
+    """A tab of the Properties editor, which has no words: from the top each is tried."""
+    area = properties()
+    bar = part_of(area, "NAVIGATION_BAR")
+    for y in range(bar.y + bar.height - 10, bar.y, -12):
+        yield from click(bar.x + bar.width // 2, y)
+        if area.spaces.active.context == name:
+            yield
+            return
+    raise AssertionError(f"there is no tab {name}")
+
+
+def named_file(name: str) -> Iterator[int]:
+    """What a file browser asks for, written into its field, in the folder that it shows."""
+    browser = file_browser()
+    part = part_of(browser, "EXECUTE")
+    yield from entered(name, part.x + part.width // 4, part.y + part.height // 2)
+    yield from key("RET", *middle(box_of(browser)))
+    yield from until(lambda: file_browser() is None, "the file browser stays")
