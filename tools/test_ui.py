@@ -50,6 +50,7 @@ ON_VULKAN = ("cards", "engine", "look", "shadows", "random", "still_views")
 #: The tutorials, each on one backend wherever it is played: what may differ, others look at. They
 #: take minutes, as a person does; a commit walks their steps as Python, by test_tutorials.
 TUTORIALS = {
+    "tutorial_first_hair": "opengl",
     "tutorial_cards_into_godot": "vulkan",
     "tutorial_look_like_cycles": "opengl",
 }

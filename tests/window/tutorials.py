@@ -315,10 +315,11 @@ def in_view() -> tuple[int, int]:
     return view.x + view.width // 4, view.y + view.height // 6
 
 
-def lowest(words: str, area: Any) -> Iterator[int]:
-    """Of words that are shown several times in an area, as a button below a panel's name."""
-    yield from scrolled(words, area)
-    places = seen(words, box_of(part_of(area, "WINDOW")))
+def lowest(words: str, area: Any, count: int = 2) -> Iterator[int]:
+    """Of words that an area shows so often, as a button below a panel of its name: the last."""
+    part = part_of(area, "WINDOW")
+    while len(places := seen(words, box_of(part))) < count:
+        assert (yield from turned("WHEELDOWNMOUSE", part)), f"'{words}' is not there {count} times"
     return min((y, x) for _, x, y in places)[::-1]
 
 
