@@ -69,8 +69,8 @@ class StageSettings(Settings):
     fill_side: float = _side(-60.0, "Fill Side", "fill light")
     fill_height: float = _height(5.0, "Fill Height", "fill light")
     rim: float = _strength(1.4, "Rim", "Light from behind, which shines through the hair")
-    rim_side: float = _side(-148.0, "Rim Side", "light from behind")
-    rim_height: float = _height(35.0, "Rim Height", "light from behind")
+    rim_side: float = _side(130.0, "Rim Side", "light from behind")
+    rim_height: float = _height(22.0, "Rim Height", "light from behind")
     distance: float = number(
         5.0,
         label="Distance",
