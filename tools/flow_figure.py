@@ -65,8 +65,8 @@ blender/preview/handlers.py register
           blender/sessions/compute_solver.py ComputeSolver
             render/dynamics_pass.py DynamicsPass
           blender/sessions/numpy_solver.py NumpySolver
-            motion_flow.py advance
-              dynamics/step.py advance
+            motion_flow.py steps
+              dynamics/step.py steps
     blender/preview/previews.py attempt
       blender/viewport/overlay.py show
         render/groom_pass.py GroomPass
