@@ -53,6 +53,7 @@ TUTORIALS = {
     "tutorial_first_hair": "opengl",
     "tutorial_cards_into_godot": "vulkan",
     "tutorial_look_like_cycles": "opengl",
+    "tutorial_eevee_shot": "opengl",
 }
 #: What is played where all is, beside the tutorials. One makes pictures of the documentation, one
 #: waits for minutes, and eight draw for minutes what others look at too: light and shadows

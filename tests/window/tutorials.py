@@ -103,12 +103,6 @@ class Page:
         """A button, for which the area is scrolled."""
         yield from click(*(yield from scrolled(self.says(button), area, kind)))
 
-    def mode(self, now: str, other: str) -> Iterator[int]:
-        """Another mode, chosen where the header shows the one that is on."""
-        before = screen.pixels()
-        yield from click(*(yield from read(now, box_of(region("HEADER")))))
-        yield from chosen([self.says(other)], before)
-
     def open(self, panel: str, area: Any, kind: str = "WINDOW") -> Iterator[int]:
         """A click on the name of a panel that is closed."""
         yield from click(*(yield from scrolled(self.says(panel), area, kind)))
@@ -315,12 +309,13 @@ def in_view() -> tuple[int, int]:
     return view.x + view.width // 4, view.y + view.height // 6
 
 
-def lowest(words: str, area: Any, count: int = 2) -> Iterator[int]:
-    """Of words that an area shows so often, as a button below a panel of its name: the last."""
+def below_name(words: str, area: Any) -> Iterator[int]:
+    """Of a button that is called as its panel: the place of the same words next below the panel's
+    name, for which the area is scrolled down."""
     part = part_of(area, "WINDOW")
-    while len(places := seen(words, box_of(part))) < count:
-        assert (yield from turned("WHEELDOWNMOUSE", part)), f"'{words}' is not there {count} times"
-    return min((y, x) for _, x, y in places)[::-1]
+    while len(places := seen(words, box_of(part))) < 2:
+        assert (yield from turned("WHEELDOWNMOUSE", part)), f"there is no button '{words}'"
+    return sorted(((x, y) for _, x, y in places), key=lambda place: -place[1])[1]
 
 
 def area_of(kind: str) -> Any:
