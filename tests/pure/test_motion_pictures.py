@@ -7,6 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
+pytest.importorskip("PIL", reason="it is for development alone")
 from PIL import Image, ImageSequence
 
 IMAGES = Path(__file__).resolve().parents[2] / "docs" / "images"
