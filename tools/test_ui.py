@@ -51,6 +51,7 @@ ON_VULKAN = ("cards", "engine", "look", "shadows", "random", "still_views")
 #: take minutes, as a person does; a commit walks their steps as Python, by test_tutorials.
 TUTORIALS = {
     "tutorial_first_hair": "opengl",
+    "tutorial_comb_and_play": "opengl",
     "tutorial_cards_into_godot": "vulkan",
     "tutorial_look_like_cycles": "opengl",
     "tutorial_eevee_shot": "opengl",

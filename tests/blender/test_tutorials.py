@@ -68,7 +68,8 @@ def test_what_a_page_names_in_italics_is_on_a_button_or_a_field(name: str) -> No
 BLENDERS = {
     *("Add", "Curve", "Properties", "Data", "Render", "Render Animation", "Sculpt Mode", "Comb"),
     *("EEVEE", "Cycles", "Motion Blur", "Project", "Project Settings", "Plugins", "Brows"),
-    *("Hairloom", "Delete"),
+    *("Hairloom", "Delete", "Edit Mode", "Object Mode"),
+    "Head Hair",  # of the sample scene, by the name of its head
 }
 
 

@@ -86,6 +86,13 @@ class Page:
         yield from click(x, y, "RIGHTMOUSE")
         yield from chosen(self.says(words).split(" > "), before)
 
+    def mode(self, name: str, now: str) -> Iterator[int]:
+        """One that this step tells to go to, by the menu that shows what is on now."""
+        before = screen.pixels()
+        yield from click(*(yield from read(now, box_of(region("HEADER")))))
+        yield from chosen([self.says(name)], before)
+        yield
+
     def sample_scene(self) -> Iterator[int]:
         """Its menu entry; Esc stops its motion."""
         own = bpy.context.window.scene
@@ -248,9 +255,10 @@ def entered(text: str, x: int, y: int) -> Iterator[int]:
 
 
 def scrolled(words: str, area: Any, kind: str = "WINDOW") -> Iterator[int]:
-    """Where words are shown in an area, which is scrolled until they are."""
+    """Where words are shown in an area, which is scrolled until they are: down first, as one reads
+    on, then up."""
     part = part_of(area, kind)
-    for wheel in (None, "WHEELUPMOUSE", "WHEELDOWNMOUSE"):
+    for wheel in (None, "WHEELDOWNMOUSE", "WHEELUPMOUSE"):
         for _ in range(1 if wheel is None else 100):
             if found := seen(words, box_of(part)):
                 return found[0][1:]
@@ -260,20 +268,15 @@ def scrolled(words: str, area: Any, kind: str = "WINDOW") -> Iterator[int]:
 
 
 def turned(wheel: str, part: Any) -> Iterator[int]:
-    """Turns the mouse wheel over a region; whether that has moved anything."""
-    before, (x, y) = _part(screen.pixels(), part), middle(box_of(part))
+    """Turns the mouse wheel over a region; whether that has moved it. What it shows need not stand
+    still: while hair plays, its panel has other times in each drawing."""
+    before, (x, y) = part.view2d.region_to_view(0, 0), middle(box_of(part))
     yield from move(x, y)
     for _ in range(3):
         bpy.context.window.event_simulate(wheel, "PRESS", x=x, y=y)
         yield 1
     yield
-    return not np.array_equal(_part(screen.pixels(), part), before)
-
-
-def _part(pixels: np.ndarray, part: Any) -> np.ndarray:
-    left, bottom, width, height = box_of(part)
-    top = len(pixels) - bottom - height
-    return pixels[top : top + height, left : left + width]
+    return part.view2d.region_to_view(0, 0) != before
 
 
 def beside(label: str, path: str, area: Any, kind: str = "WINDOW") -> Iterator[int]:
@@ -285,7 +288,7 @@ def beside(label: str, path: str, area: Any, kind: str = "WINDOW") -> Iterator[i
         return sorted((y for _, _, y in seen(label, box_of(part))), reverse=True)
 
     tried = set()
-    for wheel in (None, "WHEELUPMOUSE", "WHEELDOWNMOUSE"):
+    for wheel in (None, "WHEELDOWNMOUSE", "WHEELUPMOUSE"):
         for _ in range(1 if wheel is None else 100):
             for y in heights():
                 yield from move(x, y, count=5)

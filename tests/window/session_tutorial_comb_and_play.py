@@ -1,0 +1,213 @@
+"""The tutorial *Part, settle and play*, played by mouse and keys."""
+
+import sys
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+sys.path.append(str(Path(__file__).parent))
+import driver
+import traces
+from artist import region, viewport
+from bpy_extras.view3d_utils import location_3d_to_region_2d
+from driver import of_hairloom, until
+from reading import width_of
+from tutorials import (
+    Page,
+    area_of,
+    below_name,
+    beside,
+    click,
+    drag,
+    in_view,
+    key,
+    open_tab,
+    properties,
+    save_the_file,
+    scrolled,
+    still,
+    typed,
+)
+
+log, page = traces.Log(), Page("comb_and_play")
+#: frames that are baked: each is drawn on the processor
+LAST = 4
+#: [m] by which the parting is moved, as one types it; [pixels] from a name in the Outliner to the
+#: triangle that opens it
+ASIDE, TRIANGLE = "0.006", 28
+#: [pixels] of the hair's height below which few of its strands are drawn, and their share
+FAR, SPARSE = 10_000.0, 0.1
+#: [pixels] that the brush and the wind's slider are dragged
+COMBED, SLID = 60, 30
+
+
+def steps():
+    yield from page.begin()
+    page.step(1)
+    yield from page.sample_scene()
+    yield from parted()
+    yield from combed()
+    yield from settled()
+    yield from played()
+    yield from baked()
+    page.end()
+    assert "Traceback" not in log.added(), "something has raised"
+
+
+def live():
+    return of_hairloom("previews")
+
+
+def hair():
+    return next(obj for obj in bpy.context.scene.objects if obj.name == "Head Hair")
+
+
+def shape():
+    return of_hairloom("curves").curve_points(hair().data).copy()
+
+
+def moved(before, after):
+    """Share of the points that are elsewhere."""
+    return float((np.linalg.norm(after - before, axis=1) > 1e-4).mean())
+
+
+def parted():
+    page.step(2)
+    groom = hair().data.hairloom
+    groom.children.method = "none"  # fewer strands are drawn faster
+    groom.detail.lod_height, groom.detail.min_density = FAR, SPARSE
+    yield from still()
+    page.says("Properties > Data")
+    yield from open_tab("DATA")
+    panel, below = page.says("Children"), page.says("Partings")
+    yield from page.open(panel, properties())
+    yield from page.open(below, properties())
+    before = set(bpy.context.scene.objects)
+    yield from page.press("Add Parting", properties())
+    yield from until(lambda: set(bpy.context.scene.objects) != before, "no line comes")
+    uncombed = shape()
+    yield from its_points_are_moved()
+    yield from page.press("Comb from Partings", properties())
+    yield from until(lambda: moved(uncombed, shape()) > 0.02, "the parting combs nothing")
+    yield from still()
+    driver.screenshot("parted")
+
+
+def its_points_are_moved():
+    line = next(obj for obj in bpy.context.scene.objects if obj.type == "CURVE")
+    outliner = area_of("OUTLINER")
+    page.says("To move its points, select it")
+    yield from click(*(yield from scrolled("Parting", outliner)))
+    yield from until(lambda: bpy.context.object == line, "the line is not selected")
+    yield from page.mode("Edit Mode", "Object Mode")
+    before = places_of(line)
+    for name in ("A", "G", "X"):
+        yield from key(name, *in_view())
+    yield from typed(ASIDE, *in_view())
+    yield from key("RET", *in_view())
+    yield from page.mode("Object Mode", "Edit Mode")
+    assert np.abs(places_of(line) - before).max() > 1e-3, "the line stays where it is"
+    page.says("in the Outliner open Head and click Head Hair")
+    x, y = yield from scrolled("Head", outliner)
+    yield from click(x - width_of("Head") // 2 - TRIANGLE, y)
+    yield
+    yield from click(*(yield from scrolled("Head Hair", outliner)))
+    yield from until(lambda: bpy.context.object == hair(), "the hair is not selected")
+
+
+def places_of(line):
+    return np.array([point.co for point in line.data.splines[0].bezier_points])
+
+
+def combed():
+    page.step(3)
+    yield from page.mode("Sculpt Mode", "Object Mode")
+    assert hair().mode == "SCULPT_CURVES"
+    yield from still()
+    page.says("drag with Comb")
+    assert bpy.context.tool_settings.curves_sculpt.brush.name == "Comb"
+    before, (x, y) = shape(), in_front()
+    yield from drag((x, y), (x + COMBED, y))
+    yield from until(lambda: moved(before, shape()) > 0.0, "the brush combs nothing")
+    yield from still()
+    driver.screenshot("combed")
+    yield from page.mode("Object Mode", "Sculpt Mode")
+    assert hair().mode == "OBJECT"
+    yield from still()
+
+
+def in_front():
+    """Where the view shows the middle of the guide that is nearest to the eye."""
+    view = region("WINDOW")
+    eye = view.data.view_matrix.inverted().translation
+    (session,) = live().sessions()
+    middles = session.rig.guide_grid[:, session.rig.guide_grid.shape[1] // 2]
+    place = middles[np.linalg.norm(middles - eye, axis=1).argmin()]
+    x, y = location_3d_to_region_2d(view, view.data, place)
+    return int(view.x + x), int(view.y + y)
+
+
+def settled():
+    page.step(4)
+    yield from page.open("Dynamics", properties())
+    before = shape()
+    yield from page.press("Settle", properties())
+    yield from until(lambda: moved(before, shape()) > 0.5, "nothing falls")
+    yield from still()
+    driver.screenshot("settled")
+    page.says("Back to Combed")
+
+
+def played():
+    page.step(5)
+    yield from page.press("Play", viewport(), "UI")
+    yield from until(lambda: live().is_playing(), "nothing plays")
+    yield from goes_on("Play")
+    dynamics = hair().hairloom.dynamics
+    gusts = dynamics.gusts
+    yield from page.picture("Dynamics", "Windy", properties())
+    yield from until(lambda: dynamics.gusts != gusts, "the preset is not taken")
+    yield from page.open("Medium & Wind", properties())
+    before = dynamics.wind_speed
+    x, y = yield from beside(page.says("Wind Speed"), "dynamics.wind_speed", properties())
+    yield from drag((x, y), (x + SLID, y))
+    yield from until(lambda: dynamics.wind_speed > before, "the mouse drags nothing")
+    yield from goes_on("the wind")
+    driver.screenshot("plays")
+    page.says("Press Esc")
+    yield from key("ESC", *in_view())
+    yield from until(lambda: not live().is_playing(), "Esc does not stop it")
+    yield from still()
+
+
+def goes_on(what):
+    (session,) = live().sessions()
+    before = session.strands
+    yield from until(lambda: not np.array_equal(session.strands, before), f"{what} moves nothing")
+
+
+def baked():
+    page.step(6)
+    page.says("Save the file")
+    bpy.context.scene.frame_end = LAST
+    hair().hairloom.dynamics.device = "numpy"
+    yield from save_the_file()
+    yield from page.open("Bake", properties())
+    yield from click(*(yield from below_name(page.says("Bake"), properties())))
+    cache = of_hairloom("playback").cache_of
+    yield from until(lambda: cache(hair()) is not None, "there is no bake")
+    yield from still()
+    page.says("Space plays")
+    yield from key("SPACE", *in_view())
+    yield from until(lambda: bpy.context.screen.is_animation_playing, "Space plays nothing")
+    frame = bpy.context.scene.frame_current
+    yield from until(lambda: bpy.context.scene.frame_current != frame, "the playhead stands")
+    (preview,) = live().previews.values()
+    assert preview.phase.name == "BAKED", f"it is {preview.phase.name}, not baked"
+    yield from key("SPACE", *in_view())
+    yield from until(lambda: not bpy.context.screen.is_animation_playing, "it plays on")
+    driver.screenshot("end")
+
+
+driver.play(steps())
