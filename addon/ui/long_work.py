@@ -69,6 +69,13 @@ class LongWork:
         """What comes in the window once the work has ended and other work may begin: a popup that
         offers some."""
 
+    def is_pressed(self: Any) -> bool:
+        """Whether a button or a menu has begun it, in a window. Adjust Last Operation has not:
+        Blender does not keep a repeated operator, so it cannot run modally."""
+        how = self.options
+        is_repeated = how.is_repeat or how.is_repeat_last
+        return not bpy.app.background and how.is_invoke and not is_repeated
+
     @classmethod
     def is_free(cls: Any) -> bool:
         """For `poll`: whether no other long operator runs; the greyed button says which does."""
@@ -81,10 +88,7 @@ class LongWork:
     def execute(self: Any, context: bpy.types.Context) -> set[str]:
         global _running
         steps = self.steps(context)
-        # Blender does not keep a repeated operator, so it cannot run modally
-        how = self.options
-        is_repeated = how.is_repeat or how.is_repeat_last
-        if bpy.app.background or not how.is_invoke or is_repeated:
+        if not self.is_pressed():
             with waiting(context):
                 _at_once(steps)
             return {"FINISHED"}

@@ -27,10 +27,12 @@ from .grow_options import names_of_weights
 from .long_work import LongWork, Progress, Steps, in_parts
 from .operators_start import beginning, in_object_mode
 from .preferences import preferences
-from .selection import chosen_hair, ground_mesh
+from .selection import chosen_hair, ground_mesh, make_active
 
 #: pictures: how many side by side, how large, and the width of the page at UI scale 1
 _ACROSS, _PICTURE_SCALE, _WIDTH = 4, 5.0, 440
+#: types of objects beside which a new head is all there is to look at
+_UNSEEN = frozenset(("CAMERA", "EMPTY", "LIGHT", "LIGHT_PROBE", "SPEAKER"))
 
 
 class HAIRLOOM_OT_add_hairstyle(LongWork, bpy.types.Operator):
@@ -75,7 +77,7 @@ class HAIRLOOM_OT_add_hairstyle(LongWork, bpy.types.Operator):
     def steps(self, context: bpy.types.Context) -> Steps[None]:
         style, collection = named_hairstyle(self.style), context.collection
         head = ground_mesh(context) if grows_anywhere(style) else self._head(context)
-        is_new = head is None
+        is_new, is_alone = head is None, _is_empty(context)
         with taken_back() as note:
             if head is None:
                 head = yield from in_parts(add_head(collection, self.skin))
@@ -96,6 +98,8 @@ class HAIRLOOM_OT_add_hairstyle(LongWork, bpy.types.Operator):
                 report(self, kind, line)
         if is_new:
             report(self, "INFO", f"Added a head, {head.name}, for the hair to grow on")
+        if is_new and is_alone and self.is_pressed():
+            _look_at([*grooms, head], context)
         yield from beginning(self, context, grooms, plays=self.plays)
 
     def _head(self, context: bpy.types.Context) -> bpy.types.Object | None:
@@ -107,6 +111,25 @@ class HAIRLOOM_OT_add_hairstyle(LongWork, bpy.types.Operator):
                 return active
             report(self, "INFO", f"{active.name}: no head; a built-in one is used")
         return next((obj for obj in objects_in(context.view_layer) if is_bust(obj)), None)
+
+
+def _is_empty(context: bpy.types.Context) -> bool:
+    """Whether the view layer has nothing that one looks at."""
+    return all(obj.type in _UNSEEN for obj in objects_in(context.view_layer))
+
+
+def _look_at(objects: list[bpy.types.Object], context: bpy.types.Context) -> None:
+    """Select these, and bring them near in the 3D view that is in use: a head is a dot in the view
+    of a new file. A view through a camera stays."""
+    area = context.area
+    if area is None or area.type != "VIEW_3D":
+        return
+    if area.spaces.active.region_3d.view_perspective == "CAMERA":
+        return
+    make_active(context, objects)
+    region = next(each for each in area.regions if each.type == "WINDOW")
+    with context.temp_override(area=area, region=region):
+        bpy.ops.view3d.view_selected(use_all_regions=True)
 
 
 class HAIRLOOM_OT_place_landmarks(LongWork, bpy.types.Operator):

@@ -12,8 +12,9 @@ from typing import Any
 import bpy
 import driver
 import numpy as np
+from bpy_extras.view3d_utils import location_3d_to_region_2d
 from driver import of_hairloom, until
-from mathutils import Euler
+from mathutils import Euler, Vector
 
 #: Buttons of our panel, the first of its tab: x from the sidebar's left edge as a part of its
 #: width, y in pixels from its top at UI scale 1.
@@ -124,6 +125,15 @@ def look_from_front(distance: float) -> None:
     view.view_location = (0.0, 0.0, 0.0)
     view.view_rotation = Euler((np.pi / 2.0, 0.0, 0.0)).to_quaternion()
     view.view_distance = distance
+
+
+def share_of_view(obj: Any) -> float:
+    """How high an object is in the viewport, as a part of the viewport's height."""
+    view = region("WINDOW")
+    corners = (obj.matrix_world @ Vector(corner) for corner in obj.bound_box)
+    places = [location_3d_to_region_2d(view, view.data, corner) for corner in corners]
+    heights = [place.y for place in places if place is not None]
+    return float(np.ptp(heights)) / view.height if heights else 0.0
 
 
 def viewport_pixels(screen: np.ndarray) -> np.ndarray:

@@ -54,7 +54,6 @@ def some_hair():
     yield from until(live().is_playing, "no brows play")
     yield from key("ESC", *in_view())
     yield from until(lambda: not live().is_playing(), "Esc does not stop it")
-    yield from key("HOME", *in_view())
     yield from still()
     page.says("select it")
     assert bpy.context.object.type == "CURVES" and bpy.context.object.select_get()
