@@ -6,6 +6,7 @@ from typing import Any
 
 import bpy
 
+from ..blender.bakes.simulated import Simulated
 from ..blender.base.outcome import report
 from ..blender.preview import fins, previews
 from ..blender.scene.fin_modifier import (
@@ -129,11 +130,7 @@ def draw_fin(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
         layout.operator("hairloom.fin_add", icon="MOD_CLOTH")
         return
     fin, session = obj.hairloom.fin, previews.simulated_of(obj)
-    row = layout.row(align=True)
-    text, icon = ("Stop Preview", "HIDE_OFF") if session else ("Preview", "HIDE_ON")
-    row.operator("hairloom.fin_preview", text=text, icon=icon, depress=session is not None)
-    draw_button(row, "hairloom.fin_reset", "At Rest", "Reset", anywhere=True, icon="FILE_REFRESH")
-    row.operator("hairloom.fin_remove", text="", icon="TRASH")
+    _draw_buttons(layout.row(align=True), session)
     for warning in session.warnings if session is not None else ():
         draw_message(layout, bpy.context, warning, "ERROR")
     column = layout.column()
@@ -150,6 +147,17 @@ def draw_fin(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
         if label == "Medium & Wind":
             body.prop(obj.hairloom, "field_collection")
         draw_section(body, obj.hairloom, "fin", label)
+
+
+def _draw_buttons(row: bpy.types.UILayout, session: Simulated | None) -> None:
+    if session is not None and not session.is_made:
+        row.label(text="Making the cloth", icon="SORTTIME")
+        row.operator("hairloom.fin_preview", text="", icon="X")
+        return
+    text, icon = ("Stop Preview", "HIDE_OFF") if session else ("Preview", "HIDE_ON")
+    row.operator("hairloom.fin_preview", text=text, icon=icon, depress=session is not None)
+    draw_button(row, "hairloom.fin_reset", "At Rest", "Reset", anywhere=True, icon="FILE_REFRESH")
+    row.operator("hairloom.fin_remove", text="", icon="TRASH")
 
 
 def draw_switch(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:

@@ -10,7 +10,6 @@ A timer drives Play. A modal operator would keep Blender from saving automatical
 from __future__ import annotations
 
 import time
-from functools import partial
 
 import bpy
 
@@ -32,6 +31,7 @@ TICKS_PER_SECOND = 120.0
 TICKS = "play"
 STATUS = "Hairloom plays. Move the head or the sliders. Esc: stop, the hair returns to its style"
 PAUSED = "Hairloom is paused: press Resume in its panel. Esc: stop"
+WAITING = "{names}: plays as soon as all that it needs is made. Esc: cancel"
 
 
 class HAIRLOOM_OT_preview(bpy.types.Operator):
@@ -162,7 +162,6 @@ class HAIRLOOM_OT_pause(bpy.types.Operator):
 
     def execute(self, _context: bpy.types.Context) -> set[str]:
         previews.pause(not previews.is_paused())
-        _show_status(PAUSED if previews.is_paused() else STATUS)
         return {"FINISHED"}
 
 
@@ -207,8 +206,9 @@ class HAIRLOOM_OT_reset(bpy.types.Operator):
 
 
 def start_ticking() -> None:
-    watch(TICKS, partial(_tick, FrameClock(time.perf_counter())))
-    _show_status(STATUS)
+    ticks = _Ticks()
+    ticks.tell()
+    watch(TICKS, ticks.tick)
 
 
 def stop_ticking() -> None:
@@ -218,21 +218,36 @@ def stop_ticking() -> None:
         _show_status(None)
 
 
-def _tick(clock: FrameClock) -> float | None:
-    """Simulate the scene's frames that are due, in one step: the head has moved only once."""
-    if not previews.is_playing():
-        _show_status(None)
-        return None
-    now, window = time.perf_counter(), _window_of_play()
-    if previews.is_paused() or is_suspended() or window is None:
-        clock.skip(now)
+class _Ticks:
+    """Play's clock, and what the status bar says of it."""
+
+    def __init__(self) -> None:
+        self._clock, self._said = FrameClock(time.perf_counter()), ""
+
+    def tick(self) -> float | None:
+        """Simulate the scene's frames that are due, in one step: the head has moved only once."""
+        if not previews.is_playing():
+            _show_status(None)
+            return None
+        self.tell()
+        now, window = time.perf_counter(), _window_of_play()
+        if previews.is_paused() or is_suspended() or window is None:
+            self._clock.skip(now)
+            return 1.0 / TICKS_PER_SECOND
+        rate = frame_rate(window.scene)
+        frames = self._clock.due(now, rate)
+        if frames:
+            with bpy.context.temp_override(window=window):
+                previews.advance(bpy.context.evaluated_depsgraph_get(), frames / rate)
         return 1.0 / TICKS_PER_SECOND
-    rate = frame_rate(window.scene)
-    frames = clock.due(now, rate)
-    if frames:
-        with bpy.context.temp_override(window=window):
-            previews.advance(bpy.context.evaluated_depsgraph_get(), frames / rate)
-    return 1.0 / TICKS_PER_SECOND
+
+    def tell(self) -> None:
+        text = PAUSED if previews.is_paused() else STATUS
+        if names := previews.waiting():
+            text = WAITING.format(names=", ".join(names))
+        if text != self._said:
+            self._said = text
+            _show_status(text)
 
 
 def _window_of_play() -> bpy.types.Window | None:

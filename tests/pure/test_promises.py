@@ -63,6 +63,7 @@ PROMISES = {
     "Esc cancels and leaves everything unchanged": CANCELLED_CARDS,
     "Esc cancels it and leaves the hair as it was": "blender/test_settle.py"
     "::test_until_its_end_nothing_changes",
+    "say what goes on, and Esc cancels it": "window/session_jobs.py::cloth_is_played",
     "Cancelling with Esc or Ctrl-C": "window/session_long_work.py::cards_in_motion",
     "Esc cancels a turntable": CANCELLED_TURN,
     "After an error or Ctrl-C no partial files": "blender/test_tasks.py"

@@ -11,20 +11,33 @@ import numpy as np
 sys.path.append(str(Path(__file__).parent))
 import driver
 import traces
-from artist import hair_is_made, look_from_front, open_our_sidebar, press, region, viewport
+from artist import (
+    hair_is_made,
+    look_from_front,
+    open_our_sidebar,
+    press,
+    region,
+    share_of_view,
+    viewport,
+)
 from driver import of_hairloom, until
 from open_panels import SIDEBAR, only_our_panels, show
+from reading import box_of, read
 
 log = traces.Log()
 #: enough that growing takes a while
 STRANDS = 30_000
+#: [m] from which a head is a dot
+FAR = 18.0
+#: faces along each side of a cloth that takes seconds to make
+FACES = 250
 
 
 def steps():
     yield from press("ESC")
     driver.enable_extension()
     only_our_panels()
-    show([SIDEBAR, SIDEBAR + "_export", SIDEBAR + "_grow"])
+    show([SIDEBAR, SIDEBAR + "_export", SIDEBAR + "_grow", SIDEBAR + "_fin"])
     yield from open_our_sidebar()
     for obj in list(bpy.data.objects):
         bpy.data.objects.remove(obj)
@@ -32,6 +45,7 @@ def steps():
     yield from a_hairstyle()
     yield from made_real()
     yield from grown_again()
+    yield from cloth_is_played()
     assert "Traceback" not in log.added(), "something has raised"
 
 
@@ -85,14 +99,40 @@ def a_hairstyle():
     begin("add_hairstyle", style="buzz_cut", plays=False)
     yield from cancelled("Painting the skin", "adding")
     assert objects() == {} and len(bpy.data.meshes) == meshes, "something was added"
+    look_from_front(FAR)
     begin("add_hairstyle", style="buzz_cut", plays=False)
     yield from done()
     assert len(objects()) == 3
+    yield from until(lambda: share_of_view(head()) > 0.3, "a head alone is a dot in the view")
+    yield
+    driver.screenshot("near")
+    look_from_front(FAR)
     with bpy.context.temp_override(area=viewport(), region=region("WINDOW")):
         bpy.ops.ed.undo_redo("EXEC_DEFAULT", True)
     assert not running() and len(objects()) == 3, "Adjust Last Operation gives something else"
     yield from done()
+    assert share_of_view(head()) < 0.1, "Adjust Last Operation moves the view"
     yield from undone_and_done_again({})
+    yield from beside_something_else()
+
+
+def beside_something_else():
+    """Where there is something else to see, the view is left alone."""
+    bpy.ops.ed.undo()
+    bpy.ops.mesh.primitive_cube_add(size=0.1)
+    bpy.context.object.select_set(False)
+    bpy.context.view_layer.objects.active = None
+    bpy.ops.ed.undo_push(message="a cube")
+    begin("add_hairstyle", style="buzz_cut", plays=False)
+    yield from done()
+    yield
+    assert share_of_view(head()) < 0.1, "the view does not stay"
+    bpy.data.objects.remove(bpy.data.objects["Cube"])
+    look_from_front(0.9)
+
+
+def head():
+    return bpy.data.objects["Head"]
 
 
 def choose(end):
@@ -138,6 +178,31 @@ def grown_again():
     bpy.ops.ed.undo()
     assert np.array_equal(points(bpy.data.objects[name].data), combed)
     yield
+
+
+def cloth_is_played():
+    """Play waits for cloth beside the window, and says so; Esc cancels that."""
+    for obj in list(bpy.data.objects):
+        bpy.data.objects.remove(obj)
+    bpy.ops.mesh.primitive_grid_add(x_subdivisions=FACES, y_subdivisions=FACES, size=0.2)
+    assert bpy.ops.hairloom.fin_add() == {"FINISHED"}
+    yield
+    live = of_hairloom("previews")
+    play()
+    assert live.waiting() == ("Grid",), "Play does not wait, or no window while it does"
+    yield from read("Making the cloth", box_of(region("UI")))
+    driver.screenshot("cloth")
+    yield from press("ESC")
+    assert not live.is_playing(), "Esc does not cancel"
+    play()
+    yield from until(lambda: live.is_playing() and not live.waiting(), "it never plays")
+    yield from press("ESC")
+    assert not live.is_playing(), "Esc does not stop it"
+
+
+def play():
+    with bpy.context.temp_override(area=viewport(), region=region("UI")):
+        assert bpy.ops.hairloom.play("INVOKE_DEFAULT") == {"FINISHED"}
 
 
 driver.play(steps())

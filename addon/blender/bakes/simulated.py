@@ -42,6 +42,10 @@ class Simulated(Protocol):
     def name(self) -> str: ...
 
     @property
+    def is_made(self) -> bool:
+        """Whether nothing that it needs to be simulated is being made beside the window's work."""
+
+    @property
     def warnings(self) -> tuple[str, ...]:
         """What the artist should know, each with its remedy."""
 

@@ -85,6 +85,11 @@ class Preview:
         return self.groom is None or self.groom.is_made
 
     @property
+    def may_begin(self) -> bool:
+        """Whether nothing that it needs to be simulated is being made."""
+        return self.session.is_made and fields.are_made()
+
+    @property
     def is_deferred(self) -> bool:
         """Whether it stands at rest while Blender plays."""
         return self.phase is Phase.DEFERRED and not _is_exact()
@@ -141,9 +146,9 @@ class Preview:
         try:
             match action:
                 case Action.BEGIN:
-                    # in playback colliders are not read at each frame just to find them unmade
+                    # in playback nothing is read at each frame just to find it unmade
                     is_frame = self.phase is Phase.TIMELINE
-                    if is_frame and not blocking and not fields.are_made():
+                    if is_frame and not blocking and not self.may_begin:
                         raise NotMadeYetError
                     session.play(depsgraph, blocking=blocking, is_frame=is_frame)
                 case Action.ADVANCE:

@@ -191,6 +191,11 @@ def is_playing() -> bool:
     return any(each.phase in (Phase.FREE, Phase.WAITING) for each in previews.values())
 
 
+def waiting() -> tuple[str, ...]:
+    """The names of what plays as soon as all is made."""
+    return tuple(each.session.name for each in previews.values() if each.phase is Phase.WAITING)
+
+
 def is_paused() -> bool:
     return previews.is_paused and is_playing()
 
@@ -236,7 +241,7 @@ def advance(depsgraph: bpy.types.Depsgraph, duration: float) -> None:
     """Simulate the time [s] that has passed since the last call."""
     with together(depsgraph):
         for preview in tuple(previews.values()):
-            if preview.phase is Phase.WAITING and preview.is_made and fields.are_made():
+            if preview.phase is Phase.WAITING and preview.may_begin:
                 # its first frame is the next tick's, so that neither holds the window up for long
                 attempt(preview, depsgraph, partial(_begin, preview, depsgraph))
             elif preview.phase is Phase.FREE and not previews.is_paused:

@@ -12,7 +12,7 @@ import numpy as np
 
 from ...arrays import Floats
 from ...dynamics.cloth.settings import FinSettings
-from ...dynamics.cloth.state import ClothState, start_cloth
+from ...dynamics.cloth.state import ClothState, vertex_rows
 from ...dynamics.cloth.step import advance_cloth, cloth_at_frame_end
 from ...dynamics.step import Drive
 from ...errors import HairloomError
@@ -26,6 +26,7 @@ from ..properties.properties import settings_of
 from ..scene.fin_mesh import check_usable, corners_of, loose_edges_of, triangles_of
 from ..scene.fin_modifier import clear, fin_modifier, has_fins, read_carried, show
 from ..scene.forces import force_fields_of, gravity_of
+from .fabrics import ClothMesh, FabricJob
 
 
 class FinSession:
@@ -41,6 +42,7 @@ class FinSession:
         self.is_stale = False
         self.obstacles: Obstacles | None = None
         self.state: ClothState | None = None
+        self._fabric = FabricJob()
         self._earlier: Floats | None = None
         self._check_mesh(obj)
         self._corners = corners_of(obj.data)
@@ -53,6 +55,11 @@ class FinSession:
     @property
     def name(self) -> str:
         return self.body.handle.name
+
+    @property
+    def is_made(self) -> bool:
+        """Whether nothing of it is being made just now."""
+        return not self._fabric.is_pending
 
     @property
     def settings(self) -> FinSettings:
@@ -81,12 +88,15 @@ class FinSession:
         self._corners = corners_of(obj.data)
         self.state = None
         self.rest(depsgraph)
-        pins = self._pins(obj, depsgraph)
-        self.state = self._named(
-            lambda: start_cloth(
-                self._carried, triangles_of(obj.data), pins, loose_edges_of(obj.data)
-            )
+        mesh = ClothMesh(
+            self._carried,
+            triangles_of(obj.data),
+            self._pins(obj, depsgraph),
+            loose_edges_of(obj.data),
         )
+        fabric = self._named(lambda: self._fabric.made(mesh, blocking=blocking))
+        position = vertex_rows(self._carried)
+        self.state = ClothState(position, position, fabric)
         settings = self.settings.as_dynamics()
         self.obstacles = Obstacles.of(
             obj, None, None, settings, depsgraph, self.obstacles, blocking=blocking
@@ -96,6 +106,7 @@ class FinSession:
     def stop(self, depsgraph: bpy.types.Depsgraph) -> None:
         """Back to where the animation carries it."""
         self.is_playing = False
+        self._fabric.cancel()
         obj = self.body.handle.find()
         if obj is not None and obj.type == "MESH":
             clear(obj.data)

@@ -1,0 +1,100 @@
+"""The fabric of a fin, made where it begins to play.
+
+That takes a second for 10,000 vertices: longer than a window may stand still. So Play and playback
+have it made beside the window's work, and it is kept, as each round of playback begins alike.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...arrays import Floats, Ints
+from ...dynamics.cloth.state import Fabric, start_cloth
+from ..base.redraw import redraw_panels
+from ..base.thread_work import ThreadWork
+from ..colliders.fields import NotMadeYetError
+
+#: Meshes of so few triangles take a hundredth of a second, and are waited for.
+AT_ONCE = 500
+
+
+@dataclass(frozen=True, eq=False)
+class ClothMesh:
+    """A mesh that begins to move as cloth; arrays as in `start_cloth`."""
+
+    positions: Floats
+    triangles: Ints
+    pin: Floats
+    edges: Ints
+
+    def is_woven_as(self, other: ClothMesh) -> bool:
+        """Whether all but its place and pose is the same."""
+        return (
+            len(self.positions) == len(other.positions)
+            and np.array_equal(self.triangles, other.triangles)
+            and np.array_equal(self.pin, other.pin)
+            and np.array_equal(self.edges, other.edges)
+        )
+
+    def is_as(self, other: ClothMesh) -> bool:
+        return self.is_woven_as(other) and np.array_equal(self.positions, other.positions)
+
+    def fabric(self) -> Fabric:
+        """
+        Raises:
+            HairloomError: see `start_cloth`.
+        """
+        return start_cloth(self.positions, self.triangles, self.pin, self.edges).fabric
+
+
+class FabricJob:
+    """The fabric of the mesh that was asked for last."""
+
+    def __init__(self) -> None:
+        self._mesh: ClothMesh | None = None
+        self._fabric: Fabric | None = None
+        self._work: ThreadWork[Fabric] | None = None
+
+    @property
+    def is_pending(self) -> bool:
+        """Whether it is on its way."""
+        return self._work is not None and not self._work.is_done
+
+    def made(self, mesh: ClothMesh, *, blocking: bool) -> Fabric:
+        """The fabric of this mesh. A mesh that moves is waited for once: what was begun for the
+        same mesh in another pose will do.
+
+        Args:
+            blocking: False: have it made in a thread, unless that takes no time.
+
+        Raises:
+            HairloomError: see `start_cloth`.
+            NotMadeYetError: it is being made, and nobody waits.
+        """
+        if blocking or len(mesh.triangles) <= AT_ONCE:
+            self.cancel()
+            if self._fabric is None or self._mesh is None or not self._mesh.is_as(mesh):
+                self._mesh, self._fabric = mesh, mesh.fabric()
+            return self._fabric
+        work, self._work = self._work, None
+        if work is not None and self._mesh is not None and self._mesh.is_woven_as(mesh):
+            if not work.is_done:
+                self._work = work
+                raise NotMadeYetError
+            redraw_panels()
+            self._fabric = work.result()
+            return self._fabric
+        if self._fabric is None or self._mesh is None or not self._mesh.is_as(mesh):
+            self._mesh, self._fabric = mesh, None
+            self._work = ThreadWork(lambda _: mesh.fabric(), "fabric")
+            redraw_panels()
+            raise NotMadeYetError
+        return self._fabric
+
+    def cancel(self) -> None:
+        """Nobody waits for what is on its way."""
+        if self._work is not None:
+            self._work.give_up()
+            self._mesh = self._work = None
