@@ -152,11 +152,12 @@ class Page:
     def picture(self, panel: str, entry: str, area: Any, kind: str = "WINDOW") -> Iterator[int]:
         """One of the pictures that come up where that of a panel is clicked, left of *Save*."""
         self.says("picture")
-        _, header = yield from scrolled(self.says(panel), area, kind)
+        yield from scrolled(self.says(panel), area, kind)
         part = part_of(area, kind)
-        save = max(y for _, _, y in seen("Save", box_of(part)) if y < header)
+        while not (save := below(panel, "Save", box_of(part))):
+            assert (yield from turned("WHEELDOWNMOUSE", part)), f"{panel} has no picture"
         before = screen.pixels()
-        yield from click(part.x + int(PICTURE * part.width), save + ABOVE_SAVE)
+        yield from click(part.x + int(PICTURE * part.width), max(save) + ABOVE_SAVE)
         yield from chosen([self.says(entry)], before)
         yield
 
@@ -265,6 +266,12 @@ def scrolled(words: str, area: Any, kind: str = "WINDOW") -> Iterator[int]:
             if wheel is not None and not (yield from turned(wheel, part)):
                 break
     raise AssertionError(f"'{words}' is nowhere in the {area.type} editor")
+
+
+def below(words: str, others: str, box: Box) -> list[int]:
+    """The heights at which other words stand in a part of the window, below these."""
+    heights = [y for _, _, y in seen(words, box)]
+    return [y for _, _, y in seen(others, box) if heights and y < max(heights)]
 
 
 def turned(wheel: str, part: Any) -> Iterator[int]:
