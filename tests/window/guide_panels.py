@@ -38,9 +38,10 @@ PICTURES: dict[str, tuple[tuple[str, ...], ...]] = {
     "warnings": (("sidebar",),),
     "meshes": (("sidebar_mesh_cards", "sidebar_fin"), ("sidebar_fin_bake",)),
 }
-#: pictures of what is no panel: the window, popups, and the options beside a list of files
+#: pictures of what is no panel: the window, popups, the options beside a list of files, and what is
+#: dragged in the view
 OTHERS = ("window", "start", "check", "sort", "export_cards", "export_strands")
-OTHERS += ("preferences",)
+OTHERS += ("preferences", "handles")
 #: sections that the sidebar has too: they are pictured in Properties > Data
 TWINS = (
     "sidebar_look",

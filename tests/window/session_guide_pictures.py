@@ -7,6 +7,9 @@ import sys
 from pathlib import Path
 
 import bpy
+import numpy as np
+from bpy_extras.view3d_utils import location_3d_to_region_2d
+from mathutils import Euler
 
 sys.path.append(str(Path(__file__).parent))
 import driver
@@ -31,6 +34,10 @@ EXPORTS = ("export_cards", "export_alembic", "export_usd", "export_tressfx", "ex
 STILL = 6
 #: [pixels] how wide the Properties editor is
 COLUMN = 340
+#: [m] away, where hair is drawn fast
+FAR = 4.0
+#: [pixels] width and height of a picture of handles
+HANDLES = (380, 320)
 #: share of the window's height that is pictured
 USED = 0.8
 #: [pixels] Blender's own lines above an add-on's preferences; one names a folder of this machine
@@ -47,7 +54,8 @@ def steps():
     bpy.ops.wm.read_homefile()  # panels that have been drawn stay closed
     yield
     only_our_panels()
-    yield from set_the_scene(distance=4.0)  # far away, where hair is drawn fast
+    yield from set_the_scene(distance=FAR)
+    yield from handles()
     yield from the_sidebar()
     yield from of_meshes_in_the_sidebar()
     yield from popups()
@@ -148,6 +156,43 @@ def picture(name, place):
 
         columns.append((yield from at_rest(name, column, STILL)))
     keep(name, columns)
+
+
+def handles():
+    """What is dragged in the view: the wind that blows on the hair, and the size of a ball that it
+    collides with. Both are gone afterwards."""
+    hair, view = bpy.data.objects["Hair"], viewport().spaces.active.region_3d
+    look_from_front(0.9)
+    view.view_rotation = Euler((np.radians(60.0), 0.0, 0.0)).to_quaternion()
+    dynamics, hair.hairloom.shown_overlays = hair.hairloom.dynamics, {"wind"}
+    own, dynamics.wind_speed = dynamics.wind_speed, 3.2
+    yield
+    pictures = [around((0.03, 0.0, 0.0), (yield from whole_screen("wind")))]
+    dynamics.wind_speed, hair.hairloom.shown_overlays = own, set()
+    ball, colliders = bpy.data.objects.new("Ball", None), bpy.data.collections.new("Colliders")
+    ball.empty_display_type, ball.empty_display_size = "SPHERE", 0.06
+    ball.location = (0.1, -0.12, 0.0)
+    bpy.context.scene.collection.children.link(colliders)
+    colliders.objects.link(ball)
+    hair.hairloom.collider_collection = colliders
+    choose(ball)
+    yield
+    pictures.append(around((0.06, -0.04, 0.0), (yield from whole_screen("ball"))))
+    keep("handles", pictures)
+    bpy.data.objects.remove(ball)
+    bpy.data.collections.remove(colliders)
+    look_from_front(FAR)
+    choose(hair)
+    yield
+
+
+def around(place, screen):
+    """The part of the view that has this place of the scene in its middle."""
+    view = region("WINDOW")
+    x, y = location_3d_to_region_2d(view, view.data, place)
+    left = int(view.x + x) - HANDLES[0] // 2
+    top = bpy.context.window.height - int(view.y + y) - HANDLES[1] // 2
+    return screen[top : top + HANDLES[1], left : left + HANDLES[0]]
 
 
 def sidebar():
