@@ -14,6 +14,8 @@ import bpy
 
 #: an integer is drawn from this share of its slider: many strands only take long
 SHARE_OF_SLIDER = 0.05
+#: nothing is added to more objects
+MOST_OBJECTS = 12
 
 
 def action(weight: int = 1) -> Callable[..., Any]:

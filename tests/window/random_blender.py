@@ -3,9 +3,7 @@
 from pathlib import Path
 
 import bpy
-from dice import action, call, clicked, press, select, step, views
-
-MOST_OBJECTS = 12
+from dice import MOST_OBJECTS, action, call, clicked, press, select, step, views
 
 
 def settled():
@@ -54,7 +52,7 @@ def select_something(dice):
 
 @action(3)
 def delete_something(dice):
-    obj = dice.object("MESH", "CURVES")
+    obj = dice.object("MESH", "CURVES", "CURVE", "EMPTY")
     dice.note(obj.name)
     if dice.often(0.5):
         bpy.data.objects.remove(obj)

@@ -5,7 +5,7 @@ from pathlib import Path
 import addon_utils
 import bpy
 import driver
-from dice import action, call, clicked, objects, press, select, step
+from dice import MOST_OBJECTS, action, call, clicked, objects, press, select, step
 from driver import of_hairloom, until
 
 SECTIONS = {
@@ -14,6 +14,19 @@ SECTIONS = {
     bpy.types.Object: ["dynamics", "dynamics", "fin"],
 }
 MOST_GROOMS = 3
+#: buttons that put lines and rings on hair, that take them off, with the setting that names which;
+#: that shape hair, and that give it the shape before
+ADDED = ("add_parting", "add_stroke", "add_hair_tie")
+REMOVED = {
+    "remove_parting": "line",
+    "remove_stroke": "stroke",
+    "remove_hair_tie": "tie",
+    "remove_trim_shape": "shape",
+}
+SHAPED = ("settle", "comb_parting", "comb_flow", "trim_to_shape", "mirror_hair", "grow_again")
+#: what needs a line, and the button that adds one
+LINED = {"comb_parting": "add_parting", "comb_flow": "add_stroke"}
+TAKEN_BACK = ("back_to_combed", "take_flow_back", "take_trim_back")
 
 
 def no_long_work():
@@ -49,7 +62,7 @@ def press_a_button(dice):
     buttons = "preview play pause reset preview play pause use_groom set_surface snap_roots"
     buttons += " unwrap_surface apply_scale look_from_material mute_hair_dynamics show_settings"
     buttons += " convert_particles fin_add fin_preview fin_remove fin_reset remove_spheres"
-    buttons += " bake_free check_export sort_cards show_skin_shadow"
+    buttons += " bake_free check_export sort_cards show_skin_shadow measure look_to_material"
     clicked(dice, f"hairloom.{dice.pick(buttons.split())}")
 
 
@@ -64,6 +77,51 @@ def press_a_slow_button(dice):
     clicked(dice, f"hairloom.{dice.pick(['bake', 'bake', 'make_cards', 'fit_spheres'])}")
     yield dice.pick([0.2, 1])
     yield from press("ESC")
+
+
+@action(8)
+def put_something_on_hair(dice):
+    """A parting, a stroke, a tie: a line or ring that is selected beside it, or a new one."""
+    select(dice.object("CURVES"))
+    if dice.often(0.3):
+        dice.object().select_set(True)
+    if len(objects()) < MOST_OBJECTS:
+        clicked(dice, f"hairloom.{dice.pick(ADDED)}")
+
+
+@action(2)
+def take_something_off(dice):
+    select(dice.object("CURVES"))
+    button, setting = dice.pick(REMOVED.items())
+    clicked(dice, f"hairloom.{button}", **{setting: dice.object().name})
+
+
+@action(12)
+def shape_hair(dice):
+    """By a button, whose work Esc may end; shapes to trim by are selected beside the hair."""
+    hair = dice.object("CURVES")
+    select(hair)
+    button = dice.pick(SHAPED)
+    if button == "trim_to_shape":
+        dice.object("MESH", "EMPTY").select_set(True)
+    if button in LINED and dice.often(0.7) and len(objects()) < MOST_OBJECTS:
+        clicked(dice, f"hairloom.{LINED[button]}")
+    sides = {"side": dice.pick(["positive", "negative"])} if button == "mirror_hair" else {}
+    clicked(dice, f"hairloom.{button}", **sides)
+    if dice.often(0.3):
+        yield dice.pick([0.2, 1])
+        yield from press("ESC")
+    yield from no_long_work()
+    if dice.often(0.5):
+        clicked(dice, f"hairloom.{dice.pick(TAKEN_BACK)}")
+
+
+@action(2)
+def make_real(dice):
+    if sum(obj.type == "CURVES" for obj in bpy.data.objects) < MOST_GROOMS:
+        select(dice.object("CURVES"))
+        clicked(dice, "hairloom.make_real")
+        yield from no_long_work()
 
 
 @action(40)
