@@ -36,6 +36,7 @@ import numpy as np
 from ..arrays import Ints
 from ..shading.volume.transparency import LAYERS, TURNING_LAYERS
 from . import gpu_memory, gpu_objects
+from .image_stores import finish_stores
 from .kept_picture import KeptPicture
 from .pixel_parts import PixelPart, pixel_parts
 from .shader_program import ShaderProgram, ShaderRecipe, program, released_with_shaders
@@ -73,9 +74,6 @@ _ORDER_RECIPE = ShaderRecipe(
 #: shades fewer layers
 _TURNING_ORDER_RECIPE = replace(
     _ORDER_RECIPE, name="strand_layers_order_turning", defines=(("LAYERS", TURNING_LAYERS),)
-)
-_DONE_RECIPE = ShaderRecipe(
-    name="strand_layers_done", compute="strand_layers_done.comp.glsl", group_size=(1, 1)
 )
 
 
@@ -204,10 +202,7 @@ class StrandLayers:
             drawing_rows(rows),
         ):
             draw()
-        done = program(_DONE_RECIPE)
-        done.bind()
-        gpu.compute.dispatch(done.shader, 1, 1, 1)
-        gpu.shader.unbind()
+        finish_stores()
 
     def _is_finished(self, drawing: StrandDrawing, *, even_if_too_long: bool = False) -> bool:
         """Order, shade and show what is gathered; not where a list is too long for that."""
