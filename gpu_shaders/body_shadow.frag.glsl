@@ -1,6 +1,9 @@
 // Hair's shadow on meshes that Blender has drawn: how much of the light hair leaves, as black that
 // lies over the finished picture.
 //
+// SAMPLED: in place of that an image gets x what hair takes of the light on the screen and y all of it.
+// Where other hair has stored its part before, hair takes a part of what that left.
+//
 // What a colour of the picture becomes depends on its view transform; skin stands for all.
 // Blender lays what is drawn over its picture by the powers 2.2 of code values, see lib_output.glsl.
 #include "lib_lights.glsl"
@@ -8,7 +11,11 @@
 #include "lib_shadows.glsl"
 #include "lib_output.glsl"
 
-const float NO_LIGHT = 1.0e-4;
+const float NO_LIGHT = {{no_light}};
+
+#if SAMPLED
+layout(early_fragment_tests) in;
+#endif
 
 // Brightness on the screen of a matt body in this light.
 float shown(vec3 radiance)
@@ -33,5 +40,14 @@ void main()
     left += arriving * light_left(path, hair_forward);
   }
   // where there is no light at all hair takes none
-  color = vec4(vec3(0.0), 1.0 - (shown(left) + NO_LIGHT) / (shown(all_light) + NO_LIGHT));
+  float all_shown = shown(all_light) + NO_LIGHT, left_shown = shown(left) + NO_LIGHT;
+#if SAMPLED
+  ivec2 pixel = ivec2(gl_FragCoord.xy);
+  float taken = imageLoad(taken_and_all, pixel).x;
+  taken += (all_shown - taken) * (1.0 - left_shown / all_shown);
+  imageStore(taken_and_all, pixel, vec4(taken, all_shown, 0.0, 0.0));
+  color = vec4(0.0);
+#else
+  color = vec4(vec3(0.0), 1.0 - left_shown / all_shown);
+#endif
 }

@@ -80,7 +80,7 @@ NOT_IN_COMMITS = (
 #: pictured uncut, and Blender's own texts and gizmos must be a small part of what is compared.
 _LARGE, _SMALL = "1600x1000x24", "1024x700x24"
 _ON_SMALL = (
-    *("cards", "combing", "first_minutes", "hair_scene", "import", "layers"),
+    *("cards", "combing", "first_minutes", "hair_scene", "import", "layers", "soft_shadows"),
     *("long_work", "look", "motion", "selection", "shadows", "views"),
 )
 SCREENS = {f"session_{name}": _SMALL for name in _ON_SMALL} | {

@@ -32,13 +32,13 @@ _SHOWING = ShaderRecipe(
 class Accumulation:
     """Samples of one picture, all of one size; making one touches no GPU.
 
-    count: samples so far.
+    count: samples so far. total: their sum, RGBA32F, once there is a size.
     """
 
     def __init__(self) -> None:
         self.count = 0
         self._size = (0, 0)
-        self._sum: Any = None
+        self.total: Any = None
         self._triangle: Any = None
         released_with_shaders(self)
 
@@ -50,15 +50,15 @@ class Accumulation:
     def begin(self, width: int, height: int) -> None:
         """Forget all samples, for a picture of this size [pixels]."""
         self.count = 0
-        if self._size != (width, height) or self._sum is None:
+        if self._size != (width, height) or self.total is None:
             self._size = width, height
-            self._sum = gpu_objects.texture(self._size, format="RGBA32F")
-        self._sum.clear(format="FLOAT", value=(0.0, 0.0, 0.0, 0.0))
+            self.total = gpu_objects.texture(self._size, format="RGBA32F")
+        self.total.clear(format="FLOAT", value=(0.0, 0.0, 0.0, 0.0))
 
     def add(self, sample: Any) -> None:
         """Add one picture, a float texture of this size, premultiplied."""
         shader = program(_ADDING)
-        shader.bind(textures={"one_sample": sample}, images={"sum_of_samples": self._sum})
+        shader.bind(textures={"one_sample": sample}, images={"sum_of_samples": self.total})
         width, height = self._size
         gpu.compute.dispatch(shader.shader, -(-width // 8), -(-height // 8), 1)
         gpu.shader.unbind()
@@ -66,7 +66,7 @@ class Accumulation:
 
     def mean(self) -> Floats:
         """The picture so far, (height, width, 4) float32, row 0 at the bottom."""
-        return texture_to_array(self._sum) / np.float32(max(self.count, 1))
+        return texture_to_array(self.total) / np.float32(max(self.count, 1))
 
     def show(self, left: int = 0, bottom: int = 0) -> None:
         """Draw the picture so far over what is in the bound framebuffer.
@@ -79,7 +79,7 @@ class Accumulation:
         shader = program(_SHOWING)
         with drawing_state(depth_test="NONE", depth_write=False, blend="ALPHA_PREMULT"):
             shader.bind(
-                textures={"sum_of_samples": self._sum},
+                textures={"sum_of_samples": self.total},
                 integers={"sample_count": max(self.count, 1), "left": left, "bottom": bottom},
             )
             self._triangle.draw(shader.shader)
@@ -87,7 +87,7 @@ class Accumulation:
     def release(self) -> None:
         """See shader_program.released_with_shaders."""
         self.count = 0
-        self._sum = self._triangle = None
+        self.total = self._triangle = None
 
 
 class Target:

@@ -4,6 +4,9 @@ The meshes that throw shadows on the hair (Snapshot.casters) are drawn once more
 covers the picture by as much as hair takes of its light: of each light by its map, over all light
 that reaches the place. Where another mesh is nearer nothing is drawn.
 
+As a sample it stores, in place of drawing, how much of the light on the screen hair takes, and how
+much there is, so that both can be added up, see soft_picture.py.
+
 Limitations: it darkens the finished picture, for which matt skin stands, so that a highlight is
 darkened as its colour is, and white cloth by a view transform too much. Two sheets of a mesh closer
 together than 0.05 % of their distance to the eye are darkened twice.
@@ -11,6 +14,7 @@ together than 0.05 % of their distance to the eye are darkened twice.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 from ..strands import Surface
@@ -18,6 +22,7 @@ from . import gpu_objects
 from .camera import Camera
 from .display import Display
 from .feature_programs import UniformBlocks, bound
+from .image_stores import finish_stores
 from .marschner_textures import under_hair_feature
 from .opacity_maps import OpacityMaps
 from .shader_feature import ShaderFeature
@@ -34,6 +39,13 @@ _RECIPE = ShaderRecipe(
     inputs=(("VEC3", "position"), ("VEC3", "normal")),
     varyings=(("smooth", "VEC3", "mesh_point"), ("smooth", "VEC3", "mesh_normal")),
     outputs=(("VEC4", "color"),),
+    defines=(("SAMPLED", 0),),
+)
+_SAMPLED_RECIPE = replace(
+    _RECIPE,
+    name="body_shadow_sample",
+    images=(("RGBA32F", "taken_and_all", "READ_WRITE"),),
+    defines=(("SAMPLED", 1),),
 )
 
 
@@ -53,11 +65,14 @@ class BodyShadow:
         height: int,
         *,
         display: Display | None = None,
+        sample: Any = None,
     ) -> None:
         """Darken what is in the bound framebuffer, a viewport's, depth-tested against it.
 
         Args:
             maps: of the snapshot's hair. Others as in StrandPass.draw.
+            sample: an RGBA32F texture as large as the viewport reaches, 0 where no shadow of other
+                hair is yet; it gets the shadow, and the framebuffer nothing.
 
         Raises:
             ShaderError: the shader does not compile here.
@@ -70,9 +85,13 @@ class BodyShadow:
             ShaderFeature(numbers={"body_color": ("VEC3", snapshot.skin_color)}),
             *([] if display is None else [display.feature]),
         ]
+        recipe = _RECIPE if sample is None else _SAMPLED_RECIPE
+        images = {} if sample is None else {"taken_and_all": sample}
         for _, batch in self._batches:
             with drawing_state(depth_write=False, blend="ALPHA_PREMULT"):
-                batch.draw(bound(_RECIPE, features, self._blocks).shader)
+                batch.draw(bound(recipe, features, self._blocks, images=images).shader)
+        if sample is not None:
+            finish_stores()
 
     def release(self) -> None:
         """Let go of all that lies on the GPU; the next draw uploads again."""

@@ -6,6 +6,7 @@ large asks here first. In this order they give way:
 
     lists of strands    a quarter of the budget, less where other things need it: strands are drawn
                         in more parts, which takes longer and looks the same (strand_layers.py)
+    soft shadows        none in a view at rest for which the budget has no room (soft_picture.py)
     kept pictures       none while more than the budget is taken: a view at rest is drawn again
                         (kept_picture.py)
     shadow maps         half the budget for all grooms of a picture alike, a quarter for meshes:
@@ -80,7 +81,7 @@ def lists_room(held: int) -> int:
     return int(min(_LISTS * budget(), max(left, _MIN_LISTS * budget())))
 
 
-def is_short() -> bool:
-    """Whether more is taken than may be; in a thread that draws."""
+def is_short(more: int = 0) -> bool:
+    """Whether more is taken than may be, with this many bytes more; in a thread that draws."""
     gpu_objects.free_unused()
-    return gpu_objects.bytes_in_use() > budget()
+    return gpu_objects.bytes_in_use() + more > budget()

@@ -1,6 +1,6 @@
 """The picture of one view's strands, kept so that a view in which nothing changed shows it again.
 
-    color RGBA16F: premultiplied, as it goes into the view
+    color RGBA16F: premultiplied, as it goes into the view; for sums RGBA32F, see soft_picture.py
     depth DEPTH32F: of the nearest hair that hides more than half of what lies behind it; 1 is none
 
 That is 12 bytes a pixel. Strands are drawn into the view, depth-tested against what is in it, and
@@ -35,17 +35,23 @@ class KeptPicture:
     """Making one touches no GPU.
 
     marks: what it is of, see `is_of`; empty: nothing that may be shown again.
+    color, depth: the textures above, once it is begun.
+
+    Args:
+        color_format: of its colours.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, color_format: str = "RGBA16F") -> None:
+        self._color_format = color_format
         self.release()
         released_with_shaders(self)
 
     def release(self) -> None:
         """Let go of all that lies on the GPU; the picture is gone."""
         self.marks: tuple[Any, ...] = ()
-        self._color: Any = None
-        self._depth: Any = None
+        self.color: Any = None
+        self.depth: Any = None
+        self._target: Any = None
         self._triangle: Any = None
 
     def forget(self) -> None:
@@ -61,9 +67,9 @@ class KeptPicture:
         left, bottom, width, height = gpu.state.viewport_get()
         size = left + width, bottom + height
         self.forget()
-        if self._color is None or (self._color.width, self._color.height) != size:
-            self._color = gpu_objects.texture(size, format="RGBA16F")
-            self._depth = gpu_objects.texture(size, format="DEPTH_COMPONENT32F")
+        if self.color is None or (self.color.width, self.color.height) != size:
+            self.color = gpu_objects.texture(size, format=self._color_format)
+            self.depth = gpu_objects.texture(size, format="DEPTH_COMPONENT32F")
             self._triangle = gpu_objects.triangle()
         with self.drawing():
             self._target.clear(color=_NOTHING, depth=1.0)
@@ -73,7 +79,7 @@ class KeptPicture:
         """Draw into it, where the bound framebuffer's viewport is."""
         viewport = gpu.state.viewport_get()
         # renders draw in a context of their own, which shares textures and no framebuffers
-        self._target = gpu_objects.framebuffer(depth_slot=self._depth, color_slots=(self._color,))
+        self._target = gpu_objects.framebuffer(depth_slot=self.depth, color_slots=(self.color,))
         with drawing_into(self._target):
             gpu.state.viewport_set(*viewport)
             yield
@@ -89,7 +95,7 @@ class KeptPicture:
     def _draw(self, *, writes_depth: bool) -> None:
         shader = program(_SHOWN_RECIPE)
         shader.bind(
-            textures={"kept_color": self._color, "kept_depth": self._depth},
+            textures={"kept_color": self.color, "kept_depth": self.depth},
             integers={"writes_depth": int(writes_depth)},
         )
         self._triangle.draw(shader.shader)

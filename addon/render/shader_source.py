@@ -99,6 +99,8 @@ SKIN_TRIANGLES_ACROSS, SKIN_SEAMS_ACROSS, SKIN_COPIES_ACROSS = 1024, 1024, 4096
 TILE_GAP = 2
 #: masks hold what covers more of a pixel than this, as Cycles has it
 COVERS = 0.5
+#: added to light on the screen that something is divided by
+NO_LIGHT = 1.0e-4
 #: the strongest lights, for which one groom shades others: a channel of a texture each
 OTHER_TAU_LIGHTS = 4
 #: how a pass writes its colour; see encoded() in lib_output.glsl
@@ -172,6 +174,7 @@ CONSTANTS: Mapping[str, str] = MappingProxyType(
         "min_mesh_bias": repr(MIN_MESH_BIAS),
         "mesh_frame_capacity": str(MESH_FRAME_CAPACITY),
         "covers": repr(COVERS),
+        "no_light": repr(NO_LIGHT),
         "other_tau_lights": str(OTHER_TAU_LIGHTS),
         "mesh_bias": repr(MESH_BIAS),
         "mesh_blur": repr(MESH_BLUR),

@@ -79,10 +79,14 @@ _TURNING_ORDER_RECIPE = replace(
 
 @dataclass(frozen=True)
 class LayersDrawn:
-    """In how many parts layers were drawn, and how many fragments had no room in any."""
+    """In how many parts layers were drawn, and how many fragments had no room in any.
+
+    fragments: of strands that nothing hides, how many; 0 where they were not waited for.
+    """
 
     parts: int = 0
     missing: int = 0
+    fragments: int = 0
 
 
 class StrandLayers:
@@ -102,7 +106,7 @@ class StrandLayers:
         self._max_rows = 0
         #: where a driver has refused more
         self._refused_rows: int | None = None
-        self._pixel_count = self._too_long = 0  # of what was gathered last
+        self._found = self._pixel_count = self._too_long = 0  # of what was gathered last
         self._size = 0, 0
         self._count: Any = None
         self._heads: Any = None
@@ -112,6 +116,7 @@ class StrandLayers:
         self._fronts: Any = None
         self._triangle: Any = None
         self._picture: KeptPicture | None = None
+        self._is_sample = False
 
     def draw(
         self,
@@ -122,6 +127,7 @@ class StrandLayers:
         is_moving: bool = False,
         is_turning: bool = False,
         picture: KeptPicture | None = None,
+        is_sample: bool = False,
     ) -> LayersDrawn:
         """Gather, order, shade, and put the result over what is in the bound framebuffer.
 
@@ -131,12 +137,13 @@ class StrandLayers:
             is_moving: the GPU is not waited for, see `room_for`.
             is_turning: so does the whole view, so that fewer layers do.
             picture: takes the result as well.
+            is_sample: it takes the colours alone; the framebuffer gets the depths.
 
         Raises:
             ShaderError: a shader does not compile here, or there is no memory at all.
         """
         self._fit(_viewport_end())
-        self._picture = picture
+        self._picture, self._is_sample = picture, is_sample
         if is_moving:
             self._store(lambda: drawing.gather(self._images, self._capacity))
             *_, width, height = gpu.state.viewport_get()
@@ -144,9 +151,10 @@ class StrandLayers:
             self._shade(drawing, -(-width * height // _SHADED_IN_TURN))
             return LayersDrawn(1)
         if not in_parts and self._is_gathered(drawing) and self._is_finished(drawing):
-            return LayersDrawn(1)
+            return LayersDrawn(1, fragments=self._found)
         counts, drawn, missing = self._counted(drawing), 0, 0
-        self._make_room(int(counts.sum(dtype=np.int64)))
+        fragments = int(counts.sum(dtype=np.int64))
+        self._make_room(fragments)
         waiting = pixel_parts(counts, self._capacity)[::-1]
         while waiting:
             part = waiting.pop()
@@ -159,7 +167,7 @@ class StrandLayers:
                 waiting += part.slabs[::-1]
                 continue
             drawn, missing = drawn + 1, missing + max(beyond, 0) + self._too_long
-        return LayersDrawn(drawn, missing)
+        return LayersDrawn(drawn, missing, fragments)
 
     def room_for(self, count: int) -> int:
         """Make room for this many fragments in the bound viewport, and say how many have some.
@@ -184,8 +192,8 @@ class StrandLayers:
     ) -> int:
         """Gather all fragments, or those of a part; how many there are, with room or without."""
         self._store(lambda: drawing.gather(self._images, self._capacity, part), rows)
-        found, self._pixel_count, *_ = self._counts()
-        return found
+        self._found, self._pixel_count, *_ = self._counts()
+        return self._found
 
     def _counted(self, drawing: StrandDrawing) -> Ints:
         """How many fragments each pixel has, row by row."""
@@ -228,16 +236,17 @@ class StrandLayers:
     def _shade(self, drawing: StrandDrawing, count: int) -> None:
         """Shade all that is seen, by as many invocations, and show it."""
         _dispatch(drawing.shade(self._images), count)
-        self._show(drawing)
+        self._show(drawing, writes_color=not self._is_sample)
         if self._picture is not None:
             with self._picture.drawing():
                 self._show(drawing)
 
-    def _show(self, drawing: StrandDrawing) -> None:
+    def _show(self, drawing: StrandDrawing, *, writes_color: bool = True) -> None:
         """Colours and depths of all lists, into the bound framebuffer."""
         images = self._images
-        with drawing_state(depth_test="NONE", depth_write=False, blend="ALPHA_PREMULT"):
-            self._triangle.draw(drawing.show(images, writes_depth=False).shader)
+        if writes_color:
+            with drawing_state(depth_test="NONE", depth_write=False, blend="ALPHA_PREMULT"):
+                self._triangle.draw(drawing.show(images, writes_depth=False).shader)
         with drawing_state(depth_test="ALWAYS"):
             gpu.state.color_mask_set(False, False, False, False)
             self._triangle.draw(drawing.show(images, writes_depth=True).shader)

@@ -156,6 +156,7 @@ class StrandPass:
         is_turning: bool = False,
         is_moving: bool = False,
         picture: KeptPicture | None = None,
+        is_sample: bool = False,
     ) -> None:
         """Draw all strands into the bound framebuffer, depth-tested against what is in it.
 
@@ -174,6 +175,8 @@ class StrandPass:
             is_moving: what is seen differs from what the view showed before, and soon from this:
                 what the GPU would have to be waited for is taken from before, see `is_behind`.
             picture: takes what is drawn, so that it can be shown again.
+            is_sample: it takes this alone, scene-linear, as one of many that are added up; the
+                bound framebuffer gets the depths.
 
         Raises:
             ShaderError: the shader does not compile here, or points on the GPU were released.
@@ -185,7 +188,9 @@ class StrandPass:
         self.statistics = Statistics()
         if not snapshot.strand_count:
             return
-        output_encoding = output_index(output)
+        if is_sample:
+            display = None
+        output_encoding = output_index("scene_linear" if is_sample else output)
         self._upload(snapshot)
         size = width // samples, height // samples
         serial = self._points_serial
@@ -236,6 +241,7 @@ class StrandPass:
                 is_moving=own.is_moving,
                 is_turning=is_turning,
                 picture=picture,
+                is_sample=is_sample,
             )
             own.parts = own.parts if own.is_moving else layers.parts
         elif transparency == "hashed":
@@ -304,6 +310,10 @@ class StrandPass:
     def forget_views(self, shown: Set[Hashable]) -> None:
         """Let go of what was kept for views other than these."""
         self._views = {view: own for view, own in self._views.items() if view in shown}
+
+    def forget_view(self, view: Hashable) -> None:
+        """Let go of what was kept for this view."""
+        self._views.pop(view, None)
 
     def ball(self, snapshot: Snapshot) -> Ball:
         """A sphere that holds all its strands."""

@@ -26,7 +26,9 @@ class PictureSettings(Settings):
     viewport_samples: int = integer(
         32,
         label="View Samples",
-        description="Samples per pixel that the viewport accumulates while nothing moves",
+        description="Samples that the viewport adds up while nothing moves. In the preview over "
+        "other engines they soften the shadows of lights that have a size: each draws the hair and "
+        "its shadow maps once. With 1, or without a GPU, shadows stay hard there",
         soft=(1, 64),
         hard=(1, 65536),
     )

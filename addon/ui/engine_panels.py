@@ -122,8 +122,11 @@ class HAIRLOOM_PT_hair_scene(WithHelp, bpy.types.Panel):
         layout.use_property_split = True
         layout.use_property_decorate = False
         column = layout.column()
+        # of the preview, whoever renders
+        column.prop(settings.picture, "viewport_samples")
+        column = layout.column()
         column.active = settings.use_hair_scene
-        column.prop(settings.picture, "samples", text="Samples")
+        column.prop(settings.picture, "samples")
         if context.scene.render.use_motion_blur:
             column.prop(settings.picture, "motion_steps", text="Motion Steps")
         else:

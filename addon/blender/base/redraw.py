@@ -17,6 +17,24 @@ def redraw_views() -> None:
     _redraw({("VIEW_3D", "WINDOW")})
 
 
+def redraw_view(address: int) -> bool:
+    """Ask one 3D view to draw itself again.
+
+    Args:
+        address: of its region's data.
+
+    Returns:
+        Whether a window shows it.
+    """
+    areas = [area for window in bpy.context.window_manager.windows for area in window.screen.areas]
+    for region in (each for area in areas if area.type == "VIEW_3D" for each in area.regions):
+        is_view = region.type == "WINDOW" and region.data is not None
+        if is_view and region.data.as_pointer() == address:
+            region.tag_redraw()
+            return True
+    return False
+
+
 def redraw_panels() -> None:
     """Ask all places that have a panel of ours to draw themselves again."""
     _redraw({("VIEW_3D", "UI"), ("PROPERTIES", "WINDOW")})

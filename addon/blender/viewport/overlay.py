@@ -40,7 +40,7 @@ from ..scene.world import studio_environment
 from ..sessions.measures import FrameTimes
 from ..sessions.session import Session
 from ..sessions.snapshots import with_all_strands
-from . import view_transform
+from . import softening, view_transform
 from .debug_lines import Lines, debug_lines_of, draw_lines
 from .overlay_text import card_counts_line, counts_line, draw_graphs, write_lines
 from .views import (
@@ -226,21 +226,74 @@ def _draw_strands(context: Any) -> None:
     shown = list(_shown_now(context, camera, has_turned=view.turns_to(camera)))
     if not shown:
         view.picture.release()
+        softening.harden(view)
         return
-    marks = (*view_marks(context, camera), *(mark for each in shown for mark in each.marks))
+    samples = context.scene.hairloom.picture.viewport_samples
+    marks = (
+        *view_marks(context, camera),
+        samples,
+        *(mark for each in shown for mark in each.marks),
+    )
     with ONE_AT_A_TIME, gpu_memory.shared_by(len(shown)):
         if has_no_depths(context):
             _draw_depth(context.space_data.as_pointer(), camera, shown)
-        for each in shown:
-            each.draw_body_shadow(camera)
-        if view.picture.is_of(marks):
-            view.picture.show()
-            for uid, counted in view.counted.items():
-                _overlay.drawn[uid].hair.strands.statistics = counted
-            was_shown_again(view, context.space_data.shading)
-        else:
+        if not view.picture.is_of(marks):
+            softening.harden(view)
+            _draw_body_shadows(camera, shown)
             _draw_afresh(view, camera, shown, marks)
             was_drawn(view)
+            if view.picture.marks and softening.is_worth_it(shown[0].snapshot.lights, samples):
+                softening.soften(view)
+            return
+        is_sampled = softening.takes_sample(view)
+        if is_sampled:
+            _add_sample(view, camera, shown, samples)
+        elif not view.is_soft:
+            _draw_body_shadows(camera, shown)
+        view.picture.show()
+        for uid, counted in view.counted.items():
+            _overlay.drawn[uid].hair.strands.statistics = counted
+        if not is_sampled:
+            was_shown_again(view, context.space_data.shading)
+            softening.go_on(view)
+
+
+def _draw_body_shadows(camera: Camera, shown: Sequence[_Shown], sample: Any = None) -> None:
+    """Before all hair: they lie on what Blender has drawn.
+
+    Args:
+        sample: as in BodyShadow.draw.
+    """
+    for each in shown:
+        each.draw_body_shadow(camera, sample)
+
+
+def _add_sample(view: View, camera: Camera, shown: Sequence[_Shown], samples: int) -> None:
+    """One sample of soft shadows more, before the view shows its picture."""
+    centers = [each.snapshot.center for each in shown]
+    lights = softening.lights_of_sample(shown[0].snapshot.lights, centers)
+    name = softening.name_of(view)
+    lit = [
+        replace(each, snapshot=replace(each.snapshot, lights=lights), view=name) for each in shown
+    ]
+    is_shown, sums = softening.is_next_shown(view, samples), softening.sums()
+    if not view.is_soft and not is_shown:
+        _draw_body_shadows(camera, shown)
+
+    def draw_hair(picture: KeptPicture) -> None:
+        maps: dict[Hashable, OpacityMaps | None] = {}
+        if len(lit) > 1:
+            maps = {each.uid: each.maps() for each in lit}
+        for each in lit:
+            each.draw(camera, maps, picture, is_moving=False, is_sample=True)
+
+    sums.add(lambda texture: _draw_body_shadows(camera, lit, texture), draw_hair)
+    if is_shown:
+        sums.show_in(view.picture, shown[0].display)
+        view.is_soft = True
+    passes = [each.drawn.hair.strands for each in shown]
+    fragments = tuple(each.statistics.layers.fragments for each in passes)
+    softening.was_sampled(view, samples, passes, fragments)
 
 
 def _draw_depth(address: int, camera: Camera, shown: Sequence[_Shown]) -> None:
@@ -279,7 +332,8 @@ def _draw_afresh(view: View, camera: Camera, shown: list[_Shown], marks: tuple[A
 class _Shown:
     """One groom in the view that is being drawn.
 
-    snapshot: as it is seen and lit there. shades_body: its shadow lies on the head.
+    snapshot: as it is seen and lit there. view: the name by which passes know the view.
+    shades_body: its shadow lies on the head.
     is_turning: its lights are attached to the view, which moves.
     sees_all: strands behind heads as well.
     """
@@ -289,7 +343,7 @@ class _Shown:
     drawing: Drawing
     snapshot: Snapshot
     display: Display | None
-    address: int
+    view: Hashable
     shades_body: bool
     is_turning: bool
     sees_all: bool
@@ -316,17 +370,18 @@ class _Shown:
     def maps(self) -> OpacityMaps | None:
         """As of GroomPass."""
         hair, snapshot = self.drawn.hair, self.snapshot
-        return hair.maps(snapshot, view=self.address, is_turning=self.is_turning)
+        return hair.maps(snapshot, view=self.view, is_turning=self.is_turning)
 
-    def draw_body_shadow(self, camera: Camera) -> None:
-        """Before all hair: it lies on what Blender has drawn."""
+    def draw_body_shadow(self, camera: Camera, sample: Any = None) -> None:
+        """As `_draw_body_shadows`."""
         if not self.shades_body:
             return
         maps = self.maps()
         if maps is not None:
             _, _, width, height = gpu.state.viewport_get()
+            size = width, height
             shadow = self.drawn.shadow
-            shadow.draw(self.snapshot, maps, camera, width, height, display=self.display)
+            shadow.draw(self.snapshot, maps, camera, *size, display=self.display, sample=sample)
 
     def draw(
         self,
@@ -335,11 +390,12 @@ class _Shown:
         picture: KeptPicture | None,
         *,
         is_moving: bool,
+        is_sample: bool = False,
     ) -> None:
         """Its hair; strands go into the picture as well.
 
         Args:
-            maps: of all hair in the view, by session number.
+            maps: of all hair in the view, by session number. is_sample: as in StrandPass.draw.
         """
         _, _, width, height = gpu.state.viewport_get()
         snapshot, display, hair = self.snapshot, self.display, self.drawn.hair
@@ -351,11 +407,14 @@ class _Shown:
             output="viewport",
             display=display,
             others=hair.others(self.uid, snapshot, maps),
-            view=self.address,
+            view=self.view,
             is_turning=self.is_turning,
             is_moving=is_moving,
             picture=picture,
+            is_sample=is_sample,
         )
+        if is_sample:
+            return
         hair.cards.draw(
             snapshot,
             camera,
@@ -542,6 +601,7 @@ def _remove_handlers() -> None:
     _overlay.handles = ()
     _overlay.depth.release()
     forget_layers()
+    softening.forget()
     forget_views()
 
 

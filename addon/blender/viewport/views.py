@@ -2,7 +2,8 @@
 
 A view in which nothing has changed shows its kept picture. What is in the way of strands in it may
 change unseen while an engine still compiles or samples: so, in views other than Solid and
-Wireframe, the last redraw of a row of them is followed by one that draws strands afresh.
+Wireframe, the last redraw of a row of them is followed by one that draws strands afresh. Where
+shadows are soft by then, it is one sample that tells whether they are still right.
 """
 
 from __future__ import annotations
@@ -37,6 +38,10 @@ class View:
     is_behind: its shadows lag behind its lights, or it was drawn without waiting for the GPU.
     drawn_at: when its strands were drawn [s]. shown_again: how often its picture was since then.
     is_again: so that its strands are to be drawn after it.
+    wants_more: samples of soft shadows, see softening.py. is_soft: its picture shows their mean,
+    with the shadow on heads; has_all: of all samples.
+    fragments: how many the last sample of each groom had. changed_at: when something else was drawn
+    that is to become soft [s].
     """
 
     address: int
@@ -48,6 +53,11 @@ class View:
     shown_again: int = 0
     is_again: bool = False
     seen_from: bytes = b""
+    wants_more: bool = False
+    is_soft: bool = False
+    has_all: bool = False
+    fragments: tuple[int, ...] = ()
+    changed_at: float = 0.0
 
     def turns_to(self, camera: Camera) -> bool:
         """Whether it was drawn before, from elsewhere."""
@@ -76,6 +86,11 @@ def view_of(region_data: Any) -> View:
     """What is kept for the view that is being drawn."""
     address = region_data.as_pointer()
     return _known.views.setdefault(address, View(address))
+
+
+def known_views() -> tuple[View, ...]:
+    """All that were drawn and are not closed."""
+    return tuple(_known.views.values())
 
 
 def scene_changed() -> None:
@@ -160,7 +175,10 @@ def _soon(timer: Callable[[], None], pause: float) -> None:
 
 def _draw_afresh() -> None:
     for view in _known.views.values():
-        if view.is_again:
+        if view.is_again and view.has_all and not view.wants_more:
+            was_drawn(view)
+            view.wants_more = True
+        elif view.is_again:
             view.picture.forget()
     redraw_views()
 

@@ -1,0 +1,106 @@
+"""Soft shadows of a view at rest: hair, and its shadow on meshes, as the mean of many samples.
+
+Each sample is lit by one point of each light, see light_samples.py. Hair is added up scene-linear
+and becomes what a view shows as the mean, so that a penumbra is as bright as in a still. Of the
+shadow on meshes what hair takes of the light is added up, and all light beside it, as both are on
+the screen: a sample in which a light shines more counts more.
+
+    hair_sum, shadow_sum RGBA32F: of all samples
+    sample RGBA32F with a depth DEPTH32F: the one that is drawn
+
+That is 52 bytes a pixel, for as long as samples are added up. A KeptPicture takes the result.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import gpu
+
+from . import gpu_objects
+from .accumulation import Accumulation
+from .display import Display
+from .feature_programs import UniformBlocks, bound
+from .kept_picture import KeptPicture
+from .shader_program import ShaderRecipe, released_with_shaders
+from .textures import drawing_state
+
+_PIXEL_BYTES = 52
+_RECIPE = ShaderRecipe(
+    name="soft_picture",
+    vertex="strand_layers.vert.glsl",
+    fragment="soft_picture.frag.glsl",
+    textures=(("FLOAT_2D", "hair_sum"), ("FLOAT_2D", "shadow_sum"), ("DEPTH_2D", "hair_depth")),
+    integers=("sample_count",),
+    outputs=(("VEC4", "color"),),
+)
+
+
+class SoftPicture:
+    """Making one touches no GPU."""
+
+    def __init__(self) -> None:
+        self._hair, self._shadow = Accumulation(), Accumulation()
+        self._sample = KeptPicture("RGBA32F")
+        self._triangle: Any = None
+        released_with_shaders(self)
+
+    @property
+    def count(self) -> int:
+        """Samples so far."""
+        return self._hair.count
+
+    def missing_bytes(self) -> int:
+        """What the next sample of the bound viewport makes on the GPU."""
+        left, bottom, width, height = gpu.state.viewport_get()
+        return 0 if self.count else _PIXEL_BYTES * (left + width) * (bottom + height)
+
+    def add(
+        self, draw_shadows: Callable[[Any], None], draw_hair: Callable[[KeptPicture], None]
+    ) -> None:
+        """Add a sample of what is in the bound viewport; the first one after a release, or in a
+        viewport of another size, begins a new sum.
+
+        Args:
+            draw_shadows: has BodyShadow store into this texture.
+            draw_hair: has StrandPass draw into this picture, as a sample.
+        """
+        self._sample.begin()
+        size = self._sample.color.width, self._sample.color.height
+        if not self.count or self._hair.size != size:
+            for each in (self._hair, self._shadow):
+                each.begin(*size)
+        draw_shadows(self._sample.color)
+        self._shadow.add(self._sample.color)
+        self._sample.begin()
+        draw_hair(self._sample)
+        self._hair.add(self._sample.color)
+
+    def show_in(self, picture: KeptPicture, display: Display | None) -> None:
+        """Have the kept picture of this viewport hold the mean of the samples so far.
+
+        Args:
+            display: as in StrandPass.draw.
+        """
+        if self._triangle is None:
+            self._triangle = gpu_objects.triangle()
+        with picture.drawing(), drawing_state(depth_test="ALWAYS"):
+            shader = bound(
+                _RECIPE,
+                [] if display is None else [display.feature],
+                UniformBlocks(),
+                textures={
+                    "hair_sum": self._hair.total,
+                    "shadow_sum": self._shadow.total,
+                    "hair_depth": self._sample.depth,
+                },
+                integers={"sample_count": self.count},
+            )
+            self._triangle.draw(shader.shader)
+
+    def release(self) -> None:
+        """Let go of all that lies on the GPU, and of the samples."""
+        for each in (self._hair, self._shadow, self._sample):
+            each.release()
+        self._triangle = None

@@ -1,0 +1,195 @@
+"""Soft shadows of a view at rest: they come, go at once with any change, and cost nothing after."""
+
+import sys
+from pathlib import Path
+
+import bpy
+import numpy as np
+from mathutils import Euler
+
+sys.path.append(str(Path(__file__).parent))
+import driver
+from artist import (
+    changed,
+    hide_floor,
+    look_from_front,
+    new_head,
+    pixels_at_rest,
+    press,
+    viewport,
+)
+from driver import of_hairloom, until
+
+SAMPLES = 12
+#: share of a view's pixels by which Blender's own redraw differs
+SAME = 0.002
+#: how often strands were drawn, and how often as a sample of soft shadows
+counted = {"drawn": 0, "samples": 0}
+
+
+def steps():
+    yield from press("ESC")  # the splash screen takes the first event
+    driver.enable_extension()
+    count_draws()
+    yield from set_the_scene()
+    hard = yield from hard_is_what_it_was()
+    soft = yield from shadows_become_soft(hard)
+    yield from nothing_more_is_drawn(soft)
+    yield from what_changes_is_hard_at_once(soft)
+    yield from one_sample_tells_whether_all_is_right(soft)
+    yield from without_samples_all_is_let_go_of(hard)
+    assert of_hairloom("overlay").failure() == ""
+
+
+def count_draws():
+    strands = of_hairloom("strand_pass").StrandPass
+    draw = strands.draw
+
+    def count(*values, **options):
+        counted["samples" if options.get("is_sample") else "drawn"] += 1
+        return draw(*values, **options)
+
+    strands.draw = count
+
+
+def set_the_scene():
+    """A fringe above a ball, under a wide sun, in a view that is drawn in the scene's light."""
+    bpy.context.scene.render.engine = "BLENDER_WORKBENCH"
+    head = new_head(segments=48, ring_count=24)
+    bpy.ops.object.shade_smooth()
+    group = head.vertex_groups.new(name="Crown")
+    crown = [each.index for each in head.data.vertices if each.co.z > 0.075]
+    group.add(crown, 1.0, "REPLACE")
+    bpy.ops.hairloom.grow(
+        method="normals", lift=1.0, strand_count=2000, length=0.08, density_group="Crown"
+    )
+    bpy.context.object.name = "Hair"
+    bpy.context.object.data.hairloom.children.method = "none"
+    bpy.ops.object.light_add(type="SUN", rotation=(np.radians(25.0), 0.0, 0.0))
+    bpy.context.object.name = "Sun"
+    bpy.context.object.data.energy, bpy.context.object.data.angle = 4.0, np.radians(20.0)
+    hair = bpy.data.objects["Hair"]
+    bpy.context.view_layer.objects.active = hair
+    bpy.ops.object.select_all(action="DESELECT")
+    hair.data.hairloom.strands.fullness = 3.0
+    shading = viewport().spaces.active.shading
+    shading.type = "RENDERED"
+    shading.use_scene_lights_render = shading.use_scene_world_render = True
+    hide_floor()
+    look_from_front(0.6)
+    bpy.ops.hairloom.preview()
+    yield from until(lambda: counted["drawn"], "no hair is drawn")
+    yield
+
+
+def picture():
+    return bpy.context.scene.hairloom.picture
+
+
+def views():
+    return of_hairloom("views").known_views()
+
+
+def held():
+    of_hairloom("gpu_objects").free_unused()
+    return of_hairloom("gpu_objects").bytes_in_use()
+
+
+def hard_is_what_it_was():
+    """Where no GPU draws, and with one sample where one does: the same pixels."""
+    picture().viewport_samples = SAMPLES
+    before = yield from pixels_at_rest("no-gpu")
+    of_hairloom("softening").is_software = lambda: False
+    picture().viewport_samples = 1
+    hard = yield from pixels_at_rest("hard")
+    assert changed(before, hard, 0.0) == 0.0 and not counted["samples"]
+    return hard
+
+
+def shadows_become_soft(hard):
+    picture().viewport_samples = SAMPLES
+    yield from until(lambda: all(each.has_all for each in views()), "shadows stay hard")
+    soft = yield from pixels_at_rest("soft")
+    assert counted["samples"] >= SAMPLES
+    assert changed(hard, soft, 0.05) > 0.003, changed(hard, soft, 0.05)
+    # as bright, and with smaller steps from pixel to pixel below the fringe
+    assert abs(hard.mean() - soft.mean()) < 0.01
+    return soft
+
+
+def nothing_more_is_drawn(soft):
+    """However often the view is shown, but for a sample after each row of redraws, which tells
+    whether what is there is right.
+    """
+    before = dict(counted)
+    again = yield from pixels_at_rest("soft-again")
+    assert changed(soft, again, 0.0) == 0.0
+    assert counted["samples"] < before["samples"] + SAMPLES // 2, (before, counted)
+    shown = counted["samples"]
+    for _ in range(60):
+        yield 1
+    assert counted["drawn"] == before["drawn"] and counted["samples"] <= shown + 1
+
+
+def what_changes_is_hard_at_once(soft):
+    """And soft again where nothing is as it was, with the same pixels where all is."""
+    region, sun = viewport().spaces.active.region_3d, bpy.data.objects["Sun"]
+    hair = bpy.data.objects["Hair"].data.hairloom
+
+    def turn():
+        region.view_rotation = Euler((1.5708, 0.0, 0.3)).to_quaternion()
+
+    def turn_the_sun():
+        sun.rotation_euler.x += 0.2
+
+    def comb():
+        hair.strands.fullness = 2.0
+
+    for change, back in (
+        (turn, lambda: look_from_front(0.6)),
+        (turn_the_sun, lambda: setattr(sun.rotation_euler, "x", np.radians(25.0))),
+        (comb, lambda: setattr(hair.strands, "fullness", 3.0)),
+    ):
+        for name, act in ((change.__name__, change), (f"{change.__name__}-back", back)):
+            drawn = counted["drawn"]
+            act()
+            yield from until(lambda drawn=drawn: counted["drawn"] > drawn, f"{name}: not drawn")
+            assert not any(each.is_soft for each in views()), f"{name}: soft shadows that were"
+            yield from until(lambda: all(each.has_all for each in views()), f"{name}: stays hard")
+            found = yield from pixels_at_rest(name)
+        assert changed(soft, found, 0.02) < SAME, (name, changed(soft, found, 0.02))
+
+
+def one_sample_tells_whether_all_is_right(soft):
+    """What an engine draws later before hair: here a view that is told to look again, and then one
+    that had more hair before.
+    """
+    drawn = counted["drawn"]
+    for fragments, least in ((None, 1), ((1 << 30,), SAMPLES)):
+        for view in views():
+            view.is_again, view.fragments = True, fragments or view.fragments
+        before = counted["samples"]
+        of_hairloom("views")._draw_afresh()
+        yield from until(
+            lambda before=before: (
+                counted["samples"] > before and not any(each.wants_more for each in views())
+            ),
+            "no sample is taken",
+        )
+        assert least <= counted["samples"] - before < least + 2, (before, counted)
+        assert all(each.is_soft for each in views())
+    assert counted["drawn"] == drawn
+    found = yield from pixels_at_rest("looked-again")
+    assert changed(soft, found, 0.02) < SAME
+
+
+def without_samples_all_is_let_go_of(hard):
+    assert of_hairloom("softening").sums().count == 0
+    soft_held = held()
+    picture().viewport_samples = 1
+    found = yield from pixels_at_rest("hard-again")
+    assert changed(hard, found, 0.02) < SAME
+    assert held() == soft_held, "samples leave something on the GPU"
+
+
+driver.play(steps())
