@@ -139,6 +139,25 @@ def test_a_sample_tells_whether_a_soft_view_is_still_right(
     assert not view.wants_more
 
 
+def test_what_is_shown_among_samples_is_checked_after_them(
+    two_views: tuple[views.View, ...],
+) -> None:
+    """Samples that take long do not begin again with each redraw."""
+    view, _ = two_views
+    view.picture.marks = ("kept",)
+    softening.soften(view)
+    for count in range(10):
+        softening._ask()
+        sampled(view, 10)
+        if count == 5:
+            view.is_again = True
+            views._draw_afresh()
+    assert view.picture.marks and view.has_all and view.wants_more
+    softening._ask()
+    sampled(view, 10)
+    assert not view.wants_more
+
+
 def test_a_view_that_no_window_shows_waits_for_nothing(two_views: tuple[views.View, ...]) -> None:
     view = views.view_of(SimpleNamespace(as_pointer=lambda: 9))
     view.picture.marks = ("kept",)

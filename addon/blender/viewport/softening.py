@@ -64,7 +64,8 @@ def soften(view: View) -> None:
 
 def harden(view: View) -> None:
     """What a view shows is gone: it is not soft, and samples of it count no more."""
-    view.wants_more = view.is_soft = view.has_all = False
+    view.wants_more = view.is_soft = view.has_all = view.is_doubted = False
+    view.fragments = ()
     if _softening.view is view:
         _stop()
 
@@ -132,10 +133,12 @@ def was_sampled(
     """
     _softening.passes = tuple(passes)
     count = _softening.picture.count
+    if count == 1:
+        view.is_doubted = False
     is_as_shown = view.has_all and count == 1 and view.fragments == fragments
     view.fragments = fragments
     if is_as_shown or count >= samples:
-        view.wants_more, view.has_all = False, True
+        view.wants_more, view.has_all = view.is_doubted, True
         _stop()
     _soon(0.0)
 
@@ -164,7 +167,7 @@ def _ask() -> None:
         _leave(view)  # it was asked, and is drawn by others now
     waiting = (each for each in known_views() if each.wants_more and not each.is_again)
     view = _softening.view or next(waiting, None)
-    if view is None or view.is_again:
+    if view is None:
         return
     _softening.view, _softening.is_due = view, True
     if not redraw_view(view.address):

@@ -40,8 +40,9 @@ class View:
     is_again: so that its strands are to be drawn after it.
     wants_more: samples of soft shadows, see softening.py. is_soft: its picture shows their mean,
     with the shadow on heads; has_all: of all samples.
-    fragments: how many the last sample of each groom had. changed_at: when something else was drawn
-    that is to become soft [s].
+    fragments: how many the last sample of each groom had; none before the first.
+    is_doubted: since samples began it may have come to hold something else before hair.
+    changed_at: when something else was drawn that is to become soft [s].
     """
 
     address: int
@@ -57,6 +58,7 @@ class View:
     is_soft: bool = False
     has_all: bool = False
     fragments: tuple[int, ...] = ()
+    is_doubted: bool = False
     changed_at: float = 0.0
 
     def turns_to(self, camera: Camera) -> bool:
@@ -175,9 +177,9 @@ def _soon(timer: Callable[[], None], pause: float) -> None:
 
 def _draw_afresh() -> None:
     for view in _known.views.values():
-        if view.is_again and view.has_all and not view.wants_more:
+        if view.is_again and view.fragments:
             was_drawn(view)
-            view.wants_more = True
+            view.is_doubted, view.wants_more = True, True
         elif view.is_again:
             view.picture.forget()
     redraw_views()
