@@ -43,9 +43,11 @@ void main()
   float all_shown = shown(all_light) + NO_LIGHT, left_shown = shown(left) + NO_LIGHT;
 #if SAMPLED
   ivec2 pixel = ivec2(gl_FragCoord.xy);
-  float taken = imageLoad(taken_and_all, pixel).x;
-  taken += (all_shown - taken) * (1.0 - left_shown / all_shown);
-  imageStore(taken_and_all, pixel, vec4(taken, all_shown, 0.0, 0.0));
+  vec2 before = imageLoad(taken_and_all, pixel).xy;
+  float fraction = (before.y > 0.0 ? 1.0 - before.x / before.y : 1.0) * left_shown / all_shown;
+  // maps of other hair may know of more meshes in the way of light
+  float most = max(before.y, all_shown);
+  imageStore(taken_and_all, pixel, vec4(most * (1.0 - fraction), most, 0.0, 0.0));
   color = vec4(0.0);
 #else
   color = vec4(vec3(0.0), 1.0 - left_shown / all_shown);

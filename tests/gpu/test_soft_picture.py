@@ -264,6 +264,18 @@ def test_one_sample_is_what_is_hard(background: float) -> None:
     assert off.max() < 1.0 / 510.0
 
 
+def test_grooms_that_know_other_meshes_shade_the_floor_as_they_do_hard() -> None:
+    """The map of one of them has a sheet in the way of the sun, outside of the picture."""
+    sheet = replace(FLOOR, positions=FLOOR.positions * [0.5, 1.0, 1.0] + [-0.5, 0.0, 0.6])
+    grooms = [groom(0.0, 0.12, SUN), groom(0.1, 0.2, SUN)]
+    hair_alone = hair_alpha(grooms, PERSPECTIVE)
+    grooms[0] = replace(grooms[0], casters=(FLOOR, sheet))
+    for ordered in (grooms, grooms[::-1]):
+        view = View(ordered, PERSPECTIVE)
+        off = np.abs(view.softened(1, 1.0) - view.hard(1.0))[hair_alone == 0.0]
+        assert off.max() < 1.0 / 510.0
+
+
 def test_a_sample_leaves_a_view_as_it_was_but_for_the_depth_of_hair() -> None:
     from hairloom.addon.render.textures import texture_to_array
 
