@@ -1,6 +1,6 @@
 # All that one does here, in one place. `make` alone lists it.
 .DEFAULT_GOAL := help
-.PHONY: help setup demo lint test tests-of-a-commit test-ui test-engines test-all bench docs site gallery pictures styles zip lock clean
+.PHONY: help setup demo lint wheels test tests-of-a-commit test-ui test-engines test-all bench docs site gallery pictures styles zip lock clean
 
 PYTHON = .venv/bin/python
 OUT = out
@@ -34,9 +34,13 @@ tests-of-a-commit: setup
 	$(PYTEST) -m "not slow" --assert=plain $(TESTS) || \
 	    { $(PYTHON) -m pytest -q -m "not slow" --last-failed --last-failed-no-failures=none $(TESTS); false; }
 
-# Side by side, as mypy keeps one processor busy and the longest tests come first.
+# Side by side, as mypy keeps one processor busy, the longest tests come first, and what zips bring
+# along is waited for.
 test: setup ## lint, types, and the tests that a commit has to pass and that need no window
-	@$(PYTHON) tools/timings.py test_minutes $(MAKE) --no-print-directory -j 2 lint tests-of-a-commit
+	@$(PYTHON) tools/timings.py test_minutes $(MAKE) --no-print-directory -j 3 wheels lint tests-of-a-commit
+
+wheels: setup
+	@$(PYTHON) tools/fetch_wheels.py
 
 test-ui: zip ## the same in a Blender with a window, OpenGL and Vulkan; SESSIONS="session_x" for some
 	tools/window_blender install
@@ -69,8 +73,7 @@ pictures: setup ## draw the documentation's pictures again
 styles: setup ## make hairstyles/ from the recipes, with pictures in out/styles; NAME=x for one
 	$(PYTHON) tools/make_styles.py --pictures $(OUT)/styles $(NAME)
 
-zip: setup ## the extension's zips, one for each build of Blender, into dist/
-	@$(PYTHON) tools/fetch_wheels.py
+zip: wheels ## the extension's zips, one for each build of Blender, into dist/
 	@rm -rf dist && mkdir dist
 	$(PYTHON) tools/make_zips.py dist
 	$(PYTHON) tools/bill_of_materials.py dist/hairloom.cdx.json

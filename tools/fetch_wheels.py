@@ -16,6 +16,7 @@ import os
 import subprocess
 import sys
 import tempfile
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 REPOSITORY = Path(__file__).resolve().parents[1]
@@ -23,6 +24,7 @@ TABLE = REPOSITORY / "tools" / "wheels.sha256"
 FOLDER = REPOSITORY / "wheels"
 #: of Blender 5.2, for packages that ask for no more than any Python 3
 PYTHON = "3.13"
+AT_A_TIME = 4
 
 
 class FetchError(Exception):
@@ -75,14 +77,19 @@ def fetch(name: str, digest: str, folder: Path = FOLDER) -> None:
 
 def main() -> int:
     missing = {n: d for n, d in wanted().items() if not is_there(FOLDER / n, d)}
-    for name, digest in missing.items():
+
+    def fetched(name: str) -> bool:
         print(f"fetch_wheels: {name}", flush=True)
         try:
-            fetch(name, digest)
+            fetch(name, missing[name])
         except (FetchError, OSError) as error:
             print(f"fetch_wheels: {error}", file=sys.stderr)
-            return 1
-    return 0
+            return False
+        return True
+
+    # the network is waited for, not the processor
+    with ThreadPoolExecutor(AT_A_TIME) as pool:
+        return 0 if all(list(pool.map(fetched, missing))) else 1
 
 
 if __name__ == "__main__":

@@ -19,6 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -73,8 +74,13 @@ class HairTextures:
         return replace(self, **pictures)
 
 
+@lru_cache(maxsize=2)
 def hair_textures(settings: TextureSettings, columns: int) -> HairTextures:
-    """Textures of `columns` strips of hair side by side, (height, columns * variant_width)."""
+    """Textures of `columns` strips of hair side by side, (height, columns * variant_width).
+
+    The last ones are kept, as cards are built again for settings that do not concern these; so
+    nobody may write to them.
+    """
     random = np.random.default_rng(settings.seed)
     shape = settings.height, settings.variant_width
     drifts = [strand_drift(random, shape, settings.wander) for _ in range(columns)]
@@ -86,9 +92,10 @@ def hair_textures(settings: TextureSettings, columns: int) -> HairTextures:
     noise = stretched_noise(random, drift / columns, across, settings.sparkle_cells)
     tangent = tangent_map(strand_slope(drift, columns), shift)
     grey = np.repeat(base[..., None], 3, axis=-1)
-    return HairTextures(
-        *(image.astype(np.float32) for image in (grey, alpha, shift, noise, tangent))
-    )
+    images = [image.astype(np.float32) for image in (grey, alpha, shift, noise, tangent)]
+    for image in images:
+        image.setflags(write=False)
+    return HairTextures(*images)
 
 
 def _strip(
