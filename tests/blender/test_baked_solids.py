@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from swinging import thrown
+from tiers import few_in_commits
 
 bpy = pytest.importorskip("bpy", reason="these tests need Blender or the bpy module")
 
@@ -102,7 +103,7 @@ def test_between_two_frames_solids_go_straight(mesh):
     assert solids_between(one, gone, 0.5) is one
 
 
-@pytest.fixture(params=["sphere", "mesh"])
+@pytest.fixture(params=few_in_commits(["sphere", "mesh"]))
 def swinging(request, new_hair, sphere, tmp_path):
     """Hair that falls over the sphere, drawn as cards; the faces of its mesh are flat, so they are
     up to 1.7 mm inside of it."""

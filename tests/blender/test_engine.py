@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tiers import few_in_commits
 
 bpy = pytest.importorskip("bpy", reason="these tests need Blender or the bpy module")
 
@@ -233,8 +234,9 @@ def test_both_eyes_of_a_stereo_camera(stage: Any, tmp_path: Path) -> None:
     assert abs(abs(places[0] - places[1]) - 0.05 / 0.72 * SIZE) < 0.3
 
 
-@pytest.mark.alike
-@pytest.mark.parametrize("aperture", ["circle", "three blades", "narrow", "orthographic"])
+@pytest.mark.parametrize(
+    "aperture", few_in_commits(["circle", "three blades", "narrow", "orthographic"])
+)
 def test_what_is_out_of_focus_is_as_soft_as_in_cycles(
     stage: Any, tmp_path: Path, aperture: str
 ) -> None:

@@ -112,6 +112,7 @@ def test_a_bake_of_both_is_what_was_played_and_the_same_each_time(two):
     assert baked(*two) == first
 
 
+@pytest.mark.slow(instead="test_a_bake_of_one_beside_one_that_is_baked")
 def test_a_bake_of_one_beside_one_at_rest(two):
     """As it is played where the other does not follow the timeline."""
     one, other = two

@@ -7,6 +7,7 @@ import threading
 import bpy
 import numpy as np
 import pytest
+from tiers import few_in_commits
 from waiting import take_steps_until
 
 from hairloom.addon import card_flow
@@ -151,8 +152,9 @@ def test_the_preview_follows_other_hair(shaded, evaluated):
     assert shown(session).mean() > near.mean() + 0.02
 
 
-@pytest.mark.alike
-@pytest.mark.parametrize("way", ["hidden", "left out of renders and views", "deleted"])
+@pytest.mark.parametrize(
+    "way", few_in_commits(["deleted", "hidden", "left out of renders and views"])
+)
 def test_the_preview_follows_other_hair_that_goes_and_comes(shaded, evaluated, way):
     session, strands = shaded
     near, before = shown(session), session.cards.shaded_by

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tiers import few_in_commits
 
 bpy = pytest.importorskip("bpy", reason="these tests need Blender or the bpy module")
 
@@ -94,8 +95,7 @@ def pass_of(found: dict[str, np.ndarray], name: str) -> np.ndarray:
     return np.squeeze(found[f"ViewLayer.{name}"])
 
 
-@pytest.mark.alike
-@pytest.mark.parametrize("lens", ["PERSP", "ORTHO"])
+@pytest.mark.parametrize("lens", few_in_commits(["PERSP", "ORTHO"]))
 def test_depth_motion_and_normals_are_those_of_cycles(
     stage: Any, sphere: Any, thick: Any, tmp_path: Path, lens: str
 ) -> None:
@@ -190,6 +190,7 @@ def test_names_and_coverages_are_those_of_cycles(
         assert np.abs(ours - theirs).mean() < 0.02
 
 
+@pytest.mark.slow(instead="test_a_region_two_grooms_and_two_layers")
 def test_over_cycles_passes_are_of_hair_alone_and_follow_the_view_layer(
     stage: Any, sphere: Any, thick: Any, tmp_path: Path
 ) -> None:

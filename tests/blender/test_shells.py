@@ -85,8 +85,11 @@ def fur_and_shells() -> tuple[Snapshot, Snapshot]:
     return hair, replace(without_strands(hair), cards=made.drawn(shells, settings))
 
 
+@pytest.mark.slow(
+    instead="tests/pure/cards/test_shells.py::test_from_above_layers_cover_what_strands_cover"
+)
 @pytest.mark.draws(light=False)
-@pytest.mark.parametrize("eighth", few_in_commits((0, 4, 1, 2, 3, 5, 6, 7)))
+@pytest.mark.parametrize("eighth", range(8))
 def test_shells_cover_as_much_as_strands_from_eight_sides_in_their_colour(
     gpu_context: Any, fur_and_shells: tuple[Snapshot, Snapshot], eighth: int
 ) -> None:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from grooms_together import Groom, play_frame
-from tiers import few_by_name
+from tiers import few_by_name, few_in_commits
 
 from hairloom.addon.dynamics.clearance import GuideClearance, farthest_kept, guide_clearance
 from hairloom.addon.dynamics.colliders import (
@@ -357,10 +357,12 @@ SLOW_AT_COLLIDERS += (
     "fast plate and finger",
     "head and ball, 8 CVs",
     "combed at a plate and a finger, 8 CVs",
+    "relaxation",
 )
 SLOW_IN_AIR = ("64 CVs", "32 CVs", "blended and held", "half the force fields in wind")
 #: What two others do, each by itself.
 SLOW_IN_AIR += ("held curls", "curls with relaxation", "held at 24 frames a second")
+SLOW_IN_AIR += tuple(f"{kind} field" for kind in KINDS if f"{kind} field" in IN_AIR)
 
 
 @pytest.fixture
@@ -401,7 +403,7 @@ def test_equals_numpy_in_air(make_pass: Any, scene: Scene) -> None:
     assert_equal(scene, make_pass, FREE)
 
 
-@pytest.mark.parametrize("speed", [3.5, 4.0])
+@pytest.mark.parametrize("speed", few_in_commits([3.5, 4.0]))
 def test_equals_numpy_where_a_finger_is_drawn_through_hair(make_pass: Any, speed: float) -> None:
     """All guides meet what goes farther in a substep than a segment is long."""
     grid = np.zeros((6, 16, 3), np.float32)

@@ -254,8 +254,14 @@ BEFORE = ((0.62, -0.78, 0.13), (-0.75, -0.6, -0.28), (-0.9, -0.3, 0.3), (0.98, -
 BEHIND = (-0.62, 0.78, -0.13)
 
 
-@pytest.mark.alike
-@pytest.mark.parametrize(("cycle", "swing"), [(6.3, 0.5), (15.3, 0.5), (40.3, 1.0)])
+@pytest.mark.parametrize(
+    ("cycle", "swing"),
+    [
+        (6.3, 0.5),
+        pytest.param(15.3, 0.5, marks=pytest.mark.slow),
+        pytest.param(40.3, 1.0, marks=pytest.mark.slow),
+    ],
+)
 def test_highlights_on_waves_do_not_flicker(
     frame: Any, monkeypatch: pytest.MonkeyPatch, cycle: float, swing: float
 ) -> None:

@@ -117,7 +117,8 @@ def test_every_end_of_shading(frame: Any, model: str) -> None:
         assert is_dark == ((model, name, value) in DARK), (name, value, mean / typical)
 
 
-@pytest.mark.parametrize("model", few_in_commits(IDENTIFIERS))
+@pytest.mark.slow(instead="test_every_end_of_shading")
+@pytest.mark.parametrize("model", IDENTIFIERS)
 def test_every_end_of_strands(frame: Any, model: str) -> None:
     for name, value in ends(StrandSettings()):
         settings = replace(StrandSettings(), **{name: value})

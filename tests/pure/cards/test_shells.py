@@ -147,7 +147,7 @@ def test_from_above_layers_cover_what_strands_cover(spread: float) -> None:
 
 
 @pytest.mark.parametrize("seed", few_in_commits([0, 1, 2]))
-@pytest.mark.parametrize("count", [700, 2000])
+@pytest.mark.parametrize("count", few_in_commits([700, 2000]))
 def test_sparse_hair_covers_as_much_however_few_strands_a_pattern_has(
     count: int, seed: int
 ) -> None:

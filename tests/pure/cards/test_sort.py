@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from guide_cards import build_cards
+from tiers import few_in_commits
 
 from hairloom.addon.cards.card_mesh import OF_CARDS, OF_VERTICES, CardMesh, joined
 from hairloom.addon.cards.order_check import wrong_fraction
@@ -217,7 +218,7 @@ def nested_cubes(sizes: tuple[float, ...]) -> CardMesh:
     )
 
 
-@pytest.mark.parametrize("by", WAYS)
+@pytest.mark.parametrize("by", few_in_commits(["cards", "pieces", "distance"]))
 def test_nested_cubes_are_exactly_right_from_everywhere(by: SortBy) -> None:
     """Their order is known: front faces from the inside, back faces from the outside."""
     mesh = nested_cubes((1.0, 1.3, 1.6, 1.9))
