@@ -29,7 +29,7 @@ def shadow_figures() -> dict[str, float]:
     head = groom()
     strands = head.strands.astype(np.float64)
     for width, radius in HEAD_RADII.items():
-        of_head = errors(strands, radius, HEAD_SUN, slices=(16,), layers=(4, 8))
+        of_head = errors(strands, radius, HEAD_SUN, slices=(16,), layers=(4, 8, 16))
         name = f"t_error_{head.name.lower()}_{width}"
         found |= {f"{name}_{way}": error for way, error in of_head.items()}
     return found

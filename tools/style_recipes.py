@@ -980,8 +980,6 @@ def undercut(head: Head) -> Any:
             42000, length_variation=0.2, clump=0.15, clump_size=20, frizz=0.006, parting=0.9
         ),
         presets=("dynamics/stiff",),
-        # light from above grazes the side, where coarser layers of shadow show as dark spots
-        volume={"layers": 16},
     )
 
 

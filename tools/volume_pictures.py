@@ -3,8 +3,8 @@
 python tools/volume_pictures.py FOLDER
 
 opacity_error.png: the mean error of T on a ball of combed hair, over the number of slices and of
-deep layers. opacity_slices.png: that ball without shadows, with 15 slices, with 64, and with 8 deep
-layers.
+deep layers. opacity_slices.png: that ball without shadows, with 15 slices, with 64, and with 16
+deep layers.
 """
 
 import importlib

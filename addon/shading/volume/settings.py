@@ -62,11 +62,11 @@ class VolumeSettings(Settings):
         shown_when=when("volume.shadows", "slices"),
     )
     layers: int = integer(
-        8,
+        16,
         label="Layers",
         description="Number of layers behind the first lit hair, each thicker than the previous "
         "one",
-        soft=(4, 16),
+        soft=(4, 32),
         hard=(2, 64),
         source=_YUKSEL,
         shown_when=when("volume.shadows", "deep"),
