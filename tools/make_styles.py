@@ -18,7 +18,7 @@ import bpy
 import gpu
 import numpy as np
 from extension_loader import REPOSITORY, load_package
-from preset_pictures import THUMBNAIL, coarse
+from preset_pictures import THUMBNAIL, write_thumbnail
 from style_growth import Head, of_addon
 from style_recipes import RECIPES
 
@@ -131,7 +131,7 @@ def draw_thumbnail(name: str) -> None:
     picture = studio_of(rig, hair).picture(
         rig.rest_pose, rig.strands.points, *size, camera=camera, is_transparent=True
     )
-    of_addon("blender.base.images").write_png(STYLES / f"{name}.png", coarse(picture))
+    write_thumbnail(STYLES / f"{name}.png", picture)
     print(f"{name}: thumbnail", flush=True)
 
 

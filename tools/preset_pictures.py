@@ -14,6 +14,7 @@ import bpy  # noqa: F401  it must come before gpu, which lives inside it
 import gpu
 import numpy as np
 from extension_loader import PACKAGE, REPOSITORY, load_package
+from PIL import Image
 
 LOOKS = REPOSITORY / "presets" / "looks"
 #: [pixels]; thumbnails are square
@@ -70,6 +71,14 @@ def coarse(picture: Any) -> Any:
     return np.concatenate([colors * alpha, alpha], axis=-1).astype(np.float32)
 
 
+def write_thumbnail(path: Path, picture: Any) -> None:
+    """The picture as a small file: all of them go into the zip."""
+    of_addon("blender.base.images").write_png(path, coarse(picture))
+    with Image.open(path) as written:
+        written.load()
+        written.save(path, optimize=True)
+
+
 def main(folder: Path) -> None:
     gpu.init()
     load_package().register()
@@ -97,7 +106,7 @@ def main(folder: Path) -> None:
         for stage, lights in stages:
             studio.settings = studio.settings.with_settings(look, stage)
             if lights is None:
-                images.write_png(path.with_suffix(".png"), coarse(picture(THUMBNAIL, THUMBNAIL)))
+                write_thumbnail(path.with_suffix(".png"), picture(THUMBNAIL, THUMBNAIL))
             shown = picture(WIDTH, HEIGHT, lights)
             shown[..., :3] += BACKDROP * (1.0 - shown[..., 3:])
             shown[..., 3] = 1.0

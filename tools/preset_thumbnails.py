@@ -14,7 +14,7 @@ import bpy  # noqa: F401  it must come before gpu, which lives inside it
 import gpu
 import numpy as np
 from extension_loader import REPOSITORY, load_package
-from preset_pictures import THUMBNAIL, coarse, of_addon, studio_of, wig
+from preset_pictures import THUMBNAIL, of_addon, studio_of, wig, write_thumbnail
 
 PRESETS, SAMPLES = REPOSITORY / "presets", 2
 #: all hair is blond here: it shows shadows best
@@ -74,7 +74,7 @@ def main(folder: Path) -> None:
             studio.settings, (pose, points) = look_and_motion(presets.named_preset(entry.name))
             size = THUMBNAIL, THUMBNAIL, SAMPLES
             picture = studio.picture(pose, points, *size, is_transparent=True)
-            images.write_png(entry.path.with_suffix(".png"), coarse(picture))
+            write_thumbnail(entry.path.with_suffix(".png"), picture)
             sheet.append(picture)
             print(f"Drew {entry.name}", flush=True)
     images.write_png(folder / "presets.png", images.contact_sheet(sheet, 5))

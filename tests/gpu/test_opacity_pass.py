@@ -342,7 +342,7 @@ def test_strands_that_hide_less_shade_less(
 ) -> None:
     """Half of tau where they hide half; without transparency they hide all."""
     strands, radius = dome(300)
-    settings = VolumeSettings(shadows="deep", resolution=64, strand_fraction=1.0)
+    settings = VolumeSettings(shadows="deep", layers=8, resolution=64, strand_fraction=1.0)
     look = StrandSettings(tip_width=1.0, transparency=transparency, opacity=opacity)
     maps, ball = drawn(strands, radius, LIGHTS["sun"], settings, look)
     frame = light_frame(LIGHTS["sun"], ball)
@@ -475,7 +475,7 @@ def test_hair_that_moves_keeps_its_textures(gpu_context: Any) -> None:
     ball, opacity = ball_around(strands), OpacityPass()
 
     def textures(serial: int, resolution: int) -> set[int]:
-        settings = VolumeSettings(shadows="deep", resolution=resolution)
+        settings = VolumeSettings(shadows="deep", layers=8, resolution=resolution)
         moved = points_of(strands + np.float32(1e-4 * serial), radius)
         light = (LIGHTS["sun"],)
         maps = opacity.maps(moved, serial, layout_of(strands), ball, light, settings, PLAIN)

@@ -83,7 +83,7 @@ class VolumeSettings(Settings):
         shown_when=when("volume.shadows", "deep"),
     )
     bias: float = number(
-        0.001,
+        0.0005,
         label="Bias",
         description="Minimum distance at which strands shade each other, as a fraction of the "
         "hair's size",

@@ -41,7 +41,7 @@ def test_too_large_maps_get_fewer_texels_and_a_note(shadows: str, map_count: int
 
 
 def test_a_small_gpu_sets_the_side() -> None:
-    settings = VolumeSettings(shadows="deep", resolution=2048)
+    settings = VolumeSettings(shadows="deep", layers=8, resolution=2048)
     small = fitted_size(settings, 1, ROOM, largest_side=1024)
     assert small.side == 1024
     note = size_note(settings, 1, ROOM, small)
