@@ -72,10 +72,17 @@ def _draw_painted(
     fields.prop(group, mask.name, text="", icon="GROUP_VERTEX")
 
 
-def draw_idle(layout: bpy.types.UILayout, group: Any, name: str, lack: str) -> None:
+def draw_idle(
+    layout: bpy.types.UILayout, group: Any, name: str, lack: str, *, is_own: bool = True
+) -> None:
     """A field that does not act now, as high as if it did: it says why, and can be set all the
-    same."""
+    same.
+
+    Args:
+        is_own: False: it shows what holds instead, and is not to be set here.
+    """
     layout.active = False
+    layout.enabled = is_own
     known = group.bl_rna.properties[name]
     row = layout.split(factor=_LABEL)
     row.use_property_split = False

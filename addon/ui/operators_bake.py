@@ -95,11 +95,11 @@ def draw_bake(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
     layout.prop(bake, "folder")
     layout.prop(bake, "use_own_range")
     column = layout.column(align=True)
-    for name in ("first", "last"):
+    for name, of_scene in (("first", "frame_start"), ("last", "frame_end")):
         if bake.use_own_range:
             column.prop(bake, name)
         else:
-            draw_idle(column, bake, name, "as the scene")
+            draw_idle(column, bpy.context.scene, of_scene, "as the scene", is_own=False)
     if obj.type == "CURVES":
         layout.prop(bake, "in_renders")
     if not draw_progress(layout, HAIRLOOM_OT_bake):

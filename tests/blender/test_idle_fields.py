@@ -53,19 +53,39 @@ def test_a_field_says_what_it_needs_and_stays_where_it_is(hair):
     assert tips.count("needs Tip Tint") == 3 and "as the hair" in tips
 
 
-def test_a_field_that_is_idle_can_be_set_all_the_same(hair):
+def fields(draw, *arguments):
+    """Whose fields are drawn, and whether they can be set."""
+
     class Fields(Layout):
         drawn = ()
+        enabled = True
 
         def prop(self, data, name, **how):
-            Fields.drawn = (*Fields.drawn, name)
+            Fields.drawn = (*Fields.drawn, (data, name, self.enabled))
             super().prop(data, name, **how)
 
-    hair.data.hairloom.children.method, hair.data.hairloom.children.clump = "multi", 0.0
     layout = Fields([])
     layout._inner = lambda **_: layout
-    drawing.draw_section(layout, hair.data.hairloom, "children")
-    assert "clump_size" in Fields.drawn and "clump_along" in Fields.drawn
+    draw(layout, *arguments)
+    return Fields.drawn
+
+
+def test_a_field_that_is_idle_can_be_set_all_the_same(hair):
+    groom = hair.data.hairloom
+    groom.children.method, groom.children.clump = "multi", 0.0
+    drawn = fields(drawing.draw_section, groom, "children")
+    for name in ("clump_size", "clump_along"):
+        assert (groom.children, name, True) in drawn
+
+
+def test_a_bake_of_the_scenes_frames_shows_those(hair):
+    scene, bake = bpy.context.scene, hair.hairloom.bake
+    drawn = fields(operators_bake.draw_bake, hair)
+    assert {(scene, "frame_start", False), (scene, "frame_end", False)} < set(drawn)
+    assert (bake, "last", True) not in drawn
+    bake.use_own_range = True
+    drawn = fields(operators_bake.draw_bake, hair)
+    assert (bake, "last", True) in drawn and (scene, "frame_end", False) not in drawn
 
 
 def test_buttons_say_why_they_can_do_nothing(hair):
