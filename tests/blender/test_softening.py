@@ -191,7 +191,7 @@ def test_what_moves_slowly_is_not_at_rest_between_its_frames(
     two_views: tuple[views.View, ...], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     pauses: list[float] = []
-    monkeypatch.setattr(softening, "_soon", pauses.append)
+    monkeypatch.setattr(softening, "soon", lambda _, pause: pauses.append(pause))
     for now in (100.0, 100.05, 100.1, 100.6, 101.1, 130.0):
         monkeypatch.setattr(softening.time, "monotonic", lambda now=now: now)
         softening.soften(two_views[0])

@@ -23,7 +23,7 @@ from ...render.strand_layers import is_software
 from ...render.strand_pass import StrandPass
 from ...shading.lights import Light
 from ..base.redraw import redraw_view
-from .views import View, known_views
+from .views import View, known_views, soon
 
 #: [s] for which a view stays as it is before it gets samples; and how far apart draws of one that
 #: moves slowly may be: it is at rest after twice as long
@@ -59,7 +59,7 @@ def soften(view: View) -> None:
     now = time.monotonic()
     pause, view.changed_at = now - view.changed_at, now
     view.wants_more = True
-    _soon(max(_REST, 2.0 * pause) if pause < _SLOW else _REST)
+    soon(_ask, max(_REST, 2.0 * pause) if pause < _SLOW else _REST)
 
 
 def harden(view: View) -> None:
@@ -73,7 +73,7 @@ def harden(view: View) -> None:
 def go_on(view: View) -> None:
     """A view has shown its kept picture: if it waits for samples, a timer runs."""
     if view.wants_more and not bpy.app.timers.is_registered(_ask):
-        _soon(0.0)
+        soon(_ask, 0.0)
 
 
 def forget() -> None:
@@ -91,7 +91,7 @@ def takes_sample(view: View) -> bool:
     if gpu_memory.is_short(_softening.picture.missing_bytes()):
         view.wants_more = False
         _stop()
-        _soon(0.0)
+        soon(_ask, 0.0)
     return view.wants_more
 
 
@@ -140,7 +140,7 @@ def was_sampled(
     if is_as_shown or count >= samples:
         view.wants_more, view.has_all = view.is_doubted, True
         _stop()
-    _soon(0.0)
+    soon(_ask, 0.0)
 
 
 def _stop() -> None:
@@ -149,13 +149,6 @@ def _stop() -> None:
             each.forget_view(name_of(_softening.view))
     _softening.picture.release()
     _softening.view, _softening.is_due, _softening.passes = None, False, ()
-
-
-def _soon(pause: float) -> None:
-    """Ask for a sample this long after the last call."""
-    if bpy.app.timers.is_registered(_ask):
-        bpy.app.timers.unregister(_ask)
-    bpy.app.timers.register(_ask, first_interval=pause)
 
 
 def _ask() -> None:
@@ -172,7 +165,7 @@ def _ask() -> None:
     _softening.view, _softening.is_due = view, True
     if not redraw_view(view.address):
         _leave(view)  # no window shows it
-        _soon(0.0)
+        soon(_ask, 0.0)
 
 
 def _leave(view: View) -> None:

@@ -158,17 +158,17 @@ def was_shown_again(view: View, shading: Any) -> None:
     is_row = view.shown_again >= _ROW or time.monotonic() - view.drawn_at > _LONG
     if shading.type not in STEADY and is_row:
         view.is_again = True
-        _soon(_draw_afresh, _REST)
+        soon(_draw_afresh, _REST)
 
 
 def was_drawn(view: View) -> None:
     """A view was drawn afresh."""
     view.is_again, view.shown_again, view.drawn_at = False, 0, time.monotonic()
     if view.is_behind:
-        _soon(_catch_up, _LAG)
+        soon(_catch_up, _LAG)
 
 
-def _soon(timer: Callable[[], None], pause: float) -> None:
+def soon(timer: Callable[[], None], pause: float) -> None:
     """Once, this long after the last call."""
     if bpy.app.timers.is_registered(timer):
         bpy.app.timers.unregister(timer)
