@@ -112,6 +112,28 @@ def new_head(*, keeps_light: bool = False, **shape: int) -> Any:
     return head
 
 
+def new_fringe(strand_count: int) -> tuple[Any, Any, Any]:
+    """A fringe above a ball, under a sun from above the eye: head, hair and sun."""
+    head = new_head(segments=48, ring_count=24)
+    bpy.ops.object.shade_smooth()
+    group = head.vertex_groups.new(name="Crown")
+    crown = [each.index for each in head.data.vertices if each.co.z > 0.075]
+    group.add(crown, 1.0, "REPLACE")
+    bpy.ops.hairloom.grow(
+        method="normals", lift=1.0, strand_count=strand_count, length=0.08, density_group="Crown"
+    )
+    hair = bpy.context.object
+    hair.name = "Hair"
+    hair.data.hairloom.children.method = "none"
+    hair.data.hairloom.strands.fullness = 3.0
+    bpy.ops.object.light_add(type="SUN", rotation=(np.radians(25.0), 0.0, 0.0))
+    sun = bpy.context.object
+    sun.name, sun.data.energy = "Sun", 4.0
+    bpy.ops.object.select_all(action="DESELECT")
+    bpy.context.view_layer.objects.active = hair
+    return head, hair, sun
+
+
 def hide_floor() -> None:
     """And what else Blender draws over hair and head."""
     overlays = viewport().spaces.active.overlay

@@ -13,7 +13,7 @@ from artist import (
     click,
     hide_floor,
     look_from_front,
-    new_head,
+    new_fringe,
     open_our_sidebar,
     pixels,
     pixels_at_rest,
@@ -42,26 +42,13 @@ def steps():
 def set_the_scene():
     """A fringe above a ball, under a sun from above the eye."""
     bpy.context.scene.render.engine = "BLENDER_EEVEE"
-    head = new_head(segments=48, ring_count=24)
-    bpy.ops.object.shade_smooth()
+    head, hair, _ = new_fringe(3000)
+    hair.select_set(True)
+    hair.data.hairloom.shading.model = "marschner"
     head.data.materials.append(bpy.data.materials.new("Skin"))
     skin = head.data.materials[0].node_tree.nodes["Principled BSDF"].inputs
     skin["Base Color"].default_value = (0.55, 0.38, 0.31, 1.0)
     skin["Specular IOR Level"].default_value = 0.0
-    group = head.vertex_groups.new(name="Crown")
-    crown = [each.index for each in head.data.vertices if each.co.z > 0.075]
-    group.add(crown, 1.0, "REPLACE")
-    bpy.ops.hairloom.grow(
-        method="normals", lift=1.0, strand_count=3000, length=0.08, density_group="Crown"
-    )
-    bpy.context.object.name = "Hair"
-    bpy.context.object.data.hairloom.children.method = "none"
-    bpy.ops.object.light_add(type="SUN", rotation=(np.radians(25.0), 0.0, 0.0))
-    bpy.context.object.data.energy = 4.0
-    bpy.context.view_layer.objects.active = bpy.data.objects["Hair"]
-    bpy.data.objects["Hair"].select_set(True)
-    bpy.data.objects["Hair"].data.hairloom.shading.model = "marschner"
-    bpy.data.objects["Hair"].data.hairloom.strands.fullness = 3.0
     assert volume().shadows == "deep" and volume().on_body
     shading = viewport().spaces.active.shading
     shading.type = "MATERIAL"
@@ -159,7 +146,8 @@ def layers_are_shown():
     assert editor.type == "IMAGE_EDITOR"
     image = editor.spaces.active.image
     # nine tiles: where eight layers start, and they; of few strands they are coarser than asked
-    assert image.size[0] == image.size[1] and image.size[0] % 3 == 0
+    across = int(np.ceil(np.sqrt(1 + volume().layers)))  # with where they start
+    assert image.size[0] == image.size[1] and image.size[0] % across == 0
     assert 64 < image.size[0] // 3 <= 256 + 2
     driver.screenshot("slices")
 

@@ -13,7 +13,7 @@ from artist import (
     changed,
     hide_floor,
     look_from_front,
-    new_head,
+    new_fringe,
     pixels_at_rest,
     press,
     viewport,
@@ -55,23 +55,8 @@ def count_draws():
 def set_the_scene():
     """A fringe above a ball, under a wide sun, in a view that is drawn in the scene's light."""
     bpy.context.scene.render.engine = "BLENDER_WORKBENCH"
-    head = new_head(segments=48, ring_count=24)
-    bpy.ops.object.shade_smooth()
-    group = head.vertex_groups.new(name="Crown")
-    crown = [each.index for each in head.data.vertices if each.co.z > 0.075]
-    group.add(crown, 1.0, "REPLACE")
-    bpy.ops.hairloom.grow(
-        method="normals", lift=1.0, strand_count=2000, length=0.08, density_group="Crown"
-    )
-    bpy.context.object.name = "Hair"
-    bpy.context.object.data.hairloom.children.method = "none"
-    bpy.ops.object.light_add(type="SUN", rotation=(np.radians(25.0), 0.0, 0.0))
-    bpy.context.object.name = "Sun"
-    bpy.context.object.data.energy, bpy.context.object.data.angle = 4.0, np.radians(20.0)
-    hair = bpy.data.objects["Hair"]
-    bpy.context.view_layer.objects.active = hair
-    bpy.ops.object.select_all(action="DESELECT")
-    hair.data.hairloom.strands.fullness = 3.0
+    _, _, sun = new_fringe(2000)
+    sun.data.angle = np.radians(20.0)
     shading = viewport().spaces.active.shading
     shading.type = "RENDERED"
     shading.use_scene_lights_render = shading.use_scene_world_render = True
