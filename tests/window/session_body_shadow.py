@@ -145,10 +145,10 @@ def layers_are_shown():
     editor = windows[-1].screen.areas[0]
     assert editor.type == "IMAGE_EDITOR"
     image = editor.spaces.active.image
-    # nine tiles: where eight layers start, and they; of few strands they are coarser than asked
-    across = int(np.ceil(np.sqrt(1 + volume().layers)))  # with where they start
+    # tiles: where layers start, and they; of few strands they are coarser than asked
+    across = int(np.ceil(np.sqrt(1 + volume().layers)))
     assert image.size[0] == image.size[1] and image.size[0] % across == 0
-    assert 64 < image.size[0] // 3 <= 256 + 2
+    assert 64 < image.size[0] // across <= 256 + 2
     driver.screenshot("slices")
 
 
