@@ -146,9 +146,11 @@ def layers_are_shown():
     assert editor.type == "IMAGE_EDITOR"
     image = editor.spaces.active.image
     # tiles: where layers start, and they; of few strands they are coarser than asked
-    across = int(np.ceil(np.sqrt(1 + volume().layers)))
-    assert image.size[0] == image.size[1] and image.size[0] % across == 0
-    assert 64 < image.size[0] // across <= 256 + 2
+    tiles = 1 + volume().layers
+    columns = int(np.ceil(np.sqrt(tiles)))
+    pitch, rest = divmod(image.size[0], columns)
+    assert rest == 0 and image.size[1] == -(-tiles // columns) * pitch
+    assert 64 < pitch <= 256 + 2
     driver.screenshot("slices")
 
 
