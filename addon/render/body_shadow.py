@@ -39,13 +39,12 @@ _RECIPE = ShaderRecipe(
     inputs=(("VEC3", "position"), ("VEC3", "normal")),
     varyings=(("smooth", "VEC3", "mesh_point"), ("smooth", "VEC3", "mesh_normal")),
     outputs=(("VEC4", "color"),),
-    defines=(("SAMPLED", 0),),
 )
 _SAMPLED_RECIPE = replace(
     _RECIPE,
     name="body_shadow_sample",
+    fragment="body_shadow_sample.frag.glsl",
     images=(("RGBA32F", "taken_and_all", "READ_WRITE"),),
-    defines=(("SAMPLED", 1),),
 )
 
 

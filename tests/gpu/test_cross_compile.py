@@ -76,13 +76,14 @@ ALL = (
     "tests/gpu/test_shadow_lights.py::test_a_lamp_amidst_the_hair_leaves_the_shadows_of_others_as_they_are",
     "tests/gpu/test_shafts_pass.py::test_a_background_comes_under_what_was_drawn_over_nothing",
     "tests/gpu/test_shafts_pass.py::test_the_shaders_are_the_reference",
+    "tests/gpu/test_soft_picture.py::test_one_sample_is_what_is_hard",
     "tests/gpu/test_skin_pass.py::test_without_softness_the_shadow_is_that_of_other_meshes",
     "tests/gpu/test_uneven_strands.py::test_both_at_once_are_both_alone",
     "tests/gpu/test_uneven_strands.py::test_few_points_are_the_same_curves_as_many",
     "tests/gpu/test_uneven_strands.py::test_tint_and_taper_go_by_length_however_points_are_spaced",
 )
 #: programs that Metal is never given: what their names begin with. What moves is counted for layers
-#: alone, which Metal does not draw.
+#: alone, which Metal does not draw; nor does a view without layers take samples.
 NOT_ON_METAL = (
     "probe",
     "detail_demand",
@@ -91,6 +92,7 @@ NOT_ON_METAL = (
     "strand_gather",
     "strand_count",
     "strand_layers_order",
+    "body_shadow_sample",
 )
 #: of Direct3D, which Blender does not draw by: it lays out constants otherwise, and has no points
 NOT_IN_HLSL = ("cannot be expressed with either HLSL packing", "Unsupported builtin in HLSL: 1")

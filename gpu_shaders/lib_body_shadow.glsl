@@ -1,0 +1,36 @@
+// How much of the light on a matt body hair takes, as it is seen on the screen.
+//
+// What a colour of the picture becomes depends on its view transform; skin stands for all. Reads what both
+// recipes of body_shadow.py have: view, lights, maps, body_color, hair_forward.
+#include "lib_lights.glsl"
+#include "lib_environment.glsl"
+#include "lib_shadows.glsl"
+#include "lib_output.glsl"
+
+const float NO_LIGHT = {{no_light}};
+
+// Brightness on the screen of a matt body in this light.
+float shown(vec3 radiance)
+{
+  vec3 written = output_encoded(body_color * radiance, {{output_viewport}});
+  return dot(written, vec3(0.2126, 0.7152, 0.0722));
+}
+
+// Brightness on the screen at a place of a mesh: x with all light, y with what hair leaves of it. Where
+// there is no light at all hair takes none.
+vec2 all_and_left(vec3 point, vec3 normal)
+{
+  vec3 to_eye = view.eye.xyz - view.eye.w * point;
+  normal = dot(normal, to_eye) < 0.0 ? -normal : normal;
+  vec3 all_light = matt_light(lights, normal);
+  vec3 left = all_light;
+  for (int index = 0; index < int(lights.ambient_and_count.w); index++) {
+    vec3 to_light, irradiance;
+    light_at(lights, index, point, to_light, irradiance);
+    vec3 path = shadow_path_to_mesh(index, point, normal);
+    vec3 arriving = irradiance * max(0.0, dot(normal, to_light)) / LIGHT_PI;
+    all_light += arriving * path.z;
+    left += arriving * light_left(path, hair_forward);
+  }
+  return vec2(shown(all_light), shown(left)) + NO_LIGHT;
+}
