@@ -15,7 +15,7 @@ from _sight_grooms import rig_of, scaled
 
 from hairloom.addon.blender.sessions.prepared_groom import PreparedGroom
 from hairloom.addon.blender.sessions.snapshots import snapshot_of
-from hairloom.addon.groom.widths import _found
+from hairloom.addon.groom.widths import with_widths
 from hairloom.addon.render.camera import Camera, frame_camera
 from hairloom.addon.render.frame import render_image
 from hairloom.addon.render.snapshot import MeshSnapshot, Snapshot
@@ -64,7 +64,7 @@ def _width(rig: Rig) -> float:
 
 def _apart(rig: Rig) -> float:
     """How many times as wide strands would be, if they touched."""
-    return _found(rig.strands).spacing / _width(rig)
+    return with_widths(rig.strands, "found")[1].spacing / _width(rig)
 
 
 def _pixels_per_metre(rig: Rig, camera: Camera) -> float:

@@ -221,10 +221,7 @@ class _Hair:
         """Args:
         number: see `with_widths`. kept: of the strands that were measured last by this name.
         """
-        number = np.arange(strands.strand_count) if number is None else number
-        last = number[-1] if len(number) else 0
-        wanted = np.linspace(0, last, min(len(number), _SAMPLES)).astype(np.int64)
-        chosen = np.unique(np.searchsorted(number, wanted))
+        chosen = _some(np.arange(strands.strand_count) if number is None else number)
 
         def measured(at: Ints, where: str) -> _Measured:
             return _Measured(strands.points[at], chosen, kept, f"{name}, {where}")
@@ -325,8 +322,24 @@ def _evened(spacing: Floats) -> Floats:
     return evened
 
 
+def _some(number: Ints) -> Ints:
+    """Which strands are measured, of these numbers: all, or one out of each of as many steps.
+
+    Out of each step by chance, for hair may stand in rows.
+    """
+    if len(number) <= _SAMPLES:
+        return np.arange(len(number))
+    step = (number[-1] + 1) / _SAMPLES
+    wanted = (np.arange(_SAMPLES) + np.random.default_rng(0).random(_SAMPLES)) * step
+    return np.unique(np.searchsorted(number, wanted.astype(np.int64)))
+
+
 class _Measured:
-    """Places of strands (strand_count, 3) [m], some of which are measured.
+    """Places of strands (strand_count, 3) [m], some of which are measured among themselves.
+
+    So a groom has the same widths by all of its strands as by a part of them. Among all strands
+    more would lie deeper, not only closer: the hundredth part of a ponytail is as wide apart as on
+    an area, and all of it as in a volume.
 
     Args:
         chosen: those that are; what they are the others get from the nearest of these.
@@ -335,11 +348,11 @@ class _Measured:
 
     def __init__(self, places: Floats, chosen: Ints, kept: Kept, name: str) -> None:
         self._places, self._chosen, self._kept, self._name = places, chosen, kept, name
-        self._found: tuple[Ints, Floats] | None = None
+        self._measured = places[chosen]
 
     def border(self) -> Floats:
         """How near those that are measured are to where the hair ends, see `nearness_to_border`."""
-        return nearness_by(self._places[self._chosen], self._places, *self._around(AROUND))
+        return nearness_by(self._measured, self._measured, *self._around)
 
     def spacing(self) -> Floats:
         """How far strands are from their neighbours here, (strand_count,) [m].
@@ -347,14 +360,13 @@ class _Measured:
         It is the side of the square that a strand has for itself if its neighbours are spread
         evenly.
         """
-        neighbours = min(_NEIGHBOURS, len(self._places) - 1)
-        if not neighbours:
+        neighbours = min(_NEIGHBOURS, len(self._measured) - 1)
+        if neighbours < 1:
             return np.zeros(len(self._places))
-        measured = self._places[self._chosen]
-        reach = self._around(neighbours + 1)[1][:, neighbours]
-        count = min(_NEIGHBOURS, len(self._chosen))
-        around, _ = self._kept.nearest(f"{self._name}, around", measured, measured, count)
-        return self.spread(np.median((np.sqrt(np.pi / neighbours) * reach)[around], axis=1))
+        index, distance = self._around
+        share = len(self._measured) / len(self._places)
+        side = np.sqrt(np.pi * share / neighbours) * distance[:, neighbours]
+        return self.spread(np.median(side[index[:, :_NEIGHBOURS]], axis=1))
 
     def spread(self, values: Floats) -> Floats:
         """Values of the chosen strands, of all strands those of the nearest of these."""
@@ -363,18 +375,16 @@ class _Measured:
         spread: Floats = values[self._nearest]
         return spread
 
-    def _around(self, count: int) -> tuple[Ints, Floats]:
-        """The nearest places of those that are measured, at least as many if there are."""
-        if self._found is None or self._found[0].shape[1] < min(count, len(self._places)):
-            measured = self._places[self._chosen]
-            self._found = self._kept.nearest(f"{self._name}, reach", measured, self._places, count)
-        return self._found
+    @cached_property
+    def _around(self) -> tuple[Ints, Floats]:
+        """The nearest of those that are measured of each of them, itself first."""
+        name, count = f"{self._name}, around", max(AROUND, _NEIGHBOURS + 1)
+        return self._kept.nearest(name, self._measured, self._measured, count)
 
     @cached_property
     def _nearest(self) -> Ints:
         """Of those that are measured, for each place."""
-        measured = self._places[self._chosen]
-        near, _ = self._kept.nearest(f"{self._name}, all", self._places, measured, 1)
+        near, _ = self._kept.nearest(f"{self._name}, all", self._places, self._measured, 1)
         return near[:, 0]
 
 

@@ -62,9 +62,32 @@ def test_few_strands_take_as_much_light_as_many() -> None:
     for count in (2000, 20_000, 40_000):
         strands, widths = with_widths(head_of_hair(count))
         spacing = np.sqrt(AREA / count)
-        assert 2.0 * strands.radius.max() <= 0.25 * spacing * 1.3, "a quarter of the spacing"
+        wide = 2.0 * np.percentile(strands.radius, 95.0)  # some are apart by chance
+        assert wide <= 0.25 * spacing * 1.3, "a quarter of the spacing"
         taken.append(count * 2.0 * strands.radius.mean() * widths.extinction)
     np.testing.assert_allclose(taken, taken[-1], rtol=0.06)
+
+
+def test_a_part_of_a_groom_is_as_wide_as_all_of_it_even_where_it_lies_deep() -> None:
+    """A ponytail: its strands leave a disk and fill a volume, where more of them lie deeper."""
+    rng, count = np.random.default_rng(2), 30_000
+    root = np.sqrt(rng.random((count, 1))) * 0.02
+    turn = rng.random((count, 1)) * 2.0 * np.pi
+    root = np.concatenate([root * np.cos(turn), root * np.sin(turn), np.zeros((count, 1))], axis=1)
+    tip = root * 2.0 + rng.random((count, 3)) * np.array([0.0, 0.0, 0.3])
+    points = root[:, None] + np.linspace(0.0, 1.0, 4)[:, None] * (tip - root)[:, None]
+    all_of_it = StrandSet(
+        points.reshape(-1, 3),
+        np.arange(count + 1) * 4,
+        np.full(4 * count, 4e-5),
+        np.zeros(count),
+        has_widths=False,
+    )
+    part = all_of_it.take(np.sort(rng.permutation(count)[: count // 10]))
+    taken = [
+        each.strand_count * with_widths(each, "found")[1].median for each in (part, all_of_it)
+    ]
+    np.testing.assert_allclose(taken[0], taken[1], rtol=0.1)
 
 
 def test_hairs_fill_the_space_between_strands_that_are_found_to_stand_for_them() -> None:
