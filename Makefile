@@ -19,6 +19,7 @@ demo: setup ## the whole way on a groom: GROOM=x.tfx HEAD=x.obj COLLIDER=x.obj O
 lint: setup
 	.venv/bin/ruff check .
 	.venv/bin/ruff format --check .
+	@mkdir -p out/typed && ln -sfn ../.. out/typed/hairloom
 	.venv/bin/mypy
 
 # What draws comes first: its tests are the longest, and none is to be left over at the end.

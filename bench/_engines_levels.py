@@ -98,18 +98,18 @@ def _of(name: str, site: Path) -> dict[str, float]:
     worst: dict[str, float] = {}
     for number, switch in enumerate(drawn):
         rows = []
-        for without, fine, coarse, moved, *fading in switch:
+        for without, fine, coarse, moved, before, after in switch:
             covered = [np.abs(each - without).max(axis=-1) > SEEN for each in (fine, coarse)]
             is_hair = covered[0] | covered[1]
             figures = {
-                "pop_flip": _flip(*fading, is_hair),
+                "pop_flip": _flip(before, after, is_hair),
                 "at_once_flip": _flip(fine, coarse, is_hair),
                 "moved_flip": _flip(fine, moved, is_hair),
                 "light_percent": 100.0 * abs(coarse[is_hair].sum() / fine[is_hair].sum() - 1.0),
                 "area_percent": 100.0 * abs(covered[1].sum() / covered[0].sum() - 1.0),
             }
             worst = {key: max(float(value), worst.get(key, 0.0)) for key, value in figures.items()}
-            rows.append(np.hstack([fine, coarse, fading[1], np.abs(fine - coarse)]))
+            rows.append(np.hstack([fine, coarse, after, np.abs(fine - coarse)]))
         sheet = np.vstack(rows)[::-1]
         opaque = np.dstack([sheet, np.ones_like(sheet[..., :1])])
         write_png(OUTPUT / f"{name}_{number}.png", opaque)

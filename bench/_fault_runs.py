@@ -15,6 +15,7 @@ import re
 import resource
 import shutil
 import signal
+import subprocess
 import tempfile
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -28,7 +29,7 @@ from damaged_files import sample
 from hairloom.addon.blender.bakes.cache import Cache, CacheWriter, Facts
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.exchange.alembic.groom_alembic import write_groom_alembic
-from hairloom.addon.exchange.files import child_process, moving, subprocess_reader
+from hairloom.addon.exchange.files import moving, subprocess_reader
 from hairloom.addon.exchange.files.atomic import write_text_atomic
 from hairloom.addon.exchange.files.file_set import kept_aside, written_together
 from hairloom.addon.exchange.files.stale_temp_files import remove_stale_files
@@ -44,7 +45,7 @@ NOBODY = 65534
 #: Files to be read are made once.
 SOURCES = Path(tempfile.gettempdir()) / f"hairloom-fault-sources-{os.getpid()}"
 #: what the calls that faults happen at are
-CALLS = (("replace", moving.os), ("fsync", moving.os), ("link", os))
+CALLS = (("replace", os), ("fsync", os), ("link", os))
 FAULTS = ("full", "read-only", "killed", "vanishes", "fails", "another", "memory", "child")
 WINDOWS = ("held", "held for a moment", "no links")
 
@@ -347,7 +348,7 @@ def _memory(at: int, _path: Path, _verb: Verb, _random: Any) -> Iterator[None]:
 @contextlib.contextmanager
 def _child(_at: int, _path: Path, _verb: Verb, _random: Any) -> Iterator[None]:
     """The process that reads is killed, as by a system that is short of memory."""
-    ended = child_process.subprocess.CompletedProcess([], -9, b"", b"")
+    ended = subprocess.CompletedProcess([], -9, b"", b"")
     with mock.patch.object(subprocess_reader, "run_child", lambda *_, **__: ended):
         yield
 
@@ -364,7 +365,7 @@ def _held(at: int, path: Path, _verb: Verb, random: Any) -> Iterator[None]:
             raise PermissionError(errno.EACCES, "Access is denied", str(source), None, str(target))
         real(source, target)
 
-    with mock.patch.object(moving.os, "replace", replace):
+    with mock.patch.object(os, "replace", replace):
         yield
 
 
@@ -381,7 +382,7 @@ def _held_for_a_moment(at: int, _path: Path, _verb: Verb, _random: Any) -> Itera
     with (
         mock.patch.object(moving, "PATIENCE", 10.0),
         mock.patch.object(moving, "_PAUSE", 0.0005),
-        mock.patch.object(moving.os, "replace", replace),
+        mock.patch.object(os, "replace", replace),
     ):
         yield
 

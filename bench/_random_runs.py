@@ -326,8 +326,8 @@ def _solid(random: np.random.Generator) -> Collider:
     if kind == 0:
         return SphereCollider(random.normal(0.0, 0.05, 3), size)
     if kind == 1:
-        ends = random.normal(0.0, 0.15, (2, 3)) * random.choice([0.0, 1.0])
-        return CapsuleCollider(*ends, size)
+        start, end = random.normal(0.0, 0.15, (2, 3)) * random.choice([0.0, 1.0])
+        return CapsuleCollider(start, end, size)
     if kind == 2:
         count = int(random.integers(1, 30))
         return SphereSetCollider(random.normal(0.0, 0.1, (count, 3)), size * random.random(count))

@@ -65,7 +65,7 @@ class Shake:
             earlier, before = before, now
 
     def _carried(self, x: float) -> np.ndarray:
-        return self.grid + np.float32([x, 0.0, 0.0])
+        return self.grid + np.array([x, 0.0, 0.0], np.float32)
 
     def _drive(self, targets: tuple[np.ndarray | None, ...], places: list[float]) -> Drive:
         """Of the last two or three places of the head."""

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import _shading_ball as ball
 import numpy as np
+from _shading_cycles import BLOND
 from _shading_room import CyclesRoom
 from hair_ball import ball_mesh, combed_strands
 
@@ -24,9 +25,9 @@ FRONT = (0.45, 0.5, 0.8)
 ROWS = {
     "black": (ball.BLACK, FRONT),
     "brown": ((0.63, 1.12, 2.4), FRONT),
-    "blond": (ball.BLOND, FRONT),
+    "blond": (BLOND, FRONT),
     "white": ((0.01, 0.01, 0.01), FRONT),
-    "blond_side": (ball.BLOND, (-1.0, 0.3, 0.1)),
+    "blond_side": (BLOND, (-1.0, 0.3, 0.1)),
 }
 #: each column's share of the stand-ins, and its shadows
 COLUMNS = {

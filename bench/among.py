@@ -220,7 +220,7 @@ def halves() -> dict[str, object]:
     away: dict[str, list[float]] = {"": [], "_without": []}
     for frame in range(round(FPS)):
         x = 0.05 * np.sin(2.0 * np.pi * (frame + 1) / FPS)
-        target = grid + np.float32([x, 0.0, 0.0])
+        target = grid + np.array([x, 0.0, 0.0], np.float32)
         play_frame(whole, [target], 1.0 / FPS)
         for end, grooms, near in (("", cut, None), ("_without", unfelt, [none, none])):
             play_frame(grooms, [target[0::2], target[1::2]], 1.0 / FPS, near)
@@ -277,7 +277,7 @@ def cost_of_two(form: str, grid: np.ndarray, rounds: int) -> float:
             grooms = [Groom(grid[part], settings, make_pass=make) for part in parts]
             took = []
             for frame in range(frames):
-                target = grid + np.float32([0.01 * np.sin(frame), 0.0, 0.0])
+                target = grid + np.array([0.01 * np.sin(frame), 0.0, 0.0], np.float32)
                 begin = time.perf_counter()
                 play_frame(grooms, [target[part] for part in parts], 1.0 / FPS)
                 for groom in grooms:

@@ -10,9 +10,10 @@ tools/bench.py contacts thin compute     some parts (thin, sintel, built_in), on
 
 from __future__ import annotations
 
+import dataclasses
 import sys
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -59,7 +60,7 @@ class Depths:
     surface: Surface
     field: DistanceField
     inside_at_rest: np.ndarray
-    worst: dict[str, float] = field(default_factory=dict)
+    worst: dict[str, float] = dataclasses.field(default_factory=dict)
 
     @classmethod
     def of(cls, grid: np.ndarray, surface: Surface) -> Depths:
@@ -298,7 +299,7 @@ def eared_ball() -> tuple[Surface, np.ndarray]:
     ball = revolved(
         np.array([(-0.1 * np.cos(a), 0.1 * np.sin(a)) for a in np.linspace(0.0, np.pi, 32)]), 48
     )
-    ball = Surface(ball.positions + np.float32([0.0, 0.0, -0.11]), ball.triangles)
+    ball = Surface(ball.positions + np.array([0.0, 0.0, -0.11], np.float32), ball.triangles)
     share = np.linspace(0.0, 1.0, 12)
     half = 0.002 * np.sqrt(1.0 - share**2)
     bowl = 0.006 * share**2

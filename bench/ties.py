@@ -124,10 +124,10 @@ def draw(tail: Ponytail, shown: list, path: Path) -> None:
     settings = GroomSettings().with_settings(DetailSettings(lod_height=0.0))
     groom = prepared(tail.rig, AmbientSettings())
     studio = Studio(groom, settings, look=tail.bust.look("light"))
-    points = tail.rig.strands.points
-    box = points.min(axis=0) - 0.03, points.max(axis=0) + 0.03
+    rest = tail.rig.strands.points
+    box = rest.min(axis=0) - 0.03, rest.max(axis=0) + 0.03
     camera = frame_camera(box, (-0.9, 0.9, 0.25), FIELD_OF_VIEW, 320 / 360)
-    pictures = [studio.picture(*moment, 320, 360, 2, camera) for moment in shown[:12]]
+    pictures = [studio.picture(pose, points, 320, 360, 2, camera) for pose, points in shown[:12]]
     images.write_png(path, images.contact_sheet(pictures, 4))
 
 

@@ -110,7 +110,7 @@ def passes_of(scene: Any, path: Path) -> dict[str, Any]:
     while file.seek_subimage(len(found), 0):
         spec = file.spec()
         pixels = file.read_image(len(found), 0, 0, spec.nchannels, "float")
-        found[spec.channelnames[0].split(".")[1]] = pixels[::-1]
+        found[spec.channelnames[0].split(".")[1]] = np.asarray(pixels)[::-1]
     file.close()
     return found
 

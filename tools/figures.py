@@ -96,8 +96,8 @@ def measure(names: list[str]) -> int:
     if is_all:
         write(kept | {"minutes": round(minutes, 1)})
     print(f"{minutes:.1f} minutes; see docs/figures.md")
-    found = [kept["benches"][name] for name in names]
-    is_missed = any(not each["ended"] or each["missed"] for each in found)
+    asked = [kept["benches"][name] for name in names]
+    is_missed = any(not each["ended"] or each["missed"] for each in asked)
     return int(is_missed or (is_all and minutes > MAX_MINUTES))
 
 

@@ -36,14 +36,14 @@ BUILDS = [
 
 def extension_tool() -> Path:
     """Blender's packager, as it comes with the module bpy."""
-    (spec,) = importlib.util.find_spec("bpy").submodule_search_locations  # type: ignore[union-attr]
+    (spec,) = importlib.util.find_spec("bpy").submodule_search_locations
     return next(Path(spec).glob("*/scripts/addons_core/bl_pkg/cli/blender_ext.py"))
 
 
 def packager() -> Any:
     """The same as a module, which decides which wheels fit."""
     loader = SourceFileLoader("blender_ext", str(extension_tool()))
-    module = importlib.util.module_from_spec(importlib.util.spec_from_loader(loader.name, loader))  # type: ignore[arg-type]
+    module = importlib.util.module_from_spec(importlib.util.spec_from_loader(loader.name, loader))
     sys.modules[loader.name] = module
     loader.exec_module(module)
     return module

@@ -364,8 +364,8 @@ class _Measured:
         if neighbours < 1:
             return np.zeros(len(self._places))
         index, distance = self._around
-        share = len(self._measured) / len(self._places)
-        side = np.sqrt(np.pi * share / neighbours) * distance[:, neighbours]
+        fraction = len(self._measured) / len(self._places)
+        side = np.sqrt(np.pi * fraction / neighbours) * distance[:, neighbours]
         return self.spread(np.median(side[index[:, :_NEIGHBOURS]], axis=1))
 
     def spread(self, values: Floats) -> Floats:
