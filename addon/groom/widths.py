@@ -52,7 +52,7 @@ _ALONE = 1.0 / 500.0
 #: this part of the spacing of strands.
 _TOO_THIN, _TOO_WIDE, _TOO_NEAR = 0.25, 2.0, 0.5
 #: Strands whose neighbours are looked at, and how many neighbours.
-_SAMPLES, _NEIGHBOURS = 1500, 8
+_SAMPLES, _NEIGHBOURS = 3000, 8
 #: Where hair ends it is finer by this part.
 _FINER = 0.4
 #: Narrowest and widest of a groom's strands in terms of the median.

@@ -85,7 +85,7 @@ def test_a_part_of_a_groom_is_as_wide_as_all_of_it_even_where_it_lies_deep() -> 
     )
     part = all_of_it.take(np.sort(rng.permutation(count)[: count // 10]))
     taken = [each.strand_count * with_widths(each, "found")[1].median for each in (part, all_of_it)]
-    np.testing.assert_allclose(taken[0], taken[1], rtol=0.1)
+    np.testing.assert_allclose(taken[0], taken[1], rtol=0.15)
 
 
 def test_hairs_fill_the_space_between_strands_that_are_found_to_stand_for_them() -> None:
