@@ -1,6 +1,6 @@
 """Makes what comes from the code: tables of parameters and verbs, the figure of the flows, the
-texts to translate, the page of the gallery, the index of the decisions, the shading of cards in
-HLSL, the figures that pages quote, the pictures.
+texts to translate, the page of the gallery, the table of hairstyles, the index of the decisions,
+the shading of cards in HLSL, the figures that pages quote, the pictures.
 
 python tools/make_docs.py [--check | --pictures]
 
@@ -23,6 +23,7 @@ import figures
 import flow_figure
 import gallery
 import hair_hlsl
+import hairstyle_table
 from extension_loader import PACKAGE, REPOSITORY, load_package
 from small_pictures import write_small
 
@@ -109,6 +110,8 @@ def main() -> int:
     gallery.PAGE.write_text(gallery.page(), encoding="utf-8")
     decisions = decisions_index.PAGE.read_text(encoding="utf-8")
     decisions_index.PAGE.write_text(decisions_index.with_index(decisions), encoding="utf-8")
+    hairstyles = hairstyle_table.PAGE.read_text(encoding="utf-8")
+    hairstyle_table.PAGE.write_text(hairstyle_table.with_table(hairstyles), encoding="utf-8")
     figures.write_quotes()
     if chosen.pictures:
         make_pictures()

@@ -6,6 +6,7 @@ import re
 from pathlib import Path
 
 import decisions_index
+import hairstyle_table
 import make_docs
 import pytest
 
@@ -148,6 +149,12 @@ def test_a_file_is_named_by_its_whole_path() -> None:
     named = files_named_in(text) + folders_named_in(text)
     assert named == ["step.py", "dynamics/step.py", "lib_dual.glsl", "addon/dynamics/"]
     assert [is_there(name, page) for name in named] == [False, True, False, True]
+
+
+def test_the_table_of_hairstyles_is_that_of_their_files() -> None:
+    text = hairstyle_table.PAGE.read_text(encoding="utf-8")
+    assert hairstyle_table.table() in text, "run make docs"
+    assert hairstyle_table.with_table(text.replace("45,000", "44,000")) == text
 
 
 def test_decisions_have_a_number_a_day_a_status_and_a_topic() -> None:
