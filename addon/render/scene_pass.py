@@ -46,10 +46,13 @@ class ShaftsApart:
 
     light: RGBA32F texture of the picture's size that gets them.
     behind: the picture that is seen through the holes, see BrightThings; None: nothing is.
+    shows_world: the world is in that picture, so that its bright places are bright things and no
+        lights as well.
     """
 
     light: Any
     behind: Any = None
+    shows_world: bool = False
 
 
 def shafts_of(scene: SceneSnapshot) -> ShaftSettings | None:
@@ -117,7 +120,10 @@ class ScenePass:
             apart.light.clear(format="FLOAT", value=_NOTHING)
             if shafts is not None:
                 into, behind = apart.light, apart.behind or plain(sky)
-                shafts_apart(into, color, depth, behind, camera, scene.lights, shafts)
+                lights = [
+                    each for each in scene.lights if not (apart.shows_world and each.of_world)
+                ]
+                shafts_apart(into, color, depth, behind, camera, lights, shafts)
         elif shafts is not None:
             finish_with_shafts(color, color, depth, camera, scene.lights, shafts, sky)
 

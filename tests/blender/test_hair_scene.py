@@ -20,6 +20,7 @@ from engine_stage import set_world  # noqa: E402
 from hairloom.addon.blender.engine import engine_picture, hair_scene  # noqa: E402
 from hairloom.addon.blender.properties.properties import settings_of  # noqa: E402
 from hairloom.addon.shading.bright_shafts import bright_shafts, shaft_length  # noqa: E402
+from hairloom.addon.shading.environment import panorama_directions  # noqa: E402
 from hairloom.addon.shading.shafts_settings import ShaftSettings  # noqa: E402
 from hairloom.addon.strands import StrandSet  # noqa: E402
 
@@ -401,6 +402,48 @@ def test_a_window_throws_the_shafts_of_the_reference_cut_by_the_hair(
     assert 0.1 < added.max() < 1.0
     assert np.abs(found - expected)[..., :3].mean() < 0.02 * added.mean()
     assert np.abs(found - expected)[..., :3].max() < 0.05
+
+
+@pytest.mark.slow(instead="test_a_lamp_throws_shafts_over_cycles_and_a_mesh_cuts_them")
+def test_a_bright_place_of_the_world_throws_shafts_once(
+    cycles: Any, hairy: Any, tmp_path: Path
+) -> None:
+    """It is a light as well, which counts where a transparent film hides the world."""
+    cycles.hairloom.use_hair_scene = True
+    _set_spot(cycles.world)
+    shafts = hairy.data.hairloom.shafts
+
+    def added(*sources: str) -> list[np.ndarray]:
+        shafts.use_shafts, found = False, []
+        without = rendered(tmp_path)
+        for source in sources:
+            shafts.use_shafts, shafts.source = True, source
+            found.append((rendered(tmp_path) - without)[..., :3])
+        return found
+
+    of_bright, of_both, of_lights = added("bright", "both", "lights")
+    assert of_bright.max() > 0.1 < of_lights.max()
+    np.testing.assert_allclose(of_both, of_bright, atol=1e-4)
+    cycles.render.film_transparent = True
+    (hidden,) = added("both")
+    assert np.abs(hidden - of_lights).mean() < 0.1 * of_lights.mean()
+
+
+def _set_spot(world: Any) -> None:
+    """A grey world with a small bright place beside the ball, as the camera sees them."""
+    directions, _ = panorama_directions(64, 128)
+    is_spot = directions @ np.array([0.34, 0.94, 0.0]) > np.cos(np.radians(2.5))
+    pixels = np.ones((64, 128, 4), np.float32)
+    pixels[..., :3] = np.where(is_spot, 400.0, 0.05)[..., None]
+    image = bpy.data.images.new("Spot", 128, 64, float_buffer=True)
+    image.colorspace_settings.name = "Linear Rec.709"
+    image.pixels.foreach_set(pixels.ravel())
+    image.pack()
+    tree = world.node_tree
+    node = tree.nodes.new("ShaderNodeTexEnvironment")
+    node.image = image
+    background = next(each for each in tree.nodes if each.type == "BACKGROUND")
+    tree.links.new(node.outputs["Color"], background.inputs["Color"])
 
 
 @pytest.mark.slow(instead="test_the_scene_is_as_it_was_after_the_render_and_after_turning_off")

@@ -188,7 +188,8 @@ class Still:
         if seen is None:
             self.warnings = (*self.warnings, _UNSEEN)
             return ShaftsApart(light)
-        return ShaftsApart(light, texture_from(seen, "RGBA32F"))
+        shows_world = not behind.render.film_transparent
+        return ShaftsApart(light, texture_from(seen, "RGBA32F"), shows_world)
 
     def _moment(self) -> tuple[SceneSnapshot, Camera]:
         """Scene and camera as they are evaluated now."""
