@@ -323,9 +323,8 @@ def _evened(spacing: Floats) -> Floats:
 
 
 def _some(number: Ints) -> Ints:
-    """Which strands are measured, of these numbers: all, or one out of each of as many steps.
-
-    Out of each step by chance, for hair may stand in rows.
+    """Indices of the strands that are measured, of these numbers: all, or one in each of as many
+    equal steps, by chance, since hair may stand in rows.
     """
     if len(number) <= _SAMPLES:
         return np.arange(len(number))
