@@ -20,6 +20,25 @@ def set_world(color: tuple[float, float, float]) -> None:
     tree.links.new(background.outputs[0], output.inputs["Surface"])
 
 
+def background(scene: Any) -> Any:
+    return next(node for node in scene.world.node_tree.nodes if node.type == "BACKGROUND")
+
+
+def set_panorama(scene: Any, radiance: np.ndarray, kind: str = "EQUIRECTANGULAR") -> Any:
+    """An Environment Texture of these pixels, row 0 below; its node."""
+    rows, columns = radiance.shape[:2]
+    image = bpy.data.images.new("Panorama", columns, rows, float_buffer=True)
+    image.colorspace_settings.name = "Linear Rec.709"
+    pixels = np.concatenate([radiance, np.ones_like(radiance[..., :1])], axis=-1)
+    image.pixels.foreach_set(pixels.astype(np.float32).ravel())
+    image.pack()
+    tree = scene.world.node_tree
+    node = tree.nodes.new("ShaderNodeTexEnvironment")
+    node.image, node.projection = image, kind
+    tree.links.new(node.outputs["Color"], background(scene).inputs["Color"])
+    return node
+
+
 def add_ball(radius: float = 0.15, color: tuple[float, float, float] = (1.0, 1.0, 1.0)) -> Any:
     bpy.ops.mesh.primitive_uv_sphere_add(radius=radius, segments=48, ring_count=24)
     ball = bpy.context.object

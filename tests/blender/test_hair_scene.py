@@ -15,7 +15,7 @@ from tiers import few_in_commits
 
 bpy = pytest.importorskip("bpy", reason="these tests need Blender or the bpy module")
 
-from engine_stage import set_world  # noqa: E402
+from engine_stage import set_panorama, set_world  # noqa: E402
 
 from hairloom.addon.blender.engine import engine_picture, hair_scene  # noqa: E402
 from hairloom.addon.blender.properties.properties import settings_of  # noqa: E402
@@ -410,7 +410,7 @@ def test_a_bright_place_of_the_world_throws_shafts_once(
 ) -> None:
     """It is a light as well, which counts where a transparent film hides the world."""
     cycles.hairloom.use_hair_scene = True
-    _set_spot(cycles.world)
+    _set_spot(cycles)
     shafts = hairy.data.hairloom.shafts
 
     def added(*sources: str) -> list[np.ndarray]:
@@ -429,21 +429,11 @@ def test_a_bright_place_of_the_world_throws_shafts_once(
     assert np.abs(hidden - of_lights).mean() < 0.1 * of_lights.mean()
 
 
-def _set_spot(world: Any) -> None:
+def _set_spot(scene: Any) -> None:
     """A grey world with a small bright place beside the ball, as the camera sees them."""
     directions, _ = panorama_directions(64, 128)
     is_spot = directions @ np.array([0.34, 0.94, 0.0]) > np.cos(np.radians(2.5))
-    pixels = np.ones((64, 128, 4), np.float32)
-    pixels[..., :3] = np.where(is_spot, 400.0, 0.05)[..., None]
-    image = bpy.data.images.new("Spot", 128, 64, float_buffer=True)
-    image.colorspace_settings.name = "Linear Rec.709"
-    image.pixels.foreach_set(pixels.ravel())
-    image.pack()
-    tree = world.node_tree
-    node = tree.nodes.new("ShaderNodeTexEnvironment")
-    node.image = image
-    background = next(each for each in tree.nodes if each.type == "BACKGROUND")
-    tree.links.new(node.outputs["Color"], background.inputs["Color"])
+    set_panorama(scene, np.where(is_spot, 400.0, 0.05)[..., None] * np.ones(3))
 
 
 @pytest.mark.slow(instead="test_the_scene_is_as_it_was_after_the_render_and_after_turning_off")

@@ -7,6 +7,7 @@ from typing import Any
 import bpy
 import numpy as np
 import pytest
+from engine_stage import background, set_panorama
 from waiting import take_steps_until
 
 from hairloom.addon.blender.scene import world as world_module
@@ -25,25 +26,6 @@ def scene() -> Any:
     scene = bpy.context.scene
     scene.world = bpy.data.worlds.new("World")
     return scene
-
-
-def background(scene: Any) -> Any:
-    return next(node for node in scene.world.node_tree.nodes if node.type == "BACKGROUND")
-
-
-def picture(scene: Any, radiance: np.ndarray, kind: str = "EQUIRECTANGULAR") -> Any:
-    """An Environment Texture of these pixels, row 0 below; its node."""
-    rows, columns = radiance.shape[:2]
-    image = bpy.data.images.new("Panorama", columns, rows, float_buffer=True)
-    image.colorspace_settings.name = "Linear Rec.709"
-    pixels = np.concatenate([radiance, np.ones_like(radiance[..., :1])], axis=-1)
-    image.pixels.foreach_set(pixels.astype(np.float32).ravel())
-    image.pack()
-    tree = scene.world.node_tree
-    node = tree.nodes.new("ShaderNodeTexEnvironment")
-    node.image, node.projection = image, kind
-    tree.links.new(node.outputs["Color"], background(scene).inputs["Color"])
-    return node
 
 
 def uneven() -> np.ndarray:
@@ -100,7 +82,7 @@ def test_a_plain_color_is_even(scene: Any, has_node: bool) -> None:
 
 def test_an_image_lights_from_where_its_pixels_are(scene: Any) -> None:
     radiance = uneven()
-    picture(scene, radiance)
+    set_panorama(scene, radiance)
     background(scene).inputs["Strength"].default_value = 0.7
     found = read_environment(scene)
     directions, solid_angle = panorama_directions(64, 128)
@@ -114,7 +96,7 @@ def test_an_image_lights_from_where_its_pixels_are(scene: Any) -> None:
 
 @pytest.mark.slow(instead="test_an_image_lights_from_where_its_pixels_are")
 def test_an_image_lights_as_in_cycles(scene: Any) -> None:
-    picture(scene, uneven())
+    set_panorama(scene, uneven())
     background(scene).inputs["Strength"].default_value = 0.7
     found = read_environment(scene)
     assert found.harmonics is not None and len(found.suns) == 1
@@ -123,18 +105,18 @@ def test_an_image_lights_as_in_cycles(scene: Any) -> None:
 
 
 def test_another_image_of_the_same_name_is_another_world(scene: Any) -> None:
-    node = picture(scene, uneven())
+    node = set_panorama(scene, uneven())
     found = read_environment(scene)
     bpy.data.images.remove(node.image)
     scene.world.node_tree.nodes.remove(node)
-    assert picture(scene, 2.0 * uneven()).image.name == "Panorama"
+    assert set_panorama(scene, 2.0 * uneven()).image.name == "Panorama"
     assert read_environment(scene).ambient == pytest.approx(2.0 * np.array(found.ambient))
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["POINT", "TEXTURE", "VECTOR"])
 def test_a_mapping_turns_it_as_in_cycles(scene: Any, kind: str) -> None:
-    node, tree = picture(scene, uneven()), scene.world.node_tree
+    node, tree = set_panorama(scene, uneven()), scene.world.node_tree
     place, mapping = tree.nodes.new("ShaderNodeTexCoord"), tree.nodes.new("ShaderNodeMapping")
     mapping.vector_type = kind
     mapping.inputs["Rotation"].default_value = (0.4, -0.2, 1.3)
@@ -147,7 +129,7 @@ def test_a_mapping_turns_it_as_in_cycles(scene: Any, kind: str) -> None:
 @pytest.mark.slow
 def test_the_views_picture_turns_as_blenders_nodes_do(scene: Any, tmp_path: Any) -> None:
     """Blender lights Material Preview by a Vector Rotate around Z, of the view's own angle."""
-    node, tree = picture(scene, uneven()), scene.world.node_tree
+    node, tree = set_panorama(scene, uneven()), scene.world.node_tree
     node.image.filepath_raw, node.image.file_format = str(tmp_path / "view.exr"), "OPEN_EXR"
     node.image.save()
     ours = world_module._studio(str(tmp_path / "view.exr"), 0.8, 1.0)
@@ -237,7 +219,7 @@ def test_a_missing_file_is_said_and_black(scene: Any) -> None:
 def test_broken_pixels_leave_light_finite(scene: Any) -> None:
     radiance = uneven()
     radiance[5, 5], radiance[6, 6], radiance[7, 7] = np.nan, np.inf, 1.0e6
-    picture(scene, radiance)
+    set_panorama(scene, radiance)
     found = read_environment(scene)
     assert np.isfinite(found.ambient).all() and np.isfinite(found.harmonics).all()
     assert any(max(sun.power) > 500.0 for sun in found.suns)
