@@ -5,6 +5,8 @@ float3, version 4 as float4 whose w is the inverse mass, 0 where a vertex is hel
 file are what TressFX calls guides: it grows follow hairs around them when it loads them, in version
 3 as many as the file says, in version 4 as many as the game says. `tfxbone` is the skinning.
 
+Root UVs count v from the top of the picture, as AMD's shaders and its exporter for Maya do.
+
 Limitations: a file has one radius a strand, so a taper is not kept; groups are not stored, for
 which TressFX takes a file each (`group_files`). No loader of AMD reads the thickness, whose header
 names no unit; here it is the radius, as what their shaders multiply it with is one.
@@ -74,7 +76,7 @@ def read_tfx(path: Path, up: str = "Y", scale: float = 1.0) -> ReadTressfx:
         points,
         offsets,
         None if radius is None else np.repeat(radius, count),
-        strand_uv,
+        None if strand_uv is None else _from_top(strand_uv),
         None if color is None else color[:, :3],
     )
     if file.position_width == 4:
@@ -147,7 +149,7 @@ def write_tfx(
     vertices[:, :held_count, 3] = 0.0
     blocks = {"positions": vertices}
     if uniform.root_uv is not None:
-        blocks["strand_uv"] = uniform.root_uv
+        blocks["strand_uv"] = _from_top(uniform.root_uv)
     if vertex_uv:
         blocks["vertex_uv"] = _vertex_uv(len(grid), count)
     if uniform.color is not None:
@@ -180,6 +182,12 @@ def _write(path: Path, blocks: dict[str, Floats]) -> None:
         filed += [bytes(gap), np.ascontiguousarray(block, "<f4")]
         end += gap + block.size * 4
     write_blocks(path, [header, *filed])
+
+
+def _from_top(uv: Floats) -> Floats:
+    """UVs (n, 2) whose v goes the other way up: Blender counts it from the bottom of a picture, and
+    TressFX, which looks colours of roots up with it, from the top as Direct3D does."""
+    return np.stack([uv[:, 0], 1.0 - uv[:, 1]], axis=1)
 
 
 def _vertex_count(wanted: int | None, strands: StrandSet, path: Path) -> int:

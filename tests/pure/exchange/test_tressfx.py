@@ -16,6 +16,7 @@ from hairloom.addon.exchange.groom import Groom
 from hairloom.addon.exchange.strand_export_settings import StrandExportSettings
 from hairloom.addon.exchange.strand_writing import write_strands
 from hairloom.addon.exchange.tressfx import read_tfx, write_tfx
+from hairloom.addon.exchange.tressfx_layout import TressfxFile
 from hairloom.addon.strands import StrandSet
 
 pytestmark = pytest.mark.portable
@@ -68,6 +69,11 @@ def z_up(points: np.ndarray) -> np.ndarray:
     return np.array([[(x, -z, y) for x, y, z in strand] for strand in points.tolist()], np.float32)
 
 
+def from_top(uv: np.ndarray) -> np.ndarray:
+    """v as Direct3D counts it, from the top of the picture."""
+    return uv * [1.0, -1.0] + [0.0, 1.0]
+
+
 @pytest.fixture
 def file(tmp_path: Path) -> Path:
     path = tmp_path / "groom.tfx"
@@ -83,7 +89,7 @@ def test_version_4_is_read_as_packed(tmp_path: Path) -> None:
     groom = read_tfx(path)
     assert (groom.version, groom.dropped, groom.source) == (4.0, {}, path)
     np.testing.assert_array_equal(groom.strands.grid, z_up(positions()))
-    np.testing.assert_array_equal(groom.strands.root_uv, uv)
+    np.testing.assert_allclose(groom.strands.root_uv, from_top(uv))
     np.testing.assert_array_equal(groom.strands.radius, np.repeat(thickness, VERTICES))
 
 
@@ -94,7 +100,7 @@ def test_version_3_is_read_as_packed(tmp_path: Path) -> None:
     groom = read_tfx(path)
     assert groom.version == 3.0
     np.testing.assert_array_equal(groom.strands.grid, z_up(positions()))
-    np.testing.assert_array_equal(groom.strands.root_uv, uv)
+    np.testing.assert_allclose(groom.strands.root_uv, from_top(uv))
     # its header says two follow hairs and both ends held
     assert groom.follow_count == 2 and "2 follow hairs" in groom.notes[0]
     assert groom.is_held.all()
@@ -177,8 +183,12 @@ def test_round_trip_is_exact(tmp_path: Path, up: str) -> None:
     strands = grown(50, 16, root_uv=np.random.default_rng(0).random((50, 2)))
     write_tfx(path, strands, up=up)
     groom = read_tfx(path, up=up)
-    for name in ("points", "offsets", "radius", "root_uv"):
+    for name in ("points", "offsets", "radius"):
         np.testing.assert_array_equal(getattr(groom.strands, name), getattr(strands, name))
+    np.testing.assert_allclose(groom.strands.root_uv, strands.root_uv, atol=1e-7)
+    written = TressfxFile(path).of_strands("strand_uv", 2)
+    assert strands.root_uv is not None and written is not None
+    np.testing.assert_allclose(written, from_top(strands.root_uv), atol=1e-7)
 
 
 def test_a_metre_at_a_known_place_in_units_of_the_file(tmp_path: Path) -> None:
@@ -220,7 +230,7 @@ def test_a_multiple_of_64_repeats_the_last_strand(tmp_path: Path) -> None:
     np.testing.assert_array_equal(read.strands.grid, strands.grid[last])
     for name in ("radius", "root_uv"):
         expected = getattr(strands.take(last), name)
-        np.testing.assert_array_equal(getattr(read.strands, name), expected)
+        np.testing.assert_allclose(getattr(read.strands, name), expected, atol=1e-7)
     np.testing.assert_array_equal(read.groom.color, groom.take(last).color)
     assert write_tfx(path, grown(64, 4), multiple_of_64=True) == ()
     assert read_tfx(path).strands.strand_count == 64
@@ -292,9 +302,11 @@ def test_real_files_read_written_and_read_again(
     assert write_tfx(path, first.groom) == ()
     second = read_tfx(path)
     assert (second.version, second.dropped) == (4.0, {})
-    for field in ("points", "offsets", "radius", "root_uv"):
+    for field in ("points", "offsets", "radius"):
         a, b = getattr(first.strands, field), getattr(second.strands, field)
         np.testing.assert_array_equal(a, b)
+    if first.strands.root_uv is not None:
+        np.testing.assert_allclose(second.strands.root_uv, first.strands.root_uv, atol=1e-7)
     again = tmp_path / "again.tfx"
     write_tfx(again, second.groom)
     assert again.read_bytes() == path.read_bytes()
