@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -158,12 +158,20 @@ def _write_files(
     with written_together(next(iter(files))) as folder:
         for file, strands in files.items():
             notes += write(folder / file.name, groom.take(strands))
-        notes += kept_aside(folder, path)
+        notes += kept_aside(folder, path, _of_earlier(files))
         written = sorted(
             (path.with_name(file.name) for file in folder.iterdir()),
             key=lambda file: (file not in files, file.name),
         )
     return WrittenStrands(tuple(written), tuple(notes))
+
+
+def _of_earlier(files: Collection[Path]) -> set[str]:
+    """Names of the files that an earlier export of this has left; none where one of them is not
+    there, so that the others are somebody else's."""
+    if not all(file.is_file() for file in files):
+        return set()
+    return {name for file in files for name in (file.name, file.with_suffix(".tfxbone").name)}
 
 
 def _group_files(path: Path, groom: Groom) -> dict[Path, Ints]:

@@ -22,7 +22,7 @@ from ...errors import HairloomError
 from ...strands import StrandSet
 from ...strands.resample import arc_length_positions
 from ..files.atomic import as_system_says, atomic_write, check_free_space, unwritable
-from ..files.names import plain_name
+from ..files.names import distinct_names, plain_name
 from ..groom import Groom, GroomMotion, points_of
 from ..groom_presets import MIN_WIDTH, UNREAL, GroomPreset, chosen_strands
 from .alembic_library import alembic_library, array_of, sample_of, scope_of, write_parameter
@@ -143,11 +143,11 @@ def _chosen(groom: Groom, preset: GroomPreset) -> Iterator[tuple[str, Ints | Non
         yield plain_name(groom.name), None if len(wanted) == count else wanted
         return
     group = groom.strands.group[wanted]
-    taken: set[str] = set()
-    for number in np.unique(group).tolist():
-        name = plain_name(groom.group_names.get(number, f"{groom.name}_{number}"))
-        name = name if name not in taken else f"{name}_{number}"
-        taken.add(name)
+    numbers = np.unique(group).tolist()
+    names = distinct_names(
+        plain_name(groom.group_names.get(each, f"{groom.name}_{each}")) for each in numbers
+    )
+    for name, number in zip(names, numbers, strict=True):
         yield name, wanted[group == number]
 
 

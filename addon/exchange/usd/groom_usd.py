@@ -26,7 +26,7 @@ from ...arrays import Floats, Ints
 from ...errors import HairloomError
 from ..files.atomic import as_system_says, atomic_write, unwritable
 from ..files.axes import from_z_up
-from ..files.names import plain_name
+from ..files.names import distinct_names, plain_name
 from ..groom import Groom, GroomMotion, points_of
 from .usd_library import SUFFIXES, usd_library
 from .usd_reader import summary
@@ -145,11 +145,12 @@ def _parts(groom: Groom, by_group: bool) -> Iterator[tuple[str, _Part]]:
     if not by_group:
         yield "strands", _Part(slice(None), groom)
         return
-    taken: set[str] = set()
-    for group in np.unique(groom.strands.group).tolist():
-        wanted = plain_name(groom.group_names.get(group, ""), f"group_{group}".replace("-", "_"))
-        name = wanted if wanted not in taken else f"{wanted}_{len(taken)}"
-        taken.add(name)
+    numbers = np.unique(groom.strands.group).tolist()
+    names = distinct_names(
+        plain_name(groom.group_names.get(each, ""), f"group_{each}".replace("-", "_"))
+        for each in numbers
+    )
+    for name, group in zip(names, numbers, strict=True):
         strands = np.flatnonzero(groom.strands.group == group)
         yield name, _Part(points_of(groom.strands, strands), groom.take(strands))
 

@@ -18,6 +18,7 @@ from hairloom.addon.exchange.joined_grooms import joined_bones, joined_grooms
 from hairloom.addon.exchange.strand_check import check_lines, check_strands
 from hairloom.addon.exchange.strand_export_settings import StrandExportSettings
 from hairloom.addon.exchange.strand_formats import ALEMBIC, HAIR, TRESSFX, USD
+from hairloom.addon.exchange.strand_reading import read_strands
 from hairloom.addon.exchange.strand_writing import write_strands
 from hairloom.addon.exchange.tfxbone import strongest_bones
 from hairloom.addon.exchange.tressfx import read_tfx
@@ -145,6 +146,26 @@ def test_groups_go_into_files_with_the_bones_of_their_strands(tmp_path: Path) ->
         np.testing.assert_allclose(held.weight, bones.weight[own], atol=1e-6)
 
 
+@pytest.mark.parametrize("suffix", [".usda", ".abc", ".tfx"])
+def test_groups_whose_names_become_one_stay_apart(tmp_path: Path, suffix: str) -> None:
+    pytest.importorskip("alembic3d")
+    names = {0: "front hair", 1: "front_hair_2", 2: "front-hair", 3: "Front Hair"}
+    counts = [5, 7, 3, 2]
+    points = np.random.default_rng(3).random((sum(counts) * 4, 3))
+    strands = StrandSet(
+        points,
+        np.arange(sum(counts) + 1) * 4,
+        np.full(len(points), 1e-4),
+        np.repeat(range(4), counts),
+    )
+    hair = Groom(strands, "hair", group_names=names)
+    written = write_strands(tmp_path / f"hair{suffix}", hair, StrandExportSettings(by_group=True))
+    read = [read_strands(file).strands for file in written.files]
+    assert sum(each.strand_count for each in read) == sum(counts)
+    found = [count for each in read for count in np.unique(each.group, return_counts=True)[1]]
+    assert sorted(found) == sorted(counts)
+
+
 def test_bones_of_the_last_strand_fill_up_to_64(tmp_path: Path) -> None:
     bones = strongest_bones(("a", "b"), np.eye(2)[np.arange(COUNT) % 2])
     hair = replace(groom(), bones=bones)
@@ -152,6 +173,26 @@ def test_bones_of_the_last_strand_fill_up_to_64(tmp_path: Path) -> None:
     assert read_tfx(tmp_path / "hair.tfx").strands.strand_count == 64
     held = read_tfxbone(tmp_path / "hair.tfxbone")
     assert held.strand_count == 64 and (held.bone[COUNT:, 0] == 1).all()
+
+
+def test_an_export_again_replaces_its_own_files_and_keeps_those_of_others(tmp_path: Path) -> None:
+    bones = strongest_bones(("a", "b"), np.eye(2)[np.arange(COUNT) % 2])
+    split = StrandExportSettings(by_group=True)
+    (tmp_path / "hair_crown.tfx").write_bytes(b"somebody else's")
+    for turn in range(3):
+        hair = replace(
+            groom(seed=turn), bones=bones if turn % 2 else bones.take(np.arange(COUNT)[::-1])
+        )
+        said = write_strands(tmp_path / "hair.tfx", hair, split).notes
+        said += write_strands(tmp_path / "one.tfx", hair).notes
+        kept = [note for note in said if "is kept as" in note]
+        assert (
+            kept == ["hair_crown.tfx was there already, and is kept as hair_crown old.tfx."][turn:]
+        )
+    assert [file.name for file in tmp_path.iterdir() if "old" in file.name] == [
+        "hair_crown old.tfx"
+    ]
+    assert (tmp_path / "hair_crown old.tfx").read_bytes() == b"somebody else's"
 
 
 def test_a_file_that_fails_takes_the_others_with_it(tmp_path: Path) -> None:
