@@ -14,7 +14,8 @@ from ..blender.bakes import playback
 from ..blender.bakes.bake_settings import frame_range
 from ..blender.bakes.stale_bakes import stale_notes
 from ..blender.base.file_names import file_stem, files_of, in_own_folder
-from ..blender.base.outcome import Outcome
+from ..blender.base.objects import without_hidden
+from ..blender.base.outcome import Outcome, report
 from ..blender.cards.files import CardExport, CardOutput, FileSteps
 from ..blender.properties.groups import operator_properties
 from ..blender.properties.properties import settings_of
@@ -137,7 +138,10 @@ class HAIRLOOM_OT_export_cards(LongWork, ExportHelper, bpy.types.Operator):
             return chosen_hair(context)[:1] or _refuse("Nothing selected", "Select hair curves")
         collection = bpy.data.collections.get(self.collection)
         objects = () if collection is None else collection.all_objects
-        hair = [obj for obj in objects if obj.type == "CURVES"]
+        grooms = [obj for obj in objects if obj.type == "CURVES"]
+        hair, left_out = without_hidden(grooms, context.evaluated_depsgraph_get())
+        for each in left_out:
+            report(self, "WARNING", f"{each}, and is left out.")
         return hair or _refuse(
             f"Collection '{self.collection}'", "Link hair curves to it, or choose another one"
         )

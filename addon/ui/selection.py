@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..blender.base.objects import head_of, objects_in
+from ..blender.base.objects import head_of, is_hidden, objects_in
 from ..blender.preview import previews
 from ..errors import HairloomError
 
@@ -29,7 +29,9 @@ def _made_into(objects: list[bpy.types.Object]) -> list[bpy.types.Object]:
 
 def _grown_on(meshes: list[bpy.types.Object], context: bpy.types.Context) -> list[bpy.types.Object]:
     everything = objects_in(context.view_layer)
-    return [obj for obj in everything if obj.type == "CURVES" and head_of(obj) in meshes]
+    hair = [obj for obj in everything if obj.type == "CURVES" and head_of(obj) in meshes]
+    # such as that which hair was made real from
+    return [obj for obj in hair if not is_hidden(obj, context.view_layer)] or hair
 
 
 def _previewed() -> list[bpy.types.Object]:

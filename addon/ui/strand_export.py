@@ -13,7 +13,8 @@ from bpy_extras.io_utils import ExportHelper
 
 from ..blender.bakes.bake_settings import frame_range
 from ..blender.base.file_names import file_stem, files_of
-from ..blender.base.outcome import Outcome
+from ..blender.base.objects import without_hidden
+from ..blender.base.outcome import Outcome, report
 from ..blender.properties.properties import property_annotations, settings_of
 from ..blender.strands.export_check import ExportCheck
 from ..blender.strands.strand_export import StrandExport
@@ -159,7 +160,10 @@ class StrandExportOperator(LongWork, ExportHelper):
             self.collection, own if self.collection == own.name else None
         )
         objects = () if collection is None else collection.all_objects
-        return writable(objects) or _refuse(
+        hair, left_out = without_hidden(writable(objects), context.evaluated_depsgraph_get())
+        for each in left_out:
+            report(self, "WARNING", f"{each}, and is left out.")
+        return hair or _refuse(
             f"Collection '{self.collection}'", "Link hair curves to it, or choose another one"
         )
 

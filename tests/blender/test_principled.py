@@ -151,6 +151,9 @@ def test_the_command_line_starts_from_the_material_and_single_values_go_over_it(
     assert shading.index_of_refraction == pytest.approx(1.3)
     assert shading.width_r == 0.2
     assert "Random Roughness" in capsys.readouterr().err
+    beside = ["--preset", "looks/blond", "--stage", "studio"]
+    shading = settings_by("--groom", hair.name, "--look-from-material", *beside)
+    assert shading.index_of_refraction == pytest.approx(1.3)
 
 
 def test_the_command_line_needs_a_hair_object_for_it(hair: Any, sphere: Any) -> None:

@@ -414,3 +414,91 @@ def test_a_shake_of_a_groom_stays_out_of_its_colliders(scene: Path, how: str) ->
         local = (guides - pose.matrix[:3, 3]) @ pose.matrix[:3, :3]
         nearest = min(nearest, np.linalg.norm(local[:, 2:] - middle, axis=2).min())
     assert (nearest > 0.999 * radius) == (how != "left out"), nearest
+
+
+def exported(scene: Path, *arguments: str, code: int = 0) -> dict[str, Any]:
+    """The report of an export as .tfx."""
+    report, output = scene.with_name("report.json"), scene.with_name("out.tfx")
+    whole = ["export", "--scene", str(scene), *arguments, "--report", str(report)]
+    assert command_line.run([*whole, "--output", str(output)]) == code
+    facts: dict[str, Any] = json.loads(report.read_text())
+    return facts
+
+
+def beside(scene: Path, make: Callable[[bpy.types.Object], bpy.types.Object]) -> None:
+    """Add to the scene's file what this makes of its hair."""
+    bpy.ops.wm.open_mainfile(filepath=str(scene))
+    bpy.context.collection.objects.link(make(bpy.data.objects["Hair"]))
+    bpy.ops.wm.save_mainfile()
+
+
+def hidden_copy(hair: bpy.types.Object) -> bpy.types.Object:
+    other = hair.copy()
+    other.name, other.hide_render, other.hide_viewport = "Combed", True, True
+    return other
+
+
+def empty_curves(_hair: bpy.types.Object) -> bpy.types.Object:
+    return bpy.data.objects.new("Nothing", bpy.data.hair_curves.new("Nothing"))
+
+
+@pytest.mark.parametrize(
+    ("make", "said"),
+    [
+        (hidden_copy, "Combed: it is hidden in viewport and renders, and is left out"),
+        (empty_curves, "Nothing: it has no curves, and is left out"),
+    ],
+)
+def test_jobs_on_all_hair_of_a_scene_leave_out_what_is_hidden_or_empty(
+    scene: Path, make: Callable[[Any], Any], said: str
+) -> None:
+    """As Make Real hides the hair that it was made from."""
+    plain = ["--set", "children.method=none"]
+    alone = exported(scene, *plain)["preflight"]["strands"]
+    beside(scene, make)
+    facts = exported(scene, *plain)
+    assert facts["preflight"]["strands"] == alone
+    assert [note for note in facts["notes"] if said in note], facts["notes"]
+    small = ["--set", "dynamics.device=numpy", "--set", "dynamics.collider_resolution=8"]
+    report, folder = scene.with_name("report.json"), scene.with_name("bake")
+    bake = ["bake", "--scene", str(scene), "--frames", "1", "1", *small, "--report", str(report)]
+    assert command_line.run([*bake, "--output", str(folder)]) == 0
+    facts = json.loads(report.read_text())
+    assert [each["object"] for each in facts["baked"]] == ["Hair"]
+    assert [note for note in facts["notes"] if said in note]
+    moved = ["simulate", "--scene", str(scene), "--seconds", "0.02", *small]
+    output = ["--output", str(scene.with_name("moved")), "--report", str(report)]
+    assert command_line.run([*moved, *output]) == 0
+    assert [note for note in json.loads(report.read_text())["notes"] if said in note]
+
+
+def test_what_is_hidden_is_taken_where_it_is_named(scene: Path) -> None:
+    plain = ["--set", "children.method=none"]
+    alone = exported(scene, *plain)["preflight"]["strands"]
+    beside(scene, hidden_copy)
+    named = exported(scene, "--object", "Hair", "--object", "Combed", *plain)
+    assert named["preflight"]["strands"] == 2 * alone
+    bpy.ops.wm.open_mainfile(filepath=str(scene))
+    bpy.data.objects.remove(bpy.data.objects["Hair"])
+    bpy.ops.wm.save_mainfile()
+    refused = exported(scene, code=1)
+    assert "Combed: it is hidden" in refused["error"]["problem"]
+    assert "--object" in refused["error"]["remedy"]
+
+
+def test_strands_of_a_scene_that_are_left_out_are_named_or_refused(
+    scene: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    bpy.ops.wm.open_mainfile(filepath=str(scene))
+    curves = bpy.data.objects["Hair"].data
+    points = np.empty(len(curves.points) * 3, np.float32)
+    curves.position_data.foreach_get("vector", points)
+    points[0] = np.nan
+    curves.position_data.foreach_set("vector", points)
+    bpy.ops.wm.save_mainfile()
+    for which in ([], ["--object", "Hair"]):
+        facts = exported(scene, *which)
+        assert sum(facts["dropped"].values()) == 1
+        assert "Hair: dropped strands: 1 with" in capfd.readouterr().out
+        error = exported(scene, *which, "--strict", code=1)["error"]
+        assert "strands would be dropped: 1 with" in error["problem"] and error["place"] == "Hair"

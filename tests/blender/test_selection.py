@@ -43,13 +43,25 @@ def test_nor_for_cards_beside_it(hair):
 
 
 def test_nor_for_a_job(hair):
-    assert object_settings.named_grooms([]) == [hair]
-    assert bake_job._objects([]) == [hair]
+    assert object_settings.named_grooms([]) == ([hair], ())
+    assert bake_job._objects([]) == ([hair], ())
 
 
 def test_nor_for_the_mesh_that_hair_grows_from(hair, sphere):
     depsgraph = bpy.context.evaluated_depsgraph_get()
     assert surface_for(hair, objects_in(bpy.context.view_layer), depsgraph) == sphere
+
+
+def test_hair_on_a_selected_mesh_is_not_that_which_is_hidden(hair, sphere):
+    """As Make Real hides it; where there is none but hidden hair, its panels are shown."""
+    combed = hair.copy()
+    bpy.context.collection.objects.link(combed)
+    hair.hide_render = hair.hide_viewport = True
+    bpy.context.view_layer.update()
+    assert chosen_hair(bpy.context) == [combed]
+    combed.hide_render = combed.hide_viewport = True
+    bpy.context.view_layer.update()
+    assert set(chosen_hair(bpy.context)) == {hair, combed}
 
 
 def test_hair_of_another_view_layer_is_not_selected_but_told(hair, sphere):

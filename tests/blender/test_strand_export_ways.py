@@ -168,6 +168,23 @@ def test_a_collection_writes_its_own_hair(new_hair: Any, sphere: Any, tmp_path: 
         assert handler.bl_file_extensions == suffixes
 
 
+def test_a_collection_leaves_out_what_is_hidden_or_empty(
+    new_hair: Any, sphere: Any, tmp_path: Path, told: Callable[[], str]
+) -> None:
+    other = bpy.data.collections.new("Other")
+    bpy.context.scene.collection.children.link(other)
+    write_curves("Brows", hedgehog(20, 5), sphere, other)
+    hidden = write_curves("Combed", hedgehog(20, 5), sphere, other)
+    hidden.hide_render = hidden.hide_viewport = True
+    other.objects.link(bpy.data.objects.new("Nothing", bpy.data.hair_curves.new("Nothing")))
+    path = tmp_path / "a.tfx"
+    bpy.ops.hairloom.export_tressfx(filepath=str(path), collection="Other")
+    assert read_tfx(path).strands.strand_count == 20
+    said = told()
+    assert "Combed: it is hidden in viewport and renders, and is left out" in said
+    assert "Nothing: it has no curves, and is left out" in said
+
+
 def test_a_collections_exporter_is_run_by_blender(
     new_hair: Any, sphere: Any, tmp_path: Path
 ) -> None:

@@ -1,5 +1,7 @@
 """Hair ties in a scene: found, carried, baked, let go of."""
 
+import json
+
 import bpy
 import numpy as np
 import pytest
@@ -390,6 +392,16 @@ def test_undo_brings_back_a_tie_that_was_deleted(swinging, evaluated):
     pose = session.solver.pose
     assert np.isfinite(pose.anchors).all()
     assert not [text for text in session.warnings if "Ring" in text]
+
+
+def test_verbs_hold_hair_by_its_ties_as_the_window_does(swinging, tmp_path, evaluated):
+    hair, _ = swinging
+    tie(hair, ring())
+    expected = len(np.unique(previews.start(hair, evaluated()).rig.holds.strand))
+    report, output = tmp_path / "report.json", str(tmp_path / "hair.tfx")
+    arguments = ["export", "--groom", "Hair", "--output", output, "--report", str(report)]
+    assert command_line.run(arguments) == 0
+    assert json.loads(report.read_text())["held_strands"] == expected > 0
 
 
 def test_the_verb_shakes_hair_with_its_ties(swinging, tmp_path):

@@ -6,6 +6,7 @@ number survives.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -102,6 +103,32 @@ def is_solid(obj: bpy.types.Object) -> bool:
     """Whether 3D views draw it as a solid object that hides what is behind it."""
     with _without_area():
         return bool(obj.visible_get() and obj.display_type in {"SOLID", "TEXTURED"})
+
+
+def is_hidden(obj: bpy.types.Object, layer: bpy.types.ViewLayer) -> bool:
+    """Whether neither the views nor the renders of a view layer show an object; one that renders
+    leave out in favour of the copy that shows its bake is shown."""
+    bake = obj.hairloom.bake
+    is_left_out = bake.was_hidden if bake.hides else obj.hide_render
+    is_left_out |= all(collection.hide_render for collection in obj.users_collection)
+    with _without_area():
+        return bool(is_left_out and not obj.visible_get(view_layer=layer))
+
+
+def without_hidden(
+    objects: Iterable[bpy.types.Object], depsgraph: bpy.types.Depsgraph
+) -> tuple[list[bpy.types.Object], tuple[str, ...]]:
+    """What is taken of these where none is named: neither what is hidden in views and renders nor
+    hair without curves. And why the others are left out."""
+    taken, left_out = [], []
+    for obj in objects:
+        if is_hidden(obj, depsgraph.view_layer):
+            left_out.append(f"{obj.name}: it is hidden in viewport and renders")
+        elif obj.type == "CURVES" and not len(obj.evaluated_get(depsgraph).data.curves):
+            left_out.append(f"{obj.name}: it has no curves")
+        else:
+            taken.append(obj)
+    return taken, tuple(left_out)
 
 
 def layers_with(obj: bpy.types.Object) -> frozenset[LayerKey]:

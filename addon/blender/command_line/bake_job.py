@@ -10,12 +10,11 @@ import bpy
 
 from ..bakes import playback
 from ..bakes.bake_settings import folder_of
-from ..base.objects import objects_in
 from ..base.report import Report
 from ..preview.bake import Bake, bakeable, free, show_in_renders
 from .job_options import add_frames_option, add_object_option, frames_of_option
 from .job_steps import Job, tell_notes
-from .object_settings import named_objects, put_settings
+from .object_settings import all_of_scene, named_objects, put_settings
 from .scene_files import save_scene
 from .verb import Verb
 
@@ -23,7 +22,8 @@ from .verb import Verb
 def bake(job: Job) -> None:
     """Simulate hair and fins of a scene frame by frame and keep the motion on disk."""
     report, options = job.report, job.options
-    objects = _objects(options.object)
+    objects, notes = _objects(options.object)
+    tell_notes(list(notes), report)
     if options.delete:
         _delete(objects, report)
     else:
@@ -67,11 +67,12 @@ def _delete(objects: list[bpy.types.Object], report: Report) -> None:
     report.facts["deleted"] = [obj.name for obj in objects]
 
 
-def _objects(names: list[str]) -> list[bpy.types.Object]:
-    """Those that were named, else all hair and fins of the view layer that are to be simulated."""
+def _objects(names: list[str]) -> tuple[list[bpy.types.Object], tuple[str, ...]]:
+    """Those that were named, else all hair and fins of the view layer that are to be simulated; and
+    what is said of those left out."""
     if names:
-        return named_objects(names, bakeable, "hair curves or cloth")
-    return [o for o in objects_in(bpy.context.view_layer) if bakeable(o) and _is_wanted(o)]
+        return named_objects(names, bakeable, "hair curves or cloth"), ()
+    return all_of_scene(lambda obj: bakeable(obj) and _is_wanted(obj))
 
 
 def _is_wanted(obj: bpy.types.Object) -> bool:

@@ -53,8 +53,8 @@ def cards(job: Job) -> None:
 
 def _own_pictures(job: Job) -> dict[str, Floats]:
     """Those that the artist has chosen for the hair object that --groom names."""
-    hair = bpy.data.objects.get(job.sources.groom or "")
-    if hair is None or hair.type != "CURVES":
+    hair = job.hair
+    if hair is None:
         return {}
     pictures, warnings = chosen_pictures(hair.data.hairloom.card_images)
     tell_notes(list(warnings), job.report)
@@ -75,8 +75,8 @@ def written_cards(
     settings, report = job.settings, job.report
     if levels is not None:
         settings = settings.with_settings(replace(settings[CardSettings], levels=levels))
-    hair = bpy.data.objects.get(job.sources.groom or "")
-    if output is not None and hair is not None and hair.type == "CURVES":
+    hair = job.hair
+    if output is not None and hair is not None:
         depsgraph = bpy.context.evaluated_depsgraph_get()
         output = replace(output, head_bone=head_bone_of(hair, depsgraph, rig.strands))
     occluders = read_occluders(settings[CardOcclusionSettings], hair)

@@ -17,7 +17,6 @@ from ...errors import HairloomError
 from ...params import SettingsMap
 from ..base.gpu_context import gpu_refusals
 from ..base.interruption import Interrupted, interruptible
-from ..base.objects import objects_in
 from ..base.parts import at_once
 from ..base.report import Report
 from ..setup.hairstyles import add_hairstyle, add_head, named_hairstyle
@@ -30,7 +29,7 @@ from .import_job import IMPORT
 from .inputs import Sources
 from .job_options import check_numbers, chosen_settings
 from .job_steps import Job, tell_notes
-from .object_settings import is_groom, named_objects
+from .object_settings import all_of_scene, hair_named, is_groom, named_objects
 from .places import check_outputs, check_report
 from .render_job import RENDER
 from .run_job import RUN
@@ -160,8 +159,9 @@ def _job(verb: Verb, options: argparse.Namespace, report: Report) -> Job:
     if verb.opens_scene and options.scene:
         with report.stage("open scene"):
             open_scene(Path(options.scene))
-        if verb.takes_hair and not hasattr(options, "object"):
-            options.groom = options.groom or (None if options.style else _only_groom(options))
+        takes_one = verb.takes_hair and not hasattr(options, "object")
+        if takes_one and not (options.groom or options.style):
+            options.groom = _only_groom(options, report)
     if verb.takes_hair and options.style:
         with report.stage("add hairstyle"):
             options.groom = _styled(options, report)
@@ -222,15 +222,17 @@ def _styled(options: argparse.Namespace, report: Report) -> str:
     return str(added.hair.name)
 
 
-def _only_groom(options: argparse.Namespace) -> str | None:
+def _only_groom(options: argparse.Namespace, report: Report) -> str | None:
     """The hair of the scene that was named, where nothing else is named that hair could come from.
 
     Raises:
-        HairloomError: there are several.
+        HairloomError: there are several, or it is hidden or empty.
     """
     if options.head or getattr(options, "bake", None):
         return None
-    grooms = [obj.name for obj in objects_in(bpy.context.view_layer) if is_groom(obj)]
+    found, notes = all_of_scene(is_groom, "--groom")
+    tell_notes(list(notes), report)
+    grooms = [obj.name for obj in found]
     if len(grooms) > 1:
         raise HairloomError(
             f"this scene has hair in several objects: {', '.join(sorted(grooms))}",
@@ -242,5 +244,5 @@ def _only_groom(options: argparse.Namespace) -> str | None:
 
 def _own_density(groom: str | None) -> str:
     """What the artist has chosen for the hair object of this name, if it is one."""
-    hair = bpy.data.objects.get(groom or "")
+    hair = hair_named(groom)
     return str(hair.hairloom.children_density) if hair is not None else ""

@@ -33,7 +33,7 @@ from .job_options import (
     frames_of_option,
     parameters_of,
 )
-from .job_steps import Job, job_colors, motion_of, read_hair, read_rig, tell_notes
+from .job_steps import Job, job_colors, motion_of, read_hair, read_rig, tell_drops, tell_notes
 from .object_settings import named_grooms, put_settings
 from .places import check_not_read
 from .verb import Verb
@@ -81,7 +81,8 @@ def _of_objects(
             place="--object",
             remedy="Give --object alone, or --groom with --bake",
         )
-    hair = named_grooms(options.object)
+    hair, notes = named_grooms(options.object)
+    tell_notes(list(notes), job.report)
     for each in hair:
         put_settings(each, options.preset, options.set)
     with job.report.stage("read hair"):
@@ -92,6 +93,7 @@ def _of_objects(
             settings,
             frames=frames,
         )
+    tell_drops(job, plan.dropped, ", ".join(each.name for each in hair))
     for part in plan.moving:
         if isinstance(part, BakedMotion):
             job.report.add_input(part.cache.folder)

@@ -32,6 +32,7 @@ from ..scene.partings import read_partings
 from ..scene.surfaces import read_surface, uv_map_note
 from ..setup.hairstyles import face_hair, is_bust
 from ..strands.child_python import python_for
+from .object_settings import hair_named
 
 BUILT_IN = "built-in"
 
@@ -191,8 +192,8 @@ def named_head(sources: Sources) -> str | None:
 
 def _partings(groom: str | None) -> tuple[Floats | None, tuple[str, ...]]:
     """Those of hair curves of the scene, and what of them cannot be used."""
-    hair = bpy.data.objects.get(groom or "")
-    if hair is None or hair.type != "CURVES":
+    hair = hair_named(groom)
+    if hair is None:
         return None, ()
     lines, unusable = read_partings(hair, bpy.context.evaluated_depsgraph_get())
     return (lines if len(lines) else None), unusable
@@ -214,8 +215,8 @@ def _weights(group: str, head_name: str | None) -> Floats | None:
 
 def _surface_name(groom: str | None) -> str | None:
     """The mesh that a hair curves object of the scene says it grows on."""
-    hair = bpy.data.objects.get(groom or "")
-    surface = head_of(hair) if hair is not None and hair.type == "CURVES" else None
+    hair = hair_named(groom)
+    surface = None if hair is None else head_of(hair)
     return None if surface is None else surface.name
 
 

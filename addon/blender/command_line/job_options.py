@@ -7,8 +7,6 @@ import sys
 from pathlib import Path
 from typing import Any
 
-import bpy
-
 from ...errors import HairloomError
 from ...exchange.strand_formats import SUFFIXES
 from ...parameters import ALL_SETTINGS
@@ -19,7 +17,7 @@ from ..properties.presets import named_preset, shipped
 from ..scene.bust_skin import TONES
 from ..scene.principled import look_from_named
 from ..setup.hairstyles import shipped as hairstyles
-from .object_settings import own_settings
+from .object_settings import hair_named, own_settings
 from .overrides import overrides
 
 
@@ -328,11 +326,11 @@ def chosen_settings(options: argparse.Namespace) -> SettingsMap:
     --groom names, --preset or a material, --set."""
     chosen: dict[str, Settings] = {section: made() for section, made in ALL_SETTINGS.items()}
     name = getattr(options, "groom", None)
-    groom = bpy.data.objects.get(name or "")
-    if groom is not None and groom.type == "CURVES":
+    groom = hair_named(name)
+    if groom is not None:
         chosen |= own_settings(groom)
-    for name in (*options.preset, *_stage_preset(options)):
-        chosen |= {settings.section: settings for settings in named_preset(name).all}
+    for preset in (*options.preset, *_stage_preset(options)):
+        chosen |= {settings.section: settings for settings in named_preset(preset).all}
     if hasattr(options, "groom") and getattr(options, "look_from_material", False):
         chosen["shading"], notes = look_from_named(name, chosen["shading"])
         for note in notes:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -11,15 +12,13 @@ from typing import Self
 import bpy
 import numpy as np
 
-from ... import rig_flow
 from ...arrays import Floats
 from ...cards.edits import CardEdits
 from ...errors import HairloomError
 from ...groom.children_settings import ChildrenSettings
 from ...groom.masks import Mask, Masks, mask_names
 from ...groom.painted_color import PaintedColor
-from ...groom.settings import GrowSettings, GuideSettings
-from ...groom.width_settings import WidthSettings
+from ...groom.settings import GrowSettings
 from ...paint_flow import colored
 from ...params import Settings, SettingsMap
 from ...rig_flow import Pose, Rig
@@ -29,15 +28,17 @@ from ...wet_flow import acting
 from ..bakes.guide_motion import BakedGuides
 from ..base.report import Report
 from ..cards.edits import groom_edits
-from ..colliders.fields import solid_of
+from ..colliders.rigs import rig_from
+from ..colliders.ties import Holding
 from ..pictures.studio import Studio
 from ..properties.groom_settings import GroomSettings
 from ..scene.curves import read_curves
 from ..scene.masks import Canvas
 from ..scene.painted_colors import painted_colors
+from ..scene.source import Source
 from ..sessions.prepared_groom import prepared
 from .inputs import Inputs, Sources, head_of_sources, look_of_head, named_head, read_inputs
-from .object_settings import is_groom
+from .object_settings import hair_named
 
 
 @dataclass(frozen=True)
@@ -58,6 +59,11 @@ class Job:
     def settings(self) -> SettingsMap:
         return acting(self.chosen)
 
+    @property
+    def hair(self) -> bpy.types.Object | None:
+        """The hair of the open scene that --groom names; None where it names something else."""
+        return hair_named(self.sources.groom)
+
 
 def read_hair(job: Job) -> Inputs:
     """Read what the job names."""
@@ -65,7 +71,7 @@ def read_hair(job: Job) -> Inputs:
     print("reading", job.sources.groom or "(a groom grown here)", flush=True)
     with report.stage("read inputs"):
         inputs = read_inputs(job.sources, job.settings[GrowSettings])
-    _tell_drops(job, inputs)
+    tell_drops(job, inputs.dropped, inputs.groom_name)
     tell_notes(list(inputs.notes), report)
     report.facts["dropped"] = inputs.dropped
     return inputs
@@ -75,23 +81,30 @@ def read_rig(job: Job) -> tuple[Rig, Inputs]:
     """Read what the job names and make it ready to move."""
     inputs, report = read_hair(job), job.report
     with report.stage("bind roots, choose guides"):
-        rig = rig_flow.prepare(
-            inputs.strands,
-            inputs.head,
-            job.settings[GuideSettings],
-            place=inputs.groom_name,
-            children=job.settings[ChildrenSettings],
-            density=inputs.density,
-            masks=Masks(read_job_masks(job, inputs)),
-            partings=inputs.partings,
-            widths=job.settings[WidthSettings].method,
-            head_field=lambda: solid_of(inputs.head),
-        )
+        rig = rig_from(_source(job, inputs), job.settings, place=inputs.groom_name)
     tell_notes([f"{inputs.groom_name}: {note}" for note in rig.notes], report)
     for line in filter(None, (rig.children_line, rig.widths.line, rig.guides_line)):
         print(f"{line}.", flush=True)
     tell_rig(report, rig, inputs.groom_name)
     return colored_rig(job, rig), inputs
+
+
+def _source(job: Job, inputs: Inputs) -> Source:
+    """What was read, as a session has it of hair of the scene: with what holds that."""
+    hair, holding = job.hair, Holding()
+    if hair is not None:
+        holding = Holding.of(hair, bpy.context.evaluated_depsgraph_get())
+    tell_notes(list(holding.warnings), job.report)
+    return Source(
+        inputs.strands,
+        inputs.dropped,
+        np.arange(inputs.strands.strand_count, dtype=np.int32),
+        inputs.head,
+        inputs.density,
+        Masks(read_job_masks(job, inputs)),
+        holders=holding.holders,
+        partings=inputs.partings,
+    )
 
 
 def colored_rig(job: Job, rig: Rig) -> Rig:
@@ -126,8 +139,7 @@ def read_job_masks(
     names = mask_names(settings)
     if not names:
         return {}
-    named = bpy.data.objects.get(job.sources.groom or "")
-    hair = named if named is not None and is_groom(named) else None
+    hair = job.hair
     kept = np.zeros(0, np.int32) if hair is None else read_curves(hair, depsgraph).kept
     head = bpy.data.objects.get(inputs.head_object or "")
     canvas = Canvas(hair, head, inputs.head, inputs.strands, kept)
@@ -154,18 +166,18 @@ def tell_rig(report: Report, rig: Rig, name: str) -> None:
     )
 
 
-def _tell_drops(job: Job, inputs: Inputs) -> None:
-    """Say what was dropped; with --strict that is an error."""
-    if not inputs.dropped:
+def tell_drops(job: Job, dropped: Mapping[str, int], place: str) -> None:
+    """Say what was dropped of the hair of this name; with --strict that is an error."""
+    if not dropped:
         return
-    reasons = ", ".join(f"{count} with {reason}" for reason, count in inputs.dropped.items())
+    reasons = ", ".join(f"{count} with {reason}" for reason, count in dropped.items())
     if job.options.strict:
         raise HairloomError(
             f"strands would be dropped: {reasons}",
-            place=inputs.groom_name,
+            place=place,
             remedy="Fix the groom, or leave out --strict",
         )
-    print(f"hairloom: {inputs.groom_name}: dropped strands: {reasons}", flush=True)
+    print(f"hairloom: {place}: dropped strands: {reasons}", flush=True)
 
 
 def tell_notes(notes: list[str], report: Report) -> None:
@@ -203,8 +215,8 @@ def motion_of(job: Job, frames: range | None = None) -> BakedGuides:
     if job.options.bake:
         motion = BakedGuides.in_folder(Path(job.options.bake).resolve(), frames)
     else:
-        hair = bpy.data.objects.get(job.sources.groom or "")
-        if hair is None or hair.type != "CURVES":
+        hair = job.hair
+        if hair is None:
             raise HairloomError(
                 "this is no hair object",
                 place=f"--groom {job.sources.groom or ''}".strip(),
@@ -238,8 +250,8 @@ def with_uvs(rig: Rig, sources: Sources) -> Rig:
 
 def card_edits(job: Job) -> CardEdits | None:
     """What the artist has changed of the cards of --groom in the scene, unless --discard-edits."""
-    hair = bpy.data.objects.get(job.sources.groom or "")
-    if hair is None or hair.type != "CURVES" or getattr(job.options, "discard_edits", False):
+    hair = job.hair
+    if hair is None or getattr(job.options, "discard_edits", False):
         return None
     edits, notes = groom_edits(hair, bpy.context.evaluated_depsgraph_get())
     tell_notes(list(notes), job.report)

@@ -10,7 +10,7 @@ import bpy
 from ...errors import HairloomError
 from ...parameters import ALL_SETTINGS
 from ...params import Settings, SettingsMap
-from ..base.objects import objects_in
+from ..base.objects import objects_in, without_hidden
 from ..properties.presets import named_preset
 from ..properties.properties import settings_of
 from ..scene.fin_modifier import fin_modifier
@@ -45,20 +45,53 @@ def is_groom(obj: bpy.types.Object) -> bool:
     return bool(obj.type == "CURVES" and not obj.data.hairloom.baked_in)
 
 
-def named_grooms(names: list[str]) -> list[bpy.types.Object]:
-    """Those that were named, else all of the view layer.
+def hair_named(name: str | None) -> bpy.types.Object | None:
+    """The hair of the open file that has this name; None where it has none."""
+    named = bpy.data.objects.get(name or "")
+    return named if named is not None and is_groom(named) else None
+
+
+def named_grooms(names: list[str]) -> tuple[list[bpy.types.Object], tuple[str, ...]]:
+    """Those that were named, else all of the view layer, and what is said of those left out.
 
     Raises:
         HairloomError: there is none, or no such.
     """
-    grooms = [obj for obj in objects_in(bpy.context.view_layer) if is_groom(obj)]
-    if not names and not grooms:
+    if names:
+        return named_objects(names, is_groom, "hair curves"), ()
+    grooms, notes = all_of_scene(is_groom)
+    if not grooms:
         raise HairloomError(
             "there is no hair in the open scene",
             place="--object",
             remedy="Name a scene that has some with --scene",
         )
-    return named_objects(names, is_groom, "hair curves") if names else grooms
+    return grooms, notes
+
+
+def all_of_scene(
+    is_wanted: Callable[[bpy.types.Object], bool], option: str = "--object"
+) -> tuple[list[bpy.types.Object], tuple[str, ...]]:
+    """Such objects of the view layer, but for those that are hidden and for hair without curves;
+    and what is said of these.
+
+    Args:
+        option: which names an object.
+
+    Raises:
+        HairloomError: all that there are would be left out.
+    """
+    found = [obj for obj in objects_in(bpy.context.view_layer) if is_wanted(obj)]
+    taken, left_out = without_hidden(found, bpy.context.evaluated_depsgraph_get())
+    if left_out and not taken:
+        raise HairloomError(
+            f"nothing of this scene can be taken ({'; '.join(left_out)})",
+            place="--scene",
+            remedy=f"Show it in Blender, or name it with {option}",
+        )
+    remark = f"and is left out. Name it with {option} to have it."
+    notes = tuple(f"{each}, {remark}" for each in left_out)
+    return taken, notes
 
 
 def check_editable(obj: bpy.types.Object) -> None:

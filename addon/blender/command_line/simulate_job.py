@@ -29,7 +29,7 @@ from .bake_job import write_bake
 from .inputs import Inputs
 from .job_options import add_motion_options
 from .job_steps import Job, finish, read_hair, read_job_masks
-from .object_settings import is_groom, put_map
+from .object_settings import put_map
 from .verb import Verb
 
 #: the shake: how far the head turns and sways, and how often
@@ -88,8 +88,7 @@ def _scene_of(job: Job, inputs: Inputs) -> Iterator[bpy.types.Object]:
     if job.options.animated:
         yield _hair_of_open_scene(job, inputs)
         return
-    named = bpy.context.scene.objects.get(job.sources.groom or "")
-    depsgraph = bpy.context.evaluated_depsgraph_get()
+    named, depsgraph = job.hair, bpy.context.evaluated_depsgraph_get()
     window = bpy.context.window_manager.windows[0]
     before, scene = window.scene, bpy.data.scenes.new("Hairloom Simulation")
     window.scene = scene
@@ -97,7 +96,7 @@ def _scene_of(job: Job, inputs: Inputs) -> Iterator[bpy.types.Object]:
         assert inputs.head is not None, "simulate and demo refuse hair without a head"
         head = mesh_object("Head", inputs.head, scene)
         hair = write_curves("Hair", inputs.strands, head, scene.collection)
-        if named is not None and is_groom(named):
+        if named is not None:
             copies = StillCopies(head, scene, depsgraph)
             copy_holders(named, hair, copies)
             copy_colliders(named, bpy.data.objects.get(inputs.head_object or ""), hair, copies)
@@ -144,7 +143,7 @@ def _hair_of_open_scene(job: Job, inputs: Inputs) -> bpy.types.Object:
             remedy="Name the head's object with --head, or leave out --animated",
         )
     head, scene = bpy.data.objects[inputs.head_object], bpy.context.scene
-    hair = bpy.data.objects.get(job.sources.groom or "")
+    hair = job.hair
     if hair is None:
         hair = write_curves("Hair", inputs.strands, head, scene.collection)
         if inputs.groom is not None and inputs.groom.motion is not None:
