@@ -19,6 +19,7 @@ from hairloom.addon.blender.command_line import command_line
 from hairloom.addon.blender.command_line.run_job import OPERATORS
 from hairloom.addon.blender.properties import presets
 from hairloom.addon.blender.scene.fin_modifier import fin_modifier
+from hairloom.addon.exchange.tressfx import read_tfx
 
 FEW = [
     "--set",
@@ -502,3 +503,78 @@ def test_strands_of_a_scene_that_are_left_out_are_named_or_refused(
         assert "Hair: dropped strands: 1 with" in capfd.readouterr().out
         error = exported(scene, *which, "--strict", code=1)["error"]
         assert "strands would be dropped: 1 with" in error["problem"] and error["place"] == "Hair"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "option", "why"),
+    [
+        ("export --object Hair --style brows", "--style", "its own groom, head and bake"),
+        ("export --object Hair --head Head", "--head", "its own groom, head and bake"),
+        ("export --collider Head", "--collider", "its own groom, head and bake"),
+        ("export --object Hair --groom-up Y", "--groom-up", "its own groom, head and bake"),
+        ("export --object Hair --frame 1 --frames 1 2", "--frame", "all of --frames"),
+        ("export --groom Hair --frame 30", "--frame", "no bake is named"),
+        ("export --no-use-bake", "--use-bake", "over frames"),
+        ("render --frame 30", "--frame", "no bake is named"),
+        ("turntable --frame 30", "--frame", "no bake is named"),
+        ("turntable --no-video --frame-rate 30", "--frame-rate", "none is made"),
+        ("sheet --groom Hair --groom-scale 0.01", "--groom-scale", "read from a file"),
+        ("render --groom Hair --density-group Top", "--density-group", "there already"),
+        ("render --bake somewhere --length-group Top", "--length-group", "there already"),
+        ("simulate --animated --seconds 3", "--seconds", "those of the scene"),
+        ("cards --page-texture 512", "--page-texture", "no web page"),
+        ("cards --no-page-head", "--page-head", "no web page"),
+        ("render --head Head --skin dark", "--skin", "only the built-in head"),
+        ("bake --delete --frames 1 2", "--frames", "is deleted"),
+    ],
+)
+def test_options_that_mean_nothing_are_refused(
+    scene: Path, capsys: pytest.CaptureFixture[str], arguments: str, option: str, why: str
+) -> None:
+    """With the option that was given, and nothing is written."""
+    verb, *more = arguments.split()
+    output = {"export": "out.tfx", "render": "out.png", "sheet": "out.png", "cards": "out.glb"}
+    where = (
+        [] if "--delete" in more else ["--output", str(scene.with_name(output.get(verb, "out")))]
+    )
+    few = FEW if "--skin" in more else []
+    assert command_line.run([verb, "--scene", str(scene), *more, *few, *where]) == 1
+    said = capsys.readouterr().err
+    assert f"hairloom: {option}: " in said and why in said, said
+    assert [path.name for path in scene.parent.iterdir()] == [scene.name]
+
+
+def test_hair_of_a_scene_leaves_as_it_is_at_a_frame(scene: Path) -> None:
+    """As its modifiers move it, or its bake."""
+    bpy.ops.wm.open_mainfile(filepath=str(scene))
+    hair = bpy.data.objects["Hair"]
+    for frame in (1, 30):
+        hair.location.x = 0.01 * frame
+        hair.keyframe_insert("location", frame=frame)
+    bpy.context.scene.frame_set(1)
+    bpy.ops.wm.save_mainfile()
+    roots = {}
+    for frame in (1, 30):
+        exported(scene, "--frame", str(frame))
+        roots[frame] = read_tfx(scene.with_name("out.tfx")).strands.roots
+    np.testing.assert_allclose(roots[30] - roots[1], [[0.29, 0.0, 0.0]] * len(roots[1]), atol=1e-5)
+
+
+def test_hair_of_a_scene_is_held_to_what_jobs_ask_of_files(scene: Path) -> None:
+    """UVs with --strict, and weights that children can grow by."""
+    children = ["--set", "children.method=multi", "--set", "children.strand_count=200"]
+    fraction = {}
+    for which in ([], ["--children-density", "Top"]):
+        exported(scene, *children, *which)
+        height = read_tfx(scene.with_name("out.tfx")).strands.roots[:, 2]
+        fraction[len(which)] = (height > 0.05).mean()
+    assert fraction[2] > fraction[0] + 0.2
+    exported(scene, *children, "--children-density", "Nowhere", code=1)
+    bpy.ops.wm.open_mainfile(filepath=str(scene))
+    mesh = bpy.data.objects["Head"].data
+    for layer in list(mesh.uv_layers):
+        mesh.uv_layers.remove(layer)
+    bpy.ops.wm.save_mainfile()
+    assert exported(scene)["status"] == "done"
+    error = exported(scene, "--strict", code=1)["error"]
+    assert error["place"] == "Head" and "UV" in error["problem"]

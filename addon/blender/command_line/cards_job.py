@@ -112,7 +112,7 @@ def _moving(job: Job, settings: CardExportSettings) -> tuple[Rig, GuideMotion | 
     """The hair, and what moves it if motion is asked for: the bake of a folder or of an object."""
     options = job.options
     frames = frames_of_option(options.frames)
-    _check_motion_options(job, settings.motion)
+    _check_idle_options(job, settings)
     if settings.motion != "none":
         motion = motion_of(job, frames)
         return motion.rig, motion
@@ -125,8 +125,16 @@ def _moving(job: Job, settings: CardExportSettings) -> tuple[Rig, GuideMotion | 
     return read_rig(job)[0], None
 
 
-def _check_motion_options(job: Job, motion: str) -> None:
-    """Refuse options that say how another motion is written."""
+def _check_idle_options(job: Job, settings: CardExportSettings) -> None:
+    """Refuse options that say how another motion is written, or a page that is not."""
+    for name in () if settings.page else ("page_texture", "page_head"):
+        if getattr(job.options, name) is not None:
+            raise HairloomError(
+                "it means nothing here: no web page is written",
+                place="--" + name.replace("_", "-"),
+                remedy="Leave it out, or add --page",
+            )
+    motion = settings.motion
     for name in sorted({name for names in OF_MOTION.values() for name in names}):
         if getattr(job.options, name) is not None and name not in OF_MOTION[motion]:
             users = [each for each, names in OF_MOTION.items() if name in names]

@@ -25,6 +25,7 @@ from .cards_job import CARDS
 from .demo_job import DEMO
 from .export_job import EXPORT
 from .grow_job import GROW
+from .idle_options import check_idle_options
 from .import_job import IMPORT
 from .inputs import Sources
 from .job_options import check_numbers, chosen_settings
@@ -159,9 +160,9 @@ def _job(verb: Verb, options: argparse.Namespace, report: Report) -> Job:
     if verb.opens_scene and options.scene:
         with report.stage("open scene"):
             open_scene(Path(options.scene))
-        takes_one = verb.takes_hair and not hasattr(options, "object")
-        if takes_one and not (options.groom or options.style):
-            options.groom = _only_groom(options, report)
+    check_idle_options(verb, options)
+    if verb.takes_hair and not (options.groom or options.style or hasattr(options, "object")):
+        options.groom = _only_groom(options, report)
     if verb.takes_hair and options.style:
         with report.stage("add hairstyle"):
             options.groom = _styled(options, report)
@@ -228,7 +229,7 @@ def _only_groom(options: argparse.Namespace, report: Report) -> str | None:
     Raises:
         HairloomError: there are several, or it is hidden or empty.
     """
-    if options.head or getattr(options, "bake", None):
+    if not options.scene or options.head or getattr(options, "bake", None):
         return None
     found, notes = all_of_scene(is_groom, "--groom")
     tell_notes(list(notes), report)

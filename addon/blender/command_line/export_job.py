@@ -20,9 +20,13 @@ from ...exchange.strand_formats import STRAND_FORMATS, StrandFormat, format_of
 from ...groom.widths import as_wide
 from ...rig_flow import Rig
 from ...shading.settings import ShadingSettings
+from ..base.objects import head_of
+from ..scene.source import check_density
+from ..scene.surfaces import read_surface
 from ..strands.groom_motion import BakedMotion
 from ..strands.read_hair import hair_of_rig
 from ..strands.strand_export import StrandExport, request_of
+from .idle_options import is_of_scene
 from .inputs import Inputs
 from .job_options import (
     add_frames_option,
@@ -47,7 +51,7 @@ def export(job: Job) -> None:
         check_not_read(path, options)
     settings = parameters_of(options, job.settings[StrandExportSettings])
     frames = frames_of_option(options.frames, options.max_frames)
-    if options.object or _is_of_scene(options):
+    if is_of_scene(options):
         plan = _of_objects(job, kind, settings, frames)
     else:
         plan = _of_rig(job, kind, settings, frames)
@@ -65,38 +69,30 @@ def export(job: Job) -> None:
     print(outcome.result)
 
 
-def _is_of_scene(options: argparse.Namespace) -> bool:
-    """Whether a scene was named, and nothing else that strands could come from: all its hair."""
-    return bool(options.scene and not (options.groom or options.head or options.bake))
-
-
 def _of_objects(
     job: Job, kind: StrandFormat, settings: StrandExportSettings, frames: range | None
 ) -> StrandExport:
     """Hair of the scene, as the artist's operators write it."""
-    options = job.options
-    if options.groom or options.bake is not None:
-        raise HairloomError(
-            "hair of the scene goes by its own bake, and is no --groom",
-            place="--object",
-            remedy="Give --object alone, or --groom with --bake",
-        )
+    options, depsgraph = job.options, bpy.context.evaluated_depsgraph_get()
     hair, notes = named_grooms(options.object)
     tell_notes(list(notes), job.report)
     for each in hair:
         put_settings(each, options.preset, options.set)
+        if options.children_density:
+            each.hairloom.children_density = options.children_density
+            check_density(each, depsgraph)
+        head = head_of(each)
+        if options.strict and head is not None:
+            read_surface(head, depsgraph, need_uv=True, place=head.name)
+    still = frames is None and options.frame is not None
     with job.report.stage("read hair"):
-        plan = StrandExport.of(
-            hair,
-            bpy.context.evaluated_depsgraph_get(),
-            kind,
-            settings,
-            frames=frames,
-        )
+        at = range(options.frame, options.frame + 1) if still else frames
+        plan = StrandExport.of(hair, depsgraph, kind, settings, frames=at)
+        for part in plan.moving:
+            if isinstance(part, BakedMotion):
+                job.report.add_input(part.cache.folder)
+        plan = plan.standing() if still else plan
     tell_drops(job, plan.dropped, ", ".join(each.name for each in hair))
-    for part in plan.moving:
-        if isinstance(part, BakedMotion):
-            job.report.add_input(part.cache.folder)
     return plan
 
 
@@ -171,7 +167,7 @@ def _tell_check(facts: dict[str, Any], form: str) -> None:
 
 def add_export_options(parser: argparse.ArgumentParser) -> None:
     """The same choices as the artist's, and when."""
-    add_moment_options(parser)
+    add_moment_options(parser, "; of the scene, for --object or all of --scene")
     hair = parser.add_argument_group("hair of the scene")
     add_object_option(
         hair,

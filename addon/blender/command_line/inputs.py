@@ -25,7 +25,7 @@ from ..base.parts import at_once
 from ..base.vertex_weights import read_weights
 from ..scene.built_in_head import HeadLook, built_in_head
 from ..scene.curves import read_curves
-from ..scene.head_look import head_look
+from ..scene.head_look import head_look, is_our_bust
 from ..scene.masks import read_map
 from ..scene.mesh_files import read_mesh_file
 from ..scene.partings import read_partings
@@ -35,6 +35,7 @@ from ..strands.child_python import python_for
 from .object_settings import hair_named
 
 BUILT_IN = "built-in"
+_SKIN = "light"
 
 
 @dataclass(frozen=True)
@@ -65,7 +66,7 @@ class Sources:
     density_group: str = ""
     length_group: str = ""
     children_density: str = ""
-    skin: str = "light"
+    skin: str = _SKIN
     with_face: bool = False
 
 
@@ -164,7 +165,14 @@ def _read_head(name: str | None, sources: Sources) -> tuple[Surface | None, tupl
             remedy="Name the file with --head, or scale the object in the scene",
         )
     if name is not None:
-        return _read_mesh(name, sources)
+        head, said = _read_mesh(name, sources)
+        if sources.skin != _SKIN and not is_our_bust(head):
+            raise HairloomError(
+                "only the built-in head has another skin",
+                place="--skin",
+                remedy=f"Leave it out: {name} is drawn in its own materials",
+            )
+        return head, said
     if sources.groom is None:
         return built_in_head().surface, ()
     if sources.need_head:

@@ -150,12 +150,19 @@ def add_bake_option(parser: Any) -> None:
     )
 
 
-def add_moment_options(parser: argparse.ArgumentParser) -> None:
-    """At which frame of a bake, see job_steps.posed_hair."""
+def add_moment_options(parser: argparse.ArgumentParser, beside: str = "") -> None:
+    """At which frame of a bake, see job_steps.posed_hair.
+
+    Args:
+        beside: what else may have that frame.
+    """
     moment = parser.add_argument_group("when")
     add_bake_option(moment)
     moment.add_argument(
-        "--frame", type=int, metavar="NUMBER", help="frame of the bake (default: its first)"
+        "--frame",
+        type=int,
+        metavar="NUMBER",
+        help=f"frame of the bake (default: its first){beside}",
     )
 
 

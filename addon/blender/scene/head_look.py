@@ -36,11 +36,13 @@ def head_look(name: str | None, head: Surface | None, tone: str) -> HeadLook | N
     own = _own_look(name)
     if own is not None and sum(len(triangles) for triangles, _ in own) == len(head.triangles):
         return own
-    built_in = built_in_head()
-    is_ours = head.corner_uv is not None and np.array_equal(
-        head.triangles, built_in.surface.triangles
-    )
-    return built_in.look(tone) if is_ours else None
+    return built_in_head().look(tone) if is_our_bust(head) else None
+
+
+def is_our_bust(head: Surface) -> bool:
+    """Whether it has the mesh of the built-in head, however it got here."""
+    ours = built_in_head().surface.triangles
+    return head.corner_uv is not None and np.array_equal(head.triangles, ours)
 
 
 def look_below(hair: bpy.types.Object, head: Surface | None) -> HeadLook | None:

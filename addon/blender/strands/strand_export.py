@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Generator, Iterator
+from contextlib import closing
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -128,6 +129,17 @@ class StrandExport:
         for points in positions_of(self.moving, self.frames):
             yield points
             self.done += 1
+
+    def standing(self) -> StrandExport:
+        """Its first frame as a still.
+
+        Raises:
+            HairloomError: the frame cannot be read.
+        """
+        with closing(self.positions()) as positions:
+            points = next(positions)
+        groom = replace(self.groom, strands=self.groom.strands.with_points(points))
+        return replace(self, groom=groom, frames=None, moving=())
 
     def writing(self, path: Path, positions: Generator[Floats]) -> ThreadWork[Outcome]:
         """The same in a thread, which asks the main thread for each frame of `positions`."""

@@ -1,0 +1,123 @@
+"""Options that would change nothing beside the others. They are refused: whoever gives one expects
+something of it."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import bpy
+
+from ...errors import HairloomError
+from .verb import Verb
+
+
+@dataclass(frozen=True)
+class _Idle:
+    """Options, when they mean nothing, and what is said then."""
+
+    names: tuple[str, ...]
+    when: Callable[[argparse.Namespace], bool]
+    why: str
+    remedy: str
+
+
+def is_of_scene(options: argparse.Namespace) -> bool:
+    """Whether an export is of hair of the scene with all that it has of its own: of the objects
+    that are named, or of all where a scene is named and nothing else that strands could come from.
+    """
+    if not hasattr(options, "object") or not hasattr(options, "groom"):
+        return False
+    others = options.groom or options.head or options.style or options.bake is not None
+    return bool(options.object or (options.scene and not others))
+
+
+def _is_in_file(options: argparse.Namespace) -> bool:
+    """Whether the groom is none of the scene."""
+    return bool(options.groom) and bpy.data.objects.get(options.groom) is None
+
+
+def _is_grown(options: argparse.Namespace) -> bool:
+    return not (options.groom or options.style or getattr(options, "bake", None) is not None)
+
+
+_OF_GROOM_FILES = ("groom_scale", "groom_up")
+_OF_GROWTH = ("density_group", "length_group")
+_OF_ONE_GROOM = ("groom", "style", "head", "head_scale", "collider", "skin", "bake")
+
+_IDLE = (
+    _Idle(
+        (*_OF_ONE_GROOM, *_OF_GROOM_FILES, *_OF_GROWTH),
+        is_of_scene,
+        "hair of the scene has its own groom, head and bake",
+        "Leave it out, or name one hair with --groom in place of --object",
+    ),
+    _Idle(
+        ("frame",),
+        lambda options: getattr(options, "frames", None) is not None and hasattr(options, "object"),
+        "all of --frames is written",
+        "Give one of the two",
+    ),
+    _Idle(
+        ("frame",),
+        lambda options: options.bake is None and not is_of_scene(options),
+        "it is a frame of a bake, and no bake is named",
+        "Add --bake, or leave it out",
+    ),
+    _Idle(
+        ("use_bake",),
+        lambda options: not is_of_scene(options) or (options.frames is options.frame is None),
+        "it is about hair of the scene over frames",
+        "Leave it out, or name the hair with --object, and --frames",
+    ),
+    _Idle(
+        _OF_GROOM_FILES,
+        lambda options: hasattr(options, "style") and not _is_in_file(options),
+        "only a groom that is read from a file has another unit or axis",
+        "Leave it out, or name the file with --groom",
+    ),
+    _Idle(
+        _OF_GROWTH,
+        lambda options: hasattr(options, "style") and not _is_grown(options),
+        "it is for hair that is grown here, and this hair is there already",
+        "Leave it out, or leave out --groom, --style and --bake",
+    ),
+    _Idle(
+        ("seconds", "frame_rate"),
+        lambda options: getattr(options, "animated", False),
+        "with --animated, frames and their rate are those of the scene",
+        "Leave out one of the two",
+    ),
+    _Idle(
+        ("frame_rate",),
+        lambda options: getattr(options, "no_video", False),
+        "it is of the video, and none is made",
+        "Leave out one of the two",
+    ),
+    _Idle(
+        ("frames", "output", "preset", "set"),
+        lambda options: getattr(options, "delete", False),
+        "a bake that is deleted has no use for it",
+        "Leave out one of the two",
+    ),
+)
+
+
+def check_idle_options(verb: Verb, options: argparse.Namespace) -> None:
+    """Look at what was given, with the scene open that objects are of.
+
+    Raises:
+        HairloomError: naming the first option that means nothing, and why.
+    """
+    usual = argparse.ArgumentParser(add_help=False)
+    verb.add_all_options(usual)
+    for idle in _IDLE:
+        for name in idle.names:
+            value = getattr(options, name, None)
+            if value is not None and value != usual.get_default(name) and idle.when(options):
+                raise HairloomError(
+                    f"it means nothing here: {idle.why}",
+                    place="--" + name.replace("_", "-"),
+                    remedy=idle.remedy,
+                )
