@@ -13,6 +13,7 @@ import json
 import shutil
 import subprocess
 import sys
+import zlib
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import ModuleType
@@ -178,13 +179,13 @@ def test_a_highlight_is_as_wide_as_ours() -> None:
 def test_a_groom_gets_strands_cards_and_its_head(
     importer: ModuleType, unreal: ModuleType, asset: Asset, tmp_path: Path
 ) -> None:
-    groom = tmp_path / "Zöpfe.abc"
+    groom = tmp_path / "cards_groom.abc"
     groom.write_bytes(b"")
     head = unreal._put(unreal.SkeletalMesh(), "/Game/Head/SK_Head")
     command = [str(asset.folder / "cards.fbx"), "/Game/Hair", "--groom", str(groom)]
     command += ["--skeletal-mesh", head.path, "--simulate"]
     assert importer.main(command) == 0
-    made = unreal.assets["/Game/Hair/G_Zopfe"]
+    made = unreal.assets["/Game/Hair/G_cards_groom"]
     for number, levels in enumerate(made.values["hair_groups_lod"]):
         near, far = levels.values["lo_ds"]
         assert near.values["geometry_type"] == "GroomGeometryType.STRANDS"
@@ -202,7 +203,7 @@ def test_a_groom_gets_strands_cards_and_its_head(
     assert len(warnings) == (0 if is_packed else 1)
     solver = made.values["hair_groups_physics"][1].get_editor_property("solver_settings")
     assert solver.values["enable_simulation"] is True
-    binding = unreal.assets["/Game/Hair/G_Zopfe_Binding"]
+    binding = unreal.assets["/Game/Hair/G_cards_groom_Binding"]
     assert binding.values == {"groom": made, "target_skeletal_mesh": head}
     strands = made.values["hair_groups_materials"][0].values["material"]
     assert "OpacityMask" not in attributes_of(strands)
@@ -286,8 +287,27 @@ def test_what_can_be_shown_is_shown(importer: ModuleType, unreal: ModuleType, as
     warnings = [text for kind, text in unreal.log_lines if kind == "warning"]
     assert len(warnings) == 2
     assert "names cards.fbx" in warnings[0] and alpha in warnings[1]
-    assert "OpacityMask" not in attributes_of(unreal.assets["/Game/Hair/M_Zopfe"])
-    assert "/Game/Hair/SM_Zopfe" in unreal.saved
+    name = "Zopfe_" + f"{zlib.crc32('Zöpfe 头发'.encode()):08x}"
+    assert "OpacityMask" not in attributes_of(unreal.assets[f"/Game/Hair/M_{name}"])
+    assert f"/Game/Hair/SM_{name}" in unreal.saved
+    pictures = [path for path in unreal.assets if "/T_" in path]
+    assert pictures and all(path.startswith("/Game/Hair/T_Zopfe_cards_") for path in pictures)
+
+
+def test_hair_of_another_folder_is_replaced_on_demand_alone(
+    importer: ModuleType, unreal: ModuleType, asset: Asset
+) -> None:
+    """Two exports of one name, in folders of their own."""
+    first, second = (str(_copied(asset, f"unreal_{name}") / "cards.fbx") for name in ("a", "b"))
+    assert importer.main([first, "/Game/Hair"]) == 0
+    before, unreal.log_lines[:] = dict(unreal.assets), []
+    assert importer.main([second, "/Game/Hair"]) == 1
+    ((kind, text),) = unreal.log_lines
+    assert kind == "error" and f"made of {first}" in text and "--replace" in text
+    assert unreal.assets == before
+    assert importer.main([first, "/Game/Hair"]) == 0
+    assert importer.main([second, "/Game/Hair", "--replace"]) == 0
+    assert importer.main([second, "/Game/Hair"]) == 0
 
 
 def test_a_mesh_that_another_program_reduced_is_named(
@@ -318,9 +338,12 @@ def test_a_project_that_cannot_be_written_is_named(
 
 def test_names_stay_apart_and_plain(importer: ModuleType) -> None:
     plan = importlib.import_module("hairloom_plan")
-    assert plan.asset_name("Haar/Ä.001") == "Haar_A_001"
-    first, second = plan.asset_name("头发"), plan.asset_name("髪型")
-    assert first != second and first.isascii() and first.startswith("Hair_")
+    assert plan.asset_name("Hair_01") == "Hair_01"
+    assert plan.asset_name("Haar/Ä.001").startswith("Haar_A_001_")
+    names = ["头发", "髪型", "Zöpfe", "Zopfe", "Zopfe 头发", "Zopfe 髪型", "Zopfe_", "Zopfe."]
+    made = [plan.asset_name(name) for name in names]
+    assert len(set(made)) == len(names) and all(name.isascii() for name in made)
+    assert made[0].startswith("Hair_") and made[3] == "Zopfe"
 
 
 # The shading

@@ -39,6 +39,8 @@ ASSETS = unreal.EditorAssetLibrary
 #: of triangles, where meshes are built; 2 leaves them in their order, 1 is Unreal's own
 ORDER = "r.TriangleOrderOptimization"
 KEPT = 2
+#: tag of an asset: the file that it was made of
+SOURCE = "HairloomSource"
 #: by which a groom follows large deformations; Unreal's own number
 INTERPOLATION_POINTS = 100
 #: screen size below which a groom shows its cards; a choice, to be changed in the groom
@@ -55,6 +57,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             Path(options.groom) if options.groom else None,
             options.skeletal_mesh,
             options.simulate,
+            options.replace,
         ):
             unreal.log_warning(sentence)
     except CardFileError as error:
@@ -71,6 +74,7 @@ def _options() -> argparse.ArgumentParser:
     options.add_argument("--groom", help="a groom Alembic file of the same hair")
     options.add_argument("--skeletal-mesh", help="asset of the head to which the groom is bound")
     options.add_argument("--simulate", action="store_true", help="move the groom by its guides")
+    options.add_argument("--replace", action="store_true", help="replace assets of other files")
     return options
 
 
@@ -80,38 +84,59 @@ def import_hair(
     groom: Path | None = None,
     skeletal_mesh: str | None = None,
     simulate: bool = False,
+    replaces_others: bool = False,
 ) -> list[str]:
     """Imports cards, and a groom where one is named.
+
+    Args:
+        replaces_others: assets of the same names that were made of other files, too.
 
     Returns:
         Sentences about what is missing or odd.
 
     Raises:
-        CardFileError: nothing can be shown.
+        CardFileError: nothing can be shown, or assets of other files would be replaced.
     """
     plan = plan_of(mesh)
     warnings = list(plan.warnings)
     if groom is not None and not groom.is_file():
         raise CardFileError(f"{groom}: there is no such file; export the strands as .abc")
+    if not replaces_others:
+        names = [f"M_{plan.name}", f"SM_{plan.name}", *(each.asset for each in plan.pictures)]
+        if groom is not None:
+            names.append(f"M_{plan.name}_Strands")
+            _check_sources([_groom_name(groom)], folder, groom)
+        _check_sources(names, folder, mesh)
     for picture in plan.pictures:
-        _import_picture(picture, folder)
+        _import_picture(picture, folder, mesh)
     material = _material(f"M_{plan.name}", folder, plan.cards, is_masked=True)
     cards, found = _import_cards(plan, folder, material)
     warnings += [found] if found else []
-    made = [material, cards]
+    made = {material: mesh, cards: mesh}
     if groom is not None:
         strands = _material(f"M_{plan.name}_Strands", folder, plan.strands, is_masked=False)
         asset = _import_groom(groom, folder)
         warnings += _set_up_groom(asset, plan, folder, strands, material, cards, simulate)
-        made += [strands, asset]
+        made |= {strands: mesh, asset: groom}
         if skeletal_mesh is not None:
-            made.append(_bound(asset, skeletal_mesh, folder))
-    for asset in made:
-        _save(asset)
+            made[_bound(asset, skeletal_mesh, folder)] = groom
+    for asset, source in made.items():
+        _save(asset, source)
     return warnings
 
 
-def _save(asset: Any) -> None:
+def _check_sources(names: Sequence[str], folder: str, source: Path) -> None:
+    for path in (f"{folder}/{name}" for name in names):
+        if not ASSETS.does_asset_exist(path):
+            continue
+        found = ASSETS.get_metadata_tag(ASSETS.load_asset(path), SOURCE)
+        if found != str(source.resolve()):
+            what = f"it was made of {found}" if found else "another asset has this name"
+            raise CardFileError(f"{path}: {what}; choose another folder, or add --replace")
+
+
+def _save(asset: Any, source: Path) -> None:
+    ASSETS.set_metadata_tag(asset, SOURCE, str(source.resolve()))
     if not ASSETS.save_loaded_asset(asset, only_if_is_dirty=False):
         raise CardFileError(
             f"{asset.get_path_name()}: it cannot be saved; make its folder writable, or free space"
@@ -147,7 +172,7 @@ def _set(target: Any, values: dict) -> None:
 # Textures and materials
 
 
-def _import_picture(picture: Picture, folder: str) -> None:
+def _import_picture(picture: Picture, folder: str, mesh: Path) -> None:
     texture = _imported(picture.file, folder, picture.asset, unreal.TextureFactory())
     address = getattr(unreal.TextureAddress, picture.address)
     values = {
@@ -157,7 +182,7 @@ def _import_picture(picture: Picture, folder: str) -> None:
         "address_y": address,
     }
     _set(texture, values)
-    _save(texture)
+    _save(texture, mesh)
 
 
 def _material(name: str, folder: str, graph: Graph, is_masked: bool) -> Any:
@@ -298,6 +323,10 @@ def _set_up_levels(mesh: Any, plan: Plan) -> None:
 # The groom
 
 
+def _groom_name(file: Path) -> str:
+    return f"G_{asset_name(file.stem)}"
+
+
 def _import_groom(file: Path, folder: str) -> Any:
     """Hairloom writes grooms for Unreal in its own axes and centimetres: nothing is turned."""
     conversion = unreal.GroomConversionSettings(
@@ -305,8 +334,7 @@ def _import_groom(file: Path, folder: str) -> Any:
     )
     options = unreal.GroomImportOptions()
     options.set_editor_property("conversion_settings", conversion)
-    name = f"G_{asset_name(file.stem)}"
-    return _imported(file, folder, name, unreal.HairStrandsFactory(), options)
+    return _imported(file, folder, _groom_name(file), unreal.HairStrandsFactory(), options)
 
 
 def _set_up_groom(

@@ -119,10 +119,10 @@ class Plan:
 
 def asset_name(name: str) -> str:
     """A name that content folders take on every system: letters without accents, digits and
-    underscores. What has none of these gets a number, so that two such names stay apart."""
+    underscores. One that has lost something by that gets a number: two such names stay apart."""
     plain = unicodedata.normalize("NFKD", name).encode("ascii", "ignore").decode("ascii")
     kept = re.sub(r"[^A-Za-z0-9]+", "_", plain).strip("_")
-    return kept or f"Hair_{zlib.crc32(name.encode('utf-8')):08x}"
+    return kept if kept == name else f"{kept or 'Hair'}_{zlib.crc32(name.encode('utf-8')):08x}"
 
 
 def read_sidecar(mesh: Path) -> tuple[dict[str, Any], list[str]]:
@@ -232,8 +232,11 @@ def _picture(mesh: Path, file: str, sidecar: dict[str, Any], roles: dict[str, An
         how = ("TC_VECTOR_DISPLACEMENTMAP", "SAMPLERTYPE_LINEAR_COLOR")
     else:
         how = ("TC_MASKS", "SAMPLERTYPE_MASKS")
+    stem = Path(file).stem
+    if not stem.startswith(mesh.stem):  # files of other hair may have these names
+        stem = f"{mesh.stem}_{stem}"
     address = "TA_WRAP" if own and all(role in REPEATED for role in own) else "TA_CLAMP"
-    return Picture(mesh.parent / file, "T_" + asset_name(Path(file).stem), is_color, *how, address)
+    return Picture(mesh.parent / file, "T_" + asset_name(stem), is_color, *how, address)
 
 
 def _fractions(levels: list[dict[str, Any]], height: float) -> tuple[float, ...]:

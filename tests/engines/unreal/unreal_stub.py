@@ -68,6 +68,10 @@ class Documented:
 class Object(Documented):
     path = ""
 
+    def __init__(self) -> None:
+        super().__init__()
+        self.tags: dict[str, str] = {}
+
     def get_name(self) -> str:
         return self.path.rsplit("/", 1)[-1]
 
@@ -432,6 +436,14 @@ class EditorAssetLibrary:
     @staticmethod
     def delete_asset(asset_path_to_delete: str) -> bool:
         return assets.pop(asset_path_to_delete, None) is not None
+
+    @staticmethod
+    def get_metadata_tag(object_: Any, tag: str) -> str:
+        return str(object_.tags.get(tag, ""))
+
+    @staticmethod
+    def set_metadata_tag(object_: Any, tag: str, value: str) -> None:
+        object_.tags[tag] = value
 
     @staticmethod
     def save_loaded_asset(asset_to_save: Any, only_if_is_dirty: bool = True) -> bool:
