@@ -136,6 +136,22 @@ def quantised(folder: Path) -> None:
     _changed(folder, change)
 
 
+def with_mirrored_cards(folder: Path) -> None:
+    """No damage: the frames of cards that an artist has mirrored, on one side of the hair. Their
+    strands run where they ran.
+    """
+
+    def change(file: GlbFile) -> None:
+        for mesh in file.content["meshes"]:
+            attributes = mesh["primitives"][0]["attributes"]
+            tangents = np.asarray(file.values(attributes["TANGENT"]), np.float32)
+            is_mirrored = np.asarray(file.values(attributes["POSITION"]))[:, 0] < 0.0
+            tangents[is_mirrored] *= -1.0
+            attributes["TANGENT"] = file.add(tangents, "VEC4", target=34962)
+
+    _changed(folder, change)
+
+
 #: what was done -> what one sentence says of it; an empty one: nothing
 DAMAGES: dict[Callable[[Path], None], str] = {
     without_sidecar: "is missing",

@@ -5,7 +5,7 @@ Run in a process of its own:
     python mesh_view.py FILE RESULT.json
 
 Of each mesh, in the order of its faces: the corners' positions in the file's space, normals, and
-those of each UV set, with tangents, and of each colour set.
+those of each UV set, with tangents and bitangents, and of each colour set.
 """
 
 from __future__ import annotations
@@ -53,6 +53,7 @@ def mesh_of(mesh: Any) -> dict[str, Any]:
     corners = range(mesh.num_indices)
     layers, colors = list(mesh.uv_sets), list(mesh.color_sets)
     tangents = [layer.vertex_tangent for layer in layers]
+    bitangents = [layer.vertex_bitangent for layer in layers]
     return {
         "sizes": [face.num_indices for face in list(mesh.faces)],
         "vertices": mesh.num_vertices,
@@ -60,6 +61,7 @@ def mesh_of(mesh: Any) -> dict[str, Any]:
         "normal": per_corner(mesh.vertex_normal, corners),
         "uv": [per_corner(layer.vertex_uv, corners) for layer in layers],
         "tangent": [per_corner(each, corners) for each in tangents if each.exists],
+        "bitangent": [per_corner(each, corners) for each in bitangents if each.exists],
         "color": [per_corner(layer.vertex_color, corners) for layer in colors],
     }
 

@@ -18,6 +18,7 @@ from hairloom.addon.cards.card_mesh import CardMesh
 from hairloom.addon.cards.settings import CardSettings
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.exchange.cards.card_formats import FBX, GLB, OBJ, USD, CardFormat, format_of
+from hairloom.addon.exchange.cards.glb_file import GlbFile
 from hairloom.addon.exchange.files.axes import from_z_up
 from hairloom.addon.exchange.files.file_set import written_together
 
@@ -105,6 +106,47 @@ def test_fbx_keeps_order_attributes_and_levels(levels: list[CardMesh], tmp_path:
         np.testing.assert_allclose(got["normal"], normal, atol=2e-4)
         side = at_corners(from_z_up(across(mesh), "Y"), mesh)
         assert (np.array(got["tangent"][0]) * side).sum(axis=1).min() > 0.9
+
+
+def mirrored(levels: list[CardMesh]) -> list[CardMesh]:
+    """As an artist mirrors cards: u runs the other way, strands and faces as before."""
+    return [replace(mesh, uv=np.abs([1.0, 0.0] - mesh.uv).astype(np.float32)) for mesh in levels]
+
+
+@pytest.mark.parametrize("is_mirrored", [False, True])
+def test_glb_says_which_way_strands_run(
+    levels: list[CardMesh], tmp_path: Path, is_mirrored: bool
+) -> None:
+    """By the formula of the sidecar."""
+    assert "TANGENT.w * cross(NORMAL, TANGENT.xyz)" in GLB.attributes["TANGENT"]
+    path = written(tmp_path, mirrored(levels) if is_mirrored else levels, GLB)
+    file = GlbFile.of(path.read_bytes(), str(path))
+    for number, mesh in enumerate(levels):
+        node = file.content["nodes"][file.node(f"{NODE}_LOD{number}")]
+        (part,) = file.content["meshes"][node["mesh"]]["primitives"]
+        corners = np.asarray(file.values(part["indices"])).ravel().astype(int)
+        normal, tangent = (
+            np.asarray(file.values(part["attributes"][name]))[corners]
+            for name in ("NORMAL", "TANGENT")
+        )
+        assert set(np.sign(tangent[:, 3])) == {-1.0 if is_mirrored else 1.0}
+        along = tangent[:, 3:] * np.cross(normal, tangent[:, :3])
+        ours = at_corners(from_z_up(mesh.tangent, "Y"), mesh)
+        assert (along * ours).sum(axis=1).min() > 0.9
+
+
+@needs_ufbx
+@pytest.mark.parametrize("is_mirrored", [False, True])
+def test_fbx_says_which_way_strands_run(
+    levels: list[CardMesh], tmp_path: Path, is_mirrored: bool
+) -> None:
+    assert "root to tip" in FBX.attributes["LayerElementBinormal 0"]
+    path = written(tmp_path, mirrored(levels) if is_mirrored else levels, FBX)
+    read = read_by_ufbx(path, tmp_path)
+    for number, mesh in enumerate(levels):
+        along = np.array(read["meshes"][f"{NODE}_LOD{number}"]["bitangent"][0])
+        ours = at_corners(from_z_up(mesh.tangent, "Y"), mesh)
+        assert (along * ours).sum(axis=1).min() > 0.9
 
 
 @needs_ufbx

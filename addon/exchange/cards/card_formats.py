@@ -74,7 +74,7 @@ GLB = CardFormat(
     {
         "POSITION": _REST,
         "NORMAL": _NORMAL,
-        "TANGENT": _TANGENT + "cross(NORMAL, TANGENT.xyz)",
+        "TANGENT": _TANGENT + "TANGENT.w * cross(NORMAL, TANGENT.xyz)",
         "TEXCOORD_0": _TILE_TOP,
         "TEXCOORD_1": _OPENNESS,
     },
@@ -92,7 +92,8 @@ FBX = CardFormat(
     {
         "Vertices": _REST,
         "LayerElementNormal": _NORMAL,
-        "LayerElementTangent 0": _TANGENT + "cross(normal, tangent)",
+        "LayerElementTangent 0": "across the strands, along u",
+        "LayerElementBinormal 0": "along the strands, from root to tip",
         "LayerElementUV 0": _TILE,
         "LayerElementUV 1": _OPENNESS
         + ". An importer that turns v of textures around turns the second component around too",
