@@ -7,6 +7,7 @@ with stubs of what they include. What Unity itself makes of both is not seen her
 from __future__ import annotations
 
 import json
+import re
 import shutil
 import subprocess
 from collections.abc import Callable
@@ -27,6 +28,7 @@ from damaged_assets import (
     quantised,
     renamed,
     reordered,
+    with_mirrored_cards,
     without_index_buffer,
     without_textures,
     without_unused,
@@ -45,12 +47,18 @@ ENTRIES = {
     "fragment": "frag",
     "vertex_of_shadow": "vert",
     "fragment_of_shadow": "frag",
+    "fragment_of_depth": "frag",
+    "fragment_of_normal": "frag",
 }
+#: Unity's passes that only opaque pixels have
+OPAQUE_MODES = ("ShadowCaster", "DepthOnly", "DepthNormalsOnly")
 
 
 @pytest.fixture(scope="module")
 def asset(gpu_context: Any) -> Asset:
-    return written_asset("unity", "marschner", CardExportSettings(index_buffer=True))
+    made = written_asset("unity", "marschner", CardExportSettings(index_buffer=True))
+    with_mirrored_cards(made.folder)
+    return made
 
 
 @pytest.fixture(scope="module")
@@ -173,6 +181,35 @@ def test_levels_take_over_where_the_file_says(asset: Asset, hair: dict[str, Any]
     assert sorted(hair["heights"], reverse=True) == hair["heights"]
 
 
+@pytest.mark.parametrize(
+    ("coverage", "heights"),
+    [
+        ([1.0, 1.0, 0.0], [1.0, 0.999, 0.0]),
+        ([0.25, 0.25, 0.0], [0.5, 0.4995, 0.0]),
+        (None, [0.5, 0.25, 0.0]),
+    ],
+)
+def test_levels_end_one_after_the_other_where_the_file_has_them_end_together(
+    imported: Callable[..., dict[str, Any]],
+    asset: Asset,
+    coverage: list[float] | None,
+    heights: list[float],
+) -> None:
+    """Unity refuses all levels otherwise. A file has such where a coarser level is as good."""
+    folder = damaged(asset.folder, OUTPUT / "unity_damaged", lambda folder: None)
+    glb = glb_of(folder)
+    file = GlbFile.of(glb.read_bytes(), str(glb))
+    extras = file.content["nodes"][file.node("cards_LOD0")]["extras"]
+    extras.pop("MSFT_screencoverage")
+    if coverage:
+        extras["MSFT_screencoverage"] = coverage
+    glb.write_bytes(file.data())
+    found = imported(glb)
+    assert not found["errors"] and not found["warnings"]
+    np.testing.assert_allclose(found["heights"], heights, rtol=2e-3)
+    assert sorted(set(found["heights"]), reverse=True) == found["heights"]
+
+
 def test_levels_fade_into_each_other_unless_that_is_turned_off(
     imported: Callable[..., dict[str, Any]], asset: Asset, hair: dict[str, Any]
 ) -> None:
@@ -212,11 +249,24 @@ def test_materials_are_the_passes_of_the_sidecar(asset: Asset, hair: dict[str, A
 
 def test_every_value_of_a_material_is_a_property_of_the_shader(hair: dict[str, Any]) -> None:
     shader = (PACKAGE / "Shaders" / "HairloomCards.shader").read_text(encoding="utf-8")
-    unused = {"_color_texture", "ShadowCaster"} | {
+    unused = {"_color_texture", *OPAQUE_MODES} | {
         f"_{role}_mask" for role in ("base", "tangent", "normal")
     }
     for name in set(hair["materials"][0]["values"]) - unused:
         assert f" {name} (" in shader, name
+
+
+def test_opaque_pixels_alone_are_in_depths_and_shadows(hair: dict[str, Any]) -> None:
+    shader = (PACKAGE / "Shaders" / "HairloomCards.shader").read_text(encoding="utf-8")
+    for mode in OPAQUE_MODES:
+        assert f'"LightMode" = "{mode}"' in shader
+        assert [each["values"][mode] for each in hair["materials"]] == [True, False, False]
+
+
+def test_every_function_that_the_shader_names_is_compiled() -> None:
+    shader = (PACKAGE / "Shaders" / "HairloomCards.shader").read_text(encoding="utf-8")
+    named = re.findall(r"#pragma (?:vertex|fragment) (\w+)", shader)
+    assert set(named) == set(ENTRIES)
 
 
 def test_textures_keep_their_values(asset: Asset, hair: dict[str, Any]) -> None:

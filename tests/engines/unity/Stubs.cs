@@ -46,6 +46,7 @@ namespace UnityEngine
     public static class Mathf
     {
         public static float Sqrt(float value) { return (float)Math.Sqrt(value); }
+        public static float Min(float a, float b) { return Math.Min(a, b); }
     }
 
     public static class JsonUtility
@@ -159,7 +160,16 @@ namespace UnityEngine
     {
         public LOD[] lods;
         public LODFadeMode fadeMode;
-        public void SetLODs(LOD[] lods) { this.lods = lods; }
+        public void SetLODs(LOD[] lods)
+        {
+            // Unity logs this and keeps the levels that it had
+            for (var i = 1; i < lods.Length; i++)
+                if (lods[i].screenRelativeTransitionHeight >= lods[i - 1].screenRelativeTransitionHeight)
+                    throw new InvalidOperationException(
+                        "SetLODs: Attempting to set LOD where the screen relative size is greater then or equal "
+                        + "to a higher detail LOD level.");
+            this.lods = lods;
+        }
         public void RecalculateBounds() { }
     }
 

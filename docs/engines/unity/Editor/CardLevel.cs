@@ -41,7 +41,6 @@ namespace Hairloom
         {
             var file = new Glb(glb);
             var backs = BackIndices(glb, sidecar, warn);
-            var coverage = file.Coverage(sidecar.levels[0].node);
             var levels = new List<CardLevel>();
             foreach (var each in sidecar.levels)
             {
@@ -49,14 +48,31 @@ namespace Hairloom
                 level.Back = backs == null || each.buffer_back_first < 0 || !level.IsAsWritten
                     ? level.Front
                     : level.Turned(backs, each, glb);
-                var part = levels.Count < coverage.Length ? coverage[levels.Count] : 0.0f;
-                level.EndHeight = Mathf.Sqrt(part);
                 levels.Add(level);
             }
+            var heights = EndHeights(file.Coverage(sidecar.levels[0].node), levels.Count);
+            for (var number = 0; number < levels.Count; number++)
+                levels[number].EndHeight = heights[number];
             if (!levels.All(level => level.IsAsWritten))
                 warn($"{glb}: another program has changed it, so hair may show holes; "
                     + "use the file that Hairloom wrote");
             return levels.ToArray();
+        }
+
+        /// Unity takes levels only where each ends at a smaller size than the one before. The file lets two end at
+        /// the same size where the first of them is never needed: here it is shown within a thousandth of that.
+        /// Where the file says nothing each ends at half the size of the last one.
+        static float[] EndHeights(float[] coverage, int count)
+        {
+            var heights = new float[count];
+            var last = 1.0f / 0.999f;
+            for (var number = 0; number < count - 1; number++)
+            {
+                var own = number < coverage.Length ? Mathf.Sqrt(coverage[number]) : 0.0f;
+                last = own > 0.0f ? Mathf.Min(own, 0.999f * last) : 0.5f * last;
+                heights[number] = last;
+            }
+            return heights;  // the last one is shown at any size
         }
 
         static int[] BackIndices(string glb, Sidecar sidecar, Action<string> warn)
@@ -143,7 +159,7 @@ namespace Hairloom
             var isWhole = corners.TANGENT >= 0 && corners.TEXCOORD_1 >= 0;
             var across = corners.TANGENT >= 0
                 ? Floats(corners.TANGENT, "VEC4")
-                : Made(4 * count, i => i % 4 == 0 ? 1.0f : 0.0f);
+                : Made(4 * count, i => i % 4 == 0 || i % 4 == 3 ? 1.0f : 0.0f);
             var occlusion = corners.TEXCOORD_1 >= 0
                 ? Floats(corners.TEXCOORD_1, "VEC2")
                 : Made(2 * count, i => i % 2 == 0 ? 1.0f : 0.0f);
@@ -158,7 +174,7 @@ namespace Hairloom
                 Normals = Made(count, i => Vector(normal, 3 * i)),
                 Places = Made(count, i => new Vector2(place[2 * i], 1.0f - place[2 * i + 1])),
                 Occlusion = Made(count, i => new Vector2(occlusion[2 * i], occlusion[2 * i + 1])),
-                Tangents = Made(count, i => Along(Vector(normal, 3 * i), Vector(across, 4 * i))),
+                Tangents = Made(count, i => Along(Vector(normal, 3 * i), Vector(across, 4 * i), across[4 * i + 3])),
                 Front = Mirrored(indices, count, path),
                 IsAsWritten = isWhole && indices.Length == expected.indices
                     && (expected.indices_adler32 == 0 || Adler32(indices) == expected.indices_adler32),
@@ -205,11 +221,12 @@ namespace Hairloom
             return new Vector3(-values[first], values[first + 1], values[first + 2]);
         }
 
-        /// In glTF strands run along cross(normal, tangent), which a mirror turns around.
-        static Vector4 Along(Vector3 normal, Vector3 across)
+        /// In glTF strands run along cross(normal, tangent), which a mirror turns around: of the axes here, and
+        /// of cards that an artist has mirrored, whose tangents have -1 as their fourth number.
+        static Vector4 Along(Vector3 normal, Vector3 across, float side)
         {
-            var along = -Vector3.Cross(normal, across);
-            return new Vector4(along.x, along.y, along.z, 1.0f);
+            var along = Vector3.Cross(normal, across);
+            return new Vector4(-side * along.x, -side * along.y, -side * along.z, 1.0f);
         }
 
         Node Named(string name)

@@ -33,6 +33,9 @@ namespace Hairloom
             new CardPass { Name = "front", IsBlended = true, WritesDepth = true, Cull = CullMode.Back, Queue = 3011 },
         };
 
+        /// Passes of the shader that opaque pixels have alone.
+        static readonly string[] OpaqueModes = { "ShadowCaster", "DepthOnly", "DepthNormalsOnly" };
+
         public static Material[] Of(Sidecar sidecar, string glb, AssetImportContext context)
         {
             var pipeline = GraphicsSettings.currentRenderPipeline;
@@ -109,7 +112,8 @@ namespace Hairloom
             var least = pass.IsBack ? 0.0f : sidecar.min_alpha;
             material.SetFloat("_MinAlpha", pass.IsBlended ? least : sidecar.opaque_alpha);
             material.SetFloat("_MaxAlpha", pass.IsBlended ? sidecar.opaque_alpha : 2.0f);
-            material.SetShaderPassEnabled("ShadowCaster", !pass.IsBlended);
+            foreach (var opaque in OpaqueModes)
+                material.SetShaderPassEnabled(opaque, !pass.IsBlended);
             // "color" is for materials that know nothing of hair
             // one that is missing is as one that the export has not
             Func<string, bool> has = role => textures.TryGetValue(role, out var texture) && texture != null;

@@ -30,6 +30,7 @@ struct Corner
     float4 tangent : TANGENT;
     float2 uv : TEXCOORD0;
     float2 occlusion_and_along : TEXCOORD1;
+    UNITY_VERTEX_INPUT_INSTANCE_ID
 };
 
 struct CardPoint
@@ -40,6 +41,8 @@ struct CardPoint
     float3 place : TEXCOORD2;
     float3 normal : TEXCOORD3;
     float3 tangent : TEXCOORD4;
+    float fog : TEXCOORD5;
+    UNITY_VERTEX_OUTPUT_STEREO
 };
 
 float3 mirrored(float3 direction)
@@ -50,8 +53,11 @@ float3 mirrored(float3 direction)
 CardPoint vertex(Corner corner)
 {
     CardPoint result;
+    UNITY_SETUP_INSTANCE_ID(corner);
+    UNITY_INITIALIZE_VERTEX_OUTPUT_STEREO(result);
     result.place = TransformObjectToWorld(corner.position.xyz);
     result.position = TransformWorldToHClip(result.place);
+    result.fog = ComputeFogFactor(result.position.z);
     result.uv = corner.uv;
     result.occlusion_and_along = corner.occlusion_and_along;
     result.normal = TransformObjectToWorldNormal(corner.normal);
@@ -133,22 +139,33 @@ void leave_pixels_to_other_level(float4 position)
 #endif
 }
 
-float4 fragment(CardPoint card) : SV_Target
+float3 to_eye_of(CardPoint card)
 {
+    return mirrored(GetWorldSpaceNormalizeViewDir(card.place));
+}
+
+// Coverage of a pixel of this pass; the others are left out. The depths of a pass are those of the same pixels.
+float coverage_of(CardPoint card)
+{
+    UNITY_SETUP_STEREO_EYE_INDEX_POST_VERTEX(card);
     leave_pixels_to_other_level(card.position);
     float alpha = dot(_alpha_texture.Sample(sampler_alpha_texture, card.uv), _alpha_mask);
-    float3 to_eye = mirrored(GetWorldSpaceNormalizeViewDir(card.place));
     if (_facing_range.x > 0.0)
     {
         float3 across = cross(ddx(card.place), ddy(card.place));
         float3 tangent = hair_unit(mirrored(card.tangent), float3(0.0, 0.0, 1.0));
-        alpha = hair_view_compensated_alpha(alpha, mirrored(across), tangent, to_eye, _facing_range.xy);
+        alpha = hair_view_compensated_alpha(alpha, mirrored(across), tangent, to_eye_of(card), _facing_range.xy);
     }
     clip(alpha - _MinAlpha);
     clip(_MaxAlpha - alpha - 1.0e-6);
+    return alpha;
+}
 
+float4 fragment(CardPoint card) : SV_Target
+{
+    float alpha = coverage_of(card);
     HairMaterial hair = material_of_hair();
-    HairPlace here = place_of_hair(card, to_eye);
+    HairPlace here = place_of_hair(card, to_eye_of(card));
     float3 radiance = hair_color(hair, here.along, here.base) * _ambient * SampleSH(card.normal);
     radiance += radiance_of(hair, here, GetMainLight(TransformWorldToShadowCoord(card.place)));
 #if defined(_ADDITIONAL_LIGHTS)
@@ -160,7 +177,20 @@ float4 fragment(CardPoint card) : SV_Target
         radiance += radiance_of(hair, here, GetAdditionalLight(lightIndex, card.place, half4(1, 1, 1, 1)));
     LIGHT_LOOP_END
 #endif
-    return float4(radiance * card.occlusion_and_along.x, _MaxAlpha > 1.0 ? 1.0 : alpha);
+    radiance = MixFog(radiance * card.occlusion_and_along.x, card.fog);
+    return float4(radiance, _MaxAlpha > 1.0 ? 1.0 : alpha);
+}
+
+float4 fragment_of_depth(CardPoint card) : SV_Target
+{
+    coverage_of(card);
+    return card.position.z;
+}
+
+float4 fragment_of_normal(CardPoint card) : SV_Target
+{
+    coverage_of(card);
+    return float4(hair_unit(card.normal, float3(0.0, 0.0, 1.0)), 0.0);
 }
 
 float4 _ShadowBias;  // Unity sets both for each light
@@ -182,6 +212,7 @@ CardPoint vertex_of_shadow(Corner corner)
 // A shadow map knows no half: what covers more than half of a pixel throws a shadow.
 float4 fragment_of_shadow(CardPoint card) : SV_Target
 {
+    UNITY_SETUP_STEREO_EYE_INDEX_POST_VERTEX(card);
     leave_pixels_to_other_level(card.position);
     clip(dot(_alpha_texture.Sample(sampler_alpha_texture, card.uv), _alpha_mask) - 0.5);
     return 0.0;

@@ -54,6 +54,8 @@ Shader "Hairloom/Cards"
     }
     SubShader
     {
+        // a project without this pipeline compiles none of it
+        PackageRequirements { "com.unity.render-pipelines.universal": "14.0" }
         Tags { "RenderPipeline" = "UniversalPipeline" "IgnoreProjector" = "True" }
         Cull [_Cull]
 
@@ -68,12 +70,48 @@ Shader "Hairloom/Cards"
             #pragma target 4.5
             #pragma multi_compile _ _MAIN_LIGHT_SHADOWS _MAIN_LIGHT_SHADOWS_CASCADE
             #pragma multi_compile _ _ADDITIONAL_LIGHTS
-            #pragma multi_compile _ _FORWARD_PLUS
+            // the second is its name since Unity 6.1
+            #pragma multi_compile _ _FORWARD_PLUS _CLUSTER_LIGHT_LOOP
             #pragma multi_compile_fragment _ _ADDITIONAL_LIGHT_SHADOWS
             #pragma multi_compile_fragment _ _SHADOWS_SOFT
             #pragma multi_compile_fragment _ LOD_FADE_CROSSFADE
+            #pragma multi_compile_fog
+            #pragma multi_compile_instancing
             #pragma vertex vertex
             #pragma fragment fragment
+            #include "HairloomCards.hlsl"
+            ENDHLSL
+        }
+
+        Pass
+        {
+            Name "DepthOnly"
+            Tags { "LightMode" = "DepthOnly" }
+            ZWrite On
+            ColorMask R
+
+            HLSLPROGRAM
+            #pragma target 4.5
+            #pragma multi_compile_fragment _ LOD_FADE_CROSSFADE
+            #pragma multi_compile_instancing
+            #pragma vertex vertex
+            #pragma fragment fragment_of_depth
+            #include "HairloomCards.hlsl"
+            ENDHLSL
+        }
+
+        Pass
+        {
+            Name "DepthNormalsOnly"
+            Tags { "LightMode" = "DepthNormalsOnly" }
+            ZWrite On
+
+            HLSLPROGRAM
+            #pragma target 4.5
+            #pragma multi_compile_fragment _ LOD_FADE_CROSSFADE
+            #pragma multi_compile_instancing
+            #pragma vertex vertex
+            #pragma fragment fragment_of_normal
             #include "HairloomCards.hlsl"
             ENDHLSL
         }
@@ -88,6 +126,7 @@ Shader "Hairloom/Cards"
             HLSLPROGRAM
             #pragma target 4.5
             #pragma multi_compile_fragment _ LOD_FADE_CROSSFADE
+            #pragma multi_compile_instancing
             #pragma vertex vertex_of_shadow
             #pragma fragment fragment_of_shadow
             #include "HairloomCards.hlsl"
