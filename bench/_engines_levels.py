@@ -64,7 +64,7 @@ def level_figures(names: list[str]) -> dict[str, Any]:
         if names and name not in names:
             continue
         site = OUTPUT / name
-        shutil.copytree(REPOSITORY / "docs" / "engines", site / "hairloom")
+        shutil.copytree(REPOSITORY / "docs" / "engines" / "three", site / "hairloom")
         bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
         if not hasattr(bpy.types.Scene, "hairloom"):
             hairloom.register()

@@ -34,6 +34,9 @@ SIZE, FIELD_OF_VIEW = 480, 30.0
 EYE, TARGET = (0.25, -0.45, 0.1), (0.0, 0.0, -0.01)
 TO_SUN = tuple(np.array([0.5, -0.7, 0.5]) / np.linalg.norm([0.5, -0.7, 0.5]))
 IRRADIANCE = 4.0
+#: Radiance from all sides. Hairloom has Marschner's lobes of it too, engines the colour of hair
+#: alone: nothing to be compared.
+AMBIENT = {"kajiya_kay": 0.3, "marschner": 0.0}
 NEAR, FAR = 0.05, 5.0
 
 MOST_MEAN = 1.0 / 255.0
@@ -107,6 +110,7 @@ def written_asset(
         "target": glb_axes(TARGET),
         "to_sun": glb_axes(TO_SUN),
         "irradiance": IRRADIANCE,
+        "ambient": AMBIENT[model],
         "size": SIZE,
         "field_of_view": FIELD_OF_VIEW,
         "near": NEAR,
@@ -132,7 +136,7 @@ def by_hairloom(written: WrittenCards, look: ShadingSettings) -> np.ndarray:
             is_view_compensated=written.maps.is_view_compensated,
         ),
         lights=(Light.sun(tuple(-x for x in TO_SUN), (1.0, 1.0, 1.0), IRRADIANCE),),
-        ambient=(0.0, 0.0, 0.0),
+        ambient=(AMBIENT[look.model],) * 3,
         shading=look,
         volume=VolumeSettings(shadows="none"),
     )

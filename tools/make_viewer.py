@@ -22,7 +22,7 @@ BUNDLE = PAGE / "viewer.min.js"
 def bundle() -> bytes:
     """The whole script, as one module without imports."""
     command = [ESBUILD, "viewer.js", "--bundle", "--minify", "--format=esm", "--target=es2022"]
-    command += ["--loader:.gdshaderinc=text", "--legal-comments=none", "--log-level=error"]
+    command += ["--legal-comments=none", "--log-level=error"]
     command += [f"--alias:three/addons/loaders/EXRLoader.js={PAGE / 'table_loader.js'}"]
     environment = {**os.environ, "NODE_PATH": str(NODE)}
     return subprocess.run(

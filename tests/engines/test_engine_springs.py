@@ -21,6 +21,8 @@ from three_springs import MODULE, head_matrices, to_z_up
 
 from hairloom.addon.blender.bakes.guide_motion import GuideMotion
 from hairloom.addon.cards.spring_bones import STEP_RATE, stepped
+from hairloom.addon.exchange.cards.glb_file import GlbFile
+from hairloom.addon.exchange.cards.glb_skin import add_head_bone
 
 HERE = Path(__file__).parent
 ENGINES = REPOSITORY / "docs" / "engines"
@@ -64,7 +66,7 @@ def check(told: dict[str, Any], frames: list[dict[str, list[float]]]) -> None:
 @pytest.fixture(scope="module")
 def project(told: dict[str, Any], sandbox: str) -> Path:
     copied("godot_springs", PROJECT)
-    shutil.copytree(ENGINES, PROJECT / "addons" / "hairloom")
+    shutil.copytree(ENGINES / "godot", PROJECT / "addons" / "hairloom")
     return PROJECT
 
 
@@ -91,12 +93,26 @@ def run_godot(sandbox: str, *options: str) -> None:
     assert result.returncode == 0 and "ERROR" not in said and "WARNING" not in said, said
 
 
-def test_our_module_hands_springs_to_three_vrm(told: dict[str, Any], sandbox: str) -> None:
+def rigged(glb: Path) -> None:
+    """Below a character's bone, as hair of a rigged head is written: joints stay in place."""
+    file = GlbFile.of(glb.read_bytes(), str(glb))
+    bone = np.eye(4)
+    bone[:3] = [[1.0, 0.0, 0.0, 0.1], [0.0, 0.0, -1.0, 0.2], [0.0, 1.0, 0.0, 1.4]]
+    add_head_bone(file, file.node("hair_root"), "head", bone)
+    glb.write_bytes(file.data())
+
+
+@pytest.mark.parametrize("is_rigged", [False, True])
+def test_our_module_hands_springs_to_three_vrm(
+    told: dict[str, Any], sandbox: str, is_rigged: bool
+) -> None:
     if not MODULE.is_dir():
         pytest.skip("three-vrm-springbone is missing: `make setup` installs it")
-    site = OUTPUT / "web"
+    site = OUTPUT / f"web_{is_rigged}"
     copied("three_springs", site)
-    shutil.copytree(ENGINES, site / "hairloom")
+    if is_rigged:
+        rigged(site / "asset" / "hair.glb")
+    shutil.copytree(ENGINES / "three", site / "hairloom")
     shutil.copytree(MODULE.parents[1] / "three", site / "three")
     shutil.copytree(MODULE / "lib", site / "springs")
     shutil.copy2(REPOSITORY / "tools" / "draw_page.py", site)

@@ -25,10 +25,11 @@ from damaged_assets import (
     garbage,
     other_levels,
     quantised,
+    with_mirrored_cards,
     without_index_buffer,
     without_sidecar,
 )
-from engine_assets import SIZE, Asset, check, written_asset
+from engine_assets import SIZE, Asset, check, read_encoded, written_asset
 
 from hairloom.addon.cards.export_settings import CardExportSettings
 from hairloom.addon.exchange.cards.glb_file import GlbFile
@@ -43,7 +44,9 @@ OF_ENGINES = shutil.ignore_patterns("godot*", "game", "web*")
 
 @pytest.fixture(scope="module", params=["kajiya_kay", "marschner", "baked"])
 def asset(request: pytest.FixtureRequest, gpu_context: Any) -> Asset:
-    return written_asset(request.param, request.param, CardExportSettings(index_buffer=True))
+    made = written_asset(request.param, request.param, CardExportSettings(index_buffer=True))
+    with_mirrored_cards(made.folder)
+    return made
 
 
 @pytest.fixture(scope="module")
@@ -54,7 +57,7 @@ def baked(gpu_context: Any) -> Asset:
 def godot_project(asset: Asset, name: str) -> Path:
     project = asset.folder / name
     shutil.copytree(HERE / "godot", project)
-    shutil.copytree(ENGINES, project / "addons" / "hairloom")
+    shutil.copytree(ENGINES / "godot", project / "addons" / "hairloom")
     shutil.copytree(asset.folder, project / "asset", ignore=OF_ENGINES)
     return project
 
@@ -72,6 +75,17 @@ def run_godot(sandbox: str, *options: str, window: bool = True) -> str:
     assert result.returncode == 0, said
     assert "SCRIPT ERROR" not in said and "SHADER ERROR" not in said, said
     return said
+
+
+#: of fog that hides all, as a screen shows it
+FOG = np.array([0x33, 0x66, 0x99]) / 255.0
+
+
+def check_fog(asset: Asset, drawn: Path) -> None:
+    """Where there is hair in our picture, there is fog."""
+    theirs = read_texture(drawn, is_color=False)[..., :3]
+    is_hair = read_encoded(asset.picture).max(axis=-1) > 0.1
+    np.testing.assert_allclose(np.median(theirs[is_hair], axis=0), FOG, atol=2.0 / 255.0)
 
 
 def indices_of(glb: Path, node: str) -> np.ndarray:
@@ -112,6 +126,7 @@ def test_godot_draws_cards_as_we_do(asset: Asset, sandbox: str) -> None:
     project = godot_project(asset, "godot")
     run_godot(sandbox, "--path", str(project), "--", str(project))
     check(asset, project / "godot.png")
+    check_fog(asset, project / "fog.png")
     check_order(asset, project / "order.json")
     shown = json.loads((project / "shown.json").read_text(encoding="utf-8"))
     np.testing.assert_allclose(shown.pop("ranges"), ranges_of(asset), rtol=1e-5)
@@ -141,7 +156,7 @@ def test_three_js_draws_cards_as_we_do(asset: Asset, sandbox: str) -> None:
         pytest.skip("three.js is missing: `make setup` installs it")
     site = asset.folder / "web"
     shutil.copytree(HERE / "three", site)
-    shutil.copytree(ENGINES, site / "hairloom")
+    shutil.copytree(ENGINES / "three", site / "hairloom")
     shutil.copytree(THREE, site / "three")
     shutil.copytree(asset.folder, site / "asset", ignore=OF_ENGINES)
     shutil.copy2(REPOSITORY / "tools" / "draw_page.py", site)
@@ -149,6 +164,7 @@ def test_three_js_draws_cards_as_we_do(asset: Asset, sandbox: str) -> None:
     result = subprocess.run(command, capture_output=True, text=True, timeout=300)
     assert result.returncode == 0, result.stderr
     check(asset, site / "three.png")
+    check_fog(asset, site / "fog.png")
     shown = json.loads((site / "levels.json").read_text(encoding="utf-8"))
     sidecar = json.loads((asset.folder / "cards.hairloom.json").read_text(encoding="utf-8"))
     assert shown.pop("begins") == pytest.approx([begin for begin, _ in ranges_of(asset)], rel=1e-5)
@@ -197,9 +213,10 @@ def check_fade(folder: Path, *mixed: str) -> None:
 
 
 def test_godot_fades_levels_pixel_by_pixel(baked: Asset, sandbox: str) -> None:
+    """With the add-on in another folder than usual."""
     project = baked.folder / "godot_fade"
     shutil.copytree(HERE / "godot_fade", project)
-    shutil.copytree(ENGINES, project / "addons" / "hairloom")
+    shutil.copytree(ENGINES / "godot", project / "tools" / "hair cards")
     fading(baked, project / "asset")
     run_godot(sandbox, "--path", str(project), "--", str(project))
     check_fade(project, "both", "scaled")
@@ -210,7 +227,7 @@ def test_three_js_fades_levels_pixel_by_pixel(baked: Asset, sandbox: str) -> Non
         pytest.skip("three.js is missing: `make setup` installs it")
     site = baked.folder / "web_fade"
     shutil.copytree(HERE / "three_fade", site)
-    shutil.copytree(ENGINES, site / "hairloom")
+    shutil.copytree(ENGINES / "three", site / "hairloom")
     shutil.copytree(THREE, site / "three")
     fading(baked, site / "asset")
     shutil.copy2(REPOSITORY / "tools" / "draw_page.py", site)
@@ -227,7 +244,7 @@ def test_three_js_shows_what_can_be_shown_and_says_what_is_wrong(
         pytest.skip("three.js is missing: `make setup` installs it")
     site = baked.folder / "web_damaged"
     shutil.copytree(HERE / "three_damaged", site)
-    shutil.copytree(ENGINES, site / "hairloom")
+    shutil.copytree(ENGINES / "three", site / "hairloom")
     shutil.copytree(THREE, site / "three")
     shutil.copy2(REPOSITORY / "tools" / "draw_page.py", site)
     cases = {"whole": lambda folder: None} | {each.__name__: each for each in DAMAGES}
@@ -235,6 +252,11 @@ def test_three_js_shows_what_can_be_shown_and_says_what_is_wrong(
     for name, damage in cases.items():
         (glb,) = damaged(baked.folder, site / name, damage).glob("*.glb")
         files[name] = glb.name
+    for textures in ("exr", "dds"):
+        settings = CardExportSettings(index_buffer=True, textures=textures)
+        made = written_asset(f"damaged_{textures}", "baked", settings)
+        shutil.copytree(made.folder, site / textures)
+        files[textures] = "cards.glb"
     (site / "cases.json").write_text(json.dumps(files), encoding="utf-8")
     command = [sandbox, "run", "python3", str(site / "draw_page.py")]
     result = subprocess.run(command, capture_output=True, text=True, timeout=300)
@@ -242,6 +264,14 @@ def test_three_js_shows_what_can_be_shown_and_says_what_is_wrong(
     seen = json.loads((site / "seen.json").read_text(encoding="utf-8"))
     whole = seen.pop("whole")
     assert whole["said"] == [] and whole["levels"] == 3 and whole["filled"] > 0.1
+    for found in (whole, *seen.values()):
+        assert found["bare"] == []
+        # three.js keeps a table of its own for plain materials
+        assert found["left"]["geometries"] == 0 and found["left"]["textures"] <= 1 < found["held"]
+    assert whole["left"]["textures"] == 0
+    exr, dds = seen.pop("exr"), seen.pop("dds")
+    assert exr["said"] == [] and exr["off"] < 0.01
+    assert dds["levels"] == 3 and all("DDSLoader" in each for each in dds["said"])
     for damage, sentence in DAMAGES.items():
         found = seen.pop(damage.__name__)
         assert bool(found["said"]) == bool(sentence), damage.__name__
@@ -258,7 +288,7 @@ def test_three_js_shows_what_can_be_shown_and_says_what_is_wrong(
 def test_godot_shows_what_can_be_shown_and_says_what_is_wrong(baked: Asset, sandbox: str) -> None:
     project = baked.folder / "godot_damaged"
     shutil.copytree(HERE / "godot_damaged", project)
-    shutil.copytree(ENGINES, project / "addons" / "hairloom")
+    shutil.copytree(ENGINES / "godot", project / "addons" / "hairloom")
     cases = {"whole": lambda folder: None} | {each.__name__: each for each in DAMAGES}
     files = {}
     for name, damage in cases.items():

@@ -6,6 +6,7 @@ import hair_hlsl
 def test_the_files_are_what_the_code_makes() -> None:
     source = hair_hlsl.SOURCE.read_text(encoding="utf-8")
     for path, made in (
+        (hair_hlsl.MODULE, hair_hlsl.module(source)),
         (hair_hlsl.TARGET, hair_hlsl.hlsl(source)),
         (hair_hlsl.NODES, hair_hlsl.nodes(source)),
     ):

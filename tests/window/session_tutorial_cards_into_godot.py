@@ -7,11 +7,12 @@ from pathlib import Path
 
 import bpy
 
-sys.path.append(str(Path(__file__).parent))
+sys.path += [str(Path(__file__).parent), str(Path(__file__).parents[1])]
 import driver
 import traces
 from artist import changed, file_browser, pixels_at_rest, redrawn, region, viewport
 from driver import of_hairloom, until
+from engine_folders import missing_files
 from reading import box_of, read
 from tutorials import (
     Page,
@@ -32,7 +33,9 @@ def steps():
     yield from a_file()
     page.step(4)
     page.says("docs/engines/godot")
-    assert (Path(__file__).parents[2] / "docs/engines/godot/plugin.cfg").is_file()
+    page.says("res://addons/hairloom")
+    addon = Path(__file__).parents[2] / "docs/engines/godot"
+    assert (addon / "plugin.cfg").is_file() and not missing_files(addon)
     page.end()
     assert "Traceback" not in log.added(), "something has raised"
 

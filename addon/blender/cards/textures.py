@@ -10,8 +10,8 @@ from ...arrays import Floats
 from ...cards.atlas_grid import AtlasGrid
 from ...cards.export_settings import CardExportSettings
 from ...errors import HairloomError
+from ...exchange.textures import texture_files
 from ...exchange.textures.card_textures import WrittenTexture, of_one_size, write_card_textures
-from ...exchange.textures.texture_files import has_openimageio
 from ...shading.marschner.look import fibre_of
 from ...shading.marschner.tables import marschner_tables, shape_of
 from ...shading.settings import ShadingSettings
@@ -152,17 +152,24 @@ def png_of(path: Path, pixels: Floats, *, is_color: bool = False) -> bytes:
 
 def write_tables(folder: Path, stem: str, shading: ShadingSettings) -> dict[str, str]:
     """Marschner's tables as EXR files of 32 bits, name -> file; nothing for the other model, or
-    without OpenImageIO.
+    without OpenImageIO. They have no compression: games by Godot read them without a library.
 
     Raises:
         HairloomError: nothing can be written there.
     """
-    if not has_openimageio():
+    if not texture_files.has_openimageio():
         return {}
     pixels = look_tables(shading)
     files = {name: f"{stem}_{name}.exr" for name in pixels}
     for name, file in files.items():
-        write_texture(folder / file, pixels[name], is_color=False, depth="float", is_packed=True)
+        texture_files.write_texture(
+            folder / file,
+            pixels[name],
+            is_color=False,
+            depth="float",
+            is_packed=True,
+            compression="none",
+        )
     return files
 
 

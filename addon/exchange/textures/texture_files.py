@@ -102,6 +102,7 @@ def write_texture(
     is_color: bool,
     depth: str | None = None,
     is_packed: bool = False,
+    compression: str | None = None,
 ) -> None:
     """Write a picture as PNG, EXR or TIFF, by the suffix.
 
@@ -111,6 +112,7 @@ def write_texture(
         is_color: integers are coded by the sRGB curve.
         depth: one of DEPTHS for this suffix; None is the usual one.
         is_packed: engines unpack its channels, so that nothing is multiplied in EXR files either.
+        compression: "none" for a file that simple readers can read; None is the usual one.
 
     Raises:
         HairloomError: no OpenImageIO, another suffix or depth, or nothing can be written there.
@@ -130,6 +132,8 @@ def write_texture(
         spec.attribute("oiio:UnassociatedAlpha", int(not is_multiplied))
         spec.attribute(_STRAIGHT, int(not is_multiplied))
     spec.attribute("oiio:ColorSpace", _space(is_color=is_color, depth=depth))
+    if compression is not None:
+        spec.attribute("compression", compression)
     with atomic_write(path) as temporary:
         target = library.ImageOutput.create(str(temporary))
         done = target is not None and target.open(str(temporary), spec)

@@ -6,9 +6,7 @@ extends RefCounted
 ## ("passes_fallback"): opaque pixels, then transparent back faces, then transparent front faces, each
 ## in the order of the file.
 
-## Where this folder is in a project. Shaders are no constants by `preload`: with those Godot 4.6 often
-## waits for ever when it quits.
-const HERE := "res://addons/hairloom/godot/"
+const Table := preload("hairloom_table.gd")
 const PASSES := ["opaque", "back", "front"]
 const TEXTURES := ["base", "alpha", "shift", "noise", "tangent", "normal"]
 const TABLES := ["longitudinal", "azimuthal", "paths"]
@@ -46,9 +44,12 @@ static func of(sidecar: Dictionary, folder: String) -> ShaderMaterial:
 	var values := _values(sidecar, folder)
 	var first: ShaderMaterial = null
 	var last: ShaderMaterial = null
+	var beside_this: Script = Table
+	var here := beside_this.resource_path.get_base_dir()
 	for name in PASSES:
 		var material := ShaderMaterial.new()
-		material.shader = load(HERE + "hairloom_%s.gdshader" % name)
+		# no constants by `preload`: with shaders as such Godot 4.6 often waits for ever when it quits
+		material.shader = load(here.path_join("hairloom_%s.gdshader" % name))
 		for uniform in values:
 			material.set_shader_parameter(uniform, values[uniform])
 		if last == null:
@@ -97,7 +98,7 @@ static func _values(sidecar: Dictionary, folder: String) -> Dictionary:
 	for name in TEXTURES:
 		if name in sidecar["textures"]:
 			var entry: Dictionary = sidecar["textures"][name]
-			var texture := _texture(entry, folder, false)
+			var texture := _texture(entry, folder)
 			if texture != null:
 				found[name] = entry
 				values[name + "_texture"] = texture
@@ -111,7 +112,8 @@ static func _values(sidecar: Dictionary, folder: String) -> Dictionary:
 	values["has_shift"] = "shift" in found
 	for name in TABLES:
 		if name in material.get("tables", {}):
-			values[name] = _texture(material["tables"][name], folder, true)
+			var table := _image(material["tables"][name], folder, Table.read)
+			values[name] = ImageTexture.create_from_image(table) if table != null else null
 	return values
 
 
@@ -122,16 +124,24 @@ static func _mask(entry: Dictionary) -> Vector4:
 	return mask
 
 
-static func _texture(entry: Dictionary, folder: String, is_table: bool) -> Texture2D:
+## null, with an error in the log, where there is none.
+static func _image(entry: Dictionary, folder: String, read: Callable) -> Image:
 	var path := folder.path_join(entry["file"])
 	var file := ProjectSettings.globalize_path(path) if Engine.is_editor_hint() else path
-	var image := Image.load_from_file(file) if FileAccess.file_exists(file) else null
-	if image == null:
+	if not FileAccess.file_exists(file):
 		push_error("%s: this texture of the hair is missing; copy all files of the export" % path)
 		return null
-	if is_table:
-		image.flip_y()  # the lowest row comes first
-		return ImageTexture.create_from_image(image)
+	var image: Image = read.call(file)
+	if image == null or image.is_empty():
+		push_error("%s: this texture of the hair cannot be read; export the cards again, with textures as PNG" % path)
+		return null
+	return image
+
+
+static func _texture(entry: Dictionary, folder: String) -> Texture2D:
+	var image := _image(entry, folder, Image.load_from_file)
+	if image == null:
+		return null
 	image.generate_mipmaps()
 	if not Engine.is_editor_hint():
 		return ImageTexture.create_from_image(image)

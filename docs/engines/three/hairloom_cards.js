@@ -4,19 +4,20 @@
 //     scene.add(hair);
 //
 // Reads NAME.glb, NAME.hairloom.json and the textures next to them. Uses the lights of the scene:
-// ambient light, suns (DirectionalLight) and lamps (PointLight). Shadows are left to you.
+// ambient light, suns (DirectionalLight) and lamps (PointLight), and its fog. Shadows are left to you.
 // Joints that were exported move the hair: new AnimationMixer(hair).clipAction(hair.animations[0]);
 // springs do with @pixiv/three-vrm-springbone: plugins: [(parser) => new VRMSpringBoneLoaderPlugin(parser)],
 // and each frame hair.userData.vrmSpringBoneManager.update(1 / 60).
 import * as THREE from 'three';
 import { EXRLoader } from 'three/addons/loaders/EXRLoader.js';
 import { GLTFLoader } from 'three/addons/loaders/GLTFLoader.js';
+import SHADING from './hair_shading.js';
 
-const SHADING = new URL('../hair_shading.gdshaderinc', import.meta.url);
 // name -> value used if the sidecar has no such texture
 const TEXTURES = { base: 255, alpha: 255, shift: 128, noise: 255, tangent: 128, normal: 128 };
 const TABLES = ['longitudinal', 'azimuthal', 'paths'];
 const REPEATED = ['shift', 'noise'];
+const OWN_TEXTURES = [...Object.keys(TEXTURES).map((name) => `${name}_texture`), ...TABLES];
 
 // of a distance, without cross-fade: nothing flickers where a level takes over
 const HYSTERESIS = 0.05;
@@ -76,21 +77,23 @@ export class HairLevels extends THREE.LOD {
 
 // Options: level (0 the finest; without it a HairLevels shows each from the distance at which it takes
 // over), fieldOfView (of the camera for which these distances are, in degrees), crossFade (see HairLevels; 0
-// turns it off), shading (address of
-// hair_shading.gdshaderinc), addressOf (file name -> address, for files that lie elsewhere), plugins (for
-// GLTFLoader.register; what they find is in userData), warn (gets a sentence for each thing that is wrong;
-// what can be shown is shown).
+// turns it off), addressOf (file name -> address, for files that lie elsewhere; without it they lie beside the
+// GLB, and have the query of its address), plugins (for GLTFLoader.register; what they find is in userData),
+// warn (gets a sentence for each thing that is wrong; what can be shown is shown).
 export async function loadHairloomCards(
   url,
-  { level, fieldOfView = 50, crossFade = 0.1, shading = SHADING, addressOf, plugins = [], warn = console.warn } = {},
+  { level, fieldOfView = 50, crossFade = 0.1, addressOf, plugins = [], warn = console.warn } = {},
 ) {
   const name = addressOf
     ? url.toString().split('/').pop()
     : decodeURIComponent(addressBeside(url).pathname.split('/').pop());
-  addressOf ??= (file) => new URL(encodeURIComponent(file), addressBeside(url)).href;
-  const [sidecar, formulas, gltf] = await Promise.all([
+  addressOf ??= (file) => {
+    const address = new URL(encodeURIComponent(file), addressBeside(url));
+    address.search = addressBeside(url).search;
+    return address.href;
+  };
+  const [sidecar, gltf] = await Promise.all([
     sidecarOf(name, addressOf, warn),
-    fetch(shading).then((file) => file.text()),
     gltfOf(name, addressOf, plugins),
   ]);
   const levels = sidecar?.levels.filter((each) => numberOf(gltf, each) >= 0) ?? [];
@@ -111,7 +114,7 @@ export async function loadHairloomCards(
   const groupOf = (number) => {
     const backIndex = backs && isAsWritten[number] ? backIndexOf(backs, levels[number]) : null;
     const group = new THREE.Group();
-    group.add(...passesOf(completed(nodes[number]), sidecar, backIndex, formulas, uniforms));
+    group.add(...passesOf(completed(nodes[number]), sidecar, backIndex, uniforms));
     return group;
   };
   const last = levels.length - 1;
@@ -124,11 +127,30 @@ export async function loadHairloomCards(
   }
   const root = gltf.scene.getObjectByName('hair_root');
   if (sidecar.motion && root) {
-    hair.add(root); // all levels are bound to its joints
+    gltf.scene.updateMatrixWorld(true);
+    hair.attach(carrierOf(root)); // all levels are bound to its joints
     hair.animations = gltf.animations;
   }
   Object.assign(hair.userData, gltf.userData);
   return hair;
+}
+
+// Frees what the GPU holds of hair. Its copies share materials and textures with it.
+export function disposeHairloomCards(hair) {
+  hair.removeFromParent();
+  hair.traverse(({ geometry, material, skeleton }) => {
+    geometry?.dispose();
+    skeleton?.dispose();
+    if (!material) return;
+    const own = OWN_TEXTURES.map((name) => material.uniforms?.[name]?.value);
+    [...own, ...Object.values(material)].forEach((each) => { if (each?.isTexture) each.dispose(); });
+    material.dispose();
+  });
+}
+
+// The root joint, or the bone of a character below which it lies: that has the bone's place and axes.
+function carrierOf(joint) {
+  return joint.parent?.isBone ? carrierOf(joint.parent) : joint;
 }
 
 function addressBeside(url) {
@@ -211,11 +233,11 @@ function boundsOf({ bounds: { minimum, maximum } }) {
 
 // The same triangles once for each pass of the sidecar, in its order. Each pass has its own states, and
 // back faces have their own order if the sidecar contains one.
-function passesOf(node, sidecar, backIndex, formulas, uniforms) {
+function passesOf(node, sidecar, backIndex, uniforms) {
   return sidecar.passes.map((pass, number) => {
     const isBack = backIndex && pass.cull === 'front';
     const geometry = isBack ? node.geometry.clone().setIndex(backIndex) : node.geometry;
-    const material = materialOf(pass, sidecar, formulas, uniforms);
+    const material = materialOf(pass, sidecar, uniforms);
     const mesh = node.isSkinnedMesh
       ? new THREE.SkinnedMesh(geometry, material)
       : new THREE.Mesh(geometry, material);
@@ -252,13 +274,15 @@ function backIndexOf(all, { buffer_back_first: first, indices }) {
 const DEPTH = { less: THREE.LessDepth, equal: THREE.EqualDepth };
 const SIDE = { none: THREE.DoubleSide, front: THREE.BackSide, back: THREE.FrontSide };
 
-function materialOf(pass, sidecar, formulas, uniforms) {
+function materialOf(pass, sidecar, uniforms) {
   const blended = pass.blend !== 'off';
   return new THREE.ShaderMaterial({
     glslVersion: THREE.GLSL3,
     lights: true,
+    fog: true,
     uniforms: {
       ...THREE.UniformsUtils.clone(THREE.UniformsLib.lights),
+      ...THREE.UniformsUtils.clone(THREE.UniformsLib.fog),
       ...uniforms,
       part: { value: new THREE.Vector2(0, 1) },
     },
@@ -271,7 +295,7 @@ function materialOf(pass, sidecar, formulas, uniforms) {
       VIEW_COMPENSATED_ALPHA: sidecar.textures.view_compensated_alpha ? 1 : 0,
     },
     vertexShader: VERTEX,
-    fragmentShader: FRAGMENT.replace('#include <hair_shading>', formulas),
+    fragmentShader: FRAGMENT.replace('#include <hair_shading>', SHADING),
     colorWrite: pass.color_write,
     depthWrite: pass.depth_write,
     depthFunc: DEPTH[pass.depth_test],
@@ -306,13 +330,16 @@ async function uniformsOf(sidecar, addressOf, warn) {
   }
   const loaded = (file, promise) =>
     promise.catch(() => {
-      warn(`${file}: it is missing; copy all files of the export`);
+      const what = isDDS(file) && !THREE.DefaultLoadingManager.getHandler(file)
+        ? 'three.js has no loader for it; give it one by DefaultLoadingManager.addHandler(/\\.dds$/i, new DDSLoader())'
+        : 'it is missing or cannot be read; copy all files of the export';
+      warn(`${file}: ${what}`);
       return null;
     });
   await Promise.all([
     ...Object.entries(TEXTURES).map(async ([name, empty]) => {
       const entry = sidecar.textures[name];
-      const texture = entry && (await loaded(entry.file, textureOf(addressOf(entry.file), name)));
+      const texture = entry && (await loaded(entry.file, textureOf(entry, addressOf(entry.file), name)));
       if (!texture) delete sidecar.textures[name];
       uniforms[`${name}_texture`] = { value: texture || plain(empty) };
       uniforms[`${name}_mask`] = { value: maskOf(entry) };
@@ -338,10 +365,20 @@ function plain(value) {
   return texture;
 }
 
-async function textureOf(file, name) {
-  const texture = await new THREE.TextureLoader().loadAsync(file);
-  texture.flipY = false; // glTF counts v from the top of the picture
-  texture.colorSpace = name === 'base' ? THREE.SRGBColorSpace : THREE.NoColorSpace;
+function isDDS(file) {
+  return /\.dds$/i.test(file);
+}
+
+async function textureOf({ file, color_space: space }, address, name) {
+  const isEXR = /\.exr$/i.test(file);
+  const loader = THREE.DefaultLoadingManager.getHandler(file) ?? new (isEXR ? EXRLoader : THREE.TextureLoader)();
+  const texture = await loader.loadAsync(address);
+  texture.flipY = isEXR; // glTF counts v from the top of the picture, whose lowest row this loader has first
+  texture.colorSpace = space === 'sRGB' && !isEXR ? THREE.SRGBColorSpace : THREE.NoColorSpace;
+  if (isEXR) {
+    texture.minFilter = THREE.LinearMipmapLinearFilter;
+    texture.generateMipmaps = true;
+  }
   texture.wrapS = texture.wrapT = REPEATED.includes(name)
     ? THREE.RepeatWrapping
     : THREE.ClampToEdgeWrapping;
@@ -356,6 +393,7 @@ async function tableOf(file) {
 }
 
 const VERTEX = /* glsl */ `
+#include <fog_pars_vertex>
 #include <skinning_pars_vertex>
 in vec2 uv1;
 in vec4 tangent;
@@ -371,7 +409,7 @@ void main() {
   occlusion_and_along = uv1;
   vec3 transformed = position;
   vec3 objectNormal = normal;
-  vec3 objectTangent = cross(normal, tangent.xyz); // from root to tip
+  vec3 objectTangent = tangent.w * cross(normal, tangent.xyz); // from root to tip
 #ifdef USE_SKINNING
 #include <skinbase_vertex>
   mat3 turned = mat3(bindMatrixInverse * (skinWeight.x * boneMatX + skinWeight.y * boneMatY +
@@ -386,11 +424,16 @@ void main() {
   card_normal = normalMatrix * objectNormal;
   card_tangent = mat3(modelViewMatrix) * objectTangent;
   gl_Position = projectionMatrix * place;
+#ifdef USE_FOG
+  vFogDepth = -place.z;
+#endif
 }`;
 
 const FRAGMENT = /* glsl */ `
 #include <common>
 #include <lights_pars_begin>
+#include <fog_pars_fragment>
+#define gl_FragColor color // what three.js mixes fog into
 #include <hair_shading>
 
 uniform int model;
@@ -476,6 +519,7 @@ void main() {
   radiance *= occlusion_and_along.x;
   float covered = IS_OPAQUE == 1 ? 1.0 : alpha;
   color = linearToOutputTexel(vec4(radiance, 1.0));
+#include <fog_fragment>
   color = vec4(color.xyz * covered, covered);
 #endif
 }`;

@@ -1,9 +1,9 @@
 extends Node3D
 ## Draws asset/cards.glb as asset/view.json asks. Writes into the folder that the command line names
-## godot.png; shown.json: which meshes are shown as the loader's second level, and by Godot alone
+## godot.png; fog.png, the same in fog that hides all; shown.json: which meshes are shown as the loader's second level, and by Godot alone
 ## where it finds the file, and from where to where each; order.json: the indices of the finest level.
 
-const Cards := preload("res://addons/hairloom/godot/hairloom_cards.gd")
+const Cards := preload("res://addons/hairloom/hairloom_cards.gd")
 const GLB := "res://asset/cards.glb"
 
 
@@ -26,6 +26,9 @@ func _ready() -> void:
 	surroundings.environment = Environment.new()
 	surroundings.environment.background_mode = Environment.BG_COLOR
 	surroundings.environment.background_color = Color.BLACK
+	surroundings.environment.ambient_light_source = Environment.AMBIENT_SOURCE_COLOR
+	surroundings.environment.ambient_light_color = Color.WHITE
+	surroundings.environment.ambient_light_energy = view["ambient"]
 	add_child(surroundings)
 	var output := OS.get_cmdline_user_args()[0]
 	var shown := {"second": _shown(Cards.load_cards(GLB, 1)), "ranges": _ranges(Cards.load_cards(GLB))}
@@ -37,10 +40,18 @@ func _ready() -> void:
 	_write(output.path_join("shown.json"), shown)
 	var finest: MeshInstance3D = hair.find_child("cards_LOD0", true, false)
 	_write(output.path_join("order.json"), Array(finest.mesh.surface_get_arrays(0)[Mesh.ARRAY_INDEX]))
-	await RenderingServer.frame_post_draw
-	await RenderingServer.frame_post_draw
-	get_viewport().get_texture().get_image().save_png(output.path_join("godot.png"))
+	await _draw(output.path_join("godot.png"))
+	surroundings.environment.fog_enabled = true
+	surroundings.environment.fog_light_color = Color("336699")
+	surroundings.environment.fog_density = 1000.0
+	await _draw(output.path_join("fog.png"))
 	get_tree().quit()
+
+
+func _draw(path: String) -> void:
+	await RenderingServer.frame_post_draw
+	await RenderingServer.frame_post_draw
+	get_viewport().get_texture().get_image().save_png(path)
 
 
 func _write(path: String, content: Variant) -> void:

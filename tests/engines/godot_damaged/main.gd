@@ -3,7 +3,7 @@ extends Node3D
 ## in hair's own material, and how much of a picture they fill; null of those that cannot be read. Says
 ## before each which it is.
 
-const Cards := preload("res://addons/hairloom/godot/hairloom_cards.gd")
+const Cards := preload("res://addons/hairloom/hairloom_cards.gd")
 
 
 func _ready() -> void:

@@ -3,7 +3,7 @@ extends Node3D
 ## gives way to the second, the same of hair three times as large from three times as far, and with the
 ## cross-fade turned off. Writes fine.png, coarse.png, both.png, scaled.png and at_once.png into the folder that the command line names.
 
-const Cards := preload("res://addons/hairloom/godot/hairloom_cards.gd")
+const Cards := preload("res://tools/hair cards/hairloom_cards.gd")
 const GLB := "res://asset/cards.glb"
 
 

@@ -2,7 +2,7 @@ extends Node3D
 ## Moves asset/hair.glb as poses.json says, a matrix (column by column) a frame, and writes where
 ## its springs have all joints, in the world, into the file that the command line names.
 
-const Cards := preload("res://addons/hairloom/godot/hairloom_cards.gd")
+const Cards := preload("res://addons/hairloom/hairloom_cards.gd")
 
 var hair: Node3D
 var skeleton: Skeleton3D

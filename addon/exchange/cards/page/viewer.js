@@ -3,7 +3,6 @@
 import * as THREE from 'three';
 import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
 import { loadHairloomCards } from '../../../../docs/engines/three/hairloom_cards.js';
-import shading from '../../../../docs/engines/hair_shading.gdshaderinc';
 
 const FIELD_OF_VIEW = 30;
 const CALM = matchMedia('(prefers-reduced-motion: reduce)').matches;
@@ -47,7 +46,6 @@ async function show() {
   const scene = new THREE.Scene();
   const hair = await loadHairloomCards(asset.mesh, {
     fieldOfView: FIELD_OF_VIEW,
-    shading: URL.createObjectURL(new Blob([shading])),
     addressOf: (name) => addresses.get(name),
   });
   scene.add(hair);

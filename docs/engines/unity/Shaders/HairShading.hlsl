@@ -137,8 +137,8 @@ float3 hair_kajiya_kay(HairMaterial hair, HairPlace place, float3 to_light)
 }
 
 // Coverage of a card that is seen at a slant, if alpha is the coverage averaged over all rotations about
-// its strands: these move closer together and cover no less. `across`: normal of its plane, of any length;
-// `tangent`: of the card; `facing`: mean and least of textures.view_compensated_alpha in the sidecar.
+// its strands: these move closer together and cover no less. across: normal of its plane, of any length;
+// tangent: of the card; facing: mean and least of textures.view_compensated_alpha in the sidecar.
 float hair_view_compensated_alpha(float alpha, float3 across, float3 tangent, float3 to_eye, float2 facing)
 {
   float3 turned = to_eye - dot(to_eye, tangent) * tangent;
