@@ -1,6 +1,6 @@
 """The one kind of error that reaches an artist as a message instead of a traceback.
 
-Lives beside the rooms, on the ground floor, because every room raises it and only `host`
+Lives beside the rooms, on the ground floor, because every room raises it and only `blender`
 and `ui` turn it into an operator report or a line on stderr with a non-zero exit.
 """
 

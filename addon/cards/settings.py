@@ -29,7 +29,7 @@ class CardSettings(Settings):
             ),
         ),
         label="Kind",
-        description="What stands for the strands",
+        description="Cards or shells",
     )
     max_triangles: int = integer(
         0,
@@ -90,7 +90,7 @@ class CardSettings(Settings):
     )
     fly_aways: float = number(
         0.1,
-        label="Fly-aways",
+        label="Fly-Aways",
         description="Fraction of the cards used for single strands far from all others",
         soft=(0.0, 0.5),
         hard=(0.0, 1.0),

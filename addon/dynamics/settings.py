@@ -290,8 +290,8 @@ class DynamicsSettings(MotionSettings):
     jump_distance: float = number(
         3.0,
         label="Jump Distance",
-        description="At a cut hair goes along as it is, at no speed: where its roots go so much "
-        "farther in a frame than in the one before, in extents of the hair; 0 is never",
+        description="Take a frame for a cut, across which hair goes along without speed, where its "
+        "roots move this much farther than in the frame before, in extents of the hair; 0: never",
         soft=(0.0, 10.0),
         hard=(0.0, 1.0e6),
         panel="Shot",
@@ -299,8 +299,8 @@ class DynamicsSettings(MotionSettings):
     jump_turn: float = number(
         math.radians(120.0),
         label="Jump Turn",
-        description="At a cut hair goes along as it is, at no speed: where its roots turn so far "
-        "in a frame; 0 is never",
+        description="Take a frame for a cut, across which hair goes along without speed, where its "
+        "roots turn by more than this; 0: never",
         soft=(0.0, math.pi),
         hard=(0.0, math.pi),
         unit="angle",

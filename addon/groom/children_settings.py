@@ -62,8 +62,8 @@ class ChildrenSettings(Settings):
     scatter: float = number(
         0.0,
         label="Scatter",
-        description="Give each child the shape that hair has this far from it at random, in "
-        "distances between guides, as the hairs of fur differ from their neighbours",
+        description="Take the shape of each child from hair up to this far away, at random, in "
+        "distances between guides, as fur needs it: its hairs differ from their neighbours",
         soft=(0.0, 2.0),
         hard=(0.0, 100.0),
         shown_when=when("children.method", "multi"),

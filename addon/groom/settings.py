@@ -101,8 +101,8 @@ class GrowSettings(Settings):
     whorl: float = number(
         1.0,
         label="Whorl",
-        description="Amount by which hair that is too short to be combed lies as it grows, away "
-        "from a whorl at the crown",
+        description="How much hair that is too short to be combed turns away from a whorl at the "
+        "crown",
         unit="factor",
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),

@@ -411,9 +411,9 @@ def mask_of(name: str) -> str:
 
 def _mask(of: str, parameter: Parameter) -> Any:
     description = (
-        "What is painted, by which "
-        f"{parameter.label} is multiplied: a vertex group or an attribute of the surface, an "
-        "attribute of the curves, or an image on the surface's UVs; empty: the same everywhere"
+        f"Multiplies {parameter.label} by what is painted: a vertex group or an attribute of the "
+        "surface, an attribute of the curves, or an image on the surface's UVs; empty: the same "
+        "everywhere"
     )
     label = f"{parameter.label} Mask"
     return _declare(Parameter("", "mask", "", label, description, "Hairloom", of=of))

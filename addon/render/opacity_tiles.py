@@ -45,7 +45,7 @@ def opacity_tiles(maps: OpacityMaps, layer_count: int) -> Floats:
         raise HairloomError(
             "no light throws a shadow of hair here",
             place="Show Opacity Map",
-            remedy="Add a light outside of the hair, and raise Lights in Shadows if it is 0",
+            remedy="Add a light outside of the hair, and raise Max Lights in Shadows if it is 0",
         )
     return np.concatenate([_tiles(maps, each, layer_count) for each in reversed(range(map_count))])
 

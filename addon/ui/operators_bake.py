@@ -1,4 +1,4 @@
-"""Bake and Delete Bake: the motion of hair and fins, on disk, for the viewport and renders."""
+"""Bake and Delete Bake: the motion of hair and cloth, on disk, for the viewport and renders."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from .selection import chosen_hair
 
 
 class HAIRLOOM_OT_bake(LongWork, bpy.types.Operator):
-    """Simulate selected hair and fins over all frames and keep the motion on disk. Esc cancels"""
+    """Simulate selected hair and cloth over all frames and keep the motion on disk. Esc cancels"""
 
     bl_idname = "hairloom.bake"
     bl_label = "Bake"
@@ -52,7 +52,7 @@ class HAIRLOOM_OT_bake(LongWork, bpy.types.Operator):
 
 
 class HAIRLOOM_OT_bake_free(bpy.types.Operator):
-    """Delete the bake of the selected hair and fins from disk. This cannot be undone"""
+    """Delete the bake of the selected hair and cloth from disk. This cannot be undone"""
 
     bl_idname = "hairloom.bake_free"
     bl_label = "Delete Bake"
@@ -128,7 +128,9 @@ def _draw_state(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
             text=f"Frames {facts.first} to {facts.last} at {facts.frame_rate:g} fps, {computed}",
             icon="CHECKMARK",
         )
-    draw_figures(layout.column(align=True), table_of(None if facts is None else facts.figures))
+    if obj.type == "CURVES":  # of cloth nothing is measured
+        figures = None if facts is None else facts.figures
+        draw_figures(layout.column(align=True), table_of(figures))
     known = previews.bake_of(obj)
     changed = () if facts is None or known is None else known.changed
     text = "Out of date: " + ", ".join(changed) if changed else ""

@@ -50,10 +50,10 @@ class HAIRLOOM_OT_fin_add(bpy.types.Operator):
 
 
 class HAIRLOOM_OT_fin_remove(bpy.types.Operator):
-    """Make the active fin a plain mesh again, in its original shape"""
+    """Make the active cloth a plain mesh again, in its original shape"""
 
     bl_idname = "hairloom.fin_remove"
-    bl_label = "Remove Fin"
+    bl_label = "Remove Cloth"
     bl_options = {"REGISTER", "UNDO"}
 
     @classmethod
@@ -71,10 +71,10 @@ class HAIRLOOM_OT_fin_remove(bpy.types.Operator):
 
 
 class HAIRLOOM_OT_fin_preview(bpy.types.Operator):
-    """Toggle whether Play and Blender's playback move the active fin"""
+    """Toggle whether Play and Blender's playback move the active cloth"""
 
     bl_idname = "hairloom.fin_preview"
-    bl_label = "Preview Fin"
+    bl_label = "Preview Cloth"
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -95,10 +95,10 @@ class HAIRLOOM_OT_fin_preview(bpy.types.Operator):
 
 
 class HAIRLOOM_OT_fin_reset(bpy.types.Operator):
-    """Move the active fin back to its animated shape"""
+    """Move the active cloth back to its animated shape"""
 
     bl_idname = "hairloom.fin_reset"
-    bl_label = "Reset Fin"
+    bl_label = "Reset Cloth"
     bl_options = {"REGISTER", "UNDO"}
 
     @classmethod

@@ -90,7 +90,7 @@ def _state(curves: bpy.types.Curves, lost: tuple[str, ...]) -> str:
         return "Follows these settings"
     if not has_grown(curves):
         return "Has not grown from these"
-    return "Behind these settings" if is_behind(curves) else "Changed since it grew"
+    return "Older than these settings" if is_behind(curves) else "Changed since it grew"
 
 
 def _listed(lost: tuple[str, ...]) -> str:

@@ -51,7 +51,7 @@ def draw_measure(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
     """Draw the button, and what was measured last; greyed out once the hair has moved on."""
     session = previews.session_of(hair)
     is_old = session is not None and session.figures and not session.are_figures_current
-    text = "Measure: It Has Moved on" if is_old else None
+    text = "Measure Again: Hair Has Moved" if is_old else None
     idle, icon = "Measure: Press Play First", "DRIVER_DISTANCE"
     draw_button(layout, "hairloom.measure", idle, text, anywhere=True, icon=icon)
     lines = layout.column(align=True)

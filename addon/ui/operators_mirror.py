@@ -18,7 +18,7 @@ from .selection import chosen_hair, needs_hair
 
 class HAIRLOOM_OT_mirror_hair(LongWork, bpy.types.Operator):
     """Mirror the curves of one side of the surface to the other, whose curves they replace. Roots
-    go to the surface; widths, colors and other attributes are those of the curves that are
+    go to the surface; widths, colours and other attributes are those of the curves that are
     mirrored. Esc cancels"""
 
     bl_idname = "hairloom.mirror_hair"

@@ -92,7 +92,7 @@ def _is_being_made(hair: bpy.types.Object) -> bool:
 
 
 class HAIRLOOM_OT_play(bpy.types.Operator):
-    """Simulate previewed hair and fins in real time. Esc stops them"""
+    """Simulate previewed hair and cloth in real time. Esc stops them"""
 
     bl_idname = "hairloom.play"
     bl_label = "Play"
@@ -129,7 +129,7 @@ class HAIRLOOM_OT_play(bpy.types.Operator):
 
 
 class HAIRLOOM_OT_stop(bpy.types.Operator):
-    """Stop hair and fins that play. They return to their style"""
+    """Stop hair and cloth that play. They return to their style"""
 
     bl_idname = "hairloom.stop"
     bl_label = "Stop Hair"

@@ -52,7 +52,7 @@ def is_title(name):
 
 
 def test_titles_are_told_from_other_texts():
-    assert is_title("Levels of Detail") and is_title("Fly-aways") and not is_title("Tip width")
+    assert is_title("Levels of Detail") and is_title("Fly-Aways") and not is_title("Tip width")
 
 
 def test_numbers_have_soft_limits_within_hard_ones():

@@ -59,7 +59,7 @@ class BakedGuides:
             raise HairloomError(
                 "it has no bake, so it does not move",
                 place=hair.name,
-                remedy="Bake it (Hairloom > Bake), or write it without motion",
+                remedy="Bake it (Dynamics > Bake), or write it without motion",
             )
         notes = stale_notes(hair, cache, bpy.context.evaluated_depsgraph_get())
         return cls._in(cache, hair.name, frames, notes)

@@ -20,7 +20,7 @@ from .verb import Verb
 
 
 def bake(job: Job) -> None:
-    """Simulate hair and fins of a scene frame by frame and keep the motion on disk."""
+    """Simulate hair and cloth of a scene frame by frame and keep the motion on disk."""
     report, options = job.report, job.options
     objects, notes = _objects(options.object)
     tell_notes(list(notes), report)
@@ -68,7 +68,7 @@ def _delete(objects: list[bpy.types.Object], report: Report) -> None:
 
 
 def _objects(names: list[str]) -> tuple[list[bpy.types.Object], tuple[str, ...]]:
-    """Those that were named, else all hair and fins of the view layer that are to be simulated; and
+    """Those that were named, else all hair and cloth of the view layer to be simulated; and
     what is said of those left out."""
     if names:
         return named_objects(names, bakeable, "hair curves or cloth"), ()

@@ -150,7 +150,7 @@ def view_rectangle(
 
 
 def _border(owner: Any, name: str) -> Floats:
-    """Lower left and upper right corner, (2, 2), as shares."""
+    """Lower left and upper right corner, (2, 2), as fractions of the picture."""
     return np.array(
         [[getattr(owner, f"{name}_{end}_{axis}") for axis in "xy"] for end in ("min", "max")]
     )

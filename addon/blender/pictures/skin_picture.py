@@ -48,7 +48,7 @@ def shown_skin_shadow(snapshot: Snapshot, strand_pass: StrandPass, *, place: str
         raise HairloomError(
             "no light casts a shadow of the hair",
             place=place,
-            remedy="Add a light outside of the hair, and raise Lights in Shadows if it is 0",
+            remedy="Add a light outside of the hair, and raise Max Lights in Shadows if it is 0",
         )
     lights, skin_pass = len(kept_lights(snapshot.lights)), SkinPass()
     skin_pass.shadows(snapshot.meshes, maps, snapshot.skin, lights, hair_forward(snapshot))

@@ -62,7 +62,7 @@ def issues_of(hair: bpy.types.Object, session: Session | None) -> tuple[Issue, .
         text = "No surface: it follows its own object only, and collides with nothing"
         found.append(Issue(text, "hairloom.set_surface", "Set Surface", known))
     elif head.data.uv_layers.active is None:
-        text = f"{head.name} has no UVs: exported strands know no place on its texture"
+        text = f"{head.name} has no UVs: exported strands will have no root UVs"
         found.append(Issue(text, "hairloom.unwrap_surface", "Unwrap", known))
     if (
         head is not None
@@ -71,13 +71,13 @@ def issues_of(hair: bpy.types.Object, session: Session | None) -> tuple[Issue, .
         and (loose := session.groom.loose_roots)
     ):
         count = f"{loose:,} roots are" if loose > 1 else "1 root is"
-        text = f"{count} not on {head.name}, and would hang in the air"
+        text = f"{count} not on {head.name}, and would float"
         found.append(Issue(text, "hairloom.snap_roots", "Snap to Surface"))
     if is_unevenly_scaled(hair):
         text = "Its object is scaled unevenly, so strands are as wide as the mean of the scales"
         found.append(Issue(text, "hairloom.apply_scale", "Apply Scale"))
     if is_copy_gone(hair):
-        text = "Renders leave it out for a copy that showed its bake and is gone"
+        text = "Renders hide it: the copy that showed its bake was deleted"
         found.append(Issue(text, "hairloom.show_in_renders", "Show in Renders"))
     baked = previews.bake_of(hair)
     if baked is not None and baked.changed:

@@ -376,7 +376,7 @@ class HAIRLOOM_PG_character(bpy.types.PropertyGroup):
         "collider_shape": EnumProperty(
             items=COLLIDER_SHAPES,
             name="Collides As",
-            description="As what this object collides with hair and cloth",
+            description="Shape in which this object collides with hair and cloth",
             override=OVERRIDABLE,
         ),
         "hidden_rays": IntProperty(

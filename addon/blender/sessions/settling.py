@@ -115,7 +115,7 @@ def _check_roots(hair: bpy.types.Object, rig: Rig) -> None:
             f"{loose:,} of {rig.strands.strand_count:,} roots are away from the surface in its "
             "present pose",
             place=hair.name,
-            remedy="Go to the frame in which the hair was combed, or press Snap Roots",
+            remedy="Go to the frame in which the hair was combed, or press Snap to Surface",
         )
 
 

@@ -128,5 +128,5 @@ def size_note(settings: VolumeSettings, map_count: int, room: int, drawn: MapSiz
     return (
         f"Shadows: maps of {asked.side} x {asked.side} texels for {lights} "
         f"{reason}, so they have {drawn.side} x {drawn.side}. Lower Resolution, the number of "
-        f"layers, or Lights in Shadows{memory}."
+        f"layers, or Max Lights in Shadows{memory}."
     )
