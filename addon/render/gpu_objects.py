@@ -39,26 +39,35 @@ _TEXEL_BYTES = {
 
 @dataclass
 class _Owned:
-    """What a thread has made, and how many bytes each takes."""
+    """What a thread has made, and how many bytes each takes.
+
+    lock: a render thread that ends gives what it has made to the main thread, which works on.
+    """
 
     objects: list[Any] = field(default_factory=list)
     sizes: list[int] = field(default_factory=list)
+    lock: threading.Lock = field(default_factory=threading.Lock)
 
     def keep(self, made: Any, size: int) -> None:
-        self.objects.append(made)
-        self.sizes.append(size)
+        with self.lock:
+            self.objects.append(made)
+            self.sizes.append(size)
 
     def free_unused(self) -> None:
-        before = -1
-        while len(self.objects) != before:  # a batch goes before its vertices
-            before, counts = len(self.objects), _counts(self.objects)
-            used = [count > _UNUSED for count in counts]
-            for values in (self.objects, self.sizes):
-                values[:] = [each for each, is_used in zip(values, used, strict=True) if is_used]
+        with self.lock:
+            before = -1
+            while len(self.objects) != before:  # a batch goes before its vertices
+                before, counts = len(self.objects), _counts(self.objects)
+                used = [count > _UNUSED for count in counts]
+                for values in (self.objects, self.sizes):
+                    values[:] = [
+                        each for each, is_used in zip(values, used, strict=True) if is_used
+                    ]
 
     def take(self, other: _Owned) -> None:
-        self.objects += other.objects
-        self.sizes += other.sizes
+        with self.lock:
+            self.objects += other.objects
+            self.sizes += other.sizes
 
 
 def _counts(objects: list[Any]) -> list[int]:

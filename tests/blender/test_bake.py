@@ -11,15 +11,18 @@ import bpy
 import numpy as np
 import pytest
 from bake_files import contents, frames_in
+from fin_motion import shown
 from gpu_rounding import is_same
 from grids import baked_grid, grid_of
 from swinging import thrown
 from windows_rules import windows_rules
 
 from hairloom.addon.blender.bakes import groom_hashes, playback
+from hairloom.addon.blender.bakes.bake_settings import folder_of
 from hairloom.addon.blender.bakes.cache import Cache, CacheWriter, Facts
 from hairloom.addon.blender.bakes.simulated import SOLVER_VERSION
-from hairloom.addon.blender.base.suspension import is_suspended
+from hairloom.addon.blender.base.suspension import is_suspended, suspended
+from hairloom.addon.blender.engine import engine_hair
 from hairloom.addon.blender.preview import previews, scene_events
 from hairloom.addon.blender.preview.bake import Bake, free
 from hairloom.addon.errors import HairloomError
@@ -629,3 +632,66 @@ def test_led_strands_that_are_not_of_the_groom_are_refused(strands, count, swing
     playback.forget()
     with pytest.raises(HairloomError, match="Bake again"):
         playback.strands_in(playback.cache_of(hair), 2)
+
+
+def test_a_render_has_the_rig_of_the_newest_bake(swinging, evaluated):
+    """Strands at rest are the same, but other guides move them."""
+    hair, _ = swinging
+    bake(hair)
+    engine_hair.read_groom(hair, evaluated())
+    before = engine_hair._kept[hair.session_uid].made.rig
+    hair.data.hairloom.guides.guide_count = 10
+    bake(hair)
+    engine_hair.read_groom(hair, evaluated())
+    after = engine_hair._kept[hair.session_uid].made.rig
+    np.testing.assert_array_equal(before.strands.points, after.strands.points)
+    assert len(after.guides) == 10 < len(before.guides)
+    engine_hair.forget()
+
+
+def test_a_folder_that_is_asked_for_is_taken_though_another_object_names_it(swinging, tmp_path):
+    hair, _ = swinging
+    twin = hair.copy()
+    bpy.context.collection.objects.link(twin)
+    asked = tmp_path / "asked"
+    for each in (hair, twin):
+        bake(each, folder=asked)
+        assert Cache(asked).facts.owner == each.name
+        assert each.hairloom.bake.folder == str(asked)
+
+
+def test_two_names_of_one_folder_are_one_folder(swinging, tmp_path):
+    """Of two bakes in one run neither takes the place of the other."""
+    hair, _ = swinging
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "wig.blend"))
+    twin = hair.copy()
+    bpy.context.collection.objects.link(twin)
+    hair.hairloom.bake.folder = str(tmp_path / "one")
+    twin.hairloom.bake.folder = "//one/../one/"
+    bake(hair, twin)
+    owners = {Cache(folder_of(each)).facts.owner for each in (hair, twin)}
+    assert owners == {hair.name, twin.name}
+
+
+def test_while_hair_is_baked_cloth_shows_its_bake_as_on_the_timeline(
+    swinging, flag, evaluated, tmp_path
+):
+    hair, scene = swinging[0], bpy.context.scene
+    flag.hairloom.bake.folder = str(tmp_path / "flag")
+    bake(flag)
+    there = []
+    for frame in range(1, LAST + 1):
+        scene.frame_set(frame)
+        there.append(shown(flag, evaluated))
+    assert np.ptp(there, axis=0).max() > 0.001, "it does not move"
+    scene.frame_set(1)
+    during = [shown(flag, evaluated) for _ in Bake.of([hair], scene).steps()]
+    np.testing.assert_array_equal(during, there)
+
+
+def test_work_inside_suspended_work_leaves_it_suspended():
+    with suspended():
+        with suspended():
+            pass
+        assert is_suspended()
+    assert not is_suspended()

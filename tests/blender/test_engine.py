@@ -264,3 +264,38 @@ def test_what_is_out_of_focus_is_as_soft_as_in_cycles(
     difference = np.abs(ours - theirs)
     # blades that turn the other way are off by 0.0017 and 0.057
     assert difference.mean() < 0.001 and np.quantile(difference, 0.99) < 0.03
+
+
+def test_a_blurred_render_that_is_cancelled_goes_to_no_other_frame(
+    stage: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from hairloom.addon.blender.engine import engine
+    from hairloom.addon.blender.engine.engine_still import Still
+
+    class Cancelled:
+        """The engine of an artist who presses Esc after two samples."""
+
+        def __init__(self, own: Any) -> None:
+            self.own, self.asked, self.places = own, 0, list[float]()
+            cancelled.append(self)
+
+        def __getattr__(self, name: str) -> Any:
+            return getattr(self.own, name)
+
+        def test_break(self) -> bool:
+            self.asked += 1
+            return self.asked > 4
+
+        def frame_set(self, frame: int, subframe: float) -> None:
+            self.places.append(frame + subframe)
+            self.own.frame_set(frame, subframe=subframe)
+
+    cancelled: list[Cancelled] = []
+    monkeypatch.setattr(engine, "Still", lambda own, depsgraph: Still(Cancelled(own), depsgraph))
+    add_ball()
+    stage.render.use_motion_blur = True
+    stage.hairloom.picture.samples = stage.hairloom.picture.motion_steps = 32
+    picture(tmp_path)
+    (found,) = cancelled
+    assert len(found.places) == 3, "two moments, and back"
+    assert found.places[-1] == stage.frame_current

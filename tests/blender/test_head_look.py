@@ -14,8 +14,9 @@ from hairloom.addon.blender.pictures.head_parts import head_parts
 from hairloom.addon.blender.scene.built_in_head import built_in_head
 from hairloom.addon.blender.scene.bust import bust_object
 from hairloom.addon.blender.scene.head_look import head_look
-from hairloom.addon.blender.scene.mesh_files import read_mesh_file
+from hairloom.addon.blender.scene.mesh_files import import_mesh_file, read_mesh_file
 from hairloom.addon.blender.scene.surfaces import read_surface
+from hairloom.addon.errors import HairloomError
 from hairloom.addon.groom.settings import GrowSettings
 from hairloom.addon.render.snapshot import MeshSnapshot
 from hairloom.addon.strands import Surface
@@ -108,3 +109,34 @@ def test_hair_on_the_bust_of_a_scene_comes_with_brows_and_lashes() -> None:
         == np.unique(read_inputs(Sources(), settings).strands.group).tolist()
     )
     assert len(np.unique(grown.group)) == 3
+
+
+def test_a_rigged_file_that_is_read_leaves_nothing_in_the_scene(tmp_path: Path) -> None:
+    rig = bpy.data.objects.new("Rig", bpy.data.armatures.new("Rig"))
+    bpy.context.collection.objects.link(rig)
+    bpy.context.view_layer.objects.active = rig
+    bpy.ops.object.mode_set(mode="EDIT")
+    rig.data.edit_bones.new("head").tail = (0.0, 0.0, 1.0)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    rig.location.x = 1.0
+    rig.keyframe_insert("location", frame=1)
+    mesh = cube("Painted", [(1.0, 0.0, 0.0)])
+    mesh.parent, mesh.shape_key_add(name="Basis").value = rig, 0.0
+    file = tmp_path / "rigged.glb"
+    bpy.ops.export_scene.gltf(filepath=str(file))
+    bpy.ops.wm.read_homefile(use_empty=True)
+
+    def everything() -> dict[str, int]:
+        kinds = (
+            each.identifier for each in bpy.data.bl_rna.properties if each.type == "COLLECTION"
+        )
+        return {kind: len(getattr(bpy.data, kind)) for kind in kinds}
+
+    before = everything()
+    read_mesh_file(file, need_uv=False)
+    assert everything() == before
+    broken = tmp_path / "broken.glb"
+    broken.write_bytes(file.read_bytes()[:-200])
+    with pytest.raises(HairloomError):
+        import_mesh_file(broken)
+    assert everything() == before

@@ -200,3 +200,14 @@ def test_a_step_may_end_others_and_begin_new_ones(shop: Workshop) -> None:
     latest_job.watch("second", lambda: taken.append("second"))
     assert latest_job.take_steps() == latest_job.ARRIVAL_TIME, "the third is still to come"
     assert latest_job.take_steps() is None and taken == ["first", "last"]
+
+
+def test_what_could_not_begin_can_be_wanted_again(shop: Workshop) -> None:
+    def begin() -> Work[str]:
+        raise HairloomError("it cannot be read", place="a", remedy="Undo")
+
+    with pytest.raises(HairloomError):
+        shop.job.want("a", begin)
+    shop.want("a")
+    shop.open("a")
+    take_steps_until(lambda: shop.taken == ["A"])

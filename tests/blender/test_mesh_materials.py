@@ -9,6 +9,7 @@ import bpy
 import numpy as np
 import pytest
 
+from hairloom.addon.blender.scene import mesh_materials
 from hairloom.addon.blender.scene.mesh_materials import MeshMaterial, material_of
 from hairloom.addon.render.snapshot import MeshPictures
 from hairloom.addon.shading.lights import Light
@@ -313,3 +314,28 @@ def test_the_engine_tells_what_is_missing(sphere: Any, new_hair: Any, material: 
     assert "UVs" not in warnings()
     hair.data.hairloom.volume.shadows = "deep"
     assert "the head has no UVs" in warnings()
+
+
+def test_a_picture_whose_file_was_written_again_is_read_again(
+    material: bpy.types.Material, tmp_path: Path
+) -> None:
+    image = picture("Skin", np.full((4, 4, 4), 0.5))
+    image.filepath_raw, image.file_format = str(tmp_path / "skin.png"), "PNG"
+    image.save()
+    give(material, image, "Base Color")
+    before = material_of(material).color
+    other = picture("Other", np.ones((4, 4, 4)))
+    other.filepath_raw, other.file_format = image.filepath_raw, "PNG"
+    other.save()
+    image.reload()
+    assert material_of(material).color == pytest.approx((1.0, 1.0, 1.0)) != before
+
+
+def test_few_pictures_are_kept(material: bpy.types.Material) -> None:
+    texture = give(material, picture("First", np.ones((2, 2, 4))), "Base Color")
+    for number in range(40):
+        texture.image = picture(f"Picture {number}", np.ones((2, 2, 4)))
+        material_of(material)
+    assert len(mesh_materials._pictures) == mesh_materials._KEPT
+    mesh_materials.forget()
+    assert not mesh_materials._pictures

@@ -215,3 +215,17 @@ def test_two_grooms_have_their_own_colliders(scene):
     assert names == [{"Own", "Both"}, {"Both"}]
     assert len(scene.obstacles().parts) == 2
     assert len(Obstacles.of(other, None, None, COARSE, depsgraph(), None).parts) == 1
+
+
+def test_a_mesh_that_bends_scaled_to_nothing_and_back(scene):
+    cube, ball = scene.cube(), scene.ball()
+    cube.shape_key_add(name="Basis")
+    cube.shape_key_add(name="Wide").data[0].co *= 1.2
+    found = scene.obstacles()
+    assert len(moved(found)) == 2
+    cube.scale = (0, 0, 0)
+    assert len(moved(found)) == 1
+    assert [text for text in found.warnings if "Cube: its scale is zero" in text]
+    cube.scale = (1, 1, 1)
+    assert len(moved(found)) == 2 and found.warnings == ()
+    assert ball.name == "Ball"

@@ -197,3 +197,9 @@ def test_the_graph_of_milliseconds_goes_from_edge_to_edge_and_up_by_its_values()
     lines = graph_lines([0.0, 25.0, 50.0], 50.0, corner, extent)
     np.testing.assert_allclose(lines, [[10, 20], [60, 40], [60, 40], [110, 60]])
     assert len(graph_lines([1.0], 50.0, corner, extent)) == 0
+
+
+def test_a_field_without_an_inside_has_no_lines():
+    """As of a mesh that is thinner than a cell."""
+    field = DistanceField(np.ones((3, 3, 3), np.float32), np.zeros(3), 0.1)
+    assert shape_lines(field).shape == (0, 3)

@@ -296,3 +296,17 @@ def test_weights_are_those_that_each_vertex_has(sphere: Any, evaluated: Any) -> 
         wanted[name] = weights
     for name, weights in wanted.items():
         np.testing.assert_allclose(read_weights(sphere, evaluated(), name), weights, atol=1e-7)
+
+
+def test_the_overlay_of_a_map_on_the_curves_follows_another_number_of_curves(
+    hair: Any, sphere: Any, evaluated: Any
+) -> None:
+    soft = hair.data.attributes.new("Soft", "FLOAT", "CURVE")
+    soft.data.foreach_set("value", np.full(len(hair.data.curves), 0.25, np.float32))
+    session = started(hair, evaluated)
+    hair.hairloom.shown_overlays, hair.hairloom.shown_map = {"paint"}, "Soft"
+    assert np.allclose(session.shown_map(evaluated()), 0.25)
+    hair.data.remove_curves(indices=[0, 1, 2])
+    catch_up(evaluated)
+    shown = session.shown_map(evaluated())
+    assert shown is not None and np.allclose(shown, 0.25)

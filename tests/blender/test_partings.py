@@ -6,6 +6,7 @@ import pytest
 
 from hairloom.addon.blender.bakes.groom_hashes import groom_rig_hash
 from hairloom.addon.blender.command_line import command_line
+from hairloom.addon.blender.engine import engine_hair
 from hairloom.addon.blender.preview import previews
 from hairloom.addon.blender.properties.groom_settings import GroomSettings
 from hairloom.addon.blender.scene.curves import curve_points
@@ -218,3 +219,17 @@ def test_the_verbs_part_a_file(hair, tmp_path):
     hair = bpy.data.objects[name]
     assert [each.name for each in partings_of(hair)] == ["Line"]
     assert not np.array_equal(curve_points(hair.data), cap().points)
+
+
+def test_a_render_after_a_parting_has_moved_has_other_children(hair, evaluated):
+    line = arch()
+    add(hair, line)
+    assert line.session_uid in engine_hair.uids_of(hair), "Rendered mode does not read it again"
+    before = engine_hair.read_groom(hair, evaluated())
+    again = engine_hair.read_groom(hair, evaluated())
+    assert again.radius is before.radius, "it is kept"
+    line.location.x = 0.03
+    bpy.context.view_layer.update()
+    after = engine_hair.read_groom(hair, evaluated())
+    assert not np.array_equal(after.points, before.points)
+    engine_hair.forget()

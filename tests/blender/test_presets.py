@@ -320,3 +320,16 @@ def test_the_look_under_water_brings_its_shafts_of_light_with_it(hair: bpy.types
         ["render", "--output", "x.png", "--preset", "looks/under_water"]
     )
     assert job_options.chosen_settings(options)[ShaftSettings] == wanted[0]
+
+
+def test_a_title_in_capitals_is_the_same_title(hair: bpy.types.Object, own_folder: Path) -> None:
+    """As the dialog says, and as files are on Windows and macOS."""
+    for title, width in (("Bob", 0.1), ("BOB", 0.2)):
+        hair.data.hairloom.shading.width_r = width
+        bpy.ops.hairloom.save_preset(title=title)
+    assert titles() == ["BOB"]
+    (file,) = own_folder.glob("*.json")
+    file.rename(own_folder / "Fur.json")
+    bpy.ops.hairloom.save_preset(title="Fur")
+    names = [path.stem.casefold() for path in own_folder.glob("*.json")]
+    assert len(set(names)) == len(names) == 2

@@ -136,3 +136,11 @@ def test_motion_of_strands_and_of_cards_says_so(
     bpy.ops.hairloom.export_alembic(filepath=str(tmp_path / "hair.abc"), frames="scene")
     assert "out of date (settings)" in "".join(capfd.readouterr())
     np.testing.assert_array_equal(baked_grid(playback.cache_of(hair), LAST), before)
+
+
+def test_widths_that_were_edited_make_a_bake_out_of_date(baked: Any, changed: Any) -> None:
+    hair, _ = baked
+    assert changed() == ()
+    for value in hair.data.attributes["radius"].data:
+        value.value *= 2.0
+    assert "hair" in changed()

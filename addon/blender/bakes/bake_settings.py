@@ -68,7 +68,7 @@ def choose_folder(obj: bpy.types.Object) -> Path:
     is_of_another_file = bake.folder.startswith(f"{_BESIDE}/") and not bake.folder.startswith(
         f"{beside}/"
     )
-    if not bake.folder or is_of_another_file or bake.folder in folders_of_others(obj):
+    if not bake.folder or is_of_another_file or _is_shared(obj):
         bake.folder = _own_folder(obj, beside)
     folder = folder_of(obj)
     if folder is None:
@@ -97,8 +97,7 @@ def check_owner(obj: bpy.types.Object, folder: Path) -> None:
 
 def is_own(obj: bpy.types.Object, folder: Path) -> bool:
     """Whether the bake in the folder that an object names is of no other object or file."""
-    is_shared = obj.hairloom.bake.folder in folders_of_others(obj)
-    return not (is_shared or _other_owner(obj, folder))
+    return not (_is_shared(obj) or _other_owner(obj, folder))
 
 
 def _other_owner(obj: bpy.types.Object, folder: Path) -> str:
@@ -131,10 +130,22 @@ def _beside(obj: bpy.types.Object) -> str:
 
 
 def _own_folder(obj: bpy.types.Object, beside: str) -> str:
-    taken = {as_compared(Path(folder).name) for folder in folders_of_others(obj)}
+    named = (other.hairloom.bake.folder for other in _others(obj))
+    taken = {as_compared(Path(folder).name) for folder in named if folder}
     return f"{beside}/{folder_name(obj.name, taken)}"
 
 
-def folders_of_others(obj: bpy.types.Object) -> set[str]:
-    """The folders that other objects name, as a duplicate names that of its original."""
-    return {other.hairloom.bake.folder for other in bpy.data.objects if other != obj}
+def _is_shared(obj: bpy.types.Object) -> bool:
+    """Whether another object names the same folder, as a duplicate names that of its original."""
+    own = folder_of(obj)
+    theirs = (folder_of(other) for other in _others(obj))
+    return own is not None and any(each and same_folder(own, each) for each in theirs)
+
+
+def same_folder(one: Path, other: Path) -> bool:
+    """Whether two paths lead to one folder on any system."""
+    return as_compared(str(one.resolve())) == as_compared(str(other.resolve()))
+
+
+def _others(obj: bpy.types.Object) -> list[bpy.types.Object]:
+    return [other for other in bpy.data.objects if other != obj]

@@ -34,7 +34,7 @@ class RestMatrices:
     ties: Floats = field(default_factory=lambda: np.zeros((0, 4, 4)))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class BakedRig:
     """What all frames share."""
 

@@ -27,7 +27,7 @@ from ..colliders.obstacles import shape_of, sources_of
 from ..colliders.ties import holders_of
 from ..properties.groom_settings import GroomSettings
 from ..properties.properties import settings_of
-from ..scene.curves import COLOR_ATTRIBUTE, GROUP_ATTRIBUTES, read_curves
+from ..scene.curves import GROUP_ATTRIBUTES, VALUE_ATTRIBUTES, read_curves
 from ..scene.forces import force_fields_of, gravity_of
 from ..scene.masks import image_values
 from ..scene.partings import parting_state, partings_of
@@ -231,10 +231,11 @@ def _curves_parts(hair: bpy.types.Object) -> tuple[Floats | Ints | str, ...]:
             group = np.empty(len(attribute.data), np.int32)
             attribute.data.foreach_get("value", group)
             parts.append(group)
-    for domain in ("POINT", "CURVE"):
-        color = read_attribute(curves, COLOR_ATTRIBUTE, domain, 4)
-        if color is not None:
-            parts.append(color)
+    for name, size in VALUE_ATTRIBUTES:
+        for domain in ("POINT", "CURVE"):
+            values = read_attribute(curves, name, domain, size)
+            if values is not None:
+                parts.append(values)
     return tuple(parts)
 
 

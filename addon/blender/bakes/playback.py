@@ -6,7 +6,8 @@ In a render nothing is evaluated and nothing simulated: strands come from the ba
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -31,6 +32,7 @@ class _Known:
     caches: which file of facts it was, and the bake. rigs: of which bake, and its rig. solids: of
     which bake, and its colliders.
     problems: why a bake cannot be shown in renders; reported once.
+    unshown: session numbers of fins that are being baked.
     lock: renders read bakes in their own thread.
     """
 
@@ -40,6 +42,7 @@ class _Known:
         self.rigs: dict[Path, tuple[Cache, BakedRig]] = {}
         self.solids: dict[Path, tuple[Cache, BakedSolids | None]] = {}
         self.problems: dict[Path, str] = {}
+        self.unshown: set[int] = set()
         self.is_rendering = False
 
 
@@ -182,9 +185,20 @@ def show_fins(scene: bpy.types.Scene) -> None:
     Beyond the baked frames, a fin is where the animation carries it.
     """
     for obj in bpy.data.objects if has_fins() else ():
-        folder = folder_of(obj) if is_baked_fin(obj) else None
+        is_shown = is_baked_fin(obj) and obj.session_uid not in _known.unshown
+        folder = folder_of(obj) if is_shown else None
         if folder is not None:
             _attempt(folder, partial(_show_fin, obj, folder, scene.frame_current))
+
+
+@contextmanager
+def without_fins(objects: Sequence[bpy.types.Object]) -> Iterator[None]:
+    """Inside the block the bakes of these fins are not shown: they are being made again."""
+    _known.unshown = {obj.session_uid for obj in objects}
+    try:
+        yield
+    finally:
+        _known.unshown = set()
 
 
 def is_baked_fin(obj: bpy.types.Object) -> bool:
@@ -271,14 +285,16 @@ def needs_copies() -> bool:
 
 def drop(folder: Path) -> None:
     """The bake in this folder is gone, or another one."""
-    for known in (_known.caches, _known.rigs, _known.solids, _known.problems):
-        known.pop(folder, None)
+    with _known.lock:
+        for known in (_known.caches, _known.rigs, _known.solids, _known.problems):
+            known.pop(folder, None)
 
 
 def forget() -> None:
     """Keep no bake in memory."""
-    for known in (_known.caches, _known.rigs, _known.solids, _known.problems):
-        known.clear()
+    with _known.lock:
+        for known in (_known.caches, _known.rigs, _known.solids, _known.problems):
+            known.clear()
     _known.is_rendering = False
 
 

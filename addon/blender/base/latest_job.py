@@ -171,7 +171,11 @@ class LatestJob[Key, Result]:
     def _begin(self) -> None:
         assert self._wanted is not None
         key, begin = self._wanted
-        self._running = _Running(key, ThreadWork(begin(), self._name))
+        try:
+            self._running = _Running(key, ThreadWork(begin(), self._name))
+        except BaseException:
+            self._wanted = None  # so that the same can be wanted again
+            raise
         watch(self, self._step)
 
     def _step(self) -> float | None:

@@ -73,6 +73,16 @@ def taken_back() -> Iterator[Callable[[], None]]:
         raise
 
 
+@contextmanager
+def new_blocks_removed() -> Iterator[None]:
+    """Data-blocks that are added inside go again at the end, however it ends."""
+    before = _numbers()
+    try:
+        yield
+    finally:
+        bpy.data.batch_remove([each for each in _data_blocks() if each.session_uid not in before])
+
+
 def _numbers() -> set[int]:
     return {each.session_uid for each in _data_blocks()}
 

@@ -12,11 +12,11 @@ _is_suspended = False
 def suspended() -> Iterator[None]:
     """Ignore Blender's events and changed properties inside the block."""
     global _is_suspended
-    _is_suspended = True
+    before, _is_suspended = _is_suspended, True
     try:
         yield
     finally:
-        _is_suspended = False
+        _is_suspended = before
 
 
 def is_suspended() -> bool:

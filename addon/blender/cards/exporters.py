@@ -26,10 +26,11 @@ from ...exchange.files.atomic import DISK_FULL, as_system_says, unwritable
 from ...exchange.files.names import plain_name
 from ...exchange.textures.srgb import srgb_decoded
 from ...strands.vectors import unit
+from ..base.parts import new_blocks_removed
 from .material import fill_image, named_image, new_material
 from .mesh import OCCLUSION_LAYER, fill_mesh
 
-_MADE_IN = ("objects", "meshes", "materials", "images", "scenes")
+_NAMED = ("objects", "meshes", "materials", "images", "scenes")
 #: the attribute of OBJ that holds occlusion and along
 _COLORS = "Occlusion color"
 
@@ -235,26 +236,22 @@ def card_scene(
         texels: of each level, (vertex_count, 2): a third UV map, its second component from the top.
     """
     names = level_names(name, len(levels))
-    before = _data_blocks()
-    with _free_names({plain_name(name), *names}):
-        try:
-            scene = bpy.data.scenes.new(plain_name(name))
-            material = _new_material(look, plain_name(name), file_format)
-            parent = _new_parent(scene, plain_name(name)) if len(levels) > 1 else None
-            for number, (level, level_name) in enumerate(zip(levels, names, strict=True)):
-                mesh = bpy.data.meshes.new(level_name)
-                uv_maps = _uv_maps(level, texels[number] if len(texels) else None, file_format)
-                points = _attributes(level, file_format, portable=portable)
-                fill_mesh(mesh, level, uv_maps=uv_maps, points=points)
-                if file_format == OBJ:
-                    mesh.color_attributes.active_color = mesh.color_attributes[_COLORS]
-                mesh.materials.append(material)
-                obj = bpy.data.objects.new(level_name, mesh)
-                obj.parent = parent
-                scene.collection.objects.link(obj)
-            yield scene
-        finally:
-            bpy.data.batch_remove(_data_blocks() - before)
+    with _free_names({plain_name(name), *names}), new_blocks_removed():
+        scene = bpy.data.scenes.new(plain_name(name))
+        material = _new_material(look, plain_name(name), file_format)
+        parent = _new_parent(scene, plain_name(name)) if len(levels) > 1 else None
+        for number, (level, level_name) in enumerate(zip(levels, names, strict=True)):
+            mesh = bpy.data.meshes.new(level_name)
+            uv_maps = _uv_maps(level, texels[number] if len(texels) else None, file_format)
+            points = _attributes(level, file_format, portable=portable)
+            fill_mesh(mesh, level, uv_maps=uv_maps, points=points)
+            if file_format == OBJ:
+                mesh.color_attributes.active_color = mesh.color_attributes[_COLORS]
+            mesh.materials.append(material)
+            obj = bpy.data.objects.new(level_name, mesh)
+            obj.parent = parent
+            scene.collection.objects.link(obj)
+        yield scene
 
 
 @contextmanager
@@ -274,16 +271,12 @@ def shown(scene: bpy.types.Scene) -> Iterator[None]:
             window.view_layer = user_layer
 
 
-def _data_blocks() -> set[bpy.types.ID]:
-    return {block for kind in _MADE_IN for block in getattr(bpy.data, kind)}
-
-
 @contextmanager
 def _free_names(names: Iterable[str]) -> Iterator[None]:
     """Nothing of the file has these names while the block runs: Blender would number ours."""
     taken = [
         (block, block.name)
-        for kind in _MADE_IN
+        for kind in _NAMED
         for name in names
         if (block := getattr(bpy.data, kind).get(name)) is not None and block.library is None
     ]

@@ -8,6 +8,7 @@ builds it. That of the built-in head ships.
 from __future__ import annotations
 
 import hashlib
+from threading import Lock
 
 import numpy as np
 
@@ -22,6 +23,8 @@ from .bust_field import shipped_field
 KEPT = 8
 
 _works: dict[str, ThreadWork[DistanceField]] = {}
+#: threads that make hair ask for fields too
+_lock = Lock()
 
 
 class NotMadeYetError(Exception):
@@ -42,10 +45,11 @@ def field_of(
         NotMadeYetError: it is being made, and nobody waits.
     """
     key = field_key(surface, settings)
-    work = _works.pop(key, None)
-    if work is None:
-        work = ThreadWork(lambda _: _made(surface, settings, key), "distance field")
-    _works[key] = work  # now the youngest
+    with _lock:
+        work = _works.pop(key, None)
+        if work is None:
+            work = ThreadWork(lambda _: _made(surface, settings, key), "distance field")
+        _works[key] = work  # now the youngest
     if blocking:
         work.wait()
         trim()
@@ -56,7 +60,8 @@ def field_of(
     except HairloomError as error:  # a surface that cannot be one stays so, under any name
         raise HairloomError(error.problem, place=place, remedy=error.remedy) from error
     except Exception:
-        _works.pop(key, None)  # as where memory ran out, which may go well the next time
+        with _lock:
+            _works.pop(key, None)  # as where memory ran out, which may go well the next time
         raise
 
 
@@ -72,19 +77,22 @@ def solid_of(head: Surface | None) -> DistanceField | None:
 
 def are_made() -> bool:
     """Whether no field is being made."""
-    return all(work.is_done for work in _works.values())
+    with _lock:
+        return all(work.is_done for work in _works.values())
 
 
 def trim() -> None:
     """Keep the youngest only. Not while somebody waits for many: he could never have them all."""
-    made = [key for key, work in _works.items() if work.is_done]
-    for key in made[:-KEPT]:
-        del _works[key]
+    with _lock:
+        made = [key for key, work in _works.items() if work.is_done]
+        for key in made[:-KEPT]:
+            del _works[key]
 
 
 def forget() -> None:
     """Keep none."""
-    _works.clear()
+    with _lock:
+        _works.clear()
 
 
 def _made(surface: Surface, settings: DynamicsSettings, key: str) -> DistanceField:

@@ -19,6 +19,7 @@ from ...dynamics.colliders import (
 )
 from ...dynamics.colliders.bent_field import BentField
 from ...dynamics.settings import DynamicsSettings
+from ...errors import HairloomError
 from ...strands import Surface
 from ...strands.affine import mean_scale, moved
 from .carriers import Carrier, scales_of
@@ -126,7 +127,7 @@ class FieldPart:
         return self.carrier.body.handle.uid
 
     def now(self, depsgraph: bpy.types.Depsgraph) -> tuple[Collider, Floats]:
-        matrix, shape = self.carrier.moved(depsgraph), self.carrier.shape
+        matrix, shape = _solid(self.carrier.moved(depsgraph), self.name), self.carrier.shape
         if shape is None:
             self.swelling, self._shape = 0.0, None
             return self.distance, matrix
@@ -192,7 +193,18 @@ class ShapePart:
         return self.carrier.body.handle.uid
 
     def now(self, depsgraph: bpy.types.Depsgraph) -> tuple[Collider, Floats]:
-        return self.shape, self.carrier.moved(depsgraph) @ self.base
+        return self.shape, _solid(self.carrier.moved(depsgraph), self.name) @ self.base
+
+
+def _solid(matrix: Floats, name: str) -> Floats:
+    """It, if nothing is scaled to nothing.
+
+    Raises:
+        HairloomError: it is.
+    """
+    if not is_solid_scale(matrix):
+        raise HairloomError("its scale is zero", place=name, remedy="Correct its scale")
+    return matrix
 
 
 def is_solid_scale(matrix: Floats) -> Bools:

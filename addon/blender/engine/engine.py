@@ -93,7 +93,7 @@ class HAIRLOOM_RE_engine(bpy.types.RenderEngine):
                 traceback.print_exc()
             self.failure = f"Hairloom cannot draw here: {error}"
             print(self.failure)
-            self.update_stats("Hairloom cannot draw here", str(error).splitlines()[0])
+            self.update_stats("Hairloom cannot draw here", self.failure.splitlines()[0])
             return None
 
 

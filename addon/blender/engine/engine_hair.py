@@ -37,8 +37,10 @@ from ..cards.edits import groom_edits, same_edits
 from ..cards.occluders import Occluders, read_occluders
 from ..cards.show import as_shown
 from ..cards.textures import chosen_pictures
+from ..colliders.ties import holders_of
 from ..properties.groom_settings import GroomSettings
 from ..scene.painted_colors import read_colors
+from ..scene.partings import partings_of
 from ..sessions.groom_source import GroomSource
 from ..sessions.prepared_groom import prepared, rig_of
 from ..sessions.snapshots import snapshot_of, with_all_strands, with_settings
@@ -216,8 +218,9 @@ def state_of(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> tuple[An
 
 
 def uids_of(hair: bpy.types.Object) -> set[int]:
-    """Session numbers of hair and head, and of their data."""
-    objects = [owner_of(hair), head_of(owner_of(hair))]
+    """Session numbers of all objects that a groom is made from, and of their data."""
+    owner = owner_of(hair)
+    objects = [owner, head_of(owner), *partings_of(owner), *holders_of(owner)]
     return {each.session_uid for obj in objects if obj is not None for each in (obj, obj.data)}
 
 
@@ -255,7 +258,7 @@ def _shows_bake(hair: bpy.types.Object, cache: Cache, frame: int) -> bool:
 def _of_bake(
     owner: bpy.types.Object, baked: BakedRig, settings: GroomSettings, *, blocking: bool
 ) -> _Made:
-    made_from = baked.rig.strands.points, settings[AmbientSettings]
+    made_from = baked, settings[AmbientSettings]
     return _made(owner, made_from, settings, lambda: baked.rig, is_baked=True, blocking=blocking)
 
 
@@ -277,6 +280,8 @@ def _of_curves(
         None if source.head is None else source.head.positions,
         source.density,
         source.masks,
+        source.partings,
+        source.holders,
         settings.of_rig,
         settings[AmbientSettings],
     )

@@ -152,6 +152,8 @@ class Still:
         if DATA & wanted.keys():
             self._add_data(wanted, frame, scene, camera)
         for moment in moments:
+            if self._engine.test_break():
+                break
             if len(moments) > 1:
                 self._go_to(frame + moment.time)
                 scene, camera = self._moment()

@@ -146,18 +146,21 @@ class Bake:
             raise HairloomError(
                 "there is nothing to bake", place=scene.name, remedy="Select hair curves or cloth"
             )
-        parts = []
+        parts: list[_Part] = []
         for obj, name in zip(objects, folder_names(objects), strict=True):
             if obj.type == "CURVES":
                 check_density(obj, bpy.context.evaluated_depsgraph_get())
-            if folder is not None:
-                obj.hairloom.bake.folder = str(folder / name if len(objects) > 1 else folder)
             own = frames_of(obj, scene) if frames is None else frames
-            chosen = choose_folder(obj)
             if folder is None:
+                chosen = choose_folder(obj)
                 check_owner(obj, chosen)
+            else:
+                chosen = folder / name if len(objects) > 1 else folder
             check_bake_folder(chosen)
             parts.append(_Part(Handle.of(obj), own, chosen))
+        if folder is not None:
+            for obj, part in zip(objects, parts, strict=True):
+                obj.hairloom.bake.folder = str(part.folder)
         return cls(parts)
 
     @property
@@ -191,7 +194,7 @@ class Bake:
         scene = bpy.context.scene
         shown, subframe = scene.frame_current, scene.frame_subframe
         try:
-            with suspended():
+            with suspended(), playback.without_fins(self.objects()):
                 yield from self._frames(scene)
                 for part in self.parts:
                     part.finish(frame_rate(scene))

@@ -13,6 +13,7 @@ from ..base import suspension
 from ..base.latest_job import unwatch_all
 from ..cards.made_objects import remember_names, remember_numbers
 from ..properties import changed, library_overrides
+from ..scene import mesh_materials
 from ..viewport import views
 from . import previews as registry
 from . import scene_events
@@ -22,6 +23,7 @@ from .previews import previews
 @persistent
 def on_load_pre(*_: Any) -> None:
     registry.forget_all()
+    mesh_materials.forget()
     unwatch_all()  # Blender drops the timer itself
 
 
@@ -70,9 +72,9 @@ def on_frame_change(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> 
 @persistent
 def on_frame_change_begin(scene: bpy.types.Scene, *_: Any) -> None:
     """Runs in renders too, there in the render's thread: only what is baked is written."""
+    playback.show_fins(scene)  # hair that is baked or exported collides with them
     if suspension.is_suspended():
         return
-    playback.show_fins(scene)
     if playback.needs_copies():
         playback.show_in_copies(scene)
 

@@ -181,7 +181,8 @@ def undone() -> None:
         preview.session.is_stale = preview.cards_are_stale = True
     if previews:
         _read_again_soon()
-        bpy.app.timers.register(follow_undo, first_interval=0.0)
+        if not bpy.app.timers.is_registered(follow_undo):
+            bpy.app.timers.register(follow_undo, first_interval=0.0)
 
 
 def follow_undo() -> None:

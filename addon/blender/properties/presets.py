@@ -18,6 +18,7 @@ import bpy
 
 from ...errors import HairloomError
 from ...exchange.files.atomic import write_text_atomic
+from ...exchange.files.names import as_compared
 from ...parameters import ALL_SETTINGS
 from ...params import Settings
 from ...params.preset import Preset, preset_as_dict, read_any_preset
@@ -32,7 +33,7 @@ _LONGEST = 1_000_000
 _LONGEST_TITLE = 40
 #: section of a preset -> those that it keeps as well: cards are little without their atlas
 _TOGETHER = {"cards": ("atlas", "card_texture")}
-#: the package that Blender knows, two above this one
+#: the package that Blender knows: what stands before `.addon`
 _EXTENSION = __package__.rpartition(".addon")[0]
 
 
@@ -158,8 +159,7 @@ def save_own(title: str, settings: Settings, *also: Settings) -> Path:
 
 def replaced_preset(title: str, section: str) -> bool:
     """Whether the artist has a preset of this title, which saving another one would replace."""
-    wanted = " ".join(title.split())[:_LONGEST_TITLE].casefold()
-    return any(entry.title.casefold() == wanted for entry in own(section)[0])
+    return _of_title(" ".join(title.split())[:_LONGEST_TITLE], section) is not None
 
 
 def free_title(title: str, section: str) -> str:
@@ -252,10 +252,15 @@ def _read(path: Path, _changed: int, size: int) -> Preset[Any]:
 
 def _file_for(stem: str, title: str, section: str) -> Path:
     """The file of this title, else a new one whose name no other has."""
-    entries, _ = own(section)
-    for entry in entries:
-        if entry.title == title:
-            return entry.path
-    taken = {path.stem for path in _own_files()}
+    known = _of_title(title, section)
+    if known is not None:
+        return known.path
+    taken = {as_compared(path.stem) for path in _own_files()}
     names = [stem, *(f"{stem}_{number}" for number in range(2, len(taken) + 3))]
     return own_folder() / f"{next(name for name in names if name not in taken)}.json"
+
+
+def _of_title(title: str, section: str) -> Entry | None:
+    """The artist's own preset of a title, in capitals or not."""
+    entries, _ = own(section)
+    return next((each for each in entries if as_compared(each.title) == as_compared(title)), None)

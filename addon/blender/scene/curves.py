@@ -22,6 +22,13 @@ GROUP_ATTRIBUTES = ("groom_group_id", "group")
 COLOR_ATTRIBUTE = "color"
 #: The attribute of curves that says what the noise of a strand depends on, see `StrandSet.seed`.
 SEED_ATTRIBUTE = "strand_seed"
+#: What `read_curves` takes beside places and groups, and how many numbers a value has.
+VALUE_ATTRIBUTES = (
+    ("radius", 1),
+    ("surface_uv_coordinate", 2),
+    (SEED_ATTRIBUTE, 1),
+    (COLOR_ATTRIBUTE, 4),
+)
 _REMEDIES = {
     "CURVE": "Convert them: Object > Convert > Curves (hair)",
     "MESH": "Select hair curves; particle hair converts by Object > Convert > Curves (hair)",

@@ -13,6 +13,7 @@ from mathutils import Matrix
 
 from ...errors import HairloomError
 from ...strands import Surface
+from ..base.parts import new_blocks_removed, taken_back
 from .surfaces import read_surface, uv_map_note
 
 _IMPORTERS: dict[str, Callable[[str], Any]] = {
@@ -26,8 +27,6 @@ _IMPORTERS: dict[str, Callable[[str], Any]] = {
     ".usdc": lambda path: bpy.ops.wm.usd_import(filepath=path),
     ".usda": lambda path: bpy.ops.wm.usd_import(filepath=path),
 }
-
-_PURGED = ("objects", "meshes", "materials", "images", "collections", "cameras", "lights")
 
 
 def read_mesh_file(path: Path, *, need_uv: bool) -> tuple[Surface, tuple[str, ...]]:
@@ -52,11 +51,8 @@ def meshes_of_file(path: Path) -> Iterator[list[bpy.types.Object]]:
     Raises:
         HairloomError: no such file, or a format that Blender does not read.
     """
-    before = _data_blocks()
-    try:
+    with new_blocks_removed():
         yield _imported(path)
-    finally:
-        bpy.data.batch_remove(_data_blocks() - before)
 
 
 def import_mesh_file(path: Path, scale: float = 1.0) -> tuple[bpy.types.Object, tuple[str, ...]]:
@@ -110,15 +106,19 @@ def _imported(path: Path) -> list[bpy.types.Object]:
         )
     if not path.is_file():
         raise HairloomError("there is no such file", place=str(path), remedy="Check the path")
-    before = _data_blocks()
-    try:
-        importer(str(path))
-    except RuntimeError as error:
-        raise _unreadable(path, str(error).strip()) from error
-    meshes = [block for block in _data_blocks() - before if _is_mesh_object(block)]
-    if not meshes:
-        raise _unreadable(path, "it holds no mesh")
-    return sorted(meshes, key=lambda block: str(block.name))
+    before = {obj.session_uid for obj in bpy.data.objects}
+    with taken_back() as added:
+        try:
+            importer(str(path))
+        except RuntimeError as error:
+            raise _unreadable(path, str(error).strip()) from error
+        finally:
+            added()
+        new = [obj for obj in bpy.data.objects if obj.session_uid not in before]
+        meshes = [obj for obj in new if obj.type == "MESH"]
+        if not meshes:
+            raise _unreadable(path, "it holds no mesh")
+    return sorted(meshes, key=lambda obj: obj.name)
 
 
 def merged(parts: list[Surface]) -> Surface:
@@ -130,14 +130,6 @@ def merged(parts: list[Surface]) -> Surface:
         np.concatenate([p.triangles + start for p, start in zip(parts, starts, strict=True)]),
         np.concatenate([p.corner_uv for p in parts if p.corner_uv is not None]) if has_uv else None,
     )
-
-
-def _data_blocks() -> set[bpy.types.ID]:
-    return {block for name in _PURGED for block in getattr(bpy.data, name)}
-
-
-def _is_mesh_object(block: bpy.types.ID) -> bool:
-    return isinstance(block, bpy.types.Object) and block.type == "MESH"
 
 
 def _unreadable(path: Path, why: str) -> HairloomError:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from pathlib import Path
 
 import bpy
 
@@ -23,8 +24,10 @@ _GREY: Color = (0.8, 0.8, 0.8)
 _SPECULAR = 0.04
 _ROUGHNESS = 0.5
 
-#: pictures by image and channel, kept until the image changes
+#: pictures by image and channel, the youngest last, kept until the image changes
 _pictures: dict[tuple[int, str], tuple[tuple[object, ...], Floats]] = {}
+#: how many are kept, 16 MB each for images of 1,024 pixels
+_KEPT = 16
 
 
 @dataclass(frozen=True)
@@ -145,9 +148,10 @@ class _Reader:
         if image is None:
             return None
         kind = ("color" if self.uses_alpha else "opaque") if is_color else "normal"
-        state = (*image.size, image.filepath, image.colorspace_settings.name, image.alpha_mode)
-        known = _pictures.get((image.session_uid, kind))
+        key, state = (image.session_uid, kind), _state(image)
+        known = _pictures.pop(key, None)
         if known is not None and known[0] == state and not image.is_dirty:
+            _pictures[key] = known  # now the youngest
             return known[1]
         try:
             picture = read_image(image, is_color=is_color, place=f"Image '{image.name}'")
@@ -156,8 +160,9 @@ class _Reader:
             return None
         if kind == "opaque":
             picture[..., 3] = 1.0
-        state = (*image.size, image.filepath, image.colorspace_settings.name, image.alpha_mode)
-        _pictures[image.session_uid, kind] = state, picture
+        _pictures[key] = _state(image), picture
+        for oldest in list(_pictures)[:-_KEPT]:
+            del _pictures[oldest]
         return picture
 
     def _leave_out(self, what: str, known: str) -> None:
@@ -165,6 +170,19 @@ class _Reader:
             f"{self._name}: {what} comes from nodes that are not read; its own value was taken. "
             f"Read are values, and {known}."
         )
+
+
+def forget() -> None:
+    """Keep no picture."""
+    _pictures.clear()
+
+
+def _state(image: bpy.types.Image) -> tuple[object, ...]:
+    """What is another one where the pixels are others: among it when the file was written."""
+    file = Path(bpy.path.abspath(image.filepath, library=image.library))
+    written = file.stat().st_mtime_ns if image.packed_file is None and file.is_file() else None
+    settings = image.colorspace_settings.name, image.alpha_mode
+    return (*image.size, image.filepath, written, *settings)
 
 
 def _shader(material: bpy.types.Material) -> bpy.types.Node | None:

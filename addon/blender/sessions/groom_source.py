@@ -282,7 +282,7 @@ class GroomSource:
     def accept(self, request: BuildRequest) -> None:
         """Its hair is shown from now on; what acts at once is as it is set now."""
         self.source, self._holding = request.source, request.holding
-        self._brushed = None
+        self._brushed = self._shown_map = None
         self._combed = self.source.strands
         self.painted = self.source.density, self.source.masks
         self.settings = GroomSettings.of(self.hair.found()).at_once(request.settings)

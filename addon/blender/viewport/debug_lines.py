@@ -146,6 +146,8 @@ def shape_lines(collider: Collider) -> Floats:
         return _capsule(collider)
     assert isinstance(collider, DistanceField)
     inside = np.argwhere(collider.values < 0.0)
+    if not len(inside):  # a mesh that is thinner than a cell
+        return np.empty((0, 3), np.float32)
     low, high = (collider.low + collider.cell * end(inside, axis=0) for end in (np.min, np.max))
     return _box(low, high)
 
