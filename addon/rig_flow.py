@@ -585,7 +585,7 @@ def strand_ranks(rig: Rig) -> Floats:
     """Where each strand stands in an even order, (strand_count,) in 0 to 1: the strands of low
     rank alone are the same hair, only sparser.
 
-    The artist's own strands and children each keep their share. Children come in the order in
+    The artist's own strands and children each keep their fraction. Children come in the order in
     which they were grown, which is such an order: one more of them changes no other's rank by much.
     """
     count = rig.strands.strand_count

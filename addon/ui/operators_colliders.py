@@ -53,12 +53,12 @@ class HAIRLOOM_OT_fit_spheres(LongWork, bpy.types.Operator):
 
     def _tell(self, mesh: bpy.types.Object, fitted: FittedSpheres) -> None:
         error, count = fitted.fit.error, len(fitted.fit.radii)
-        if fitted.hanging and mesh.modifiers:
+        if fitted.unskinned and mesh.modifiers:
             report(
                 self,
                 "WARNING",
-                f"{fitted.hanging} of {count} spheres follow {mesh.name} as an object but not its "
-                "shape: apply the modifiers that copy vertices, and fit again",
+                f"{fitted.unskinned} of {count} spheres follow {mesh.name} as an object but not "
+                "its shape: apply the modifiers that copy vertices, and fit again",
             )
         report(
             self,

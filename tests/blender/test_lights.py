@@ -106,7 +106,10 @@ def test_parents_carry_and_scale_a_panel():
 @pytest.mark.parametrize("kind", ["POINT", "SUN", "SPOT", "AREA"])
 def test_scales_of_nought_and_mirrored_ones_are_read(kind, scale):
     add(kind, energy=10.0).scale = scale
-    for light in lights():
+    found = lights()
+    # an area light of no width and a lamp without a direction shine on nothing
+    assert len(found) == 1 or kind != "POINT"
+    for light in found:
         irradiance = light_irradiance(light, np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 1.0]]))
         assert np.isfinite(irradiance).all()
     if min(np.abs(scale)) > 0.0:

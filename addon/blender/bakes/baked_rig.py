@@ -186,12 +186,10 @@ def _holds_of(arrays: Arrays, strands: StrandSet) -> Holds | None:
         arrays.get("tip_triangle"),
         arrays.get("tip_barycentric"),
     )
-    _check_indices(holds.strand, strands.strand_count)
-    if (holds.place < 0.0).any() or (holds.place >= strands.point_counts[holds.strand]).any():
-        raise ValueError("a strand is held beyond its tip")
-    _check_indices(holds.anchor, holds.anchor_count)
     if not len(holds.strand) == len(holds.place) == len(holds.anchor):
         raise ValueError("holds do not fit together")
+    _check_indices(holds.strand, strands.strand_count)
+    _check_indices(holds.anchor, holds.anchor_count)
     last = strands.point_counts[holds.strand] - 1
     if not ((holds.place >= 0.0) & (holds.place <= last)).all():
         raise ValueError("a hold is at no point of its strand")

@@ -41,11 +41,11 @@ _COPYING = frozenset(("MIRROR", "ARRAY", "SCREW", "SKIN", "REMESH", "BOOLEAN", "
 
 @dataclass(frozen=True)
 class FittedSpheres:
-    """What was created. hanging: number of spheres that follow the object only, not its shape."""
+    """What was created. unskinned: how many spheres follow the object only, not its shape."""
 
     collection: bpy.types.Collection
     fit: SphereFit
-    hanging: int
+    unskinned: int
 
 
 def fit_spheres_to(
@@ -71,8 +71,8 @@ def fit_spheres_to(
         empty[MARK] = True
         collection.objects.link(empty)
         empties.append(empty)
-    hanging = _hang(empties, fit, mesh, carrying, context)
-    return FittedSpheres(collection, fit, hanging)
+    unskinned = _parent_to(empties, fit, mesh, carrying, context)
+    return FittedSpheres(collection, fit, unskinned)
 
 
 def fitted_collections(mesh: bpy.types.Object) -> list[bpy.types.Collection]:
@@ -134,7 +134,7 @@ def _vertices_now(mesh: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Flo
     return positions[:count]  # subdivision keeps them first
 
 
-def _hang(
+def _parent_to(
     empties: list[bpy.types.Object],
     fit: SphereFit,
     mesh: bpy.types.Object,
@@ -142,12 +142,12 @@ def _hang(
     context: bpy.types.Context,
 ) -> int:
     """Parent the spheres and place them; returns how many are parented to the object only."""
-    hanging = 0
+    unskinned = 0
     for empty, center, radius in zip(empties, fit.centers, fit.radii, strict=True):
         carriers = None if vertices is None else _carriers(vertices, center, radius)
         empty.parent = mesh
         if carriers is None:
-            hanging += 1
+            unskinned += 1
         else:
             empty.parent_type, empty.parent_vertices = "VERTEX_3", carriers.tolist()
     context.view_layer.update()  # Blender works out the frame of each sphere's parent
@@ -155,7 +155,7 @@ def _hang(
         empty.matrix_parent_inverse = empty.matrix_world.inverted_safe()
         empty.matrix_basis = Matrix.Translation([float(value) for value in center])
     context.view_layer.update()
-    return hanging
+    return unskinned
 
 
 def _carriers(vertices: Floats, center: Floats, radius: float) -> Ints | None:
@@ -169,6 +169,6 @@ def _carriers(vertices: Floats, center: Floats, radius: float) -> Ints | None:
     offset = vertices[near] - vertices[first]
     second = near[np.linalg.norm(offset, axis=1).argmax()]
     area = np.linalg.norm(np.cross(offset, vertices[second] - vertices[first]), axis=1)
-    if not len(near) or area.max() <= 1.0e-6 * float(distance.max()) ** 2:
+    if area.max() <= 1.0e-6 * float(distance.max()) ** 2:
         return None
     return np.array([first, second, near[area.argmax()]])

@@ -181,11 +181,10 @@ def permutation() -> Ints:
     window, edges = 24, [tuple(edge) for edge in GRADIENTS.astype(int).tolist()]
     starts = {tuple((seen * 2)[at : at + window]): at for at in range(256)}
     ahead = np.array([starts[tuple(_gradient(0, y, z) for z in range(window))] for y in range(256)])
-    known = [_gradient(0, 0, z) for z in range(256)]
     for begin in range(256):  # p[0]
         first = (begin - ahead[-begin % 256]) % 256  # p[p[0]]
         found = (np.roll(ahead, begin) + first) % 256
-        if [edges[found[(first + z) % 256] & 15] for z in range(256)] == known:
+        if [edges[found[(first + z) % 256] & 15] for z in range(256)] == seen:
             return found
     raise AssertionError("Blender's noise is not Perlin's")
 

@@ -17,7 +17,7 @@ What we do otherwise:
         hair as thick as a groom's strands make it, that is nearly half of the light. Skin farther
         away lights hair too, see off_far_skin.
 
-Colours are absorption, so that a strand's own colour may differ from root to tip: see shares().
+Colours are absorption, so that a strand's own colour may differ from root to tip: see `fractions`.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ from ..skin_seen import SkinSeen, far_light, plane_beneath, through_hair
 
 #: strands that are taken to lie behind a place where nothing is known of it
 UNKNOWN_BEYOND = 4.0
-#: Texels of the table of shares: cos theta_d from 0 to 1, and absorption from 0 to infinity.
+#: Texels of the table of fractions: cos theta_d from 0 to 1, and absorption from 0 to infinity.
 FRACTIONS_SIZE = 32
 #: Absorption in the middle of that axis.
 MIDPOINT = 0.5
@@ -73,7 +73,7 @@ def fractions(tables: MarschnerTables, size: int = FRACTIONS_SIZE) -> Fractions:
     """From the lobes around the fibre, for all absorptions.
 
     Light that comes from anywhere in half a circle, and leaves by phi, goes on into the other half
-    with the share |phi| / pi (Zinke et al. 2008, equation 6, for azimuths).
+    with the fraction |phi| / pi (Zinke et al. 2008, equation 6, for azimuths).
     """
     rows = np.linspace(0, len(tables.azimuthal) - 1, 2 * size).round().astype(int)
     columns = np.linspace(0, len(tables.azimuthal) - 1, size).round().astype(int)
@@ -227,7 +227,7 @@ def dual_scattering(
 
     Args:
         single: S of the strand alone, (..., 3).
-        forward, backward: shares at this theta_d by colour and lobe, (..., 3, 4).
+        forward, backward: fractions at this theta_d by colour and lobe, (..., 3, 4).
         tau: strands between the place and the light, on average, (...).
         beyond: strands behind the place, seen from the light, (...).
         density: d_f and d_b of the paper.
@@ -272,7 +272,7 @@ def off_the_skin(
     what lights it from behind to an eye on the light's side, and a_b to one on the other.
 
     Args:
-        forward, backward: shares at this theta_d by colour and lobe, (..., 3, 4).
+        forward, backward: fractions at this theta_d by colour and lobe, (..., 3, 4).
         tau: strands between the place and the light, on average, (...).
         beyond: strands behind the place, seen from the light, (...).
         facing: cosine between the light and the skin's normal, above 0 where it is lit, (...).
@@ -306,7 +306,7 @@ def off_far_skin(
 
     Args:
         outward: cosine between the eye and the normal of the hair's volume, (...).
-        forward, backward: shares at this theta_d by colour and lobe, (..., 3, 4).
+        forward, backward: fractions at this theta_d by colour and lobe, (..., 3, 4).
     """
     a_f, a_b = forward.sum(axis=-1), backward.sum(axis=-1)
     taken = np.sqrt(np.maximum((1.0 - a_f) ** 2 - a_b**2, 0.0))
