@@ -43,7 +43,7 @@ class CardTracks:
     levels: at rest [m], the finest first.
     moved: (vertex_count, frame_count, 3) float32 [m] of each level.
     carrier: (frame_count, 4, 4) rigid, from that space to the world.
-    hair_length: mean length of the guides [m], of which errors are shares.
+    hair_length: median length of the guides [m], of which errors are fractions.
     root: (3,) middle of the roots at rest [m].
     first: number of the first frame. frame_rate: [1/s].
     """

@@ -22,6 +22,7 @@ from tiers import few_in_commits
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.exchange.cards.card_formats import FORMATS
 from hairloom.addon.exchange.textures.card_textures import FORMATS as TEXTURE_FORMATS
+from hairloom.addon.exchange.textures.card_textures import WrittenTexture
 from hairloom.addon.exchange.textures.texture_packing import PRESETS
 from hairloom.addon.shading.card_look import plain_albedo
 from hairloom.addon.shading.marschner.look import fibre_of
@@ -35,7 +36,11 @@ pytest.importorskip("jsonschema", reason="it is missing: `make setup` installs i
 from card_exports import BAKED, cards, grown, sidecar_of  # noqa: E402
 
 from hairloom.addon.blender.cards import files  # noqa: E402
-from hairloom.addon.blender.cards.textures import TABLE_SIZE  # noqa: E402
+from hairloom.addon.blender.cards.textures import (  # noqa: E402
+    TABLE_SIZE,
+    texture_channels,
+    texture_roles,
+)
 from hairloom.addon.ui.operators_card_export import HAIRLOOM_OT_export_cards  # noqa: E402
 
 pytestmark = pytest.mark.usefixtures("extension")
@@ -333,6 +338,19 @@ def test_files_of_an_artist_are_kept_and_own_ones_replaced(tmp_path: Path, capfd
 
 
 @pytest.mark.slow(instead="test_files_of_an_artist_are_kept_and_own_ones_replaced")
+def test_meshes_that_would_have_one_sidecar_are_not_written_into_one_folder(
+    tmp_path: Path, capfd: Any
+) -> None:
+    (tmp_path / "hair.fbx").touch()
+    (tmp_path / "hair.hairloom.json").write_text('{"hairloom_sidecar": 1, "file": "hair.fbx"}')
+    (tmp_path / "Brows.glb").touch()
+    for name, other in (("hair.glb", "hair.fbx"), ("brows.glb", "Brows.glb")):
+        assert cards(tmp_path / name, *BAKED, "--levels", "1") == 1
+        assert f"{other} is in this folder" in capfd.readouterr().err
+        assert not (tmp_path / name).exists()
+    assert len(list(tmp_path.iterdir())) == 3
+
+
 def test_a_picture_is_not_replaced_by_what_is_made_of_it(tmp_path: Path, capfd: Any) -> None:
     assert cards(tmp_path / "hair.glb", "--levels", "1") == 0
     base = tmp_path / "hair_base.png"
@@ -451,3 +469,12 @@ def test_a_collection_without_hair_is_told(sphere: Any, tmp_path: Path) -> None:
         with pytest.raises(RuntimeError, match=f"Collection '{name}': there is no hair to write"):
             bpy.ops.hairloom.export_cards(filepath=str(tmp_path / "a.glb"), collection=name)
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(("suffix", "space"), [(".png", "sRGB"), (".exr", "linear")])
+def test_a_sidecar_says_how_colours_are_stored(suffix: str, space: str) -> None:
+    color, alpha = PRESETS["hairloom"][:2]
+    written = [WrittenTexture(Path(f"hair{each.suffix}{suffix}"), each) for each in (color, alpha)]
+    assert [each["color_space"] for each in texture_channels(written).values()] == [space, "linear"]
+    named = texture_roles(written, ["color", "alpha"])
+    assert named["color"].get("color_space", "sRGB") == space

@@ -28,9 +28,10 @@ from ...exchange.cards.glb_file import GlbFile
 from ...exchange.cards.glb_plain import screen_coverage, with_levels, with_material
 from ...exchange.cards.glb_springs import HeadBone
 from ...exchange.cards.index_buffer import index_buffer
-from ...exchange.cards.sidecar import SUFFIX, CardFile, files_of_earlier, sidecar_text
+from ...exchange.cards.sidecar import SUFFIX, CardFile, files_of_earlier, other_owner, sidecar_text
 from ...exchange.files.atomic import check_place
 from ...exchange.files.file_set import kept_aside, written_together
+from ...exchange.files.names import alike_beside
 from ...exchange.textures.card_textures import WrittenTexture, of_one_size
 from ...exchange.textures.texture_packing import packed
 from ...exchange.usd.usd_levels import with_level_variants
@@ -182,10 +183,26 @@ def check_output(path: Path, output: CardOutput, motion: GuideMotion | None) -> 
     """
     path, file_format = format_of(path, output.format)
     check_place(path)
+    _check_neighbours(path)
     check_exporter(file_format, str(path))
     check_page(output.settings, file_format, str(path))
     if motion is not None:
         check_motion(output.settings, motion, file_format)
+
+
+def _check_neighbours(path: Path) -> None:
+    """Refuse names that would make one file of two: of sidecars, or on systems that ignore case.
+
+    Raises:
+        HairloomError: naming the other file.
+    """
+    other = other_owner(path) or alike_beside(path)
+    if other:
+        raise HairloomError(
+            f"{other} is in this folder, and files beside both would have the same names",
+            place=str(path),
+            remedy="Export under another name, or into another folder",
+        )
 
 
 def check_no_input(path: Path, pictures: Iterable[Path]) -> None:

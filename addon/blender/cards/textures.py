@@ -111,6 +111,7 @@ def texture_roles(
                 "file": texture.path.name,
                 "channels": "".join(mine),
                 **({"inverted": "".join(turned)} if turned else {}),
+                **({"color_space": "linear"} if texture.color_space == "linear" else {}),
             }
     return roles
 
@@ -119,7 +120,7 @@ def texture_channels(written: Iterable[WrittenTexture]) -> dict[str, dict[str, A
     """Each file -> what its channels hold."""
     return {
         texture.path.name: {
-            "color_space": texture.layout.color_space,
+            "color_space": texture.color_space,
             "channels": texture.layout.roles,
         }
         for texture in written

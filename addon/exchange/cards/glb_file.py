@@ -113,8 +113,10 @@ class GlbFile:
         return len(entries) - 1
 
     def node(self, name: str) -> int:
-        """The number of the node of this name."""
+        """The number of the mesh's node of this name, which a bone may have too."""
         (number,) = (
-            number for number, node in enumerate(self.content["nodes"]) if node["name"] == name
+            number
+            for number, node in enumerate(self.content["nodes"])
+            if "mesh" in node and node["name"] == name
         )
         return number

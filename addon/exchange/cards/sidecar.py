@@ -134,14 +134,32 @@ def files_of_earlier(path: Path) -> set[str]:
 
     path: of the mesh. Without a sidecar of ours there is none.
     """
-    sidecar = path.with_name(path.stem + SUFFIX)
-    try:
-        content = json.loads(sidecar.read_text(encoding="utf-8"))
-        is_ours = content["file"] == path.name and "hairloom_sidecar" in content
-    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+    owner, texts = _read(path)
+    if owner != path.name:
         return set()
     of_formats = {f"{path.stem}{suffix}" for suffix in (".mtl", ".bin")}
-    return {sidecar.name, *of_formats, *_texts(content)} if is_ours else set()
+    return {path.stem + SUFFIX, *of_formats, *texts}
+
+
+def other_owner(path: Path) -> str:
+    """The name of another mesh that lies beside this one and has the sidecar that this one would
+    have; "" where there is none.
+
+    path: of the mesh.
+    """
+    owner, _ = _read(path)
+    return owner if owner != path.name and (path.parent / owner).is_file() else ""
+
+
+def _read(path: Path) -> tuple[str, set[str]]:
+    """Which mesh the sidecar of this name is of, and all texts in it; nothing where it is none of
+    ours."""
+    try:
+        content = json.loads(path.with_name(path.stem + SUFFIX).read_text(encoding="utf-8"))
+        owner = str(content["file"]) if "hairloom_sidecar" in content else ""
+        return Path(owner).name, set(_texts(content))
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+        return "", set()
 
 
 def _texts(content: object) -> Iterator[str]:
@@ -246,7 +264,7 @@ def _textures(cards: CardFile) -> dict[str, Any]:
     for role, where in cards.textures.items():
         space, meaning = texts.ROLES[role]
         gain = {"gain": cards.base_gain} if role == "base" else {}
-        roles[role] = {**where, "color_space": space, **gain, "meaning": meaning}
+        roles[role] = {"color_space": space, **where, **gain, "meaning": meaning}
     compensation = (
         {
             "view_compensated_alpha": {

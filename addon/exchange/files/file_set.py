@@ -141,8 +141,8 @@ def _restore(file: Path, target: Path, backup: Path) -> None:
     """The old file again, or none where there was none; the new one is staged again."""
     if not file.exists():
         move(target, file)
-    if backup.exists():
-        move(backup, target)
+    if backup.exists() and not (target.exists() and os.path.samefile(backup, target)):
+        move(backup, target)  # unless it was never replaced: who holds it has been waited for
 
 
 def _kept(staging: Path, path: Path, error: PermissionError) -> HairloomError:

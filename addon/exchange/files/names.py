@@ -92,6 +92,20 @@ def _free(name: str, taken: Container[str]) -> str:
     return next(each for each in choices if as_compared(each) not in taken)
 
 
+def alike_beside(path: Path) -> str:
+    """The name of another file in the folder that is one with this on systems which ignore case;
+    "" where there is none."""
+    wanted = as_compared(path.name)
+    there = sorted(path.parent.iterdir()) if path.parent.is_dir() else []
+    alike = (each for each in there if each.name != path.name and as_compared(each.name) == wanted)
+    # where the system itself ignores case, the other name is this file's
+    return next((each.name for each in alike if not _is_one(each, path)), "")
+
+
+def _is_one(path: Path, other: Path) -> bool:
+    return other.exists() and os.path.samefile(path, other)
+
+
 def as_compared(name: str) -> str:
     """The same for names that are one to any system: Windows and macOS ignore case."""
     return unicodedata.normalize("NFC", name).casefold()

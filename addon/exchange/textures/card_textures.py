@@ -27,6 +27,11 @@ class WrittenTexture:
     path: Path
     layout: TextureLayout
 
+    @property
+    def color_space(self) -> str:
+        """How programs are to read it: colours of half floats are not by the sRGB curve."""
+        return "linear" if self.path.suffix == FORMATS["exr"] else self.layout.color_space
+
 
 def write_card_textures(
     asset: Path,

@@ -208,3 +208,26 @@ def test_a_file_that_another_program_holds_keeps_all_and_the_new_ones(
     assert contents(tmp_path / "hair new") == dict.fromkeys(sorted(FILES), "new")
     shutil.rmtree(tmp_path / "hair new")
     assert contents(tmp_path) == dict.fromkeys(sorted(FILES), "old")
+
+
+def test_who_holds_a_file_is_waited_for_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Windows does not replace an open file; what was never replaced need not be put back."""
+    write(tmp_path, "old")
+    moved: list[str] = []
+
+    def held(source: Path, target: Path) -> None:
+        moved.append(target.name)
+        if target == tmp_path / FILES[1]:
+            raise PermissionError(errno.EACCES, "held", str(target))
+        os.replace(source, target)
+
+    monkeypatch.setattr(file_set, "move", held)
+    with (
+        pytest.raises(HairloomError, match="all are as they were"),
+        written_together(tmp_path / "hair.glb") as folder,
+    ):
+        write(folder, "new")
+    assert moved.count(FILES[1]) == 1
+    assert {(tmp_path / name).read_text() for name in FILES} == {"old"}

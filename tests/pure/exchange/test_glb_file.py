@@ -43,9 +43,13 @@ def test_what_is_put_in_is_found() -> None:
     assert all(view["byteOffset"] % 4 == 0 for view in again.content["bufferViews"])
 
 
-def test_nodes_are_known_by_name() -> None:
+def test_nodes_of_meshes_are_known_by_name() -> None:
+    """Beside bones, which may have the same name or none."""
     file = GlbFile.of(EMPTY, "x")
-    numbers = [file.append("nodes", {"name": name}) for name in ("hair", "Ä")]
+    file.append("nodes", {"name": "hair"})
+    numbers = [file.append("nodes", {"name": name, "mesh": 0}) for name in ("hair", "Ä")]
+    file.append("nodes", {"name": "Ä"})
+    file.append("nodes", {})
     assert [GlbFile.of(file.data(), "x").node(name) for name in ("hair", "Ä")] == numbers
 
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
-from hairloom.addon.exchange.files.names import plain_name
+from hairloom.addon.exchange.files.names import alike_beside, plain_name
 
 
 @pytest.mark.parametrize(
@@ -23,3 +25,11 @@ from hairloom.addon.exchange.files.names import plain_name
 def test_names_are_identifiers(name: str, plain: str) -> None:
     assert plain_name(name) == plain
     assert plain_name(name).isidentifier()
+
+
+def test_a_name_that_differs_in_case_alone_is_found(tmp_path: Path) -> None:
+    (tmp_path / "Hair.glb").touch()
+    assert alike_beside(tmp_path / "Hair.glb") == "" == alike_beside(tmp_path / "hair.fbx")
+    assert alike_beside(tmp_path / "nowhere" / "hair.glb") == ""
+    if not (tmp_path / "hair.glb").exists():  # this system tells them apart
+        assert alike_beside(tmp_path / "hair.glb") == "Hair.glb"

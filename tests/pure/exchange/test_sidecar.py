@@ -14,7 +14,13 @@ from hairloom.addon.cards.atlas_grid import AtlasGrid
 from hairloom.addon.cards.card_mesh import CardMesh
 from hairloom.addon.exchange.cards.card_formats import FBX, FORMATS, GLB, USD
 from hairloom.addon.exchange.cards.index_buffer import index_buffer
-from hairloom.addon.exchange.cards.sidecar import CardFile, description, sidecar_text
+from hairloom.addon.exchange.cards.sidecar import (
+    CardFile,
+    description,
+    files_of_earlier,
+    other_owner,
+    sidecar_text,
+)
 
 jsonschema = pytest.importorskip("jsonschema", reason="it is missing: `make setup` installs it")
 
@@ -179,9 +185,29 @@ def test_textures_beside_are_named_with_how_they_are_read() -> None:
     assert content["tangent"]["inverted"] == "g"
     assert content["highlights_by"] == "tangent"
     assert read(card_file())["textures"] == {}
+    roles["base"] |= {"file": "hair_color.exr", "color_space": "linear"}
+    assert read(card_file(textures=roles))["textures"]["base"]["color_space"] == "linear"
+
+
+def test_a_sidecar_that_is_nested_deeply_is_none_of_ours(tmp_path: Path) -> None:
+    """Deep enough to be read, and too deep to be walked through."""
+    for depth in (400, 900, 100_000):
+        nested = (
+            '{"hairloom_sidecar": 1, "file": "hair.glb", "x": ' + "[" * depth + "]" * depth + "}"
+        )
+        (tmp_path / "hair.hairloom.json").write_text(nested)
+        files_of_earlier(tmp_path / "hair.glb")
 
 
 def test_lists_of_numbers_stand_in_one_line() -> None:
     text = sidecar_text(card_file(levels=(triangles(6),)))
     assert '"minimum": [0.0, 0.0, -2.0]' in text
     assert '"first": [0, 6, 12]' in text
+
+
+def test_a_sidecar_of_another_mesh_that_is_there_is_known(tmp_path: Path) -> None:
+    (tmp_path / "hair.v1.hairloom.json").write_text(sidecar_text(card_file()))
+    assert other_owner(tmp_path / "hair.v1.fbx") == ""  # the mesh is gone
+    (tmp_path / "hair.v1.glb").touch()
+    assert other_owner(tmp_path / "hair.v1.fbx") == "hair.v1.glb"
+    assert other_owner(tmp_path / "hair.v1.glb") == other_owner(tmp_path / "brows.glb") == ""
