@@ -127,17 +127,29 @@ class ReadMotion:
     positions: Floats
 
     def at_frames(self, rate: float) -> tuple[int, Floats]:
-        """The first whole frame, and the points at this and all that follow, (frames, point_count,
-        3); in between two times they go straight.
+        """The first whole frame, and the points at this and those that follow, MAX_FRAMES at most,
+        (frames, point_count, 3); in between two times they go straight.
 
         Args:
             rate: frames in a second; frame f is at f / rate seconds.
         """
-        first, last = round(self.times[0] * rate), round(self.times[-1] * rate)
-        number = np.arange(first, min(last, first + MAX_FRAMES) + 1)
+        first, count = self._range(rate)
+        number = first + np.arange(min(count, MAX_FRAMES))
         left, part = between(self.times, number / rate)
         near, far = self.positions[left], self.positions[left + 1]
         return first, np.asarray(near + (far - near) * part[:, None, None], np.float32)
+
+    def cut_note(self, rate: float) -> str:
+        """What is said of frames that `at_frames` leaves out; empty without any."""
+        _, count = self._range(rate)
+        if count <= MAX_FRAMES:
+            return ""
+        return f"its motion has {count:,} frames, and only the first {MAX_FRAMES:,} are read."
+
+    def _range(self, rate: float) -> tuple[int, int]:
+        """The first whole frame, and how many there are."""
+        first, last = round(self.times[0] * rate), round(self.times[-1] * rate)
+        return first, last - first + 1
 
 
 def between(times: Floats, wanted: Floats) -> tuple[Ints, Floats]:

@@ -118,7 +118,7 @@ def read_hair_file(path: Path, up: str = "Z", scale: float = 1.0) -> ReadHairFil
         notes = (f"{path.name}: its transparency is not kept.",)
     return ReadHairFile(
         groom,
-        0.0,
+        "",
         FileSpace(up),
         notes,
         file.info,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -39,15 +39,18 @@ def joined_grooms(grooms: Sequence[Groom], name: str) -> tuple[Groom, tuple[str,
         color=_all_or_none([each.color for each in strands]),
     )
     notes = (
-        *_lost(grooms, "root_uv", "root UVs", "a surface with UVs"),
-        *_lost(grooms, "color", "colours", "an attribute color"),
+        *_lost(grooms, lambda groom: groom.strands.root_uv, "root UVs", "a surface with UVs"),
+        *_lost(grooms, lambda groom: groom.color, "colours", "an attribute color"),
+        *_lost(grooms, lambda groom: groom.closest_guides, "closest guides", "guides"),
     )
     return Groom(together, name, group_names=names, **values), notes
 
 
-def _lost(grooms: Sequence[Groom], name: str, what: str, remedy: str) -> tuple[str, ...]:
-    """A note where some strands have this and others do not."""
-    without = [groom.name for groom in grooms if getattr(groom.strands, name) is None]
+def _lost(
+    grooms: Sequence[Groom], of: Callable[[Groom], Any], what: str, remedy: str
+) -> tuple[str, ...]:
+    """A note where some grooms have this and others do not."""
+    without = [groom.name for groom in grooms if of(groom) is None]
     if not 0 < len(without) < len(grooms):
         return ()
     return (

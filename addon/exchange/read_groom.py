@@ -20,13 +20,13 @@ class ReadGroom:
     """What a file held that can be used.
 
     groom: Z up, metres.
-    version: as the file says, such as 4.0; 0 where the format has none.
+    version: as the file says, such as "1.5"; "" where it says none.
     axes: how the file's axes were read, in metres.
     notes: what the file also holds, and the groom does not.
     """
 
     groom: Groom
-    version: float
+    version: str
     axes: FileSpace
     notes: tuple[str, ...]
 

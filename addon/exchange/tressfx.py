@@ -91,7 +91,7 @@ def read_tfx(path: Path, up: str = "Y", scale: float = 1.0) -> ReadTressfx:
     )
     return ReadTressfx(
         groom,
-        file.version,
+        f"{file.version:g}",
         FileSpace(up),
         _reading_notes(path.name, file, color),
         is_held,

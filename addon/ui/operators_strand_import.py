@@ -116,8 +116,9 @@ class HAIRLOOM_OT_import_strands(LongWork, ImportHelper, bpy.types.Operator):
         imported: list[bpy.types.Object] = []
         for each in found:
             if isinstance(each, FileStrands):
-                imported += add_to_scene(each, ground, context.collection)
-                tell(self, each.outcome)
+                hair, outcome = add_to_scene(each, ground, context.collection)
+                imported += hair
+                tell(self, outcome)
             elif each is found[-1] and not imported:
                 raise each  # nothing came in, so there is nothing to undo
             else:

@@ -525,6 +525,12 @@ def test_strands_of_a_scene_that_are_left_out_are_named_or_refused(
         ("cards --page-texture 512", "--page-texture", "no web page"),
         ("cards --no-page-head", "--page-head", "no web page"),
         ("render --head Head --skin dark", "--skin", "only the built-in head"),
+        ("cards --levels 9", "--levels", "cannot be used"),
+        (
+            "export --vertex-count 8 --format alembic",
+            "--vertex-count",
+            "no option of Groom Alembic",
+        ),
         ("bake --delete --frames 1 2", "--frames", "is deleted"),
     ],
 )
@@ -534,9 +540,8 @@ def test_options_that_mean_nothing_are_refused(
     """With the option that was given, and nothing is written."""
     verb, *more = arguments.split()
     output = {"export": "out.tfx", "render": "out.png", "sheet": "out.png", "cards": "out.glb"}
-    where = (
-        [] if "--delete" in more else ["--output", str(scene.with_name(output.get(verb, "out")))]
-    )
+    made = "out.abc" if "alembic" in more else output.get(verb, "out")
+    where = [] if "--delete" in more else ["--output", str(scene.with_name(made))]
     few = FEW if "--skin" in more else []
     assert command_line.run([verb, "--scene", str(scene), *more, *few, *where]) == 1
     said = capsys.readouterr().err

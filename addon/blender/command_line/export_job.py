@@ -15,7 +15,7 @@ from ...arrays import Floats
 from ...errors import HairloomError
 from ...exchange.groom import Groom
 from ...exchange.strand_check import check_lines
-from ...exchange.strand_export_settings import StrandExportSettings
+from ...exchange.strand_export_settings import StrandExportSettings, layout_of
 from ...exchange.strand_formats import STRAND_FORMATS, StrandFormat, format_of
 from ...groom.widths import as_wide
 from ...rig_flow import Rig
@@ -50,6 +50,7 @@ def export(job: Job) -> None:
     if not options.preflight:
         check_not_read(path, options)
     settings = parameters_of(options, job.settings[StrandExportSettings])
+    _check_layout(kind, settings)
     frames = frames_of_option(options.frames, options.max_frames)
     if is_of_scene(options):
         plan = _of_objects(job, kind, settings, frames)
@@ -67,6 +68,19 @@ def export(job: Job) -> None:
     for file in plan.files:
         report.add_output(file)
     print(outcome.result)
+
+
+def _check_layout(kind: StrandFormat, settings: StrandExportSettings) -> None:
+    """Raises:
+    HairloomError: an option that the format does not have, by the name that it has here.
+    """
+    try:
+        layout_of(kind, settings)
+    except HairloomError as error:
+        option = "--" + error.place.replace("_", "-")
+        is_choice = error.place == "engine"  # which the format has, but not with this value
+        problem = error.problem if is_choice else f"it is no option of {kind.title}"
+        raise HairloomError(problem, place=option, remedy=error.remedy) from error
 
 
 def _of_objects(

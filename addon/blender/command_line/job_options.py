@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from ...cards.settings import CardSettings
 from ...errors import HairloomError
 from ...exchange.strand_formats import SUFFIXES
 from ...parameters import ALL_SETTINGS
@@ -309,6 +310,12 @@ def check_numbers(options: argparse.Namespace) -> None:
             )
 
 
+def _range_of(kind: type[Settings], name: str) -> tuple[float, float]:
+    (parameter,) = (each for each in kind.parameters() if each.name == name)
+    assert parameter.hard_range is not None, "it is a number with limits"
+    return parameter.hard_range
+
+
 _LIMITS = (
     ("width", 1, 4096),
     ("height", 1, 4096),
@@ -317,6 +324,7 @@ _LIMITS = (
     ("frame_rate", 1.0, 1000.0),
     ("groom_scale", 1e-6, 1e6),
     ("head_scale", 1e-6, 1e6),
+    ("levels", *_range_of(CardSettings, "levels")),
 )
 
 

@@ -111,7 +111,7 @@ def import_strands(
         HairloomError: the file cannot be read, or is of another scale or place than the mesh.
     """
     read = read_file(path, ground, choices or StrandImport())
-    return add_to_scene(read, ground, collection), read.outcome
+    return add_to_scene(read, ground, collection)
 
 
 def read_file(path: Path, ground: Ground | None, choices: StrandImport) -> FileStrands:
@@ -167,9 +167,11 @@ def settle_ground(ground: Ground) -> None:
 
 def add_to_scene(
     read: FileStrands, ground: Ground | None, collection: bpy.types.Collection
-) -> list[bpy.types.Object]:
-    """The new objects, guides that stand apart last."""
-    return [_written(groom, name, ground, collection) for groom, name in read.hair]
+) -> tuple[list[bpy.types.Object], Outcome]:
+    """The new objects, guides that stand apart last; what happened."""
+    hair = [_written(groom, name, ground, collection) for groom, name in read.hair]
+    cut = [f"{name}: {note}" for groom, name in read.hair for note in cut_notes(groom.motion)]
+    return hair, replace(read.outcome, warnings=(*read.outcome.warnings, *cut))
 
 
 def _objects(groom: Groom, guides: str) -> list[tuple[Groom, str]]:
@@ -189,6 +191,12 @@ def _written(
     if groom.motion is not None:
         let_move(hair, groom.motion)
     return hair
+
+
+def cut_notes(motion: ReadMotion | None) -> tuple[str, ...]:
+    """What is said of frames of a file that the scene does not get."""
+    note = "" if motion is None else motion.cut_note(frame_rate(bpy.context.scene))
+    return (note,) if note else ()
 
 
 def let_move(hair: bpy.types.Object, motion: ReadMotion) -> None:
@@ -273,4 +281,4 @@ def _moving(groom: Groom) -> str:
 
 def _format(path: Path, read: ReadGroom) -> str:
     title = strand_format(path).title
-    return f"{title} {read.version:g}" if read.version else title
+    return f"{title} {read.version}" if read.version else title

@@ -71,9 +71,8 @@ def read_groom_alembic(
         groom = groom.without_guides()
     if not groom.strands.strand_count:
         raise _error(path, "it holds nothing but guides", "Read it with its guides")
-    version = f"{_number(found, 'major')}.{_number(found, 'minor')}"
     notes = [f"{path.name}: {note}." for note in notes]
-    return ReadGroom(groom, float(version), replace(space, per_metre=1.0), tuple(notes))
+    return ReadGroom(groom, _version(found), replace(space, per_metre=1.0), tuple(notes))
 
 
 def _check(path: Path) -> None:
@@ -175,11 +174,11 @@ def _radius(widths: Floats, space: FileSpace) -> Floats:
     return np.where(radius == 0.0, np.float32(1.0e-7), radius)
 
 
-def _number(found: Arrays, which: str) -> int:
-    value = found.get(f"groom_version_{which}")
-    return (
-        int(value.flat[0]) if value is not None and value.size and value.dtype.kind in "iu" else 0
-    )
+def _version(found: Arrays) -> str:
+    """Of the conventions for grooms; "" where the file says none."""
+    values = [found.get(f"groom_version_{which}") for which in ("major", "minor")]
+    numbers = [int(v.flat[0]) for v in values if v is not None and v.size and v.dtype.kind in "iu"]
+    return ".".join(map(str, numbers)) if len(numbers) == 2 and min(numbers) >= 0 else ""
 
 
 def _error(path: Path, problem: str, remedy: str) -> HairloomError:

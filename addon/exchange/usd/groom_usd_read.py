@@ -116,10 +116,10 @@ class _Reading:
             "Choose a file with BasisCurves, or export hair as curves",
         )
 
-    def version(self) -> float:
-        """Of the conventions for grooms, as the topmost prim says; 0 where it does not."""
+    def version(self) -> str:
+        """Of the conventions for grooms, as the topmost prim says; "" where it does not."""
         major, minor = self._arrays["version"].tolist()
-        return float(f"{major}.{minor}") if major >= 0 else 0.0
+        return f"{major}.{minor}" if min(major, minor) >= 0 else ""
 
     def name(self) -> str:
         """The topmost prim's, unless that is Blender's "root"."""

@@ -17,6 +17,7 @@ import pytest
 from full_disk import full_disk
 
 from hairloom.addon.errors import HairloomError
+from hairloom.addon.exchange.alembic import groom_alembic
 from hairloom.addon.exchange.alembic.groom_alembic import write_groom_alembic
 from hairloom.addon.exchange.alembic.groom_alembic_read import read_groom_alembic
 from hairloom.addon.exchange.files.child_process import same_packages
@@ -190,7 +191,7 @@ def test_all_comes_back_to_the_bit(tmp_path: Path) -> None:
     path, hair = tmp_path / "a.abc", groom()
     write_groom_alembic(path, hair, BLENDER)
     read = read_groom_alembic(path)
-    assert read.version == 1.5
+    assert read.version == "1.5"
     assert not read.notes
     assert not read.dropped
     assert read.groom.group_names == NAMES
@@ -533,3 +534,14 @@ def test_preflight_of_nothing_says_so() -> None:
     no_guides = replace(groom(), is_guide=np.zeros(6, bool))
     guides = replace(UNREAL, parts="guides")
     assert preflight(no_guides, guides)["warnings"] == ["The engine will see no guides"]
+
+
+@pytest.mark.parametrize(
+    ("version", "expected"), [((1, 10), "1.10"), ((1, -5), ""), ((0, 3), "0.3")]
+)
+def test_versions_are_read_as_they_are(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, version: tuple[int, int], expected: str
+) -> None:
+    monkeypatch.setattr(groom_alembic, "VERSION", version)
+    write_groom_alembic(tmp_path / "a.abc", groom(), BLENDER)
+    assert read_groom_alembic(tmp_path / "a.abc").version == expected

@@ -146,7 +146,7 @@ def test_a_groom_comes_back_bit_for_bit(tmp_path: Path, suffix: str) -> None:
     path, groom = tmp_path / f"hair{suffix}", full_groom()
     write_usd(path, groom, up="Y")
     read = read_usd(path)
-    assert (read.version, read.notes, read.dropped) == (1.5, (), {})
+    assert (read.version, read.notes, read.dropped) == ("1.5", (), {})
     assert read.groom.name == groom.name and read.source == path
     assert_equal(read.groom, groom)
     assert dict(read.groom.group_names) == groom.group_names

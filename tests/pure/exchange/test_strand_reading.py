@@ -12,7 +12,7 @@ from tiers import few_in_commits
 
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.exchange.alembic.groom_alembic import write_groom_alembic
-from hairloom.addon.exchange.groom import Groom, GroomMotion
+from hairloom.addon.exchange.groom import Groom, GroomMotion, ReadMotion
 from hairloom.addon.exchange.groom_presets import BLENDER, UNITY, UNREAL
 from hairloom.addon.exchange.hair_file import write_hair_file
 from hairloom.addon.exchange.strand_formats import SUFFIXES
@@ -158,6 +158,7 @@ def test_motion_is_read_with_all_its_frames(tmp_path: Path, suffix: str, parts: 
     np.testing.assert_allclose(
         positions[2] - positions[0], expected * 0 + [0.0, 3.0, 0.0], atol=1e-6
     )
+    assert read.groom.motion.cut_note(24.0) == ""
     half, doubled = read.groom.motion.at_frames(48.0)
     assert (half, len(doubled)) == (10, 5)
     np.testing.assert_allclose(doubled[1], (positions[0] + positions[1]) / 2.0, atol=1e-6)
@@ -288,3 +289,10 @@ def test_guides_of_a_file_without_any_are_refused(tmp_path: Path) -> None:
     write(tmp_path / "hair.tfx", groom())
     with pytest.raises(HairloomError, match="none of its strands is marked as a guide"):
         read_strands(tmp_path / "hair.tfx", parts="guides")
+
+
+def test_frames_beyond_the_most_that_are_read_are_counted() -> None:
+    motion = ReadMotion(np.array([0.0, 1000.0]), np.zeros((2, 3, 3), np.float32))
+    first, positions = motion.at_frames(24.0)
+    assert (first, len(positions)) == (0, 10_000)
+    assert "24,001 frames, and only the first 10,000" in motion.cut_note(24.0)

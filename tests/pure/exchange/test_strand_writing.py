@@ -212,6 +212,12 @@ def test_what_is_cut_is_told(tmp_path: Path) -> None:
     assert "resampled to 64" in write_strands(tmp_path / "a.tfx", long).notes[0]
 
 
+def test_closest_guides_that_not_all_grooms_have_are_lost_with_a_note() -> None:
+    both, notes = joined_grooms([guided(), replace(groom(), name="brows")], "all")
+    assert both.closest_guides is None and both.guide_weights is None
+    assert len(notes) == 1 and "brows: no closest guides" in notes[0]
+
+
 def test_joined_grooms_keep_their_groups_guides_and_ids_apart() -> None:
     one, other = guided(), replace(guided(), name="brows", group_names={})
     both, notes = joined_grooms([one, other], "all")
