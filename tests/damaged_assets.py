@@ -58,6 +58,11 @@ def without_textures(folder: Path) -> None:
             (folder / roles[role]["file"]).unlink()
 
 
+def cut_off_table(folder: Path) -> None:
+    table = folder / sidecar_of(folder)["material"]["tables"]["azimuthal"]["file"]
+    table.write_bytes(table.read_bytes()[:50_000])
+
+
 def without_index_buffer(folder: Path) -> None:
     (folder / sidecar_of(folder)["index_buffer"]["file"]).unlink()
 
@@ -159,6 +164,7 @@ DAMAGES: dict[Callable[[Path], None], str] = {
     renamed: "names cards.glb",
     other_levels: "its sidecar",
     without_textures: "is missing",
+    cut_off_table: "cannot be read",
     without_index_buffer: "is missing",
     reordered: "another program has changed",
     without_unused: "another program has changed",
