@@ -11,6 +11,8 @@ from .groom import ReadMotion, between
 
 #: Times nearer than this [s] are one.
 _SAME_TIME = 1.0e-5
+#: Times from here on [s] are beyond the last frame that Blender has, at any rate.
+_LATEST = 2.0e6
 
 
 def motion_of(
@@ -46,12 +48,15 @@ def _at(times: Floats, own: Floats | None, positions: Floats) -> Floats:
 
 
 def sound_motion(times: Floats, positions: Floats) -> tuple[ReadMotion | None, str]:
-    """The motion up to the first time at which a point is not finite, and what is said of that."""
-    is_sound = np.isfinite(positions).all(axis=(1, 2))
+    """The motion up to the first time at which a point is not finite or that no scene has, and what
+    is said of that."""
+    is_finite, is_near = np.isfinite(positions).all(axis=(1, 2)), np.abs(times) < _LATEST
+    is_sound = is_finite & is_near
     count = len(times) if is_sound.all() else int(is_sound.argmin())
     note = ""
     if count < len(times):
-        note = ended_at(float(times[count]), "points that are no numbers")
+        reason = "points that are no numbers" if is_near[count] else "a time that no scene has"
+        note = ended_at(float(times[count]), reason)
     return (ReadMotion(times[:count], positions[:count]) if count > 1 else None), note
 
 

@@ -15,6 +15,7 @@ from hairloom.addon.exchange.alembic.groom_alembic import write_groom_alembic
 from hairloom.addon.exchange.groom import Groom, GroomMotion, ReadMotion
 from hairloom.addon.exchange.groom_presets import BLENDER, UNITY, UNREAL
 from hairloom.addon.exchange.hair_file import write_hair_file
+from hairloom.addon.exchange.read_motion import sound_motion
 from hairloom.addon.exchange.strand_formats import SUFFIXES
 from hairloom.addon.exchange.strand_reading import read_strands
 from hairloom.addon.exchange.tressfx import write_tfx
@@ -296,3 +297,11 @@ def test_frames_beyond_the_most_that_are_read_are_counted() -> None:
     first, positions = motion.at_frames(24.0)
     assert (first, len(positions)) == (0, 10_000)
     assert "24,001 frames, and only the first 10,000" in motion.cut_note(24.0)
+
+
+def test_times_that_no_scene_has_end_the_motion() -> None:
+    positions = np.zeros((3, 2, 3), np.float32)
+    motion, note = sound_motion(np.array([0.0, 1.0, 1e300]), positions)
+    assert motion is not None and motion.times.tolist() == [0.0, 1.0]
+    assert "at 1e+300 s it has a time that no scene has" in note
+    assert sound_motion(np.array([1e300, 1.5e300, 2e300]), positions)[0] is None
