@@ -68,6 +68,8 @@ def test_properties_show_what_was_declared(section, group_of):
             assert soft == pytest.approx(parameter.soft_range)
         if parameter.unit == "angle":
             assert shown.subtype == "ANGLE"
+        elif parameter.kind == "number":
+            assert round(parameter.default, shown.precision) == pytest.approx(parameter.default)
         if parameter.unit == "length":
             assert shown.unit == "LENGTH"
         if parameter.kind == "color":

@@ -150,8 +150,18 @@ def _property(parameter: Parameter, changed: Changed | None, is_animated: bool) 
         return FloatVectorProperty(size=3, subtype="COLOR", **common)
     if parameter.kind == "curve":
         return FloatVectorProperty(size=len(PLACES), precision=2, **common)
-    precision = _PRECISION.get(parameter.unit, 3)
-    return FloatProperty(precision=precision, **_SHOWN_AS[parameter.unit], **common)
+    return FloatProperty(precision=_digits(parameter), **_SHOWN_AS[parameter.unit], **common)
+
+
+def _digits(parameter: Parameter) -> int:
+    """Decimals that a field shows: as many as its default has, where that is a plain number."""
+    shown = _PRECISION.get(parameter.unit, 3)
+    if parameter.unit == "angle":  # shown in degrees, kept in radians
+        return shown
+    enough = (
+        each for each in range(shown, 6) if round(parameter.default, each) == parameter.default
+    )
+    return next(enough, shown)
 
 
 def _ranges(parameter: Parameter) -> dict[str, float]:
