@@ -6,7 +6,8 @@ number survives.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -79,6 +80,20 @@ class Body:
 def objects_in(layer: bpy.types.ViewLayer) -> list[bpy.types.Object]:
     """The objects of a view layer, whose list holds None for one that was just removed."""
     return [obj for obj in layer.objects if obj is not None]
+
+
+@contextmanager
+def as_mesh(
+    obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph
+) -> Iterator[bpy.types.Mesh | None]:
+    """What an object is drawn as, even in Edit Mode, in its own space; None where that is nothing,
+    as of an Empty. It is freed at the end of the block."""
+    evaluated = obj.evaluated_get(depsgraph)
+    mesh = evaluated.to_mesh()
+    try:
+        yield mesh
+    finally:
+        evaluated.to_mesh_clear()
 
 
 def matrix_of(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Floats:

@@ -11,6 +11,7 @@ import numpy as np
 from ...arrays import Floats, Ints
 from ...errors import HairloomError
 from .attributes import read_attribute
+from .objects import as_mesh
 
 #: Attributes that may be painted; colours count by their luminance (Rec. 709).
 _NUMBERS, _COLORS = ("FLOAT", "BOOLEAN"), ("FLOAT_COLOR", "BYTE_COLOR")
@@ -81,16 +82,13 @@ def read_weights(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, name: st
             place=obj.name,
             remedy="Choose a mesh object",
         )
-    evaluated = obj.evaluated_get(depsgraph)
-    mesh = evaluated.to_mesh()
-    try:
+    with as_mesh(obj, depsgraph) as mesh:
+        assert mesh is not None
         values, domain = weights_on(obj, mesh, name)
         if domain == "POINT":
             return values
         corners, triangles = at_corners(mesh, values, domain), triangle_corners(mesh, "vertices")
         count = len(mesh.vertices)
-    finally:
-        evaluated.to_mesh_clear()
     around = np.bincount(triangles.ravel(), minlength=count)
     total = np.bincount(triangles.ravel(), corners.ravel(), count)
     return (total / np.maximum(around, 1)).astype(np.float32)

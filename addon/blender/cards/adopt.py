@@ -25,8 +25,9 @@ from ...cards.uv_directions import UvDirection
 from ...errors import HairloomError
 from ...strands import Surface
 from ..base.attributes import set_attribute
+from ..base.objects import matrix_of
 from ..base.vertex_weights import weights_on
-from ..scene.surfaces import read_corner_uv, read_surface
+from ..scene.surfaces import evaluated_mesh, read_corner_uv, read_surface
 from .material import alpha_of
 from .mesh import CARD_ATTRIBUTES, OCCLUSION_IS_OURS, OCCLUSION_LAYER, reorder_faces, set_uv_map
 from .occluders import read_occluders
@@ -189,14 +190,10 @@ def _read_faces(
     obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph
 ) -> tuple[Surface, Ints, Ints, list[str]]:
     """Triangles as Blender draws them, in world space; the face and the corners of each; notes."""
-    evaluated = obj.evaluated_get(depsgraph)
-    matrix = np.array(evaluated.matrix_world)
-    bent = evaluated.to_mesh()
-    try:
+    matrix = matrix_of(obj, depsgraph)
+    with evaluated_mesh(obj, depsgraph, obj.name) as bent:
         if np.array_equal(_corners(bent), _corners(obj.data)):
             return (*_triangles(bent, matrix), [])
-    finally:
-        evaluated.to_mesh_clear()
     note = "Modifiers that add or remove faces were left out, because they come after the order"
     return (*_triangles(obj.data, matrix), [note])
 

@@ -19,7 +19,7 @@ from ...errors import HairloomError
 from ...groom.holds import Holds, anchors_of
 from ...groom.ties import Holders, Tie, TipSurface, find_holds
 from ...strands.affine import moved
-from ..base.objects import Body, Handle, head_of, matrix_of
+from ..base.objects import Body, Handle, as_mesh, head_of, matrix_of
 from ..base.vertex_weights import read_weights
 from ..scene.own_collections import objects_in, put_into, take_out
 from ..scene.source import usable_curves
@@ -309,16 +309,11 @@ def _of_empty(obj: bpy.types.Object) -> tuple[Floats, bool]:
 
 def _points_of(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Floats:
     """(n, 3) object space, of a mesh or of a curve as it is drawn."""
-    evaluated = obj.evaluated_get(depsgraph)
-    mesh = evaluated.to_mesh()
-    try:
-        count = 0 if mesh is None else len(mesh.vertices)
-        points = np.empty((count, 3), np.float32)
-        if count:
+    with as_mesh(obj, depsgraph) as mesh:
+        points = np.empty((0 if mesh is None else len(mesh.vertices), 3), np.float32)
+        if mesh is not None:
             mesh.vertices.foreach_get("co", points.ravel())
         return points
-    finally:
-        evaluated.to_mesh_clear()
 
 
 def _fitted(points: Floats, name: str) -> tuple[Floats, bool]:

@@ -11,7 +11,8 @@ from ...exchange.cards.glb_springs import HeadBone
 from ...exchange.tfxbone import BoneWeights, bones_at_roots
 from ...strands import StrandSet
 from ..base.objects import head_of
-from .surfaces import read_surface
+from ..base.vertex_weights import Memberships
+from .surfaces import evaluated_mesh, read_surface
 
 
 def bones_of(
@@ -86,15 +87,7 @@ def _vertex_weights(
     skin: bpy.types.Object, depsgraph: bpy.types.Depsgraph, names: tuple[str, ...]
 ) -> Floats:
     """(vertex_count, bone_count) float32 of the mesh after its modifiers."""
-    column = {skin.vertex_groups[name].index: place for place, name in enumerate(names)}
-    evaluated = skin.evaluated_get(depsgraph)
-    mesh = evaluated.to_mesh()
-    try:
-        weights = np.zeros((len(mesh.vertices), len(names)), np.float32)
-        for vertex in mesh.vertices:  # Blender gives the weights of groups in no faster way
-            for member in vertex.groups:
-                if member.group in column:
-                    weights[vertex.index, column[member.group]] = member.weight
-    finally:
-        evaluated.to_mesh_clear()
-    return weights
+    with evaluated_mesh(skin, depsgraph, skin.name) as mesh:
+        members = Memberships.of(mesh)
+    weights = [members.weights(skin.vertex_groups[name].index) for name in names]
+    return np.stack(weights, axis=1)

@@ -9,7 +9,7 @@ from ...arrays import Floats
 from ...errors import HairloomError
 from ...strands.affine import moved
 from ...strands.closest_point import search_of
-from ..base.objects import head_of, matrix_of
+from ..base.objects import as_mesh, head_of, matrix_of
 from .surfaces import read_surface
 
 #: types of objects that can be a line
@@ -40,23 +40,19 @@ def pieces_of(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Floats:
             remedy="Draw a curve on the surface (Add > Curve > Bezier, then the Draw tool)",
         )
     matrix = matrix_of(obj, depsgraph)
-    evaluated = obj.evaluated_get(depsgraph)
-    mesh = evaluated.to_mesh()
-    try:
+    with as_mesh(obj, depsgraph) as mesh:
         if mesh is not None and len(mesh.polygons):
             raise HairloomError(
                 "it has faces, so it is no line",
                 place=obj.name,
                 remedy="Set its bevel and extrusion to 0, or delete its faces and keep the line",
             )
-        count = 0 if mesh is None else len(mesh.edges)
-        points, ends = np.empty((0, 3), np.float32), np.empty(2 * count, np.int32)
-        if count:
+        points, ends = np.empty((0, 3), np.float32), np.empty(0, np.int32)
+        if mesh is not None and len(mesh.edges):
             points = np.empty((len(mesh.vertices), 3), np.float32)
             mesh.vertices.foreach_get("co", points.ravel())
+            ends = np.empty(2 * len(mesh.edges), np.int32)
             mesh.edges.foreach_get("vertices", ends)
-    finally:
-        evaluated.to_mesh_clear()
     pieces = moved(points, matrix)[ends].reshape(-1, 2, 3)
     if not np.isfinite(pieces).all():
         raise HairloomError(

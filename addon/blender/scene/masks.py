@@ -50,12 +50,9 @@ class _Groups:
     corners: Ints
 
     @classmethod
-    def of(cls, evaluated: bpy.types.Object) -> Self:
-        mesh = evaluated.to_mesh()
-        try:
+    def of(cls, surface: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Self:
+        with evaluated_mesh(surface, depsgraph, surface.name) as mesh:
             return cls(Memberships.of(mesh), triangle_corners(mesh, "vertices"))
-        finally:
-            evaluated.to_mesh_clear()
 
     def at_corners(self, index: int) -> Floats:
         """The weights in one group, (triangle_count, 3)."""
@@ -152,16 +149,13 @@ class Canvas:
         group = surface.vertex_groups.get(name)
         if group is not None:
             if not self._groups:
-                self._groups.append(_Groups.of(evaluated))
+                self._groups.append(_Groups.of(surface, depsgraph))
             corners = self._groups[0].at_corners(group.index)
         else:
-            mesh = evaluated.to_mesh()
-            try:
+            with evaluated_mesh(surface, depsgraph, surface.name) as mesh:
                 if not has_weights(surface, mesh, name):
                     return None
                 corners = at_corners(mesh, *weights_on(surface, mesh, name))
-            finally:
-                evaluated.to_mesh_clear()
         if len(corners) != len(head.triangles):
             raise HairloomError(
                 f"the mask '{name}' lies on {len(corners):,} triangles, the hair was made on "

@@ -18,6 +18,7 @@ from ...arrays import Floats, Ints
 from ...errors import HairloomError
 from ...strands import Surface
 from ..base.attributes import read_attribute
+from ..base.objects import as_mesh
 
 
 @dataclass
@@ -130,12 +131,9 @@ def evaluated_mesh(
             place=place,
             remedy="Choose a mesh object",
         )
-    evaluated = obj.evaluated_get(depsgraph)
-    mesh = evaluated.to_mesh()
-    try:
+    with as_mesh(obj, depsgraph) as mesh:
+        assert mesh is not None
         yield mesh
-    finally:
-        evaluated.to_mesh_clear()
 
 
 def _positions(mesh: bpy.types.Mesh) -> Floats:
