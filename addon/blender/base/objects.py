@@ -20,6 +20,10 @@ from ...errors import HairloomError
 type LayerKey = tuple[int, str]
 
 
+class ObjectGoneError(HairloomError):
+    """An object that was there is no longer."""
+
+
 @dataclass
 class Handle:
     """An object by its session number; the name only speeds up the search."""
@@ -38,6 +42,17 @@ class Handle:
             obj = next((each for each in bpy.data.objects if each.session_uid == self.uid), None)
         if obj is not None:
             self.name = obj.name
+        return obj
+
+    def found(self, remedy: str = "Press Preview again") -> bpy.types.Object:
+        """The object.
+
+        Raises:
+            ObjectGoneError: it no longer exists.
+        """
+        obj = self.find()
+        if obj is None:
+            raise ObjectGoneError("this object is gone", place=self.name, remedy=remedy)
         return obj
 
 
@@ -59,20 +74,15 @@ class Body:
         """The object.
 
         Raises:
-            HairloomError: it is gone.
+            ObjectGoneError: it no longer exists.
         """
-        obj = self.handle.find()
-        if obj is None:
-            raise HairloomError(
-                "this object is gone", place=self.handle.name, remedy="Press Preview again"
-            )
-        return obj
+        return self.handle.found()
 
     def moved(self, depsgraph: bpy.types.Depsgraph) -> Floats:
         """(4, 4), from where it was at rest to where it is now.
 
         Raises:
-            HairloomError: it is gone.
+            ObjectGoneError: it no longer exists.
         """
         return matrix_of(self.found(), depsgraph) @ np.linalg.pinv(self.rest)
 
@@ -99,6 +109,16 @@ def as_mesh(
 def matrix_of(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Floats:
     """(4, 4) float64, from object to world space, as evaluated."""
     return np.array(obj.evaluated_get(depsgraph).matrix_world, np.float64)
+
+
+def check_editable(obj: bpy.types.Object) -> None:
+    """Raises:
+    HairloomError: it cannot be changed in this file.
+    """
+    if not obj.is_editable or (obj.data is not None and not obj.data.is_editable):
+        raise HairloomError(
+            "it is linked from another file", place=obj.name, remedy="Make it local in Blender"
+        )
 
 
 def head_of(hair: bpy.types.Object) -> bpy.types.Object | None:

@@ -18,7 +18,7 @@ from ...cards.edits import UNPRINTED, EditCounts, MadeCards, prints
 from ...errors import HairloomError
 from ...shading.settings import ShadingSettings
 from ..base.attributes import set_attribute
-from ..base.objects import Handle, head_of, matrix_of
+from ..base.objects import Handle, check_editable, head_of, matrix_of
 from ..base.thread_work import ThreadWork
 from .build import MappedCards, built_in_thread, order_line, read_inputs
 from .edits import MADE_ATTRIBUTE, TILE_LAYER, forget_record, read_pieces, write_record
@@ -44,7 +44,7 @@ class CardObjectJob:
         self, hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph, *, keep_edits: bool = True
     ) -> None:
         for obj in card_objects(hair):
-            _check_editable(obj)
+            _check_replaceable(obj)
         self._inputs, self.notes, self.dropped = read_inputs(hair, depsgraph, keep_edits=keep_edits)
         self._hair, self._matrix = Handle.of(hair), matrix_of(hair, depsgraph)
         self.objects: list[bpy.types.Object] = []
@@ -62,27 +62,20 @@ class CardObjectJob:
         Raises:
             HairloomError: the hair is gone, or its cards cannot be changed any more.
         """
-        hair, build = self._hair.find(), made.build
-        if hair is None:
-            raise HairloomError(
-                "this object is gone", place=self._hair.name, remedy="Choose other hair"
-            )
+        hair, build = self._hair.found("Choose other hair"), made.build
         for obj in card_objects(hair):
-            _check_editable(obj)
+            _check_replaceable(obj)
         self.notes += tuple(f"{hair.name}: {note}." for note in made.notes)
         card = made.maps.plain_card(self._inputs.settings[ShadingSettings])
         self.objects = _write(hair, build, card, self._matrix)
         self.order, self.edits = order_line(build.wrong_fraction), build.edits
 
 
-def _check_editable(obj: bpy.types.Object) -> None:
+def _check_replaceable(obj: bpy.types.Object) -> None:
     """Raises:
     HairloomError: its mesh cannot be replaced.
     """
-    if not obj.is_editable or not obj.data.is_editable:
-        raise HairloomError(
-            "it is linked from another file", place=obj.name, remedy="Make it local first"
-        )
+    check_editable(obj)
     if obj.mode != "OBJECT":
         raise HairloomError(
             "its mesh is being edited", place=obj.name, remedy="Go back to Object Mode"

@@ -19,7 +19,7 @@ from ...errors import HairloomError
 from ...groom.holds import Holds, anchors_of
 from ...groom.ties import Holders, Tie, TipSurface, find_holds
 from ...strands.affine import moved
-from ..base.objects import Body, Handle, as_mesh, head_of, matrix_of
+from ..base.objects import Body, Handle, ObjectGoneError, as_mesh, head_of, matrix_of
 from ..base.vertex_weights import read_weights
 from ..scene.own_collections import objects_in, put_into, take_out
 from ..scene.source import usable_curves
@@ -394,7 +394,7 @@ def _disabled(name: str) -> HairloomError:
 
 
 def _lost(name: str, error: HairloomError) -> HairloomError:
-    if error.problem != "this object is gone":
+    if not isinstance(error, ObjectGoneError):
         return error
     return HairloomError(
         "this tie is gone, so it holds no hair", place=name, remedy="Undo that, or add another tie"

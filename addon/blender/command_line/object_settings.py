@@ -94,16 +94,6 @@ def all_of_scene(
     return taken, notes
 
 
-def check_editable(obj: bpy.types.Object) -> None:
-    """Raises:
-    HairloomError: it cannot be changed in this file.
-    """
-    if not obj.is_editable or (obj.data is not None and not obj.data.is_editable):
-        raise HairloomError(
-            "it is linked from another file", place=obj.name, remedy="Make it local in Blender"
-        )
-
-
 def own_settings(obj: bpy.types.Object) -> dict[str, Settings]:
     """What the artist has set for this object, by section."""
     groups = {section: _group(obj, section) for section in ALL_SETTINGS}

@@ -10,10 +10,11 @@ from typing import Any
 import bpy
 
 from ...errors import HairloomError
+from ..base.objects import check_editable
 from ..base.outcome import Reports, collected_reports
 from .job_options import add_object_option, add_save_option
 from .job_steps import Job, tell_notes
-from .object_settings import check_editable, check_sections, named_objects, put_settings
+from .object_settings import check_sections, named_objects, put_settings
 from .overrides import plain_value
 from .scene_files import check_saving, save_scene
 from .verb import SCENE_OUTPUT, Verb

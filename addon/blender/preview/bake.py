@@ -110,10 +110,7 @@ class _Part:
             self.writer.abandon()
 
     def found(self) -> bpy.types.Object:
-        obj = self.handle.find()
-        if obj is None:
-            raise HairloomError("it is gone", place=self.handle.name, remedy="Bake again")
-        return obj
+        return self.handle.found("Bake again")
 
 
 @dataclass

@@ -101,12 +101,7 @@ class Preview:
 
     def found(self) -> bpy.types.Object:
         """Its object."""
-        obj = Handle(self.uid, self.session.name).find()
-        if obj is None:
-            raise HairloomError(
-                "this object is gone", place=self.session.name, remedy="Press Preview again"
-            )
-        return obj
+        return Handle(self.uid, self.session.name).found()
 
     def go(
         self,

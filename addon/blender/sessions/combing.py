@@ -13,7 +13,7 @@ from ...errors import HairloomError
 from ...groom.roots import bind_roots
 from ...refine.lead_out_at_rest import led_out_at_rest
 from ...strands import StrandSet, Surface
-from ..base.objects import head_of
+from ..base.objects import check_editable, head_of
 from ..base.parts import Part, Parts
 from ..colliders.fields import solid_of
 from ..scene.curves import read_own_curves, write_own_curves
@@ -30,23 +30,13 @@ class Combed:
     dropped: dict[str, int]
 
 
-def check_own(hair: bpy.types.Object) -> None:
-    """Raises:
-    HairloomError: the curves are not the file's own, so that nothing can be done to them.
-    """
-    if not hair.data.is_editable:
-        raise HairloomError(
-            "it is linked from another file", place=hair.name, remedy="Make it local in Blender"
-        )
-
-
 def surface_to_comb_on(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Surface:
     """What the hair grows on, in world space.
 
     Raises:
-        HairloomError: it has no surface, or one that cannot be used; or see `check_own`.
+        HairloomError: it has no surface, or one that cannot be used; or see `check_editable`.
     """
-    check_own(hair)
+    check_editable(hair)
     head = head_of(hair)
     if head is None:
         raise HairloomError(

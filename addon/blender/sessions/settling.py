@@ -21,13 +21,13 @@ from ...groom.settings import GuideSettings
 from ...rig_flow import Rig
 from ...shading.ambient_settings import AmbientSettings
 from ...strands.clean import Cleaned
+from ..base.objects import check_editable
 from ..base.outcome import Outcome
 from ..colliders.fields import solid_of
 from ..colliders.obstacles import Obstacles
 from ..scene.curves import read_own_curves, write_own_curves
 from ..scene.forces import gravity_of
 from ..scene.kept_shape import KeptShape
-from .combing import check_own
 from .groom_source import GroomSource
 from .prepared_groom import PreparedGroom
 
@@ -53,7 +53,7 @@ def settle_hair(
         HairloomError: no hair that can be used, it is linked from another file, its roots are away
             from its surface, or the surface is gone.
     """
-    check_own(hair)
+    check_editable(hair)
     source = GroomSource(hair, depsgraph)
     own = read_own_curves(hair, depsgraph, COMBED.before(hair))
     guides = settle_flow.guides_that_fall(own.strands, source.settings[GuideSettings])

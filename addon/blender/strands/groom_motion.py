@@ -73,7 +73,7 @@ class ShownMotion:
     needs_scene: bool = True
 
     def at(self, frame: int, depsgraph: bpy.types.Depsgraph) -> Floats:
-        read = usable_curves(_found(self.hair), depsgraph).strands
+        read = usable_curves(self.hair.found("Export again"), depsgraph).strands
         if not np.array_equal(read.offsets, self.out.seen.offsets):
             raise _other_curves(self.hair, frame)
         return read.points
@@ -98,7 +98,7 @@ class ChildrenMotion:
     needs_scene: bool = True
 
     def at(self, frame: int, depsgraph: bpy.types.Depsgraph) -> Floats:
-        read = usable_curves(_found(self.hair), depsgraph).strands
+        read = usable_curves(self.hair.found("Export again"), depsgraph).strands
         if read.strand_count != self.count:
             raise _other_curves(self.hair, frame)
         now = center_lines(read.take(self.guides), self.rig.guide_grid.shape[1]).grid
@@ -202,13 +202,6 @@ def _children_motion(
         source.strands.strand_count,
         Body.at_rest(body, depsgraph),
     )
-
-
-def _found(handle: Handle) -> bpy.types.Object:
-    hair = handle.find()
-    if hair is None:
-        raise HairloomError("it is gone", place=handle.name, remedy="Export again")
-    return hair
 
 
 def _other_curves(handle: Handle, frame: int) -> HairloomError:
