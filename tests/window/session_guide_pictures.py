@@ -366,6 +366,7 @@ def the_preferences():
     bpy.ops.preferences.addon_expand(module=driver.EXTENSION)
     yield
     assert bpy.ops.hairloom.self_test() == {"FINISHED"}
+    bpy.context.window.event_simulate("MOUSEMOVE", "NOTHING", x=2, y=2)  # no tooltip
     yield from whole_screen("preferences")
     window = next(each for each in area.regions if each.type == "WINDOW")
     keep("preferences", [crop("preferences", area, window)[BLENDERS:]])
