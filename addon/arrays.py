@@ -1,4 +1,7 @@
-"""Array types for annotations. Shapes, units, dtype and space are said where an array is born."""
+"""Array types for annotations, and when arrays are the same.
+
+Shapes, units, dtype and space are said where an array is born.
+"""
 
 from __future__ import annotations
 
@@ -10,3 +13,10 @@ from numpy.typing import NDArray
 type Floats = NDArray[np.floating[Any]]
 type Ints = NDArray[np.integer[Any]]
 type Bools = NDArray[np.bool_]
+
+
+def are_same(one: Floats | None, other: Floats | None) -> bool:
+    """Whether two arrays are equal, with NaN in the same places, or both missing."""
+    if one is None or other is None:
+        return one is other
+    return np.array_equal(one, other, equal_nan=True)

@@ -10,7 +10,7 @@ from typing import Protocol
 
 import numpy as np
 
-from .arrays import Bools, Floats, Ints
+from .arrays import Bools, Floats, Ints, are_same
 from .dynamics.colliders import DistanceField, PosedCollider
 from .dynamics.held import Held
 from .dynamics.neighbours import hair_of
@@ -108,17 +108,11 @@ class Pose:
 
     def is_as(self, other: Pose) -> bool:
         """Whether hair is carried to the same places, bit for bit."""
-        if not _are_same(self.anchors, other.anchors):
+        if not are_same(self.anchors, other.anchors):
             return False
         if self.head_positions is None or other.head_positions is None:
             return np.array_equal(self.matrix, other.matrix)
         return np.array_equal(self.head_positions, other.head_positions)
-
-
-def _are_same(one: Floats | None, other: Floats | None) -> bool:
-    if one is None or other is None:
-        return one is other
-    return np.array_equal(one, other, equal_nan=True)
 
 
 @dataclass(frozen=True, eq=False)

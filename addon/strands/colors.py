@@ -41,12 +41,6 @@ def joined_colors(parts: Sequence[StrandSet]) -> Floats | None:
     )
 
 
-def same_colors(one: Floats | None, other: Floats | None) -> bool:
-    if one is None or other is None:
-        return one is other
-    return np.array_equal(one, other, equal_nan=True)
-
-
 def color_notes(place: str, strands: StrandSet) -> tuple[str, ...]:
     """A warning where some strands of coloured hair have no colour; place names the hair."""
     if strands.color is None:

@@ -18,7 +18,7 @@ from ...errors import HairloomError
 from ...strands.affine import moved
 from ..base.objects import check_editable, head_of, matrix_of
 from ..properties.groom_settings import GroomSettings
-from ..scene.drawn_lines import pieces_of
+from ..scene.drawn_lines import lines_of
 from ..scene.surfaces import read_surface
 from .edits import MADE_ATTRIBUTE, TILE_LAYER, read_record
 from .made_objects import card_objects
@@ -116,7 +116,7 @@ def add_along_curves(
     surface = None
     if head is not None:
         surface = read_surface(head, depsgraph, need_uv=False, place=head.name)
-    lines = [line for curve in curves for line in _lines_of(pieces_of(curve, depsgraph))]
+    lines = [line for curve in curves for line in lines_of(curve, depsgraph)]
     edited = bmesh.new()
     try:
         edited.from_mesh(obj.data)
@@ -184,12 +184,6 @@ def _selected_pieces(edited: bmesh.types.BMesh) -> list[list[bmesh.types.BMVert]
                         waiting.append(other)
         pieces.append(piece)
     return pieces
-
-
-def _lines_of(pieces: Floats) -> list[Floats]:
-    """Straight pieces (n, 2, 3) as lines (point_count, 3): where one ends another begins."""
-    breaks = np.flatnonzero((pieces[:-1, 1] != pieces[1:, 0]).any(axis=1)) + 1
-    return [np.concatenate([each[:1, 0], each[:, 1]]) for each in np.split(pieces, breaks)]
 
 
 def _append(edited: bmesh.types.BMesh, card: CardMesh, matrix: Floats) -> None:

@@ -14,7 +14,7 @@ from typing import Any
 import bpy
 import numpy as np
 
-from ...arrays import Floats
+from ...arrays import Floats, are_same
 from ...cards.edits import CardEdits
 from ...cards.follow import moved_mesh
 from ...cards.occlusion_settings import CardOcclusionSettings
@@ -25,7 +25,6 @@ from ...rig_flow import Rig
 from ...shading.ambient_settings import AmbientSettings
 from ...shading.settings import ShadingSettings
 from ...strands.affine import moved
-from ...strands.colors import same_colors
 from ..bakes import playback
 from ..bakes.baked_rig import BakedRig
 from ..bakes.cache import Cache
@@ -67,7 +66,7 @@ class _Made:
         """In what is painted under it; the same object where that looks as it did last."""
         rig = colored(self.rig, colors, look)
         for known in self._colored:
-            if same_colors(known.strands.color, rig.strands.color):
+            if are_same(known.strands.color, rig.strands.color):
                 return known
         self._colored[:] = [rig]
         return rig

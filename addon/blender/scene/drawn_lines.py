@@ -68,6 +68,17 @@ def pieces_of(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Floats:
     return pieces
 
 
+def lines_of(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> list[Floats]:
+    """The same as lines (m, 3): where a piece ends and another begins, they are one.
+
+    Raises:
+        HairloomError: see `pieces_of`.
+    """
+    pieces = pieces_of(obj, depsgraph)
+    breaks = np.flatnonzero((pieces[:-1, 1] != pieces[1:, 0]).any(axis=1)) + 1
+    return [np.concatenate([each[:1, 0], each[:, 1]]) for each in np.split(pieces, breaks)]
+
+
 def is_wire(obj: bpy.types.Object) -> bool:
     """Whether it is a mesh of edges without faces."""
     return bool(obj.type == "MESH" and len(obj.data.edges) and not len(obj.data.polygons))

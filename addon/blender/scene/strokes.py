@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import bpy
-import numpy as np
 
 from ...arrays import Floats
 from ...errors import HairloomError
-from .drawn_lines import pieces_of
+from .drawn_lines import lines_of
 from .own_collections import objects_in
 
 #: setting of the hair that names the collection, and what is in it
@@ -28,13 +27,7 @@ def read_strokes(
     unusable: list[str] = []
     for obj in strokes_of(hair):
         try:
-            found += _lines(pieces_of(obj, depsgraph))
+            found += lines_of(obj, depsgraph)
         except HairloomError as error:
             unusable.append(str(error))
     return tuple(found), tuple(unusable)
-
-
-def _lines(pieces: Floats) -> list[Floats]:
-    """Pieces (n, 2, 3) that follow each other, as lines (m, 3)."""
-    ends = np.flatnonzero((pieces[1:, 0] != pieces[:-1, 1]).any(axis=1)) + 1
-    return [np.concatenate([line[:, 0], line[-1:, 1]]) for line in np.split(pieces, ends)]

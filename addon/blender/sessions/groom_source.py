@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import bpy
 import numpy as np
 
-from ...arrays import Floats, Ints
+from ...arrays import Floats, Ints, are_same
 from ...dynamics.painted import PaintedGuides
 from ...dynamics.settings import DynamicsSettings
 from ...groom.children_settings import ChildrenSettings
@@ -22,7 +22,6 @@ from ...shading.settings import ShadingSettings
 from ...strands import StrandSet
 from ...strands.affine import moved
 from ...strands.clean import Cleaned
-from ...strands.colors import same_colors
 from ...strands.kept import Kept
 from ...style_flow import at_rest, styled
 from ..bakes.baked_rig import BakedRig, RestMatrices
@@ -418,7 +417,7 @@ def _same(one: StrandSet, other: StrandSet, back: Floats) -> bool:
         and _same_places(one, other, back)
         and np.allclose(one.radius, other.radius, rtol=1e-5)
         and np.array_equal(one.group, other.group)
-        and same_colors(one.color, other.color)
+        and are_same(one.color, other.color)
     )
 
 

@@ -10,7 +10,7 @@ from typing import Any
 import bpy
 import numpy as np
 
-from ...arrays import Floats
+from ...arrays import Floats, are_same
 from ...groom.painted_color import PaintedColor
 from ...light_flow import HairLight
 from ...paint_flow import with_colors
@@ -26,7 +26,6 @@ from ...shading.settings import ShadingSettings
 from ...shading.volume.settings import VolumeSettings
 from ...shading.volume.shadow_lights import shadow_warnings
 from ...strands import Surface
-from ...strands.colors import same_colors
 from ..cards.show import ShownCards
 from ..properties.groom_settings import GroomSettings
 from ..scene.lights import (
@@ -155,7 +154,7 @@ class GroomPicture:
         until settings are taken over."""
         self._colors = colors
         found = with_colors(rig.strands, colors, settings[ShadingSettings]).color
-        if not same_colors(found, self.snapshot.color):
+        if not are_same(found, self.snapshot.color):
             self.snapshot = replace(self.snapshot, color=found)
 
     def take_settings(self, rig: Rig, was: GroomSettings, now: GroomSettings) -> bool:
