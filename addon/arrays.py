@@ -1,4 +1,4 @@
-"""Array types for annotations, and when arrays are the same.
+"""Array types for annotations; arrays that are the same; rows of pieces that follow each other.
 
 Shapes, units, dtype and space are said where an array is born.
 """
@@ -20,3 +20,14 @@ def are_same(one: Floats | None, other: Floats | None) -> bool:
     if one is None or other is None:
         return one is other
     return np.array_equal(one, other, equal_nan=True)
+
+
+def piece_starts(counts: Ints) -> Ints:
+    """Where each piece begins, (n,), of pieces of this many rows that follow each other."""
+    return np.cumsum(counts) - counts
+
+
+def number_in_piece(counts: Ints) -> Ints:
+    """The number of each row in its piece, (row_count,), see `piece_starts`."""
+    numbers: Ints = np.arange(counts.sum()) - np.repeat(piece_starts(counts), counts)
+    return numbers

@@ -22,6 +22,7 @@ import numpy as np
 from _suzanne import suzanne
 from refinement_probes import adaptive_points, point_textures, read_factors
 
+from hairloom.addon.arrays import piece_starts
 from hairloom.addon.exchange.tressfx import read_tfx
 from hairloom.addon.groom.grow import grow, scalp_density
 from hairloom.addon.groom.settings import GrowSettings
@@ -136,7 +137,7 @@ def _error_of(strands: np.ndarray, factors: np.ndarray, view: PictureView) -> fl
     clip = np.concatenate([exact, np.ones((len(exact), 1))], axis=1) @ view.view_projection.T
     # a strand's corners are its probes, every eighth from its root on
     starts = stations(factors)[:, -1] * PROBES + 1
-    root = np.repeat(np.cumsum(starts) - starts, starts)
+    root = np.repeat(piece_starts(starts), starts)
     place = np.arange(len(clip)) - root
     corner = np.flatnonzero((place % PROBES == 0) & (np.append(place[1:], 0) > 0))
     pieces = clip[corner[:, None] + np.arange(PROBES + 1)]

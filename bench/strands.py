@@ -36,7 +36,7 @@ from _sight_grooms import GROOMS, Pair, rig_of
 from _strands_cost import cost_figures
 
 from hairloom.addon import motion_flow
-from hairloom.addon.arrays import Floats, Ints
+from hairloom.addon.arrays import Floats, Ints, piece_starts
 from hairloom.addon.blender.colliders.fields import field_of
 from hairloom.addon.blender.command_line.simulate_job import shake_matrix
 from hairloom.addon.blender.scene.built_in_head import built_in_head
@@ -384,7 +384,7 @@ def _middle_lines(mesh: CardMesh, cards: CardBinding) -> Ints:
     order = np.lexsort((mesh.uv[:, 0], cards.row))
     count = np.bincount(cards.row)
     assert (count % 2 == 1).all()
-    middles: Ints = order[np.cumsum(count) - count + count // 2]
+    middles: Ints = order[piece_starts(count) + count // 2]
     return middles
 
 

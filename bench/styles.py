@@ -44,7 +44,7 @@ from _styles_cards import card_figures
 from mathutils import Vector
 
 import hairloom
-from hairloom.addon.arrays import Bools, Floats
+from hairloom.addon.arrays import Bools, Floats, number_in_piece
 from hairloom.addon.blender.base import latest_job
 from hairloom.addon.blender.colliders.fields import field_of
 from hairloom.addon.blender.preview import previews, scene_events
@@ -155,9 +155,7 @@ def hair_samples(strands: StrandSet) -> tuple[Floats, Floats]:
     length = np.linalg.norm(end - begin, axis=1)
     count = np.maximum(np.ceil(length / STEP).astype(int), 1)
     segment = np.repeat(np.arange(len(first)), count)
-    inside = (np.arange(len(segment)) - np.repeat(np.cumsum(count) - count, count) + 0.5) / count[
-        segment
-    ]
+    inside = (number_in_piece(count) + 0.5) / count[segment]
     points = begin[segment] + inside[:, None] * (end - begin)[segment]
     width = strands.radius[first] + strands.radius[first + 1]
     return points.astype(np.float32), (width * length / count)[segment]

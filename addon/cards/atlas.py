@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import Bools, Floats, Ints
+from ..arrays import Bools, Floats, Ints, piece_starts
 from ..errors import HairloomError
 from ..strands.face import is_face_hair
 from .atlas_grid import AtlasGrid
@@ -268,7 +268,7 @@ def medoids(features: Floats, count: int, random: np.random.Generator) -> tuple[
         mean = np.stack([np.bincount(label, f, count) for f in features.T], axis=1) / size[:, None]
         gap = ((features - mean[label]) ** 2).sum(axis=1)
         order = np.lexsort((gap, label))
-        medoid = order[np.cumsum(size) - size]
+        medoid = order[piece_starts(size)]
     label = _gaps(features, features[medoid]).argmin(axis=1)
     label[medoid] = np.arange(count)
     return label, medoid

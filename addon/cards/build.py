@@ -8,7 +8,7 @@ from typing import cast
 
 import numpy as np
 
-from ..arrays import Floats, Ints
+from ..arrays import Floats, Ints, piece_starts
 from ..strands import StrandSet, Surface
 from ..strands.face import is_face_hair
 from .atlas import AtlasPlan, plan_atlas
@@ -378,7 +378,7 @@ def with_occlusion_of(finest: CardMesh, level: CardMesh) -> CardMesh:
     owner = card_of_vertex(finest)
     vertices = np.argsort(owner, kind="stable")
     count = np.bincount(owner, minlength=len(finest.group))
-    start = np.cumsum(count) - count
+    start = piece_starts(count)
     mine = card_of_vertex(level)
     step = np.arange(int(count.max(initial=0)))
     candidate = vertices[start[mine, None] + np.minimum(step, count[mine, None] - 1)]

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..arrays import Floats, Ints
+from ..arrays import Floats, Ints, piece_starts
 from ..strands.frames import tangents, transported_normals
 from .clusters import cluster_strands
 from .settings import CardSettings
@@ -150,7 +150,7 @@ class _Mean:
     def __init__(self, cluster: Ints) -> None:
         self._order = np.argsort(cluster, kind="stable")
         counts = np.bincount(cluster)
-        self._counts, self._starts = counts, np.cumsum(counts) - counts
+        self._counts, self._starts = counts, piece_starts(counts)
 
     def of(self, values: Floats) -> Floats:
         """(strand_count, ...) to (cluster_count, ...)."""

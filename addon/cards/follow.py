@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays import Floats, Ints
+from ..arrays import Floats, Ints, piece_starts
 from ..refine.ride import Riders, ride, turns_along
 from ..strands import StrandSet
 from ..strands.affine import moved
@@ -233,7 +233,7 @@ def _middles(across: Floats, row: Ints, count: int) -> Ints:
         across: (m,) where vertices are across their cards. row: (m,) theirs.
     """
     order, sizes = np.lexsort((across, row)), np.bincount(row, minlength=count)
-    begins = np.cumsum(sizes) - sizes
+    begins = piece_starts(sizes)
     begins, sizes = (np.where(sizes == 0, np.roll(of, 1), of) for of in (begins, sizes))
     return np.stack([order[begins + (sizes - 1) // 2], order[begins + sizes // 2]])
 

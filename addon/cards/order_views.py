@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import Bools, Floats, Ints
+from ..arrays import Bools, Floats, Ints, number_in_piece
 from ..strands import Surface
 from .card_mesh import CardMesh
 
@@ -132,7 +132,7 @@ def _candidates(corners: Floats, size: int) -> tuple[Ints, Ints, Ints]:
     width, height = np.maximum(high - low + 1, 0)
     count = width * height * (corners[3] > 0.0).all(axis=0)
     triangle = np.repeat(np.arange(len(count)), count)
-    inside = np.arange(len(triangle)) - np.repeat(np.cumsum(count) - count, count)
+    inside = number_in_piece(count)
     row, column = np.divmod(inside, width[triangle])
     return low[0, triangle] + column, low[1, triangle] + row, triangle
 

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import Floats, Ints
+from ..arrays import Floats, Ints, piece_starts
 
 #: Cells at most: so their numbers fit 16 bits, which numpy sorts fastest; and rows of them.
 _MAX_CELLS, _MAX_ROWS = 1 << 16, 250
@@ -110,7 +110,7 @@ def _spans(grid: PointGrid, corners: Floats) -> tuple[Ints, Ints, Ints]:
     is_beside = (_greatest(x) < 0) | (_least(x) >= grid.column_count)
     rows = np.where(is_beside, 0, np.maximum(beyond - first, 0))
     triangle = np.repeat(np.arange(len(rows)), rows)
-    row = np.arange(len(triangle)) - np.repeat(np.cumsum(rows) - rows - first, rows)
+    row = np.arange(len(triangle)) - np.repeat(piece_starts(rows) - first, rows)
     left, right = _ends_in_row(x, y, triangle, row.astype(np.float32))
     begin = np.clip(left, 0, grid.column_count).astype(np.int64)
     end = np.clip(np.floor(right) + 1, 0, grid.column_count).astype(np.int64)
@@ -164,7 +164,7 @@ def _barycentric_forms(corners: Floats) -> Floats:
 
 def _covered(grid: PointGrid, forms: Floats, triangle: Ints, start: Ints, count: Ints) -> Crossings:
     """The points of spans that lie in their triangles."""
-    begin = np.cumsum(count) - count
+    begin = piece_starts(count)
     is_next = np.zeros(int(begin[-1] + count[-1]), np.int8)
     is_next[begin[1:]] = 1
     span = np.cumsum(is_next, dtype=np.int64)

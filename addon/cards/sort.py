@@ -23,7 +23,7 @@ from typing import Literal
 
 import numpy as np
 
-from ..arrays import Floats, Ints
+from ..arrays import Floats, Ints, piece_starts
 from ..strands import Surface
 from ..strands.closest_point import closest_point
 from .card_mesh import OF_CARDS, OF_VERTICES, CardMesh
@@ -321,13 +321,13 @@ def card_distances(mesh: CardMesh, head: Surface | None) -> Floats:
     owner = card_of_vertex(mesh)
     vertices = np.argsort(owner, kind="stable")
     counts = np.bincount(owner, minlength=int(mesh.card.max()) + 1)
-    starts = np.cumsum(counts) - counts
+    starts = piece_starts(counts)
     fraction = (np.arange(SAMPLE_COUNT) + 0.5) / SAMPLE_COUNT
     used = np.flatnonzero(counts)
     picks = vertices[starts[used, None] + (counts[used, None] * fraction).astype(np.int64)]
     points = mesh.positions[picks.ravel()]
     if head is None:
-        distance = np.linalg.norm(points - mesh.positions.mean(axis=0), axis=1)
+        distance: Floats = np.linalg.norm(points - mesh.positions.mean(axis=0), axis=1)
     else:
         distance = closest_point(points, head).distance
     distances = np.zeros(len(counts))

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import Floats, Ints
+from ..arrays import Floats, Ints, piece_starts
 from ..strands.vectors import unit_or
 from .card_mesh import CardMesh
 from .sort import card_of_vertex
@@ -64,7 +64,7 @@ def taken_over(
     length = np.linalg.norm(np.diff(grid, axis=1), axis=2).sum(axis=1)
     order = np.argsort(card, kind="stable")[np.count_nonzero(card < 0) :]
     count = np.bincount(card[order])
-    start = np.cumsum(count) - count
+    start = piece_starts(count)
     own = card_of_vertex(mesh) % len(count)
     side, reach = _rows(mesh)
     plane = unit_or(np.cross(side, mesh.tangent), mesh.normal)

@@ -21,7 +21,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import Floats, Ints
+from ..arrays import Floats, Ints, number_in_piece
 from ..errors import HairloomError
 from ..strands.side_by_side import even_parts, side_by_side
 from .counter_random import named, uniform
@@ -129,7 +129,7 @@ class _Target:
         wanted = self.mass[some] * (count / self.whole_mass)
         counts = np.floor(wanted + uniform(piece_key, 0)).astype(np.int64)
         piece = np.repeat(np.arange(len(counts)), counts)
-        number = np.arange(len(piece)) - np.repeat(np.cumsum(counts) - counts, counts)
+        number = number_in_piece(counts)
         key = named(piece_key[piece], 1 + number)
         piece += some.start
         density = self.density.take(piece, axis=0)

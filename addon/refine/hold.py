@@ -13,7 +13,7 @@ from typing import Protocol
 
 import numpy as np
 
-from ..arrays import Bools, Floats, Ints
+from ..arrays import Bools, Floats, Ints, number_in_piece
 from ..strands.strand_set import ROOT_POINTS
 
 #: Sweeps to and fro that give a strand its lengths back.
@@ -47,9 +47,7 @@ def hold(points: Floats, rest: Floats, offsets: Ints, holds: Holds, anchors: Flo
     """
     counts = np.diff(offsets)
     begins = np.flatnonzero(np.diff(holds.strand, prepend=-1))
-    order = np.arange(len(holds.strand)) - np.repeat(
-        begins, np.diff(begins, append=len(holds.strand))
-    )
+    order = number_in_piece(np.diff(begins, append=len(holds.strand)))
     before = np.full(len(counts), ROOT_POINTS - 1, np.int64)  # the last point that is held so far
     for number in range(int(order.max(initial=-1)) + 1):
         of_order = np.flatnonzero(order == number)

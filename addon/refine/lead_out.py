@@ -27,7 +27,7 @@ from functools import cache, cached_property
 
 import numpy as np
 
-from ..arrays import Bools, Floats, Ints
+from ..arrays import Bools, Floats, Ints, number_in_piece, piece_starts
 from ..dynamics.colliders import Pose, PosedCollider, signed_distance
 from ..dynamics.colliders.signed_distance import (
     are_outside_meshes,
@@ -89,9 +89,8 @@ class HeldParts:
         """
         strands = held.nonzero()[0]
         counts, last = np.diff(offsets)[strands], held[strands]
-        every, ends = points_of(strands, offsets), np.cumsum(counts)
-        number = np.arange(len(every)) - np.repeat(ends - counts, counts)
-        is_held = number <= np.repeat(last, counts)
+        every = points_of(strands, offsets)
+        is_held = number_in_piece(counts) <= np.repeat(last, counts)
         along = np.maximum.accumulate(np.where(is_held, np.cumsum(is_held) - 1, 0))
         return cls(strands, every[is_held], np.repeat(strands, last + 1), every, along)
 
@@ -150,7 +149,7 @@ class Leans:
         strands: (n,). ridden, led: (m, 3) where they ride, and where they were led to.
         """
         counts = np.diff(offsets)[strands]
-        begins = np.cumsum(counts) - counts
+        begins = piece_starts(counts)
         values = _steps(led - ridden, begins)  # over lengths, which both have in common
         values /= np.maximum(_size(_steps(ridden, begins)), np.float32(_TINY))[:, None]
         return cls(strands, values)._where(_size(values) > UPRIGHT, counts)
@@ -167,7 +166,7 @@ class Leans:
         """Those of strands of these point counts (n,) with any point that is bent (m,)."""
         if not len(self.strands):
             return self
-        chosen = np.logical_or.reduceat(is_bent, np.cumsum(counts) - counts)
+        chosen = np.logical_or.reduceat(is_bent, piece_starts(counts))
         return Leans(self.strands[chosen], self.values[np.repeat(chosen, counts)])
 
     def bend(self, points: Floats, offsets: Ints) -> None:
@@ -175,7 +174,7 @@ class Leans:
         if not len(self.strands):
             return
         counts, index = np.diff(offsets)[self.strands], points_of(self.strands, offsets)
-        begins = np.cumsum(counts) - counts
+        begins = piece_starts(counts)
         ridden = points[index].astype(np.float64)
         steps = _steps(ridden, begins)
         length = _size(steps)
@@ -321,7 +320,7 @@ def _steps(points: Floats, begins: Ints) -> Floats:
 def points_of(strands: Ints, offsets: Ints) -> Ints:
     """The indices of all points of some strands, one strand after the other."""
     counts = np.diff(offsets)[strands]
-    begins = np.cumsum(counts) - counts
+    begins = piece_starts(counts)
     index: Ints = np.arange(counts.sum()) + np.repeat(offsets[:-1][strands] - begins, counts)
     return index
 

@@ -23,7 +23,7 @@ from typing import Any
 import gpu
 import numpy as np
 
-from ..arrays import Ints
+from ..arrays import Ints, number_in_piece
 from ..dynamics.colliders import PosedCollider
 from ..refine.lead_out import (
     ATTEMPTS,
@@ -233,7 +233,7 @@ class LeadOutPass:
         spans = self._layout.spans[led.strands]
         counts = spans[:, 2].astype(int)
         texels = np.repeat(spans[:, :2], counts, axis=0)
-        texels[:, 0] += np.arange(count) - np.repeat(np.cumsum(counts) - counts, counts)
+        texels[:, 0] += number_in_piece(counts)
         points = np.pad(led.points, ((0, 0), (0, 1)))
         shader = program(PUT_RECIPE)
         textures = {

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import Bools, Floats, Ints
+from ..arrays import Bools, Floats, Ints, piece_starts
 from ..errors import HairloomError
 from .point_clusters import PointClusters, clustered
 from .side_by_side import side_by_side
@@ -198,7 +198,7 @@ class ClosestPointSearch:
                 found.append((cluster[is_near], triangle[is_near], far[is_near]))
         cluster, triangle, far = (np.concatenate(each) for each in zip(*found, strict=True))
         count = np.bincount(cluster, minlength=len(middle))
-        return _Candidates(triangle, far, np.cumsum(count) - count, count)
+        return _Candidates(triangle, far, piece_starts(count), count)
 
     def _of_clusters(
         self,
@@ -218,7 +218,7 @@ class ClosestPointSearch:
             best = _Best(self._forms.squared_distance(here, triangle), triangle)
             count, first = candidates.count[cluster], candidates.first[cluster]
             point = np.repeat(np.arange(len(here)), count)
-            pair = np.arange(len(point)) + np.repeat(first - (np.cumsum(count) - count), count)
+            pair = np.arange(len(point)) + np.repeat(first - piece_starts(count), count)
             so_far = np.minimum(np.sqrt(best.distance), reach) + clusters.away[part]
             is_near = candidates.away[pair] <= (so_far * _HAIR)[point]
             self._improve(best, here, point[is_near], candidates.triangle[pair[is_near]])

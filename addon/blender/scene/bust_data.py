@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...arrays import Floats, Ints
+from ...arrays import Floats, Ints, number_in_piece, piece_starts
 
 _FILE = Path(__file__).with_name("bust.npz")
 #: vertex groups, each from 0 to 1: where hair grows
@@ -45,10 +45,10 @@ class Bust:
     @property
     def fans(self) -> tuple[Ints, Ints]:
         """Triangles of the polygons: their corners (triangle_count, 3), and their materials."""
-        first = np.cumsum(self.sizes) - self.sizes
+        first = piece_starts(self.sizes)
         count = self.sizes - 2
         polygon = np.repeat(np.arange(len(count)), count)
-        step = np.arange(len(polygon)) - np.repeat(np.cumsum(count) - count, count)
+        step = number_in_piece(count)
         start = first[polygon]
         corners = np.stack([start, start + step + 1, start + step + 2], axis=1)
         return corners, self.material[polygon]

@@ -7,7 +7,7 @@ from typing import Any
 import bpy
 import numpy as np
 
-from ...arrays import Floats, Ints
+from ...arrays import Floats, Ints, number_in_piece
 from ...errors import HairloomError
 from ...groom.widths import with_widths
 from ...strands import StrandSet
@@ -100,7 +100,7 @@ def write_own_curves(
     curves = obj.data
     offsets, moved_points = curve_offsets(curves), curve_points(curves)
     counts = np.diff(offsets)[own.kept]
-    number = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
+    number = number_in_piece(counts)
     back = np.linalg.inv(np.array(obj.evaluated_get(depsgraph).matrix_world, np.float64))
     moved_points[np.repeat(offsets[own.kept], counts) + number] = moved(points, back)
     put_points(curves, moved_points)

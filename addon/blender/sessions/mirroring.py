@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from ...arrays import Bools, Floats, Ints
+from ...arrays import Bools, Floats, Ints, number_in_piece
 from ...errors import HairloomError
 from ...groom.mirror import Mirrored, mirrored, reflection, sides
 from ...groom.mirror_settings import MirrorSettings
@@ -139,7 +139,7 @@ def _replace(
 
 def _inside(counts: Ints) -> Ints:
     """The number of each point in its own curve."""
-    return np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
+    return number_in_piece(counts)
 
 
 def _name_again(curves: bpy.types.Curves, source: Ints, new: Ints) -> None:

@@ -17,7 +17,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ...arrays import Bools, Floats, Ints
+from ...arrays import Bools, Floats, Ints, number_in_piece
 from ...strands import Surface
 from ...strands.vectors import cross_rows, dot_rows
 from .distance_field import MARGIN, DistanceField, covering, points_on
@@ -126,9 +126,7 @@ class BentField:
             last = max(last, first + 1)
             some = slice(first, last)
             triangle = np.repeat(np.arange(first, last), pairs[some])
-            within = np.arange(len(triangle)) - np.repeat(
-                ends[some] - pairs[some] - (ends[first] - pairs[first]), pairs[some]
-            )
+            within = number_in_piece(pairs[some])
             count = counts[triangle]
             node = np.stack(
                 [

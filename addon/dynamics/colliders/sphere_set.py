@@ -11,7 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ...arrays import Floats, Ints
+from ...arrays import Floats, Ints, piece_starts
 from ...errors import HairloomError
 from .ball_grid import PAIR_LIMIT, BallGrid, ball_distances, ball_grid, box_of
 from .shapes import distance_from, is_solid
@@ -101,7 +101,7 @@ class SphereSetCollider:
         row, begin = self._grid.row.take(cells), self._grid.begin
         first = begin.take(row)
         count = begin.take(row + 1) - first
-        start = np.cumsum(count) - count  # of each point's pairs
+        start = piece_starts(count)  # of each point's pairs
         ball = self._grid.ball.take(np.arange(int(count.sum())) + np.repeat(first - start, count))
         squared = np.zeros(len(ball), np.float32)
         for axis, row in enumerate(points):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...arrays import Floats, Ints
+from ...arrays import Floats, Ints, number_in_piece
 from .seams import Borders
 
 #: [texels] along a border from one texel that the search starts from to the next
@@ -71,7 +71,7 @@ def _seeds(start: Floats, end: Floats, columns: int, rows: int) -> tuple[Ints, I
     """Texels along each border, and whose they are."""
     count = np.ceil(np.linalg.norm(end - start, axis=1) / _SEED_STEP).astype(int) + 1
     border = np.repeat(np.arange(len(start)), count)
-    number = np.arange(len(border)) - np.repeat(np.cumsum(count) - count, count)
+    number = number_in_piece(count)
     fraction = (number / np.maximum(count - 1, 1)[border])[:, None]
     point = start[border] + fraction * (end[border] - start[border])
     column, row = np.clip(np.floor(point), 0, [columns - 1, rows - 1]).astype(int).T

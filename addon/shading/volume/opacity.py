@@ -28,7 +28,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...arrays import Bools, Floats, Ints
+from ...arrays import Bools, Floats, Ints, piece_starts
 from .light_frame import LightFrame
 from .settings import VolumeSettings
 
@@ -315,7 +315,7 @@ def coverage(
     texels = np.linalg.norm(to_place - from_place, axis=-1) * resolution
     count = np.maximum(np.ceil(texels / _PIECE), 1).astype(np.int64)
     segment = np.repeat(np.arange(len(start)), count)
-    first = np.repeat(np.cumsum(count) - count, count)
+    first = np.repeat(piece_starts(count), count)
     fraction = (np.arange(len(segment)) - first + 0.5) / count[segment]
     middle = start[segment] + (end - start)[segment] * fraction[:, None]
     place, depth = frame.places(middle.astype(np.float64))
