@@ -143,8 +143,8 @@ class CardExportSettings(Settings):
     joint_error: float = number(
         1.0,
         label="Error",
-        description="Root mean square distance of cards from the simulation, of the median length "
-        "of the guides",
+        description="Root mean square distance of cards from the simulation, as a fraction of the "
+        "median length of the guides",
         soft=(0.01, 10.0),
         hard=(0.01, 100.0),
         unit="percent",

@@ -137,14 +137,14 @@ def _own_folder(obj: bpy.types.Object, beside: str) -> str:
 
 def _is_shared(obj: bpy.types.Object) -> bool:
     """Whether another object names the same folder, as a duplicate names that of its original."""
-    own = folder_of(obj)
-    theirs = (folder_of(other) for other in _others(obj))
-    return own is not None and any(each and same_folder(own, each) for each in theirs)
+    own = _place_of(obj)
+    return bool(own) and own in map(_place_of, _others(obj))
 
 
-def same_folder(one: Path, other: Path) -> bool:
-    """Whether two paths lead to one folder on any system."""
-    return as_compared(str(one.resolve())) == as_compared(str(other.resolve()))
+def _place_of(obj: bpy.types.Object) -> str:
+    """The same for paths that lead to one folder on any system; empty where it names none."""
+    folder = folder_of(obj)
+    return "" if folder is None else as_compared(str(folder.resolve()))
 
 
 def _others(obj: bpy.types.Object) -> list[bpy.types.Object]:

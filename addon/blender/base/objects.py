@@ -21,7 +21,7 @@ type LayerKey = tuple[int, str]
 
 
 class ObjectGoneError(HairloomError):
-    """An object that was there is no longer."""
+    """An object no longer exists."""
 
 
 @dataclass
