@@ -12,7 +12,7 @@ from ..blender.base import gpu_choices
 from ..blender.base.gpu_context import gpu_in_use
 from ..blender.base.redraw import redraw_views
 from ..blender.properties.groups import operator_properties
-from ..blender.properties.presets import names
+from ..blender.properties.presets import titles
 from ..blender.sessions.solvers import compute_problem
 from ..blender.setup.self_test import last_report
 from .menus import draw_shortcuts
@@ -20,15 +20,16 @@ from .messages import draw_message
 
 #: the package that Blender knows, above this one
 ROOT_PACKAGE = __package__.rpartition(".addon")[0]
-LOOK, DYNAMICS = "looks/brown", "dynamics/breeze"
+#: titles of presets
+LOOK, DYNAMICS = "Brown", "Breeze"
 
 
 def _looks(_owner: Any, _context: bpy.types.Context, typed: str) -> list[str]:
-    return [name for name in names("shading") if typed.lower() in name.lower()]
+    return [name for name in titles("shading") if typed.lower() in name.lower()]
 
 
 def _motions(_owner: Any, _context: bpy.types.Context, typed: str) -> list[str]:
-    return [name for name in names("dynamics") if typed.lower() in name.lower()]
+    return [name for name in titles("dynamics") if typed.lower() in name.lower()]
 
 
 #: what a new groom has; for the `__annotations__` of the page, and of operators that make one
@@ -164,9 +165,10 @@ def chosen_presets(chosen: Any) -> tuple[str, ...]:
     """The presets of a new groom, by name.
 
     Args:
-        chosen: preferences, or an operator with NEW_GROOM.
+        chosen: preferences, or an operator with NEW_GROOM: presets by their title or name.
     """
-    return tuple(name for name in (chosen.look, chosen.motion) if name)
+    typed = {"shading": chosen.look, "dynamics": chosen.motion}
+    return tuple(titles(section).get(text, text) for section, text in typed.items() if text)
 
 
 def register() -> None:

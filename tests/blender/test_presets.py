@@ -322,6 +322,16 @@ def test_the_look_under_water_brings_its_shafts_of_light_with_it(hair: bpy.types
     assert job_options.chosen_settings(options)[ShaftSettings] == wanted[0]
 
 
+def test_a_title_stands_for_one_preset(hair: bpy.types.Object, own_folder: Path) -> None:
+    """An artist may call a look of their own as one that ships."""
+    assert presets.titles("dynamics")["Soft and long"] == "dynamics/soft"
+    for title in ("Brown", "Mine"):
+        bpy.ops.hairloom.save_preset(title=title)
+    found = presets.titles("shading")
+    assert found["Brown"] == "looks/brown" and found["own/brown"] == "own/brown"
+    assert found["Mine"] == "own/mine"
+
+
 def test_a_title_in_capitals_is_the_same_title(hair: bpy.types.Object, own_folder: Path) -> None:
     """As the dialog says, and as files are on Windows and macOS."""
     for title, width in (("Bob", 0.1), ("BOB", 0.2)):

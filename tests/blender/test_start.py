@@ -17,7 +17,7 @@ from hairloom.addon.blender.viewport import overlay
 from hairloom.addon.groom.settings import GrowSettings
 from hairloom.addon.shading.settings import ShadingSettings
 from hairloom.addon.ui import operators_start
-from hairloom.addon.ui.preferences import DYNAMICS, LOOK, chosen_presets, preferences
+from hairloom.addon.ui.preferences import chosen_presets, preferences
 
 pytestmark = [pytest.mark.portable, pytest.mark.usefixtures("extension")]
 FEW = {"strand_count": 150, "length": 0.1}
@@ -35,7 +35,9 @@ def test_a_groom_is_grown_dressed_previewed_and_active(sphere):
     assert bpy.ops.hairloom.add_groom(**FEW) == {"FINISHED"}
     hair = bpy.context.object
     assert hair.type == "CURVES" and hair.data.surface == sphere and len(hair.data.curves) == 150
-    look, motion = (named_preset(name).settings for name in (LOOK, DYNAMICS))
+    look, motion = (
+        named_preset(name).settings for name in chosen_presets(preferences(bpy.context))
+    )
     assert hair.data.hairloom.shading.base_color[:] == pytest.approx(look.base_color)
     assert hair.hairloom.dynamics.wind_speed == pytest.approx(motion.wind_speed)
     assert motion.wind_speed > 0.0, "nothing moves in still air"
@@ -59,8 +61,9 @@ def test_a_new_groom_can_be_adjusted(sphere, name):
     assert not operator.poll()
 
 
-def test_the_presets_of_a_new_groom_can_be_others_or_none(sphere):
-    bpy.ops.hairloom.add_groom(look="looks/blond", motion="", **FEW)
+@pytest.mark.parametrize("look", ["looks/blond", "Blond"], ids=["by name", "by title"])
+def test_the_presets_of_a_new_groom_can_be_others_or_none(sphere, look):
+    bpy.ops.hairloom.add_groom(look=look, motion="", **FEW)
     hair = bpy.context.object
     blond = named_preset("looks/blond").settings
     assert hair.data.hairloom.shading.base_color[:] == pytest.approx(blond.base_color)
@@ -165,7 +168,7 @@ def test_empty_hair_of_blenders_gets_hair_a_look_and_a_preview(sphere):
     hair = bpy.data.objects[name]
     assert len(hair.data.curves) > 1000 and hair.data.surface == sphere
     assert not own_dynamics(hair) and len(previews.sessions()) == 1
-    blond = named_preset(preferences(bpy.context).look).settings
+    blond = named_preset(chosen_presets(preferences(bpy.context))[0]).settings
     assert hair.data.hairloom.shading.base_color[:] == pytest.approx(blond.base_color)
     assert len(bpy.data.hair_curves) == 1, "the empty curves are left"
 

@@ -88,9 +88,15 @@ def own(section: str) -> tuple[tuple[Entry, ...], tuple[str, ...]]:
     return tuple(sorted(entries, key=lambda entry: entry.title.lower())), tuple(warnings)
 
 
-def names(section: str) -> list[str]:
-    """All presets of one section, as `named_preset` knows them: those that ship come first."""
-    return [entry.name for entry in (*shipped(section), *own(section)[0])]
+def titles(section: str) -> dict[str, str]:
+    """Title of each preset of one section -> its name; those that ship come first.
+
+    A preset whose title another has before it stands under its name.
+    """
+    found: dict[str, str] = {}
+    for entry in (*shipped(section), *own(section)[0]):
+        found[entry.name if entry.title in found else entry.title] = entry.name
+    return found
 
 
 def own_folder() -> Path:
