@@ -266,6 +266,16 @@ def test_where_the_hair_cannot_be_laid_over_blender_draws_it(
     assert wrong == "gone" or problem in capsys.readouterr().out
 
 
+def test_time_of_the_hair_is_stretched_as_that_of_its_scene(cycles: Any, tmp_path: Path) -> None:
+    """The hair scene shows the moment that Blender's own engine shows."""
+    cycles.hairloom.use_hair_scene = True
+    cycles.render.frame_map_old, cycles.render.frame_map_new = 100, 200
+    cycles.frame_set(50)
+    rendered(tmp_path)
+    hair = hair_scene.hair_scene_of(cycles)
+    assert hair.frame_current_final == cycles.frame_current_final == 25.0
+
+
 @pytest.mark.slow
 def test_cameras_that_change_in_an_animation_are_followed(
     cycles: Any, hairy: Any, tmp_path: Path

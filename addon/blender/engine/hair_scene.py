@@ -31,6 +31,7 @@ _RENDER = (
     *("resolution_x", "resolution_y", "resolution_percentage", "pixel_aspect_x", "pixel_aspect_y"),
     *("use_border", "use_crop_to_border", "border_min_x", "border_min_y"),
     *("border_max_x", "border_max_y", "filter_size", "fps", "fps_base"),
+    *("frame_map_old", "frame_map_new"),
     *("use_motion_blur", "motion_blur_position", "motion_blur_shutter"),
     *("use_multiview", "views_format"),
 )
