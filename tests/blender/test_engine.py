@@ -169,6 +169,22 @@ def test_motion_blur_spreads_over_the_way(stage: Any, tmp_path: Path) -> None:
     assert stage.frame_current == 2 and stage.frame_subframe == 0.0
 
 
+def test_stretched_time_is_stretched_once(stage: Any, tmp_path: Path) -> None:
+    """A shutter that hardly opens shows what is seen without motion blur."""
+    stage.hairloom.picture.samples = stage.hairloom.picture.motion_steps = 2
+    ball = add_ball(0.05)
+    for frame, x in ((1, -0.2), (21, 0.2)):
+        ball.location.x = x
+        ball.keyframe_insert("location", frame=frame)
+    stage.render.frame_map_old, stage.render.frame_map_new = 100, 200
+    stage.frame_set(20)
+    stage.render.film_transparent = True
+    sharp = picture(tmp_path)[..., 3]
+    stage.render.use_motion_blur, stage.render.motion_blur_shutter = True, 0.01
+    assert sharp.any(), "there is a ball"
+    np.testing.assert_allclose(picture(tmp_path)[..., 3], sharp, atol=0.02)
+
+
 def curves_of(obj: Any) -> Iterator[Any]:
     for layer in obj.animation_data.action.layers:
         for strip in layer.strips:

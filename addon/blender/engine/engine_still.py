@@ -134,7 +134,9 @@ class Still:
             engine.get_result().stamp_data_add_field(key, value)
 
     def _fill(self, result: Any) -> None:
-        frame = self._depsgraph.scene.frame_current_final
+        timed = self._depsgraph.scene
+        # frame_set stretches time itself
+        frame = timed.frame_current + timed.frame_subframe
         moments = sample_times(self._settings, self._render)
         lens = read_lens(self._engine, self._depsgraph)
         through_lens = None if lens is None else lens.places(self._settings.samples)
