@@ -185,6 +185,13 @@ def test_stretched_time_is_stretched_once(stage: Any, tmp_path: Path) -> None:
     np.testing.assert_allclose(picture(tmp_path)[..., 3], sharp, atol=0.02)
 
 
+@pytest.mark.parametrize("kind", ["nothing", "empty"])
+def test_without_a_camera_the_report_says_so(stage: Any, tmp_path: Path, kind: str) -> None:
+    stage.camera = None if kind == "nothing" else bpy.data.objects.new("Empty", None)
+    with pytest.raises(RuntimeError, match="camera"):
+        rendered(tmp_path)
+
+
 def curves_of(obj: Any) -> Iterator[Any]:
     for layer in obj.animation_data.action.layers:
         for strip in layer.strips:

@@ -31,8 +31,8 @@ def read_camera(
     Raises:
         HairloomError: there is no camera.
     """
-    camera = engine.camera_override or depsgraph.scene.camera
-    if camera is None or camera.type != "CAMERA":
+    camera = _chosen(engine, depsgraph)
+    if camera is None:
         raise HairloomError(
             "there is no camera", place=depsgraph.scene.name, remedy="Add one (Add > Camera)"
         )
@@ -56,10 +56,16 @@ def read_camera(
     return cropped(Camera(_view_matrix(matrix), projection), window)
 
 
+def _chosen(engine: Any, depsgraph: bpy.types.Depsgraph) -> bpy.types.Object | None:
+    """The camera that renders now; None where the scene has none, or another object for it."""
+    camera = engine.camera_override or depsgraph.scene.camera
+    return camera if camera is not None and camera.type == "CAMERA" else None
+
+
 def read_lens(engine: Any, depsgraph: bpy.types.Depsgraph) -> Lens | None:
     """The lens of the camera that renders now; None where all is sharp."""
-    camera = engine.camera_override or depsgraph.scene.camera
-    if camera is None or camera.type != "CAMERA" or not camera.data.dof.use_dof:
+    camera = _chosen(engine, depsgraph)
+    if camera is None or not camera.data.dof.use_dof:
         return None
     evaluated = camera.evaluated_get(depsgraph)
     data = evaluated.data
@@ -87,9 +93,9 @@ def _focus_distance(camera: bpy.types.Object, depsgraph: bpy.types.Depsgraph) ->
     return float(abs(seen.z))
 
 
-def camera_warnings(depsgraph: bpy.types.Depsgraph) -> tuple[str, ...]:
+def camera_warnings(engine: Any, depsgraph: bpy.types.Depsgraph) -> tuple[str, ...]:
     """What the artist should know about the camera, with its remedy; mostly nothing."""
-    camera = depsgraph.scene.camera
+    camera = _chosen(engine, depsgraph)
     if camera is None or camera.data.type != "PANO":
         return ()
     return (

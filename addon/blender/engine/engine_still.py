@@ -197,10 +197,11 @@ class Still:
 
     def _moment(self) -> tuple[SceneSnapshot, Camera]:
         """Scene and camera as they are evaluated now."""
+        seen = read_camera(self._engine, self._depsgraph, *self._whole, self._window)
         scene = self._reader.read(self._depsgraph)
-        found = (*self._reader.warnings, *camera_warnings(self._depsgraph))
+        found = (*self._reader.warnings, *camera_warnings(self._engine, self._depsgraph))
         self.warnings = tuple(dict.fromkeys((*self.warnings, *found, *_dark(scene))))
-        return scene, read_camera(self._engine, self._depsgraph, *self._whole, self._window)
+        return scene, seen
 
     def _go_to(self, time_: float) -> None:
         frame = int(np.floor(time_))
