@@ -7,7 +7,8 @@ layout(early_fragment_tests) in;
 
 void main()
 {
-  vec2 on_screen = all_and_left(mesh_point, normalize(mesh_normal));
+  vec3 facet = cross(dFdx(mesh_point), dFdy(mesh_point));
+  vec2 on_screen = all_and_left(mesh_point, normalize(mesh_normal), facet);
   ivec2 pixel = ivec2(gl_FragCoord.xy);
   vec2 before = imageLoad(taken_and_all, pixel).xy;
   float fraction = (before.y > 0.0 ? 1.0 - before.x / before.y : 1.0) * on_screen.y / on_screen.x;

@@ -4,6 +4,7 @@
 // recipes of body_shadow.py have: view, lights, maps, body_color, hair_forward.
 #include "lib_lights.glsl"
 #include "lib_environment.glsl"
+#include "lib_facing.glsl"
 #include "lib_shadows.glsl"
 #include "lib_output.glsl"
 
@@ -18,10 +19,10 @@ float shown(vec3 radiance)
 
 // Brightness on the screen at a place of a mesh: x with all light, y with what hair leaves of it. Where
 // there is no light at all hair takes none.
-vec2 all_and_left(vec3 point, vec3 normal)
+//   facet: see facing_normal.
+vec2 all_and_left(vec3 point, vec3 normal, vec3 facet)
 {
-  vec3 to_eye = view.eye.xyz - view.eye.w * point;
-  normal = dot(normal, to_eye) < 0.0 ? -normal : normal;
+  normal = facing_normal(normal, normal, facet, normalize(view.eye.xyz - view.eye.w * point));
   vec3 all_light = matt_light(lights, normal);
   vec3 left = all_light;
   for (int index = 0; index < int(lights.ambient_and_count.w); index++) {

@@ -5,6 +5,7 @@
 // and bend its normals. HASHED and BLENDED: it does not cover all. EMISSION: it shines.
 #include "lib_lights.glsl"
 #include "lib_environment.glsl"
+#include "lib_facing.glsl"
 #include "lib_microfacet.glsl"
 #include "lib_shadows.glsl"
 #include "lib_output.glsl"
@@ -41,7 +42,7 @@ vec3 bent_normal(vec3 normal, vec3 mapped, float bump)
 void main()
 {
   vec3 to_eye = normalize(view.eye.xyz - view.eye.w * mesh_point);
-  vec3 normal = normalize(mesh_normal);
+  vec3 own_normal = normalize(mesh_normal), normal = own_normal;
   vec3 facet = cross(dFdx(mesh_point), dFdy(mesh_point));
 #ifdef PICTURES
   vec4 texel = texture(mesh_color_map, mesh_uv);
@@ -60,7 +61,7 @@ void main()
     discard;
   }
 #endif
-  normal = dot(normal, to_eye) < 0.0 ? reflect(normal, to_eye) : normal;
+  normal = facing_normal(own_normal, normal, facet, to_eye);
 
 #ifdef SKIN
   float known;

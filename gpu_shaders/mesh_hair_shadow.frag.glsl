@@ -3,6 +3,7 @@
 // OTHER_TAU, SKIN, HASHED and BLENDED as in mesh.frag.glsl; of PICTURES only alpha counts.
 #include "lib_lights.glsl"
 #include "lib_environment.glsl"
+#include "lib_facing.glsl"
 #include "lib_shadows.glsl"
 #ifdef SKIN
 #  include "lib_skin.glsl"
@@ -28,10 +29,10 @@ void main()
     discard;
   }
 #endif
-  vec3 to_eye = view.eye.xyz - view.eye.w * mesh_point;
-  vec3 normal = normalize(mesh_normal);
-  normal = dot(normal, to_eye) < 0.0 ? reflect(normal, normalize(to_eye)) : normal;
+  vec3 to_eye = normalize(view.eye.xyz - view.eye.w * mesh_point);
   vec3 facet = cross(dFdx(mesh_point), dFdy(mesh_point));
+  vec3 normal = normalize(mesh_normal);
+  normal = facing_normal(normal, normal, facet, to_eye);
 #ifdef SKIN
   float known;
   vec4 soft = skin_soft_shadow(skin_shadow,

@@ -161,6 +161,24 @@ def test_a_mesh_hides_what_is_behind_it_only(frame: Any, front: Any) -> None:
     assert middle[70].tolist() == [0.0, 0.0, 0.0, 0.0], "nothing"
 
 
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_both_sides_of_a_mesh_are_lit_alike(frame: Any, front: Any, side: float) -> None:
+    """A square at 45 degrees whose normal points away from the eye or to it, lit from before."""
+    corners = np.array([[0, -0.5, 0], [1, -0.5, 0], [1, 0.5, 1], [0, 0.5, 1]], np.float32)
+    square = Surface(corners, np.array([[0, 1, 2], [0, 2, 3]])[:, :: int(side)])
+    normals = square.vertex_normals()
+    assert np.sign(normals[0, 1]) == -side
+    snapshot = frame.Snapshot(
+        np.zeros((0, 2, 3), np.float32),
+        np.zeros((0, 2), np.float32),
+        meshes=(frame.MeshSnapshot(square, normals, (0.8, 0.5, 0.2), specular=0.0),),
+        lights=(Light.sun((0.0, 1.0, -1.0), (1.0, 1.0, 1.0), 3.0),),
+        ambient=(0.0, 0.0, 0.0),
+    )
+    seen = frame.render_image(snapshot, front, 16, 16, 1)[8, 8, :3]
+    np.testing.assert_allclose(seen, np.array([0.8, 0.5, 0.2]) * 3.0 / np.pi, rtol=1e-3)
+
+
 def test_more_strands_than_a_texture_has_rows(frame: Any) -> None:
     """20,000 strands, each in a cell of its own, each with a brightness that names it."""
     columns, rows = 200, 100
