@@ -255,10 +255,8 @@ def brightest(lights: Iterable[Light], place: Floats) -> tuple[Light, ...]:
 
 
 def kept_lights(lights: Sequence[Light]) -> list[Light]:
-    """The lights that shaders know, in their order: those beyond the capacity are left out,
-    weakest first.
-    """
-    return sorted(lights, key=lambda light: -sum(light.power) * _reach(light))[:LIGHT_CAPACITY]
+    """The lights that shaders know, in their order, which is that of `brightest`."""
+    return list(lights[:LIGHT_CAPACITY])
 
 
 def pack_lights(
@@ -293,11 +291,6 @@ def _lanes(light: Light) -> Floats:
         lanes[3:, 3] = light.cone.fade
     lanes[0, 3] = _FORMS.index(form)
     return lanes
-
-
-def _reach(light: Light) -> float:
-    """Rough irradiance per unit of power, to compare lights: a point is taken as a metre away."""
-    return 1.0 if light.kind == "sun" else 1.0 / (4.0 * np.pi)
 
 
 def _triple(values: Sequence[float] | Floats) -> tuple[float, float, float]:

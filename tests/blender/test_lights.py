@@ -196,14 +196,14 @@ def test_hair_is_lit_as_blender_lights_the_rest_and_never_black() -> None:
     for kind in ("MATERIAL", "RENDERED"):
         picture = studio_environment(view(kind, False, False))
         assert picture.ambient[0] > 0.0 and picture.harmonics is not None
-        assert shown(view(kind, True, True), (lamp, sun), world) == ((lamp, sun), world)
+        assert shown(view(kind, True, True), (sun, lamp), world) == ((sun, lamp), world)
         assert shown(view(kind, False, True), (lamp, sun), world) == ((sun,), world)
         assert shown(view(kind, True, True), (), world) == ((), world)
         of_picture = picture.ambient[0]
         assert shown(view(kind, True, False), (lamp, sun), world) == (
-            (lamp, *picture.suns),
+            (*picture.suns, lamp),
             of_picture,
-        )
+        ), "no lamp takes their place"
         assert shown(view(kind, False, False), (lamp,), world) == (picture.suns, of_picture)
         assert shown(view(kind, True, False, ""), (), world) == (studio, plain)
         assert shown(view(kind, True, False, "none.exr"), (), world) == (studio, plain)

@@ -573,8 +573,9 @@ def lit[Shown: (Snapshot, SceneSnapshot)](
     scene: Snapshot | SceneSnapshot = shown
     own = Environment(scene.ambient, scene.harmonics, world_suns(scene.lights))
     world: Environment = own if used[1] else studio_environment(shading)
-    lamps: tuple[Light, ...] = tuple(light for light in scene.lights if not light.of_world)
-    lights = (*(lamps if used[0] else ()), *world.suns)
+    known: tuple[Light, ...] = tuple(light for light in scene.lights if used[light.of_world])
+    # suns of the view's own picture come first, since no light of the scene may take their place
+    lights = known if used[1] else (*world.suns, *known)
     if not lights and world.is_black:
         return replace(shown, lights=studio, ambient=Snapshot.ambient, harmonics=None)
     return replace(shown, lights=lights, ambient=world.ambient, harmonics=world.harmonics)

@@ -12,6 +12,7 @@ from hairloom.addon.shading.lights import (
     LIGHT_CAPACITY,
     Cone,
     Light,
+    brightest,
     light_at,
     light_irradiance,
     pack_lights,
@@ -157,11 +158,15 @@ def test_packed_lanes() -> None:
     assert along[2:] == pytest.approx(np.array([[0, 0, 1, 0.25], [0, 0, -1, 1e8]]))
 
 
-def test_the_weakest_lights_are_left_out() -> None:
-    suns = [Light.sun((0.0, 0.0, -1.0), (1.0, 1.0, 1.0), strength) for strength in range(1, 12)]
-    block = pack_lights(suns, (0.0, 0.0, 0.0)).reshape(-1, 4)
+def test_the_brightest_lights_come_first_and_the_weakest_are_left_out() -> None:
+    """Not by their power: a sun of 3 W/m^2 is brighter than lamps of 100 W five metres away."""
+    lamps = [Light.point((5.0 + n, 0.0, 0.0), WHITE, 100.0) for n in range(9)]
+    sun = Light.sun((0.0, 0.0, -1.0), WHITE, 3.0)
+    block = pack_lights(brightest((*lamps, sun), np.zeros(3)), (0.0, 0.0, 0.0)).reshape(-1, 4)
     assert block[0, 3] == LIGHT_CAPACITY
-    assert sorted(block[1 + LIGHT_CAPACITY :, 0][:LIGHT_CAPACITY]) == list(range(4, 12))
+    places = block[1 : 1 + LIGHT_CAPACITY]
+    assert places[0].tolist() == [0.0, 0.0, 1.0, 0.0]
+    assert places[1:, 0].tolist() == [5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0]
 
 
 def test_studio_hangs_on_the_camera() -> None:
