@@ -38,8 +38,8 @@ def lights() -> tuple[Light, ...]:
     return read_lights(bpy.context.evaluated_depsgraph_get(), np.zeros(3))
 
 
-def warnings() -> tuple[str, ...]:
-    return light_warnings(bpy.context.evaluated_depsgraph_get())
+def warnings(*suns: Light) -> tuple[str, ...]:
+    return light_warnings(bpy.context.evaluated_depsgraph_get(), suns)
 
 
 def test_eight_that_are_brightest_at_the_hair_are_kept_and_the_artist_is_told():
@@ -48,6 +48,9 @@ def test_eight_that_are_brightest_at_the_hair_are_kept_and_the_artist_is_told():
         add("POINT", (0.0, 0.0, 1.0 + place), energy=10.0)
     assert len(lights()) == LIGHT_CAPACITY
     assert warnings() == ()
+    sun = Light("sun", (1.0, 0.0, 0.0), (2.0, 2.0, 2.0), of_world=True)
+    (warning,) = warnings(sun)
+    assert warning.startswith("Lights: 9 shine here (1 from the world), but")
     far = add("POINT", (0.0, 0.0, 100.0), energy=1000.0)
     near = add("POINT", (0.0, 0.0, 0.1), energy=1.0)
     away = add("AREA", (0.0, 0.0, 0.2), energy=1000.0)

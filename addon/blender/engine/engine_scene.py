@@ -139,9 +139,10 @@ class SceneReader:
         of_meshes = [note for each in read.values() for note in each.notes]
         if any(_has_soft_shadow(each.groom.snapshot) for each in grooms.values()):
             of_meshes += [note for each in read.values() for note in each.skin_notes]
-        self.warnings = (*warnings, *dict.fromkeys(of_meshes), *light_warnings(depsgraph))
         environment = read_environment(depsgraph.scene_eval, blocking=blocking)
-        self.warnings = (*self.warnings, *world_notes(depsgraph.scene_eval))
+        of_light = light_warnings(depsgraph, environment.suns)
+        of_world = world_notes(depsgraph.scene_eval)
+        self.warnings = (*warnings, *dict.fromkeys(of_meshes), *of_light, *of_world)
         return SceneSnapshot(
             meshes=tuple(drawn),
             casters=tuple(casters),

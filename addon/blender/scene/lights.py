@@ -31,14 +31,16 @@ def read_lights(
     return brightest([*_lights(depsgraph), *suns], center)
 
 
-def light_warnings(depsgraph: bpy.types.Depsgraph) -> tuple[str, ...]:
-    """Warnings about the scene's lights, each with its remedy; usually none."""
-    count = sum(1 for _ in _lights(depsgraph))
+def light_warnings(depsgraph: bpy.types.Depsgraph, suns: Sequence[Light] = ()) -> tuple[str, ...]:
+    """Warnings about the scene's lights, each with its remedy; usually none. Suns as of
+    `read_lights`."""
+    count = sum(1 for _ in _lights(depsgraph)) + len(suns)
     if count <= LIGHT_CAPACITY:
         return ()
+    of_world = f" ({len(suns)} from the world)" if suns else ""
     return (
-        f"Lights: {count} shine here, but the preview draws only the {LIGHT_CAPACITY} that are "
-        "brightest at the middle of the hair. Hide those that add least.",
+        f"Lights: {count} shine here{of_world}, but the preview draws only the {LIGHT_CAPACITY} "
+        "that are brightest at the middle of the hair. Hide those that add least.",
     )
 
 

@@ -204,7 +204,10 @@ class GroomPicture:
             ambient=environment.ambient,
             harmonics=environment.harmonics,
         )
-        self._light_warnings = (*light_warnings(depsgraph), *world_notes(depsgraph.scene))
+        self._light_warnings = (
+            *light_warnings(depsgraph, environment.suns),
+            *world_notes(depsgraph.scene),
+        )
 
     def show(
         self, rig: Rig, solver: Solver, settings: GroomSettings, solids: Solids | None
