@@ -14,7 +14,10 @@ bpy = pytest.importorskip("bpy", reason="these tests need Blender or the bpy mod
 
 from engine_stage import SIZE, add_ball, picture, rendered  # noqa: E402
 
+from hairloom.addon.blender.engine import engine_hair  # noqa: E402
 from hairloom.addon.blender.engine.engine_meshes import read_meshes  # noqa: E402
+from hairloom.addon.light_flow import strand_axes  # noqa: E402
+from hairloom.addon.strands import StrandSet  # noqa: E402
 
 pytestmark = [pytest.mark.draws, pytest.mark.usefixtures("gpu_context", "extension")]
 
@@ -119,6 +122,39 @@ def test_texts_metaballs_and_instances_are_drawn(stage: Any, tmp_path: Path) -> 
         stage.collection.objects.link(empty)
     alpha = picture(tmp_path)[SIZE // 2, :, 3]
     assert np.count_nonzero(np.diff((alpha > 0.5).astype(int))) == 4
+
+
+@pytest.mark.parametrize("shown_as", ["strands", "cards"])
+def test_hair_of_instances_is_as_thick_and_lit_as_it_looks(
+    sphere: Any, new_hair: Callable[..., Any], shown_as: str
+) -> None:
+    """Twice as large is twice as thick, and vectors of light are mirrored with the hair."""
+    hair = new_hair(sphere)
+    settings = hair.data.hairloom
+    settings.card_drawing.shown_as, settings.card_occlusion.rays = shown_as, 4
+    settings.cards.order_by, settings.atlas.source = "distance", "made"
+    own = engine_hair.read_groom(hair, bpy.context.evaluated_depsgraph_get())
+    large = engine_hair.placed(own, np.diag((2.0, 2.0, 2.0, 1.0)))
+    mirrored = engine_hair.placed(own, np.diag((-1.0, 1.0, 1.0, 1.0)))
+    if own.cards is None:
+        np.testing.assert_allclose(large.radius, 2.0 * own.radius)
+    else:
+        np.testing.assert_allclose(large.cards.depth, 2.0 * own.cards.depth)
+    for before, after in zip(vectors_of(own), vectors_of(mirrored), strict=True):
+        np.testing.assert_allclose(after, before * (-1.0, 1.0, 1.0), atol=1e-5)
+
+
+def vectors_of(snapshot: Any) -> list[np.ndarray]:
+    """Where light comes to hair from, and where skin lies: (n, 3) each, world space."""
+    drawn, layout = snapshot.cards or snapshot, snapshot.layout
+    if snapshot.cards is None:
+        group = np.zeros(layout.strand_count, np.int32)
+        strands = StrandSet(snapshot.points, layout.offsets, snapshot.radius, group)
+        axes = strand_axes(strands)
+    else:
+        axes = drawn.mesh.axes
+    lanes = drawn.openness[:, 1:4], drawn.skin_seen[:, 1:4], drawn.skin_seen[:, 4:7]
+    return [np.einsum("na,anx->nx", parts, np.array(axes)) for parts in lanes]
 
 
 def test_a_mesh_that_is_edited_is_seen_as_it_is(sphere: Any) -> None:

@@ -24,7 +24,7 @@ from ...render.snapshot import Snapshot
 from ...rig_flow import Rig
 from ...shading.ambient_settings import AmbientSettings
 from ...shading.settings import ShadingSettings
-from ...strands.affine import moved
+from ...strands.affine import mean_scale, moved
 from ..bakes import playback
 from ..bakes.baked_rig import BakedRig
 from ..bakes.cache import Cache
@@ -224,14 +224,42 @@ def uids_of(hair: bpy.types.Object) -> set[int]:
 
 
 def placed(snapshot: Snapshot, motion: Floats) -> Snapshot:
-    """The same, moved by an affine (4, 4) matrix, as an instance is."""
-    points = moved(snapshot.points, motion)
-    cards, center = snapshot.cards, snapshot.volume_center
+    """The same, moved by an affine (4, 4) matrix, as an instance is. Hair gets thicker as it gets
+    longer on average, and in a mirror what lies across a strand lies on its other side."""
+    cards, center, scale = snapshot.cards, snapshot.volume_center, mean_scale(motion)
+    is_mirrored = bool(np.linalg.det(motion[:3, :3]) < 0.0)
     if cards is not None:
-        cards = replace(cards, mesh=moved_mesh(cards.mesh, motion))
+        back, depth = cards.back_triangles, cards.depth
+        cards = replace(
+            cards,
+            mesh=moved_mesh(cards.mesh, motion),
+            back_triangles=back[:, ::-1] if is_mirrored and back is not None else back,
+            openness=_placed_light(cards.openness, is_mirrored),
+            skin_seen=_placed_light(cards.skin_seen, is_mirrored),
+            depth=None if depth is None else depth * np.float32(scale),
+        )
     if center is not None:
         center = moved(center[None], motion)[0]
-    return replace(snapshot, points=points, cards=cards, volume_center=center)
+    return replace(
+        snapshot,
+        points=moved(snapshot.points, motion),
+        radius=snapshot.radius * np.float32(scale),
+        spacing=snapshot.spacing * scale,
+        openness=_placed_light(snapshot.openness, is_mirrored),
+        skin_seen=_placed_light(snapshot.skin_seen, is_mirrored),
+        cards=cards,
+        volume_center=center,
+    )
+
+
+def _placed_light(light: Floats | None, is_mirrored: bool) -> Floats | None:
+    """Openness (n, 4) or the skin that is seen (n, 8), whose vectors lie by axes of which the third
+    is the cross product of the others."""
+    if light is None or not is_mirrored:
+        return light
+    sign = np.ones(light.shape[1], np.float32)
+    sign[3::3] = -1.0
+    return light * sign
 
 
 def is_pending(uid: int) -> bool:
