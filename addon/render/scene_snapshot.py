@@ -103,13 +103,14 @@ def shaded_by(meshes: tuple[MeshSnapshot, ...], centers: Floats) -> list[int]:
 
 
 def _nearest(meshes: tuple[MeshSnapshot, ...], center: Floats) -> MeshSnapshot | None:
-    """The mesh that hair around this place grows from, as far as that is known; of those whose
-    box holds the place, the smallest.
+    """The mesh that hair around this place grows from, as far as that is known: of those whose
+    box holds the place, skin before a cap that is worn on it, then the smallest.
     """
 
-    def rank(mesh: MeshSnapshot) -> tuple[float, float]:
+    def rank(mesh: MeshSnapshot) -> tuple[float, bool, float]:
         low, high = mesh.surface.bounds()
-        return float(_distances(mesh, center[None])[0]), float(np.linalg.norm(high - low))
+        distance = float(_distances(mesh, center[None])[0])
+        return distance, mesh.skin is None, float(np.linalg.norm(high - low))
 
     return min(meshes, key=rank, default=None)
 

@@ -32,4 +32,8 @@ def test_light_comes_back_to_each_groom_off_its_own_head() -> None:
         lit = scene.lit(groom)
         assert lit.skin_color == pytest.approx(own.color)
         assert set(map(id, lit.all_casters)) == set(map(id, heads))
+    cap = MeshSnapshot.of(Surface(0.5 * CORNERS, TRIANGLES), (0.9, 0.0, 0.0))
+    worn = MeshSnapshot.of(Surface(CORNERS, TRIANGLES), colors[0.0], is_skin=True)
+    lit = SceneSnapshot(casters=(cap, worn), grooms=grooms).lit(grooms[0])
+    assert lit.skin_color == pytest.approx(colors[0.0]), "not in that of a cap"
     assert SceneSnapshot(grooms=grooms).lit(grooms[0]).skin_color == (0.0, 0.0, 0.0)
