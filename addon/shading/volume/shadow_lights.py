@@ -48,8 +48,8 @@ def shadow_warnings(
     if settings.max_lights and len(lights) > len(asked) and left_out > _MUCH_LIGHT:
         found.append(
             f"Shadows: only the {settings.max_lights} strongest of {len(lights)} lights throw "
-            f"shadows of hair; {left_out:.0%} of the light comes from the others. Raise Lights in "
-            "Shadows, or hide those that add least."
+            f"shadows of hair; {left_out:.0%} of the light comes from the others. Raise Max "
+            "Lights, or hide those that add least."
         )
     return tuple(found)
 
@@ -62,12 +62,13 @@ def _setting_warnings(ball: Ball, settings: VolumeSettings) -> Iterator[str]:
         )
     if settings.extinction >= _HARD_EXTINCTION:
         yield (
-            f"Shadows: with an Extinction of {settings.extinction:g} a single strand takes all "
-            "light. Set it to 1, which is what the strands' width asks for."
+            "Shadows: with so high an Extinction a single strand takes all light. Set it to 1, "
+            "which is what the strands' width asks for."
         )
     if settings.max_lights == 0:
         yield (
-            "Shadows: no light throws any as long as Lights is 0. Raise it, or set Shadows to None."
+            "Shadows: no light throws any as long as Max Lights is 0. Raise it, or set Shadows to "
+            "None."
         )
     if ball.radius < 2.0 * MIN_RADIUS:
         yield (

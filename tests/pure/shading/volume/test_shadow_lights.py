@@ -15,6 +15,8 @@ from hairloom.addon.shading.volume.shadow_lights import shadow_frames, shadow_wa
 
 BALL = Ball(np.array([0.1, 0.0, 1.5]), 0.2)
 SUN = Light.sun((0.0, 0.0, -1.0), (1, 1, 1), 3.0)
+#: as the panel shows them
+LABELS = {each.name: each.label for each in VolumeSettings.parameters()}
 DEEP = VolumeSettings(shadows="deep", max_lights=2)
 #: shines along +x
 CONE = Cone(((0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (-1.0, 0.0, 0.0)), 1.0, 0.1)
@@ -73,7 +75,7 @@ def test_a_panel_with_its_back_to_the_hair_is_told() -> None:
 def test_lights_beyond_those_that_throw_shadows_are_told_where_they_are_much() -> None:
     lights = [point(np.cos(turn), np.sin(turn), 1.5) for turn in range(20)]
     (warning,) = told(*lights)
-    assert "the 2 strongest of 20" in warning
+    assert "the 2 strongest of 20" in warning and f"Raise {LABELS['max_lights']}," in warning
     assert told(*lights[:2], point(0.0, 2.0, 1.5, power=1.0)) == ()
 
 
@@ -81,13 +83,13 @@ def test_lights_beyond_those_that_throw_shadows_are_told_where_they_are_much() -
     ("name", "value", "word"),
     [
         ("extinction", 0.0, "throws none"),
-        ("extinction", 1000.0, "1000"),
-        ("max_lights", 0, "Lights is 0"),
+        ("extinction", 1000.0, "so high"),
+        ("max_lights", 0, "is 0"),
     ],
 )
 def test_settings_that_leave_no_shadow_are_told(name: str, value: float, word: str) -> None:
     (warning,) = told(SUN, settings=replace(DEEP, **{name: value}))
-    assert word in warning
+    assert word in warning and LABELS[name] in warning
 
 
 def test_hair_without_extent_is_told() -> None:
