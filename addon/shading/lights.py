@@ -53,6 +53,13 @@ class Cone:
     blend: float
 
     @property
+    def widest(self) -> float:
+        """The farthest off its axis that it lets light through in the world [rad]."""
+        right, up, back = np.linalg.norm(np.array(self.axes, np.float64), axis=1)
+        squeezed = back / max(min(right, up), 1e-30)
+        return float(np.arctan(np.tan(0.5 * min(self.size, np.pi)) * squeezed))
+
+    @property
     def fade(self) -> tuple[float, float]:
         """Middle and half width of the rim, in 1 - cos of the angle to the axis."""
         rim = 1.0 - float(np.cos(0.5 * max(self.size, 1e-3)))

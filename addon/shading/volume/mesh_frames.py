@@ -113,12 +113,8 @@ def _is_flat(positions: Floats, size: float) -> bool:
 
 
 def _cone_tangent(light: Light) -> float:
-    """Of half the angle of a spot's cone; endless of all else. A scaled object squeezes it."""
-    if light.cone is None or light.cone.size >= np.pi:
-        return np.inf
-    right, up, back = np.linalg.norm(np.asarray(light.cone.axes, np.float64), axis=1)
-    squeezed = float(back / max(min(right, up), 1e-30))
-    return max(float(np.tan(0.5 * light.cone.size)) * squeezed, 1e-3)
+    """Of half the angle of a spot's cone; endless of all else."""
+    return np.inf if light.cone is None else max(float(np.tan(light.cone.widest)), 1e-3)
 
 
 def _sides(axis: Floats | None) -> Iterator[Floats]:

@@ -100,7 +100,7 @@ def _is_wide(light: Light) -> bool:
     """Whether it lights more than a map can hold."""
     if light.panel is not None:
         return False  # what lies flat beside it has hardly any light
-    return light.cone is None or 0.5 * light.cone.size > WIDEST
+    return light.cone is None or light.cone.widest > WIDEST
 
 
 def _misses(light: Light, ball: Ball) -> bool:
@@ -113,7 +113,7 @@ def _misses(light: Light, ball: Ball) -> bool:
     if distance <= ball.radius:
         return light_frame(light, ball) is None
     angle = float(np.arccos(np.clip(along @ towards / distance, -1.0, 1.0)))
-    half = 0.5 * (light.cone.size if light.cone is not None else np.pi)
+    half = light.cone.widest if light.cone is not None else 0.5 * np.pi
     return angle - float(np.arcsin(ball.radius / distance)) > half
 
 

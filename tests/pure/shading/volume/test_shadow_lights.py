@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hairloom.addon.shading.area_lights import Panel
-from hairloom.addon.shading.lights import Cone, Light
+from hairloom.addon.shading.lights import Cone, Light, light_irradiance
 from hairloom.addon.shading.volume.light_frame import Ball
 from hairloom.addon.shading.volume.settings import VolumeSettings
 from hairloom.addon.shading.volume.shadow_lights import shadow_frames, shadow_warnings
@@ -63,6 +63,15 @@ def test_of_a_light_as_near_as_hair_reaches_a_part_has_no_shadow() -> None:
 def test_a_spot_that_misses_the_hair_is_told(place: tuple[float, float, float]) -> None:
     (warning,) = told(spot(*place))
     assert warning.startswith("Spot: it shines past the hair")
+
+
+def test_a_spot_of_a_scaled_object_lights_as_far_as_its_cone_is_squeezed() -> None:
+    """Just off the hair as it is; three times as wide it lights it."""
+    lamp, place = spot(-1.0, 0.9, 1.5), np.array([BALL.center])
+    assert lamp.cone is not None and not light_irradiance(lamp, place).any()
+    axes = tuple(tuple(row) for row in np.array(CONE.axes) / np.array([[3.0], [3.0], [1.0]]))
+    wide = replace(lamp, cone=replace(lamp.cone, axes=axes))
+    assert light_irradiance(wide, place).all() and told(wide) == ()
 
 
 def test_a_panel_with_its_back_to_the_hair_is_told() -> None:
