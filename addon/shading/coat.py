@@ -7,9 +7,13 @@ the film itself reflects). The film is smooth, so its highlight is narrow and do
 scales do; and the scales under water bend light less.
 
 Dust. Of the part that it covers one sees its colour, without highlights; what is left of these is
-wider. Water wets dust as it wets hair.
+wider. Water wets dust as it wets hair. Grey strands have no colour among the settings. So as many
+of them as dust covers become strands of a colour, of which dust is then so large a part that the
+mean over all strands is right.
 
-Limitation: all of a groom is as wet and dusty.
+Limitations: all of a groom is as wet and dusty. Grey strands go by the pigment of the others in
+Marschner's model: a little dust makes hair lighter of which nearly all is grey, and water darkens
+them by less than it should. In Kajiya-Kay water does not change them.
 """
 
 from __future__ import annotations
@@ -39,12 +43,17 @@ _WIDER = 2.0
 
 
 def coated_color(color: Floats, look: ShadingSettings) -> Floats:
-    """The colour of a mass of hair, (..., 3) linear, with the look's dust and water; NaN stays.
-    Without any it is the same array."""
+    """The colour of a mass of hair that is not grey, (..., 3) linear, with the look's dust and
+    water; NaN stays. Without any it is the same array.
+
+    Args:
+        look: as it is drawn, of which dust has taken its grey strands, see `coated`.
+    """
     if not is_coated(look):
         return color
     kept = KEPT * look.wetness
-    dusty = color + look.dust * (np.array(look.dust_color) - color)
+    covered = look.dust / max(1.0 - look.grey_fraction, look.dust) if look.dust else 0.0
+    dusty = color + covered * (np.array(look.dust_color) - color)
     wet = dusty * (1.0 - kept) / (1.0 - kept * np.minimum(dusty, 1.0))
     return wet.astype(color.dtype)
 
@@ -55,6 +64,7 @@ def coated(look: ShadingSettings) -> ShadingSettings:
     if not is_coated(look):
         return look
     water, clean = look.wetness, 1.0 - look.dust
+    look = replace(look, grey_fraction=clean * look.grey_fraction)
     wider, slope = 1.0 + _WIDER * look.dust, 1.0 + water * (_BENT - 1.0)
     film = look.width_r + water * (min(look.width_r, FILM_WIDTH) - look.width_r)
     tip, brow = (

@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 from hairloom.addon.shading.coat import FILM_WIDTH, KEPT, coated, coated_color
-from hairloom.addon.shading.drawn_strands import look_color
+from hairloom.addon.shading.drawn_strands import look_color, strand_colors
 from hairloom.addon.shading.marschner.look import fibre_of
 from hairloom.addon.shading.settings import ShadingSettings
 
 DRY = ShadingSettings(cuticle_tilt=0.05, width_r=0.1, width_tt=0.06, dust_color=(0.3, 0.2, 0.1))
+SEEDS, ROOT = np.arange(4000)[:, None], np.zeros((1, 1))
 WET, DUSTY = replace(DRY, wetness=1.0), replace(DRY, dust=0.6)
 
 
@@ -55,6 +56,21 @@ def test_dust_has_its_colour_and_water_darkens_that_too() -> None:
     whole = replace(DRY, dust=1.0)
     np.testing.assert_allclose(coated_color(black, whole), DRY.dust_color)
     assert (coated_color(black, replace(whole, wetness=1.0)) < DRY.dust_color).all()
+
+
+@pytest.mark.parametrize(
+    ("model", "fraction", "off"),
+    [("kajiya_kay", 0.5, 0.007), ("kajiya_kay", 1.0, 0.007), ("marschner", 0.5, 0.06)],
+)
+def test_dust_covers_grey_strands_too(model: str, fraction: float, off: float) -> None:
+    """The mean of all strands comes as near to its colour as it covers them, and none stays grey
+    under all of it."""
+    dry = replace(DRY, model=model, grey_fraction=fraction, color_variation=0.0, tip_tint=0.0)
+    for dust in (0.0, 0.1, 0.5, 0.9, 1.0):
+        drawn = strand_colors(SEEDS, ROOT, coated(replace(dry, dust=dust)))
+        expected = coated_color(strand_colors(SEEDS, ROOT, dry), replace(DRY, dust=dust))
+        np.testing.assert_allclose(drawn.mean(axis=0), expected.mean(axis=0), atol=off)
+    np.testing.assert_allclose(drawn, np.broadcast_to(DRY.dust_color, drawn.shape), atol=1e-6)
 
 
 def test_hair_without_either_is_the_same_object() -> None:
