@@ -9,7 +9,7 @@ from typing import Any
 import bpy
 
 from ..blender.bakes.baked_copy import is_copy_gone, remove
-from ..blender.base.objects import head_of, objects_in
+from ..blender.base.objects import head_of, is_shape_editable, objects_in
 from ..blender.base.outcome import report
 from ..blender.preview.diagnostics import is_unevenly_scaled, set_surface, surface_for
 from ..errors import HairloomError
@@ -81,7 +81,7 @@ class HAIRLOOM_OT_unwrap_surface(bpy.types.Operator):
         head = _surface_of(context)
         if head.data.uv_layers.active is not None:
             cls.poll_message_set("The surface has UVs already")
-        elif not head.data.is_editable or not head.visible_get():
+        elif not is_shape_editable(head) or not head.visible_get():
             cls.poll_message_set("The surface is hidden, or linked from another file")
         else:
             return True
@@ -182,7 +182,7 @@ def _can_fix(operator: type[Any], context: bpy.types.Context) -> bool:
     hair = chosen_hair(context)[0]
     if context.mode != "OBJECT":
         operator.poll_message_set("Go back to Object Mode first")
-    elif not hair.is_editable or not hair.data.is_editable:
+    elif not is_shape_editable(hair):
         operator.poll_message_set("It is linked from another file: make it local first")
     else:
         return True

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from mathutils import Vector
 from mathutils.bvhtree import BVHTree
+from overriding import overridden
 from tiers import few_in_commits
 
 from hairloom.addon.blender.base.parts import at_once
@@ -449,3 +450,11 @@ def test_what_may_be_a_head() -> None:
         [(0.0, 0.0, 0.0)] * BODY, [], [[int(order[v]) for v in p.vertices] for p in mesh.polygons]
     )
     assert not has_makehuman_topology(shuffled)
+
+
+def test_an_overridden_head_gets_no_weights_that_are_not_saved(tmp_path):
+    makehuman()
+    (head,) = overridden(tmp_path)
+    with pytest.raises(HairloomError, match="whose mesh it cannot change"):
+        added("bob", head)
+    assert not head.vertex_groups and not bpy.data.hair_curves

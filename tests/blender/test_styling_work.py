@@ -10,9 +10,12 @@ from types import SimpleNamespace
 import bpy
 import numpy as np
 import pytest
+from overriding import overridden
 
 from hairloom.addon.blender.base.parts import Part, at_once, together
-from hairloom.addon.blender.scene.curves import curve_points
+from hairloom.addon.blender.colliders import ties
+from hairloom.addon.blender.scene.curves import curve_points, put_points
+from hairloom.addon.blender.sessions.settling import COMBED
 from hairloom.addon.ui import (
     operators_colliders,
     operators_export_check,
@@ -103,6 +106,81 @@ def test_it_says_what_it_makes_and_leaves_nothing_when_it_is_cancelled(job, hair
     assert len(bpy.data.objects) == objects
     assert not hair.data.attributes.get("hairloom_before_flow")
     assert not hair.data.attributes.get("hairloom_before_trim")
+
+
+@pytest.fixture
+def trimmed(hair, tmp_path):
+    """Hair that was trimmed and has settled in another file, with all that there is, overridden."""
+    with_plane(hair)
+    bpy.ops.hairloom.trim_to_shape()
+    COMBED.keep(hair)
+    put_points(hair.data, curve_points(hair.data) * np.float32(1.01))
+    COMBED.seal(hair)
+    return overridden_hair(tmp_path)
+
+
+def overridden_hair(folder):
+    hair = next(obj for obj in overridden(folder) if obj.type == "CURVES")
+    chosen(hair)
+    return hair
+
+
+@pytest.mark.parametrize(
+    "tool",
+    ["grow_again", "fit_again", "settle", "back_to_combed", "trim_to_shape", "take_trim_back"]
+    + ["mirror_hair", "comb_flow", "comb_parting"],
+)
+def test_curves_of_a_library_override_are_left_alone(tool, trimmed):
+    """Blender ignores points that are written into them, but takes curves away."""
+    hair = trimmed
+    hair.hairloom.hairstyle = "bob"
+    hair.hairloom.dynamics.sag_compensation = 0.5
+    for add in ("add_stroke", "add_parting"):
+        getattr(bpy.ops.hairloom, add)()
+    chosen(hair)
+    before = curve_points(hair.data)
+    with pytest.raises(RuntimeError, match="whose curves it cannot change"):
+        getattr(bpy.ops.hairloom, tool)()
+    assert len(before) and np.array_equal(curve_points(hair.data), before)
+    assert hair.hairloom.dynamics.sag_compensation == 0.5
+
+
+def test_a_setting_of_growth_says_why_overridden_curves_do_not_follow(hair, tmp_path):
+    hair = overridden_hair(tmp_path)
+    before, own = curve_points(hair.data), hair.data.hairloom.grow
+    own.length = 0.05
+    assert "whose curves it cannot change" in own.problem
+    assert len(before) and np.array_equal(curve_points(hair.data), before)
+
+
+@pytest.mark.parametrize(
+    "tool", ["add_stroke", "add_parting", "add_hair_tie", "make_real", "make_cards"]
+)
+def test_what_is_made_for_overridden_hair_goes_into_a_collection_of_this_file(tool, hair, tmp_path):
+    overridden_hair(tmp_path)
+    before = set(bpy.data.objects)
+    assert getattr(bpy.ops.hairloom, tool)() == {"FINISHED"}
+    made = set(bpy.data.objects) - before
+    assert made and all(obj.users_scene == (bpy.context.scene,) for obj in made)
+    homes = {each for obj in made for each in obj.users_collection}
+    assert bpy.context.scene.collection in homes
+    assert not any(each.override_library for each in homes)
+
+
+def test_ties_of_a_library_stay_where_one_is_added_to_its_override(hair, tmp_path):
+    bpy.ops.hairloom.add_hair_tie()
+    first = bpy.context.scene.objects["Hair Tie"]
+    first.name = "First"
+    library = hair.hairloom.tie_collection
+    bpy.context.scene.collection.children.unlink(library)
+    first.parent.users_collection[0].children.link(library)
+    hair = overridden_hair(tmp_path)
+    bpy.ops.hairloom.add_hair_tie()
+    assert {obj.name for obj in ties.ties_of(hair)} == {"First", "Hair Tie"}
+    with pytest.raises(RuntimeError, match="First: it is not"):
+        bpy.ops.hairloom.remove_hair_tie(tie="First")
+    assert bpy.ops.hairloom.remove_hair_tie(tie="Hair Tie") == {"FINISHED"}
+    assert [obj.name for obj in ties.ties_of(hair)] == ["First"]
 
 
 def test_of_many_hairs_all_is_made_before_any_is_written():

@@ -11,6 +11,7 @@ from ...paint_flow import with_colors
 from ...shading.coat import coated
 from ...shading.settings import ShadingSettings
 from ..base.attributes import read_attribute, set_attribute
+from ..base.objects import link_into
 from ..properties.properties import settings_of
 from ..scene.curves import set_colors
 from ..scene.hair_material import put_look_material
@@ -38,7 +39,7 @@ def show_in_renders(
     if copy is None or copy.hairloom.bake.stands_for not in (None, hair):  # its original's
         curves = bpy.data.hair_curves.new(f"{hair.name} Baked")
         copy = bpy.data.objects.new(curves.name, curves)
-    _link_beside(copy, hair, depsgraph.scene)
+    link_into(copy, hair.users_collection, depsgraph.scene)
     _fill(copy.data, hair, rig, depsgraph)
     bake.copy = copy
     if not bake.hides:
@@ -94,15 +95,6 @@ def is_copy_gone(hair: bpy.types.Object) -> bool:
     """Whether renders leave hair out in favour of a copy that is in no scene."""
     bake = hair.hairloom.bake
     return bool(bake.hides and not (bake.copy and bake.copy.users_scene))
-
-
-def _link_beside(copy: bpy.types.Object, hair: bpy.types.Object, scene: bpy.types.Scene) -> None:
-    """Into the collections of the hair, or the scene's where those are linked or overridden."""
-    editable = [each for each in hair.users_collection if each.is_editable]
-    own = [each for each in editable if each.override_library is None]
-    for collection in own or [scene.collection]:
-        if copy.name not in collection.objects:
-            collection.objects.link(copy)
 
 
 def _fill(

@@ -121,6 +121,44 @@ def check_editable(obj: bpy.types.Object) -> None:
         )
 
 
+def is_shape_editable(obj: bpy.types.Object) -> bool:
+    """Whether what it is made of can be changed in this file. Blender takes settings of a library
+    override, but neither points nor weights: it ignores some without a word, and drops others when
+    the file is saved."""
+    data = obj.data
+    if data is None:
+        return bool(obj.is_editable)
+    return bool(obj.is_editable and data.is_editable and data.override_library is None)
+
+
+def check_shape_editable(obj: bpy.types.Object) -> None:
+    """Raises:
+    HairloomError: what it is made of cannot be changed in this file.
+    """
+    check_editable(obj)
+    if not is_shape_editable(obj):
+        kind = "curves" if obj.type == "CURVES" else "mesh"
+        raise HairloomError(
+            f"it overrides the settings of another file, whose {kind} it cannot change",
+            place=obj.name,
+            remedy="Make object and data local in Blender (Object > Relations > Make Local)",
+        )
+
+
+def takes_objects(collection: bpy.types.Collection) -> bool:
+    """Whether Blender puts objects into it: it is neither linked nor overridden."""
+    return bool(collection.is_editable and collection.override_library is None)
+
+
+def link_into(
+    obj: bpy.types.Object, collections: Iterable[bpy.types.Collection], scene: bpy.types.Scene
+) -> None:
+    """Put an object into these collections, or into the scene's where none takes objects."""
+    for collection in list(filter(takes_objects, collections)) or [scene.collection]:
+        if obj.name not in collection.objects:
+            collection.objects.link(obj)
+
+
 def head_of(hair: bpy.types.Object) -> bpy.types.Object | None:
     """The mesh that the hair grows from: its surface, else a mesh that is its parent.
 

@@ -16,7 +16,7 @@ from ...cards.settings import CardSettings
 from ...cards.shaping import CardVertices, card_along, tile_shift
 from ...errors import HairloomError
 from ...strands.affine import moved
-from ..base.objects import check_editable, head_of, matrix_of
+from ..base.objects import check_shape_editable, head_of, matrix_of
 from ..properties.groom_settings import GroomSettings
 from ..scene.drawn_lines import lines_of
 from ..scene.surfaces import read_surface
@@ -104,7 +104,7 @@ def add_along_curves(
     if not objects:
         raise HairloomError("it has no cards yet", place=hair.name, remedy="Press Make Cards first")
     obj, settings = objects[0], GroomSettings.of(hair)[CardSettings]
-    check_editable(obj)
+    check_shape_editable(obj)
     matrix, head = matrix_of(obj, depsgraph), head_of(hair)
     record = _record_of(obj).moved(matrix)
     if tile >= record.grid.tile_count:

@@ -18,7 +18,7 @@ from ...cards.edits import UNPRINTED, EditCounts, MadeCards, prints
 from ...errors import HairloomError
 from ...shading.settings import ShadingSettings
 from ..base.attributes import set_attribute
-from ..base.objects import Handle, check_editable, head_of, matrix_of
+from ..base.objects import Handle, check_shape_editable, head_of, link_into, matrix_of
 from ..base.thread_work import ThreadWork
 from .build import MappedCards, built_in_thread, order_line, read_inputs
 from .edits import MADE_ATTRIBUTE, TILE_LAYER, forget_record, read_pieces, write_record
@@ -75,7 +75,7 @@ def _check_replaceable(obj: bpy.types.Object) -> None:
     """Raises:
     HairloomError: its mesh cannot be replaced.
     """
-    check_editable(obj)
+    check_shape_editable(obj)
     if obj.mode != "OBJECT":
         raise HairloomError(
             "its mesh is being edited", place=obj.name, remedy="Go back to Object Mode"
@@ -135,8 +135,7 @@ def _new_object(hair: bpy.types.Object, level: int, matrix: Floats) -> bpy.types
     """An empty one beside the hair, carried by what carries it; coarser levels are hidden."""
     name = f"{hair.name} Cards" + (f" LOD{level}" if level else "")
     obj = bpy.data.objects.new(name, bpy.data.meshes.new(name))
-    for collection in hair.users_collection or [bpy.context.scene.collection]:
-        collection.objects.link(obj)
+    link_into(obj, hair.users_collection, bpy.context.scene)
     card_object = obj.hairloom.card_object
     card_object.groom, card_object.level = hair, level
     card_object.made_name, card_object.made_uid = obj.name, obj.session_uid

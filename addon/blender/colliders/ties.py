@@ -19,7 +19,15 @@ from ...errors import HairloomError
 from ...groom.holds import Holds, anchors_of
 from ...groom.ties import Holders, Tie, TipSurface, find_holds
 from ...strands.affine import moved
-from ..base.objects import Body, Handle, ObjectGoneError, as_mesh, head_of, matrix_of
+from ..base.objects import (
+    Body,
+    Handle,
+    ObjectGoneError,
+    as_mesh,
+    head_of,
+    link_into,
+    matrix_of,
+)
 from ..base.vertex_weights import read_weights
 from ..scene.own_collections import objects_in, put_into, take_out
 from ..scene.source import usable_curves
@@ -227,7 +235,7 @@ def new_ring(hair: bpy.types.Object, context: bpy.types.Context) -> bpy.types.Ob
     ring.empty_display_type = "CIRCLE"
     strands = usable_curves(hair, context.evaluated_depsgraph_get()).strands
     ring.empty_display_size = _NEW_RADIUS * float(np.median(strands.lengths()))
-    hair.users_collection[0].objects.link(ring)
+    link_into(ring, hair.users_collection, context.scene)
     head = head_of(hair)
     if head is not None:
         ring.parent = head

@@ -14,6 +14,7 @@ from ...strands import StrandSet
 from ...strands.affine import mean_scale, moved
 from ...strands.clean import Cleaned, clean
 from ..base.attributes import read_attribute, set_attribute
+from ..base.objects import link_into
 
 #: Curve attributes that may hold a strand's group. The first one found wins; its name is the one
 #: that Unreal and USD use.
@@ -125,6 +126,7 @@ def write_curves(
     Args:
         strands: world space, which is also object space: the object is at the origin. If nobody
             knows their widths, the curves have those that are found.
+        collection: where it goes, or the scene's where that is linked or overridden.
         are_found: they were found already; see `groom.widths.with_widths`.
     """
     curves = bpy.data.hair_curves.new(name)
@@ -132,7 +134,7 @@ def write_curves(
     if are_found:
         curves.hairloom.widths.method = "found"
     obj = bpy.data.objects.new(name, curves)
-    collection.objects.link(obj)
+    link_into(obj, [collection], bpy.context.scene)
     if surface is not None:
         _attach(obj, surface)
     return obj

@@ -9,7 +9,7 @@ from ...arrays import Floats
 from ...errors import HairloomError
 from ...strands.affine import moved
 from ...strands.closest_point import search_of
-from ..base.objects import as_mesh, head_of, matrix_of
+from ..base.objects import as_mesh, head_of, link_into, matrix_of
 from .surfaces import read_surface
 
 #: types of objects that can be a line
@@ -144,7 +144,7 @@ def new_line(hair: bpy.types.Object, name: str, context: bpy.types.Context) -> b
         point.handle_left_type = point.handle_right_type = "AUTO"
     line = bpy.data.objects.new(name, data)
     line.show_in_front = True
-    hair.users_collection[0].objects.link(line)
+    link_into(line, hair.users_collection, context.scene)
     line.parent = head
     context.view_layer.update()
     return line

@@ -5,6 +5,7 @@ from __future__ import annotations
 import bpy
 
 from ...errors import HairloomError
+from ..base.objects import takes_objects
 
 
 def objects_in(hair: bpy.types.Object, setting: str) -> tuple[bpy.types.Object, ...]:
@@ -21,16 +22,19 @@ def put_into(
     objects: list[bpy.types.Object],
     scene: bpy.types.Scene,
 ) -> None:
-    """Put objects into a collection of the hair, which is made where there is none.
+    """Put objects into a collection of the hair. It is made where there is none, and around one
+    that is linked or overridden.
 
     Args:
         setting: the property of the hair that names it.
         kind: what is in it, such as "Ties".
     """
     collection = getattr(hair.hairloom, setting)
-    if collection is None:
-        collection = bpy.data.collections.new(f"{hair.name} {kind}")
+    if collection is None or not takes_objects(collection):
+        inner, collection = collection, bpy.data.collections.new(f"{hair.name} {kind}")
         scene.collection.children.link(collection)
+        if inner is not None:
+            collection.children.link(inner)
     for obj in objects:
         if obj not in collection.all_objects.values():
             collection.objects.link(obj)
@@ -47,9 +51,9 @@ def take_out(
     """
     collection = getattr(hair.hairloom, setting)
     obj = None if collection is None else collection.objects.get(name)
-    if obj is None:
+    if obj is None or not takes_objects(collection):
         raise HairloomError(
-            f"it is not in the collection of {kind.lower()} itself",
+            f"it is not in a collection of {kind.lower()} of this file itself",
             place=name or hair.name,
             remedy="Name one of its objects, or take it out of the collection that it is in",
         )

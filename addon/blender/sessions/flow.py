@@ -7,7 +7,7 @@ import bpy
 from ...errors import HairloomError
 from ...groom.flow import combed_along
 from ...groom.flow_settings import FlowSettings
-from ..base.objects import check_editable
+from ..base.objects import check_shape_editable
 from ..base.outcome import Outcome
 from ..base.parts import Parts
 from ..scene.kept_shape import KeptShape
@@ -54,7 +54,7 @@ def take_flow_back(hair: bpy.types.Object) -> None:
     Raises:
         HairloomError: there is no such shape, or it is linked from another file.
     """
-    check_editable(hair)
+    check_shape_editable(hair)
     if not BEFORE_FLOW.back(hair):
         raise HairloomError(
             "it has not been combed along strokes, so there is no shape to go back to",

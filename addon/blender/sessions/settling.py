@@ -21,7 +21,7 @@ from ...groom.settings import GuideSettings
 from ...rig_flow import Rig
 from ...shading.ambient_settings import AmbientSettings
 from ...strands.clean import Cleaned
-from ..base.objects import check_editable
+from ..base.objects import check_shape_editable
 from ..base.outcome import Outcome
 from ..colliders.fields import solid_of
 from ..colliders.obstacles import Obstacles
@@ -53,7 +53,7 @@ def settle_hair(
         HairloomError: no hair that can be used, it is linked from another file, its roots are away
             from its surface, or the surface is gone.
     """
-    check_editable(hair)
+    check_shape_editable(hair)
     source = GroomSource(hair, depsgraph)
     own = read_own_curves(hair, depsgraph, COMBED.before(hair))
     guides = settle_flow.guides_that_fall(own.strands, source.settings[GuideSettings])
@@ -92,8 +92,9 @@ def back_to_combed(hair: bpy.types.Object) -> None:
     """Give curves the shape that they had before they settled; those drawn since stay as they are.
 
     Raises:
-        HairloomError: there is no such shape.
+        HairloomError: there is no such shape, or it is linked from another file.
     """
+    check_shape_editable(hair)
     if not COMBED.back(hair):
         raise HairloomError(
             "it has not settled, so there is no combed shape to go back to",

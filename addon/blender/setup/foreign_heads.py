@@ -23,6 +23,7 @@ from ...groom.head_fit import (
 )
 from ...strands import StrandSet, Surface
 from ...strands.rooted_shapes import RootedShapes
+from ..base.objects import link_into
 from ..base.parts import Part, Parts
 from ..scene.built_in_head import built_in_head
 from ..scene.bust_data import SKIN, load_bust
@@ -304,6 +305,6 @@ def put_landmarks(
         empty.matrix_parent_inverse = head.matrix_world.inverted_safe()
         empty.location = place.tolist()
         empty.empty_display_size = _SHOWN * extent / 0.3
-        collection.objects.link(empty)
+        link_into(empty, [collection], bpy.context.scene)
         made.append(empty)
     return made

@@ -26,7 +26,7 @@ from ...strands import StrandSet, Surface
 from ...strands.affine import mean_scale, moved
 from ...strands.face import is_face_hair
 from ...strands.rooted_shapes import RootedShapes
-from ..base.objects import head_of
+from ..base.objects import check_shape_editable, head_of
 from ..base.parts import Part, Parts, taken_back
 from ..base.vertex_weights import read_weights, set_group, weight_names
 from ..colliders.fields import solid_of
@@ -166,11 +166,14 @@ def add_hairstyle(
 
     Raises:
         HairloomError: a mesh that it does not grow on, a mask that it has not or that is empty, a
-            preset or node group that is not there. Nothing is added then, nor if it is cancelled.
+            preset or node group that is not there, a head that lacks the group and is linked.
+            Nothing is added then, nor if it is cancelled.
     """
     masks = {**style.masks, **({"children": hairline} if hairline and style.masks else {})}
     _check_masks(style, head, depsgraph, masks.values(), needed=hairline)
     growth = yield from _growth(style, head, depsgraph, masks)
+    if growth.groups:
+        check_shape_editable(head)
     with taken_back() as note:
         hair = write_curves(
             f"{head.name} {style.title}", growth.strands, head, collection, are_found=True
@@ -215,8 +218,8 @@ def fit_again(
     now; modifiers and settings stay. Returns warnings.
 
     Raises:
-        HairloomError: some was not added as a hairstyle, has no head, or does not fit on it. All
-            is as it was then, and if it is cancelled.
+        HairloomError: some was not added as a hairstyle, has no head, does not fit on it, or is
+            linked from another file. All is as it was then, and if it is cancelled.
     """
     grown = []
     for hair in grooms:
@@ -227,6 +230,7 @@ def fit_again(
 
 
 def _grown_again(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Parts[_Growth]:
+    check_shape_editable(hair)
     head = head_of(hair)
     if not hair.hairloom.hairstyle or head is None:
         raise HairloomError(

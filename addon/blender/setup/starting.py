@@ -12,7 +12,7 @@ from ...errors import HairloomError
 from ...groom.settings import GrowSettings
 from ...shading.coat import coated
 from ...shading.settings import ShadingSettings
-from ..base.objects import head_of
+from ..base.objects import head_of, link_into
 from ..base.parts import Parts
 from ..properties.presets import apply, named_preset
 from ..properties.properties import settings_of
@@ -180,8 +180,7 @@ def _grown_in_place(
     settings = fitted(GrowSettings(), factor)
     name, collections = hair.name, list(hair.users_collection)
     grown = yield from grow_on(head, depsgraph, collections[0], settings)
-    for collection in collections[1:]:
-        collection.objects.link(grown)
+    link_into(grown, collections, bpy.context.scene)
     curves = hair.data
     bpy.data.objects.remove(hair)
     if not curves.users:

@@ -21,7 +21,7 @@ from ...groom.settings import GrowSettings
 from ...groom.widths import with_widths
 from ...strands import StrandSet
 from ..base.attributes import read_attribute
-from ..base.objects import head_of
+from ..base.objects import check_shape_editable, head_of
 from ..base.parts import Part, Parts, at_once
 from ..properties import changed
 from ..properties.properties import settings_of
@@ -68,7 +68,8 @@ def grow_again(grooms: Sequence[bpy.types.Object], depsgraph: bpy.types.Depsgrap
     """Give hair the curves that its settings make now, whatever was done to those that it has.
 
     Raises:
-        HairloomError: some has no mesh to grow on, or as `grow_on`. All is as it was then.
+        HairloomError: some has no mesh to grow on, is linked from another file, or as `grow_on`.
+            All is as it was then.
     """
     made = []
     for hair in grooms:
@@ -78,6 +79,7 @@ def grow_again(grooms: Sequence[bpy.types.Object], depsgraph: bpy.types.Depsgrap
 
 
 def _grown_again(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Parts[StrandSet]:
+    check_shape_editable(hair)
     head, own = head_of(hair), hair.data.hairloom.grow
     if head is None:
         raise HairloomError(

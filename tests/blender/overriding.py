@@ -1,0 +1,27 @@
+"""A scene whose objects come from another file, and are overridden with their data."""
+
+from pathlib import Path
+
+import bpy
+
+
+def overridden(folder: Path) -> list[bpy.types.Object]:
+    """All that is in the scene, saved in a file of its own and brought back from there in one
+    collection, in the same order."""
+    file, collection = str(folder / "library.blend"), bpy.data.collections.new("Character")
+    bpy.context.scene.collection.children.link(collection)
+    names = [obj.name for obj in bpy.context.scene.objects]
+    for obj in bpy.context.scene.collection.objects[:]:
+        collection.objects.link(obj)
+        bpy.context.scene.collection.objects.unlink(obj)
+    bpy.ops.wm.save_as_mainfile(filepath=file)
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    with bpy.data.libraries.load(file, link=True) as (_, wanted):
+        wanted.collections = ["Character"]
+    scene, layer = bpy.context.scene, bpy.context.view_layer
+    bpy.data.collections["Character"].override_hierarchy_create(scene, layer)
+    objects = [scene.objects[name] for name in names]
+    for obj in objects:
+        if obj.data is not None:
+            obj.data.override_create(remap_local_usages=True)
+    return objects
