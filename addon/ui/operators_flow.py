@@ -19,7 +19,7 @@ from .long_work import LongWork, Steps, draw_progress, in_parts
 from .object_lists import draw_objects
 from .operators_start import in_object_mode
 from .reports import reporting, tell
-from .selection import chosen_hair, needs_hair
+from .selection import chosen_hair, needs_hair, once_each
 
 
 class HAIRLOOM_OT_add_stroke(bpy.types.Operator):
@@ -89,7 +89,7 @@ class HAIRLOOM_OT_comb_flow(LongWork, bpy.types.Operator):
 
     def steps(self, context: bpy.types.Context) -> Steps[None]:
         settings, depsgraph = settings_of(self, FlowSettings), context.evaluated_depsgraph_get()
-        grooms = filter(strokes_of, chosen_hair(context))
+        grooms = once_each(filter(strokes_of, chosen_hair(context)))
         works = (comb_flow(hair, depsgraph, settings) for hair in grooms)
         for outcome in (yield from in_parts(together(works))):
             tell(self, outcome)

@@ -10,7 +10,7 @@ from .grow_options import GROW_PROPERTIES, draw_where_settings_are
 from .long_work import LongWork, Steps, draw_progress, in_parts
 from .messages import draw_message
 from .operators_start import in_object_mode
-from .selection import chosen_hair, ground_mesh, make_active, needs_hair
+from .selection import chosen_hair, ground_mesh, make_active, needs_hair, once_each
 
 #: More names than these are only counted.
 _NAMED = 2
@@ -63,7 +63,8 @@ class HAIRLOOM_OT_grow_again(LongWork, bpy.types.Operator):
         return cls.is_free() and in_object_mode(cls, context) and needs_hair(cls, context)
 
     def steps(self, context: bpy.types.Context) -> Steps[None]:
-        yield from in_parts(grow_again(chosen_hair(context), context.evaluated_depsgraph_get()))
+        grooms = once_each(chosen_hair(context))
+        yield from in_parts(grow_again(grooms, context.evaluated_depsgraph_get()))
 
 
 def draw_grow(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:

@@ -27,7 +27,7 @@ from .grow_options import names_of_weights
 from .long_work import LongWork, Progress, Steps, in_parts
 from .operators_start import beginning, in_object_mode
 from .preferences import preferences
-from .selection import chosen_hair, ground_mesh, make_active
+from .selection import chosen_hair, ground_mesh, make_active, once_each
 
 #: pictures: how many side by side, how large, and the width of the page at UI scale 1
 _ACROSS, _PICTURE_SCALE, _WIDTH = 4, 5.0, 440
@@ -180,7 +180,7 @@ class HAIRLOOM_OT_fit_again(LongWork, bpy.types.Operator):
         return False
 
     def steps(self, context: bpy.types.Context) -> Steps[None]:
-        grooms = [hair for hair in chosen_hair(context) if hair.hairloom.hairstyle]
+        grooms = once_each(hair for hair in chosen_hair(context) if hair.hairloom.hairstyle)
         fitting = fit_again(grooms, context.evaluated_depsgraph_get())
         for warning in (yield from in_parts(fitting)):
             report(self, "WARNING", warning)

@@ -13,7 +13,7 @@ from .drawing import draw_button
 from .long_work import LongWork, Steps, draw_progress, in_parts
 from .operators_start import in_object_mode
 from .reports import tell
-from .selection import chosen_hair, needs_hair
+from .selection import chosen_hair, needs_hair, once_each
 
 
 class HAIRLOOM_OT_mirror_hair(LongWork, bpy.types.Operator):
@@ -33,7 +33,7 @@ class HAIRLOOM_OT_mirror_hair(LongWork, bpy.types.Operator):
 
     def steps(self, context: bpy.types.Context) -> Steps[None]:
         settings, depsgraph = settings_of(self, MirrorSettings), context.evaluated_depsgraph_get()
-        works = (mirror_hair(hair, depsgraph, settings) for hair in chosen_hair(context))
+        works = (mirror_hair(hair, depsgraph, settings) for hair in once_each(chosen_hair(context)))
         for outcome in (yield from in_parts(together(works))):
             tell(self, outcome)
 

@@ -18,7 +18,7 @@ from .long_work import LongWork, Steps, draw_progress, in_parts
 from .object_lists import draw_objects
 from .operators_start import in_object_mode
 from .reports import reporting, tell
-from .selection import chosen_hair, needs_hair
+from .selection import chosen_hair, needs_hair, once_each
 
 
 class HAIRLOOM_OT_add_parting(bpy.types.Operator):
@@ -84,7 +84,7 @@ class HAIRLOOM_OT_comb_parting(LongWork, bpy.types.Operator):
 
     def steps(self, context: bpy.types.Context) -> Steps[None]:
         settings, depsgraph = settings_of(self, PartingSettings), context.evaluated_depsgraph_get()
-        grooms = filter(partings.partings_of, chosen_hair(context))
+        grooms = once_each(filter(partings.partings_of, chosen_hair(context)))
         works = (comb_parting(hair, depsgraph, settings) for hair in grooms)
         for outcome in (yield from in_parts(together(works))):
             tell(self, outcome)

@@ -15,7 +15,7 @@ from .long_work import LongWork, Steps, draw_progress, in_parts
 from .object_lists import draw_objects
 from .operators_start import in_object_mode
 from .reports import reporting, tell
-from .selection import chosen_hair, needs_hair
+from .selection import chosen_hair, needs_hair, once_each
 
 
 class HAIRLOOM_OT_trim_to_shape(LongWork, bpy.types.Operator):
@@ -38,7 +38,7 @@ class HAIRLOOM_OT_trim_to_shape(LongWork, bpy.types.Operator):
         return False
 
     def steps(self, context: bpy.types.Context) -> Steps[None]:
-        depsgraph, works = context.evaluated_depsgraph_get(), []
+        depsgraph, grooms = context.evaluated_depsgraph_get(), []
         for hair in chosen_hair(context):
             chosen = _chosen(hair, context)
             for obj in chosen:
@@ -46,7 +46,8 @@ class HAIRLOOM_OT_trim_to_shape(LongWork, bpy.types.Operator):
             if chosen:
                 put_into(hair, SETTING, KIND, chosen, context.scene)
             if trim_shapes_of(hair):
-                works.append(trim_to_shapes(hair, depsgraph))
+                grooms.append(hair)
+        works = (trim_to_shapes(hair, depsgraph) for hair in once_each(grooms))
         for outcome in (yield from in_parts(together(works))):
             tell(self, outcome)
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import bpy
 
 from ..blender.base.objects import head_of, is_hidden, objects_in
@@ -19,6 +21,14 @@ def chosen_hair(context: bpy.types.Context) -> list[bpy.types.Object]:
     selected = list(dict.fromkeys(obj for obj in candidates if obj is not None))
     hair = [obj for obj in selected if obj.type == "CURVES"]
     return hair or _made_into(selected) or _grown_on(selected, context) or _previewed()
+
+
+def once_each(grooms: Iterable[bpy.types.Object]) -> list[bpy.types.Object]:
+    """Of linked duplicates, which share their curves, the first: a tool changes these once."""
+    firsts: dict[bpy.types.ID, bpy.types.Object] = {}
+    for hair in grooms:
+        firsts.setdefault(hair.data, hair)
+    return list(firsts.values())
 
 
 def _made_into(objects: list[bpy.types.Object]) -> list[bpy.types.Object]:

@@ -183,6 +183,25 @@ def test_ties_of_a_library_stay_where_one_is_added_to_its_override(hair, tmp_pat
     assert [obj.name for obj in ties.ties_of(hair)] == ["First"]
 
 
+@pytest.mark.parametrize("tool", ["mirror_hair", "trim_to_shape", "comb_flow", "comb_parting"])
+def test_linked_duplicates_share_curves_which_are_changed_once(tool, hair):
+    for prepare in (with_stroke, with_parting, with_plane):
+        prepare(hair)
+    beside = bpy.context.selected_objects
+    copy = hair.copy()
+    bpy.context.collection.objects.link(copy)
+    other = hair.copy()
+    other.data = hair.data.copy()
+    bpy.context.collection.objects.link(other)
+    chosen(other, *(obj for obj in beside if obj != hair))
+    getattr(bpy.ops.hairloom, tool)()
+    chosen(hair, copy, *(obj for obj in beside if obj != hair))
+    before = curve_points(hair.data)
+    getattr(bpy.ops.hairloom, tool)()
+    assert np.array_equal(curve_points(hair.data), curve_points(other.data))
+    assert not np.array_equal(curve_points(hair.data), before)
+
+
 def test_of_many_hairs_all_is_made_before_any_is_written():
     log = []
 
