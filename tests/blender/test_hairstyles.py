@@ -10,16 +10,19 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
-from mathutils import Vector
+from mathutils import Euler, Matrix, Vector
 from tiers import few_in_commits
 
+from hairloom.addon.blender.base.attributes import read_attribute
 from hairloom.addon.blender.base.parts import at_once
 from hairloom.addon.blender.command_line.command_line import run
 from hairloom.addon.blender.preview import previews
 from hairloom.addon.blender.properties.presets import named_preset
 from hairloom.addon.blender.scene import hair_nodes
-from hairloom.addon.blender.scene.curves import read_curves
+from hairloom.addon.blender.scene.carried_weight import carry_whole_weight
+from hairloom.addon.blender.scene.curves import curve_points, put_points, read_curves
 from hairloom.addon.blender.scene.surfaces import read_surface
+from hairloom.addon.blender.sessions.settling import COMBED, is_settled
 from hairloom.addon.blender.setup import hairstyles
 from hairloom.addon.blender.setup.hairstyles import (
     add_hairstyle,
@@ -233,6 +236,24 @@ def refused(style: Hairstyle, head: bpy.types.Object, problem: str) -> None:
     with pytest.raises(HairloomError, match=problem) as error:
         added(style, head)
     assert error.value.remedy and everything() == before
+
+
+def test_hair_that_is_fitted_again_is_as_it_was_added(head: bpy.types.Object) -> None:
+    """On an object that is larger, moved and turned; with nothing of what it had settled into."""
+    hair = added(named_hairstyle("buzz_cut"), head)
+    added_points, radius = curve_points(hair.data), read_attribute(hair.data, "radius", "POINT")
+    hair.hairloom.dynamics.sag_compensation = 0.5
+    head.matrix_world = Matrix.LocRotScale((0.3, 0.0, 0.1), Euler((0.0, 0.4, 0.0)), (2.0,) * 3)
+    bpy.context.view_layer.update()
+    COMBED.keep(hair)
+    put_points(hair.data, added_points * np.float32(1.05))
+    COMBED.seal(hair)
+    assert carry_whole_weight(hair) and is_settled(hair)
+    bpy.context.view_layer.objects.active = hair
+    assert bpy.ops.hairloom.fit_again() == {"FINISHED"}
+    assert curve_points(hair.data) == pytest.approx(added_points, abs=1e-5)
+    assert read_attribute(hair.data, "radius", "POINT") == pytest.approx(radius, rel=1e-3)
+    assert not is_settled(hair) and hair.hairloom.dynamics.sag_compensation == 0.5
 
 
 def test_empty_masks_are_refused(head: bpy.types.Object) -> None:

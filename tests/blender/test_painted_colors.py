@@ -14,6 +14,8 @@ from hairloom.addon.blender.command_line import command_line
 from hairloom.addon.blender.engine.engine_hair import read_groom
 from hairloom.addon.blender.preview import previews, scene_events
 from hairloom.addon.blender.properties.properties import colors_of_groom
+from hairloom.addon.blender.scene.curves import curve_points, put_points
+from hairloom.addon.blender.strands.growing import losses
 from hairloom.addon.blender.strands.read_hair import ExportRequest, still_hair
 from hairloom.addon.blender.viewport import overlay
 from hairloom.addon.exchange.hair_file import read_hair_file
@@ -322,6 +324,38 @@ def test_real_hair_and_materials_have_what_is_painted(
     starts = [each.first_point_index for each in real.data.curves]
     roots = np.array([real.data.points[each].position for each in starts])
     assert_halves(colors("color", real.data)[starts], roots)
+
+
+@pytest.mark.parametrize("is_changed", [False, True])
+def test_curves_that_are_replaced_have_what_is_painted_under_the_new_ones(
+    sphere: Any, extension: None, is_changed: bool
+) -> None:
+    """Also where an artist has changed the material's nodes, which stay so."""
+    paint_halves(sphere)
+    bpy.ops.hairloom.add_groom(strand_count=150, plays=False)
+    hair = bpy.context.object
+    look = hair.data.hairloom.shading
+    look.color_map = MAP
+    nodes = hair.data.materials[0].node_tree.nodes
+    node = next(each for each in nodes if each.type == "BSDF_HAIR_PRINCIPLED")
+    if is_changed:
+        node.inputs["Random Roughness"].default_value = 0.7
+    assert losses(hair.data) == ()
+
+    def assert_painted(count: int) -> None:
+        values = np.empty((count, 4), np.float32)
+        hair.data.attributes["hair_color"].data.foreach_get("color", values.ravel())
+        starts = [each.first_point_index for each in hair.data.curves]
+        roots = np.array([hair.data.points[each].position for each in starts])
+        assert_halves(values[:, :3], roots)
+
+    hair.data.hairloom.grow.strand_count = 200
+    assert_painted(200)
+    put_points(hair.data, curve_points(hair.data) * np.float32(1.05))
+    assert bpy.ops.hairloom.grow_again() == {"FINISHED"}
+    assert_painted(200)
+    if is_changed:
+        assert node.inputs["Random Roughness"].default_value == pytest.approx(0.7)
 
 
 def test_a_verb_writes_what_is_painted(

@@ -55,14 +55,7 @@ def put_look_material(
     Returns:
         the material, and notes on what of the look it does not have.
     """
-    has_own = COLOR_ATTRIBUTE in curves.attributes and bool(
-        shading.color_source == "own" or shading.color_map
-    )
-    has_colors = painted is not None or has_own
-    if painted is not None:
-        set_attribute(curves, MATERIAL_COLOR, "CURVE", painted)
-    elif has_own:
-        _copy_colors(curves)
+    has_colors = put_colors(curves, shading, painted)
     slots, material = curves.materials, look_material(curves)
     if material is None:
         material = bpy.data.materials.new(f"{curves.name} Look")
@@ -77,11 +70,30 @@ def put_look_material(
     return material, notes
 
 
+def put_colors(curves: bpy.types.Curves, shading: ShadingSettings, painted: Floats | None) -> bool:
+    """Give hair curves the colours that their material reads, as `put_look_material` does; whether
+    they have any."""
+    if painted is not None:
+        set_attribute(curves, MATERIAL_COLOR, "CURVE", painted)
+        return True
+    has_own = COLOR_ATTRIBUTE in curves.attributes and bool(
+        shading.color_source == "own" or shading.color_map
+    )
+    if has_own:
+        _copy_colors(curves)
+    return has_own
+
+
+def is_as_made(material: bpy.types.Material) -> bool:
+    """Whether no artist has changed its nodes since it was made of a look."""
+    return bool(material.get(_NODES) == _digest(_nodes(material)))
+
+
 def is_behind(material: bpy.types.Material, look: ShadingSettings) -> bool:
     """Whether it was made of another look, and is still as it was made: with nodes that an artist
     has changed it is the artist's own."""
     known = material.get(_LOOK)
-    return known not in (None, _digest(look)) and material[_NODES] == _digest(_nodes(material))
+    return known not in (None, _digest(look)) and is_as_made(material)
 
 
 def _nodes(material: bpy.types.Material) -> list[object]:

@@ -9,7 +9,7 @@ from ...shading.coat import coated
 from ...shading.settings import ShadingSettings
 from ..properties import changed
 from ..properties.properties import settings_of
-from .hair_material import is_behind, look_material, put_look_material
+from .hair_material import is_as_made, is_behind, look_material, put_colors, put_look_material
 from .painted_colors import colors_of_curves
 
 #: how long painted colours wait for further edits [s]
@@ -29,6 +29,19 @@ def put_look(hair: bpy.types.Object) -> tuple[bpy.types.Material, tuple[str, ...
     painted, notes = colors_of_curves(hair, look, bpy.context.evaluated_depsgraph_get())
     material, more = put_look_material(hair.data, look, painted=painted)
     return material, (*notes, *more)
+
+
+def follow_curves(hair: bpy.types.Object) -> None:
+    """Its curves were replaced: its material reads the colours of those before."""
+    look, material = _look_of(hair.data), look_material(hair.data)
+    try:
+        if material is not None and is_as_made(material):
+            put_look(hair)
+        else:
+            depsgraph = bpy.context.evaluated_depsgraph_get()
+            put_colors(hair.data, look, colors_of_curves(hair, look, depsgraph)[0])
+    except HairloomError:  # what is painted cannot be read; the preview says so
+        return
 
 
 def follow(owner: bpy.types.ID) -> None:

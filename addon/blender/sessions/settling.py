@@ -25,6 +25,7 @@ from ..base.objects import check_shape_editable
 from ..base.outcome import Outcome
 from ..colliders.fields import solid_of
 from ..colliders.obstacles import Obstacles
+from ..scene.carried_weight import carry_as_before, carry_whole_weight
 from ..scene.curves import read_own_curves, write_own_curves
 from ..scene.forces import gravity_of
 from ..scene.kept_shape import KeptShape
@@ -32,8 +33,6 @@ from .groom_source import GroomSource
 from .prepared_groom import PreparedGroom
 
 COMBED = KeptShape("hairloom_combed", "hairloom_settled")
-#: custom property of the object: its Sag Correction before
-_SAG = "hairloom_combed_sag"
 
 
 def is_settled(hair: bpy.types.Object) -> bool:
@@ -74,7 +73,7 @@ def settle_hair(
     head = solid_of(rig.head)
     settled, is_out = settle_flow.as_curves(own.strands, rig, fallen, head)
     _store(hair, own, settled.points, depsgraph)
-    warnings += _carry_whole_weight(hair)
+    warnings += carry_whole_weight(hair)
     lost = int((~is_out).sum())
     if lost:
         are = "1 curve is" if lost == 1 else f"{lost:,} curves are"
@@ -101,9 +100,7 @@ def back_to_combed(hair: bpy.types.Object) -> None:
             place=hair.name,
             remedy="Press Settle first",
         )
-    sag = hair.pop(_SAG, None)
-    if sag is not None:
-        hair.hairloom.dynamics.sag_compensation = sag
+    carry_as_before(hair)
 
 
 def _check_roots(hair: bpy.types.Object, rig: Rig) -> None:
@@ -141,19 +138,3 @@ def _store(
     COMBED.keep(hair)
     write_own_curves(hair, own, settled, depsgraph)
     COMBED.seal(hair)
-
-
-def _carry_whole_weight(hair: bpy.types.Object) -> tuple[str, ...]:
-    """The settled shape hangs under its weight already: it would sag once more where the style does
-    not carry all of it. What is said of that."""
-    dynamics = hair.hairloom.dynamics
-    if dynamics.sag_compensation == 1.0:
-        return ()
-    before = dynamics.sag_compensation
-    if _SAG not in hair:
-        hair[_SAG] = before
-    dynamics.sag_compensation = 1.0
-    return (
-        f"{hair.name}: Sag Correction was {before:.2g} and is 1 now, as settled hair hangs under "
-        "its weight already",
-    )

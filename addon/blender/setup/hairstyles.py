@@ -23,7 +23,7 @@ from ...refine.lead_out_at_rest import are_inside, led_out_at_rest
 from ...shading.coat import coated
 from ...shading.settings import ShadingSettings
 from ...strands import StrandSet, Surface
-from ...strands.affine import mean_scale, moved
+from ...strands.affine import mean_scale
 from ...strands.face import is_face_hair
 from ...strands.rooted_shapes import RootedShapes
 from ..base.objects import check_shape_editable, head_of
@@ -35,10 +35,11 @@ from ..properties.presets import apply, named_preset
 from ..properties.properties import settings_of
 from ..scene.bust import bust_object, encoded_skin
 from ..scene.bust_data import load_bust
-from ..scene.curves import fill_curves, read_curves, write_curves
+from ..scene.curves import read_curves, write_curves
 from ..scene.hair_material import put_look_material
 from ..scene.hair_nodes import add_hair_nodes
 from ..scene.surfaces import read_surface
+from ..strands.growing import replace_curves
 from .foreign_heads import fitted_to, own_positions, put_landmarks, read_foreign_head
 from .starting import REAL, fit_motion, fitted, fitting_factor
 
@@ -225,7 +226,9 @@ def fit_again(
     for hair in grooms:
         grown.append((yield from _grown_again(hair, depsgraph)))
     for hair, growth in zip(grooms, grown, strict=True):
-        _replace_curves(hair, growth)
+        replace_curves(hair, growth.strands, depsgraph)
+        if growth.solid is not None and hair.modifiers:
+            _leave_out_inside(hair, growth.solid, _DEEP * growth.size)
     return tuple(warning for growth in grown for warning in growth.warnings)
 
 
@@ -243,17 +246,6 @@ def _grown_again(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Part
     masks = {**style.masks, **({"children": mask} if mask else {})}
     _check_masks(style, head, depsgraph, masks.values(), needed="")
     return (yield from _growth(style, head, depsgraph, masks))
-
-
-def _replace_curves(hair: bpy.types.Object, growth: _Growth) -> None:
-    curves = hair.data
-    curves.remove_curves()
-    # as they are written where their object stands now
-    back = np.linalg.inv(np.array(hair.matrix_world, np.float64))
-    fill_curves(curves, replace(growth.strands, points=moved(growth.strands.points, back)))
-    hair.update_tag()
-    if growth.solid is not None and hair.modifiers:
-        _leave_out_inside(hair, growth.solid, _DEEP * growth.size)
 
 
 def _check_masks(

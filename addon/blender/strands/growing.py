@@ -25,7 +25,10 @@ from ..base.objects import check_shape_editable, head_of
 from ..base.parts import Part, Parts, at_once
 from ..properties import changed
 from ..properties.properties import settings_of
+from ..scene.carried_weight import carry_as_before
 from ..scene.curves import curve_offsets, curve_points, fill_curves, write_curves
+from ..scene.hair_material import MATERIAL_COLOR
+from ..scene.look_materials import follow_curves
 from ..scene.masks import read_map
 from ..scene.surfaces import read_surface
 
@@ -75,7 +78,9 @@ def grow_again(grooms: Sequence[bpy.types.Object], depsgraph: bpy.types.Depsgrap
     for hair in grooms:
         made.append((yield from _grown_again(hair, depsgraph)))
     for hair, strands in zip(grooms, made, strict=True):
-        _replace_curves(hair, strands, depsgraph)
+        replace_curves(hair, strands, depsgraph)
+        hair.data.hairloom.grow.problem = ""
+        _seal(hair.data)
 
 
 def _grown_again(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Parts[StrandSet]:
@@ -99,18 +104,22 @@ def _grown_again(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Part
     )
 
 
-def _replace_curves(
+def replace_curves(
     hair: bpy.types.Object, strands: StrandSet, depsgraph: bpy.types.Depsgraph
 ) -> None:
+    """Give hair other curves, in world space. All that went with those before is gone, but the
+    colours that its material reads: they are found again."""
     curves = hair.data
     back = np.linalg.inv(np.array(hair.evaluated_get(depsgraph).matrix_world, np.float64))
+    has_colors = MATERIAL_COLOR in curves.attributes
     curves.remove_curves()
-    for name in _other_attributes(curves):
+    for name in (*_other_attributes(curves), *([MATERIAL_COLOR] if has_colors else [])):
         curves.attributes.remove(curves.attributes[name])
     fill_curves(curves, strands.transformed(back))
     curves.update_tag()
-    curves.hairloom.grow.problem = ""
-    _seal(curves)
+    carry_as_before(hair)
+    if has_colors:
+        follow_curves(hair)
 
 
 def follow_settings(curves: bpy.types.ID) -> None:
@@ -184,9 +193,11 @@ def _with_widths(strands: StrandSet, radius: Floats | None, offsets: Ints) -> St
 
 
 def _other_attributes(curves: bpy.types.Curves) -> tuple[str, ...]:
-    """Names of what curves have beside what has grown, such as painted colours."""
+    """Names of what curves have beside what has grown, such as painted colours, and what follows
+    from the look."""
     names = (attribute.name for attribute in curves.attributes)
-    return tuple(n for n in names if n not in _OWN_ATTRIBUTES and not n.startswith("."))
+    own = (*_OWN_ATTRIBUTES, MATERIAL_COLOR)
+    return tuple(n for n in names if n not in own and not n.startswith("."))
 
 
 def _seal(curves: bpy.types.Curves) -> None:
