@@ -249,6 +249,25 @@ def test_cancelling_leaves_the_bake_before_untouched(swinging, evaluated, tmp_pa
     assert not is_suspended()
 
 
+@pytest.mark.parametrize("what", ["a second version of the file", "a duplicate"])
+def test_what_shows_the_bake_of_another_shows_it_after_cancelling_too(what, swinging, tmp_path):
+    hair, _ = swinging
+    hair.hairloom.bake.folder = ""
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot_v1.blend"))
+    bake(hair)
+    hair = bpy.data.objects["Hair"]
+    if what == "a duplicate":
+        hair = hair.copy()
+        bpy.context.collection.objects.link(hair)
+    else:
+        bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot_v2.blend"))
+    steps = Bake.of([hair], bpy.context.scene).steps()
+    next(steps)
+    steps.close()
+    assert hair.hairloom.bake.folder == "//hairloom_cache/shot_v1/Hair"
+    assert playback.cache_of(hair).facts.file == "shot_v1.blend"
+
+
 def test_a_bake_that_fails_says_in_which_frame_and_leaves_nothing(swinging, tmp_path):
     hair, head = swinging
     smooth = head.modifiers.new("Smooth", "SUBSURF")

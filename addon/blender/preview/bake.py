@@ -42,11 +42,15 @@ from .bystanders import Bystanders
 
 @dataclass
 class _Part:
-    """One groom or fin of a bake."""
+    """One groom or fin of a bake.
+
+    folder: where it goes. named: the same as its object names it once it is there.
+    """
 
     handle: Handle
     frames: range
     folder: Path
+    named: str
     session: Simulated | None = None
     writer: CacheWriter | None = None
     rig_hash: str = ""
@@ -144,20 +148,20 @@ class Bake:
                 "there is nothing to bake", place=scene.name, remedy="Select hair curves or cloth"
             )
         parts: list[_Part] = []
-        for obj, name in zip(objects, folder_names(objects), strict=True):
-            if obj.type == "CURVES":
-                check_density(obj, bpy.context.evaluated_depsgraph_get())
-            own = frames_of(obj, scene) if frames is None else frames
-            if folder is None:
-                chosen = choose_folder(obj)
-                check_owner(obj, chosen)
-            else:
-                chosen = folder / name if len(objects) > 1 else folder
-            check_bake_folder(chosen)
-            parts.append(_Part(Handle.of(obj), own, chosen))
-        if folder is not None:
-            for obj, part in zip(objects, parts, strict=True):
-                obj.hairloom.bake.folder = str(part.folder)
+        with _folders_kept(objects):
+            for obj, name in zip(objects, folder_names(objects), strict=True):
+                if obj.type == "CURVES":
+                    check_density(obj, bpy.context.evaluated_depsgraph_get())
+                own = frames_of(obj, scene) if frames is None else frames
+                if folder is None:
+                    chosen = choose_folder(obj)
+                    check_owner(obj, chosen)
+                    named = obj.hairloom.bake.folder
+                else:
+                    chosen = folder / name if len(objects) > 1 else folder
+                    named = str(chosen)
+                check_bake_folder(chosen)
+                parts.append(_Part(Handle.of(obj), own, chosen, named))
         return cls(parts)
 
     @property
@@ -233,6 +237,8 @@ class Bake:
             for writer in writers:
                 writer.take_back()
             raise
+        for part in self.parts:
+            part.found().hairloom.bake.folder = part.named
         for writer in writers:
             writer.clean()
 
@@ -243,6 +249,17 @@ class Bake:
             obj = part.handle.find()
             if obj is not None:
                 previews.bake_changed(obj, depsgraph)
+
+
+@contextmanager
+def _folders_kept(objects: list[bpy.types.Object]) -> Iterator[None]:
+    """Objects name their folders as before again, whose bakes they show until there are others."""
+    before = [obj.hairloom.bake.folder for obj in objects]
+    try:
+        yield
+    finally:
+        for obj, folder in zip(objects, before, strict=True):
+            obj.hairloom.bake.folder = folder
 
 
 @contextmanager
