@@ -18,7 +18,7 @@ from ..blender.cards.hand_tools import (
 )
 from ..blender.cards.made_objects import card_objects
 from .reports import reporting
-from .selection import chosen_hair, needs_hair
+from .selection import chosen_hair, in_object_mode, needs_hair
 
 _MENU = "HAIRLOOM_MT_card_edits"
 _STEPS = {"next": 1, "previous": -1}
@@ -178,10 +178,7 @@ class HAIRLOOM_OT_add_card_along_curve(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if context.mode != "OBJECT":
-            cls.poll_message_set("Go back to Object Mode first")
-            return False
-        if not needs_hair(cls, context):
+        if not (in_object_mode(cls, context) and needs_hair(cls, context)):
             return False
         if not card_objects(chosen_hair(context)[0]):
             cls.poll_message_set("There are no cards yet: press Make Cards first")

@@ -17,7 +17,7 @@ from ..errors import HairloomError
 from .drawing import draw_button
 from .long_work import LongWork, Progress, Steps, draw_progress, threaded
 from .reports import tell
-from .selection import chosen_hair, needs_hair
+from .selection import chosen_hair, in_object_mode, needs_hair
 
 #: levels of detail that a panel has room for: as many as there may be
 _MAX_LEVELS = next(
@@ -84,12 +84,8 @@ class HAIRLOOM_OT_discard_card_edits(LongWork, bpy.types.Operator):
 
 
 def _can_make(operator: Any, context: bpy.types.Context) -> bool:
-    if not operator.is_free():
-        return False
-    if context.mode != "OBJECT":
-        operator.poll_message_set("Go back to Object Mode first")
-        return False
-    return needs_hair(operator, context)
+    is_free: bool = operator.is_free()
+    return is_free and in_object_mode(operator, context) and needs_hair(operator, context)
 
 
 def _built(

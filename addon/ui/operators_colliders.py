@@ -14,7 +14,7 @@ from ..blender.properties.properties import settings_of
 from .drawing import draw_button
 from .help import WithHelp
 from .long_work import LongWork, Steps, draw_progress, in_parts
-from .selection import active_mesh, chosen_hair
+from .selection import active_mesh, chosen_hair, in_object_mode
 
 _MILLIMETRES = 1000.0
 
@@ -139,8 +139,7 @@ def _mesh(context: bpy.types.Context) -> bpy.types.Object | None:
 
 def _has_mesh(operator: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
     """For `poll`: whether there is one; the greyed-out button says what to do."""
-    if context.mode != "OBJECT":
-        operator.poll_message_set("Go to Object Mode first")
+    if not in_object_mode(operator, context):
         return False
     if _mesh(context) is not None:
         return True

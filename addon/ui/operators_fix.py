@@ -14,7 +14,7 @@ from ..blender.base.outcome import report
 from ..blender.preview.diagnostics import is_unevenly_scaled, set_surface, surface_for
 from ..errors import HairloomError
 from .reports import reporting, waiting
-from .selection import chosen_hair, needs_hair
+from .selection import chosen_hair, in_object_mode, needs_hair
 
 #: for Smart UV Project: the largest angle within an island [rad], the margin between islands
 _ANGLE_LIMIT, _ISLAND_MARGIN = 1.15, 0.02
@@ -177,15 +177,11 @@ def _alone(context: bpy.types.Context, obj: bpy.types.Object) -> Iterator[None]:
 
 
 def _can_fix(operator: type[Any], context: bpy.types.Context) -> bool:
-    if not needs_hair(operator, context):
+    if not (needs_hair(operator, context) and in_object_mode(operator, context)):
         return False
-    hair = chosen_hair(context)[0]
-    if context.mode != "OBJECT":
-        operator.poll_message_set("Go back to Object Mode first")
-    elif not is_shape_editable(hair):
-        operator.poll_message_set("It is linked from another file: make it local first")
-    else:
+    if is_shape_editable(chosen_hair(context)[0]):
         return True
+    operator.poll_message_set("It is linked from another file: make it local first")
     return False
 
 

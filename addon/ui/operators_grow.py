@@ -9,8 +9,7 @@ from .drawing import draw_button, draw_section
 from .grow_options import GROW_PROPERTIES, draw_where_settings_are
 from .long_work import LongWork, Steps, draw_progress, in_parts
 from .messages import draw_message
-from .operators_start import in_object_mode
-from .selection import chosen_hair, ground_mesh, make_active, needs_hair, once_each
+from .selection import chosen_hair, ground_mesh, in_object_mode, make_active, needs_hair, once_each
 
 #: More names than these are only counted.
 _NAMED = 2
@@ -27,7 +26,7 @@ class HAIRLOOM_OT_grow(LongWork, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if not cls.is_free():
+        if not (cls.is_free() and in_object_mode(cls, context)):
             return False
         if ground_mesh(context) is not None:
             return True

@@ -25,9 +25,9 @@ from ..blender.setup.hairstyles import (
 )
 from .grow_options import names_of_weights
 from .long_work import LongWork, Progress, Steps, in_parts
-from .operators_start import beginning, in_object_mode
+from .operators_start import beginning
 from .preferences import preferences
-from .selection import chosen_hair, ground_mesh, make_active, once_each
+from .selection import chosen_hair, ground_mesh, in_object_mode, make_active, once_each
 
 #: pictures: how many side by side, how large, and the width of the page at UI scale 1
 _ACROSS, _PICTURE_SCALE, _WIDTH = 4, 5.0, 440

@@ -7,7 +7,7 @@ import bpy
 from ..blender.strands.make_real import make_real
 from .long_work import LongWork, Steps, in_parts
 from .reports import tell
-from .selection import chosen_hair, make_active, needs_hair
+from .selection import chosen_hair, in_object_mode, make_active, needs_hair
 
 
 class HAIRLOOM_OT_make_real(LongWork, bpy.types.Operator):
@@ -21,12 +21,7 @@ class HAIRLOOM_OT_make_real(LongWork, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if not cls.is_free():
-            return False
-        if context.mode != "OBJECT":
-            cls.poll_message_set("Return to Object Mode first")
-            return False
-        return needs_hair(cls, context)
+        return cls.is_free() and in_object_mode(cls, context) and needs_hair(cls, context)
 
     def steps(self, context: bpy.types.Context) -> Steps[None]:
         parts = make_real(chosen_hair(context), context.evaluated_depsgraph_get())

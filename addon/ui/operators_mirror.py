@@ -11,9 +11,8 @@ from ..blender.sessions.mirroring import mirror_hair
 from ..groom.mirror_settings import MirrorSettings
 from .drawing import draw_button
 from .long_work import LongWork, Steps, draw_progress, in_parts
-from .operators_start import in_object_mode
 from .reports import tell
-from .selection import chosen_hair, needs_hair, once_each
+from .selection import chosen_hair, in_object_mode, needs_hair, once_each
 
 
 class HAIRLOOM_OT_mirror_hair(LongWork, bpy.types.Operator):

@@ -16,9 +16,8 @@ from ..groom.parting_settings import PartingSettings
 from .drawing import draw_button
 from .long_work import LongWork, Steps, draw_progress, in_parts
 from .object_lists import draw_objects
-from .operators_start import in_object_mode
 from .reports import reporting, tell
-from .selection import chosen_hair, needs_hair, once_each
+from .selection import chosen_hair, in_object_mode, needs_hair, once_each
 
 
 class HAIRLOOM_OT_add_parting(bpy.types.Operator):

@@ -11,9 +11,8 @@ from ..blender.sessions.settling import back_to_combed, is_settled, settle_hair
 from ..dynamics.settle_settings import SettleSettings
 from .drawing import draw_button
 from .long_work import LongWork, Progress, Steps, as_progress, draw_progress
-from .operators_start import in_object_mode
 from .reports import reporting, tell
-from .selection import chosen_hair, needs_hair
+from .selection import chosen_hair, in_object_mode, needs_hair
 
 
 class HAIRLOOM_OT_settle(LongWork, bpy.types.Operator):

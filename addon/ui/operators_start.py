@@ -23,7 +23,14 @@ from .long_work import LongWork, Progress, Steps, in_parts
 from .operators_preview import start_preview
 from .preferences import NEW_GROOM, chosen_presets, preferences
 from .reports import reporting
-from .selection import active_mesh, chosen_hair, ground_mesh, make_active, needs_hair
+from .selection import (
+    active_mesh,
+    chosen_hair,
+    ground_mesh,
+    in_object_mode,
+    make_active,
+    needs_hair,
+)
 
 _NO_MESH = "Select the mesh to grow hair on, or add a sample: Add > Curve > Hairloom Sample Scene"
 
@@ -277,13 +284,6 @@ def _take_preferences(operator: Any, context: bpy.types.Context) -> None:
     for name in NEW_GROOM:
         if not operator.properties.is_property_set(name):
             setattr(operator, name, getattr(chosen, name))
-
-
-def in_object_mode(operator: type[Any], context: bpy.types.Context) -> bool:
-    if context.mode == "OBJECT":
-        return True
-    operator.poll_message_set("Go back to Object Mode first")
-    return False
 
 
 def _has_ground(operator: type[Any], context: bpy.types.Context) -> bool:

@@ -32,7 +32,7 @@ from ..blender.strands.import_groom import (
 from .drawing import draw_idle
 from .long_work import LongWork, Steps, threaded
 from .reports import tell
-from .selection import active_mesh, ground_mesh, make_active
+from .selection import active_mesh, ground_mesh, in_object_mode, make_active
 
 SUFFIXES = tuple(suffix for _, suffixes in FILE_KINDS for suffix in suffixes)
 UP_AXES = (
@@ -96,8 +96,8 @@ class HAIRLOOM_OT_import_strands(LongWork, ImportHelper, bpy.types.Operator):
     )
 
     @classmethod
-    def poll(cls, _context: bpy.types.Context) -> bool:
-        return cls.is_free()
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return cls.is_free() and in_object_mode(cls, context)
 
     def steps(self, context: bpy.types.Context) -> Steps[None]:
         """Where a file cannot be used, the others still come in."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import Any
 
 import bpy
 
@@ -66,6 +67,14 @@ def ground_mesh(context: bpy.types.Context) -> bpy.types.Object | None:
     if active is not None and active.type == "CURVES" and active.select_get():
         return head_of(active)
     return active_mesh(context)
+
+
+def in_object_mode(operator: type[Any], context: bpy.types.Context) -> bool:
+    """For `poll`: whether no object is being edited; the greyed-out button says so."""
+    if context.mode == "OBJECT":
+        return True
+    operator.poll_message_set("Go back to Object Mode first")
+    return False
 
 
 def needs_hair(operator: type[bpy.types.Operator], context: bpy.types.Context) -> bool:

@@ -71,3 +71,11 @@ def test_hair_of_another_view_layer_is_not_selected_but_told(hair, sphere):
     assert chosen_hair(bpy.context) == [hair]
     with pytest.raises(RuntimeError, match="Hair: it is not in this view layer"):
         bpy.ops.hairloom.show_settings()
+
+
+@pytest.mark.parametrize("name", ["grow", "add_groom", "import_strands", "mirror_hair", "make_real"])
+def test_what_adds_or_shapes_hair_waits_for_object_mode(name, hair, sphere):
+    button = getattr(bpy.ops.hairloom, name)
+    assert button.poll()
+    bpy.ops.object.mode_set(mode="EDIT")
+    assert not button.poll()
