@@ -46,7 +46,7 @@ class HAIRLOOM_OT_fit_spheres(LongWork, bpy.types.Operator):
         fitting = spheres.fit_spheres_to(mesh, context, settings_of(self, SphereFitSettings))
         fitted = yield from in_parts(fitting)
         for hair in spheres.grown_on(mesh, context.view_layer):
-            spheres.use_spheres(hair, fitted.collection)
+            spheres.use_spheres(hair, fitted.collection, context.scene)
         if self.replace_mesh:
             mesh.hairloom.collider_shape = "none"
         self._tell(mesh, fitted)

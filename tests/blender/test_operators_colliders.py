@@ -164,6 +164,24 @@ def test_the_hair_of_the_mesh_uses_them(new_hair, sphere):
     np.testing.assert_allclose(np.sort(posed.collider.radii), np.sort(balls(sphere)[1]), rtol=1e-5)
 
 
+def test_spheres_of_another_mesh_that_the_artist_has_chosen_stay(new_hair, sphere):
+    bpy.ops.mesh.primitive_uv_sphere_add(radius=0.1, location=(0.0, 0.0, -0.3))
+    body = bpy.context.object
+    fit(4)
+    hair = new_hair(sphere)
+    (of_body,) = spheres.fitted_collections(body)
+    hair.hairloom.collider_collection = of_body
+    fit(8)
+    fit(8)  # again: nothing comes twice
+    (of_head,) = spheres.fitted_collections(sphere)
+    used = hair.hairloom.collider_collection
+    assert (
+        list(used.children) == [of_body, of_head]
+        and used.name in bpy.context.scene.collection.children
+    )
+    assert not of_body.children and not of_head.children
+
+
 @pytest.mark.slow(instead="test_the_hair_of_the_mesh_uses_them")
 def test_colliders_that_the_artist_has_chosen_stay(new_hair, sphere):
     sphere.scale.z = 3.0  # one ball would do for a sphere

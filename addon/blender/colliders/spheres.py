@@ -17,7 +17,7 @@ from mathutils import Matrix
 from ...arrays import Floats, Ints
 from ...dynamics.fitting.settings import SphereFitSettings
 from ...dynamics.fitting.sphere_fit import SphereFit, fit_spheres
-from ..base.objects import head_of, objects_in
+from ..base.objects import head_of, objects_in, takes_objects
 from ..base.parts import Part, Parts
 from ..scene.surfaces import read_positions, read_surface
 
@@ -80,12 +80,20 @@ def fitted_collections(mesh: bpy.types.Object) -> list[bpy.types.Collection]:
     return [each for each in bpy.data.collections if each.get(MARK) == mesh]
 
 
-def use_spheres(hair: bpy.types.Object, collection: bpy.types.Collection) -> None:
-    """Let hair collide with a collection, in addition to the one it has."""
+def use_spheres(
+    hair: bpy.types.Object, collection: bpy.types.Collection, scene: bpy.types.Scene
+) -> None:
+    """Let hair collide with a collection, in addition to the one it has; where that is not to be
+    changed, such as the spheres of another mesh, both go into a new one."""
     used = hair.hairloom.collider_collection
-    if used is None or used.get(MARK) is not None:
+    if used is None:
         hair.hairloom.collider_collection = collection
-    elif collection not in used.children_recursive and collection != used:
+    elif collection not in (used, *used.children_recursive):
+        if used.get(MARK) is not None or not takes_objects(used):
+            both = bpy.data.collections.new(f"{hair.name} Colliders")
+            scene.collection.children.link(both)
+            both.children.link(used)
+            hair.hairloom.collider_collection = used = both
         used.children.link(collection)
 
 
