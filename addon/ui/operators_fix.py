@@ -51,7 +51,7 @@ class HAIRLOOM_OT_snap_roots(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if not (_can_fix(cls, context) and _needs_surface(cls, context)):
+        if not (_is_shown(cls, context) and _needs_surface(cls, context)):
             return False
         if _surface_of(context).data.uv_layers.active is not None:
             return True
@@ -133,7 +133,7 @@ class HAIRLOOM_OT_apply_scale(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if not _can_fix(cls, context):
+        if not _is_shown(cls, context):
             return False
         hair = chosen_hair(context)[0]
         if hair.data.users > 1:
@@ -182,6 +182,16 @@ def _can_fix(operator: type[Any], context: bpy.types.Context) -> bool:
     if is_shape_editable(chosen_hair(context)[0]):
         return True
     operator.poll_message_set("It is linked from another file: make it local first")
+    return False
+
+
+def _is_shown(operator: type[Any], context: bpy.types.Context) -> bool:
+    """Whether Blender's own operators can do it, which work on what is selected."""
+    if not _can_fix(operator, context):
+        return False
+    if chosen_hair(context)[0].visible_get():
+        return True
+    operator.poll_message_set("The hair is hidden: show it first")
     return False
 
 

@@ -70,6 +70,15 @@ def test_a_selected_mesh_is_taken_before_a_closer_one(new_hair, sphere):
     assert hair.data.surface == cube
 
 
+def test_cards_of_the_hair_are_no_surface(new_hair, sphere):
+    hair = new_hair(sphere)
+    bpy.ops.hairloom.make_cards()
+    bpy.context.view_layer.objects.active = hair
+    hair.parent = hair.data.surface = None
+    fix(hair)
+    assert hair.data.surface == sphere
+
+
 def test_without_any_mesh_the_button_says_what_to_do(new_hair):
     new_hair()
     with pytest.raises(RuntimeError, match="no mesh that it could grow from"):
@@ -130,6 +139,23 @@ def test_a_scale_of_shared_curves_or_of_a_parent_is_refused_with_a_reason(new_ha
     assert told(hair) == ["hairloom.apply_scale"]
     with pytest.raises(RuntimeError, match="its parent, Head, is scaled unevenly"):
         bpy.ops.hairloom.apply_scale()
+
+
+@pytest.mark.parametrize("name", ["snap_roots", "apply_scale"])
+def test_what_blender_does_to_selected_hair_waits_for_hidden_hair_to_be_shown(
+    name, new_hair, sphere
+):
+    hair = new_hair(sphere)
+    hair.scale = (1.0, 1.0, 1.5)
+    bpy.context.view_layer.objects.active = sphere
+    sphere.select_set(True)
+    hair.select_set(False)
+    bpy.context.view_layer.update()
+    button = getattr(bpy.ops.hairloom, name)
+    assert button.poll()
+    hair.hide_set(True)
+    with pytest.raises(RuntimeError, match="The hair is hidden: show it first"):
+        button()
 
 
 def test_blenders_dynamics_are_muted(sphere, extension):

@@ -121,14 +121,21 @@ def is_unevenly_scaled(obj: bpy.types.Object) -> bool:
 def surface_for(
     hair: bpy.types.Object, candidates: list[bpy.types.Object], depsgraph: bpy.types.Depsgraph
 ) -> bpy.types.Object:
-    """The mesh that hair grows from: the one whose vertices are closest to its roots.
+    """The mesh that hair grows from: the one whose vertices are closest to its roots. Cards are
+    none, whose roots are where those of their hair are.
 
     Raises:
         HairloomError: there is no mesh with faces, or no hair.
     """
     roots = read_curves(hair, depsgraph).strands.roots
     roots = roots[:: max(len(roots) // _ASKED, 1)]
-    meshes = [mesh for mesh in candidates if mesh.type == "MESH" and len(mesh.data.polygons)]
+    meshes = [
+        mesh
+        for mesh in candidates
+        if mesh.type == "MESH"
+        and len(mesh.data.polygons)
+        and mesh.hairloom.card_object.groom is None
+    ]
     if not meshes or not len(roots):
         raise HairloomError(
             "there is no mesh that it could grow from",
