@@ -192,6 +192,19 @@ def test_a_look_is_saved_listed_applied_and_deleted(
     assert list(own_folder.iterdir()) == [] and titles() == []
 
 
+def test_the_name_that_is_offered_for_hair_of_a_long_name_is_free(
+    hair: bpy.types.Object, own_folder: Path
+) -> None:
+    offered = []
+    for _ in range(12):
+        offered.append(
+            presets.free_title("Aurelia of the Long Name  Head Hair, left side", "shading")
+        )
+        assert bpy.ops.hairloom.save_preset(title=offered[-1]) == {"FINISHED"}
+    assert sorted(titles()) == sorted(set(offered)) and max(map(len, offered)) == 40
+    assert offered[0].startswith("Aurelia") and offered[11].endswith(" 12")
+
+
 def test_presets_of_all_kinds_are_saved_and_cards_bring_their_atlas(
     hair: bpy.types.Object, own_folder: Path
 ) -> None:

@@ -83,7 +83,7 @@ def own(section: str) -> tuple[tuple[Entry, ...], tuple[str, ...]]:
             warnings.append(f"{path.name} is no preset: {why}")
             continue
         if preset.settings.section == section:
-            title = " ".join(preset.title.split())[:_LONGEST_TITLE] or path.stem
+            title = _as_title(preset.title) or path.stem
             entries.append(Entry(OWN + path.stem, title, path, preset))
     return tuple(sorted(entries, key=lambda entry: entry.title.lower())), tuple(warnings)
 
@@ -153,7 +153,7 @@ def save_own(title: str, settings: Settings, *also: Settings) -> Path:
     Raises:
         HairloomError: the title is empty, or the file cannot be written.
     """
-    title = " ".join(title.split())[:_LONGEST_TITLE]
+    title = _as_title(title)
     stem = re.sub(r"[^a-z0-9]+", "_", title.lower()).strip("_")
     if not title:
         raise HairloomError("a preset needs a name", place="Save Preset", remedy="Type one")
@@ -163,15 +163,23 @@ def save_own(title: str, settings: Settings, *also: Settings) -> Path:
     return path
 
 
+def _as_title(text: str) -> str:
+    """As titles are kept: in one line, and not too long."""
+    return " ".join(text.split())[:_LONGEST_TITLE].rstrip()
+
+
 def replaced_preset(title: str, section: str) -> bool:
     """Whether the artist has a preset of this title, which saving another one would replace."""
-    return _of_title(" ".join(title.split())[:_LONGEST_TITLE], section) is not None
+    return _of_title(_as_title(title), section) is not None
 
 
 def free_title(title: str, section: str) -> str:
     """This title, or one with a number that no preset of the artist's has."""
-    choices = (title, *(f"{title} {number}" for number in range(2, 10_000)))
-    return next(each for each in choices if not replaced_preset(each, section))
+    title, number, free = _as_title(title), 2, _as_title(title)
+    while replaced_preset(free, section):
+        free = f"{title[: _LONGEST_TITLE - 1 - len(str(number))].rstrip()} {number}"
+        number += 1
+    return free
 
 
 def delete_own(name: str) -> None:
