@@ -133,6 +133,19 @@ def test_the_preview_listens_while_hairloom_is_enabled_and_no_longer(extension):
         hairloom.register()
 
 
+def test_checkboxes_in_headers_go_back_to_what_was_declared(new_hair):
+    groom = new_hair().data.hairloom
+    for name, section, parameter in (
+        ("use_children", "children", "method"),
+        ("use_shadows", "volume", "shadows"),
+    ):
+        setattr(groom, name, False)
+        assert getattr(getattr(groom, section), parameter) == "none"
+        setattr(groom, name, True)
+        default = ALL_SETTINGS[section]()
+        assert getattr(getattr(groom, section), parameter) == getattr(default, parameter)
+
+
 def test_choices_and_toggles_have_properties_too(extension):
     """No parameter uses them yet; the next one that does must find them working."""
     from dataclasses import dataclass

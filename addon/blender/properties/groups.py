@@ -197,7 +197,7 @@ def _switch(section: str, parameter: str, values: tuple[str, str], name: str, te
 
 _SWITCHES = {
     "use_children": _switch(
-        "children", "method", ("none", "multi"), "Children", "Grow more hair between the curves"
+        "children", "method", ("none", "auto"), "Children", "Grow more hair between the curves"
     ),
     "use_shadows": _switch(
         "volume", "shadows", ("none", "deep"), "Shadows", "Let hair shade itself and what is near"
