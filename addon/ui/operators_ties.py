@@ -32,10 +32,10 @@ class HAIRLOOM_OT_add_hair_tie(bpy.types.Operator):
         rings = [obj for obj in context.selected_objects if _may_tie(obj, hair)]
         if not rings:
             rings = [ties.new_ring(hair, context)]
-        ties.add_ties(hair, rings, context.scene)
         depsgraph = context.evaluated_depsgraph_get()
-        for ring in rings:
-            held, count = ties.held_by(hair, ring, depsgraph)
+        holds = [ties.held_by(hair, ring, depsgraph) for ring in rings]  # or they are no ties
+        ties.add_ties(hair, rings, context.scene)
+        for ring, (held, count) in zip(rings, holds, strict=True):
             level = "INFO" if held else "WARNING"
             remedy = "" if held else ". Move it so that hair passes through it"
             report(self, level, f"{ring.name} holds {held:,} of {count:,} strands{remedy}")

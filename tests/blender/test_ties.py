@@ -313,6 +313,19 @@ def test_the_button_adds_the_selected_ring_or_a_new_one(swinging):
     assert made.matrix_world.translation.z == pytest.approx(0.14)
 
 
+def test_what_cannot_hold_hair_becomes_no_tie(swinging):
+    hair, _ = swinging
+    one, flat = ring(), ring()
+    flat.scale = (0.0, 0.0, 0.0)
+    bpy.context.view_layer.update()
+    for obj in (hair, one, flat):
+        obj.select_set(True)
+    bpy.context.view_layer.objects.active = hair
+    with pytest.raises(RuntimeError, match="its scale is zero"):
+        bpy.ops.hairloom.add_hair_tie()
+    assert hair.hairloom.tie_collection is None
+
+
 def test_ties_survive_saving_and_opening(swinging, tmp_path, evaluated):
     hair, _ = swinging
     tie(hair, ring())
