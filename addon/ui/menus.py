@@ -85,12 +85,15 @@ class HAIRLOOM_MT_pie(bpy.types.Menu):
     bl_idname = _PIE
     bl_label = "Hairloom"
 
-    def draw(self, _context: bpy.types.Context) -> None:
-        pie = self.layout.menu_pie()
+    def draw(self, context: bpy.types.Context) -> None:
+        pie, active = self.layout.menu_pie(), context.active_object
         pie.operator("hairloom.preview", icon="HIDE_OFF")
         pie.operator("hairloom.play", icon="PLAY")
-        comb = pie.operator("object.mode_set", text="Comb", icon="SCULPTMODE_HLT")
-        comb.mode, comb.toggle = "SCULPT_CURVES", True
+        if active is not None and active.type == "CURVES":  # others have no such mode to name
+            comb = pie.operator("object.mode_set", text="Comb", icon="SCULPTMODE_HLT")
+            comb.mode, comb.toggle = "SCULPT_CURVES", True
+        else:
+            pie.separator()
         pie.operator("hairloom.settle")
         pie.operator("hairloom.reset", icon="FILE_REFRESH")
         pie.operator("hairloom.pause", icon="PAUSE")

@@ -1,7 +1,10 @@
 """What buttons and jobs are about, in a view layer that Blender has not put in order yet."""
 
+from types import SimpleNamespace
+
 import bpy
 import pytest
+from panel_layout import Layout
 
 from hairloom.addon.blender.base.objects import objects_in
 from hairloom.addon.blender.cards.occluders import read_occluders
@@ -10,6 +13,7 @@ from hairloom.addon.blender.command_line import bake_job, object_settings
 from hairloom.addon.blender.preview.diagnostics import surface_for
 from hairloom.addon.blender.sessions.fins import fins_in
 from hairloom.addon.cards.occlusion_settings import CardOcclusionSettings
+from hairloom.addon.ui import menus
 from hairloom.addon.ui.selection import chosen_hair
 
 
@@ -73,9 +77,28 @@ def test_hair_of_another_view_layer_is_not_selected_but_told(hair, sphere):
         bpy.ops.hairloom.show_settings()
 
 
-@pytest.mark.parametrize("name", ["grow", "add_groom", "import_strands", "mirror_hair", "make_real"])
+@pytest.mark.parametrize(
+    "name", ["grow", "add_groom", "import_strands", "mirror_hair", "make_real"]
+)
 def test_what_adds_or_shapes_hair_waits_for_object_mode(name, hair, sphere):
     button = getattr(bpy.ops.hairloom, name)
     assert button.poll()
     bpy.ops.object.mode_set(mode="EDIT")
     assert not button.poll()
+
+
+@pytest.mark.parametrize("what", ["hair", "mesh", "nothing"])
+def test_the_pie_menu_offers_to_comb_what_blender_combs(what, hair, sphere):
+    active = {"hair": hair, "mesh": sphere, "nothing": None}[what]
+    bpy.context.view_layer.objects.active = active
+    layout = Layout([])
+    layout.menu_pie = layout.column
+    menus.HAIRLOOM_MT_pie.draw(SimpleNamespace(layout=layout), bpy.context)
+    (pie,) = layout.parts
+    assert len(pie.parts) == 8, "each button stays at its place"
+    try:
+        bpy.ops.object.mode_set(mode="SCULPT_CURVES")
+        can_comb = True
+    except (TypeError, RuntimeError):
+        can_comb = False
+    assert can_comb is (what == "hair") is ("Comb" in dict(layout.texts))
