@@ -31,18 +31,21 @@ vec3 catmull_rom_tangent(vec3 p0, vec3 p1, vec3 p2, vec3 p3, float u)
   return normalize(dot(slope, slope) > 0.0 ? slope : chord);
 }
 
-// A length at the clip position's depth, as the camera sees it [pixels of the target].
-float pixels_wide(float length_of, vec4 clip, View view)
+// A length across a ribbon at the clip position's depth, as the camera sees it [pixels of the target].
+// `normal` is the ribbon's in the picture, whose pixels need not be square.
+float pixels_wide(float length_of, vec2 normal, vec4 clip, View view)
 {
-  return length_of * view.projection[1][1] * 0.5 * view.viewport.y / max(abs(clip.w), 1.0e-6);
+  vec2 pixels = 0.5 * vec2(view.projection[0][0], view.projection[1][1]) * view.viewport.xy;
+  return length_of * length(normal * pixels) / max(abs(clip.w), 1.0e-6);
 }
 
 // Half the ribbon's width in pixels of the target, where it is opaque: the radius as the camera sees
 // it, but no less than half the minimum. The taper to the tip (1 at the root) makes even the minimum
 // narrower, down to one pixel of the target, below which an opaque ribbon breaks up.
-float ribbon_half_width(float radius, float taper, float minimum_width, vec4 clip, View view)
+float ribbon_half_width(
+    float radius, float taper, float minimum_width, vec2 normal, vec4 clip, View view)
 {
-  float untapered = max(pixels_wide(radius, clip, view), 0.5 * minimum_width);
+  float untapered = max(pixels_wide(radius, normal, clip, view), 0.5 * minimum_width);
   return max(untapered * taper, 0.5 * min(minimum_width, 1.0));
 }
 
@@ -56,10 +59,9 @@ vec2 ribbon_normal_at(vec4 clip, vec4 clip_tangent, View view)
   return size > 1.0e-20 ? vec2(-along.y, along.x) / size : vec2(1.0, 0.0);
 }
 
-// The clip position moved sidewise, across the tangent as the picture shows it.
-vec4 ribbon_edge(vec4 clip, vec4 clip_tangent, float side, float half_width, View view)
+// The clip position moved sidewise, along the ribbon's normal in the picture.
+vec4 ribbon_edge(vec4 clip, vec2 normal, float side, float half_width, View view)
 {
-  vec2 across = ribbon_normal_at(clip, clip_tangent, view);
-  vec2 shift = across * side * half_width * 2.0 / view.viewport.xy;
+  vec2 shift = normal * side * half_width * 2.0 / view.viewport.xy;
   return vec4(clip.xy + shift * clip.w, clip.zw);
 }

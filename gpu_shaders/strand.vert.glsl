@@ -109,14 +109,14 @@ void main()
 
   vec4 clip = view.view_projection * vec4(point, 1.0);
   vec4 clip_tangent = view.view_projection * vec4(tangent, 0.0);
-#if COVERED
   vec2 normal = ribbon_normal_at(clip, clip_tangent, view);
-  float half_width = pixels_wide(radius, clip, view) * taper * widening;
+#if COVERED
+  float half_width = pixels_wide(radius, normal, clip, view) * taper * widening;
   float reach = half_width + coverage_reach(normal);
   ribbon = vec4(side * reach, half_width, normal) * clip.w;
 #else
   float minimum = strands.minimum_width * float(samples_across);
-  float reach = ribbon_half_width(radius, taper, minimum, clip, view) * widening;
+  float reach = ribbon_half_width(radius, taper, minimum, normal, clip, view) * widening;
 #endif
-  gl_Position = ribbon_edge(clip, clip_tangent, side, reach, view);
+  gl_Position = ribbon_edge(clip, normal, side, reach, view);
 }

@@ -353,8 +353,10 @@ def _view_values(view: PictureView, camera: Camera, snapshot: Snapshot, shades: 
 
 
 def _focal_length(view: PictureView) -> float:
-    """Pixels of a metre at a depth of 1, as clip space's w has it."""
-    return float(view.projection[1, 1]) * view.half_size[1]
+    """Pixels of a metre at a depth of 1, as clip space's w has it; of pixels that are not square
+    the geometric mean."""
+    across, upward = np.diag(view.projection)[:2] * view.half_size
+    return float(np.sqrt(across * upward))
 
 
 def _pixels_per_metre(view: PictureView, place: Floats) -> float:

@@ -306,6 +306,28 @@ def test_thin_opaque_strands_get_the_minimum_width(frame: Any, front: Any) -> No
         assert drawn.sum(axis=1) == pytest.approx(np.full(40, 2.0 * width))
 
 
+@pytest.mark.parametrize("transparency", ["none", "layers"])
+def test_strands_are_as_wide_where_pixels_are_not_square(
+    frame: Any, front: Any, transparency: str
+) -> None:
+    """Upright, lying and oblique ones cover the same part of a picture of half as many columns."""
+    settings = dataclasses.replace(RIBBON, transparency=transparency)
+    for direction in ((0.0, 0.0, 0.6), (0.6, 0.0, 0.0), (0.4, 0.0, 0.4)):
+        strand = np.array([0.2, 0.0, 0.2]) + np.array([[0.0], [1.0]]) * direction
+        snapshot = frame.Snapshot(
+            strand[None].astype(np.float32),
+            np.full((1, 2), 0.06, np.float32),
+            strand_settings=settings,
+        )
+        square, wide = (
+            frame.render_image(snapshot, front, columns, 64, 4)[..., 3].mean()
+            for columns in (64, 32)
+        )
+        expected = 0.12 * np.linalg.norm(direction)
+        assert square == pytest.approx(expected, rel=0.05)
+        assert wide == pytest.approx(expected, rel=0.05)
+
+
 def test_radius_scale_and_taper(frame: Any, front: Any) -> None:
     strands, radius = uprights(np.array([0.5]), 0.05)
     settings = dataclasses.replace(RIBBON, fullness=2.0, tip_width=0.25)
