@@ -49,17 +49,23 @@ def _of_sun(light: Light, aside: Floats) -> Light:
 
 
 def _of_lamp(light: Light, aside: Floats, center: Floats) -> Light:
-    """Of the disk that faces the hair; along its axis, what arrives stays the same."""
+    """Of the disk that faces the hair, as a point; at the middle of the hair as much arrives as of
+    the whole lamp. Of a disk without a cone that is so all along its axis."""
     away = center - np.array(light.vector)
-    if np.linalg.norm(away) <= light.radius:  # hair inside a lamp sees no side of it
+    distance = float(np.linalg.norm(away))
+    if distance <= light.radius:  # hair inside a lamp sees no side of it
         return light
-    right, up = _across(away / np.linalg.norm(away))
+    right, up = _across(away / distance)
     x, y = light.radius * aside
-    left = light.radius
-    if not light.is_ball:
-        left *= float(np.sqrt(max(1.0 - float(aside @ aside), 0.0)))
-    at = np.array(light.vector) + x * right + y * up
-    return replace(light, vector=_triple(at), radius=left)
+    at = _triple(np.array(light.vector) + x * right + y * up)
+    farther = float(x * x + y * y)
+    if light.cone is None and not light.is_ball:
+        left = np.sqrt(max(light.radius**2 - farther, 0.0))
+        return replace(light, vector=at, radius=float(left))
+    # with a radius, a cone would blur its rim by it once more
+    factor = (distance**2 + farther) / (distance**2 + light.softening[0])
+    power = _triple(factor * np.array(light.power))
+    return replace(light, vector=at, power=power, radius=0.0)
 
 
 def _of_panel(light: Light, panel: Panel, place: Floats) -> Light:

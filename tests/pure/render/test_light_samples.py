@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from hairloom.addon.render.light_samples import disk_place, lights_at
 from hairloom.addon.shading.area_lights import Panel
-from hairloom.addon.shading.lights import Light, light_at, light_irradiance
+from hairloom.addon.shading.lights import Cone, Light, light_at, light_irradiance
 
 WHITE = (1.0, 1.0, 1.0)
 AXES = (1.0, 0.0, 0.0), (0.0, 0.6, 0.8), (0.0, 0.8, -0.6)
+#: a spot that shines down
+TURNED = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 LIGHTS = {
     "sun": Light.sun((0.3, 0.2, -1.0), WHITE, 3.0, np.radians(20.0)),
     "lamp": Light.point((0.4, -0.9, 1.2), WHITE, 40.0, 0.3),
     "ball": Light.point((0.4, -0.9, 1.2), WHITE, 40.0, 0.1, is_ball=True),
+    "spot": Light.spot((0.0, 0.0, 1.0), WHITE, 40.0, Cone(TURNED, 1.5, 0.0), 0.1),
     "panel": Light.area((0.0, -1.0, 1.0), WHITE, 40.0, Panel(*AXES, 0.5, 0.25)),
     "ellipse": Light.area((0.0, -1.0, 1.0), WHITE, 40.0, Panel(*AXES, 0.5, 0.25, True)),
     "narrow": Light.area(
@@ -48,11 +54,31 @@ def test_the_first_sample_is_the_middle() -> None:
         assert first.vector == pytest.approx(light.vector), name
 
 
-def test_every_point_of_a_lamp_gives_the_hair_as_much() -> None:
-    light, hair = LIGHTS["lamp"], np.zeros((1, 3))
+@pytest.mark.parametrize("name", ["lamp", "ball", "spot"])
+def test_every_point_of_a_lamp_gives_the_hair_as_much(name: str) -> None:
+    light, hair = LIGHTS[name], np.zeros((1, 3))
     for sample in range(8):
         (part,) = lights_at((light,), sample, hair[0])
         assert light_irradiance(part, hair) == pytest.approx(light_irradiance(light, hair))
+
+
+@pytest.mark.parametrize("is_ball", [False, True])
+def test_the_rim_of_a_spot_is_as_wide_as_its_lamp_makes_it(is_ball: bool) -> None:
+    """The part of the disk's own points that light each place through a sharp cone."""
+    cone = Cone(TURNED, np.radians(60.0), 0.0)
+    light = Light.spot((0.0, 0.0, 2.0), WHITE, 40.0, cone, 0.3, is_ball)
+    points = np.linspace([0.0, 0.0, 0.0], [2.0, 0.0, 0.0], 400)
+
+    def let_through(parts: Sequence[Light]) -> np.ndarray:
+        every = [light_irradiance(replace(part, cone=None), points) for part in parts]
+        seen = [light_irradiance(part, points) for part in parts]
+        return np.mean(np.divide(seen, every)[..., 0], axis=0)
+
+    side = (np.arange(40) + 0.5) / 40
+    disk = [disk_place(np.array([x, y])) for x in side for y in side]
+    of_disk = [replace(light, radius=0.0, vector=(*(0.3 * place), 2.0)) for place in disk]
+    found = let_through([lights_at((light,), n, np.zeros(3))[0] for n in range(1024)])
+    assert np.abs(found - let_through(of_disk)).max() < 0.02
 
 
 def test_a_sun_fills_its_angle() -> None:
