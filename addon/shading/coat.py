@@ -38,7 +38,8 @@ FILM_WIDTH = float(np.radians(2.0))
 _BENT = (_HAIR / _WATER - 1.0) / (_HAIR - 1.0)
 #: Exponent of Kajiya-Kay's highlights on a film.
 _FILM_GLOSS = 400.0
-#: How much wider dust makes what is left of highlights.
+#: How much wider dust makes what is left of highlights; of Kajiya-Kay's, widths go as the inverse
+#: square root of exponents.
 _WIDER = 2.0
 
 
@@ -80,8 +81,9 @@ def coated(look: ShadingSettings) -> ShadingSettings:
         offset_r=look.offset_r - water * look.cuticle_tilt,
         primary_strength=clean * look.primary_strength,
         secondary_strength=clean * look.secondary_strength,
-        primary_exponent=_glossier(look.primary_exponent, water * clean) / wider,
-        secondary_exponent=_glossier(look.secondary_exponent, water * clean) / wider,
+        primary_shift=(1.0 - water) * look.primary_shift,
+        primary_exponent=_glossier(look.primary_exponent, water * clean) / wider**2,
+        secondary_exponent=_glossier(look.secondary_exponent, water * clean) / wider**2,
         sparkle=clean * look.sparkle,
     )
 

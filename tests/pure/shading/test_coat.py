@@ -9,6 +9,7 @@ import pytest
 
 from hairloom.addon.shading.coat import FILM_WIDTH, KEPT, coated, coated_color
 from hairloom.addon.shading.drawn_strands import look_color, strand_colors
+from hairloom.addon.shading.kajiya_kay import strand_specular
 from hairloom.addon.shading.marschner.look import fibre_of
 from hairloom.addon.shading.settings import ShadingSettings
 
@@ -95,7 +96,24 @@ def test_a_look_in_dust_is_dull() -> None:
     dusty = coated(DUSTY)
     assert dusty.strength_r == pytest.approx(0.4 * DRY.strength_r)
     assert dusty.width_r > 2.0 * DRY.width_r
-    assert dusty.primary_exponent < 0.5 * DRY.primary_exponent
+
+
+def half_width(exponent: float) -> float:
+    """Of Kajiya-Kay's highlight, where half of it is left [rad]."""
+    angle = np.linspace(0.0, 1.5, 15001)
+    half_vectors = np.stack([np.sin(angle), np.cos(angle), 0.0 * angle], axis=-1)
+    left = strand_specular(np.array([1.0, 0.0, 0.0]), half_vectors, exponent)
+    return float(angle[np.argmax(left < 0.5)])
+
+
+def test_kajiya_kays_highlights_lie_and_widen_as_marschners_do() -> None:
+    dusty, wet = coated(DUSTY), coated(WET)
+    wider = dusty.width_r / DRY.width_r
+    for name in ("primary_exponent", "secondary_exponent"):
+        before, after = (half_width(getattr(look, name)) for look in (DRY, dusty))
+        assert after / before == pytest.approx(wider, rel=0.06), name
+    assert DRY.primary_shift != 0.0 == wet.primary_shift
+    assert wet.secondary_shift == DRY.secondary_shift
 
 
 def test_colours_that_are_missing_stay_so() -> None:
