@@ -2,7 +2,8 @@
 //
 // Twin of look_up in addon/shading/volume/opacity.py. Reads the block `opacity`, the texture arrays
 // `opacity_0` to `opacity_5`, as many as SLOTS says, `opacity_meshes`, and `opacity_spans` where
-// layers are DEEP.
+// layers are DEEP. Where they are not, all four texels around a place are asked at once, for tau up to the
+// nearest mesh of theirs; the twin asks each up to its own.
 //
 // Texel t of a map lies in array t % SLOTS, since one framebuffer cannot hold several layers of one
 // array, and there in one of PASSES layers.

@@ -53,7 +53,7 @@ class MarschnerTextures:
         return {name: kept[name] for _, name in MARSCHNER_TEXTURES}
 
     def fractions(self, shading: ShadingSettings, size: int) -> dict[str, Any]:
-        """Textures by the names of SHARES_TEXTURES, made of tables `size` texels across."""
+        """Textures by the names of FRACTIONS_TEXTURES, made of tables `size` texels across."""
         kept = self._of(shading, size).textures
         return {name: kept[name] for _, name in FRACTIONS_TEXTURES}
 

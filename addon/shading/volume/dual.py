@@ -61,7 +61,7 @@ _MIN_LIGHT = 1e-3
 class Fractions:
     """What a fibre sends on and back, by lobe: R, TT, TRT and the rest.
 
-    forward, backward: (SHARES_SIZE, SHARES_SIZE, 4) float32; row by absorption, see
+    forward, backward: (FRACTIONS_SIZE, FRACTIONS_SIZE, 4) float32; row by absorption, see
         absorption_place; column by cos theta_d; fractions of the light on the fibre.
     """
 
@@ -103,7 +103,7 @@ def place_absorption(place: Floats | float) -> Floats:
 
 
 def fractions_at(table: Floats, cos_d: Floats, absorption: Floats) -> Floats:
-    """Shares by colour and lobe, (..., 3, 4), from the forward or the backward table.
+    """Fractions by colour and lobe, (..., 3, 4), from the forward or the backward table.
 
     Args:
         cos_d: (...). absorption: (..., 3).
@@ -118,7 +118,7 @@ def mean_forward(table: Floats, shading: ShadingSettings) -> Floats:
     cos theta as broad; from root to tip, grey ones as many as there are.
 
     Args:
-        table: `forward` of Shares.
+        table: `forward` of Fractions.
     """
     count = 16
     theta = (np.arange(count) + 0.5) / count * 0.5 * np.pi

@@ -161,6 +161,9 @@ def look_up(
 ) -> tuple[Floats, Floats, Floats]:
     """What light meets on its way, blended between the four texels around each place of a map.
 
+    Beyond a place each texel is asked up to its own first mesh. Of slices the GPU asks all four up
+    to the nearest of these, at once.
+
     Args:
         layers: (resolution, resolution, n) sums, row by row.
         spans: of these texels.
