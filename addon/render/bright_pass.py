@@ -15,12 +15,10 @@ from ..shading.bright_shafts import (
     BrightRegions,
     bright_regions,
     cell_side,
-    has_length,
     node_spacing,
-    shaft_length,
     wants_bright,
 )
-from ..shading.shafts import LightOnScreen, PolarGrid
+from ..shading.shafts import LightOnScreen, PolarGrid, has_length, shaft_length
 from ..shading.shafts_settings import ShaftSettings
 from . import gpu_objects
 from .camera import Camera

@@ -47,10 +47,6 @@ _REACH, _SAME = 0.2, 0.02
 _SHIFTS = 30
 #: middles at most; what is fainter joins the nearest
 MAX_REGIONS = 6
-#: an orthographic picture is taken to be this high, as an angle of view [rad]
-_FLAT_HEIGHT = 2.0 * np.arctan(0.36)
-#: length [pixels] up to which there are no shafts
-_SHORTEST = 1.0e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,18 +73,6 @@ def wants_bright(settings: ShaftSettings) -> bool:
     """Whether bright things throw shafts."""
     is_wanted = settings.use_shafts and settings.source in ("bright", "both")
     return is_wanted and settings.bright_strength > 0.0
-
-
-def shaft_length(projection: Floats, height: int, length: float) -> float:
-    """A length given as an angle of view, at the middle of the picture [pixels]."""
-    is_perspective = projection[3, 3] == 0.0
-    # of a part of a picture the projection is so much larger
-    halves = projection[1, 1] if is_perspective else 1.0 / np.tan(0.5 * _FLAT_HEIGHT)
-    return float(np.tan(length) * halves * height / 2.0)
-
-
-def has_length(length: float) -> bool:
-    return length > _SHORTEST
 
 
 def bright_part(colors: Floats, threshold: float) -> Floats:

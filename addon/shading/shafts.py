@@ -34,6 +34,8 @@ from .shafts_settings import ShaftSettings
 REACH = 2.0
 #: radiance below which a light's haze is left out
 FAINTEST = 1.0e-4
+#: an orthographic picture is taken to be this high, as an angle of view [rad]
+_FLAT_HEIGHT = 2.0 * np.arctan(0.36)
 #: length [pixels] up to which there are no shafts
 _SHORTEST = 1.0e-3
 #: rays on the way out from a light at most, and at least
@@ -121,6 +123,18 @@ class PolarGrid:
         return self.center[0] + radius * np.cos(angle), self.center[1] + radius * np.sin(angle)
 
 
+def shaft_length(projection: Floats, height: int, length: float) -> float:
+    """A length given as an angle of view, at the middle of the picture [pixels]."""
+    is_perspective = projection[3, 3] == 0.0
+    # of a part of a picture the projection is so much larger
+    halves = projection[1, 1] if is_perspective else 1.0 / np.tan(0.5 * _FLAT_HEIGHT)
+    return float(np.tan(length) * halves * height / 2.0)
+
+
+def has_length(length: float) -> bool:
+    return length > _SHORTEST
+
+
 def lights_on_screen(
     lights: Sequence[Light],
     view: Floats,
@@ -138,10 +152,9 @@ def lights_on_screen(
         width, height: of the picture [pixels].
     """
     is_perspective = projection[3, 3] == 0.0
-    # of a part of a picture the projection is so much larger
-    length = float(np.tan(settings.length) * projection[1, 1] * height / 2.0)
+    length = shaft_length(projection, height, settings.length)
     is_wanted = settings.use_shafts and settings.source in ("lights", "both")
-    if not (is_wanted and is_perspective and length > _SHORTEST):
+    if not (is_wanted and is_perspective and has_length(length)):
         return []
     to_clip = np.asarray(projection, np.float64) @ np.asarray(view, np.float64)
     eye = np.linalg.inv(np.asarray(view, np.float64))[:3, 3]

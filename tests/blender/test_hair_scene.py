@@ -19,8 +19,9 @@ from engine_stage import set_panorama, set_world  # noqa: E402
 
 from hairloom.addon.blender.engine import engine_picture, hair_scene  # noqa: E402
 from hairloom.addon.blender.properties.properties import settings_of  # noqa: E402
-from hairloom.addon.shading.bright_shafts import bright_shafts, shaft_length  # noqa: E402
+from hairloom.addon.shading.bright_shafts import bright_shafts  # noqa: E402
 from hairloom.addon.shading.environment import panorama_directions  # noqa: E402
+from hairloom.addon.shading.shafts import shaft_length  # noqa: E402
 from hairloom.addon.shading.shafts_settings import ShaftSettings  # noqa: E402
 from hairloom.addon.strands import StrandSet  # noqa: E402
 

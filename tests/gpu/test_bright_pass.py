@@ -11,8 +11,9 @@ import pytest
 
 from hairloom.addon.render.camera import Camera, look_at, orthographic, perspective
 from hairloom.addon.render.snapshot import MeshSnapshot, Snapshot
-from hairloom.addon.shading.bright_shafts import bright_shafts, shaft_length
+from hairloom.addon.shading.bright_shafts import bright_shafts
 from hairloom.addon.shading.lights import Light
+from hairloom.addon.shading.shafts import shaft_length
 from hairloom.addon.shading.shafts_settings import ShaftSettings
 from hairloom.addon.strands import Surface
 

@@ -16,9 +16,9 @@ from hairloom.addon.shading.bright_shafts import (
     bright_part,
     bright_regions,
     bright_shafts,
-    shaft_length,
     wants_bright,
 )
+from hairloom.addon.shading.shafts import shaft_length
 from hairloom.addon.shading.shafts_settings import ShaftSettings
 
 WIDTH, HEIGHT = 160, 120
