@@ -2,6 +2,7 @@
 //
 // What a colour of the picture becomes depends on its view transform; skin stands for all. Reads what both
 // recipes of body_shadow.py have: view, lights, maps, body_color, hair_forward.
+#include "lib_bright.glsl"
 #include "lib_lights.glsl"
 #include "lib_environment.glsl"
 #include "lib_facing.glsl"
@@ -14,7 +15,7 @@ const float NO_LIGHT = {{no_light}};
 float shown(vec3 radiance)
 {
   vec3 written = output_encoded(body_color * radiance, {{output_viewport}});
-  return dot(written, vec3(0.2126, 0.7152, 0.0722));
+  return luminance_of(written);
 }
 
 // Brightness on the screen at a place of a mesh: x with all light, y with what hair leaves of it. Where

@@ -1,4 +1,4 @@
-// Luminance of scene-linear Rec. 709; twin of LUMINANCE in addon/shading/bright_shafts.py.
+// Luminance of scene-linear Rec. 709; twin of addon/shading/luminance.py.
 
 float luminance_of(vec3 color)
 {

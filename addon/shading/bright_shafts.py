@@ -29,11 +29,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays import Floats
+from .luminance import LUMINANCE
 from .shafts import PolarGrid, from_polar, radial_blur, to_polar
 from .shafts_settings import ShaftSettings
 
-#: luminance of scene-linear Rec. 709
-LUMINANCE = (0.2126, 0.7152, 0.0722)
 #: how far above the threshold [thresholds] brightness counts half
 KNEE = 0.5
 #: luminance that counts at most, so that single pixels do not outshine all
@@ -83,7 +82,7 @@ def bright_part(colors: Floats, threshold: float) -> Floats:
     """
     colors = np.asarray(colors, np.float64)[..., :3]
     colors = np.where(colors >= 0.0, np.minimum(colors, LARGEST), 0.0)
-    luminance = colors @ np.array(LUMINANCE)
+    luminance = colors @ LUMINANCE
     above = np.maximum(luminance - threshold, 0.0)
     is_bright = above > 0.0
     surely = np.divide(above, above + KNEE * threshold, out=np.zeros_like(above), where=is_bright)
@@ -104,7 +103,7 @@ def bright_cells(bright: Floats) -> Floats:
     """
     height, width = bright.shape[:2]
     side = cell_side(width, height)
-    luminance = bright[..., :3] @ np.array(LUMINANCE)
+    luminance = bright[..., :3] @ LUMINANCE
     x, y = np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)
     values = np.stack([luminance, luminance * x, luminance * y, bright[..., 3]], axis=-1)
     missing = (0, -height % side), (0, -width % side), (0, 0)

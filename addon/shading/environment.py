@@ -25,6 +25,7 @@ import numpy as np
 
 from ..arrays import Floats, Ints
 from .lights import Color, Light
+from .luminance import LUMINANCE
 
 #: pixels of the panorama from which suns and harmonics are found
 ROWS, COLUMNS = 128, 256
@@ -46,7 +47,6 @@ _CANDIDATES, _SMOOTH = 1024, np.radians(12.0)
 _EVEN = 1e-3
 #: mean squares of the eight harmonics over all directions
 _SQUARES = np.array([1 / 3, 1 / 3, 1 / 3, 1 / 15, 1 / 15, 4 / 5, 1 / 15, 4 / 15])
-_LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,10 +144,10 @@ def _without_suns(
     radiance: Floats, directions: Floats, weights: Floats
 ) -> tuple[Floats, list[Light]]:
     """What remains of the radiance, and the brightest lobes as suns, brightest first."""
-    whole = float(weights @ radiance @ _LUMINANCE)
+    whole = float(weights @ radiance @ LUMINANCE)
     suns: list[Light] = []
     while len(suns) < _MAX_SUNS and whole > 0.0:
-        bright = radiance @ _LUMINANCE
+        bright = radiance @ LUMINANCE
         # what is left of a lobe is no other sun
         for sun in suns:
             bright[directions @ np.array(sun.vector) > np.cos(2.0 * _LOBE)] = 0.0
@@ -155,7 +155,7 @@ def _without_suns(
         around = float(weights[~is_near] @ bright[~is_near] / weights[~is_near].sum())
         excess = np.maximum(bright - _BRIGHTER * around, 0.0) / np.maximum(bright, 1e-30)
         taken = radiance * np.where(is_near, excess, 0.0)[:, None]
-        flux = taken @ _LUMINANCE * weights
+        flux = taken @ LUMINANCE * weights
         if flux.sum() < _LOBE_LIGHT * whole:
             break
         middle = flux @ directions

@@ -10,12 +10,12 @@ import numpy as np
 
 from ...arrays import Floats, Ints
 from ...errors import HairloomError
+from ...shading.luminance import LUMINANCE
 from .attributes import read_attribute
 from .objects import as_mesh
 
-#: Attributes that may be painted; colours count by their luminance (Rec. 709).
+#: Attributes that may be painted; colours count by their luminance.
 _NUMBERS, _COLORS = ("FLOAT", "BOOLEAN"), ("FLOAT_COLOR", "BYTE_COLOR")
-LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)
 _DOMAINS = ("POINT", "CORNER", "FACE", "CURVE")
 #: Of Blender's own that are no paint; and what it keeps among images that is none.
 _NOT_PAINT, _NO_IMAGES = ("sharp_", "radius"), ("RENDER_RESULT", "COMPOSITING")

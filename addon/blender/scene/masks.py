@@ -24,9 +24,9 @@ from ...groom.masks import (
     mask_names,
 )
 from ...params import Settings
+from ...shading.luminance import LUMINANCE
 from ...strands import StrandSet, Surface
 from ..base.vertex_weights import (
-    LUMINANCE,
     Memberships,
     at_corners,
     has_weights,
