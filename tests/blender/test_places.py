@@ -13,6 +13,8 @@ import pytest
 from strand_files import hedgehog
 
 from hairloom.addon.blender.command_line import command_line, job_steps
+from hairloom.addon.blender.command_line.places import check_outputs
+from hairloom.addon.errors import HairloomError
 from hairloom.addon.exchange.groom import Groom
 from hairloom.addon.exchange.tressfx import write_tfx
 
@@ -81,6 +83,21 @@ def test_a_report_tells_that_the_output_is_refused(folder: Path) -> None:
     assert command_line.run([*EXPORT, "--output", "hair.tfx", "--report", "r.json"]) == 1
     error = json.loads((folder / "r.json").read_text())["error"]
     assert error["place"] == "hair.tfx" and "another name" in error["remedy"]
+
+
+def test_a_folder_with_the_name_of_a_verb_or_an_object_is_no_input(folder: Path) -> None:
+    for arguments in (
+        ["bake", "--scene", "wig.blend", "--output", "bake"],
+        ["turntable", "--scene", "wig.blend", "--output", "turntable"],
+        ["simulate", "--scene", "wig.blend", "--groom", "Hair", "--output", "Hair"],
+    ):
+        options = command_line.parser().parse_args(arguments)
+        options.output.mkdir()
+        (verb,) = (each for each in command_line.VERBS if each.name == options.verb)
+        check_outputs(verb, options)
+    options.bake = "Hair"
+    with pytest.raises(HairloomError, match="the job reads this"):
+        check_outputs(verb, options)
 
 
 def test_a_check_of_an_export_needs_no_place(folder: Path) -> None:

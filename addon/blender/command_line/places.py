@@ -70,14 +70,17 @@ def check_not_read(path: Path, options: argparse.Namespace) -> None:
 
 
 def named_inputs(options: argparse.Namespace) -> set[str]:
-    """The files and folders that are there and that options name, also as NAME=FILE, but for those
-    to be written."""
+    """The files that are there and that options name, also as NAME=FILE, and the folder of a bake,
+    but for those to be written."""
     words = []
     for name, value in vars(options).items():
-        if name not in _OUTPUTS:
+        if name not in ("verb", *_OUTPUTS):
             words += [str(one) for one in (value if isinstance(value, list) else [value])]
     words += [word.partition("=")[2] for word in words]
-    return {os.path.abspath(word) for word in words if word and os.path.exists(word)}
+    found = [word for word in words if os.path.isfile(word)]
+    # objects may have the names of folders
+    bake = getattr(options, "bake", None)
+    return {os.path.abspath(word) for word in (*found, *([bake] if bake else []))}
 
 
 def _check_file(path: Path, name: str, suffix: str, options: argparse.Namespace) -> None:
