@@ -229,6 +229,25 @@ def test_an_interrupted_task_leaves_nothing(scene: Path, tmp_path: Path) -> None
         assert left == [], "something half-written remains"
 
 
+def test_an_operator_that_is_interrupted_is_not_said_to_fail(
+    extension: None,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def execute(_self: Any, _context: Any) -> set[str]:
+        os.kill(os.getpid(), signal.SIGTERM)
+        time.sleep(1.0)
+        return {"FINISHED"}
+
+    monkeypatch.setattr(bpy.types.HAIRLOOM_OT_sample_scene, "execute", execute)
+    report = tmp_path / "report.json"
+    arguments = ["run", "sample_scene", "--output", str(tmp_path / "a.blend")]
+    assert command_line.run([*arguments, "--report", str(report)]) == 128 + signal.SIGTERM
+    assert capsys.readouterr().err.endswith("hairloom: interrupted (SIGTERM)\n")
+    assert json.loads(report.read_text())["status"] == "interrupted"
+
+
 def test_signals_are_as_before_afterwards() -> None:
     before = signal.getsignal(signal.SIGINT)
     with pytest.raises(interruption.Interrupted) as caught, interruption.interruptible():

@@ -45,6 +45,9 @@ def interruptible() -> Iterator[None]:
     before = {number: signal.signal(number, _stop) for number in numbers}
     try:
         yield
+    except Exception:
+        stop_if_asked()  # Blender raises another error for what has interrupted an operator
+        raise
     finally:
         for number, handler in before.items():
             # None: set by C code, which Python cannot set again
