@@ -8,6 +8,7 @@ import pytest
 from mathutils import Euler, Matrix
 
 from hairloom.addon.blender.scene.curves import read_curves, write_curves
+from hairloom.addon.blender.scene.curves_motion import store_motion
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.strands import StrandSet
 from hairloom.addon.strands.clean import clean
@@ -216,3 +217,16 @@ def test_blenders_own_surface_node_accepts_the_attachment(evaluated, sphere):
     moved = read_curves(obj, evaluated()).strands.points
     assert obj.modifiers[0].node_warnings[:] == []
     assert moved == pytest.approx(points + np.array([0.0, 0.0, 0.25]), abs=1e-4)
+
+
+def test_imported_motion_goes_straight_from_frame_to_frame_on_both_sides_of_0(new_hair, evaluated):
+    hair = new_hair()
+    rest = read_curves(hair, evaluated()).strands.points
+    positions = [rest + np.float32([10.0 + frame, 0.0, 0.0]) for frame in range(-2, 3)]
+    store_motion(hair, -2, np.array(positions, np.float32))
+    for time in (-3.0, -1.5, -0.75, -0.25, 0.25, 1.5, 2.5):
+        frame = int(np.floor(time))
+        bpy.context.scene.frame_set(frame, subframe=time - frame)
+        read = read_curves(hair, evaluated()).strands
+        expected = rest + [10.0 + np.clip(time, -2.0, 2.0), 0.0, 0.0]
+        np.testing.assert_allclose(read.points, expected, atol=2e-6, err_msg=f"{time}")

@@ -17,7 +17,7 @@ NAME = "Hairloom Motion"
 #: of the attributes; the frame follows
 PREFIX = "motion_"
 _FIRST, _LAST = "First Frame", "Last Frame"
-_MARK, _VERSION = "hairloom_curves_motion", 1
+_MARK, _VERSION = "hairloom_curves_motion", 2
 
 
 def store_motion(hair: bpy.types.Object, first: int, positions: Floats) -> None:
@@ -44,8 +44,10 @@ def _fill(tree: bpy.types.NodeTree) -> None:
     begin, end, time = (
         new(kind) for kind in ("NodeGroupInput", "NodeGroupOutput", "GeometryNodeInputSceneTime")
     )
-    clamped, part, following = new("ShaderNodeClamp"), _math(tree, "FRACT"), _math(tree, "CEIL")
-    whole, mix, place = _math(tree, "FLOOR"), new("ShaderNodeMix"), new("GeometryNodeSetPosition")
+    clamped, part, mix = new("ShaderNodeClamp"), new("ShaderNodeMath"), new("ShaderNodeMix")
+    whole, following = _whole(tree, "FLOOR"), _whole(tree, "CEILING")
+    place = new("GeometryNodeSetPosition")
+    part.operation = "FRACT"
     link(time.outputs["Frame"], clamped.inputs["Value"])
     link(begin.outputs[_FIRST], clamped.inputs["Min"])
     link(begin.outputs[_LAST], clamped.inputs["Max"])
@@ -68,9 +70,10 @@ def _fill(tree: bpy.types.NodeTree) -> None:
             node.location = 220.0 * across, -220.0 * down
 
 
-def _math(tree: bpy.types.NodeTree, operation: str) -> bpy.types.Node:
-    node = tree.nodes.new("ShaderNodeMath")
-    node.operation = operation
+def _whole(tree: bpy.types.NodeTree, mode: str) -> bpy.types.Node:
+    """A whole number: as text a float above -1 is -0, which names no attribute."""
+    node = tree.nodes.new("FunctionNodeFloatToInt")
+    node.rounding_mode = mode
     return node
 
 
@@ -83,7 +86,7 @@ def _of_frame(tree: bpy.types.NodeTree, frame: bpy.types.Node) -> bpy.types.Node
         new("GeometryNodeInputNamedAttribute"),
     )
     prefix = new("FunctionNodeInputString")
-    prefix.string = PREFIX
+    prefix.string, text.data_type = PREFIX, "INT"
     attribute.data_type = "FLOAT_VECTOR"
     link(frame.outputs[0], text.inputs["Value"])
     link(text.outputs[0], name.inputs["Strings"])
