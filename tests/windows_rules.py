@@ -22,7 +22,7 @@ LIMIT = 259
 #: functions that take a path first, and those that take two
 _ONE = (
     *("open", "mkdir", "rmdir", "unlink", "stat", "lstat", "scandir", "listdir", "chmod"),
-    *("utime", "listxattr", "getxattr", "setxattr"),
+    *("access", "utime", "listxattr", "getxattr", "setxattr"),
 )
 _TWO = ("replace", "rename", "link")
 #: these need the file for themselves

@@ -17,12 +17,14 @@ from .stale_temp_files import remove_stale_files, temporary_beside
 
 #: reasons why nothing can be written
 IS_FOLDER = "a folder has this name"
+IS_PROTECTED = "the file of this name is write-protected"
 DISK_FULL = os.strerror(errno.ENOSPC)
 _NO_RIGHTS = os.strerror(errno.EACCES)
 _RIGHTS = "Choose a folder that you may write to"
 _SPACE = "Free some space there, or choose a folder on another disk"
 _REMEDIES = {
     IS_FOLDER: "Choose another name",
+    IS_PROTECTED: "Allow writing to that file, or choose another name",
     DISK_FULL: _SPACE,
     os.strerror(errno.EDQUOT): _SPACE,
     os.strerror(errno.EFBIG): "Choose a folder on a disk that takes files of this size",
@@ -64,9 +66,9 @@ def atomic_write(path: Path, *, keeps: bool = True) -> Iterator[Path]:
         yield temporary
         if not temporary.is_file():
             raise unwritable(path, "nothing was written")
+        flush(temporary)  # first, since the old file's mode may not allow it
         if target.exists():
             shutil.copymode(target, temporary)
-        flush(temporary)
         try:
             with committing.get()():
                 move(temporary, target)
@@ -105,8 +107,9 @@ def _check_writable(target: Path) -> None:
     check_name(target)
     with suppress(FileNotFoundError):
         os.stat(target)  # a name that is too long, or below a file
-    if target.is_dir():
-        raise IsADirectoryError(errno.EISDIR, IS_FOLDER)
+    why = why_not_replaced(target)
+    if why:
+        raise PermissionError(errno.EACCES, why)
     target.parent.mkdir(parents=True, exist_ok=True)
     remove_stale_files(target.parent)
     # under another name: nobody else shall know the right one before it is taken
@@ -129,10 +132,10 @@ def check_place(path: Path) -> None:
     """Refuse a place that nothing can be written to before long work begins; writes nothing.
 
     Raises:
-        HairloomError: a folder has this name, or no file can be made in its folder.
+        HairloomError: what has this name cannot be replaced, or no file can be made in its folder.
     """
     check_name(path)
-    why = IS_FOLDER if path.is_dir() else _why_no_file(path)
+    why = why_not_replaced(path) or _why_no_file(path)
     if why:
         raise unwritable(path, why)
 
@@ -151,6 +154,13 @@ def check_folder_place(folder: Path) -> None:
     why = _why_no_file(folder / "file")
     if why:
         raise folder_unwritable(folder, why)
+
+
+def why_not_replaced(path: Path) -> str:
+    """Why what is at this path cannot be replaced by a file; empty where it can."""
+    if path.is_dir():
+        return IS_FOLDER
+    return IS_PROTECTED if path.exists() and not os.access(path, os.W_OK) else ""
 
 
 def folder_unwritable(folder: Path, why: str) -> HairloomError:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import filecmp
 import os
 import shutil
@@ -10,7 +11,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from ...errors import HairloomError
-from .atomic import IS_FOLDER, unwritable
+from .atomic import IS_PROTECTED, unwritable, why_not_replaced
 from .moving import committing, flush, flush_names, free_name, move
 from .names import check_name
 from .stale_temp_files import COMPLETE, remove_stale_files, temporary_beside
@@ -42,6 +43,8 @@ def written_together(path: Path) -> Iterator[Path]:
     try:
         (staging / path.name).touch(exist_ok=False)  # fails now for a name that cannot be
         (staging / path.name).unlink()
+        if why := why_not_replaced(path):
+            raise unwritable(path, why)
         yield staging
         if not (staging / path.name).is_file():
             raise unwritable(path, "nothing was written")
@@ -120,11 +123,14 @@ def _put_in_place(staging: Path, folder: Path) -> None:
 
 
 def _check_and_flush(file: Path, target: Path) -> None:
-    if target.is_dir():
-        raise unwritable(target, IS_FOLDER)
+    why = why_not_replaced(target)
+    if why == IS_PROTECTED:
+        raise PermissionError(errno.EACCES, why, str(target))  # so that the new files are kept
+    if why:
+        raise unwritable(target, why)
+    flush(file)  # first, since the old file's mode may not allow it
     if target.exists():
         shutil.copymode(target, file)
-    flush(file)
 
 
 def _keep(target: Path, backup: Path) -> None:
@@ -155,5 +161,6 @@ def _kept(staging: Path, path: Path, error: PermissionError) -> HairloomError:
     return HairloomError(
         f"a file cannot be replaced ({error.strerror or error}); all are as they were",
         place=str(error.filename2 or error.filename or path),
-        remedy=f"Close other programs that use it. The new files are beside it in {kept.name}",
+        remedy="Allow writing to it, and close other programs that use it. The new files are "
+        f"beside it in {kept.name}",
     )

@@ -5,14 +5,14 @@ from __future__ import annotations
 import errno
 import os
 import shutil
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 
 from hairloom.addon.errors import HairloomError
-from hairloom.addon.exchange.files import moving
+from hairloom.addon.exchange.files import atomic, file_set, moving
 from hairloom.addon.exchange.files.atomic import (
     as_system_says,
     atomic_write,
@@ -245,3 +245,33 @@ def test_a_name_that_is_not_utf_8_is_a_message(tmp_path: Path) -> None:
             write(path)
         str(caught.value).encode("utf-8")
     assert names(tmp_path) == []
+
+
+@pytest.mark.parametrize("write", [write_alone, write_set])
+def test_a_write_protected_file_is_refused_before_any_work(
+    write: Callable[[Path], None], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    target = tmp_path / "groom.tfx"
+    target.write_bytes(b"old")
+    access = os.access
+    monkeypatch.setattr(os, "access", lambda path, mode: path != target and access(path, mode))
+    with monkeypatch.context() as patched:
+        patched.setattr(Path, "write_bytes", lambda *_: pytest.fail("the block must not run"))
+        for refused in (write, check_place):
+            with pytest.raises(HairloomError, match="write-protected") as caught:
+                refused(target)
+            assert caught.value.place == str(target) and "Allow" in caught.value.remedy
+    assert target.read_bytes() == b"old" and names(tmp_path) == ["groom.tfx"]
+
+
+@pytest.mark.parametrize("write", [write_alone, write_set])
+def test_a_new_file_is_on_the_disk_before_it_has_the_old_ones_mode(
+    write: Callable[[Path], None], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With a mode of 0444 nobody but root may open it again."""
+    (tmp_path / "groom.tfx").write_bytes(b"old")
+    calls: list[str] = []
+    for module, name in ((atomic, "flush"), (file_set, "flush"), (shutil, "copymode")):
+        monkeypatch.setattr(module, name, lambda *_, name=name: calls.append(name))
+    write(tmp_path / "groom.tfx")
+    assert calls == ["flush", "copymode"]

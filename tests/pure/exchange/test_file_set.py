@@ -231,3 +231,20 @@ def test_who_holds_a_file_is_waited_for_once(
         write(folder, "new")
     assert moved.count(FILES[1]) == 1
     assert {(tmp_path / name).read_text() for name in FILES} == {"old"}
+
+
+def test_a_write_protected_file_beside_the_main_one_keeps_all_and_the_new_ones(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write(tmp_path, "old")
+    protected, access = tmp_path / FILES[1], os.access
+    monkeypatch.setattr(os, "access", lambda path, mode: path != protected and access(path, mode))
+    with (
+        pytest.raises(HairloomError, match=r"write-protected.*hair new") as caught,
+        written_together(tmp_path / "hair.glb") as folder,
+    ):
+        write(folder, "new")
+    assert caught.value.place == str(protected)
+    assert contents(tmp_path / "hair new") == dict.fromkeys(sorted(FILES), "new")
+    shutil.rmtree(tmp_path / "hair new")
+    assert contents(tmp_path) == dict.fromkeys(sorted(FILES), "old")
