@@ -188,8 +188,9 @@ def _times(prim: Any) -> list[float]:
 
     times = set(UsdGeom.BasisCurves(prim).GetPointsAttr().GetTimeSamples())
     above = prim
-    while above and above.IsA(UsdGeom.Xformable):
-        times |= set(UsdGeom.Xformable(above).GetTimeSamples())
+    while above:  # scopes and prims without a type lie between what moves, too
+        if above.IsA(UsdGeom.Xformable):
+            times |= set(UsdGeom.Xformable(above).GetTimeSamples())
         above = above.GetParent()
     return sorted(times) if len(times) > 1 else []
 

@@ -372,6 +372,22 @@ def test_parents_instances_units_and_axes_place_the_strands(tmp_path: Path) -> N
     assert read.group.tolist() == [0, 1]
 
 
+@pytest.mark.parametrize("between", ["Scope", "", "Xform"])
+def test_hair_moves_with_an_animated_prim_whatever_lies_between(
+    tmp_path: Path, between: str
+) -> None:
+    stage = new_stage(tmp_path / "a.usdc", unit=1.0, up="Z")
+    place = UsdGeom.Xform.Define(stage, "/head").AddTranslateOp()
+    for time in (24, 48):
+        place.Set(Gf.Vec3d(time / 24, 0, 0), time)
+    stage.DefinePrim("/head/grooms", between)
+    add_curves(stage, "/head/grooms/hair", [[0, 0, 0], [0, 1, 0]], [2], basis="linear")
+    stage.Save()
+    motion = read_usd(tmp_path / "a.usdc").groom.motion
+    assert motion is not None and motion.times.tolist() == [1.0, 2.0]
+    assert motion.positions[:, :, 0].tolist() == [[1.0, 1.0], [2.0, 2.0]]
+
+
 def test_an_unnamed_unit_is_a_centimetre_and_can_be_overruled(tmp_path: Path) -> None:
     stage = Usd.Stage.CreateNew(str(tmp_path / "a.usda"))
     add_curves(stage, "/hair", [[0, 0, 0], [0, 100, 0]], [2])
