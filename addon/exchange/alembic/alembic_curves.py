@@ -79,13 +79,41 @@ def _walk(thing: Any, above: tuple[Any, ...], found: Arrays, depth: int) -> None
         _walk(child, above, found, depth + 1)
 
 
-def _matrix(above: tuple[Any, ...], *when: Any) -> NDArray[np.float64]:
-    """(4, 4) that takes row vectors to the world, at a time or at the first."""
+def _matrix(above: tuple[Any, ...], time: float | None = None) -> NDArray[np.float64]:
+    """(4, 4) that takes row vectors to the world, at a time, or at the first."""
     matrix = np.eye(4)
     for place in above:
-        own = np.array([list(row) for row in place.getValue(*when).getMatrix()], np.float64)
-        matrix = own @ matrix
+        if not place.getValue().getInheritsXforms():
+            matrix = np.eye(4)
+        around, part = _around(place, time)
+        own = [
+            np.array([list(row) for row in place.getValue(*when).getMatrix()], np.float64)
+            for when in around
+        ]
+        matrix = _mixed(own, part) @ matrix
     return matrix
+
+
+def _around(moving: Any, time: float | None) -> tuple[list[tuple[Any, ...]], float]:
+    """How to ask for the samples before and after a time, and how far it is from one to the other;
+    for one sample where it is that, or lies beyond all.
+
+    The library itself gives the nearest one.
+    """
+    from alembic3d import Abc
+
+    if time is None or moving.isConstant():
+        return [()], 0.0
+    sampling, count = moving.getTimeSampling(), moving.getNumSamples()
+    numbers = {sampling.getFloorIndex(time, count), sampling.getCeilIndex(time, count)}
+    times = [float(sampling.getSampleTime(number)) for number in sorted(numbers)]
+    part = (time - times[0]) / (times[1] - times[0]) if len(times) > 1 else 0.0
+    return [(Abc.ISampleSelector(each),) for each in times], part
+
+
+def _mixed(around: list[NDArray[Any]], part: float) -> NDArray[Any]:
+    """Between two samples values go straight."""
+    return around[0] if len(around) == 1 else around[0] + (around[1] - around[0]) * part
 
 
 def _read_motion(schema: Any, above: tuple[Any, ...], prefix: str, found: Arrays) -> None:
@@ -103,15 +131,16 @@ def _read_motion(schema: Any, above: tuple[Any, ...], prefix: str, found: Arrays
         raise ValueError(f"it has more than {MAX_TIMES:,} frames")
     first, positions = found[prefix + "counts"], []
     for time in times.tolist():
-        when = Abc.ISampleSelector(float(time))
-        here = _values(schema, headers["P"], when)
-        own = np.array(counts.getValue(when))
-        if len(here) != len(found[prefix + "points"]) or not np.array_equal(own, first):
+        around, part = _around(points, time)
+        here = [_values(schema, headers["P"], *when).astype(np.float64) for when in around]
+        own = [np.array(counts.getValue(*when)) for when in around]
+        is_same = [len(each) == len(found[prefix + "points"]) for each in here]
+        if not all(is_same) or not all(np.array_equal(each, first) for each in own):
             found[prefix + "ended"] = np.array(time)
             break
-        matrix = _matrix(above, when)
+        matrix = _matrix(above, time)
         with np.errstate(over="ignore", invalid="ignore"):
-            placed = here.astype(np.float64) @ matrix[:3, :3] + matrix[3, :3]
+            placed = _mixed(here, part) @ matrix[:3, :3] + matrix[3, :3]
             positions.append(placed.astype(np.float32))
     found[prefix + "times"] = times[: len(positions)]
     found[prefix + "motion"] = np.array(positions, np.float32)

@@ -30,7 +30,7 @@ from hairloom.addon.strands.strand_set import DEFAULT_RADIUS
 
 pytest.importorskip("alembic3d", reason="it is missing: `make setup` installs it")
 import imath
-from alembic3d import Abc, AbcGeom
+from alembic3d import Abc, AbcCoreAbstract, AbcGeom
 
 COUNTS = np.array([4, 2, 7, 5, 3, 6])
 GROUP = np.array([3, 3, 8, 8, 3, 8])
@@ -230,6 +230,57 @@ def test_motion_has_times_and_each_frame(tmp_path: Path) -> None:
     assert str(value.getType()) == "kCubic"
     assert str(value.getBasis()) == "kCatmullromBasis"
     assert value.getKnots() is None
+
+
+def moving(path: Path, points: Any, places: Any, *, inherits: bool = True) -> None:
+    """A curve from (0, 0, 0) to (0, 1, 0) below two transforms, the outer one 5 to the right.
+
+    Args:
+        points, places: time [s] -> how far the curve is up, and the inner transform to the right;
+            times at equal steps.
+    """
+
+    def sampling(times: Any) -> int:
+        first, second, *_ = *times, 1.0
+        return int(archive.addTimeSampling(AbcCoreAbstract.TimeSampling(second - first, first)))
+
+    archive = Abc.CreateArchiveWithInfo(str(path), "Blender", "")
+    outer = AbcGeom.OXform(archive.getTop(), "outer")
+    sample = AbcGeom.XformSample()
+    sample.setTranslation(imath.V3d(5, 0, 0))
+    outer.getSchema().set(sample)
+    inner = AbcGeom.OXform(outer, "inner", sampling(places))
+    for right in places.values():
+        sample = AbcGeom.XformSample()
+        sample.setTranslation(imath.V3d(right, 0, 0))
+        sample.setInheritsXforms(inherits)
+        inner.getSchema().set(sample)
+    schema = AbcGeom.OCurves(inner, "hair", sampling(points)).getSchema()
+    for up in points.values():
+        sample = AbcGeom.OCurvesSchemaSample()
+        control = np.array([[0, up, 0], [0, up + 1, 0]], np.float32)
+        sample.setPositions(imath.V3fArrayFromBuffer(control))
+        sample.setCurvesNumVertices(imath.IntArrayFromBuffer(np.array([2], np.int32)))
+        schema.set(sample)
+
+
+def test_points_and_places_go_straight_between_their_own_samples(tmp_path: Path) -> None:
+    points, places = {0.0: 0.0, 1.0: 4.0}, {0.25: 0.0, 0.75: 1.0, 1.25: 3.0}
+    moving(tmp_path / "a.abc", points, places)
+    motion = read_groom_alembic(tmp_path / "a.abc").groom.motion
+    assert motion is not None and motion.times.tolist() == [0.0, 0.25, 0.75, 1.0, 1.25]
+    ups = np.interp(motion.times, list(points), list(points.values()))
+    rights = np.interp(motion.times, list(places), list(places.values()))
+    np.testing.assert_allclose(motion.positions[:, 0, 2], ups, atol=1e-6)
+    np.testing.assert_allclose(motion.positions[:, 0, 0], 5.0 + rights, atol=1e-6)
+
+
+def test_a_transform_that_does_not_inherit_leaves_those_above_out(tmp_path: Path) -> None:
+    moving(tmp_path / "a.abc", {0.0: 0.0}, {0.0: 2.0, 1.0: 3.0}, inherits=False)
+    read = read_groom_alembic(tmp_path / "a.abc")
+    assert read.strands.points[:, 0].tolist() == [2.0, 2.0]
+    assert read.groom.motion is not None
+    assert read.groom.motion.positions[:, 0, 0].tolist() == [2.0, 3.0]
 
 
 def test_long_curves_alone_are_resampled(tmp_path: Path) -> None:
