@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -78,3 +79,12 @@ def kept_points(values: Floats, offsets: Ints, cleaned: Cleaned) -> Floats:
     is_kept = np.zeros(len(offsets) - 1, bool)
     is_kept[cleaned.kept] = True
     return values[np.repeat(is_kept, np.diff(offsets))]
+
+
+def known_apart(identities: dict[str, Any], notes: list[str]) -> dict[str, Any]:
+    """IDs, and what names strands by them; nothing where two strands have the same. Notes grow."""
+    numbers = identities.get("strand_id")
+    if numbers is None or len(np.unique(numbers)) == len(numbers):
+        return identities
+    notes.append("IDs were left out, because strands share them")
+    return {}

@@ -5,10 +5,10 @@
 Alembic's library may crash, or ask for all memory, on a damaged file. So this module imports no
 other of ours: it can be run by its path in a process that may die. The result has, for each curves
 object N in the file's order, "N/name", "N/matrix" (4, 4) that takes row vectors to the world,
-"N/points", "N/counts", "N/basis", "N/widths" where there are some, and "N/groom_*" as the file has
-them; of curves that move "N/times" [s] and "N/motion" (times, points, 3) in the world, as long as
-they have the same counts, and else "N/ended", the time from which on they have others; and what the
-file says of itself: "application", and "groom_*" of the top object.
+"N/points", "N/counts", "N/basis", "N/is_closed", "N/widths" where there are some, and "N/groom_*"
+as the file has them; of curves that move "N/times" [s] and "N/motion" (times, points, 3) in the
+world, as long as they have the same counts, and else "N/ended", the time from which on they have
+others; and what the file says of itself: "application", and "groom_*" of the top object.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ MAX_TIMES = 10_000
 REPORTED, NO_ROOM = 3, 4
 
 #: In Alembic's enumerations. Curves of other bases run through their points, or near them.
-_CUBIC, _BEZIER = 0, 1
+_CUBIC, _BEZIER, _PERIODIC = 0, 1, 1
 _VECTORS = {2: "IV2fArrayProperty", 3: "IV3fArrayProperty"}
 
 
@@ -162,9 +162,10 @@ def _read_geometry(schema: Any, prefix: str, found: Arrays) -> None:
         if ours is not None:
             found[prefix + ours] = _values(schema, header)
         elif name == "curveBasisAndType":
-            kind, _, basis, _ = tuple(Abc.IScalarProperty(schema, name).getValue())
+            kind, wrap, basis, _ = tuple(Abc.IScalarProperty(schema, name).getValue())
             is_bezier = kind == _CUBIC and basis == _BEZIER
             found[prefix + "basis"] = np.array("bezier" if is_bezier else "linear")
+            found[prefix + "is_closed"] = np.array(wrap == _PERIODIC)
         elif name == ".arbGeomParams":
             _read_attributes(schema, header, prefix, found)
 
@@ -182,7 +183,10 @@ def _read_attributes(schema: Any, header: Any, prefix: str, found: Arrays) -> No
     parent = Abc.ICompoundProperty(schema, header.getName())
     for each in parent.propertyheaders:
         if each.getName().startswith("groom_"):
-            found[prefix + each.getName()] = _values(parent, each)
+            values = _values(parent, each)
+            # quaternions and boxes, for which numpy has no type, are text in the result
+            is_plain = values.dtype.kind != "O"
+            found[prefix + each.getName()] = values if is_plain else values.astype(str)
 
 
 def _values(parent: Any, header: Any, *when: Any) -> NDArray[Any]:

@@ -30,7 +30,8 @@ class Joined:
     group: (curve_count,) int32.
     root_uv: (curve_count, 2), or None.
     color: (point_count, 3), or None.
-    uniform: strand_id, is_guide, closest_guides, guide_weights of each curve, or None.
+    is_guide: of each curve, or None.
+    identities: strand_id, closest_guides and guide_weights of each curve, as far as they are there.
     group_names: group -> name.
     motion: times [s] and the points at these, (n, point_count, 3), or None.
     unfit: see `unfit_curves`.
@@ -43,7 +44,8 @@ class Joined:
     group: Ints
     root_uv: Floats | None
     color: Floats | None
-    uniform: Arrays
+    is_guide: Bools | None
+    identities: Arrays
     group_names: dict[int, str]
     motion: tuple[Floats, Floats] | None
     unfit: dict[str, Bools]
@@ -104,17 +106,20 @@ def joined(found: Arrays, path: Path) -> Joined:
     Raises:
         HairloomError: there are none, or one's counts do not fit its points.
     """
-    objects = [_object(found, number, path) for number in _numbers(found)]
+    numbers, closed = _numbers(found)
+    objects = [_object(found, number, path) for number in numbers]
     objects = [each for each in objects if len(each.counts)]
+    left_out = tuple(f"{name} was left out: its curves are closed" for name in closed)
     if not objects:
         raise HairloomError(
-            "there are no curves in it",
+            "; ".join(("there are no curves in it", *left_out[:3])),
             place=str(path),
             remedy="Export hair curves, not meshes or empties",
         )
     counts = np.concatenate([each.counts for each in objects])
     widths = [_widths(each) for each in objects]
     group, names = _groups(objects)
+    guide = _uniform(objects, "groom_guide", 1, 0)
     return Joined(
         points=np.concatenate([each.points for each in objects]),
         offsets=np.concatenate([[0], np.cumsum(counts)]),
@@ -126,11 +131,12 @@ def joined(found: Arrays, path: Path) -> Joined:
             [len(each.points) for each in objects],
             np.nan,
         ),
-        uniform=_guides(objects),
+        is_guide=None if guide is None else guide != 0,
+        identities=_identities(objects),
         group_names=names,
         motion=motion_of([_moving(each) for each in objects]),
         unfit=_unfit(objects),
-        notes=_notes(objects),  # after all others, which add to them
+        notes=(*_notes(objects), *left_out),  # after all others, which add to them
     )
 
 
@@ -154,10 +160,12 @@ def _unfit(objects: list[_Object]) -> dict[str, Bools]:
     }
 
 
-def _numbers(found: Arrays) -> list[int]:
-    """Of objects that have points and counts."""
+def _numbers(found: Arrays) -> tuple[list[int], list[str]]:
+    """Of objects that have points and counts; and the names of those whose curves are closed."""
     every = [n for n in range(len(found)) if f"{n}/name" in found]
-    return [n for n in every if f"{n}/points" in found and f"{n}/counts" in found]
+    full = [n for n in every if f"{n}/points" in found and f"{n}/counts" in found]
+    closed = [n for n in full if found.get(f"{n}/is_closed")]
+    return [n for n in full if n not in closed], [str(found[f"{n}/name"]) for n in closed]
 
 
 def _object(found: Arrays, number: int, path: Path) -> _Object:
@@ -223,12 +231,11 @@ def _groups(objects: list[_Object]) -> tuple[Ints, dict[int, str]]:
     return np.concatenate(ids), names
 
 
-def _guides(objects: list[_Object]) -> Arrays:
-    """What tells guides from strands, and ties them; closest guides only where there are IDs."""
+def _identities(objects: list[_Object]) -> Arrays:
+    """IDs, and what names strands by them: closest guides, with weights."""
     ids = [_whole(each.of_curves("groom_id")) for each in objects]
     sizes = [len(each.counts) for each in objects]
     known = None if any(each is None for each in ids) else _side_by_side(ids, sizes, 0)
-    guide = _uniform(objects, "groom_guide", 1, 0)
     closest = _side_by_side(
         [_whole(o.of_curves("groom_closest_guides", 3)) for o in objects], sizes, 0
     )
@@ -236,8 +243,6 @@ def _guides(objects: list[_Object]) -> Arrays:
     found: Arrays = {}
     if known is not None:
         found["strand_id"] = known
-    if guide is not None:
-        found["is_guide"] = guide != 0
     if known is not None and closest is not None and weights is not None:
         found["closest_guides"] = closest
         found["guide_weights"] = np.nan_to_num(weights, posinf=0.0, neginf=0.0)

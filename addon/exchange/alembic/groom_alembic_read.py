@@ -21,7 +21,7 @@ from ...strands.clean import clean
 from ..files.file_space import FileSpace
 from ..files.subprocess_reader import run_reader
 from ..groom import Groom
-from ..read_groom import ReadGroom, kept_points
+from ..read_groom import ReadGroom, kept_points, known_apart
 from ..read_motion import sound_motion
 from . import alembic_curves
 from .alembic_curves import Arrays
@@ -147,7 +147,10 @@ def _groom(curves: Joined, space: FileSpace, path: Path, notes: list[str]) -> Gr
         problem = f"none of its strands can be used ({reasons})"
         raise _error(path, problem, "Export the groom again")
     kept = cleaned.kept
-    optional: dict[str, Any] = {name: values[kept] for name, values in curves.uniform.items()}
+    identities = {name: values[kept] for name, values in curves.identities.items()}
+    optional: dict[str, Any] = known_apart(identities, notes)
+    if curves.is_guide is not None:
+        optional["is_guide"] = curves.is_guide[kept]
     if curves.motion is not None:
         times, positions = curves.motion
         with np.errstate(over="ignore", invalid="ignore"):

@@ -21,7 +21,7 @@ from ...strands.clean import clean
 from ..files.axes import to_z_up
 from ..files.file_space import FileSpace
 from ..groom import Groom
-from ..read_groom import ReadGroom, kept_points
+from ..read_groom import ReadGroom, kept_points, known_apart
 from ..read_motion import motion_of, sound_motion
 from .usd_curves import Curves, UnusableCurvesError, curves_of
 from .usd_library import usd_arrays
@@ -259,20 +259,19 @@ def _guides(pieces: list[Curves], kept: Ints) -> Bools | None:
 
 
 def _identities(pieces: list[Curves], kept: Ints, notes: list[str]) -> dict[str, Any]:
-    """IDs, and what names strands by them; nothing where two strands have the same."""
+    """See `known_apart`."""
     numbers = _of_all("IDs", [piece.strand_id for piece in pieces], notes)
     if numbers is None:
         return {}
-    numbers = numbers[kept]
-    if len(np.unique(numbers)) < len(numbers):
-        notes.append("IDs were left out, because strands share them")
+    known = known_apart({"strand_id": numbers[kept]}, notes)
+    if not known:
         return {}
     closest = _of_all("closest guides", [piece.closest_guides for piece in pieces], notes)
     weights = _of_all("guide weights", [piece.guide_weights for piece in pieces], notes)
     if closest is None or weights is None:
-        return {"strand_id": numbers}
+        return known
     weights = weights[kept]
     if not np.isfinite(weights).all():
         notes.append("closest guides were left out, because weights of them are no numbers")
-        return {"strand_id": numbers}
-    return {"strand_id": numbers, "closest_guides": closest[kept], "guide_weights": weights}
+        return known
+    return known | {"closest_guides": closest[kept], "guide_weights": weights}

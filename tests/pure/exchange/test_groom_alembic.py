@@ -232,6 +232,64 @@ def test_motion_has_times_and_each_frame(tmp_path: Path) -> None:
     assert value.getKnots() is None
 
 
+def test_attributes_without_a_plain_type_leave_the_rest_of_a_file_sound(tmp_path: Path) -> None:
+    scope = AbcGeom.GeometryScope.kConstantScope
+    archive = Abc.CreateArchiveWithInfo(str(tmp_path / "a.abc"), "Blender", "")
+    schema = new_curves(archive.getTop(), "hair")
+    parent = schema.getArbGeomParams()
+    for kind, name, values in (
+        ("Quatf", "groom_frame", imath.QuatfArray(1)),
+        ("Box3f", "groom_id", imath.Box3fArray(1)),
+    ):
+        attribute = getattr(AbcGeom, f"O{kind}GeomParam")(parent, name, False, scope, 1)
+        attribute.set(getattr(AbcGeom, f"O{kind}GeomParamSample")(values, scope))
+    del attribute, parent, schema, archive
+    read = read_groom_alembic(tmp_path / "a.abc")
+    assert read.strands.points.tolist() == [[0, 0, 0], [0, 0, 1]]
+    assert read.notes == ("a.abc: hair: groom_id is of another type.",)
+
+
+def test_ids_that_strands_of_several_objects_share_are_left_out(tmp_path: Path) -> None:
+    archive = Abc.CreateArchiveWithInfo(str(tmp_path / "a.abc"), "Blender", "")
+    scope = AbcGeom.GeometryScope.kUniformScope
+    for name in ("left", "right"):
+        parent = new_curves(archive.getTop(), name).getArbGeomParams()
+        ids = AbcGeom.OInt32GeomParam(parent, "groom_id", False, scope, 1)
+        values = imath.IntArrayFromBuffer(np.array([7], np.int32))
+        ids.set(AbcGeom.OInt32GeomParamSample(values, scope))
+    del ids, parent, archive
+    read = read_groom_alembic(tmp_path / "a.abc")
+    assert read.groom.strand_id is None and read.strands.strand_count == 2
+    assert "a.abc: IDs were left out, because strands share them." in read.notes
+
+
+def test_closed_curves_are_left_out_and_told(tmp_path: Path) -> None:
+    for file, names in (("some.abc", ("hair", "loop")), ("none.abc", ("loop",))):
+        archive = Abc.CreateArchiveWithInfo(str(tmp_path / file), "Blender", "")
+        for name in names:
+            new_curves(archive.getTop(), name, is_closed=name == "loop")
+        del archive
+    read = read_groom_alembic(tmp_path / "some.abc")
+    assert read.strands.strand_count == 1
+    assert read.notes == ("some.abc: loop was left out: its curves are closed.",)
+    with pytest.raises(HairloomError, match="loop was left out: its curves are closed"):
+        read_groom_alembic(tmp_path / "none.abc")
+
+
+def new_curves(parent: Any, name: str, *, is_closed: bool = False) -> Any:
+    """The schema of an object with a curve from (0, 0, 0) to (0, 1, 0)."""
+    schema = AbcGeom.OCurves(parent, name).getSchema()
+    sample = AbcGeom.OCurvesSchemaSample()
+    control = np.array([[0, 0, 0], [0, 1, 0]], np.float32)
+    sample.setPositions(imath.V3fArrayFromBuffer(control))
+    sample.setCurvesNumVertices(imath.IntArrayFromBuffer(np.array([2], np.int32)))
+    sample.setType(AbcGeom.CurveType.kLinear)
+    if is_closed:
+        sample.setWrap(AbcGeom.CurvePeriodicity.kPeriodic)
+    schema.set(sample)
+    return schema
+
+
 def moving(path: Path, points: Any, places: Any, *, inherits: bool = True) -> None:
     """A curve from (0, 0, 0) to (0, 1, 0) below two transforms, the outer one 5 to the right.
 
