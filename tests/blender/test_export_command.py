@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ from hairloom.addon.blender.command_line import command_line
 from hairloom.addon.blender.preview.bake import Bake
 from hairloom.addon.exchange.groom import Groom
 from hairloom.addon.exchange.hair_file import read_hair_file
+from hairloom.addon.exchange.strand_reading import read_strands
 from hairloom.addon.exchange.tressfx import read_tfx
 from hairloom.addon.exchange.usd.groom_usd import write_usd
 from hairloom.addon.strands import StrandSet
@@ -90,6 +92,18 @@ def test_a_grooms_file_keeps_all_that_it_says(
     assert list(primvars.GetPrimvar("groom_group_name").Get())[:2] == ["top", ""]
     assert report["preflight"]["guides"] == 12 and report["preflight"]["unit"] == "cm"
     assert report["outputs"] == ["out.usdc"]
+
+
+@pytest.mark.parametrize("suffix", ["usdc", "tfx", "hair", "abc"])
+def test_a_groom_of_guides_alone_is_written_as_strands(
+    extension: None, sphere: Any, tmp_path: Path, run: Callable[..., Any], suffix: str
+) -> None:
+    pytest.importorskip("pxr")
+    write_usd(tmp_path / "in.usdc", replace(on_sphere(), is_guide=np.ones(40, bool)))
+    source = ["--groom", str(tmp_path / "in.usdc"), "--head", "Head", *SMALL]
+    report = run(*source, "--parts", "strands", output=f"out.{suffix}")
+    read = read_strands(tmp_path / f"out.{suffix}")
+    assert report["preflight"]["strands"] == read.strands.strand_count == 40
 
 
 def test_a_check_writes_nothing(

@@ -13,8 +13,11 @@ from strand_files import curves_of, hedgehog, needs_usd, push_up, stage_of, stra
 
 from hairloom.addon.blender.scene.curves import write_curves
 from hairloom.addon.blender.scene.groom_attributes import store_groom
+from hairloom.addon.blender.strands.export_check import ExportCheck
 from hairloom.addon.exchange.groom import Groom
 from hairloom.addon.exchange.hair_file import read_hair_file
+from hairloom.addon.exchange.strand_export_settings import StrandExportSettings
+from hairloom.addon.exchange.strand_formats import TRESSFX
 from hairloom.addon.exchange.tressfx import read_tfx
 from hairloom.addon.strands import StrandSet
 
@@ -121,6 +124,18 @@ def test_point_counts_of_their_own_stay(new_hair: Any, tmp_path: Path) -> None:
     bpy.ops.hairloom.export_alembic(filepath=str(tmp_path / "a.abc"), parts="strands")
     (curves,) = curves_of(tmp_path / "a.abc").values()
     np.testing.assert_array_equal(curves["counts"], counts)
+
+
+def test_curves_that_are_all_guides_are_strands_for_the_check_as_for_the_file(
+    new_hair: Any, tmp_path: Path
+) -> None:
+    hair = new_hair()
+    store_groom(hair.data, Groom(hedgehog(), is_guide=np.ones(60, bool)))
+    bpy.ops.hairloom.export_tressfx(filepath=str(tmp_path / "a.tfx"))
+    assert read_tfx(tmp_path / "a.tfx").strands.strand_count == 60
+    check = ExportCheck.of([hair])
+    check.refresh(bpy.context.evaluated_depsgraph_get(), TRESSFX, StrandExportSettings())
+    assert check.lines[0].startswith("60 strands, 0 guides")
 
 
 def test_what_the_hair_says_of_itself_is_in_the_file(new_hair: Any, tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ import bpy
 from ...errors import HairloomError
 from ...exchange.groom import Groom
 from ...exchange.joined_grooms import joined_grooms
-from ...exchange.strand_check import check_lines, check_strands
+from ...exchange.strand_check import check_lines
 from ...exchange.strand_export_settings import StrandExportSettings
 from ...exchange.strand_formats import StrandFormat
 from ...rig_flow import Rig
@@ -23,7 +23,7 @@ from ..colliders.rigs import rig_from
 from ..properties.groom_settings import GroomSettings
 from ..scene.source import Source, read_source
 from .read_hair import ExportRequest, needs_rig, still_hair
-from .strand_export import request_of
+from .strand_export import StrandExport, request_of
 
 
 @dataclass
@@ -76,7 +76,7 @@ class ExportCheck:
             self._look_at_bakes(depsgraph)
         try:
             groom, notes = self._groom(depsgraph, request_of(kind, settings))
-            facts = check_strands(groom, kind, settings)
+            facts = StrandExport(groom, settings, kind).check()
         except HairloomError as error:
             self.lines, self.warnings = [], [str(error)]
         else:

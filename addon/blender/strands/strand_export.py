@@ -47,6 +47,12 @@ class StrandExport:
     done: int = 0
     files: tuple[Path, ...] = ()
 
+    def __post_init__(self) -> None:
+        """Where all curves are marked as guides and strands are asked for, they are the strands."""
+        is_guide, parts = self.groom.is_guide, layout_of(self.kind, self.settings).parts
+        if parts != "guides" and is_guide is not None and is_guide.all():
+            self.groom = replace(self.groom, is_guide=None, closest_guides=None, guide_weights=None)
+
     @classmethod
     def of(
         cls,
@@ -76,7 +82,6 @@ class StrandExport:
                 hair, depsgraph, request, frames, use_bake=settings.use_bake
             )
         groom, lost = joined_grooms([out.groom for out in outs], hair[0].name)
-        groom = _with_strands(groom, layout_of(kind, settings).parts)
         bones, missing = None, tuple[str, ...]()
         if with_bones:
             bones, missing = _bones(hair, depsgraph, outs)
@@ -196,13 +201,6 @@ def _moving(
         moving.append(part)
         notes += said
     return [part.out for part in moving], tuple(moving), tuple(notes)
-
-
-def _with_strands(groom: Groom, parts: str) -> Groom:
-    """Where all curves are marked as guides and strands are asked for, they are the strands."""
-    if parts == "guides" or groom.is_guide is None or not groom.is_guide.all():
-        return groom
-    return replace(groom, is_guide=None, closest_guides=None, guide_weights=None)
 
 
 def _bones(
