@@ -17,7 +17,7 @@ from strand_files import needs_usd
 from hairloom.addon.blender.bakes import playback
 from hairloom.addon.blender.command_line import command_line
 from hairloom.addon.blender.preview.bake import Bake
-from hairloom.addon.exchange.groom import Groom
+from hairloom.addon.exchange.groom import Groom, GroomMotion
 from hairloom.addon.exchange.hair_file import read_hair_file
 from hairloom.addon.exchange.strand_reading import read_strands
 from hairloom.addon.exchange.tressfx import read_tfx
@@ -104,6 +104,24 @@ def test_a_groom_of_guides_alone_is_written_as_strands(
     report = run(*source, "--parts", "strands", output=f"out.{suffix}")
     read = read_strands(tmp_path / f"out.{suffix}")
     assert report["preflight"]["strands"] == read.strands.strand_count == 40
+
+
+def test_motion_of_a_grooms_file_is_left_out_with_a_note(
+    extension: None,
+    sphere: Any,
+    tmp_path: Path,
+    run: Callable[..., Any],
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    pytest.importorskip("pxr")
+    groom = on_sphere()
+    frames = [groom.strands.points + np.float32(0.1 * frame) for frame in range(3)]
+    write_usd(tmp_path / "in.usdc", groom, motion=GroomMotion(frames, 24.0))
+    source = ["--groom", str(tmp_path / "in.usdc"), "--head", "Head", *SMALL]
+    notes = run(*source, output="out.usdc")["notes"]
+    assert any(note.startswith("in.usdc: it moves, and only its first frame") for note in notes)
+    run(*source, "--frames", "1", "3", output="out.usdc", code=1)
+    assert "import brings the motion" in capsys.readouterr().err
 
 
 def test_a_check_writes_nothing(

@@ -118,9 +118,10 @@ def _of_rig(
     if job.options.bake is None:
         if frames is not None:
             raise HairloomError(
-                "this hair does not move",
+                "of this hair only one frame is read",
                 place="--frames",
-                remedy="Give a bake with --bake, or hair of the scene with --object",
+                remedy="Give a bake with --bake, or hair of the scene with --object. "
+                "The verb import brings the motion of a groom's file into a scene",
             )
         rig, inputs = read_rig(job)
         own = _groom(rig, inputs)

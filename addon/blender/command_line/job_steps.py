@@ -72,7 +72,15 @@ def read_hair(job: Job) -> Inputs:
     with report.stage("read inputs"):
         inputs = read_inputs(job.sources, job.settings[GrowSettings])
     tell_drops(job, inputs.dropped, inputs.groom_name)
-    tell_notes(list(inputs.notes), report)
+    notes, groom = list(inputs.notes), inputs.groom
+    takes_motion = getattr(job.options, "animated", False)
+    if groom is not None and groom.motion is not None and not takes_motion:
+        name = Path(inputs.groom_name).name
+        notes.append(
+            f"{name}: it moves, and only its first frame is read. The verb import brings its "
+            "motion into a scene."
+        )
+    tell_notes(notes, report)
     report.facts["dropped"] = inputs.dropped
     return inputs
 
