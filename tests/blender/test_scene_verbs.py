@@ -554,7 +554,7 @@ def test_hair_of_a_scene_leaves_as_it_is_at_a_frame(scene: Path) -> None:
     bpy.ops.wm.open_mainfile(filepath=str(scene))
     hair = bpy.data.objects["Hair"]
     for frame in (1, 30):
-        hair.location.x = 0.01 * frame
+        hair.location.x = 0.0005 * frame
         hair.keyframe_insert("location", frame=frame)
     bpy.context.scene.frame_set(1)
     bpy.ops.wm.save_mainfile()
@@ -562,7 +562,9 @@ def test_hair_of_a_scene_leaves_as_it_is_at_a_frame(scene: Path) -> None:
     for frame in (1, 30):
         exported(scene, "--frame", str(frame))
         roots[frame] = read_tfx(scene.with_name("out.tfx")).strands.roots
-    np.testing.assert_allclose(roots[30] - roots[1], [[0.29, 0.0, 0.0]] * len(roots[1]), atol=1e-5)
+    np.testing.assert_allclose(
+        roots[30] - roots[1], [[0.0145, 0.0, 0.0]] * len(roots[1]), atol=1e-5
+    )
 
 
 def test_hair_of_a_scene_is_held_to_what_jobs_ask_of_files(scene: Path) -> None:

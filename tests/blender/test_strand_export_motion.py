@@ -148,6 +148,37 @@ def test_hair_without_a_bake_moves_as_its_modifiers_move_it(
 
 
 @needs_usd
+@pytest.mark.parametrize("children", ["none", "multi"])
+def test_widths_are_those_of_the_first_frame_wherever_the_scene_is(
+    new_hair: Any, sphere: Any, tmp_path: Path, children: str
+) -> None:
+    hair = new_hair(sphere)
+    hair.data.hairloom.children.method = children
+    hair.data.hairloom.children.strand_count = 80
+    push_up(hair, 0.002, frame_driven=True)
+    tree = hair.modifiers[-1].node_group
+    radius, thin = tree.nodes.new("GeometryNodeSetCurveRadius"), tree.nodes.new("ShaderNodeMath")
+    time = tree.nodes.new("GeometryNodeInputSceneTime")
+    thin.operation, thin.inputs[1].default_value = "MULTIPLY", 1e-5
+    (end,) = (each for each in tree.nodes if each.type == "GROUP_OUTPUT")
+    tree.links.new(time.outputs["Frame"], thin.inputs[0])
+    tree.links.new(thin.outputs[0], radius.inputs["Radius"])
+    tree.links.new(end.inputs[0].links[0].from_socket, radius.inputs[0])
+    tree.links.new(radius.outputs[0], end.inputs[0])
+    written = []
+    for playhead in (1, 9):
+        bpy.context.scene.frame_set(playhead, subframe=0.25)
+        path = tmp_path / f"{playhead}" / "a.usda"
+        bpy.ops.hairloom.export_usd(filepath=str(path), frames="own", first=3, last=5)
+        assert bpy.context.scene.frame_current_final == playhead + 0.25
+        written.append(path.read_bytes())
+    assert written[0] == written[1]
+    _, curves = stage_of(path)
+    widths = np.array(curves.GetWidthsAttr().Get())
+    np.testing.assert_allclose(widths[:480], 2.0 * 3e-5, rtol=1e-4)
+
+
+@needs_usd
 def test_children_follow_guides_that_modifiers_move(
     new_hair: Any, sphere: Any, tmp_path: Path
 ) -> None:

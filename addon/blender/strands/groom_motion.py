@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -132,16 +133,20 @@ def moving_hair(
         check_frames(hair.name, frames, cache)
         motion = BakedMotion(baked_hair(hair, depsgraph, cache, request), cache)
         return motion, stale_notes(hair, cache, depsgraph)
-    out, rate = still_hair(hair, depsgraph, request), frame_rate(depsgraph.scene)
+    rate = frame_rate(depsgraph.scene)
+    with _scene_kept() as go_to:
+        depsgraph = go_to(frames[0])
+        out = still_hair(hair, depsgraph, request)
+        moving: Moving = ShownMotion(out, Handle.of(hair), rate)
+        if out.has_children:
+            moving = _children_motion(hair, depsgraph, out, rate)
     notes: tuple[str, ...] = ()
     if use_bake:
         notes = (
             f"{hair.name}: it has no bake, so it moves as Blender's own animation and modifiers "
             "move it. Bake it to write Hairloom's motion.",
         )
-    if not out.has_children:
-        return ShownMotion(out, Handle.of(hair), rate), notes
-    return _children_motion(hair, depsgraph, out, rate), notes
+    return moving, notes
 
 
 def common_rate(parts: Sequence[Moving]) -> float:
@@ -170,18 +175,30 @@ def positions_of(parts: Sequence[Moving], frames: range) -> Generator[Floats]:
     Raises:
         HairloomError: hair that is gone, or has other curves than in the first frame.
     """
-    scene = bpy.context.scene
-    shown, subframe = scene.frame_current, scene.frame_subframe
     needs_scene = any(part.needs_scene for part in parts)
-    try:
+    with _scene_kept() as go_to:
         for frame in frames:
-            if needs_scene:
-                with suspended():
-                    scene.frame_set(frame)
-            depsgraph = bpy.context.evaluated_depsgraph_get()
+            depsgraph = go_to(frame) if needs_scene else bpy.context.evaluated_depsgraph_get()
             yield np.concatenate([part.out.points(part.at(frame, depsgraph)) for part in parts])
+
+
+@contextmanager
+def _scene_kept() -> Iterator[Callable[[int], bpy.types.Depsgraph]]:
+    """Lets the scene go to frames, and brings it back to the one where it was."""
+    scene = bpy.context.scene
+    shown, subframe, has_gone = scene.frame_current, scene.frame_subframe, False
+
+    def go_to(frame: int) -> bpy.types.Depsgraph:
+        nonlocal has_gone
+        has_gone = True
+        with suspended():
+            scene.frame_set(frame)
+        return bpy.context.evaluated_depsgraph_get()
+
+    try:
+        yield go_to
     finally:
-        if needs_scene:
+        if has_gone:
             with suspended():
                 scene.frame_set(shown, subframe=subframe)
 
