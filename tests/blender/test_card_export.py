@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from full_disk import full_disk
 from guide_cards import build_cards
 
 from hairloom.addon.cards.card_mesh import CardMesh
@@ -21,6 +22,7 @@ from hairloom.addon.exchange.cards.card_formats import FBX, GLB, OBJ, USD, CardF
 from hairloom.addon.exchange.cards.glb_file import GlbFile
 from hairloom.addon.exchange.files.axes import from_z_up
 from hairloom.addon.exchange.files.file_set import written_together
+from hairloom.addon.exchange.usd.usd_levels import with_level_variants
 
 bpy = pytest.importorskip("bpy", reason="Blender's exporters need Blender or the bpy module")
 
@@ -230,6 +232,15 @@ def test_usd_keeps_order_attributes_and_levels(
     ]
     assert sorted(files) == ["hair_alpha.png", "hair_base.png"]
     assert [file.name for file in tmp_path.iterdir()] == [path.name]
+
+
+@pytest.mark.parametrize("suffix", [".usda", ".usdc"])
+def test_a_disk_that_is_full_for_the_levels_of_usd_is_told(
+    levels: list[CardMesh], tmp_path: Path, suffix: str
+) -> None:
+    path = written(tmp_path, levels, USD, suffix=suffix)
+    with full_disk(500), pytest.raises(HairloomError, match="this file cannot be written"):
+        with_level_variants(path, [f"{NODE}_LOD{number}" for number in range(len(levels))])
 
 
 def test_the_users_blocks_keep_their_names(levels: list[CardMesh], tmp_path: Path) -> None:

@@ -165,16 +165,25 @@ def test_the_occlusion_of_a_vertex_is_what_a_viewer_reads_from_the_ramp(tmp_path
     np.testing.assert_allclose(read, occlusion, atol=0.005)
 
 
-@pytest.mark.parametrize("suffix", [".usda", ".usdc"])
-def test_one_level_is_active_in_usd_and_the_others_can_be_chosen(
-    tmp_path: Path, suffix: str
+@pytest.mark.parametrize(
+    ("suffix", "textures", "space"), [(".usda", "png", "sRGB"), (".usdc", "exr", None)]
+)
+def test_usd_shows_one_level_of_many_and_says_how_colours_are_coded(
+    tmp_path: Path, suffix: str, textures: str, space: str | None
 ) -> None:
     if not bpy.app.build_options.usd:
         pytest.skip("this Blender was built without USD")
     usd = pytest.importorskip("pxr.Usd", reason="usd-core is missing: `make setup` installs it")
     path = tmp_path / f"hair{suffix}"
-    assert cards(path, "--levels", "3") == 0
+    assert cards(path, "--levels", "3", "--textures", textures) == 0
     stage = usd.Stage.Open(str(path))
+    spaces = {
+        prim.GetAttribute("inputs:file").Get().path: prim.GetAttribute(name).Get()
+        for prim in stage.Traverse()
+        if prim.HasAttribute(name := "inputs:sourceColorSpace")
+    }
+    # without one it is "auto": sRGB for eight bits, linear for more
+    assert spaces.get(sidecar_of(path)["textures"]["color"]["file"]) == space
 
     def shown() -> list[str]:
         return [prim.GetName() for prim in stage.Traverse() if prim.GetTypeName() == "Mesh"]

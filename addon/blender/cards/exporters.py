@@ -43,11 +43,13 @@ class CardLook:
         file; or None.
     base, alpha: files beside it, for formats that name files. alpha is read from the channel "a" of
         the same file, else from the red of its own.
+    is_linear: whether the colours of base are not coded by sRGB's curve.
     """
 
     card: Floats | None = None
     base: str | None = None
     alpha: str | None = None
+    is_linear: bool = False
 
 
 def level_names(name: str, count: int) -> tuple[str, ...]:
@@ -330,7 +332,8 @@ def _new_material(look: CardLook, name: str, file_format: CardFormat) -> bpy.typ
     if file_format == GLB:
         packed = None if look.card is None else _packed_image(look.card, name)
         return new_material(name, packed, packed, blending="BLENDED")
-    base = None if look.base is None else named_image(look.base, "sRGB")
+    space = "Linear Rec.709" if look.is_linear else "sRGB"
+    base = None if look.base is None else named_image(look.base, space)
     alpha = base
     if look.alpha != look.base:
         alpha = None if look.alpha is None else named_image(look.alpha, "Non-Color")

@@ -35,6 +35,7 @@ from ...exchange.files.names import alike_beside
 from ...exchange.textures.card_textures import WrittenTexture, of_one_size
 from ...exchange.textures.texture_packing import packed
 from ...exchange.usd.usd_levels import with_level_variants
+from ...exchange.usd.usd_library import usd_library
 from ...params import Settings, SettingsMap
 from ...shading.card_look import VIEW_COMPENSATED_ALPHA
 from ...shading.drawn_strands import in_color
@@ -395,9 +396,10 @@ class _Writer:
         """What Blender's exporters do not write: which level is shown, and maps of a GLB."""
         if self.file_format == USD and len(levels) > 1:
             try:
-                with_level_variants(self.path, nodes)
+                usd_library(self.path)
             except HairloomError as error:
                 return (f"{error} Until then viewers show all levels at once.",)
+            with_level_variants(self.path, nodes)
         if self.file_format == GLB:
             file = GlbFile.of(self.path.read_bytes(), str(self.path))
             with_levels(file, nodes, screen_coverage(levels, self.made.build.errors))
@@ -425,11 +427,12 @@ def _look(
 ) -> CardLook:
     """The material of the mesh's own file: colour, and alpha where plain nodes can name it."""
     (colored,) = (texture for texture in written if "color" in texture.layout.sources)
-    file = colored.path.name
+    file, alpha = colored.path.name, None
     if colored.layout.has_coverage:
-        return CardLook(card, file, file)
-    has_own_file = roles["alpha"]["channels"] == "r"
-    return CardLook(card, file, roles["alpha"]["file"] if has_own_file else None)
+        alpha = file
+    elif roles["alpha"]["channels"] == "r":
+        alpha = roles["alpha"]["file"]
+    return CardLook(card, file, alpha, is_linear=colored.color_space == "linear")
 
 
 def material_of(shading: ShadingSettings, tables: Mapping[str, str]) -> dict[str, Any]:

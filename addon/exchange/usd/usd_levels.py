@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from types import ModuleType
 
+from ..files.atomic import as_system_says, unwritable
 from .usd_library import usd_library
+from .usd_reader import summary
 
 #: the name of the set, and of each variant
 VARIANT_SET, _VARIANT = "LOD", "LOD{}"
@@ -18,9 +21,16 @@ def with_level_variants(path: Path, nodes: Sequence[str]) -> None:
         nodes: the levels' names, the finest first, which are siblings.
 
     Raises:
-        HairloomError: this Python has no OpenUSD.
+        HairloomError: this Python has no OpenUSD, or the file cannot be written.
     """
     pxr = usd_library(path)
+    try:
+        _make_variants(pxr, path, nodes)
+    except pxr.Tf.ErrorException as error:
+        raise unwritable(path, as_system_says(path, summary(error))) from error
+
+
+def _make_variants(pxr: ModuleType, path: Path, nodes: Sequence[str]) -> None:
     stage = pxr.Usd.Stage.Open(str(path))
     levels = [prim for prim in stage.Traverse() if prim.GetName() in nodes and prim.IsA("Xform")]
     levels.sort(key=lambda prim: nodes.index(prim.GetName()))
