@@ -137,6 +137,23 @@ def test_a_linked_library_is_an_input(
     assert task()["status"] == "done"
 
 
+def test_files_that_blender_brings_along_are_no_inputs(
+    task: Callable[..., dict[str, Any]], scene: Path, tmp_path: Path
+) -> None:
+    """Nodes of its own assets, linked as the asset browser does it."""
+    assets = Path(bpy.utils.resource_path("LOCAL") or bpy.utils.resource_path("SYSTEM"))
+    (nodes,) = assets.glob("datafiles/assets/**/procedural_hair_node_assets.blend")
+    bpy.ops.wm.open_mainfile(filepath=str(scene))
+    with bpy.data.libraries.load(str(nodes), link=True) as (there, into):
+        into.node_groups = there.node_groups[:1]
+    group = bpy.data.node_groups.new("Own", "GeometryNodeTree")
+    group.nodes.new("GeometryNodeGroup").node_tree = into.node_groups[0]
+    group.use_fake_user = True
+    bpy.ops.wm.save_mainfile()
+    task()
+    assert set(json.loads((tmp_path / "bake.done.json").read_text())["inputs"]) == {"wig.blend"}
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [(["bake", "--skip-existing"], "--output"), (["bake", "--output", "x", "--save"], "--save-as")],

@@ -167,6 +167,10 @@ def _files_read(options: argparse.Namespace) -> set[str]:
 
 
 def _files_of_scene() -> list[str]:
-    """The files that the open scene takes more from: libraries, pictures, caches."""
+    """The files that the open scene takes more from: libraries, pictures, caches; but for those
+    that Blender brings along, which lie elsewhere on another machine."""
     paths: list[str] = bpy.utils.blend_paths(absolute=True, packed=False, local=False)
-    return [os.path.abspath(path) for path in paths if Path(path).is_file()]
+    folders = [bpy.utils.resource_path(kind) for kind in ("LOCAL", "SYSTEM")]
+    of_blender = tuple(os.path.join(os.path.abspath(each), "") for each in folders if each)
+    found = [os.path.abspath(path) for path in paths if Path(path).is_file()]
+    return [path for path in found if not path.startswith(of_blender)]
