@@ -532,6 +532,9 @@ def test_strands_of_a_scene_that_are_left_out_are_named_or_refused(
             "no option of Groom Alembic",
         ),
         ("bake --delete --frames 1 2", "--frames", "is deleted"),
+        ("render --groom Hair --collider Head", "--collider", "simulated"),
+        ("cards --groom Hair --collider Head", "--collider", "simulated"),
+        ("export --preflight --skip-existing", "--skip-existing", "writes nothing"),
     ],
 )
 def test_options_that_mean_nothing_are_refused(

@@ -44,6 +44,8 @@ def _is_grown(options: argparse.Namespace) -> bool:
 
 _OF_GROOM_FILES = ("groom_scale", "groom_up")
 _OF_GROWTH = ("density_group", "length_group")
+#: verbs that simulate hair of their own
+_SIMULATE = ("simulate", "demo")
 _OF_ONE_GROOM = ("groom", "style", "head", "head_scale", "collider", "skin", "bake")
 
 _IDLE = (
@@ -52,6 +54,18 @@ _IDLE = (
         is_of_scene,
         "hair of the scene has its own groom, head and bake",
         "Leave it out, or name one hair with --groom in place of --object",
+    ),
+    _Idle(
+        ("collider",),
+        lambda options: options.verb not in _SIMULATE,
+        "only hair that is simulated stays out of it",
+        f"Leave it out, or give it to {' or '.join(_SIMULATE)}",
+    ),
+    _Idle(
+        ("skip_existing",),
+        lambda options: bool(getattr(options, "preflight", None)),
+        "a check writes nothing that could be there already",
+        "Leave out one of the two",
     ),
     _Idle(
         ("frame",),
