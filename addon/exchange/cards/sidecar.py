@@ -125,8 +125,13 @@ class CardFile:
 def sidecar_text(cards: CardFile) -> str:
     """The whole sidecar; numbers of a list stand in one line."""
     text = json.dumps(description(cards), indent=2, ensure_ascii=False)
-    lists = re.compile(r"\[\s+(-?[\d.][^\[\]{}\"]*?)\s+\]")
-    return lists.sub(lambda found: f"[{' '.join(found[1].split())}]", text) + "\n"
+    texts_or_lists = re.compile(r'"(?:[^"\\]|\\.)*"|\[\s+(-?[\d.][^\[\]{}"]*?)\s+\]')
+    return texts_or_lists.sub(_in_one_line, text) + "\n"
+
+
+def _in_one_line(found: re.Match[str]) -> str:
+    """A list of numbers; texts stay as they are."""
+    return found[0] if found[1] is None else f"[{' '.join(found[1].split())}]"
 
 
 def files_of_earlier(path: Path) -> set[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -211,3 +212,10 @@ def test_a_sidecar_of_another_mesh_that_is_there_is_known(tmp_path: Path) -> Non
     (tmp_path / "hair.v1.glb").touch()
     assert other_owner(tmp_path / "hair.v1.fbx") == "hair.v1.glb"
     assert other_owner(tmp_path / "hair.v1.glb") == other_owner(tmp_path / "brows.glb") == ""
+
+
+def test_names_in_the_sidecar_keep_their_spaces() -> None:
+    name = 'hair [  2  ] "a".glb'
+    text = sidecar_text(replace(card_file(), name=name))
+    assert json.loads(text)["file"] == name
+    assert re.search(r"\[-?\d[^\n]*\d\]", text), "lists of numbers stand in one line"
