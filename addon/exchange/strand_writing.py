@@ -12,7 +12,9 @@ import numpy as np
 from ..arrays import Floats, Ints
 from ..errors import HairloomError
 from .alembic.groom_alembic import write_groom_alembic
+from .files.atomic import unwritable
 from .files.file_set import kept_aside, written_together
+from .files.moving import free_name, move
 from .files.names import as_compared, distinct_names, plain_name
 from .groom import Groom, GroomMotion, points_of
 from .groom_presets import GroomPreset, chosen_strands
@@ -118,7 +120,27 @@ def _write_tressfx(
             write_tfxbone(file.with_suffix(".tfxbone"), part.bones, filled)
         return notes
 
-    return _write_files(path, groom, layout, write)
+    written = _write_files(path, groom, layout, write)
+    return replace(written, notes=(*written.notes, *_bones_set_aside(written.files)))
+
+
+def _bones_set_aside(written: Collection[Path]) -> tuple[str, ...]:
+    """Bones of an earlier export would be read with strands that they do not fit; a note for each.
+
+    Raises:
+        HairloomError: they cannot be moved.
+    """
+    notes = []
+    for bones in sorted({file.with_suffix(".tfxbone") for file in written} - set(written)):
+        if not bones.is_file():
+            continue
+        kept = free_name(bones.with_stem(f"{bones.stem} old"))
+        try:
+            move(bones, kept)
+        except OSError as error:
+            raise unwritable(bones, error.strerror or str(error)) from error
+        notes.append(f"{bones.name} is of other strands, and is kept as {kept.name}.")
+    return tuple(notes)
 
 
 def _write_hair(

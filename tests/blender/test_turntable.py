@@ -159,6 +159,17 @@ def test_transparent_pictures_have_no_backdrop(table: Turntable) -> None:
     assert picture[0, 0].tolist() == [0.0] * 4 and picture[..., 3].max() > 0.9
 
 
+def test_pictures_and_a_video_of_a_longer_turn_go(table: Turntable) -> None:
+    list(table.steps())
+    others = [table.folder / name for name in ("turntable_0007.png", "other_0003.png")]
+    for path in (*others, table.folder / "turntable.mp4"):
+        path.write_bytes(b"mine")
+    table.settings = replace(SMALL, frames=2)
+    list(table.steps())
+    assert set(table.folder.iterdir()) == {*table.files, *others}
+    assert len(table.files) == 2
+
+
 @pytest.mark.parametrize("is_there", few_in_commits([True, False]))
 def test_what_is_cancelled_leaves_nothing(table: Turntable, is_there: bool) -> None:
     kept = table.folder / "turntable_0001.png"

@@ -10,13 +10,14 @@ from collections.abc import Generator, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import count, takewhile
 from pathlib import Path
 
 import numpy as np
 
 from ...arrays import Floats
 from ...errors import HairloomError
-from ...exchange.files.atomic import folder_unwritable
+from ...exchange.files.atomic import folder_unwritable, unwritable
 from ...exchange.files.file_set import written_together
 from ...render.camera import Camera
 from ...rig_flow import Pose
@@ -108,9 +109,11 @@ class Turntable:
     @property
     def files(self) -> tuple[Path, ...]:
         """The files after the last step: the pictures, and the video if there is one."""
-        numbers = range(1, self.settings.frames + 1)
-        pictures = [self.folder / f"{self.name}_{number:04}.png" for number in numbers]
+        pictures = [self._picture_path(number) for number in range(1, self.settings.frames + 1)]
         return (*pictures, *([self.folder / f"{self.name}.mp4"] if self.has_video else []))
+
+    def _picture_path(self, number: int) -> Path:
+        return self.folder / f"{self.name}_{number:04}.png"
 
     def picture(self, frame: int) -> Floats:
         """The picture of a frame, from 0; a whole turn later it is the same."""
@@ -155,6 +158,18 @@ class Turntable:
                 yield index + 1
             if chosen.video:
                 self._write_video(beside, frames)
+        self._remove_earlier()
+
+    def _remove_earlier(self) -> None:
+        """Pictures and a video of an earlier turn would be taken for this one's."""
+        numbers = count(self.settings.frames + 1)
+        more = map(self._picture_path, numbers)
+        videos = [] if self.has_video else [self.folder / f"{self.name}.mp4"]
+        for path in (*takewhile(Path.is_file, more), *filter(Path.is_file, videos)):
+            try:
+                path.unlink()
+            except OSError as error:
+                raise unwritable(path, error.strerror or str(error)) from error
 
     def _write_video(self, beside: Path, frames: list[Path]) -> None:
         """A video, or a note why there is none; the pictures are written in any case."""

@@ -175,6 +175,16 @@ def test_bones_of_the_last_strand_fill_up_to_64(tmp_path: Path) -> None:
     assert held.strand_count == 64 and (held.bone[COUNT:, 0] == 1).all()
 
 
+def test_bones_of_an_earlier_export_do_not_stay_with_other_strands(tmp_path: Path) -> None:
+    bones = strongest_bones(("a", "b"), np.eye(2)[np.arange(COUNT) % 2])
+    write_strands(tmp_path / "hair.tfx", replace(groom(), bones=bones))
+    before = (tmp_path / "hair.tfxbone").read_bytes()
+    written = write_strands(tmp_path / "hair.tfx", groom())
+    assert {file.name for file in tmp_path.iterdir()} == {"hair.tfx", "hair old.tfxbone"}
+    assert (tmp_path / "hair old.tfxbone").read_bytes() == before
+    assert written.notes[-1].endswith("of other strands, and is kept as hair old.tfxbone.")
+
+
 def test_an_export_again_replaces_its_own_files_and_keeps_those_of_others(tmp_path: Path) -> None:
     bones = strongest_bones(("a", "b"), np.eye(2)[np.arange(COUNT) % 2])
     split = StrandExportSettings(by_group=True)
