@@ -19,7 +19,9 @@ import pytest
 
 from hairloom.addon.blender.bakes.cache import Cache
 from hairloom.addon.blender.base import interruption
+from hairloom.addon.blender.base.report import Report
 from hairloom.addon.blender.command_line import command_line
+from hairloom.addon.blender.command_line.stamp import Stamp
 
 REPOSITORY = Path(__file__).parents[2]
 QUICK = ["--set", "dynamics.device=numpy", "--set", "dynamics.collider_resolution=8"]
@@ -135,6 +137,21 @@ def test_a_linked_library_is_an_input(
     bpy.data.objects.new("Another", None).use_fake_user = True
     bpy.ops.wm.save_mainfile()
     assert task()["status"] == "done"
+
+
+def test_what_a_heads_file_names_is_an_input(extension: None, tmp_path: Path) -> None:
+    head, output = tmp_path / "head.obj", tmp_path / "a.tfx"
+    head.write_text("mtllib skin.mtl\nv 0 0 0\n")
+    (tmp_path / "skin.mtl").write_text("newmtl skin\n")
+    asked = ["export", "--head", str(head), "--output", str(output), "--skip-existing"]
+    options = command_line.parser().parse_args(asked)
+    stamp, report = Stamp(options), Report("export")
+    output.write_bytes(b"strands")
+    report.add_output(output)
+    stamp.write(report)
+    assert Stamp(options).why_not_done() == ""
+    (tmp_path / "skin.mtl").write_text("newmtl other\n")
+    assert Stamp(options).why_not_done() == "skin.mtl is not as it was"
 
 
 def test_files_that_blender_brings_along_are_no_inputs(

@@ -23,6 +23,7 @@ import bpy
 
 from ...errors import HairloomError
 from ...exchange.files.atomic import write_text_atomic
+from ...exchange.named_files import named_files
 from ...params.preset import preset_as_dict
 from ..base.report import Report, hairloom_version
 from ..properties.presets import named_preset
@@ -83,7 +84,11 @@ class Stamp:
             HairloomError: the stamp cannot be written.
         """
         outputs = [os.path.abspath(path) for path in report.outputs]
-        found = [os.path.abspath(path) for path in report.inputs] + _files_of_scene()
+        read = [
+            *report.inputs,
+            *(named for path in self._inputs for named in named_files(Path(path))),
+        ]
+        found = [os.path.abspath(path) for path in read] + _files_of_scene()
         inputs = {path: self._digest_as_read(Path(path)) for path in found} | self._inputs
         content = {
             "asked": self._asked,

@@ -1,0 +1,76 @@
+"""The files that a file of a mesh or groom names: whoever reads the one depends on the others."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote
+
+from ..errors import HairloomError
+from .usd.usd_library import SUFFIXES as USD_SUFFIXES
+from .usd.usd_library import usd_library
+
+#: lines of .obj and .mtl that end with the name of a file
+_MATERIALS, _PICTURE = (
+    re.compile(rb"^mtllib\s(.*)$", re.M),
+    re.compile(rb"^\s*map_\w+\s(.*)$", re.M),
+)
+
+
+def named_files(path: Path) -> list[Path]:
+    """Those that are there, of a file that could be read: buffers and pictures of a .gltf,
+    materials of an .obj and their pictures, and layers and pictures of USD."""
+    suffix = path.suffix.lower()
+    if suffix == ".gltf":
+        found = _of_gltf(path)
+    elif suffix == ".obj":
+        materials = list(_of_lines(path, _MATERIALS))
+        found = [*materials, *(each for file in materials for each in _of_lines(file, _PICTURE))]
+    elif suffix in USD_SUFFIXES:
+        found = _of_usd(path)
+    else:
+        found = []
+    return list(dict.fromkeys(each for each in found if each.is_file()))
+
+
+def _of_gltf(path: Path) -> list[Path]:
+    try:
+        content: Any = json.loads(path.read_bytes())
+        entries = [*content.get("buffers", ()), *content.get("images", ())]
+        uris = [each["uri"] for each in entries if "uri" in each]
+    except (ValueError, AttributeError, TypeError):  # a reader of it has said what is wrong
+        return []
+    return [path.parent / unquote(uri) for uri in uris if not uri.startswith("data:")]
+
+
+def _of_lines(path: Path, line: re.Pattern[bytes]) -> Iterator[Path]:
+    """Names may have spaces, and follow options or other names: all that could be one."""
+    for found in line.finditer(path.read_bytes()):
+        words = found[1].decode("utf-8", "replace").split()
+        ends = (" ".join(words[first:]) for first in range(len(words)))
+        yield from (path.parent / name for name in (*ends, *words) if _is_there(path.parent / name))
+
+
+def _is_there(path: Path) -> bool:
+    try:
+        return path.is_file()
+    except (OSError, ValueError):  # what no file can be called
+        return False
+
+
+def _of_usd(path: Path) -> list[Path]:
+    try:
+        usd_library(path)
+    except HairloomError:  # then nobody has read it
+        return []
+    from pxr import Tf, UsdUtils
+
+    try:
+        layers, assets, _ = UsdUtils.ComputeAllDependencies(str(path))
+    except Tf.ErrorException:
+        return []
+    files = [Path(layer.realPath) for layer in layers] + [Path(asset) for asset in assets]
+    return [file for file in files if file != path.resolve()]

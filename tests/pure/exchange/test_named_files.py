@@ -1,0 +1,54 @@
+"""What else a file depends on is found by the names in it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from hairloom.addon.exchange.named_files import named_files
+
+
+def made(folder: Path, *names: str) -> list[Path]:
+    for name in names:
+        (folder / name).parent.mkdir(exist_ok=True)
+        (folder / name).write_bytes(b"content")
+    return [folder / name for name in names]
+
+
+def test_buffers_and_pictures_of_gltf(tmp_path: Path) -> None:
+    files = made(tmp_path, "my head.bin", "pics/skin.png")
+    uris = ["my%20head.bin", "gone.bin", "data:application/octet-stream;base64,AAAA"]
+    content = {"buffers": [{"uri": uri} for uri in uris], "images": [{"uri": "pics/skin.png"}, {}]}
+    (tmp_path / "head.gltf").write_text(json.dumps(content))
+    assert named_files(tmp_path / "head.gltf") == files
+    (tmp_path / "head.gltf").write_text("[1")
+    assert named_files(tmp_path / "head.gltf") == []
+
+
+def test_materials_and_pictures_of_obj(tmp_path: Path) -> None:
+    made(tmp_path, "my skin.mtl", "eyes.mtl", "teeth.mtl", "pics/my face.png", "iris.png")
+    obj = "# mtllib none.mtl\nmtllib my skin.mtl\nv 0 0 0\nmtllib eyes.mtl teeth.mtl\r\n"
+    (tmp_path / "head.obj").write_text(obj)
+    (tmp_path / "my skin.mtl").write_text("newmtl a\n map_Kd -s 1 1 1 pics/my face.png\n")
+    (tmp_path / "eyes.mtl").write_text("map_Bump iris.png\nmap_d gone.png\n")
+    found = {file.relative_to(tmp_path).as_posix() for file in named_files(tmp_path / "head.obj")}
+    assert found == {"my skin.mtl", "eyes.mtl", "teeth.mtl", "pics/my face.png", "iris.png"}
+
+
+def test_layers_and_pictures_of_usd(tmp_path: Path) -> None:
+    pytest.importorskip("pxr", reason="usd-core is missing: `make setup` installs it")
+    made(tmp_path, "skin.png")
+    (tmp_path / "hair.usda").write_text(
+        '#usda 1.0\ndef Xform "hair"\n{\n    asset picture = @./skin.png@\n}\n'
+    )
+    (tmp_path / "all.usda").write_text(
+        '#usda 1.0\ndef Xform "all" (\n    references = @./hair.usda@</hair>\n)\n{\n}\n'
+    )
+    found = {file.name for file in named_files(tmp_path / "all.usda")}
+    assert found == {"hair.usda", "skin.png"}
+
+
+def test_other_files_name_none(tmp_path: Path) -> None:
+    assert named_files(*made(tmp_path, "hair.tfx")) == []
