@@ -9,6 +9,7 @@ from functools import partial
 import numpy as np
 
 from .arrays import Floats, Ints
+from .dynamics.blend import seen
 from .dynamics.clearance import GuideClearance, farthest_kept, guide_clearance
 from .dynamics.colliders import PosedCollider
 from .dynamics.constraints import PINNED
@@ -49,9 +50,10 @@ class FrameInput:
     pose: at the frame's end.
     colliders: with their way during the frame.
     gravity: (3,) [m/s^2], world space.
-    duration: time since the motion's pose [s].
+    duration: since the motion's pose [s].
     force_fields: of the scene.
     painted: by what settings are multiplied at each guide; None: nothing is painted.
+    time_scale: speed of the hair's time; 0: it is frozen.
     """
 
     pose: Pose
@@ -61,6 +63,12 @@ class FrameInput:
     duration: float
     force_fields: ForceFields = NO_FIELDS
     painted: PaintedGuides | None = None
+    time_scale: float = 1.0
+
+    @property
+    def hair_time(self) -> float:
+        """The hair's own duration [s]."""
+        return self.duration * self.time_scale
 
 
 @dataclass(frozen=True)
@@ -70,7 +78,7 @@ class Motion:
     guides: (guide_count, cv_count, 3) [m], simulated, with their roots in this pose.
     carried_guides: the same without dynamics: their rest shape carried by the roots.
     carried_earlier: the same one frame earlier; None at the start.
-    duration: of the last frame [s]; 0 at the start.
+    duration: of the last frame [s]; 0 at the start. hair_time: the hair's own, in which it moved.
     colliders: as they stand at its end.
     clearance: how far strands stay from these; None before there are any.
     guide_clearance: the same of guides.
@@ -84,6 +92,7 @@ class Motion:
     pose: Pose
     carried_earlier: Floats | None = None
     duration: float = 0.0
+    hair_time: float = 0.0
     colliders: tuple[PosedCollider, ...] = ()
     clearance: Clearance | None = None
     guide_clearance: GuideClearance | None = None
@@ -199,19 +208,20 @@ def steps(rig: Rig, motion: Motion, frame: FrameInput, led: LedOut = NOT_LED) ->
         led: the strands that were led out at this moment of the motion: from how they were bent
             the next frame's are led.
     """
-    settings, duration = frame.settings, frame.duration
+    settings, hair_time = frame.settings, frame.hair_time
     target = style_of_guides(rig, frame.pose)
     motion = with_clearance(rig, motion, frame.colliders, settings, frame.painted)
     drive = motion.drive(frame, target, held_cvs(rig, frame.pose))
-    state = yield from dynamics_steps(motion.dynamics, drive, settings, duration)
-    guides, before = grid_at_frame_end(state, drive, settings, duration), motion.carried_guides
+    state = yield from dynamics_steps(motion.dynamics, drive, settings, hair_time)
+    guides, before = grid_at_frame_end(state, drive, settings, hair_time), motion.carried_guides
     return Motion(
         state,
         guides,
         target,
         frame.pose,
         before,
-        duration,
+        frame.duration,
+        hair_time,
         frame.colliders,
         motion.clearance,
         motion.guide_clearance,
@@ -250,19 +260,13 @@ def has_jumped(
     return 0.0 < settings.jump_turn < angle
 
 
-def go_along(
-    rig: Rig,
-    motion: Motion,
-    pose: Pose,
-    colliders: tuple[PosedCollider, ...],
-    duration: float,
-) -> Motion:
+def go_along(rig: Rig, motion: Motion, frame: FrameInput) -> Motion:
     """A frame in which hair goes along with its roots as it is, each guide rigidly.
 
-    Args:
-        duration: [s] of a jump, after which hair has no speed; 0: hair is frozen, and goes on with
-            the speed that it had.
+    After a jump hair has no speed. Frozen hair goes on with the speed that it had. What is not
+    to be seen of the simulation goes with the style.
     """
+    pose, is_frozen = frame.pose, not frame.time_scale
     target, state = style_of_guides(rig, pose), motion.dynamics
     turn = root_turns(rig, pose) @ np.linalg.pinv(root_turns(rig, motion.pose))
     root = state.grid[:, :1]
@@ -273,9 +277,9 @@ def go_along(
         return rows_of(moved.astype(np.float32), "dynamics")
 
     position = taken_along(state.position)
-    previous = position if duration else taken_along(state.previous)
+    previous = taken_along(state.previous) if is_frozen else position
     carried = NOT_MOVED
-    if not duration:
+    if is_frozen:
         roots = Carrier.through(root_sample(motion.carried_guides), root_sample(target))
         before, now = (place.turned(roots.path.now.rotation) for place in state.carried.places)
         # hair goes to where its roots are at the frame's end
@@ -284,14 +288,16 @@ def go_along(
     state = replace(
         state, position=position, previous=previous, styles=(), push=None, carried=carried
     )
+    simulated = simulated_of(frame.painted, frame.settings, len(target))
     return Motion(
         state,
-        state.grid,
+        seen(state.grid, target, simulated),
         target,
         pose,
         None,
-        duration or motion.duration,
-        colliders,
+        motion.duration if is_frozen else frame.duration,
+        frame.hair_time,
+        frame.colliders,
         motion.clearance,
         motion.guide_clearance,
         begun=motion.begun,
@@ -370,7 +376,7 @@ def strands_and_led(rig: Rig, motion: Motion) -> tuple[Floats, LedOut]:
     if motion.clearance is None:
         return held_strands(rig, pose, points), NOT_LED
     carry = partial(motions.carried, rig.strands.points)
-    leans = motion.leans.after(motion.duration, offsets)
+    leans = motion.leans.after(motion.hair_time, offsets)
     led, leans = lead_out(points, carry, offsets, motion.colliders, motion.clearance, leans)
     points = held_strands(rig, pose, points)
     return points, LedOut.of(led, points, offsets, leans)

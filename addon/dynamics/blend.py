@@ -16,6 +16,13 @@ from .constraints import TINY
 OPPOSITE = np.float32(1.0e-4)
 
 
+def seen(simulated: Floats, style: Floats, fraction: Floats | None) -> Floats:
+    """What is seen of simulated guides, see `blended`, float32; None: all of all."""
+    if fraction is None:
+        return simulated
+    return blended(simulated, style.astype(np.float32), fraction)
+
+
 def blended(simulated: Floats, style: Floats, fraction: Floats) -> Floats:
     """Guides (guide_count, cv_count, 3) [m], the root that of the style.
 

@@ -33,7 +33,7 @@ from itertools import pairwise
 import numpy as np
 
 from ..arrays import Floats
-from .blend import blended
+from .blend import seen
 from .colliders import Pose, poses_through
 from .constraints import PINNED, pin
 from .force_fields import along_strands, blow
@@ -208,9 +208,7 @@ def grid_at_frame_end(
         root = grid[:, :1]
         grid = Carry(turn, np.zeros(3), np.zeros(3)).moved((grid - root).T).T + root
     grid = (grid + displacement).astype(np.float32)
-    if drive.simulated is None:
-        return grid
-    return blended(grid, drive.target_now.astype(np.float32), drive.simulated)
+    return seen(grid, drive.target_now, drive.simulated)
 
 
 def turned_beside_root(state: DynamicsState, settings: DynamicsSettings) -> Floats | None:

@@ -114,6 +114,44 @@ def test_frozen_hair_goes_along_and_then_goes_on(playing, evaluated):
     assert np.abs(on_head(session, head) - before).max() > 1e-3
 
 
+@pytest.mark.parametrize("is_cut", [True, False])
+def test_hair_goes_along_as_far_as_it_is_simulated(playing, evaluated, is_cut):
+    """At a cut and frozen: what is not selected, or nothing of it, is exactly in its style."""
+    settings, head, session = playing
+    chosen = np.arange(0, len(session.hair.found().data.curves), 2)
+    select(session.hair.found(), "CURVE", chosen)
+    settings.only_selected = True
+    session.read_again(evaluated())
+    session.play(evaluated())
+    advance(evaluated, 3, lambda frame: setattr(head.location, "x", 0.05 * frame**2))
+    settings.time_scale = 1.0 if is_cut else 0.0
+    for simulated, is_seen in ((1.0, np.isin(session.rig.guides, chosen)), (0.0, False)):
+        settings.simulated = simulated
+        session.take_settings()
+        advance(evaluated, 1, lambda frame: cut(head))
+        style = motion_flow.style_of_guides(session.rig, session.solver.pose)
+        away = np.abs(session.solver.guides() - style).max(axis=(1, 2))
+        np.testing.assert_array_equal(away > 0.003, is_seen)
+        assert (away[~(away > 0.003)] == 0.0).all()
+        head.matrix_world = Matrix.Translation((9.0, 0.0, 0.0))
+        advance(evaluated)
+
+
+def test_the_end_of_slow_motion_is_no_cut(playing, evaluated):
+    """The head goes evenly in the scene's time, and so do the roots in their last frame."""
+    settings, head, session = playing
+
+    def driven(frame):
+        settings.time_scale = 0.1 if frame < 4 else 1.0
+        session.take_settings()
+        head.location.x = 5.0 * (frame + 1)
+
+    advance(evaluated, 5, driven)
+    dynamics = session.solver.motion.dynamics
+    moved = (dynamics.position - dynamics.previous)[0, 0] / dynamics.substep
+    np.testing.assert_allclose(moved, 5.0 * 24.0, rtol=1e-3)
+
+
 def test_at_half_the_speed_two_frames_are_one(playing, evaluated):
     settings, head, session = playing
     advance(evaluated, 4)

@@ -332,7 +332,7 @@ def test_strands_that_ride_are_led_out(monkeypatch: pytest.MonkeyPatch, rounds: 
     along = np.linspace(0.0, 1.0, guides.shape[1])[:, None]
     for frame in (1.0, 2.0, 3.0):
         moved = guides + frame * np.float32([0.0, 0.004, 0.0]) * along
-        after = replace(motion, guides=moved, duration=1.0 / 60.0, leans=led.leans)
+        after = replace(motion, guides=moved, hair_time=1.0 / 60.0, leans=led.leans)
         expected, led = motion_flow.strands_and_led(rig, after)
         ride.ride(pose.head_positions, pose.matrix, moved, None, posed, since=1.0 / 60.0)
         found = ride.read_led()

@@ -100,20 +100,21 @@ class ComputeSolver:
             self._take(self.motion)
         if self._motion.clearance is not None and not self._is_resting:
             self._draw()  # what was not shown counts too: motion does not depend on who looks
-            self._since = frame.duration
+            self._since = frame.hair_time
         self.meet(frame.colliders, frame.settings, frame.painted)
         motion = self._motion
         if self._dynamics is None:
             self._dynamics = DynamicsPass(motion.dynamics, self._colliders)
         target = motion_flow.style_of_guides(self._rig, frame.pose)
         drive = motion.drive(frame, target, motion_flow.held_cvs(self._rig, frame.pose))
-        yield from self._dynamics.steps(drive, frame.settings, frame.duration)
+        yield from self._dynamics.steps(drive, frame.settings, frame.hair_time)
         self._motion = replace(
             motion,
             carried_guides=target,
             pose=frame.pose,
             carried_earlier=motion.carried_guides,
             duration=frame.duration,
+            hair_time=frame.hair_time,
             colliders=frame.colliders,
         )
         self._is_resting = self._is_drawn = False
@@ -129,8 +130,8 @@ class ComputeSolver:
     def has_jumped(self, pose: Pose, settings: DynamicsSettings, duration: float) -> bool:
         return motion_flow.has_jumped(self._rig, self._motion, pose, settings, duration)
 
-    def go_along(self, pose: Pose, colliders: tuple[PosedCollider, ...], duration: float) -> None:
-        self._take(motion_flow.go_along(self._rig, self.motion, pose, colliders, duration))
+    def go_along(self, frame: FrameInput) -> None:
+        self._take(motion_flow.go_along(self._rig, self.motion, frame))
 
     def carry(self, pose: Pose, guides: Floats, led: LedOut = NOT_LED) -> None:
         self._take(carried_motion(self._rig, self._motion, pose, guides))

@@ -80,8 +80,8 @@ class NumpySolver:
     def has_jumped(self, pose: Pose, settings: DynamicsSettings, duration: float) -> bool:
         return motion_flow.has_jumped(self._rig, self._motion, pose, settings, duration)
 
-    def go_along(self, pose: Pose, colliders: tuple[PosedCollider, ...], duration: float) -> None:
-        self._take(motion_flow.go_along(self._rig, self.motion, pose, colliders, duration))
+    def go_along(self, frame: FrameInput) -> None:
+        self._take(motion_flow.go_along(self._rig, self.motion, frame))
 
     def carry(self, pose: Pose, guides: Floats, led: LedOut = NOT_LED) -> None:
         self._take(carried_motion(self._rig, self._motion, pose, guides))

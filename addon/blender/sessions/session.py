@@ -587,10 +587,7 @@ class Session:
             self._is_recorded = False
             self._take_style(depsgraph)
             scale = self.settings[DynamicsSettings].time_scale
-            if scale:
-                yield from self._simulate(depsgraph, duration * scale)
-            else:
-                self._go_along(depsgraph, self._pose(depsgraph), 0.0)
+            yield from self._simulate(depsgraph, duration, scale)
             self._show()
 
     @property
@@ -617,22 +614,27 @@ class Session:
         """See `motion_flow.style_seen`."""
         return motion_flow.style_seen(self.rig, self.solver.pose, self.groom.rig)
 
-    def _simulate(self, depsgraph: bpy.types.Depsgraph, duration: float) -> Steps[None]:
-        """A frame of this duration of the hair's time [s]."""
+    def _simulate(
+        self, depsgraph: bpy.types.Depsgraph, duration: float, time_scale: float = 1.0
+    ) -> Steps[None]:
+        """A frame of this duration [s], in which the hair's time goes at this speed."""
         pose, settings = self._pose(depsgraph), self.settings[DynamicsSettings]
-        if self.solver.has_jumped(pose, settings, duration):
-            self._go_along(depsgraph, pose, duration)
-            return
-        self._posed = () if self.obstacles is None else self.obstacles.move(depsgraph, duration)
+        goes_along = not time_scale or self.solver.has_jumped(pose, settings, duration)
+        if self.obstacles is not None and goes_along:
+            self._posed = self.obstacles.rest(depsgraph)
+        elif self.obstacles is not None:
+            self._posed = self.obstacles.move(depsgraph, duration)
+        else:
+            self._posed = ()
         fields, self._field_notes = force_fields_of(self.hair.found(), depsgraph)
         gravity, painted = gravity_of(depsgraph.scene), self._source.painted_guides(self.rig)
-        frame = FrameInput(pose, self._posed, settings, gravity, duration, fields, painted)
-        yield from self.solver.steps(frame)
-
-    def _go_along(self, depsgraph: bpy.types.Depsgraph, pose: Pose, duration: float) -> None:
-        """A frame in which hair goes with its head as it is; see `motion_flow.go_along`."""
-        self._posed = () if self.obstacles is None else self.obstacles.rest(depsgraph)
-        self.solver.go_along(pose, self._posed, duration)
+        frame = FrameInput(
+            pose, self._posed, settings, gravity, duration, fields, painted, time_scale
+        )
+        if goes_along:
+            self.solver.go_along(frame)
+        else:
+            yield from self.solver.steps(frame)
 
     def measure(self) -> None:
         """Find the figures of this moment, while it is simulated."""

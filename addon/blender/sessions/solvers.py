@@ -82,7 +82,7 @@ class Solver(Protocol):
     def has_jumped(self, pose: Pose, settings: DynamicsSettings, duration: float) -> bool:
         """Whether the head is elsewhere all of a sudden, see `motion_flow.has_jumped`."""
 
-    def go_along(self, pose: Pose, colliders: tuple[PosedCollider, ...], duration: float) -> None:
+    def go_along(self, frame: FrameInput) -> None:
         """A frame in which hair goes along with its roots, see `motion_flow.go_along`."""
 
     def carry(self, pose: Pose, guides: Floats, led: LedOut = NOT_LED) -> None:
