@@ -51,12 +51,13 @@ def simulated_of(
     """How much of each guide is simulated, (guide_count,) float32, see `blend.blended`; None: all
     of all."""
     factors = {} if painted is None else painted.factors
-    if settings.simulated == 1.0 and not factors.keys() & {"simulated", "only_selected"}:
+    by_selection = settings.only_selected and "only_selected" in factors
+    if settings.simulated == 1.0 and not by_selection and "simulated" not in factors:
         return None
     fraction = np.full(guide_count, settings.simulated, np.float32)
     if painted is not None and "simulated" in factors:
         fraction = painted.of_guides(settings, "simulated").astype(np.float32)
-    if "only_selected" in factors:
+    if by_selection:
         fraction *= factors["only_selected"].mean(axis=0).astype(np.float32)
     return fraction
 

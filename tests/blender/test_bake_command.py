@@ -81,7 +81,8 @@ def test_only_selected_curves_move_by_themselves(file, tmp_path, verb):
     bpy.ops.wm.save_mainfile()
     soft = ("only_selected=true", "style_root=1", "style_tip=0.2", "sag_compensation=0")
     chosen = [part for each in soft for part in ("--set", f"dynamics.{each}")]
-    place = ["--object", "Hair"] if verb == ["bake"] else ["--groom", "Hair", "--seconds", "0.2"]
+    place = ["--object" if verb == ["bake"] else "--groom", "Hair"]
+    place += ["--seconds", "0.2"] if verb == ["simulate"] else []
     output = ["--output", str(tmp_path / "out")]
     assert command_line.run([*verb, "--scene", str(file), *place, *chosen, *output]) == 0
     motion = BakedGuides.in_folder(tmp_path / "out")

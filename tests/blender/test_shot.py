@@ -6,9 +6,12 @@ import pytest
 from mathutils import Matrix
 
 from hairloom.addon import motion_flow
+from hairloom.addon.blender.bakes import playback
 from hairloom.addon.blender.bakes.cache import Cache
+from hairloom.addon.blender.bakes.stale_bakes import changed_since
 from hairloom.addon.blender.command_line import command_line
 from hairloom.addon.blender.preview import previews
+from hairloom.addon.blender.preview.bake import Bake
 
 pytestmark = pytest.mark.draws(light=False)
 SOFT = {"style_root": 1.0, "style_tip": 0.2, "sag_compensation": 0.0}
@@ -230,7 +233,9 @@ def test_without_inheriting_it_lags(playing, evaluated):
 def select(hair, domain, chosen):
     """Curves by number, as Sculpt or Edit Mode of curves writes it."""
     curves = hair.data
-    attribute = curves.attributes.new(".selection", "BOOLEAN", domain)
+    attribute = curves.attributes.get(".selection")
+    if attribute is None:
+        attribute = curves.attributes.new(".selection", "BOOLEAN", domain)
     values = np.isin(np.arange(len(curves.curves)), chosen)
     if domain == "POINT":  # one of its points alone
         firsts = np.array([curve.first_point_index for curve in curves.curves])
@@ -256,6 +261,36 @@ def test_only_selected_curves_are_simulated(playing, evaluated, domain):
     assert is_chosen.any() and not is_chosen.all()
     assert (away[is_chosen] > 0.003).all()
     assert (away[~is_chosen] == 0.0).all()
+
+
+def test_keyframes_turn_only_selected_on_and_off(new_hair, sphere, tmp_path, evaluated):
+    """In frames 1, 2 and 4 all are simulated, in frame 3 those that are selected; no frame of the
+    bake is out of date, until others are selected."""
+    hair, scene = new_hair(sphere), bpy.context.scene
+    for name, value in SOFT.items():
+        setattr(hair.hairloom.dynamics, name, value)
+    hair.hairloom.bake.folder, scene.frame_end = str(tmp_path / "bake"), 4
+    chosen = np.arange(0, len(hair.data.curves), 2)
+    select(hair, "CURVE", chosen)
+    for frame in (1, 2, 3, 4):
+        hair.hairloom.dynamics.only_selected = frame == 3
+        hair.keyframe_insert("hairloom.dynamics.only_selected", frame=frame)
+        sphere.location.x = 0.05 * frame**2
+        sphere.keyframe_insert("location", frame=frame)
+    list(Bake.of([hair], scene).steps())
+    cache = playback.cache_of(hair)
+    rig = playback.rig_in(cache)
+    for frame in (2, 3, 4):
+        scene.frame_set(frame)
+        assert changed_since(hair, cache, evaluated()) == ()
+        arrays = cache.frame(frame)
+        style = motion_flow.style_of_guides(rig.rig, rig.pose(arrays))
+        is_away = (arrays["guides"] != style).any(axis=(1, 2))
+        np.testing.assert_array_equal(is_away, np.isin(rig.rig.guides, chosen) | (frame != 3))
+    select(hair, "CURVE", chosen[:4])
+    assert changed_since(hair, cache, evaluated()) == ()
+    scene.frame_set(3)
+    assert changed_since(hair, cache, evaluated()) == ("selection",)
 
 
 def test_where_no_selection_is_known_all_is_simulated(playing, evaluated):

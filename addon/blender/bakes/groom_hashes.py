@@ -14,7 +14,7 @@ import numpy as np
 from ...arrays import Floats, Ints
 from ...dynamics.settings import DynamicsSettings
 from ...groom.children_settings import ChildrenSettings
-from ...groom.masks import mask_names
+from ...groom.masks import SELECTION, mask_names
 from ...groom.settings import GuideSettings
 from ...groom.width_settings import WidthSettings
 from ...rig_flow import Pose
@@ -64,8 +64,9 @@ def groom_rig_hash(
     others = _other_grooms(hair, scene) if dynamics.volume > 0.0 else ()
     if others:
         grown["other_grooms"] = others
-    if mask_names(dynamics):
-        grown["paint"] = _paint(hair, head, *mask_names(dynamics).values())
+    painted = [name for name in mask_names(dynamics).values() if name != SELECTION]
+    if painted:
+        grown["paint"] = _paint(hair, head, *painted)
     return hashes(
         hair=_curves_parts(hair),
         head=() if head is None else mesh_parts(head),
@@ -91,12 +92,15 @@ def groom_frame_hash(
     """
     ties = _tie_places(hair, depsgraph)
     style = _style(hair, depsgraph)
+    settings = _dynamics(hair)
+    selection = _paint(hair, None, SELECTION) if settings.only_selected else ()
     return hashes(
         pose=pose.matrix if pose.head_positions is None else pose.head_positions,
-        settings=_dynamics(hair),
+        settings=settings,
         colliders=collider_places(hair, head, depsgraph),
         **({"ties": ties} if ties else {}),
         **({"style": style} if style else {}),
+        **({"selection": selection} if selection else {}),
         forces=(gravity_of(depsgraph.scene), force_fields_of(hair, depsgraph)[0].table),
     )
 

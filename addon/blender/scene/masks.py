@@ -83,15 +83,21 @@ class Canvas:
         self, settings: Settings, depsgraph: bpy.types.Depsgraph
     ) -> tuple[Masks, tuple[str, ...]]:
         """Those that settings name, and what is to be said of them. One that cannot be used stays
-        as it was last; one that never could acts nowhere."""
-        named, labels = mask_names(settings), {p.name: p.label for p in settings.parameters()}
+        as it was last; one that never could acts nowhere. A selection is read whether or not it
+        acts, as keyframes may let it."""
+        acting, labels = mask_names(settings), {p.name: p.label for p in settings.parameters()}
+        named = dict(acting)
+        if hasattr(settings, "only_selected") and self._has_selection(depsgraph):
+            named["only_selected"] = SELECTION
         found, warnings = {}, []
         read = {name: self.read(name, depsgraph) for name in sorted(set(named.values()))}
         for of, name in named.items():
             mask, warning = read[name]
             if mask is not None:
                 found[of] = mask
-            if warning and warning not in warnings:
+            if of not in acting or warning in warnings:
+                continue
+            if warning:
                 warnings.append(warning)
             elif name == SELECTION and mask is not None and mask.is_zero:
                 warnings.append(
@@ -186,6 +192,10 @@ class Canvas:
         if domain == "POINT":
             values = np.maximum.reduceat(values, self.strands.offsets[:-1])
         return StrandMask(values[:, None])
+
+    def _has_selection(self, depsgraph: bpy.types.Depsgraph) -> bool:
+        curves = None if self.hair is None else self.hair.evaluated_get(depsgraph).data
+        return curves is not None and painted_attribute(curves, SELECTION) is not None
 
     def _on_curves(self, name: str, depsgraph: bpy.types.Depsgraph) -> tuple[Floats, str] | None:
         """An attribute of the curves that are usable, or of their points, and its domain."""
