@@ -168,6 +168,7 @@ class DynamicsSettings(MotionSettings):
         description="Read the curves again in each frame, so that hair returns to them as shape "
         "keys, modifiers, nodes or a cache move them; off, they are read once",
         panel="Style",
+        is_animatable=False,
     )
     simulated: float = number(
         1.0,

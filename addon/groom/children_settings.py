@@ -23,6 +23,7 @@ class ChildrenSettings(Settings):
     title = "Children"
     help_page = "refinement#children"
     owner = "groom"
+    is_animatable = False
 
     method: str = choice(
         "auto",

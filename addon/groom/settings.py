@@ -20,6 +20,7 @@ class GrowSettings(Settings):
     title = "Grow"
     help_page = "styling#grow"
     owner = "groom"
+    is_animatable = False
 
     method: str = choice(
         "combed",
@@ -250,6 +251,7 @@ class GuideSettings(Settings):
     title = "Guides"
     help_page = "user_guide#strands-and-children"
     owner = "groom"
+    is_animatable = False
     panel_after = "strands"
     panels = ("Ties",)
 

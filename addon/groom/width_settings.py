@@ -16,6 +16,7 @@ class WidthSettings(Settings):
     title = "Widths"
     help_page = "user_guide#strands-and-children"
     owner = "groom"
+    is_animatable = False
 
     method: str = choice(
         "auto",

@@ -67,6 +67,7 @@ class Parameter:
     It is drawn where `shown_when` holds, and greyed out where `active_when` does not, which says
     why.
     `is_painted`: a mask may multiply it, which follows it by itself, see `Settings`.
+    `is_animatable`: keyframes and drivers may change it.
     `of` is the parameter beside which a mask is drawn, and which it multiplies.
     """
 
@@ -84,6 +85,7 @@ class Parameter:
     shown_when: Condition | None = None
     active_when: Condition | None = None
     is_painted: bool = False
+    is_animatable: bool = True
     of: str = ""
 
     def checked(self, value: Any, place: str) -> Any:
@@ -174,6 +176,8 @@ class Settings:
     said_above: ClassVar[str] = ""
     #: the toggle in the header of its panel
     header_toggle: ClassVar[str] = ""
+    #: whether keyframes and drivers may change any
+    is_animatable: ClassVar[bool] = True
 
     def __init_subclass__(cls) -> None:
         """Each parameter that may be painted is followed by the one that names its mask."""
@@ -197,8 +201,9 @@ class Settings:
     @cache
     def parameters(cls) -> tuple[Parameter, ...]:
         """The declarations in the order in which they stand in the class."""
+        keyed = {} if cls.is_animatable else {"is_animatable": False}
         return tuple(
-            dataclasses.replace(field.metadata[_METADATA_KEY], name=field.name)
+            dataclasses.replace(field.metadata[_METADATA_KEY], name=field.name, **keyed)
             for field in dataclasses.fields(cls)
         )
 
@@ -280,12 +285,13 @@ def either(one: Condition, other: Condition) -> Condition:
 
 
 class _Drawn(TypedDict, total=False):
-    """Where and when a parameter is drawn, see `Parameter`."""
+    """Where and when a parameter is drawn, and what may change it, see `Parameter`."""
 
     panel: str
     shown_when: Condition
     active_when: Condition
     is_painted: bool
+    is_animatable: bool
 
 
 def number(

@@ -15,6 +15,7 @@ class AmbientSettings(Settings):
     title = "Ambient Occlusion"
     help_page = "shading#shadows"
     owner = "groom"
+    is_animatable = False
 
     strength: float = number(
         1.0,

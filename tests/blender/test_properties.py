@@ -13,12 +13,14 @@ from hairloom import register, unregister
 from hairloom.addon.blender.engine import hair_scene
 from hairloom.addon.blender.preview import handlers
 from hairloom.addon.blender.properties import changed, groups
+from hairloom.addon.blender.properties.groom_settings import GroomSettings
 from hairloom.addon.blender.properties.properties import property_group, settings_of
 from hairloom.addon.blender.scene import look_materials
 from hairloom.addon.blender.strands import growing
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.parameters import ALL_SETTINGS
 from hairloom.addon.params.curve import PLACES
+from hairloom.addon.params.field import NAMING
 
 pytestmark = pytest.mark.portable
 
@@ -170,6 +172,41 @@ def test_choices_and_toggles_have_properties_too(extension):
     finally:
         del bpy.types.Scene.hairloom_example
         bpy.utils.unregister_class(group)
+
+
+def _another(value, parameter):
+    if parameter.kind == "choice":
+        return next(one for one, *_ in parameter.choices if one != value)
+    if parameter.kind == "toggle":
+        return not value
+    if parameter.kind in ("color", "curve"):
+        return tuple(0.5 * each + 0.1 for each in value)
+    low, high = parameter.hard_range
+    return low if value == high else type(value)(min(value + 1, high))
+
+
+def test_keyframes_change_nothing_that_needs_other_hair(new_hair):
+    """No frame reads the hair again: what would need it takes no keyframes, but for water, of which
+    look and weight follow, and Only Selected, for whose warning alone curves are read again."""
+    hair, tried, known = new_hair(), 0, {"wetness", "only_selected"}
+    hair.data.hairloom.children.method = "multi"
+    for owner in (hair.data, hair):
+        for section, kind in ALL_SETTINGS.items():
+            group = getattr(owner.hairloom, section, None)
+            for parameter in kind.parameters() if group is not None else ():
+                if parameter.kind in NAMING or parameter.name in known:
+                    continue
+                before, value = GroomSettings.of(hair), getattr(group, parameter.name)
+                value = tuple(value) if parameter.kind in ("color", "curve") else value
+                setattr(group, parameter.name, _another(value, parameter))
+                needs_other_hair = not GroomSettings.of(hair).acts_at_once(before)
+                setattr(group, parameter.name, value)
+                is_keyed = group.bl_rna.properties[parameter.name].is_animatable
+                assert not (needs_other_hair and is_keyed), (section, parameter.name)
+                tried += needs_other_hair
+    assert tried > 30
+    with pytest.raises(TypeError, match="not animatable"):
+        hair.data.hairloom.children.keyframe_insert("clump")
 
 
 def test_a_copy_of_the_curves_has_the_same_settings(new_hair):

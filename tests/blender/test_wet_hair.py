@@ -8,8 +8,12 @@ import bpy
 import numpy as np
 import pytest
 
+from hairloom.addon.blender.bakes import playback
 from hairloom.addon.blender.bakes.groom_hashes import settings_part
+from hairloom.addon.blender.bakes.stale_bakes import changed_since
 from hairloom.addon.blender.colliders.rigs import rig_of
+from hairloom.addon.blender.preview.bake import Bake
+from hairloom.addon.blender.preview.preview import rig_for
 from hairloom.addon.blender.properties.groom_settings import GroomSettings
 from hairloom.addon.blender.scene.source import read_source
 from hairloom.addon.dynamics.settings import DynamicsSettings
@@ -49,6 +53,25 @@ def test_a_bake_of_dry_hair_is_out_of_date_once_it_is_wet(hair: Any) -> None:
     hair.data.hairloom.shading.wetness = 0.0
     hair.data.hairloom.shading.dust = 0.5  # which has no weight
     assert settings_part(hair) == before
+
+
+def test_hair_that_becomes_wet_is_baked_with_the_children_of_its_first_frame(
+    hair: Any, tmp_path: Any
+) -> None:
+    """Their bake is up to date in each frame, and the preview has its hair."""
+    scene = bpy.context.scene
+    scene.frame_start, scene.frame_end = 1, 3
+    hair.hairloom.bake.folder, hair.hairloom.dynamics.device = str(tmp_path / "bake"), "numpy"
+    for frame, wetness in ((1, 0.0), (3, 1.0)):
+        hair.data.hairloom.shading.wetness = wetness
+        hair.data.hairloom.shading.keyframe_insert("wetness", frame=frame)
+    list(Bake.of([hair], scene).steps())
+    cache = playback.cache_of(hair)
+    assert cache is not None
+    for frame in (1, 2, 3):
+        scene.frame_set(frame)
+        assert changed_since(hair, cache, bpy.context.evaluated_depsgraph_get()) == ()
+        assert rig_for(hair, scene) is not None
 
 
 def test_hair_made_real_has_its_water_within_it(hair: Any) -> None:

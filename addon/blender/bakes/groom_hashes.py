@@ -47,8 +47,11 @@ def groom_rig_hash(
     """Named hashes, see `simulated.hashes`; messages say by these names what has changed."""
     grown: dict[str, tuple[Hashed, ...]] = {}
     if settings[ChildrenSettings].method != "none":
+        children = settings[ChildrenSettings]
+        if hair.data.animation_data is not None:  # water may be keyed, and no frame grows others
+            children = settings_of(hair.data.hairloom.children, ChildrenSettings)
         grown["children"] = (
-            settings[ChildrenSettings],
+            children,
             *_paint(hair, head, settings.children_density),
             *_paint(hair, head, *mask_names(settings[ChildrenSettings]).values()),
         )

@@ -135,7 +135,7 @@ SECTION_GROUPS = {
     section: property_group(kind, _redraw if kind.owner == "scene" else changed.settings)
     for section, kind in ALL_SETTINGS.items()
     if kind.owner != "job"
-} | {"grow": property_group(ALL_SETTINGS["grow"], changed.grow, is_animated=False)}
+} | {"grow": property_group(ALL_SETTINGS["grow"], changed.grow)}
 SECTION_GROUPS["grow"].__annotations__ |= {
     "density_group": StringProperty(
         name="Density",
@@ -258,6 +258,7 @@ class HAIRLOOM_PG_character(bpy.types.PropertyGroup):
             description="How densely children grow: a vertex group or an attribute of the surface, "
             "an attribute of the curves, or an image; empty: wherever guides are near",
             search=masks_of_groom,
+            options=set(),
             update=lambda self, _context: changed.settings(self.id_data),
             override=OVERRIDABLE,
         ),

@@ -45,30 +45,26 @@ _LARGEST_INTEGER = 2**31 - 1
 OVERRIDABLE = {"LIBRARY_OVERRIDABLE"}
 
 
-def property_group(
-    settings: type[Settings], changed: Changed | None = None, *, is_animated: bool = True
-) -> type[Any]:
+def property_group(settings: type[Settings], changed: Changed | None = None) -> type[Any]:
     """A PropertyGroup class with one property a parameter, same names, same order.
 
     Args:
-        changed: called with the data-block that owns the group, as soon as a value is edited.
-        is_animated: whether keyframes and drivers may change it, of which `changed` does not learn.
+        changed: called with the data-block that owns the group, as soon as a value is edited; not
+            by keyframes and drivers.
     """
     namespace = {
         "__doc__": settings.title,
-        "__annotations__": property_annotations(
-            settings.parameters(), changed, is_animated=is_animated
-        ),
+        "__annotations__": property_annotations(settings.parameters(), changed),
         "settings": settings,
     }
     return type(f"HAIRLOOM_PG_{settings.section}", (bpy.types.PropertyGroup,), namespace)
 
 
 def property_annotations(
-    parameters: Iterable[Parameter], changed: Changed | None = None, *, is_animated: bool = True
+    parameters: Iterable[Parameter], changed: Changed | None = None
 ) -> dict[str, Any]:
     """name -> Blender property, for the `__annotations__` of a group or an operator."""
-    return {each.name: _property(each, changed, is_animated) for each in parameters}
+    return {each.name: _property(each, changed) for each in parameters}
 
 
 def settings_of[S: Settings](group: Any, settings: type[S]) -> S:
@@ -127,14 +123,14 @@ def weights_meant(obj: bpy.types.Object | None, typed: str) -> list[str]:
     return [name for name in names if typed.lower() in name.lower()]
 
 
-def _property(parameter: Parameter, changed: Changed | None, is_animated: bool) -> Any:
+def _property(parameter: Parameter, changed: Changed | None) -> Any:
     common: dict[str, Any] = {
         "name": parameter.label,
         "description": parameter.description,
         "default": parameter.default,
         "update": None if changed is None else _update(changed),
         "override": OVERRIDABLE,
-        "options": {"ANIMATABLE"} if is_animated else set(),
+        "options": {"ANIMATABLE"} if parameter.is_animatable else set(),
     }
     if parameter.kind == "toggle":
         return BoolProperty(**common)
