@@ -103,6 +103,24 @@ def test_what_drives_and_what_makes_the_hair_is_told_by_name(baked: Any, changed
     assert "hair" in changed()
 
 
+def test_a_collider_that_is_disabled_or_thickened_is_told(baked: Any, changed: Any) -> None:
+    hair, head = baked
+    colliders = bpy.data.collections.new("Colliders")
+    bpy.context.scene.collection.children.link(colliders)
+    body = bpy.data.objects.new("Body", head.data.copy())
+    colliders.objects.link(body)
+    hair.hairloom.collider_collection = colliders
+    thick = body.modifiers.new("Solidify", "SOLIDIFY")  # which moves no vertex from frame to frame
+    list(Bake.of([hair], bpy.context.scene).steps())
+    assert changed() == ()
+    thick.thickness = 0.05
+    assert changed() == ("colliders",)
+    thick.thickness = 0.01
+    assert changed() == ()
+    body.hide_viewport = True
+    assert changed() == ("colliders",)
+
+
 def test_a_head_of_other_vertices_is_told_and_stops_nothing(baked: Any, changed: Any) -> None:
     baked[1].modifiers.new("Subdivision", "SUBSURF").levels = 1
     bpy.context.view_layer.update()

@@ -6,6 +6,7 @@ space and before modifiers. What modifiers and animation change shows in the has
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 
 import bpy
@@ -93,7 +94,7 @@ def groom_frame_hash(
     Args:
         head: that carries it. pose: where it is, see `poses.read_pose`.
     """
-    ties = _tie_places(hair, depsgraph)
+    ties = _places(holders_of(hair), depsgraph)
     style = _style(hair, depsgraph)
     settings = _dynamics(hair)
     selection = _paint(hair, None, SELECTION) if settings.only_selected else ()
@@ -141,14 +142,21 @@ def _dynamics(hair: bpy.types.Object) -> DynamicsSettings:
 
 def collider_places(
     owner: bpy.types.Object, head: bpy.types.Object | None, depsgraph: bpy.types.Depsgraph
-) -> tuple[Floats, ...]:
-    """Where the colliders of a groom or fin are now, but for the head: that is its pose."""
-    places = []
-    for obj in sources_of(owner, head):
-        if obj != head:
-            places.append(matrix_of(obj, depsgraph))
-            if obj.type == "MESH" and is_deforming(obj):
-                places.append(read_positions(obj, depsgraph, place=obj.name))
+) -> tuple[Floats | str, ...]:
+    """Where the colliders of a groom or fin are now, and which collide; but for the head: that is
+    its pose."""
+    return _places([obj for obj in sources_of(owner, head) if obj != head], depsgraph)
+
+
+def _places(
+    objects: Iterable[bpy.types.Object], depsgraph: bpy.types.Depsgraph
+) -> tuple[Floats | str, ...]:
+    """Where they are now and in which shape, and which of them count."""
+    places: list[Floats | str] = []
+    for obj in objects:
+        places += [f"{is_left_out(obj, depsgraph)}", matrix_of(obj, depsgraph)]
+        if obj.type == "MESH" and (len(obj.modifiers) or is_deforming(obj)):
+            places.append(read_positions(obj, depsgraph, place=obj.name))
     return tuple(places)
 
 
@@ -163,17 +171,6 @@ def collider_shapes(
         if obj.type == "MESH" and shape != "none":
             parts += mesh_parts(obj)
     return tuple(parts)
-
-
-def _tie_places(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> tuple[Floats | str, ...]:
-    """Where all that holds hair beside its roots is now."""
-    places: list[Floats | str] = []
-    for obj in holders_of(hair):
-        places.append(f"{obj.name} {is_left_out(obj, depsgraph)}")
-        places.append(matrix_of(obj, depsgraph))
-        if obj.type == "MESH" and is_deforming(obj):
-            places.append(read_positions(obj, depsgraph, place=obj.name))
-    return tuple(places)
 
 
 def _tie_shapes(hair: bpy.types.Object) -> tuple[Floats | Ints | str, ...]:
