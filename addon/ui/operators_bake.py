@@ -48,6 +48,8 @@ class HAIRLOOM_OT_bake(LongWork, bpy.types.Operator):
         names = ", ".join(obj.name for obj in bake.objects())
         also = "; Render > Lock Interface is on, which renders of baked hair need" if locked else ""
         count = "1 frame" if bake.frame_count == 1 else f"{bake.frame_count:,} frames"
+        if bake.unfelt:
+            report(self, "WARNING", " ".join(bake.unfelt))
         report(self, "INFO", f"Baked {count} of {names}{also}")
 
 

@@ -139,6 +139,21 @@ def test_a_bake_of_one_beside_one_that_is_baked(two):
     assert np.array_equal(played(one)[0], found)
 
 
+def test_a_bake_leaves_out_hair_that_cannot_be_used_and_says_so(two):
+    """Such as Blender's Empty Hair on the same head."""
+    one, other = two
+    other.hide_render = True
+    (expected,) = baked(one)
+    empty = bpy.data.objects.new("Nothing", bpy.data.hair_curves.new("Nothing"))
+    empty.data.surface = empty.parent = one.parent
+    bpy.context.collection.objects.link(empty)
+    plan = Bake.of([one], bpy.context.scene)
+    list(plan.steps())
+    found = contents(frames_in(Path(one.hairloom.bake.folder)))
+    assert all(found[name] == expected[name] for name in expected if name.endswith(".npz"))
+    assert any("not felt" in note and "Nothing: it has no curves" in note for note in plan.notes)
+
+
 def test_a_kilometre_apart_they_are_as_if_alone(two):
     one, other = two
     by_itself = alone(two)[0]

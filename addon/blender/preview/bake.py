@@ -122,6 +122,7 @@ class Bake:
     """A bake of some grooms and fins of the open scene, each over its own frames."""
 
     parts: list[_Part] = field(default_factory=list)
+    _bystanders: Bystanders = field(default_factory=Bystanders)
 
     @classmethod
     def of(
@@ -179,7 +180,13 @@ class Bake:
     @property
     def notes(self) -> list[str]:
         """What the artist should know about what was baked so far."""
-        return [f"{part.handle.name}: {note}" for part in self.parts for note in part.notes]
+        own = [f"{part.handle.name}: {note}" for part in self.parts for note in part.notes]
+        return own + self.unfelt
+
+    @property
+    def unfelt(self) -> list[str]:
+        """Which hair was left out, and why."""
+        return list(self._bystanders.notes.values())
 
     def objects(self) -> list[bpy.types.Object]:
         return [part.found() for part in self.parts]
@@ -208,7 +215,7 @@ class Bake:
             self._show()
 
     def _frames(self, scene: bpy.types.Scene) -> Iterator[int]:
-        bystanders = Bystanders()
+        bystanders = self._bystanders
         for done, frame in enumerate(range(self._first, self._last + 1), start=1):
             scene.frame_set(frame)
             depsgraph = bpy.context.evaluated_depsgraph_get()

@@ -8,6 +8,7 @@ import numpy as np
 from ... import motion_flow
 from ...arrays import Floats
 from ...dynamics.neighbours import Style
+from ...errors import HairloomError
 from ...rig_flow import Pose, Rig
 from ..bakes import playback
 from ..bakes.baked_rig import BakedRig
@@ -66,19 +67,26 @@ class Bystander:
 
 
 class Bystanders(dict[int, Bystander]):
-    """Those of a bake, by session number of their objects, once they may be near to it."""
+    """Those of a bake, by session number of their objects, once they may be near to it.
+
+    notes: why others are not felt, by the same numbers.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.notes: dict[int, str] = {}
 
     def join(self, sessions: list[Session], depsgraph: bpy.types.Depsgraph) -> None:
-        """All that these may feel and that are none of them.
-
-        Raises:
-            HairloomError: as `Bystander`.
-        """
+        """All that these may feel and that are none of them, but for those that cannot be used."""
         for session in sessions:
             self.pop(session.uid, None)
         for obj in near_to(sessions, depsgraph):
-            if obj.session_uid not in self:
+            if obj.session_uid in self.keys() | self.notes.keys():
+                continue
+            try:
                 self[obj.session_uid] = Bystander(obj, depsgraph)
+            except HairloomError as error:
+                self.notes[obj.session_uid] = f"not felt by hair that was baked beside it: {error}"
 
     def move(self, depsgraph: bpy.types.Depsgraph) -> None:
         """All of them to the scene's frame.
