@@ -10,9 +10,10 @@ from swinging import FRAME, swings
 from tiers import few_in_commits
 
 from hairloom.addon.blender.bakes import playback
+from hairloom.addon.blender.bakes.cache import Cache
 from hairloom.addon.blender.engine import engine_hair
 from hairloom.addon.blender.preview import previews
-from hairloom.addon.blender.preview.bake import Bake, show_in_renders
+from hairloom.addon.blender.preview.bake import Bake, free, show_in_renders
 from hairloom.addon.blender.properties.groom_settings import GroomSettings
 from hairloom.addon.blender.viewport import overlay
 from hairloom.addon.dynamics.settings import DynamicsSettings
@@ -136,6 +137,33 @@ def test_pictures_of_cards_and_whose_they_are_can_be_overridden(override, tmp_pa
     assert head.hairloom.card_object.groom == hair and head.hairloom.card_object.level == 2
     assert head.hairloom.card_object.image == bpy.data.images["Strands"]
     assert head.hairloom.collider_shape == "sphere"
+
+
+def test_an_override_plays_the_bake_of_the_library_until_it_is_baked_itself(library, tmp_path):
+    """In a file of another folder, whose path to the bake would be another one."""
+    bpy.ops.wm.open_mainfile(filepath=library)
+    hair, scene = bpy.data.objects["Hair"], bpy.context.scene
+    scene.frame_end = 2
+    list(Bake.of([hair], scene).steps())
+    assert hair.hairloom.bake.folder.startswith("//")
+    baked = playback.cache_of(hair).folder
+    bpy.ops.wm.save_mainfile()
+    (tmp_path / "shot").mkdir()
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot" / "groom.blend"))
+    scene = bpy.context.scene
+    brought(library, link=True).override_hierarchy_create(scene, bpy.context.view_layer)
+    hair = next(obj for obj in scene.objects if obj.type == "CURVES")
+    assert playback.cache_of(hair).folder == baked
+    hair = saved_and_loaded(tmp_path / "shot")
+    assert playback.cache_of(hair).folder == baked
+    bpy.context.scene.frame_end = 3
+    list(Bake.of([hair], bpy.context.scene).steps())
+    own = playback.cache_of(hair)
+    assert own.folder.is_relative_to(tmp_path / "shot") and own.facts.frame_count == 3
+    assert Cache(baked).facts.frame_count == 2
+    free(hair, bpy.context.evaluated_depsgraph_get())
+    assert not own.folder.exists() and baked.exists()
 
 
 def test_saving_leaves_the_file_of_the_library_as_it_is(override, library, tmp_path):

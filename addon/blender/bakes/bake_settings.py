@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 import bpy
 
@@ -44,11 +45,20 @@ def frame_range(first: int, last: int, place: str) -> range:
 
 def folder_of(obj: bpy.types.Object) -> Path | None:
     """The folder that the object's bake is in; None where it names none."""
-    return absolute(obj.hairloom.bake.folder, obj.library)
+    return _named(obj, lambda owner: owner.hairloom.bake.folder)
 
 
-def absolute(folder: str, library: bpy.types.Library | None) -> Path | None:
-    """A path of Blender's, which may begin with // for the folder of the file."""
+def shown_folder_of(curves: bpy.types.Curves) -> Path | None:
+    """The folder of the bake that curves show in renders; None where they show none."""
+    return _named(curves, lambda owner: owner.hairloom.baked_in)
+
+
+def _named(owner: Any, read: Callable[[Any], str]) -> Path | None:
+    """What a data-block names: a path of Blender's, which may begin with // for the folder of the
+    file. What an override has not set itself is named in the file of the library."""
+    folder, library, override = read(owner), owner.library, owner.override_library
+    if override is not None and override.reference and read(override.reference) == folder:
+        return _named(override.reference, read)
     if not folder or (folder.startswith("//") and not bpy.data.filepath and library is None):
         return None
     return Path(bpy.path.abspath(folder, library=library))

@@ -19,7 +19,7 @@ from ...arrays import Floats
 from ...errors import HairloomError
 from ...rig_flow import Pose, Solids
 from ..scene.fin_modifier import clear, fin_modifier, has_fins, show
-from .bake_settings import absolute, folder_of
+from .bake_settings import folder_of, shown_folder_of
 from .baked_rig import BakedRig, rig_of
 from .baked_solids import BakedSolids, solids_between
 from .cache import FACTS, Cache
@@ -222,7 +222,7 @@ def _show_fin(obj: bpy.types.Object, folder: Path, frame: int) -> None:
 def show_in_copies(scene: bpy.types.Scene) -> None:
     """Write the frame that the scene goes to into all curves that show a bake in renders."""
     for curves in bpy.data.hair_curves:
-        folder = absolute(curves.hairloom.baked_in, curves.library)
+        folder = shown_folder_of(curves)
         if folder is not None:
             _attempt(folder, partial(_write, curves, folder, scene))
 

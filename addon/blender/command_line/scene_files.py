@@ -21,7 +21,7 @@ from ...exchange.files.atomic import (
     unwritable,
 )
 from ...exchange.files.stale_temp_files import temporary_beside
-from ..bakes.bake_settings import absolute, folder_of
+from ..bakes.bake_settings import folder_of, shown_folder_of
 from ..base.suspension import suspended
 
 #: how compressed files begin and end, the number of their frames, and what a file's end needs
@@ -157,7 +157,7 @@ def _keep_bakes(folder: Path) -> None:
         if obj.library is None and bake is not None:
             _rename(obj.hairloom.bake, "folder", bake, folder)
     for curves in bpy.data.hair_curves:
-        bake = absolute(curves.hairloom.baked_in, curves.library)
+        bake = shown_folder_of(curves)
         if curves.library is None and bake is not None:
             _rename(curves.hairloom, "baked_in", bake, folder)
 
