@@ -519,6 +519,27 @@ def test_a_folder_with_the_bake_of_another_file_is_refused(swinging, evaluated, 
     assert Cache(tmp_path / "bake").facts.file == "shot_v2.blend"
 
 
+def test_a_renamed_groom_keeps_its_bake_where_another_gets_its_name(swinging, evaluated):
+    hair, _ = swinging
+    bake(hair)
+    folder = folder_of(hair)
+    hair.name = "Renamed"
+    other = bpy.data.objects.new("Hair", hair.data.copy())
+    bpy.context.collection.objects.link(other)
+    other.hairloom.bake.folder = str(folder.parent / "elsewhere")
+    bake(hair)
+    assert Cache(folder).facts.owner == "Renamed"
+    hair.name = "Again"
+    other.name = "Renamed"
+    free(hair, evaluated())
+    assert not folder.exists()
+    bake(other)
+    hair.hairloom.bake.folder = other.hairloom.bake.folder
+    other.hairloom.bake.folder = ""
+    with pytest.raises(HairloomError, match="holds the bake of Renamed"):
+        bake(hair)
+
+
 def test_a_duplicate_is_baked_into_a_folder_of_its_own(swinging, tmp_path):
     hair, _ = swinging
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "wig.blend"))

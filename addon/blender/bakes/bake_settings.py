@@ -115,7 +115,8 @@ def _other_owner(obj: bpy.types.Object, folder: Path) -> str:
     owner, file = owner_of(folder)
     if file and file != file_name(obj):
         return f"{owner} in {file}"
-    return owner if owner != obj.name and owner in bpy.data.objects else ""
+    is_own = owner in (obj.name, obj.hairloom.bake.owner)
+    return owner if not is_own and owner in bpy.data.objects else ""
 
 
 def file_name(obj: bpy.types.Object) -> str:

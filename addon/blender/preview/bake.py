@@ -248,6 +248,8 @@ class Bake:
             part.found().hairloom.bake.folder = part.named
         for writer in writers:
             writer.clean()
+        for part in self.parts:
+            part.found().hairloom.bake.owner = part.handle.name
 
     def _show(self) -> None:
         """Previewed grooms show the new bake, or what they showed before."""
@@ -340,6 +342,7 @@ def free(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> None:
     folder = folder_of(obj)
     if folder is not None and is_own(obj, folder):
         delete(folder)
+        obj.hairloom.bake.owner = ""
     else:
         obj.hairloom.bake.folder = ""
     if obj.type == "CURVES":

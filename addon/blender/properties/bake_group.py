@@ -68,6 +68,12 @@ class HAIRLOOM_PG_bake(bpy.types.PropertyGroup):
         default=True,
         override=OVERRIDABLE,
     )
+    owner: StringProperty(
+        name="Owner",
+        description="Name that the object had when it was baked",
+        options={"HIDDEN"},
+        override=OVERRIDABLE,
+    )
     copy: PointerProperty(
         type=bpy.types.Object,
         name="Copy in Renders",
