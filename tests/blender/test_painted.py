@@ -12,10 +12,13 @@ from hairloom.addon.blender.bakes.groom_hashes import groom_rig_hash
 from hairloom.addon.blender.bakes.simulated import differences
 from hairloom.addon.blender.base.vertex_weights import Memberships, read_weights
 from hairloom.addon.blender.preview import previews, scene_events
+from hairloom.addon.blender.preview.bake import Bake
+from hairloom.addon.blender.preview.preview import rig_for
 from hairloom.addon.blender.properties import presets
 from hairloom.addon.blender.properties.groom_settings import GroomSettings
 from hairloom.addon.blender.properties.properties import masks_of_groom
 from hairloom.addon.blender.scene.curves import read_curves
+from hairloom.addon.blender.sessions.session import Session
 from hairloom.addon.blender.viewport import motion_lines, overlay
 
 #: how far [m] from the border between the halves is far enough: the sphere's faces are coarse
@@ -153,6 +156,7 @@ def test_a_map_that_breaks_stays_as_it_was_last(hair: Any, sphere: Any, evaluate
     catch_up(evaluated)
     (warning,) = session.warnings
     assert warning.startswith("Head: ") and "'Top'" in warning and "as it was last" in warning
+    assert ".." not in warning
     np.testing.assert_array_equal(factors(session)["gravity"], before)
     dynamics.gravity_mask = "Gone"
     catch_up(evaluated)
@@ -187,6 +191,22 @@ def test_an_image_is_read_again_once_it_is_painted(hair: Any, sphere: Any, evalu
     bpy.context.view_layer.update()
     assert session.is_stale
     catch_up(evaluated)
+    np.testing.assert_allclose(factors(session)["volume"], 0.25, atol=2e-3)
+
+
+def test_an_image_is_read_again_by_a_preview_that_has_the_hair_of_its_bake(
+    hair: Any, sphere: Any, evaluated: Any, tmp_path: Any
+) -> None:
+    paint("image", hair, sphere)
+    hair.hairloom.dynamics.volume_mask = "Top"
+    hair.hairloom.bake.folder, bpy.context.scene.frame_end = str(tmp_path / "bake"), 1
+    list(Bake.of([hair], bpy.context.scene).steps())
+    baked = rig_for(hair, bpy.context.scene)
+    session = Session(hair, evaluated(), baked=baked)
+    assert baked is not None and session.warnings == ()
+    bpy.data.images["Top"].pixels.foreach_set(np.full(64 * 4 * 4, 0.25, np.float32))
+    session.read_again(evaluated())
+    assert session.warnings == ()
     np.testing.assert_allclose(factors(session)["volume"], 0.25, atol=2e-3)
 
 

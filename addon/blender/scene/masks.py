@@ -119,7 +119,7 @@ class Canvas:
             known = self.good.get(name)
             if known is None or not self._fits(known):
                 return None, str(error)
-            return known, f"{error}. Until then it is used as it was last"
+            return known, f"{error} Until then it is used as it was last"
         self.good[name] = mask
         return mask, ""
 

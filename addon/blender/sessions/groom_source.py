@@ -19,7 +19,7 @@ from ...paint_flow import painted_guides
 from ...rig_flow import Pose, Rig
 from ...shading.ambient_settings import AmbientSettings
 from ...shading.settings import ShadingSettings
-from ...strands import StrandSet
+from ...strands import StrandSet, Surface
 from ...strands.affine import moved
 from ...strands.clean import Cleaned
 from ...strands.kept import Kept
@@ -142,12 +142,13 @@ class GroomSource:
         lines = self.source.partings
         if lines is not None:
             lines = moved(lines.reshape(-1, 3), back).reshape(-1, 2, 3)
-        head = baked.rig.head
+        rig = _with_uv(baked.rig, self.source.head)
+        head = rig.head
         self.source = replace(self.source, strands=strands, head=head, partings=lines)
         self.hair.rest = baked.rests.hair
         if self.head is not None and baked.rests.head is not None:
             self.head.rest = baked.rests.head
-        return baked.rig
+        return rig
 
     def has_another_head(self) -> bool:
         """Whether the artist has set another surface since."""
@@ -369,6 +370,15 @@ class GroomSource:
         hair = self.hair.found()
         head = None if self.head is None else self.head.found()
         return groom_frame_hash(hair, head, pose, depsgraph)
+
+
+def _with_uv(rig: Rig, read: Surface | None) -> Rig:
+    """The rig of a bake, which has none, with the UVs of its head as it was read: images lie on
+    them."""
+    head = rig.head
+    if head is None or read is None or not np.array_equal(head.triangles, read.triangles):
+        return rig
+    return replace(rig, head=replace(head, corner_uv=read.corner_uv))
 
 
 def shown_map_name(hair: bpy.types.Object) -> str:
