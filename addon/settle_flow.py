@@ -13,6 +13,7 @@ import numpy as np
 from . import motion_flow
 from .arrays import Bools, Floats
 from .dynamics.colliders import DistanceField, PosedCollider
+from .dynamics.painted import PaintedGuides
 from .dynamics.settings import DynamicsSettings
 from .dynamics.settle_settings import SettleSettings
 from .groom.settings import GuideSettings
@@ -48,6 +49,7 @@ def settle(
     own: DynamicsSettings,
     settings: SettleSettings,
     gravity: Floats,
+    painted: PaintedGuides | None = None,
 ) -> Generator[float, None, Floats]:
     """All strands after they have fallen, (point_count, 3) [m]; yields the fraction of the time.
 
@@ -55,12 +57,14 @@ def settle(
         pose, colliders: at rest, where they stay.
         own: the hair's dynamics.
         gravity: (3,) [m/s^2], world space.
+        painted: by what its dynamics are multiplied at each guide; all of the motion is seen.
     """
     falling = settings.falling(own)
     still = _STILL * float(np.median(rig.rest_lengths))
     motion = motion_flow.begin(rig, pose)
     frame_count = round(settings.seconds / _FRAME)
-    frame = FrameInput(pose, colliders, falling, gravity, _FRAME)
+    seen = None if painted is None else painted.all_seen()
+    frame = FrameInput(pose, colliders, falling, gravity, _FRAME, painted=seen)
     for number in range(frame_count):
         before = motion.guides
         motion = motion_flow.advance(rig, motion, frame)

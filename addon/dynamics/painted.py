@@ -17,6 +17,9 @@ from .forces import Damped
 from .settings import DynamicsSettings
 from .style import StyleBand, painted_band
 
+#: By what is painted of these, less is seen of the motion.
+_SEEN = frozenset({"simulated", "only_selected"})
+
 
 @dataclass(frozen=True, eq=False)
 class PaintedGuides:
@@ -36,7 +39,11 @@ class PaintedGuides:
     @property
     def is_of_motion(self) -> bool:
         """Whether any is painted but what is seen of the motion."""
-        return bool(self.factors.keys() - {"simulated", "only_selected"})
+        return bool(self.factors.keys() - _SEEN)
+
+    def all_seen(self) -> PaintedGuides:
+        """The same where all of the motion is seen."""
+        return PaintedGuides({of: each for of, each in self.factors.items() if of not in _SEEN})
 
     def fits(self, cv_count: int, guide_count: int) -> bool:
         return all(

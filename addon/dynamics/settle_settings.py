@@ -43,7 +43,11 @@ class SettleSettings(Settings):
         held = dict.fromkeys(("style_root", "style_tip", "bend"), self.stiffness)
         return replace(
             own.multiplied(**held),
+            simulated=1.0,
+            only_selected=False,
             sag_compensation=0.0,
+            buoyancy=0.0,
+            drag=0.0,
             wind_speed=0.0,
             damping=max(own.damping, _DAMPING),
         )

@@ -59,6 +59,26 @@ def test_hair_without_stiffness_hangs_straight_down_from_its_roots(new_hair, sph
     assert np.abs(hanging[:, :2]).max() < 0.03
 
 
+def test_hair_falls_by_its_whole_weight_whatever_is_seen_of_its_motion_and_under_water(
+    new_hair, sphere
+):
+    """And not where its gravity is painted 0."""
+    found = []
+    for values in ({}, {"simulated": 0.0, "buoyancy": 1.0, "drag": 5.0, "simulated_mask": "Few"}):
+        hair = new_hair(sphere, lying())
+        few = hair.data.attributes.new("Few", "FLOAT", "CURVE")
+        few.data.foreach_set("value", [0.0, 0.0, 1.0, 1.0, 1.0])
+        hair.hairloom.dynamics.gravity_mask = "Few"
+        for name, value in values.items():
+            setattr(hair.hairloom.dynamics, name, value)
+        settle(stiffness=0.0, seconds=1.0)
+        found.append(curve_points(hair.data).reshape(5, 12, 3))
+        bpy.data.objects.remove(hair)
+    np.testing.assert_array_equal(*found)
+    tips = found[0][:, -1, 2]
+    assert np.abs(tips[:2]).max() < 1e-4 and tips[2:].max() < -0.2
+
+
 @pytest.mark.slow
 def test_stiffness_holds_hair_up(new_hair, sphere):
     tips = []
