@@ -285,6 +285,22 @@ def test_the_head_is_followed_at_its_roots_where_the_body_bends(scene):
     assert by_all.swelling > 0.05
 
 
+def test_a_look_at_colliders_between_two_frames_changes_no_motion(scene):
+    """Such as that of an overlay, once the body has bent."""
+    body, pose = long_body()
+    scene.add(body)
+    found = [scene.obstacles(), scene.obstacles()]
+    swellings = []
+    for angle in (0.2, 0.4, 0.4):
+        pose(Matrix.Rotation(angle, 4, "X"))
+        found[0].standing(depsgraph())
+        (looked,), (alone,) = map(moved, found)
+        np.testing.assert_array_equal(looked.matrix_now, alone.matrix_now)
+        assert looked.swelling == alone.swelling
+        swellings.append(alone.swelling)
+    assert min(swellings[:2]) > 0.01 and swellings[2] == 0.0
+
+
 # --- what is used again
 
 

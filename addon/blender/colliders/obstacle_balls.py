@@ -44,7 +44,6 @@ class BallsPart:
     rest: Floats
     track: Track = field(default_factory=Track)
     warnings: dict[str, str] = field(default_factory=dict)
-    swelling: float = 0.0
     _set: SphereSetCollider | None = None
     _members: tuple[int, ...] = ()
 
@@ -78,6 +77,9 @@ class BallsPart:
         centers = moved(now[::4].astype(np.float32), np.linalg.inv(matrix))
         radii = radius * size / mean_scale(matrix)
         return self._set_of(centers, radii, tuple(chosen)), matrix
+
+    def swollen(self) -> float:
+        return 0.0
 
     def _found(self, depsgraph: bpy.types.Depsgraph) -> tuple[list[int], list[Floats]]:
         """The balls that exist, by index, and their matrices."""

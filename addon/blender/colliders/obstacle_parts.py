@@ -39,13 +39,11 @@ class Part(Protocol):
     name: of the object that it is made of, or of one of them.
     uid: the object's session number, or None where it is made of several.
     track: where it was in the last two frames.
-    swelling: how far its shape has changed since it was last seen, see `PosedCollider`.
     warnings: object -> what the artist should know since it was last seen.
     """
 
     track: Track
     warnings: dict[str, str]
-    swelling: float
 
     @property
     def name(self) -> str: ...
@@ -54,11 +52,15 @@ class Part(Protocol):
     def uid(self) -> int | None: ...
 
     def now(self, depsgraph: bpy.types.Depsgraph) -> tuple[Collider, Floats]:
-        """The collider, and its matrix (4, 4) to world space.
+        """The collider, and its matrix (4, 4) to world space. Looking at it changes no motion.
 
         Raises:
             HairloomError: it is gone, or it is another mesh.
         """
+
+    def swollen(self) -> float:
+        """How far the shape that was seen last has changed since this was asked before, see
+        `PosedCollider`."""
 
 
 @dataclass
@@ -90,13 +92,20 @@ class Track:
         return posed
 
 
+@dataclass(frozen=True, eq=False)
+class _Seen:
+    """shape: (vertex_count, 3) [m], of a mesh in its own space. scale: of that space."""
+
+    shape: Floats
+    scale: float
+
+
 @dataclass
 class FieldPart:
     """A mesh, as its signed distance in world space with the mesh at rest.
 
     surface: world space at rest; its field takes a second to build. Where the mesh has another
     shape, the field is made again around what has moved, which takes some hundredths of a second.
-    swelling: see `PosedCollider`.
     """
 
     carrier: Carrier
@@ -105,8 +114,8 @@ class FieldPart:
     resolution: int
     track: Track = field(default_factory=Track)
     warnings: dict[str, str] = field(default_factory=dict)
-    swelling: float = 0.0
-    _shape: Floats | None = None
+    _seen: _Seen | None = None
+    _before: Floats | None = None
     _bent: BentField | None = None
     _at: tuple[Floats, DistanceField] | None = None
 
@@ -129,19 +138,23 @@ class FieldPart:
     def now(self, depsgraph: bpy.types.Depsgraph) -> tuple[Collider, Floats]:
         matrix, shape = _solid(self.carrier.moved(depsgraph), self.name), self.carrier.shape
         if shape is None:
-            self.swelling, self._shape = 0.0, None
+            self._seen = None
             return self.distance, matrix
         local = moved(shape, np.linalg.inv(matrix)).astype(np.float32)
-        before = self.surface.positions if self._shape is None else self._shape
-        path = (local - before)[self._near]
-        self.swelling = float(np.sqrt(np.einsum("ij,ij->i", path, path).max(initial=0.0)))
-        self.swelling *= mean_scale(matrix)
-        self._shape = local
+        self._seen = _Seen(local, mean_scale(matrix))
         if self._bent is None:
             self._bent = BentField(self.distance, self.surface)
         if self._at is None or not np.array_equal(self._at[0], local):
             self._at = local, self._bent.at(local)
         return self._at[1], matrix
+
+    def swollen(self) -> float:
+        before, seen = self._before, self._seen
+        self._before = None if seen is None else seen.shape
+        if seen is None:
+            return 0.0
+        path = (seen.shape - (self.surface.positions if before is None else before))[self._near]
+        return float(np.sqrt(np.einsum("ij,ij->i", path, path).max(initial=0.0))) * seen.scale
 
     def take_bent(self, other: FieldPart) -> None:
         """Go on with the last shape of a part that was made from the same mesh."""
@@ -182,7 +195,6 @@ class ShapePart:
     base: Floats
     track: Track = field(default_factory=Track)
     warnings: dict[str, str] = field(default_factory=dict)
-    swelling: float = 0.0
 
     @property
     def name(self) -> str:
@@ -194,6 +206,9 @@ class ShapePart:
 
     def now(self, depsgraph: bpy.types.Depsgraph) -> tuple[Collider, Floats]:
         return self.shape, _solid(self.carrier.moved(depsgraph), self.name) @ self.base
+
+    def swollen(self) -> float:
+        return 0.0
 
 
 def _solid(matrix: Floats, name: str) -> Floats:

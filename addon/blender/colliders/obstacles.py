@@ -117,7 +117,7 @@ class Obstacles:
         for part in self._there(depsgraph):
             try:
                 collider, matrix = part.now(depsgraph)
-                posed.append(part.track.go(collider, matrix, duration, part.swelling))
+                posed.append(part.track.go(collider, matrix, duration, part.swollen()))
             except HairloomError as error:
                 self._fail(part, error)
         return tuple(posed)
@@ -134,6 +134,7 @@ class Obstacles:
                 collider, matrix = part.now(depsgraph)
                 posed.append(PosedCollider(collider, matrix, matrix))
                 part.track.rest(matrix)
+                part.swollen()
             except HairloomError as error:
                 self._fail(part, error)
         return tuple(posed)
