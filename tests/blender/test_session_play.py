@@ -46,6 +46,20 @@ def test_playing_hair_lags_behind_and_returns_when_stopped(preview, evaluated):
     assert drawn(session) == pytest.approx(carried, abs=2e-6)
 
 
+def test_a_head_that_stands_still_is_the_same_one_in_the_next_frame(preview, evaluated):
+    """So that nothing is found or uploaded of it again."""
+    _, head, session = preview
+    previews.play(evaluated())
+    heads = []
+    for place in (0.0, 0.0, 0.1):
+        head.location.x = place
+        play(evaluated, 1)
+        heads += session.snapshot.casters
+    assert heads[0] is heads[1] and heads[1] is not heads[2]
+    moved = heads[2].positions - heads[1].positions
+    np.testing.assert_allclose(moved - [0.1, 0.0, 0.0], 0.0, atol=1e-6)
+
+
 def test_without_motion_gravity_alone_pulls_unheld_hair_down(preview, evaluated):
     hair, _, session = preview
     at_rest = drawn(session)

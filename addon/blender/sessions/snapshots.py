@@ -217,7 +217,7 @@ class GroomPicture:
         known = None if self._groom is None else self._groom.occluders
         if known is not None and settings[DetailSettings].culling == "hidden":
             spheres = known.at(pose)
-        self.head = _head(rig, pose)
+        self.head = _head(rig, pose, self.head)
         is_shadowed = settings[VolumeSettings].shadows != "none"
         self.snapshot = replace(
             solver.shown(self.snapshot),
@@ -232,8 +232,15 @@ def _with_color(rig: Rig, color: Floats | None) -> Rig:
     return rig if strands.color is color else replace(rig, strands=replace(strands, color=color))
 
 
-def _head(rig: Rig, pose: Pose) -> Surface | None:
-    """As it is posed, world space."""
+def _head(rig: Rig, pose: Pose, known: Surface | None) -> Surface | None:
+    """As it is posed, world space; the known one where that stands still, so that nothing is found
+    or uploaded of it again."""
     if rig.head is None or pose.head_positions is None:
         return None
+    if (
+        known is not None
+        and known.triangles is rig.head.triangles
+        and np.array_equal(known.positions, pose.head_positions)
+    ):
+        return known
     return Surface(pose.head_positions, rig.head.triangles)
