@@ -224,6 +224,22 @@ def test_tips_on_a_mesh_follow_its_deformation(swinging, evaluated):
     assert np.abs(after[:, 0] - before[:, 0]).max() < 1e-6
 
 
+def test_a_renamed_mesh_holds_the_same_tips(swinging, evaluated):
+    """Also where it is read again while its head is in another pose than at rest."""
+    hair, _ = swinging
+    bpy.ops.mesh.primitive_uv_sphere_add(radius=0.18, segments=24, ring_count=12)
+    bun = bpy.context.object
+    hair.hairloom.tip_surface = bun
+    hair.data.hairloom.guides.tip_distance = 0.1
+    session = previews.start(hair, evaluated())
+    held = session.rig.holds
+    bun.location.z += 0.5
+    bun.name = "Knot"
+    bpy.context.view_layer.update()
+    session.read_again(evaluated())
+    assert session.rig.holds is held
+
+
 def test_tips_are_held_where_a_vertex_group_says(swinging, evaluated):
     """Where it is one half between vertices, so within one of them; a bake knows it, and a message
     names one that is missing."""

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 import bpy
 import numpy as np
 
-from ...arrays import Floats
+from ...arrays import Floats, are_same
 from ...dynamics.fitting.similarity import fit_similarity
 from ...errors import HairloomError
 from ...groom.holds import Holds, anchors_of
@@ -122,9 +122,9 @@ class Holding:
             tips = _read_tips(hair, depsgraph, back)
         except HairloomError as error:
             unusable.append(str(error))
-        if tips is not None and known is not None:
-            tips = _same_surface(tips, known.holders.tip_surface)
         surface = hair.hairloom.tip_surface
+        if tips is not None and known is not None and known._holds_tips_by(surface):
+            tips = _same_surface(tips, known.holders.tip_surface)
         return cls(
             Holders(tuple(one.tie for one in found), tips),
             tuple(found),
@@ -132,6 +132,9 @@ class Holding:
             tuple(unusable),
             {obj.session_uid: _drawn_as(obj) for obj in holders_of(hair)},
         )
+
+    def _holds_tips_by(self, surface: bpy.types.Object) -> bool:
+        return self._tips is not None and self._tips.uid == surface.session_uid
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -385,12 +388,15 @@ def _again(read: _TrackedTie, known: Holding | None) -> _TrackedTie:
 
 
 def _same_surface(read: TipSurface, known: TipSurface | None) -> TipSurface:
-    """The one of before for the same mesh: it may be in another pose now."""
-    if known is None or known.name != read.name:
+    """The one of before for the same triangles: it may be in another pose now."""
+    if known is None:
         return read
     one, other = read.surface.triangles, known.surface.triangles
     is_same = one.shape == other.shape and bool((one == other).all())
-    return replace(known, weight=read.weight) if is_same else read
+    if not is_same:
+        return read
+    is_as_weighted = are_same(read.weight, known.weight)
+    return known if is_as_weighted else replace(known, weight=read.weight)
 
 
 def _disabled(name: str) -> HairloomError:
