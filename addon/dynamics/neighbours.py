@@ -102,8 +102,9 @@ def hair_of(guides: Floats, strands: Floats) -> Floats:
 class KnownHair:
     """What a groom knows of others since its motion began.
 
-    rest: of the groom. at_rest: of each other, by its number, what its style was made from and the
-        CVs of this near the groom's, where both are at rest; None: there are none.
+    rest: of the groom, another one in each frame where its style is animated. at_rest: of each
+        other, by its number, what its style was made from and the CVs of this near the groom's,
+        where both are at rest; None: there are none.
     grid: of the groom among those that are near now. among: their numbers, as far as they are near
         at rest.
     """
@@ -120,7 +121,7 @@ class KnownHair:
             rest, style: see `Stop`.
             others: those that are near, by numbers that stay the same.
         """
-        known = dict(self.at_rest) if rest is self.rest else {}
+        known = dict(self.at_rest)
         fresh = [
             number
             for number, other in others.items()

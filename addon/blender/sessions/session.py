@@ -706,7 +706,7 @@ class Session:
         self._go_by(baked.styled(frame))
         pose = replace(baked.pose(frame), solids=solids)
         self.solver.carry(pose, frame["guides"], led_in(frame))
-        self._is_recorded = True
+        self._is_recorded, self.known_hair = True, KnownHair()
         self._show()
 
     def _show(self) -> None:

@@ -222,6 +222,20 @@ def test_neighbours_counts_for_the_strands_it_stands_for():
     np.testing.assert_allclose(found, found[0], rtol=0.1)
 
 
+def test_an_animated_style_does_not_forget_how_others_were_combed():
+    """Its grid is that of the new style, with the others as they were first met."""
+    one, other = tail(200), tail(200, seed=2)
+    places = iter([other, other + np.float32([0.01, 0.0, 0.0])])
+    style = Style(lambda: next(places), hair_of(other, np.ones(200)), other)
+    first = KnownHair().meeting(start(one).rest, one, {1: style})
+    bent = one * np.float32([1.1, 1.0, 1.0])
+    second = first.meeting(start(bent).rest, bent, {1: style})
+    assert second.at_rest[1][1] is first.at_rest[1][1]
+    expected = KnownHair().meeting(start(bent).rest, one, {1: replace(style, read=lambda: other)})
+    np.testing.assert_allclose(second.grid.density, expected.grid.density, rtol=0.02)
+    assert np.abs(second.grid.density - first.grid.density).max() > 0.1
+
+
 def test_what_is_known_of_others_is_kept():
     """While nobody comes, goes or is edited, the grid is the same one."""
     grooms = [Groom(tail(60), FULL), Groom(tail(60, seed=2), FULL)]
