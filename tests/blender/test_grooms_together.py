@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 from bake_files import contents, frames_in
 
+from hairloom.addon.blender.bakes import playback
+from hairloom.addon.blender.bakes.stale_bakes import changed_since
 from hairloom.addon.blender.preview import previews
 from hairloom.addon.blender.preview.bake import Bake
 from hairloom.addon.blender.preview.diagnostics import unfelt_note
@@ -234,6 +236,36 @@ def test_a_bake_is_out_of_date_once_other_hair_has_changed(two):
     other.data.position_data[7].vector.x += 0.02
     previewed(*two)
     assert previews.bake_of(one).changed == ()
+
+
+def test_a_bake_is_out_of_date_by_what_moves_other_hair_in_its_frame(two):
+    """Not by keyframes on its settings in frames that have them, nor by its name."""
+    one, other = two
+    scene = bpy.context.scene
+    scene.frame_end = 3
+    own_head = other.parent.copy()
+    scene.collection.objects.link(own_head)
+    other.data.surface = other.parent = own_head
+    for frame, damping in ((1, 0.5), (3, 6.0)):
+        other.hairloom.dynamics.damping = damping
+        other.keyframe_insert("hairloom.dynamics.damping", frame=frame)
+    baked(*two)
+    cache = playback.cache_of(one)
+
+    def changed(frame):
+        scene.frame_set(frame)
+        return changed_since(one, cache, bpy.context.evaluated_depsgraph_get())
+
+    assert [changed(frame) for frame in (1, 2, 3)] == [()] * 3
+    other.name = "A beard"
+    assert changed(2) == ()
+    own_head.delta_location.x = 0.01
+    assert changed(2) == ("other grooms",)
+    own_head.delta_location.x = 0.0
+    assert changed(2) == ()
+    other.animation_data.action = None
+    other.hairloom.dynamics.damping = 0.7
+    assert changed(2) == ("other grooms",)
 
 
 def test_the_panel_names_hair_that_only_a_bake_would_feel(two):

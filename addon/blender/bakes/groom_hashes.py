@@ -21,7 +21,7 @@ from ...groom.width_settings import WidthSettings
 from ...rig_flow import Pose
 from ...wet_flow import heavier
 from ..base.attributes import read_attribute
-from ..base.objects import matrix_of
+from ..base.objects import head_of, matrix_of
 from ..base.vertex_weights import painted_attribute, weight_names, weights_on
 from ..colliders.carriers import is_deforming, is_left_out
 from ..colliders.obstacles import shape_of, sources_of
@@ -48,11 +48,8 @@ def groom_rig_hash(
     """Named hashes, see `simulated.hashes`; messages say by these names what has changed."""
     grown: dict[str, tuple[Hashed, ...]] = {}
     if settings[ChildrenSettings].method != "none":
-        children = settings[ChildrenSettings]
-        if hair.data.animation_data is not None:  # water may be keyed, and no frame grows others
-            children = settings_of(hair.data.hairloom.children, ChildrenSettings)
         grown["children"] = (
-            children,
+            _children(hair, settings),
             *_paint(hair, head, settings.children_density),
             *_paint(hair, head, *mask_names(settings[ChildrenSettings]).values()),
         )
@@ -65,9 +62,9 @@ def groom_rig_hash(
     dynamics = settings[DynamicsSettings]
     if dynamics.animated_style:
         grown["style"] = ("animated",)
-    others = _other_grooms(hair, scene) if dynamics.volume > 0.0 else ()
+    others = _other_grooms(hair, scene) if dynamics.volume > 0.0 else []
     if others:
-        grown["other_grooms"] = others
+        grown["other_grooms"] = tuple(sorted(map(_shape_of_groom, others)))
     painted = [name for name in mask_names(dynamics).values() if name != SELECTION]
     if painted:
         grown["paint"] = _paint(hair, head, *painted)
@@ -97,6 +94,8 @@ def groom_frame_hash(
     ties = _places(holders_of(hair), depsgraph)
     style = _style(hair, depsgraph)
     settings = _dynamics(hair)
+    others = _other_grooms(hair, depsgraph.scene) if settings.volume > 0.0 else []
+    places = sorted(_place_of_groom(other, head, depsgraph) for other in others)
     selection = _paint(hair, None, SELECTION) if settings.only_selected else ()
     return hashes(
         pose=pose.matrix if pose.head_positions is None else pose.head_positions,
@@ -105,20 +104,43 @@ def groom_frame_hash(
         **({"ties": ties} if ties else {}),
         **({"style": style} if style else {}),
         **({"selection": selection} if selection else {}),
+        **({"other_grooms": tuple(places)} if places else {}),
         forces=(gravity_of(depsgraph.scene), force_fields_of(hair, depsgraph)[0].table),
     )
 
 
-def _other_grooms(hair: bpy.types.Object, scene: bpy.types.Scene) -> tuple[Hashed, ...]:
-    """The grooms that this one may feel, wherever they are."""
-    parts: list[Hashed] = []
-    for other in sorted(scene.objects, key=lambda obj: obj.name):
-        is_groom = other.type == "CURVES" and not other.data.hairloom.baked_in
-        if is_groom and other != hair and not other.hide_render:
-            settings = GroomSettings.of(other)
-            parts += [other.name, settings[GuideSettings], settings[ChildrenSettings]]
-            parts += [_dynamics(other), *_curves_parts(other)]
-    return tuple(parts)
+def _other_grooms(hair: bpy.types.Object, scene: bpy.types.Scene) -> list[bpy.types.Object]:
+    """Those that this one may feel, wherever they are."""
+    grooms = (each for each in scene.objects if each.type == "CURVES" and each != hair)
+    return [each for each in grooms if not (each.data.hairloom.baked_in or each.hide_render)]
+
+
+def _shape_of_groom(other: bpy.types.Object) -> str:
+    """What another groom is made from."""
+    settings = GroomSettings.of(other)
+    made = settings[GuideSettings], _children(other, settings), *_curves_parts(other)
+    return hashes(groom=made)
+
+
+def _place_of_groom(
+    other: bpy.types.Object, known: bpy.types.Object | None, depsgraph: bpy.types.Depsgraph
+) -> str:
+    """What drives another groom in the scene's frame, but for its colliders and forces.
+
+    Args:
+        known: a head that is hashed already.
+    """
+    head = head_of(other)
+    body = () if head is None or head == known else _places([head], depsgraph)
+    style = _style(other, depsgraph)
+    return hashes(groom=(_dynamics(other), matrix_of(other, depsgraph), *body, *style))
+
+
+def _children(hair: bpy.types.Object, settings: GroomSettings) -> ChildrenSettings:
+    """As they are grown, but for keyed water: no frame grows others."""
+    if hair.data.animation_data is None:
+        return settings[ChildrenSettings]
+    return settings_of(hair.data.hairloom.children, ChildrenSettings)
 
 
 def _style(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> tuple[Floats | Ints, ...]:
