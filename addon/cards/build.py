@@ -151,7 +151,8 @@ def card_steps(
     error = None
     if settings.source == "clusters":
         error = settings.error * float(np.median(groom.strands.lengths()))
-    levels = card_levels(cards, settings, error)
+    levels = card_levels(cards, settings, error, None if kept is None else kept.numbers)
+    made = made.joined(levels[0].owner)
     meshes, errors = zip(*((level.mesh, level.error) for level in levels), strict=True)
     meshes = tuple(on_skin(mesh, groom.head, usual) for mesh in meshes)
     meshes = tuple(above_skin(mesh, groom.head, usual) for mesh in meshes)

@@ -47,7 +47,8 @@ class MadeCards:
     places: (card_count, 5, 3) float32 [m] of each: its middle at `STATIONS`, and its edge halfway.
     tile: (card_count,) int32 that each showed. grid: of the atlas.
     marks: (card_count,) int32 prints, see `prints`, or NO_PRINT, or UNPRINTED.
-    stands: (card_count,) int32 the card that stands for each: itself, or an edited one.
+    stands: (card_count,) int32 the card that stands for each: itself, an edited one, or the one
+        that it was joined with.
     triangle: (card_count,) int32 of the head under the root; corners: (card_count, 3, 3) of it [m].
     triangle_count: of the head; 0 without one.
     """
@@ -90,6 +91,16 @@ class MadeCards:
             corners,
             triangle_count,
         )
+
+    def joined(self, owner: Ints) -> MadeCards:
+        """Where some cards were joined with others in the mesh.
+
+        Args:
+            owner: (card_count or more,) the card in the mesh that stands for each.
+        """
+        is_gone = owner[: len(self)] != np.arange(len(self))
+        marks = np.where(is_gone, NO_PRINT, self.marks).astype(np.int32)
+        return replace(self, marks=marks, stands=owner[self.stands])
 
     def moved(self, matrix: Floats) -> MadeCards:
         """The same in another space, by an affine (4, 4) matrix."""

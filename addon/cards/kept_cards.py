@@ -56,9 +56,14 @@ class KeptCards:
     counts: EditCounts
     notes: tuple[str, ...]
 
+    @property
+    def numbers(self) -> Ints:
+        """Of the kept cards."""
+        return np.unique(self.mesh.card)
+
     def put_into(self, mesh: CardMesh) -> CardMesh:
         """The finest level with the kept cards as they are."""
-        is_made = ~np.isin(mesh.card, np.unique(self.mesh.card))
+        is_made = ~np.isin(mesh.card, self.numbers)
         rest = replace(mesh, triangles=mesh.triangles[is_made], card=mesh.card[is_made])
         rest, _ = rest.without_loose(rest.triangles)
         both = joined([rest, self.mesh]) if len(rest.triangles) else self._alone(mesh)

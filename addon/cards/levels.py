@@ -8,7 +8,7 @@ levels show the same tiles of the same atlas, and a card keeps its number.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -34,10 +34,12 @@ class CardLevel:
     """One level of detail.
 
     error: nine tenths of the places on the edges of all cards are so near to this level's [m].
+    owner: (card_count,) the card in it that stands for each; empty for shells.
     """
 
     mesh: CardMesh
     error: float
+    owner: Ints = field(default_factory=lambda: np.zeros(0, np.int32))
 
 
 @dataclass(frozen=True)
@@ -67,15 +69,16 @@ class _Cut:
 
 
 def card_levels(
-    cards: UncutCards, settings: CardSettings, error: float | None
+    cards: UncutCards, settings: CardSettings, error: float | None, kept: Ints | None = None
 ) -> tuple[CardLevel, ...]:
     """The levels, finest first: as many as the settings ask for, or fewer where so few triangles
     are left that they cannot be halved.
 
     Args:
         error: that the rows of the finest level are allowed [m]; None keeps as many as there are.
+        kept: cards that the finest level joins with no others.
     """
-    cuts = [_within(_finest(cards, settings, error), cards.group, settings)]
+    cuts = [_within(_finest(cards, settings, error), cards.group, settings, kept)]
     while cuts[-1].triangle_count and len(cuts) < settings.levels:
         half = cuts[-1].triangle_count / 2.0
         coarser = _coarser(cuts[-1], cards.group, settings.segment_count, half)
@@ -83,7 +86,8 @@ def card_levels(
             break
         cuts.append(coarser)
     return tuple(
-        CardLevel(_mesh(cut, cards, settings), _silhouette_error(cut, cards.strips)) for cut in cuts
+        CardLevel(_mesh(cut, cards, settings), _silhouette_error(cut, cards.strips), cut.owner)
+        for cut in cuts
     )
 
 
@@ -103,26 +107,26 @@ def _finest(cards: UncutCards, settings: CardSettings, error: float | None) -> _
     return _Cut(strips, count, numbers, segments, errors, columns, allowed, max_allowed)
 
 
-def _within(cut: _Cut, group: Ints, settings: CardSettings) -> _Cut:
+def _within(cut: _Cut, group: Ints, settings: CardSettings, kept: Ints | None) -> _Cut:
     """No more triangles than the settings allow, as far as cards can be joined."""
     budget = settings.max_triangles
     while budget and cut.triangle_count > budget:
         target = max(float(budget), cut.triangle_count / 2.0)
-        coarser = _coarser(cut, group, settings.segment_count, target)
+        coarser = _coarser(cut, group, settings.segment_count, target, kept)
         if coarser.triangle_count == cut.triangle_count:
             break
         cut = coarser
     return cut
 
 
-def _coarser(cut: _Cut, group: Ints, most: int, half: float) -> _Cut:
+def _coarser(cut: _Cut, group: Ints, most: int, half: float, kept: Ints | None = None) -> _Cut:
     """No more than these triangles, half of what there are or more, or as near as may be."""
     allowed = min(2.0 * cut.error, cut.max_error)
     if _fewer_rows(cut, allowed, most).triangle_count > half and cut.columns > 1:
         cut = replace(cut, columns=(cut.columns + 1) // 2)
     least = _fewer_rows(cut, allowed, most)
     if least.triangle_count > half:
-        cut = _fewer_cards(cut, least.segments, half, group, most)
+        cut = _fewer_cards(cut, least.segments, half, group, most, kept)
         least = _fewer_rows(cut, allowed, most)
     halved = _halved(cut, half, allowed, most)
     if halved.triangle_count > half:  # no other way is left
@@ -148,7 +152,9 @@ def _fewer_rows(cut: _Cut, error: float, most: int) -> _Cut:
     return replace(cut, segments=np.minimum(cut.segments, enough))
 
 
-def _fewer_cards(cut: _Cut, segments: Ints, half: float, group: Ints, most: int) -> _Cut:
+def _fewer_cards(
+    cut: _Cut, segments: Ints, half: float, group: Ints, most: int, kept: Ints | None
+) -> _Cut:
     """Cards are joined until no more triangles than `half` are left, if cards have these segments.
 
     Where one round of pairs does not do, there is another.
@@ -156,7 +162,8 @@ def _fewer_cards(cut: _Cut, segments: Ints, half: float, group: Ints, most: int)
     while True:
         there = np.flatnonzero(cut.segments)
         over = segments[there].sum() - half / (2.0 * cut.columns)
-        pairs = pairs_to_join(cut.strips, cut.strand_count, group, there)
+        free = there if kept is None else np.setdiff1d(there, kept)
+        pairs = pairs_to_join(cut.strips, cut.strand_count, group, free)
         if over <= 0.0 or not len(pairs):
             break
         freed = np.cumsum(segments[pairs[:, 1]])

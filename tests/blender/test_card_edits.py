@@ -179,6 +179,36 @@ def test_with_other_cards_nothing_vanishes(hair, count):
     assert obj.hairloom.card_object.card_count == len(found) <= count + 1
 
 
+@pytest.mark.parametrize("seed", [1, 3])
+def test_cards_that_were_joined_to_save_triangles_are_not_deleted(hair, seed):
+    cards = hair.data.hairloom.cards
+    cards.segment_count, cards.max_triangles, cards.seed = 1, 12, seed
+    obj = make(hair)
+    first = areas(obj)
+    assert len(first) == 6 and edits(hair) is None
+    np.testing.assert_allclose(sorted(areas(make(hair))), sorted(first), rtol=1e-5)
+    # an edited one stands for those that it was joined with, as it was put
+    card = max(numbers(obj))
+    shape = corners(obj, card)
+    move(obj, card)
+    assert edits(hair).edited == 1 and edits(hair).deleted == 0
+    for _ in range(2):
+        np.testing.assert_allclose(sorted(areas(make(hair))), sorted(first), rtol=1e-5)
+        np.testing.assert_allclose(corners(obj, card), shape + [0.02, 0.0, 0.0], atol=1e-6)
+    # others come back where there is room for them
+    cards.max_triangles = 0
+    assert len(areas(make(hair))) == 11
+    bpy.ops.hairloom.discard_card_edits()
+    assert len(areas(obj)) == 12 and edits(hair) is None
+
+
+def areas(obj):
+    """Of each card [m^2]."""
+    total = np.zeros(max(numbers(obj)) + 1)
+    np.add.at(total, numbers(obj), [face.area for face in obj.data.polygons])
+    return total[total > 0.0]
+
+
 def test_all_deleted_is_an_empty_mesh_and_a_note(hair, capfd):
     delete(make(hair), *range(12))
     obj = make(hair)
