@@ -377,6 +377,41 @@ def test_rounded_positions_are_where_they_were(
     np.testing.assert_array_equal(parts, wanted)
 
 
+def test_in_the_high_definition_pipeline_alpha_comes_with_the_colour_or_with_a_warning(
+    imported: Callable[..., dict[str, Any]], asset: Asset
+) -> None:
+    folder = damaged(asset.folder, OUTPUT / "unity_damaged", lambda folder: None)
+    (said,) = imported(glb_of(folder), "hdrp")["warnings"]
+    assert "packing Unity HDRP" in said
+    sidecar = next(folder.glob("*.hairloom.json"))
+    content = sidecar_of(folder)
+    content["textures"]["alpha"] |= {"file": content["textures"]["color"]["file"], "channels": "a"}
+    sidecar.write_text(json.dumps(content), encoding="utf-8")
+    assert not imported(glb_of(folder), "hdrp")["warnings"]
+
+
+@pytest.mark.parametrize("loop", ["", "-D_FORWARD_PLUS", "-D_CLUSTER_LIGHT_LOOP"])
+def test_every_light_is_seen_once(sandbox: str, loop: str) -> None:
+    """Where clusters hold lamps alone, suns have a loop of their own."""
+    options = ["-E", "-D", "-S", "frag", f"-I{HERE}", "-D_ADDITIONAL_LIGHTS", *loop.split()]
+    done = subprocess.run(
+        [sandbox, "run", "glslangValidator", *options, str(SHADERS)],
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    loops = re.findall(
+        r"for \(uint (\w+) = (\w+); \1 < (.+?); ?(?:\+\+ ?\1|\1 ?\+\+)\)\s*{"
+        r"\s*radiance \+= radiance_of\(hair, here, GetAdditionalLight\(\1,",
+        done.stdout,
+    )
+    counts = {"sun_count": 2, "light_count": 5, "count": 5, "min": min}
+    seen: list[int] = []
+    for _, first, end in loops:
+        seen += range(*(eval(each.replace("0u", "0"), counts) for each in (first, end)))
+    assert seen == list(range(5))
+
+
 @pytest.mark.parametrize("entry", ENTRIES)
 def test_the_shaders_compile(sandbox: str, entry: str) -> None:
     OUTPUT.mkdir(parents=True, exist_ok=True)

@@ -41,7 +41,7 @@ public static class Imported
             ["heights"] = group?.lods.Select(lod => lod.screenRelativeTransitionHeight).ToArray(),
             ["fade"] = group?.fadeMode.ToString(),
             ["fades"] = group?.lods.Select(lod => lod.fadeTransitionWidth).ToArray(),
-            ["textures"] = before.Where(File.Exists).ToDictionary(Path.GetFileName, SetUp),
+            ["textures"] = before.Distinct().Where(File.Exists).ToDictionary(Path.GetFileName, SetUp),
         };
         Console.WriteLine(new JavaScriptSerializer { MaxJsonLength = int.MaxValue }.Serialize(found));
         return 0;

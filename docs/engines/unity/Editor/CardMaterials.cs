@@ -43,6 +43,10 @@ namespace Hairloom
             var name = isHighDefinition ? "HDRP/Lit" : "Hairloom/Cards";
             var shader = Shader.Find(name)
                 ?? throw new CardFileException($"{glb}: the shader {name} is missing; install this package again");
+            if (isHighDefinition && !sidecar.textures.HasAlphaInColor)
+                context.LogImportWarning(
+                    $"{glb}: HDRP/Lit reads alpha with the colour alone, so cards come without gaps between strands; "
+                    + "export them again with the packing Unity HDRP");
             var textures = sidecar.textures.Used().ToDictionary(
                 each => each.Key, each => Texture(Sidecar.Beside(glb, each.Value.file), context));
             return Passes.Select(pass =>

@@ -105,6 +105,9 @@ namespace Hairloom
         public SidecarTexture tangent;
         public SidecarTexture normal;
 
+        /// Whether alpha lies in the fourth channel of the colour's file, where Unity's own materials look for it.
+        public bool HasAlphaInColor => alpha?.file == color?.file && alpha?.channels == "a";
+
         /// By their roles, those that the shader reads and this export has.
         public Dictionary<string, SidecarTexture> Used()
         {

@@ -172,6 +172,12 @@ float4 fragment(CardPoint card) : SV_Target
     InputData inputData = (InputData)0;
     inputData.positionWS = card.place;
     inputData.normalizedScreenSpaceUV = GetNormalizedScreenSpaceUV(card.position);
+#if USE_FORWARD_PLUS || USE_CLUSTER_LIGHT_LOOP  // the loop after it has lamps alone then
+    for (uint sun = 0; sun < min(URP_FP_DIRECTIONAL_LIGHTS_COUNT, MAX_VISIBLE_LIGHTS); sun++)
+    {
+        radiance += radiance_of(hair, here, GetAdditionalLight(sun, card.place, half4(1, 1, 1, 1)));
+    }
+#endif
     uint count = GetAdditionalLightsCount();
     LIGHT_LOOP_BEGIN(count)
         radiance += radiance_of(hair, here, GetAdditionalLight(lightIndex, card.place, half4(1, 1, 1, 1)));
@@ -193,14 +199,12 @@ float4 fragment_of_normal(CardPoint card) : SV_Target
     return float4(hair_unit(card.normal, float3(0.0, 0.0, 1.0)), 0.0);
 }
 
-float4 _ShadowBias;  // Unity sets both for each light
-float3 _LightDirection;
+float3 _LightDirection;  // Unity sets it for each light
 
 CardPoint vertex_of_shadow(Corner corner)
 {
     CardPoint result = vertex(corner);
-    float3 place = result.place + _LightDirection * _ShadowBias.x;
-    result.position = TransformWorldToHClip(place);
+    result.position = TransformWorldToHClip(ApplyShadowBias(result.place, result.normal, _LightDirection));
 #if UNITY_REVERSED_Z
     result.position.z = min(result.position.z, result.position.w * UNITY_NEAR_CLIP_VALUE);
 #else

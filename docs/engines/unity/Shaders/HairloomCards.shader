@@ -67,7 +67,7 @@ Shader "Hairloom/Cards"
             Blend [_SrcBlend] [_DstBlend], One OneMinusSrcAlpha
 
             HLSLPROGRAM
-            #pragma target 4.5
+            #pragma target 3.5
             #pragma multi_compile _ _MAIN_LIGHT_SHADOWS _MAIN_LIGHT_SHADOWS_CASCADE
             #pragma multi_compile _ _ADDITIONAL_LIGHTS
             // the second is its name since Unity 6.1
@@ -91,7 +91,7 @@ Shader "Hairloom/Cards"
             ColorMask R
 
             HLSLPROGRAM
-            #pragma target 4.5
+            #pragma target 3.5
             #pragma multi_compile_fragment _ LOD_FADE_CROSSFADE
             #pragma multi_compile_instancing
             #pragma vertex vertex
@@ -107,7 +107,7 @@ Shader "Hairloom/Cards"
             ZWrite On
 
             HLSLPROGRAM
-            #pragma target 4.5
+            #pragma target 3.5
             #pragma multi_compile_fragment _ LOD_FADE_CROSSFADE
             #pragma multi_compile_instancing
             #pragma vertex vertex
@@ -124,7 +124,7 @@ Shader "Hairloom/Cards"
             ColorMask 0
 
             HLSLPROGRAM
-            #pragma target 4.5
+            #pragma target 3.5
             #pragma multi_compile_fragment _ LOD_FADE_CROSSFADE
             #pragma multi_compile_instancing
             #pragma vertex vertex_of_shadow
