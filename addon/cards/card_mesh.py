@@ -104,18 +104,12 @@ class CardMesh:
             return np.zeros(3, np.float32), np.zeros(3, np.float32)
         return self.positions.min(axis=0), self.positions.max(axis=0)
 
-    def without_loose(self, back: Ints) -> tuple[CardMesh, Ints]:
-        """The same mesh without vertices that no triangle has, which some exporters leave out.
-
-        Args:
-            back: (triangle_count, 3) its triangles in another order, which are given back likewise.
-        """
+    def without_loose(self) -> CardMesh:
+        """The same mesh without vertices that no triangle has."""
         used = np.unique(self.triangles)
-        if len(used) == len(self.positions):
-            return self, back
         vertices: dict[str, Any] = {name: getattr(self, name)[used] for name in OF_VERTICES}
         triangles = np.searchsorted(used, self.triangles)
-        return replace(self, triangles=triangles, **vertices), np.searchsorted(used, back)
+        return replace(self, triangles=triangles, **vertices)
 
     def with_occlusion(self, occlusion: Floats) -> CardMesh:
         """The same mesh with ambient occlusion, (vertex_count,)."""

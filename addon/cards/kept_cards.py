@@ -65,8 +65,9 @@ class KeptCards:
         """The finest level with the kept cards as they are."""
         is_made = ~np.isin(mesh.card, self.numbers)
         rest = replace(mesh, triangles=mesh.triangles[is_made], card=mesh.card[is_made])
-        rest, _ = rest.without_loose(rest.triangles)
-        both = joined([rest, self.mesh]) if len(rest.triangles) else self._alone(mesh)
+        both = (
+            joined([rest.without_loose(), self.mesh]) if len(rest.triangles) else self._alone(mesh)
+        )
         return reordered(both, np.arange(len(self.cards)))
 
     def _alone(self, mesh: CardMesh) -> CardMesh:

@@ -1,11 +1,13 @@
 """Cards that an artist has edited survive being made again; Blender does the edits."""
 
 import json
+import zlib
 
 import bmesh
 import bpy
 import numpy as np
 import pytest
+from glb_files import Glb
 
 from hairloom.addon.blender.cards.build import BuiltCards, build_steps, read_inputs
 from hairloom.addon.blender.cards.edits import MADE_ATTRIBUTE, RECORD, groom_edits
@@ -15,6 +17,7 @@ from hairloom.addon.blender.command_line import command_line
 from hairloom.addon.blender.preview import previews, scene_events
 from hairloom.addon.blender.viewport import overlay
 from hairloom.addon.card_flow import cards_at
+from hairloom.addon.cards.export_settings import CardExportSettings
 from hairloom.addon.cards.steps import result_of
 
 
@@ -482,6 +485,40 @@ def test_exported_cards_have_the_edits(hair, evaluated, tmp_path):
     heights = np.array([read.matrix_world @ v.co for v in read.data.vertices])[:, 2]
     assert np.count_nonzero(heights > 0.6) == 9 * 3
     assert sidecar["levels"][0]["cards"] == 11
+
+
+def test_a_card_whose_uvs_are_folded_has_the_indices_of_its_file(hair, evaluated, tmp_path):
+    """And one whose corner is turned over, so that its triangles meet in a vertex alone."""
+    hair.data.hairloom.cards.column_count = 2
+    obj = make(hair)
+    uv = obj.data.uv_layers["UVMap"].uv
+    for card in (3, 7):
+        loops = [
+            loop
+            for face, number in zip(obj.data.polygons, numbers(obj), strict=True)
+            if number == card
+            for loop in face.loop_indices
+        ]
+        u = np.array([uv[loop].vector[0] for loop in loops])
+        low, middle = u.min(), (u.min() + u.max()) / 2.0
+        for loop, across in zip(loops, u, strict=True):
+            is_folded = across > middle if card == 3 else loop in loops[:3]
+            uv[loop].vector[0] = low + middle - across if is_folded else across
+    settings = CardExportSettings(index_buffer=True)
+    path, output = tmp_path / "cards.glb", CardOutput(settings=settings)
+    export = CardExport.of(hair, evaluated(), path, output, levels=1)
+    result_of(export.writing(result_of(build_steps(export.inputs))))
+    (level,) = json.loads((tmp_path / "cards.hairloom.json").read_text())["levels"]
+    glb = Glb(path)
+    (primitive,) = glb.json["meshes"][0]["primitives"]
+    indices = glb.accessor(primitive["indices"]).ravel()
+    vertex_count = glb.json["accessors"][primitive["attributes"]["POSITION"]]["count"]
+    assert level["vertices"] == vertex_count > 12 * 9 * 3
+    assert level["indices_adler32"] == zlib.adler32(indices.astype("<u4").tobytes())
+    beside = np.frombuffer((tmp_path / "cards.indices.bin").read_bytes(), "<u2")
+    assert (beside[: len(indices)] == indices).all()
+    first, back = (np.sort(each.reshape(-1, 3), axis=1) for each in np.split(beside, 2))
+    assert sorted(first.tolist()) == sorted(back.tolist())
 
 
 @pytest.mark.parametrize("is_chosen", [False, True])

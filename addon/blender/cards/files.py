@@ -19,6 +19,7 @@ from ...cards.export_settings import CardExportSettings
 from ...cards.joints import CardTracks
 from ...cards.settings import CardSettings
 from ...cards.steps import map_progress, result_of
+from ...cards.uv_fans import with_fans_apart
 from ...cards.vertex_animation import motion_layout
 from ...dynamics.figures import CardFigures
 from ...errors import HairloomError
@@ -270,7 +271,7 @@ class _Writer:
     def steps(self, motion: GuideMotion | None) -> FileSteps[tuple[str, ...]]:
         """Gives back what the artist should know."""
         build = self.made.build
-        parts = map(CardMesh.without_loose, build.levels, build.backs)
+        parts = map(with_fans_apart, build.levels, build.backs)
         levels, backs = zip(*parts, strict=True)
         if motion is None or self.output.settings.motion == "none":
             yield "Writing", None

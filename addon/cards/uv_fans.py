@@ -1,0 +1,50 @@
+"""Vertices of cards as files hold them.
+
+Where a card's UVs are mirrored or folded, its frame turns over, and exporters that write tangents
+make two vertices of one. They are two in the mesh too, so that its indices are those of the file.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ..arrays import Bools, Ints
+from .card_mesh import OF_VERTICES, CardMesh
+from .sort import connected_components
+
+
+def with_fans_apart(mesh: CardMesh, back: Ints) -> tuple[CardMesh, Ints]:
+    """The same mesh, whose triangles share a vertex only if they hang together around it by edges
+    and their UVs turn the same way, as MikkTSpace groups them (Mikkelsen 2008, "Simulation of
+    Wrinkled Surfaces Revisited"). Vertices without a triangle are left out.
+
+    Args:
+        back: (triangle_count, 3) its triangles in another order, which are given back likewise.
+    """
+    triangles = mesh.triangles
+    uv = mesh.uv[triangles].astype(np.float64)
+    one, two = uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]
+    is_turned = one[:, 0] * two[:, 1] > one[:, 1] * two[:, 0]
+    # each corner has two edges; corners at one vertex that have one in common are of one fan
+    own = triangles.astype(np.int64)
+    edges = [_edges(own, np.roll(own, step, axis=1), is_turned) for step in (1, 2)]
+    _, number = np.unique(np.stack(edges, axis=2), return_inverse=True)
+    fan = connected_components(number.reshape(-1, 2)[:, [0, 1, 1]]).astype(np.int64)
+    vertex, corner = np.unique(own.ravel() * max(len(fan), 1) + fan, return_inverse=True)
+    used = vertex // max(len(fan), 1)
+    vertices: dict[str, Any] = {name: getattr(mesh, name)[used] for name in OF_VERTICES}
+    split = replace(mesh, triangles=corner.reshape(-1, 3), **vertices)
+    place = np.empty(len(back), np.int64)
+    place[np.lexsort(back.T)] = np.lexsort(triangles.T)
+    return split, split.triangles[place]
+
+
+def _edges(vertex: Ints, other: Ints, is_turned: Bools) -> Ints:
+    """(triangle_count, 3) a number for each edge, seen from a vertex, and how the UVs turn."""
+    low, high = np.minimum(vertex, other), np.maximum(vertex, other)
+    pair = low * (int(high.max(initial=0)) + 1) + high
+    number: Ints = (pair * 2 + (vertex == high)) * 2 + is_turned[:, None]
+    return number
