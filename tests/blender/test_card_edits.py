@@ -212,6 +212,20 @@ def areas(obj):
     return total[total > 0.0]
 
 
+def test_cards_with_shape_keys_are_not_made_again(hair):
+    """Blender keeps the places of keys by their number, which new vertices would get."""
+    obj = make(hair)
+    obj.shape_key_add(name="Basis")
+    obj.shape_key_add(name="Wind").data[0].co.z += 0.1
+    hair.data.hairloom.cards.card_count = 20
+    select(hair)
+    with pytest.raises(RuntimeError, match="shape keys"):
+        bpy.ops.hairloom.make_cards()
+    assert set(numbers(obj)) == set(range(12))
+    obj.shape_key_clear()
+    assert set(numbers(make(hair))) == set(range(20))
+
+
 def test_all_deleted_is_an_empty_mesh_and_a_note(hair, capfd):
     delete(make(hair), *range(12))
     obj = make(hair)

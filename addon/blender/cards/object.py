@@ -80,6 +80,12 @@ def _check_replaceable(obj: bpy.types.Object) -> None:
         raise HairloomError(
             "its mesh is being edited", place=obj.name, remedy="Go back to Object Mode"
         )
+    if obj.data.shape_keys is not None:
+        raise HairloomError(
+            "it has shape keys, which would put new cards where the old ones were",
+            place=obj.name,
+            remedy="Apply or delete them (Object Data > Shape Keys > Apply All, Delete All)",
+        )
 
 
 def _write(
