@@ -15,7 +15,7 @@ from ..blender.cards.adopt import (
     SortOptions,
     sort_steps,
 )
-from ..blender.cards.material import alpha_image
+from ..blender.cards.material import alpha_images
 from ..blender.properties.groups import operator_properties
 from ..blender.properties.properties import settings_of
 from ..errors import HairloomError
@@ -78,8 +78,8 @@ class HAIRLOOM_OT_sort_cards(LongWork, bpy.types.Operator):
             head = _likely_head(obj, context)
             self.head = "" if head is None else head.name
         if not self.alpha:
-            image = alpha_image(obj)
-            self.alpha = "" if image is None else image.name
+            images = alpha_images(obj)
+            self.alpha = images[0].name if len(images) == 1 else ""
         return context.window_manager.invoke_props_dialog(self, confirm_text="Sort")
 
     def draw(self, context: bpy.types.Context) -> None:

@@ -108,6 +108,10 @@ def test_occlusion_is_an_attribute_and_a_map_that_keep_to_their_vertices(shells,
     corner = np.array([loop.vertex_index for loop in mesh.loops])
     np.testing.assert_allclose(layer(mesh, "Occlusion"), np.stack([openness, along], 1)[corner])
     assert mesh.uv_layers.active.name == "Hair"
+    uv = read_cards(shells, evaluated(), SortOptions(head=sphere)).cards.mesh.uv
+    mesh.uv_layers.active = mesh.uv_layers["Occlusion"]  # which says nothing of pictures
+    again = read_cards(shells, evaluated(), SortOptions(head=sphere)).cards.mesh.uv
+    np.testing.assert_array_equal(again, uv)
     once = layer(mesh, "Occlusion")
     sort_mesh(shells, evaluated(), SortOptions(head=sphere, occlusion=QUICK))
     np.testing.assert_allclose(layer(mesh, "Occlusion"), once, atol=1e-6)
@@ -263,6 +267,9 @@ def test_alpha_comes_from_the_material(shells, sphere, evaluated):
     clear = values(shells.data, "occlusion")
     assert done.notes == ()
     assert (clear >= opaque - 1e-6).all() and clear.mean() > opaque.mean() + 0.1
+    clear_material(shells)
+    (note,) = sort_mesh(shells, evaluated(), SortOptions(head=sphere, occlusion=QUICK)).notes
+    assert "several pictures" in note and "'Clear' counted" in note
 
 
 def test_the_order_goes_by_what_the_material_lets_see(shells, sphere, evaluated):

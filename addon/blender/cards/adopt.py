@@ -27,9 +27,15 @@ from ...strands import Surface
 from ..base.attributes import set_attribute
 from ..base.objects import matrix_of
 from ..base.vertex_weights import weights_on
-from ..scene.surfaces import evaluated_mesh, read_corner_uv, read_surface
+from ..scene.surfaces import (
+    CARD_ATTRIBUTES,
+    OCCLUSION_LAYER,
+    evaluated_mesh,
+    read_corner_uv,
+    read_surface,
+)
 from .material import alpha_of
-from .mesh import CARD_ATTRIBUTES, OCCLUSION_IS_OURS, OCCLUSION_LAYER, reorder_faces, set_uv_map
+from .mesh import OCCLUSION_IS_OURS, reorder_faces, set_uv_map
 from .occluders import read_occluders
 
 __all__ = [

@@ -18,9 +18,9 @@ from ...errors import HairloomError
 from ...strands import Surface
 from ..base.attributes import read_attribute
 from ..base.objects import matrix_of
+from ..scene.surfaces import OCCLUSION_LAYER
 from .adopt import loop_triangles
 from .made_objects import card_objects
-from .mesh import OCCLUSION_LAYER
 
 #: the attribute of faces: the number of the card on record, counted from 1
 MADE_ATTRIBUTE = "made_card"

@@ -27,8 +27,9 @@ from ...exchange.files.names import plain_name
 from ...exchange.textures.srgb import srgb_decoded
 from ...strands.vectors import unit
 from ..base.parts import new_blocks_removed
+from ..scene.surfaces import OCCLUSION_LAYER
 from .material import fill_image, named_image, new_material
-from .mesh import OCCLUSION_LAYER, fill_mesh
+from .mesh import fill_mesh
 
 _NAMED = ("objects", "meshes", "materials", "images", "scenes")
 #: the attribute of OBJ that holds occlusion and along

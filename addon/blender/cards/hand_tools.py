@@ -19,10 +19,9 @@ from ...strands.affine import moved
 from ..base.objects import check_shape_editable, head_of, matrix_of
 from ..properties.groom_settings import GroomSettings
 from ..scene.drawn_lines import lines_of
-from ..scene.surfaces import read_surface
+from ..scene.surfaces import OCCLUSION_LAYER, read_surface
 from .edits import MADE_ATTRIBUTE, TILE_LAYER, read_record
 from .made_objects import card_objects
-from .mesh import OCCLUSION_LAYER
 
 
 def edited_cards(context: bpy.types.Context) -> list[bpy.types.Object]:

@@ -13,12 +13,8 @@ from ...cards.card_mesh import CardMesh
 from ...strands.vectors import unit
 from ..base.attributes import set_attribute
 
-#: the UV map that holds occlusion and along
-OCCLUSION_LAYER = "Occlusion"
 #: marks a mesh whose occlusion we have written, so that it may be replaced
 OCCLUSION_IS_OURS = "hairloom_occlusion"
-#: attributes of cards: how open each vertex is, and how far from the root
-CARD_ATTRIBUTES = ("occlusion", "along")
 
 
 def fill_mesh(

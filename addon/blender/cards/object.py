@@ -20,11 +20,12 @@ from ...shading.settings import ShadingSettings
 from ..base.attributes import set_attribute
 from ..base.objects import Handle, check_shape_editable, head_of, link_into, matrix_of
 from ..base.thread_work import ThreadWork
+from ..scene.surfaces import OCCLUSION_LAYER
 from .build import MappedCards, built_in_thread, order_line, read_inputs
 from .edits import MADE_ATTRIBUTE, TILE_LAYER, forget_record, read_pieces, write_record
 from .made_objects import card_objects
 from .material import fill_image, new_material
-from .mesh import OCCLUSION_IS_OURS, OCCLUSION_LAYER, fill_mesh
+from .mesh import OCCLUSION_IS_OURS, fill_mesh
 
 
 class CardObjectJob:

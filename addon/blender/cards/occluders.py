@@ -28,9 +28,8 @@ from ..base.objects import objects_in
 from ..colliders.rigs import rig_from
 from ..properties.groom_settings import GroomSettings
 from ..scene.source import Source, read_source
-from ..scene.surfaces import read_surface
+from ..scene.surfaces import CARD_ATTRIBUTES, read_surface
 from .material import alpha_of
-from .mesh import CARD_ATTRIBUTES
 
 #: Hair that is nearer than this to where it was has not moved, in terms of how far it reaches.
 _STILL = 1.0e-5

@@ -20,6 +20,11 @@ from ...strands import Surface
 from ..base.attributes import read_attribute
 from ..base.objects import as_mesh
 
+#: the UV map of cards that holds occlusion and along
+OCCLUSION_LAYER = "Occlusion"
+#: attributes of cards: how open each vertex is, and how far from the root
+CARD_ATTRIBUTES = ("occlusion", "along")
+
 
 @dataclass
 class _Read:
@@ -150,13 +155,18 @@ def triangle_loops(mesh: bpy.types.Mesh) -> Ints:
 
 
 def read_corner_uv(mesh: bpy.types.Mesh, loops: Ints) -> Floats | None:
-    """UVs of the active map at each triangle's corners, (triangle_count, 3, 2), or None.
+    """UVs of the active map at each triangle's corners, (triangle_count, 3, 2), or None. Where that
+    is the one in which we have written the occlusion of cards, those of the first other one.
 
     Args:
         loops: see `triangle_loops`.
     """
-    if mesh.uv_layers.active is None:
+    layer = mesh.uv_layers.active
+    is_cards = all(name in mesh.attributes for name in CARD_ATTRIBUTES)
+    if layer is not None and layer.name == OCCLUSION_LAYER and is_cards:
+        layer = next((each for each in mesh.uv_layers if each.name != OCCLUSION_LAYER), None)
+    if layer is None:
         return None
     uv = np.empty((len(mesh.loops), 2), np.float32)
-    mesh.uv_layers.active.uv.foreach_get("vector", uv.ravel())
+    layer.uv.foreach_get("vector", uv.ravel())
     return uv[loops]
