@@ -96,24 +96,20 @@ def tile_shift(grid: AtlasGrid, tile: Ints, wanted: Ints) -> Floats:
 
 def card_along(
     line: Floats,
-    head: Surface | None,
+    outwards: Floats,
     settings: CardSettings,
     *,
     width: float,
     tile: int,
     grid: AtlasGrid,
 ) -> CardMesh:
-    """A card along a line, whose root is on the skin.
-
-    The end that is nearer to the skin is the root. Where it is near enough it is moved onto the
-    skin, and the line with it, ever less towards the tip.
+    """A card along a line from root to tip.
 
     Args:
-        line: (point_count, 3) [m], in the space of the head.
+        line, outwards: see `from_root`.
         width: at the root [m].
     """
-    points, outwards = _rooted(line.astype(np.float64), head)
-    frames = card_frames(points[None].astype(np.float32), outwards[None], settings.segment_count)
+    frames = card_frames(line[None].astype(np.float32), outwards[None], settings.segment_count)
     along = np.linspace(0.0, 1.0, settings.segment_count + 1, dtype=np.float32)
     strips = Strips(frames, (width * taper(along, settings.tip_width))[None].astype(np.float32))
     one = np.zeros(1, np.int32)
@@ -121,8 +117,16 @@ def card_along(
     return strip_mesh([(one, strips)], cards, settings.column_count, settings)
 
 
-def _rooted(line: Floats, head: Surface | None) -> tuple[Floats, Floats]:
-    """The line from its root on, and the normal of the skin there."""
+def from_root(line: Floats, head: Surface | None) -> tuple[Floats, Floats]:
+    """A line from its root on, and the normal of the skin there.
+
+    The end that is nearer to the skin is the root. Where it is near enough it is moved onto the
+    skin, and the line with it, ever less towards the tip.
+
+    Args:
+        line: (point_count, 3) [m], in the space of the head.
+    """
+    line = line.astype(np.float64)
     if head is None or not len(head.triangles):
         higher = line if line[0, 2] >= line[-1, 2] else line[::-1]
         return higher, np.array([0.0, 0.0, 1.0])

@@ -27,7 +27,9 @@ _STEPS = {"next": 1, "previous": -1}
 def _in_edit_mode(operator: Any, context: bpy.types.Context) -> bool:
     if edited_cards(context):
         return True
-    operator.poll_message_set("Select cards in Edit Mode of an object that Make Cards has made")
+    operator.poll_message_set(
+        "Select cards in Edit Mode of what Make Cards has made, the finest level"
+    )
     return False
 
 

@@ -5,6 +5,8 @@ import numpy as np
 import pytest
 from test_card_edits import corners, edit, edits, hair, make, numbers, select
 
+from hairloom.addon.blender.cards.made_objects import card_objects
+
 __all__ = ["hair"]
 
 
@@ -106,6 +108,12 @@ def test_tools_say_what_they_need(hair, capfd):
     bpy.ops.object.mode_set(mode="EDIT")
     assert not bpy.ops.hairloom.card_width.poll(), "a mesh that is no cards of ours"
     bpy.ops.object.mode_set(mode="OBJECT")
+    for level, obj in enumerate(card_objects(hair)):
+        obj.hide_viewport = False
+        select(obj)
+        bpy.ops.object.mode_set(mode="EDIT")
+        assert bpy.ops.hairloom.card_width.poll() == (level == 0), "a level that is made again"
+        bpy.ops.object.mode_set(mode="OBJECT")
 
 
 def curve(points, kind="POLY"):
@@ -149,20 +157,24 @@ def test_a_card_along_a_curve_stands_on_the_skin_and_stays(hair, kind, turned):
         np.testing.assert_allclose(corners(obj, number), places, atol=1e-6)
 
 
-def test_without_numbers_a_curve_gets_the_width_and_tile_of_its_neighbours(hair):
+@pytest.mark.parametrize("turned", [False, True])
+def test_without_numbers_a_curve_gets_the_width_and_tile_of_its_neighbours(hair, turned):
     obj = make(hair)
     near = grid(obj, 3)
     middle = (near[:, 0] + near[:, 2]) / 2.0
-    line = curve([tuple(place) for place in middle])
+    # the line ends above the root of a card that shows another tile
+    tile = [int(corners(obj, card, "UVMap")[:, 0].mean() * 4) for card in range(12)]
+    other = next(card for card in range(12) if tile[card] != tile[3])
+    tip = grid(obj, other)[0, 1]
+    middle[-3:] = middle[-4] + (1.3 * tip - middle[-4]) * np.linspace(0.3, 1.0, 3)[:, None]
+    line = curve([tuple(place) for place in (middle[::-1] if turned else middle)])
     select(obj)
     line.select_set(True)
     assert bpy.ops.hairloom.add_card_along_curve() == {"FINISHED"}
     card = grid(obj, -1)
     usual = np.median([widths(grid(obj, each))[4] for each in range(12)])
     np.testing.assert_allclose(widths(card)[0], usual, rtol=0.1)
-    assert int(corners(obj, -1, "UVMap")[:, 0].mean() * 4) == int(
-        corners(obj, 3, "UVMap")[:, 0].mean() * 4
-    )
+    assert int(corners(obj, -1, "UVMap")[:, 0].mean() * 4) == tile[3]
 
 
 @pytest.mark.parametrize("case", ["tile", "point", "faces"])

@@ -13,7 +13,7 @@ from ...arrays import Floats, Ints
 from ...cards.card_mesh import CardMesh
 from ...cards.edits import MadeCards
 from ...cards.settings import CardSettings
-from ...cards.shaping import CardVertices, card_along, tile_shift
+from ...cards.shaping import CardVertices, card_along, from_root, tile_shift
 from ...errors import HairloomError
 from ...strands.affine import moved
 from ..base.objects import check_shape_editable, head_of, matrix_of
@@ -25,11 +25,12 @@ from .made_objects import card_objects
 
 
 def edited_cards(context: bpy.types.Context) -> list[bpy.types.Object]:
-    """The objects of cards that are in Edit Mode."""
+    """The objects of cards that are in Edit Mode; coarser levels are made from the finest."""
     if context.mode != "EDIT_MESH":
         return []
     objects = context.objects_in_mode
-    return [obj for obj in objects if obj.hairloom.card_object.groom is not None]
+    cards = [(obj, obj.hairloom.card_object) for obj in objects]
+    return [obj for obj, card in cards if card.groom is not None and not card.level]
 
 
 def shape_selected(obj: bpy.types.Object, shape: Callable[[CardVertices], Floats]) -> int:
@@ -120,10 +121,11 @@ def add_along_curves(
     try:
         edited.from_mesh(obj.data)
         for line in lines:
-            near = np.linalg.norm(record.places[:, 0] - line[0], axis=1).argmin()
+            rooted, outwards = from_root(line, surface)
+            near = np.linalg.norm(record.places[:, 0] - rooted[0], axis=1).argmin()
             card = card_along(
-                line,
-                surface,
+                rooted,
+                outwards,
                 settings,
                 width=width or record.usual_width,
                 tile=tile if tile >= 0 else int(record.tile[near]),
