@@ -95,8 +95,8 @@ def spring_steps(tracks: CardTracks, most: int, balls: Balls) -> Generator[float
     learnt = _Learnt.of(tracks)
     yield 0.1
     tried: list[Tried[_Choice]] = []
-    for number, joints in enumerate(_JOINTS):
-        counts = {min(count, max((most - 1) // joints, 1)) for count in _CHAINS}
+    for number, joints in enumerate(each for each in _JOINTS if each < most):
+        counts = {min(count, (most - 1) // joints) for count in _CHAINS}
         for count in sorted(counts):
             choice = learnt.choice(count, joints)
             tried.append(Tried(count * joints, learnt.error(choice), choice))

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 from guide_cards import build_cards
 
+from hairloom.addon.cards import spring_chains
 from hairloom.addon.cards.joints import CardTracks
 from hairloom.addon.cards.settings import CardSettings
 from hairloom.addon.cards.spring_bones import (
@@ -210,6 +212,19 @@ def test_the_fewest_joints_that_do_are_chosen(errors: dict[int, float], best: in
 def test_what_swings_as_one_needs_one_chain() -> None:
     rig = result_of(spring_steps(moving_cards(0.4), 120, NO_BALLS))
     assert rig.chains.rest.shape[0] == 1
+
+
+def test_nothing_is_tried_that_has_more_joints_than_the_maximum(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The root that carries all chains is one of them."""
+
+    def most(tried: list[Tried[Any]], unseen: float) -> Any:
+        return max(tried, key=lambda each: each.joints).choice
+
+    monkeypatch.setattr(spring_chains, "fewest_joints", most)
+    rest = result_of(spring_steps(moving_cards(0.4), 5, NO_BALLS)).chains.rest
+    assert 1 + rest.shape[0] * rest.shape[1] == 5
 
 
 def test_cards_at_rest_stay_where_they_are() -> None:
