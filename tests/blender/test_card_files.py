@@ -105,6 +105,19 @@ def test_a_baked_atlas_is_packed_as_the_engine_wants_it(tmp_path: Path) -> None:
     assert (content["atlas"]["columns"], content["atlas"]["rows"]) == (4, 2)
 
 
+@pytest.mark.parametrize(
+    ("packing", "alpha"), [("unreal", "hair_Coverage.png"), ("unreal_compact", "")]
+)
+def test_only_a_picture_of_alpha_alone_is_linked_as_opacity(
+    tmp_path: Path, packing: str, alpha: str
+) -> None:
+    """Plain importers take the mean of all channels."""
+    assert cards(tmp_path / "hair.obj", *BAKED, "--packing", packing, "--levels", "1") == 0
+    material = (tmp_path / "hair.mtl").read_text(encoding="utf-8")
+    linked = [line.split()[-1] for line in material.splitlines() if line.startswith("map_d")]
+    assert linked == [alpha] * bool(alpha)
+
+
 def test_a_viewer_that_knows_nothing_of_us_shows_one_level_in_the_hairs_colour(
     tmp_path: Path,
 ) -> None:

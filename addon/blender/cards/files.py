@@ -346,7 +346,7 @@ class _Writer:
             written = write_textures(path.parent, path.stem, named, grid, settings)
             tables = write_tables(path.parent, path.stem, shading)
         roles = texture_roles(written, named)
-        look = _look(card, written, roles)
+        look = _look(card, written)
         with self.stage("write cards"):
             write_card_mesh(
                 path,
@@ -423,16 +423,15 @@ def _direction_pictures(path: Path, maps: CardMaps) -> dict[str, bytes]:
     }
 
 
-def _look(
-    card: Floats, written: Iterable[WrittenTexture], roles: Mapping[str, Mapping[str, str]]
-) -> CardLook:
+def _look(card: Floats, written: Sequence[WrittenTexture]) -> CardLook:
     """The material of the mesh's own file: colour, and alpha where plain nodes can name it."""
     (colored,) = (texture for texture in written if "color" in texture.layout.sources)
     file, alpha = colored.path.name, None
     if colored.layout.has_coverage:
         alpha = file
-    elif roles["alpha"]["channels"] == "r":
-        alpha = roles["alpha"]["file"]
+    else:  # importers take the mean of all channels
+        own = [each.path.name for each in written if each.layout.sources == {"alpha"}]
+        alpha = own[0] if own else None
     return CardLook(card, file, alpha, is_linear=colored.color_space == "linear")
 
 
