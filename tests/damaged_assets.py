@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from hairloom.addon.exchange.cards.glb_file import GlbFile
+from hairloom.addon.exchange.textures.texture_files import read_texture, write_texture
 
 NAME = "Zöpfe 头发"
 
@@ -155,6 +156,20 @@ def with_mirrored_cards(folder: Path) -> None:
             attributes["TANGENT"] = file.add(tangents, "VEC4", target=34962)
 
     _changed(folder, change)
+
+
+def with_turned_tangents(folder: Path) -> None:
+    """No damage: their components as packings for some engines have them, x in green as 1 minus the
+    value, y in red."""
+    file = folder / sidecar_of(folder)["textures"]["tangent"]["file"]
+    pixels = read_texture(file, is_color=False)[::-1, :, :3]
+    turned = np.stack([pixels[..., 1], 1.0 - pixels[..., 0], pixels[..., 2]], axis=-1)
+    write_texture(file, turned, is_color=False, depth="uint16", is_packed=True)
+
+    def change(content: dict[str, Any]) -> None:
+        content["textures"]["tangent"] |= {"channels": "grb", "inverted": "g"}
+
+    change_sidecar(folder, change)
 
 
 #: what was done -> what one sentence says of it; an empty one: nothing

@@ -23,6 +23,7 @@ pytest.importorskip("bpy", reason="writing cards needs Blender or the bpy module
 
 from damaged_assets import (
     DAMAGES,
+    change_sidecar,
     damaged,
     other_levels,
     quantised,
@@ -245,6 +246,31 @@ def test_materials_are_the_passes_of_the_sidecar(asset: Asset, hair: dict[str, A
     opaque, least = sidecar["opaque_alpha"], sidecar["min_alpha"]
     wanted_alpha = [(opaque, 2.0), (0.0, opaque), (least, opaque)]
     np.testing.assert_allclose(alpha, wanted_alpha, rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("channels", "inverted", "lanes"),
+    [
+        ("rgb", "", [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0]]),
+        ("rgb", "g", [[1, 0, 0, 0], [0, -1, 0, 1], [0, 0, 1, 0]]),
+        ("gr", "g", [[0, -1, 0, 1], [1, 0, 0, 0], [0, 0, 0, 0.5]]),
+    ],
+)
+def test_directions_are_read_from_the_channels_that_hold_them(
+    imported: Callable[..., dict[str, Any]],
+    asset: Asset,
+    channels: str,
+    inverted: str,
+    lanes: list[list[float]],
+) -> None:
+    def change(content: dict[str, Any]) -> None:
+        content["textures"]["tangent"] |= {"channels": channels, "inverted": inverted}
+        content["textures"]["normal"] = content["textures"]["tangent"] | {"channels": channels}
+
+    folder = damaged(asset.folder, OUTPUT / "unity_damaged", lambda at: change_sidecar(at, change))
+    found = imported(glb_of(folder))["materials"][0]["values"]
+    assert [found[f"_tangent_{axis}"] for axis in "xyz"] == lanes
+    assert found["_has_normal_map"] == (2 if len(channels) == 2 else 1)
 
 
 def test_every_value_of_a_material_is_a_property_of_the_shader(hair: dict[str, Any]) -> None:

@@ -16,7 +16,7 @@ import sys
 import zlib
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from types import ModuleType
+from types import ModuleType, SimpleNamespace
 from typing import Any
 
 import hair_hlsl
@@ -29,7 +29,10 @@ pytest.importorskip("bpy", reason="writing cards needs Blender or the bpy module
 from engine_assets import OUTPUT, Asset, written_asset
 from hlsl_on_gpu import probed, probed_hlsl
 
+from hairloom.addon.blender.cards.textures import texture_roles
 from hairloom.addon.cards.export_settings import CardExportSettings
+from hairloom.addon.exchange.textures.card_textures import WrittenTexture
+from hairloom.addon.exchange.textures.texture_packing import PRESETS, packed
 
 HERE = Path(__file__).parent / "unreal"
 FOLDER = REPOSITORY / "docs" / "engines" / "unreal"
@@ -95,6 +98,23 @@ def attributes_of(material: Any) -> dict[str, Any]:
     """Pin of the material -> the node that goes there."""
     (node,) = (each for each in material.values[""] if "the material" in each.inputs)
     return {pin: source for pin, (source, _) in node.inputs.items() if pin != "the material"}
+
+
+@pytest.mark.parametrize("packing", PRESETS)
+def test_directions_are_read_from_the_channels_that_hold_them(
+    importer: ModuleType, packing: str
+) -> None:
+    """What the node reckons of a texel of each packing is the direction in front of packing."""
+    plan = sys.modules["hairloom_plan"]
+    tangent = np.array([0.3, 0.9, 0.6], np.float32)
+    for texture in packed({"tangent": tangent[None, None]}, packing):
+        entry = texture_roles([WrittenTexture(Path("a.png"), texture.layout)], ["tangent"])
+        code = plan._texel("Texel", entry["tangent"])
+        texel = SimpleNamespace(**dict(zip("rgba", texture.pixels[0, 0], strict=False)))
+        found = eval(code, {"float3": lambda *each: each, "Texel": texel})
+        found = (found.r, found.g, found.b) if found is texel else found
+        z = 0.5 if len(entry["tangent"]["channels"]) == 2 else tangent[2]
+        np.testing.assert_allclose(found, [*tangent[:2], z], atol=1e-6)
 
 
 def test_all_of_an_export_comes_into_the_project(

@@ -105,7 +105,10 @@ def texture_roles(
     for texture in written:
         channels = dict(zip("rgba", texture.layout.channels, strict=False))
         for name in sorted(texture.layout.sources & set(maps)):
-            mine = [letter for letter, channel in channels.items() if channel.source == name]
+            mine = sorted(
+                (letter for letter, channel in channels.items() if channel.source == name),
+                key=lambda letter: channels[letter].component,
+            )
             turned = [letter for letter in mine if channels[letter].is_inverted]
             roles[name] = {
                 "file": texture.path.name,

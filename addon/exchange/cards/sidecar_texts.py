@@ -68,7 +68,11 @@ ROLES = {
         "along the normal. In place of shift: T = normalize(d.x across + d.y along + shift_noise "
         "d.z normal)",
     ),
-    "normal": ("linear", "the normal of a strand in the axes of tangent"),
+    "normal": (
+        "linear",
+        "the normal of a strand in the axes of tangent; with two channels d.z is root(1 - d.x^2 - "
+        "d.y^2)",
+    ),
     "depth": ("linear", "0.5 in the card's plane, larger nearer to the outside"),
     "along": ("linear", "0 at the root to 1 at the tip of the strand that is seen"),
     "strand_id": ("linear", "a number of its own for each strand, from 0 to 1"),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -70,6 +70,8 @@ def write_card_textures(
         if file_format.startswith("dds"):
             is_compressed = file_format == "dds"
             _write_dds(path, layout, maps, grid, threshold, is_compressed=is_compressed)
+            if is_compressed and layout.is_normal_map:
+                layout = replace(layout, channels=layout.channels[:2])
         else:
             depth = layout.depth if file_format == "png" else "half"
             write(path, layout.packed(maps), is_color=layout.is_color, depth=depth, is_packed=True)

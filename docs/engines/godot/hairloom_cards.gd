@@ -13,7 +13,7 @@ const Import := preload("hairloom_import.gd")
 ## The cards, or null with an error in the log. Without a sidecar that fits they come in the plain
 ## material of the file; the log says why.
 ##
-## level: shows this one alone, 0 the finest; -1: all, each from the distance at which it takes over.
+## level: shows this one alone, 0 the finest, or the coarsest that there is; -1: all, each from the distance at which it takes over.
 static func load_cards(path: String, level := -1) -> Node3D:
 	var scene := _imported(path)
 	if scene == null:
@@ -24,7 +24,7 @@ static func load_cards(path: String, level := -1) -> Node3D:
 	var names: Array = scene.get_meta(Import.KEY)
 	for number in names.size():
 		var hair: MeshInstance3D = scene.find_child(names[number], true, false)
-		hair.visible = number == level
+		hair.visible = number == mini(level, names.size() - 1)
 		hair.visibility_range_begin = 0.0
 		hair.visibility_range_end = 0.0
 		hair.material_override = HairMaterial.with_values(hair.material_override, {

@@ -103,6 +103,9 @@ static func _values(sidecar: Dictionary, folder: String) -> Dictionary:
 				found[name] = entry
 				values[name + "_texture"] = texture
 				values[name + "_mask"] = _mask(entry)
+	if "tangent" in found:
+		for axis in 3:
+			values["tangent_" + "xyz"[axis]] = _lanes(found["tangent"], axis)
 	values["base_gain"] = found.get("base", {}).get("gain", 1.0)
 	var facing: Dictionary = sidecar["textures"].get("view_compensated_alpha", {})
 	values["facing_range"] = Vector2(facing.get("mean_facing", 0.0), facing.get("min_facing", 0.0))
@@ -122,6 +125,18 @@ static func _mask(entry: Dictionary) -> Vector4:
 	var mask := Vector4.ZERO
 	mask["rgba".find(entry.get("channels", "r")[0])] = 1.0
 	return mask
+
+
+## What a component of a direction is made of, see hair_texel; one that the file has not is 0.
+static func _lanes(entry: Dictionary, axis: int) -> Vector4:
+	var channels: String = entry.get("channels", "rgb")
+	if axis >= channels.length():
+		return Vector4(0.0, 0.0, 0.0, 0.5)
+	var is_inverted: bool = channels[axis] in entry.get("inverted", "")
+	var lanes := Vector4.ZERO
+	lanes["rgb".find(channels[axis])] = -1.0 if is_inverted else 1.0
+	lanes.w = 1.0 if is_inverted else 0.0
+	return lanes
 
 
 ## null, with an error in the log, where there is none.

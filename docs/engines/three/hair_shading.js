@@ -69,6 +69,14 @@ bool hair_level_has(vec2 pixel, vec2 part)
   return threshold >= part.x && threshold < part.y;
 }
 
+// A texel of the tangent map as Hairloom's own packing has it: other packings have its components in other
+// channels, or as 1 minus the value. Each component is made of red, green, blue and 1.
+vec3 hair_texel(vec3 texel, vec4 x, vec4 y, vec4 z)
+{
+  vec4 lanes = vec4(texel, 1.0);
+  return vec3(dot(lanes, x), dot(lanes, y), dot(lanes, z));
+}
+
 // Direction of the strands from a texel of the tangent map.
 vec3 hair_tangent(vec3 texel, vec3 tangent, vec3 normal, float shift_noise)
 {

@@ -37,6 +37,8 @@ export class HairLevels extends THREE.LOD {
     super.copy(source);
     this.crossFade = source.crossFade;
     this.center.copy(source.center);
+    const others = source.children.filter((child) => source.levels.every(({ object }) => object !== child));
+    this.add(...others.map((child) => child.clone())); // joints, to which SkeletonUtils.clone binds the levels
     return this;
   }
 
@@ -330,8 +332,8 @@ async function uniformsOf(sidecar, addressOf, warn) {
   }
   const loaded = (file, promise) =>
     promise.catch(() => {
-      const what = isDDS(file) && !THREE.DefaultLoadingManager.getHandler(file)
-        ? 'three.js has no loader for it; give it one by DefaultLoadingManager.addHandler(/\\.dds$/i, new DDSLoader())'
+      const what = isDDS(file)
+        ? 'three.js cannot read it; export the cards again, with textures as PNG'
         : 'it is missing or cannot be read; copy all files of the export';
       warn(`${file}: ${what}`);
       return null;
@@ -349,6 +351,7 @@ async function uniformsOf(sidecar, addressOf, warn) {
       uniforms[name] = { value: (await loaded(file, tableOf(addressOf(file)))) || plain(0) };
     }),
   ]);
+  for (const axis of [0, 1, 2]) uniforms[`tangent_${'xyz'[axis]}`] = { value: lanesOf(sidecar.textures.tangent, axis) };
   uniforms.base_gain = { value: sidecar.textures.base?.gain ?? 1.0 }; // 8 bits hold no more than 1
   return uniforms;
 }
@@ -357,6 +360,15 @@ async function uniformsOf(sidecar, addressOf, warn) {
 function maskOf(entry) {
   const channel = 'rgba'.indexOf(entry?.channels?.[0] ?? 'r');
   return new THREE.Vector4(...[0, 1, 2, 3].map((lane) => (lane === channel ? 1 : 0)));
+}
+
+// What a component of a direction is made of, see hair_texel; one that the file has not is 0.
+function lanesOf({ channels = 'rgb', inverted = '' } = {}, axis) {
+  const letter = channels[axis];
+  if (!letter) return new THREE.Vector4(0, 0, 0, 0.5);
+  const isInverted = inverted.includes(letter);
+  const lanes = new THREE.Vector4(0, 0, 0, isInverted ? 1 : 0);
+  return lanes.setComponent('rgb'.indexOf(letter), isInverted ? -1 : 1);
 }
 
 function plain(value) {
@@ -373,6 +385,8 @@ async function textureOf({ file, color_space: space }, address, name) {
   const isEXR = /\.exr$/i.test(file);
   const loader = THREE.DefaultLoadingManager.getHandler(file) ?? new (isEXR ? EXRLoader : THREE.TextureLoader)();
   const texture = await loader.loadAsync(address);
+  // what DDSLoader gives for a format that it does not know
+  if (texture.isCompressedTexture && !texture.mipmaps?.length) throw new Error(`${file}: it has no pixels`);
   texture.flipY = isEXR; // glTF counts v from the top of the picture, whose lowest row this loader has first
   texture.colorSpace = space === 'sRGB' && !isEXR ? THREE.SRGBColorSpace : THREE.NoColorSpace;
   if (isEXR) {
@@ -386,7 +400,7 @@ async function textureOf({ file, color_space: space }, address, name) {
 }
 
 async function tableOf(file) {
-  const table = await new EXRLoader().setDataType(THREE.FloatType).loadAsync(file);
+  const table = await new EXRLoader().setDataType(THREE.HalfFloatType).loadAsync(file);
   table.minFilter = table.magFilter = THREE.LinearFilter;
   table.generateMipmaps = false;
   return table;
@@ -446,7 +460,7 @@ uniform vec2 facing_range, part;
 uniform vec4 fibre_root, fibre_tip, fibre_strengths;
 uniform sampler2D base_texture, alpha_texture, shift_texture, noise_texture, tangent_texture;
 uniform sampler2D normal_texture;
-uniform vec4 alpha_mask, shift_mask, noise_mask;
+uniform vec4 alpha_mask, shift_mask, noise_mask, tangent_x, tangent_y, tangent_z;
 uniform sampler2D longitudinal, azimuthal, paths;
 
 in vec2 card_uv;
@@ -476,7 +490,8 @@ HairPlace place() {
   here.shift = 0.5;
   here.sparkle = dot(texture(noise_texture, card_uv), noise_mask);
 #if TANGENT_MAP
-  here.tangent = hair_tangent(texture(tangent_texture, card_uv).xyz, tangent, normal, shift_noise);
+  vec3 texel = hair_texel(texture(tangent_texture, card_uv).xyz, tangent_x, tangent_y, tangent_z);
+  here.tangent = hair_tangent(texel, tangent, normal, shift_noise);
 #else
   here.shift = dot(texture(shift_texture, card_uv), shift_mask);
 #endif

@@ -380,15 +380,15 @@ def _output(entry: dict[str, Any]) -> str:
 
 
 def _texel(name: str, entry: dict[str, Any]) -> str:
-    """A pin with the channels that hold 1 minus the value turned round."""
-    inverted = entry.get("inverted", "")
-    if not inverted:
-        return name
-    channels = entry.get("channels", "r")
+    """The value of a pin, whose channels may be in another order, hold 1 minus the value, or be two
+    of a direction, which lies in the card's plane then."""
+    inverted, channels = entry.get("inverted", ""), entry.get("channels", "r")
     if len(channels) == 1:
-        return f"(1.0 - {name})"
-    mask = ", ".join("1.0" if letter in inverted else "0.0" for letter in channels[:3])
-    return f"lerp({name}, 1.0 - {name}, float3({mask}))"
+        return f"(1.0 - {name})" if inverted else name
+    parts = [f"1.0 - {name}.{each}" if each in inverted else f"{name}.{each}" for each in channels]
+    return (
+        name if channels == "rgb" and not inverted else f"float3({', '.join([*parts, '0.5'][:3])})"
+    )
 
 
 def _hair_color(sidecar: dict[str, Any], along: str, base: str, **inputs: tuple[str, str]) -> Node:

@@ -31,7 +31,8 @@ func _ready() -> void:
 	surroundings.environment.ambient_light_energy = view["ambient"]
 	add_child(surroundings)
 	var output := OS.get_cmdline_user_args()[0]
-	var shown := {"second": _shown(Cards.load_cards(GLB, 1)), "ranges": _ranges(Cards.load_cards(GLB))}
+	var shown := {"second": _shown(Cards.load_cards(GLB, 1)), "beyond": _shown(Cards.load_cards(GLB, 99)),
+			"ranges": _ranges(Cards.load_cards(GLB))}
 	if FileAccess.file_exists(GLB):
 		var document := GLTFDocument.new()
 		var state := GLTFState.new()

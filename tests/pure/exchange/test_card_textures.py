@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -57,12 +58,14 @@ def test_files_hold_what_was_packed(preset: str, file_format: str, tmp_path: Pat
     assert [each.path.name for each in written] == names
     assert sorted(os.listdir(tmp_path)) == sorted(names)
     for file, texture in zip(written, wanted, strict=True):
-        assert file.layout is texture.layout
+        named = len(file.layout.channels)
+        assert file.layout == replace(texture.layout, channels=texture.layout.channels[:named])
         is_coded = texture.layout.is_color and file_format != "exr"
         found = read_texture(file.path, is_color=is_coded)
         count = texture.pixels.shape[2]
         if file_format == "dds" and texture.layout.is_normal_map:
             count = 2
+        assert named == count
         assert found.shape[:2] == SIZE and found.shape[2] >= count
         error = np.abs(found[..., :count] - texture.pixels[..., :count])
         step = STEPS.get(file_format, 0.15)

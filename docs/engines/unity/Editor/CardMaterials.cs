@@ -133,7 +133,11 @@ namespace Hairloom
             material.SetVector("_facing_range", new Vector4(facing.mean_facing, facing.min_facing));
             var hasTangents = sidecar.textures.highlights_by == "tangent" && has("tangent");
             material.SetFloat("_has_tangent_map", hasTangents ? 1.0f : 0.0f);
-            material.SetFloat("_has_normal_map", has("normal") ? 1.0f : 0.0f);
+            var tangent = sidecar.textures.tangent;
+            for (var axis = 0; axis < 3 && has("tangent"); axis++)
+                material.SetVector($"_tangent_{"xyz"[axis]}", tangent.Lanes(axis));
+            var isFlat = has("normal") && sidecar.textures.normal.channels.Length == 2;
+            material.SetFloat("_has_normal_map", !has("normal") ? 0.0f : isFlat ? 2.0f : 1.0f);
             material.SetFloat("_has_shift", has("shift") ? 1.0f : 0.0f);
             material.SetFloat("_model", sidecar.material.model == "marschner" ? 1.0f : 0.0f);
             SetAll(material, "_", sidecar.material.values);

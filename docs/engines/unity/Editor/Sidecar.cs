@@ -124,6 +124,7 @@ namespace Hairloom
     {
         public string file;
         public string channels = "r";
+        public string inverted = "";
         public string color_space;
         public float gain = 1.0f;
 
@@ -133,6 +134,17 @@ namespace Hairloom
             var mask = new Vector4();
             mask[Math.Max("rgba".IndexOf(channels[0]), 0)] = 1.0f;
             return mask;
+        }
+
+        /// What a component of a direction is made of, see hair_texel; one that the file has not is 0.
+        public Vector4 Lanes(int axis)
+        {
+            if (axis >= channels.Length)
+                return new Vector4(0.0f, 0.0f, 0.0f, 0.5f);
+            var isInverted = inverted.IndexOf(channels[axis]) >= 0;
+            var lanes = new Vector4(0.0f, 0.0f, 0.0f, isInverted ? 1.0f : 0.0f);
+            lanes[Math.Max("rgb".IndexOf(channels[axis]), 0)] = isInverted ? -1.0f : 1.0f;
+            return lanes;
         }
     }
 

@@ -80,6 +80,14 @@ bool hair_level_has(float2 pixel, float2 part)
   return threshold >= part.x && threshold < part.y;
 }
 
+// A texel of the tangent map as Hairloom's own packing has it: other packings have its components in other
+// channels, or as 1 minus the value. Each component is made of red, green, blue and 1.
+float3 hair_texel(float3 texel, float4 x, float4 y, float4 z)
+{
+  float4 lanes = float4(texel, 1.0);
+  return float3(dot(lanes, x), dot(lanes, y), dot(lanes, z));
+}
+
 // Direction of the strands from a texel of the tangent map.
 float3 hair_tangent(float3 texel, float3 tangent, float3 normal, float shift_noise)
 {

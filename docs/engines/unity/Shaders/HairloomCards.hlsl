@@ -15,7 +15,7 @@ float _secondary_strength, _secondary_exponent, _secondary_shift;
 float _fake_scattering, _volume_shadow, _base_gain, _has_shift, _has_tangent_map, _has_normal_map;
 float4 _base_color, _tip_color, _primary_color, _secondary_color;
 float4 _fibre_root, _fibre_tip, _fibre_strengths, _facing_range;
-float4 _alpha_mask, _shift_mask, _noise_mask;
+float4 _alpha_mask, _shift_mask, _noise_mask, _tangent_x, _tangent_y, _tangent_z;
 CBUFFER_END
 
 Texture2D _base_texture, _alpha_texture, _shift_texture, _noise_texture, _tangent_texture, _normal_texture;
@@ -109,6 +109,7 @@ HairPlace place_of_hair(CardPoint card, float3 to_eye)
     if (_has_tangent_map > 0.5)
     {
         float3 texel = _tangent_texture.Sample(sampler_tangent_texture, card.uv).xyz;
+        texel = hair_texel(texel, _tangent_x, _tangent_y, _tangent_z);
         here.tangent = hair_tangent(texel, tangent, normal, _shift_noise);
     }
     else if (_has_shift > 0.5)
@@ -117,7 +118,13 @@ HairPlace place_of_hair(CardPoint card, float3 to_eye)
     }
     if (_has_normal_map > 0.5)
     {
-        here.normal = hair_normal(_normal_texture.Sample(sampler_normal_texture, card.uv).xyz, tangent, normal);
+        float3 texel = _normal_texture.Sample(sampler_normal_texture, card.uv).xyz;
+        if (_has_normal_map > 1.5)  // of two channels
+        {
+            float2 aside = 2.0 * texel.xy - 1.0;
+            texel.z = 0.5 + 0.5 * sqrt(saturate(1.0 - dot(aside, aside)));
+        }
+        here.normal = hair_normal(texel, tangent, normal);
     }
     return here;
 }

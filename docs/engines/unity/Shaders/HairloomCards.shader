@@ -38,7 +38,7 @@ Shader "Hairloom/Cards"
         _facing_range ("Mean and Minimum Facing", Vector) = (0, 0, 0, 0)
         [Toggle] _has_shift ("Has Shift Map", Float) = 0
         [Toggle] _has_tangent_map ("Has Tangent Map", Float) = 0
-        [Toggle] _has_normal_map ("Has Normal Map", Float) = 0
+        [Enum(None, 0, Three Channels, 1, Two Channels, 2)] _has_normal_map ("Normal Map", Float) = 0
         [NoScaleOffset] _base_texture ("Base", 2D) = "white" {}
         [NoScaleOffset] _alpha_texture ("Alpha", 2D) = "white" {}
         [NoScaleOffset] _shift_texture ("Shift", 2D) = "grey" {}
@@ -48,6 +48,9 @@ Shader "Hairloom/Cards"
         _alpha_mask ("Channel of Alpha", Vector) = (1, 0, 0, 0)
         _shift_mask ("Channel of Shift", Vector) = (1, 0, 0, 0)
         _noise_mask ("Channel of Noise", Vector) = (1, 0, 0, 0)
+        _tangent_x ("Tangent across, of Red, Green, Blue and 1", Vector) = (1, 0, 0, 0)
+        _tangent_y ("Tangent along", Vector) = (0, 1, 0, 0)
+        _tangent_z ("Tangent out", Vector) = (0, 0, 1, 0)
         [NoScaleOffset] _longitudinal ("Longitudinal", 2D) = "black" {}
         [NoScaleOffset] _azimuthal ("Azimuthal", 2D) = "black" {}
         [NoScaleOffset] _paths ("Paths", 2D) = "black" {}
