@@ -348,5 +348,19 @@ def files_that_list_sections(sections: dict[str, str], addon: Path = ADDON) -> l
     return found
 
 
+def renamed_arguments(addon: Path = ADDON) -> list[str]:
+    """Names under "Args:" that the function has no argument of."""
+    found = []
+    for file in sorted(addon.rglob("*.py")):
+        functions = (node for node in _nodes(file) if isinstance(node, ast.FunctionDef))
+        for function in functions:
+            own = {node.arg for node in ast.walk(function.args) if isinstance(node, ast.arg)}
+            text = (ast.get_docstring(function) or "").partition("\nArgs:\n")[2]
+            for names in re.findall(r"^ {4}(\w+(?:, \w+)*): ", text.partition("\n\n")[0], re.M):
+                unknown = sorted(set(names.split(", ")) - own)
+                found += [f"{file.relative_to(addon)}: {function.name}: {name}" for name in unknown]
+    return found
+
+
 def addon_lines(addon: Path = ADDON) -> int:
     return sum(len(file.read_text(encoding="utf-8").splitlines()) for file in addon.rglob("*.py"))

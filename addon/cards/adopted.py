@@ -61,7 +61,7 @@ def adopt_cards(
         source: with UVs, in the space of the head.
         head: what the hair grows from; without one the higher ends of cards are their roots.
         group: (vertex_count,) of the source's vertices; a card belongs to that of most of them.
-        way: where the UVs of all cards lead from root to tip, or to find it out.
+        direction: where the UVs of all cards lead from root to tip, or to find it out.
         place: names the mesh in messages.
 
     Raises:

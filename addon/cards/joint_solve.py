@@ -44,7 +44,7 @@ def rigid_fits(
         before: (frame_count, 3, 3) turns.
 
     Returns:
-        Turns (frame_count, 3, 3) and ways (frame_count, 3): target = turn point + way.
+        Turns (frame_count, 3, 3) and shifts (frame_count, 3): target = turn point + shift.
     """
     total = max(float(weight.sum()), _SMALLEST)
     middle, goal = weight @ points / total, np.tensordot(weight, targets, 1) / total
@@ -67,7 +67,7 @@ def skinned(points: Floats, skin: Skin, turn: Floats, shift: Floats) -> Floats:
     """Points (n, 3) moved by their joints, (n, frame_count, 3): linear blend skinning.
 
     Args:
-        turn, way: (joint_count, frame_count, 3, 3) and (joint_count, frame_count, 3).
+        turn, shift: (joint_count, frame_count, 3, 3) and (joint_count, frame_count, 3).
     """
     result = np.zeros((len(points), *shift.shape[1:]), shift.dtype)
     for joint in range(len(turn)):
@@ -94,11 +94,11 @@ def first_joints(points: Floats, targets: Floats, skin: Skin, count: int) -> tup
 def move_joints(
     points: Floats, targets: Floats, skin: Skin, turn: Floats, shift: Floats, rounds: int
 ) -> None:
-    """Better `turn` and `way`, in place: joint by joint against what the others leave (eq. 8).
+    """Better `turn` and `shift`, in place: joint by joint against what the others leave (eq. 8).
 
     Args:
         targets: (n, frame_count, 3).
-        turn, way: as of `skinned`.
+        turn, shift: as of `skinned`.
     """
     left = targets - skinned(points, skin, turn, shift)
     count = len(turn)

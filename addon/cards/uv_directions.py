@@ -62,7 +62,7 @@ def uv_axes(
         uv: (triangle_count, 3, 2).
         distance: (triangle_count, 3) from the head [m].
         island: (triangle_count,) numbered from 0 without gaps.
-        way: of all islands, when it is known.
+        direction: of all islands, when it is known.
     """
     if direction != "auto":
         count = int(island.max()) + 1

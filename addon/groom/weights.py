@@ -271,7 +271,8 @@ def likeness(
     """1 for strands that go the same way, 0 for those that diverge, smooth between.
 
     Args:
-        own_way, other_way: (n, k, 6) or (n, k, 0) `directions`, broadcast with each other.
+        own_direction, other_direction: (n, k, 6) or (n, k, 0) `directions`, broadcast with each
+            other.
         parting: the angle from which they diverge [rad]; None: 90 degrees, alike up to 60.
     """
     divergent, alike = _DIVERGENT, _ALIKE

@@ -24,6 +24,7 @@ from house_rules import (
     is_declaration,
     module_name,
     mutable_names,
+    renamed_arguments,
     unused_names,
     violations,
 )
@@ -147,6 +148,13 @@ def test_unused_and_mutable_names_are_seen(tmp_path: Path) -> None:
     )
     assert [each.split()[1] for each in unused_names(tmp_path)] == ["orphan", "other"]
     assert mutable_names(tmp_path / "addon") == ["one.py: _seen", "one.py: total"]
+
+
+def test_docstrings_name_arguments_that_there_are(tmp_path: Path) -> None:
+    assert renamed_arguments() == []
+    text = "Turn.\n\n    Args:\n        a, way: [m].\n        b: x.\n    "
+    (tmp_path / "one.py").write_text(f'def turned(a, *, b):\n    """{text}"""\n')
+    assert renamed_arguments(tmp_path) == ["one.py: turned: way"]
 
 
 def test_importing_the_pure_rooms_needs_no_blender() -> None:
