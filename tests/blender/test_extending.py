@@ -174,6 +174,7 @@ def test_the_places_of_a_force_are_complete() -> None:
     others = {"addon/dynamics/constraints.py", "addon/dynamics/settings.py"}
     others |= {"addon/dynamics/force_fields.py", "addon/blender/scene/forces.py"}  # Blender's
     others |= {"gpu_shaders/lib_force_fields.glsl", "addon/wet_flow.py"}
+    others |= {"addon/dynamics/settle_settings.py"}  # where there is none
     others |= SPRINGS | {"addon/cards/spring_bones.py", "addon/cards/spring_fit.py"}
     assert listed_files("A force or constraint") - others == files_with("drag") - others
 
