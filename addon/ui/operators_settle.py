@@ -12,7 +12,7 @@ from ..dynamics.settle_settings import SettleSettings
 from .drawing import draw_button
 from .long_work import LongWork, Progress, Steps, as_progress, draw_progress
 from .reports import reporting, tell
-from .selection import chosen_hair, in_object_mode, needs_hair
+from .selection import chosen_hair, in_object_mode, needs_hair, once_each
 
 
 class HAIRLOOM_OT_settle(LongWork, bpy.types.Operator):
@@ -30,11 +30,13 @@ class HAIRLOOM_OT_settle(LongWork, bpy.types.Operator):
         return cls.is_free() and in_object_mode(cls, context) and needs_hair(cls, context)
 
     def steps(self, context: bpy.types.Context) -> Steps[None]:
-        settings = settings_of(self, SettleSettings)
-        for hair in chosen_hair(context):
+        settings, depsgraph = settings_of(self, SettleSettings), context.evaluated_depsgraph_get()
+        writes = []
+        for hair in once_each(chosen_hair(context)):
             yield Progress("Reading the hair")
-            depsgraph = context.evaluated_depsgraph_get()
-            tell(self, (yield from as_progress(settle_hair(hair, depsgraph, settings))))
+            writes.append((yield from as_progress(settle_hair(hair, depsgraph, settings))))
+        for write in writes:
+            tell(self, write())
 
 
 class HAIRLOOM_OT_back_to_combed(bpy.types.Operator):

@@ -11,7 +11,7 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty
 
 from ..blender.base.outcome import report
-from ..blender.base.parts import at_once
+from ..blender.base.parts import at_once, together
 from ..blender.preview import previews
 from ..blender.scene.bust_skin import TONES
 from ..blender.scene.particle_hair import convert_particle_hair, hair_systems
@@ -129,7 +129,6 @@ class HAIRLOOM_OT_use_groom(LongWork, bpy.types.Operator):
     bl_idname = "hairloom.use_groom"
     bl_label = "Use Hairloom"
     bl_options = {"REGISTER", "UNDO"}
-    unharmed = "hair that was done by then stays so"
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
@@ -141,20 +140,14 @@ class HAIRLOOM_OT_use_groom(LongWork, bpy.types.Operator):
         return False
 
     def steps(self, context: bpy.types.Context) -> Steps[None]:
-        chosen, taken, problems = preferences(context), [], []
-        grooms = chosen_hair(context)
-        for hair in grooms:
-            yield Progress("Reading the hair")
-            name, depsgraph = hair.name, context.evaluated_depsgraph_get()
-            taking = take_over(hair, depsgraph, chosen_presets(chosen))
-            try:
-                ready, done = yield from in_parts(taking)
-            except HairloomError as error:  # the others are taken all the same
-                problems.append(error)
-                continue
+        chosen = preferences(context)
+        taken, problems = list[bpy.types.Object](), list[HairloomError]()
+        grooms, depsgraph = chosen_hair(context), context.evaluated_depsgraph_get()
+        works = (take_over(hair, depsgraph, chosen_presets(chosen)) for hair in grooms)
+        for hair, done in (yield from in_parts(together(works, problems.append))):
             for one in done:
-                report(self, "INFO", f"{name}: {one}")
-            taken.append(ready)
+                report(self, "INFO", f"{hair.name}: {one}")
+            taken.append(hair)
         for problem in problems[not taken :]:
             report(self, "ERROR", problem)
         if not taken:

@@ -196,6 +196,19 @@ def test_until_its_end_nothing_changes(new_hair, sphere, evaluated):
     assert not COMBED.is_there(hair)
 
 
+def test_of_several_hairs_all_settle_or_none(new_hair, sphere):
+    first, second = new_hair(sphere), new_hair(sphere)
+    combed = curve_points(first.data)
+    second.data.position_data.foreach_set("vector", (combed + np.float32(1.0)).ravel())
+    second.data.update_tag()
+    for hair in (second, first):
+        hair.select_set(True)
+        bpy.context.view_layer.objects.active = hair
+    with pytest.raises(RuntimeError, match=r"roots lie .* m from the head"):
+        bpy.ops.hairloom.settle(seconds=0.2)
+    assert (curve_points(first.data) == combed).all() and not COMBED.is_there(first)
+
+
 @pytest.mark.slow
 def test_modifiers_act_on_what_has_settled(extension):
     """A modifier that curls does so once: the curves themselves keep their points and lengths."""

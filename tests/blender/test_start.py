@@ -6,7 +6,7 @@ import pytest
 from grids import grid_of
 
 from hairloom.addon.blender.base.outcome import past_reports
-from hairloom.addon.blender.base.parts import at_once
+from hairloom.addon.blender.base.parts import at_once, together
 from hairloom.addon.blender.preview import previews, scene_events
 from hairloom.addon.blender.properties.presets import named_preset
 from hairloom.addon.blender.scene import particle_hair
@@ -195,6 +195,15 @@ def test_all_selected_hair_is_taken_and_counted(new_hair, sphere):
         bpy.ops.hairloom.use_groom()
     assert {each.name for each in previews.sessions()} == {each.name for each in hair}
     assert "Hairloom took 2 of 3 grooms" in [each.text for each in past_reports]
+
+
+def test_cancelling_takes_none_of_several_hairs(new_hair, sphere, evaluated):
+    grooms = [new_hair(sphere) for _ in range(2)]
+    work = together(starting.take_over(hair, evaluated(), ("looks/blond",)) for hair in grooms)
+    next(work)
+    work.send(None)  # the second one's part is on its way
+    work.close()
+    assert all(map(starting.is_untouched, grooms))
 
 
 def test_hair_without_curves_and_surface_says_what_to_do():

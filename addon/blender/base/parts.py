@@ -16,6 +16,8 @@ from typing import Any, NamedTuple
 
 import bpy
 
+from ...errors import HairloomError
+
 
 class Part(NamedTuple):
     """title: what it makes, as a person reads it. work: makes it, from arrays alone."""
@@ -42,12 +44,24 @@ def at_once[Result](parts: Parts[Result]) -> Result:
             step = partial(parts.throw, error)
 
 
-def together[Result](works: Iterable[Parts[Result]]) -> Parts[list[Result]]:
+def together[Result](
+    works: Iterable[Parts[Result]], failed: Callable[[HairloomError], None] | None = None
+) -> Parts[list[Result]]:
     """Works of one part each, such as one for each hair: all that may fail or be cancelled is done
-    before any of them writes."""
+    before any of them writes.
+
+    Args:
+        failed: gets the error of each work that cannot be done, and the others are; without it, the
+            first error is raised.
+    """
     begun, results = [], list[Result]()
     for work in works:
-        begun.append((work, (yield next(work))))
+        try:
+            begun.append((work, (yield next(work))))
+        except HairloomError as error:
+            if failed is None:
+                raise
+            failed(error)
     for work, made in begun:
         try:
             work.send(made)

@@ -6,13 +6,13 @@ does so after they have fallen. The combed shape stays with them, as an attribut
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 
 import bpy
 import numpy as np
 
 from ... import rig_flow, settle_flow
-from ...arrays import Floats
+from ...arrays import Bools
 from ...dynamics.colliders import PosedCollider
 from ...dynamics.settings import DynamicsSettings
 from ...dynamics.settle_settings import SettleSettings
@@ -20,6 +20,7 @@ from ...errors import HairloomError
 from ...groom.settings import GuideSettings
 from ...rig_flow import Rig
 from ...shading.ambient_settings import AmbientSettings
+from ...strands import StrandSet
 from ...strands.clean import Cleaned
 from ..base.objects import check_shape_editable
 from ..base.outcome import Outcome
@@ -42,11 +43,12 @@ def is_settled(hair: bpy.types.Object) -> bool:
 
 def settle_hair(
     hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph, settings: SettleSettings
-) -> Generator[float, None, Outcome]:
-    """Let hair fall in the present pose of its body; yields how much is done, 0 to 1.
+) -> Generator[float, None, Callable[[], Outcome]]:
+    """Let hair fall in the present pose of its body; yields how much is done, 0 to 1. Returns what
+    gives the curves their settled shape: nothing changes before that is called.
 
-    Nothing changes before the end. Hair that has settled, and has not been combed since, falls from
-    its combed shape again, so that other settings can be tried.
+    Hair that has settled, and has not been combed since, falls from its combed shape again, so that
+    other settings can be tried.
 
     Raises:
         HairloomError: no hair that can be used, it is linked from another file, its roots are away
@@ -72,7 +74,26 @@ def settle_hair(
     fallen = yield from settle_flow.settle(rig, pose, posed, dynamics, settings, gravity, painted)
     head = solid_of(rig.head)
     settled, is_out = settle_flow.as_curves(own.strands, rig, fallen, head)
-    _store(hair, own, settled.points, depsgraph)
+    return lambda: _stored(hair, own, settled, is_out, warnings, depsgraph)
+
+
+def _stored(
+    hair: bpy.types.Object,
+    own: Cleaned,
+    settled: StrandSet,
+    is_out: Bools,
+    warnings: tuple[str, ...],
+    depsgraph: bpy.types.Depsgraph,
+) -> Outcome:
+    """Write the settled shape, and keep the combed one; hair that settles a second time without
+    having been combed keeps the first.
+
+    Args:
+        is_out: (strand_count,) whether each has come out of the surface.
+    """
+    COMBED.keep(hair)
+    write_own_curves(hair, own, settled.points, depsgraph)
+    COMBED.seal(hair)
     warnings += carry_whole_weight(hair)
     lost = int((~is_out).sum())
     if lost:
@@ -128,13 +149,3 @@ def _colliders(
     roots, head = rig.root_vertices, source.head
     obstacles = Obstacles.of(hair, head, rig.head, dynamics, depsgraph, None, roots)
     return obstacles.rest(depsgraph), (*source.warnings, *obstacles.warnings)
-
-
-def _store(
-    hair: bpy.types.Object, own: Cleaned, settled: Floats, depsgraph: bpy.types.Depsgraph
-) -> None:
-    """Write the settled shape (point_count, 3), world space, and keep the combed one; hair that
-    settles a second time without having been combed keeps the first."""
-    COMBED.keep(hair)
-    write_own_curves(hair, own, settled, depsgraph)
-    COMBED.seal(hair)

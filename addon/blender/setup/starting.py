@@ -13,7 +13,7 @@ from ...groom.settings import GrowSettings
 from ...shading.coat import coated
 from ...shading.settings import ShadingSettings
 from ..base.objects import head_of, link_into
-from ..base.parts import Parts
+from ..base.parts import Part, Parts
 from ..properties.presets import apply, named_preset
 from ..properties.properties import settings_of
 from ..scene.curves import read_curves
@@ -139,8 +139,10 @@ def take_over(
     if not len(hair.data.curves) and not read_curves(hair, depsgraph).strands.strand_count:
         hair, factor = yield from _grown_in_place(hair, depsgraph)
         done.append("grew hair, since there was none")
-    elif mute_own_dynamics(hair):
-        done.append("turned off Blender's Hair Dynamics")
+    else:
+        yield Part("Reading the hair", lambda: None)  # before which nothing changes
+        if mute_own_dynamics(hair):
+            done.append("turned off Blender's Hair Dynamics")
     if is_untouched(hair):
         dress(hair, presets)
         fit_motion(hair, factor)
