@@ -10,15 +10,17 @@ from ..blender.base.parts import together
 from ..blender.properties.groups import operator_properties
 from ..blender.properties.properties import settings_of
 from ..blender.scene.drawn_lines import chosen_or_new_lines
+from ..blender.scene.kept_shape import BEFORE_FLOW
 from ..blender.scene.own_collections import put_into, take_out
 from ..blender.scene.strokes import KIND, SETTING, strokes_of
-from ..blender.sessions.flow import BEFORE_FLOW, comb_flow, take_flow_back
+from ..blender.sessions.flow import comb_flow
 from ..groom.flow_settings import FlowSettings
 from .drawing import draw_button
 from .long_work import LongWork, Steps, draw_progress, in_parts
 from .object_lists import draw_objects
 from .reports import reporting, tell
 from .selection import chosen_hair, in_object_mode, needs_hair, once_each
+from .take_back import TakesBack
 
 
 class HAIRLOOM_OT_add_stroke(bpy.types.Operator):
@@ -94,28 +96,16 @@ class HAIRLOOM_OT_comb_flow(LongWork, bpy.types.Operator):
             tell(self, outcome)
 
 
-class HAIRLOOM_OT_take_flow_back(bpy.types.Operator):
-    """Give the selected hair the shape that it had before it was combed along strokes"""
+class HAIRLOOM_OT_take_flow_back(TakesBack, bpy.types.Operator):
+    """Give the selected hair the shape that it had before it was combed along strokes. What was
+    combed otherwise, settled or trimmed since is lost"""
 
     bl_idname = "hairloom.take_flow_back"
     bl_label = "Take Flow Back"
     bl_options = {"REGISTER", "UNDO"}
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        if not (in_object_mode(cls, context) and needs_hair(cls, context)):
-            return False
-        if any(map(BEFORE_FLOW.is_there, chosen_hair(context))):
-            return True
-        cls.poll_message_set("The selected hair does not follow strokes: press Comb Along Flow")
-        return False
-
-    @reporting
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        for hair in filter(BEFORE_FLOW.is_there, chosen_hair(context)):
-            take_flow_back(hair)
-            report(self, "INFO", f"{hair.name} is as it was before it followed strokes")
-        return {"FINISHED"}
+    shape = BEFORE_FLOW
+    idle = "The selected hair does not follow strokes: press Comb Along Flow"
+    before = "followed strokes"
 
 
 def draw_flow(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import bpy
 
-from ..blender.base.outcome import report
 from ..blender.properties.groups import operator_properties
 from ..blender.properties.properties import settings_of
-from ..blender.sessions.settling import back_to_combed, is_settled, settle_hair
+from ..blender.scene.kept_shape import COMBED
+from ..blender.sessions.settling import settle_hair
 from ..dynamics.settle_settings import SettleSettings
 from .drawing import draw_button
 from .long_work import LongWork, Progress, Steps, as_progress, draw_progress
-from .reports import reporting, tell
+from .reports import tell
 from .selection import chosen_hair, in_object_mode, needs_hair, once_each
+from .take_back import TakesBack
 
 
 class HAIRLOOM_OT_settle(LongWork, bpy.types.Operator):
@@ -39,28 +40,16 @@ class HAIRLOOM_OT_settle(LongWork, bpy.types.Operator):
             tell(self, write())
 
 
-class HAIRLOOM_OT_back_to_combed(bpy.types.Operator):
-    """Give the selected hair the shape that it had before it settled"""
+class HAIRLOOM_OT_back_to_combed(TakesBack, bpy.types.Operator):
+    """Give the selected hair the shape that it had before it settled. What was combed or trimmed
+    since is lost"""
 
     bl_idname = "hairloom.back_to_combed"
     bl_label = "Back to Combed"
     bl_options = {"REGISTER", "UNDO"}
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        if not (in_object_mode(cls, context) and needs_hair(cls, context)):
-            return False
-        if any(map(is_settled, chosen_hair(context))):
-            return True
-        cls.poll_message_set("The selected hair has not settled: press Settle first")
-        return False
-
-    @reporting
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        for hair in filter(is_settled, chosen_hair(context)):
-            back_to_combed(hair)
-            report(self, "INFO", f"{hair.name} is as it was combed")
-        return {"FINISHED"}
+    shape = COMBED
+    idle = "The selected hair has not settled: press Settle first"
+    before = "settled"
 
 
 def draw_settle(layout: bpy.types.UILayout) -> None:

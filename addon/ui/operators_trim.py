@@ -5,16 +5,17 @@ from __future__ import annotations
 import bpy
 from bpy.props import StringProperty
 
-from ..blender.base.outcome import report
 from ..blender.base.parts import together
+from ..blender.scene.kept_shape import BEFORE_TRIM
 from ..blender.scene.own_collections import put_into, take_out
 from ..blender.scene.trim_shapes import KIND, SETTING, may_trim, read_shape, trim_shapes_of
-from ..blender.sessions.trimming import BEFORE_TRIM, take_trim_back, trim_to_shapes
+from ..blender.sessions.trimming import trim_to_shapes
 from .drawing import draw_button
 from .long_work import LongWork, Steps, draw_progress, in_parts
 from .object_lists import draw_objects
 from .reports import reporting, tell
 from .selection import chosen_hair, in_object_mode, needs_hair, once_each
+from .take_back import TakesBack
 
 
 class HAIRLOOM_OT_trim_to_shape(LongWork, bpy.types.Operator):
@@ -75,28 +76,16 @@ class HAIRLOOM_OT_remove_trim_shape(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class HAIRLOOM_OT_take_trim_back(bpy.types.Operator):
-    """Give the selected hair the lengths that it had before it was trimmed"""
+class HAIRLOOM_OT_take_trim_back(TakesBack, bpy.types.Operator):
+    """Give the selected hair the shape that it had before it was trimmed. What was combed or
+    settled since is lost"""
 
     bl_idname = "hairloom.take_trim_back"
     bl_label = "Take Trim Back"
     bl_options = {"REGISTER", "UNDO"}
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        if not (in_object_mode(cls, context) and needs_hair(cls, context)):
-            return False
-        if any(map(BEFORE_TRIM.is_there, chosen_hair(context))):
-            return True
-        cls.poll_message_set("The selected hair is not trimmed: press Trim to Shape")
-        return False
-
-    @reporting
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        for hair in filter(BEFORE_TRIM.is_there, chosen_hair(context)):
-            take_trim_back(hair)
-            report(self, "INFO", f"{hair.name} is as long as before it was trimmed")
-        return {"FINISHED"}
+    shape = BEFORE_TRIM
+    idle = "The selected hair is not trimmed: press Trim to Shape"
+    before = "was trimmed"
 
 
 def _chosen(hair: bpy.types.Object, context: bpy.types.Context) -> list[bpy.types.Object]:

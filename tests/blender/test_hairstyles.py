@@ -21,8 +21,8 @@ from hairloom.addon.blender.properties.presets import named_preset
 from hairloom.addon.blender.scene import hair_nodes
 from hairloom.addon.blender.scene.carried_weight import carry_whole_weight
 from hairloom.addon.blender.scene.curves import curve_points, put_points, read_curves
+from hairloom.addon.blender.scene.kept_shape import COMBED
 from hairloom.addon.blender.scene.surfaces import read_surface
-from hairloom.addon.blender.sessions.settling import COMBED, is_settled
 from hairloom.addon.blender.setup import hairstyles
 from hairloom.addon.blender.setup.hairstyles import (
     add_hairstyle,
@@ -248,12 +248,12 @@ def test_hair_that_is_fitted_again_is_as_it_was_added(head: bpy.types.Object) ->
     COMBED.keep(hair)
     put_points(hair.data, added_points * np.float32(1.05))
     COMBED.seal(hair)
-    assert carry_whole_weight(hair) and is_settled(hair)
+    assert carry_whole_weight(hair) and COMBED.is_there(hair)
     bpy.context.view_layer.objects.active = hair
     assert bpy.ops.hairloom.fit_again() == {"FINISHED"}
     assert curve_points(hair.data) == pytest.approx(added_points, abs=1e-5)
     assert read_attribute(hair.data, "radius", "POINT") == pytest.approx(radius, rel=1e-3)
-    assert not is_settled(hair) and hair.hairloom.dynamics.sag_compensation == 0.5
+    assert not COMBED.is_there(hair) and hair.hairloom.dynamics.sag_compensation == 0.5
 
 
 def test_empty_masks_are_refused(head: bpy.types.Object) -> None:

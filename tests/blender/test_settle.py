@@ -5,10 +5,12 @@ import numpy as np
 import pytest
 from tiers import few_in_commits
 
+from hairloom.addon.blender.base.outcome import past_reports
 from hairloom.addon.blender.command_line import command_line
 from hairloom.addon.blender.preview import previews
 from hairloom.addon.blender.scene.curves import curve_offsets, curve_points
-from hairloom.addon.blender.sessions.settling import COMBED, settle_hair
+from hairloom.addon.blender.scene.kept_shape import BEFORE_TRIM, COMBED
+from hairloom.addon.blender.sessions.settling import settle_hair
 from hairloom.addon.dynamics.settle_settings import SettleSettings
 from hairloom.addon.strands import StrandSet
 
@@ -183,6 +185,50 @@ def test_curves_drawn_since_and_curves_that_cannot_be_used_stay_as_they_are(new_
     back = curve_points(hair.data)
     assert (back[-3:] == now[-3:]).all()
     assert (back[:-3] == combed).all()
+
+
+def trim(hair):
+    plane = bpy.data.objects.new("Plane", None)
+    bpy.context.collection.objects.link(plane)
+    plane.location.z = -0.12
+    plane.select_set(True)
+    hair.select_set(True)
+    bpy.context.view_layer.objects.active = hair
+    bpy.context.view_layer.update()
+    assert bpy.ops.hairloom.trim_to_shape() == {"FINISHED"}
+    plane.select_set(False)
+
+
+@pytest.mark.parametrize("order", ["settle, trim", "trim, settle"])
+def test_what_is_taken_back_takes_later_tools_along(order, new_hair, sphere):
+    """And no earlier ones: hair that has settled first still has, once its trim is taken back."""
+    past_reports.clear()
+    hair = new_hair(sphere)
+    hair.hairloom.dynamics.sag_compensation = 0.5
+    shapes = [curve_points(hair.data)]
+    for tool in order.split(", "):
+        trim(hair) if tool == "trim" else settle(seconds=0.2)
+        shapes.append(curve_points(hair.data))
+    first, second = (
+        {"settle": "back_to_combed", "trim": "take_trim_back"}[tool] for tool in order.split(", ")
+    )
+    twin = hair.copy()
+    twin.data = hair.data.copy()
+    bpy.context.collection.objects.link(twin)
+    twin.select_set(False)
+    getattr(bpy.ops.hairloom, first)()
+    assert (curve_points(hair.data) == shapes[0]).all()
+    assert not COMBED.is_there(hair) and not BEFORE_TRIM.is_there(hair)
+    assert hair.hairloom.dynamics.sag_compensation == 0.5
+    assert len([each for each in past_reports if "is gone too" in each.text]) == 1
+    hair.select_set(False)
+    twin.select_set(True)
+    bpy.context.view_layer.objects.active = twin
+    getattr(bpy.ops.hairloom, second)()
+    assert (curve_points(twin.data) == shapes[1]).all()
+    assert COMBED.is_there(twin) is (second == "take_trim_back")
+    assert twin.hairloom.dynamics.sag_compensation == (0.5 if second == "back_to_combed" else 1.0)
+    assert len([each for each in past_reports if "is gone too" in each.text]) == 1
 
 
 def test_until_its_end_nothing_changes(new_hair, sphere, evaluated):

@@ -15,7 +15,7 @@ from overriding import overridden
 from hairloom.addon.blender.base.parts import Part, at_once, together
 from hairloom.addon.blender.colliders import ties
 from hairloom.addon.blender.scene.curves import curve_points, put_points
-from hairloom.addon.blender.sessions.settling import COMBED
+from hairloom.addon.blender.scene.kept_shape import COMBED
 from hairloom.addon.ui import (
     operators_colliders,
     operators_export_check,

@@ -1,4 +1,4 @@
-"""A shape that curves had, kept in an attribute of their points: a tool can be taken back."""
+"""Shapes that curves had, kept in attributes of their points: a tool can be taken back."""
 
 from __future__ import annotations
 
@@ -9,8 +9,14 @@ import bpy
 import numpy as np
 
 from ...arrays import Bools, Floats
+from ...errors import HairloomError
 from ..base.attributes import read_attribute, set_attribute
+from ..base.objects import check_shape_editable
+from .carried_weight import carry_as_before
 from .curves import curve_offsets, curve_points, put_points
+
+#: custom property of the curves: the attributes of their kept shapes, in the order of time
+_ORDER = "hairloom_kept"
 
 
 @dataclass(frozen=True)
@@ -19,10 +25,12 @@ class KeptShape:
 
     attribute: of the points: where they were, object space [m].
     done: custom property of the curves: a digest of what the tool made of them.
+    tool: its button.
     """
 
     attribute: str
     done: str
+    tool: str
 
     def is_there(self, hair: bpy.types.Object) -> bool:
         """Whether there is a shape to go back to."""
@@ -41,25 +49,54 @@ class KeptShape:
         goes back to the shape from before both times."""
         if self.before(hair) is None:
             set_attribute(hair.data, self.attribute, "POINT", curve_points(hair.data))
+            others = (each for each in _in_order(hair.data) if each != self.attribute)
+            hair.data[_ORDER] = " ".join((*others, self.attribute))
 
     def seal(self, hair: bpy.types.Object) -> None:
         """The tool has changed the curves."""
         hair.data[self.done] = _digest(curve_points(hair.data))
 
     def back(self, hair: bpy.types.Object) -> bool:
-        """Give curves their kept shape, and those that were drawn since none; whether there was
-        one."""
-        curves = hair.data
+        """Give curves their kept shape; those that were drawn since stay as they are. What other
+        tools have kept since then goes, as it is later than what the curves are now.
+
+        Returns whether anything has changed the curves since the tool, which is gone now.
+
+        Raises:
+            HairloomError: there is no such shape, or it is linked from another file.
+        """
+        check_shape_editable(hair)
+        curves, is_changed = hair.data, self.before(hair) is None
         kept = read_attribute(curves, self.attribute, "POINT", 3)
         if kept is None:
-            return False
+            raise HairloomError(
+                "there is no shape to go back to",
+                place=hair.name,
+                remedy=f"Press {self.tool} first",
+            )
         points, offsets = curve_points(curves), curve_offsets(curves)
         is_known = np.repeat(_have_extent(kept, offsets), np.diff(offsets))
         points[is_known] = kept[is_known]
         put_points(curves, points)
-        curves.attributes.remove(curves.attributes[self.attribute])
-        curves.pop(self.done, None)
-        return True
+        order = _in_order(curves)
+        place = order.index(self.attribute) if self.attribute in order else len(order)
+        for name in {self.attribute, *order[place:]}.intersection(curves.attributes.keys()):
+            curves.attributes.remove(curves.attributes[name])
+        curves[_ORDER] = " ".join(order[:place])
+        if not COMBED.is_there(hair):
+            carry_as_before(hair)
+        return is_changed
+
+
+COMBED = KeptShape("hairloom_combed", "hairloom_settled", "Settle")
+BEFORE_TRIM = KeptShape("hairloom_before_trim", "hairloom_trimmed", "Trim to Shape")
+BEFORE_FLOW = KeptShape("hairloom_before_flow", "hairloom_flowed", "Comb Along Flow")
+KEPT_SHAPES = (COMBED, BEFORE_TRIM, BEFORE_FLOW)
+
+
+def _in_order(curves: bpy.types.Curves) -> list[str]:
+    """The attributes with kept shapes, the latest last."""
+    return str(curves.get(_ORDER, "")).split()
 
 
 def _digest(points: Floats) -> str:

@@ -7,14 +7,11 @@ import bpy
 from ...errors import HairloomError
 from ...groom.flow import combed_along
 from ...groom.flow_settings import FlowSettings
-from ..base.objects import check_shape_editable
 from ..base.outcome import Outcome
 from ..base.parts import Parts
-from ..scene.kept_shape import KeptShape
+from ..scene.kept_shape import BEFORE_FLOW
 from ..scene.strokes import read_strokes
 from .combing import comb, surface_to_comb_on
-
-BEFORE_FLOW = KeptShape("hairloom_before_flow", "hairloom_flowed")
 
 
 def comb_flow(
@@ -46,18 +43,3 @@ def comb_flow(
     )
     result = f"{hair.name}: {done.changed:,} of {done.all:,} curves follow its strokes"
     return Outcome(result, done.dropped, unusable)
-
-
-def take_flow_back(hair: bpy.types.Object) -> None:
-    """Give curves the shape that they had before they followed strokes.
-
-    Raises:
-        HairloomError: there is no such shape, or it is linked from another file.
-    """
-    check_shape_editable(hair)
-    if not BEFORE_FLOW.back(hair):
-        raise HairloomError(
-            "it has not been combed along strokes, so there is no shape to go back to",
-            place=hair.name,
-            remedy="Press Comb Along Flow first",
-        )

@@ -19,16 +19,14 @@ from ..base.parts import Part, Parts
 from ..colliders.fields import solid_of
 from ..scene.curves import curve_offsets, curve_points, put_points, read_own_curves
 from ..scene.groom_attributes import CLOSEST_GUIDES, STRAND_ID
+from ..scene.kept_shape import KEPT_SHAPES
 from .combing import surface_to_comb_on
-from .flow import BEFORE_FLOW
-from .settling import COMBED
-from .trimming import BEFORE_TRIM
 
 #: attributes of points that are places in object space, beside the position
 _PLACES = (
     "handle_left",
     "handle_right",
-    *(shape.attribute for shape in (BEFORE_FLOW, BEFORE_TRIM, COMBED)),
+    *(shape.attribute for shape in KEPT_SHAPES),
 )
 
 
@@ -61,6 +59,7 @@ def mirror_hair(
         lambda: _led_out(mirrored(own.strands.take(source), surface, across), surface),
     )
     replaced = own.kept[side < 0]
+    unchanged = [shape for shape in KEPT_SHAPES if shape.before(hair) is not None]
     hair_frame = matrix_of(hair, depsgraph)
     to_own = np.linalg.inv(hair_frame)
     _replace(
@@ -71,6 +70,8 @@ def mirror_hair(
         to_own,
         to_own @ across @ hair_frame,
     )
+    for shape in unchanged:  # what is kept is mirrored too
+        shape.seal(hair)
     middle = int((side == 0).sum())
     result = f"{hair.name}: {len(source):,} curves mirrored, {len(replaced):,} replaced"
     if middle:

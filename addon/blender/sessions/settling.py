@@ -26,19 +26,12 @@ from ..base.objects import check_shape_editable
 from ..base.outcome import Outcome
 from ..colliders.fields import solid_of
 from ..colliders.obstacles import Obstacles
-from ..scene.carried_weight import carry_as_before, carry_whole_weight
+from ..scene.carried_weight import carry_whole_weight
 from ..scene.curves import read_own_curves, write_own_curves
 from ..scene.forces import gravity_of
-from ..scene.kept_shape import KeptShape
+from ..scene.kept_shape import COMBED
 from .groom_source import GroomSource
 from .prepared_groom import PreparedGroom
-
-COMBED = KeptShape("hairloom_combed", "hairloom_settled")
-
-
-def is_settled(hair: bpy.types.Object) -> bool:
-    """Whether there is a combed shape to go back to."""
-    return COMBED.is_there(hair)
 
 
 def settle_hair(
@@ -106,22 +99,6 @@ def _stored(
         f"{100.0 * float(np.median(moved_by)):.1f} cm"
     )
     return Outcome(result, own.dropped, warnings)
-
-
-def back_to_combed(hair: bpy.types.Object) -> None:
-    """Give curves the shape that they had before they settled; those drawn since stay as they are.
-
-    Raises:
-        HairloomError: there is no such shape, or it is linked from another file.
-    """
-    check_shape_editable(hair)
-    if not COMBED.back(hair):
-        raise HairloomError(
-            "it has not settled, so there is no combed shape to go back to",
-            place=hair.name,
-            remedy="Press Settle first",
-        )
-    carry_as_before(hair)
 
 
 def _check_roots(hair: bpy.types.Object, rig: Rig) -> None:

@@ -12,10 +12,8 @@ from ..base.objects import check_shape_editable
 from ..base.outcome import Outcome
 from ..base.parts import Part, Parts
 from ..scene.curves import read_own_curves, write_own_curves
-from ..scene.kept_shape import KeptShape
+from ..scene.kept_shape import BEFORE_TRIM
 from ..scene.trim_shapes import read_shapes, trim_shapes_of
-
-BEFORE_TRIM = KeptShape("hairloom_before_trim", "hairloom_trimmed")
 
 
 def trim_to_shapes(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Parts[Outcome]:
@@ -46,18 +44,3 @@ def trim_to_shapes(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Pa
     if outside:
         result += f", {outside:,} of them with roots outside"
     return Outcome(result, own.dropped, unusable)
-
-
-def take_trim_back(hair: bpy.types.Object) -> None:
-    """Give curves the shape that they had before they were trimmed.
-
-    Raises:
-        HairloomError: there is no such shape, or it is linked from another file.
-    """
-    check_shape_editable(hair)
-    if not BEFORE_TRIM.back(hair):
-        raise HairloomError(
-            "it has not been trimmed, so there is no shape to go back to",
-            place=hair.name,
-            remedy="Press Trim to Shape first",
-        )
