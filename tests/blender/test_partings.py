@@ -3,6 +3,7 @@
 import bpy
 import numpy as np
 import pytest
+from mathutils import Matrix
 
 from hairloom.addon.blender.bakes.groom_hashes import groom_rig_hash
 from hairloom.addon.blender.command_line import command_line
@@ -10,7 +11,7 @@ from hairloom.addon.blender.engine import engine_hair
 from hairloom.addon.blender.preview import previews
 from hairloom.addon.blender.properties.groom_settings import GroomSettings
 from hairloom.addon.blender.scene.curves import curve_points
-from hairloom.addon.blender.scene.drawn_lines import pieces_of
+from hairloom.addon.blender.scene.drawn_lines import new_line, pieces_of
 from hairloom.addon.blender.scene.partings import partings_of
 from hairloom.addon.strands import StrandSet
 
@@ -233,3 +234,28 @@ def test_a_render_after_a_parting_has_moved_has_other_children(hair, evaluated):
     after = engine_hair.read_groom(hair, evaluated())
     assert not np.array_equal(after.points, before.points)
     engine_hair.forget()
+
+
+@pytest.mark.parametrize("data", ["Y up", "Z up"])
+def test_a_new_line_goes_with_its_head(data, new_hair):
+    """The same line on a head whose data have Y up, in centimetres; and one that turns with a head
+    which looks to the side."""
+    turn = Matrix.Rotation(0.5 * np.pi, 4, "X") @ Matrix.Scale(0.01, 4)
+    if data == "Z up":
+        turn = Matrix.Rotation(0.5 * np.pi, 4, "Z")
+    lines = []
+    for matrix in (Matrix.Identity(4), turn):
+        bpy.ops.mesh.primitive_uv_sphere_add(radius=0.1)
+        head = bpy.context.object
+        head.data.transform(Matrix.Diagonal((0.8, 1.0, 1.3, 1.0)))
+        if data == "Y up":
+            head.data.transform(matrix.inverted())
+        head.matrix_world = matrix
+        bpy.context.view_layer.update()
+        line = new_line(new_hair(head), "Line", bpy.context)
+        lines.append(pieces_of(line, bpy.context.evaluated_depsgraph_get()))
+    upright, other = lines
+    assert upright[..., 2].min() > 0.05 and upright[0, 0, 1] < upright[-1, 1, 1]
+    if data == "Z up":
+        upright = upright @ np.array(turn.to_3x3()).T
+    assert other == pytest.approx(upright, abs=1e-5)

@@ -121,12 +121,17 @@ def new_line(hair: bpy.types.Object, name: str, context: bpy.types.Context) -> b
     head = head_of(hair)
     if head is None:
         raise _no_surface(hair)
-    evaluated = head.evaluated_get(context.evaluated_depsgraph_get())
+    depsgraph = context.evaluated_depsgraph_get()
+    evaluated = head.evaluated_get(depsgraph)
     low, high = np.array(evaluated.bound_box)[[0, 6]]
-    points = []
+    # heads look along -Y; where the object stands on its Y, as from other programs, along Z
+    has_y_up = _points_up(matrix_of(head, depsgraph)).argmax() == 1
+    depth, up, front, back = (2, 1, high, low) if has_y_up else (1, 2, low, high)
+    points, above, down = [], 0.5 * (low + high), np.zeros(3)
+    above[up], down[up] = 2.0 * high[up] - low[up], -1.0
     for part in np.linspace(_FRONT, _BACK, _POINTS):
-        above = (0.5 * (low[0] + high[0]), low[1] + part * (high[1] - low[1]), high[2] + 1.0)
-        is_hit, place, _, _ = evaluated.ray_cast(above, (0.0, 0.0, -1.0))
+        above[depth] = front[depth] + part * (back[depth] - front[depth])
+        is_hit, place, _, _ = evaluated.ray_cast(above, down)
         if is_hit:
             points.append(place)
     if len(points) < 2:
@@ -148,6 +153,12 @@ def new_line(hair: bpy.types.Object, name: str, context: bpy.types.Context) -> b
     line.parent = head
     context.view_layer.update()
     return line
+
+
+def _points_up(matrix: Floats) -> Floats:
+    """How far each axis (3,) of an object points up in the world, -1 to 1."""
+    up: Floats = matrix[2, :3] / np.maximum(np.linalg.norm(matrix[:3, :3], axis=0), 1e-30)
+    return up
 
 
 def chosen_or_new_lines(
