@@ -112,7 +112,10 @@ class StrandExportOperator(LongWork, ExportHelper):
 
     def steps(self: Any, context: bpy.types.Context) -> Steps[None]:
         export_check.end()
-        for path, plan in self._plans(context):
+        plans = self._plans(context)
+        for done, (path, plan) in enumerate(plans):
+            if done:
+                self.unharmed = f"{done:,} of {len(plans):,} files are written"
             if plan.frames is None:
                 tell(self, plan.write(path))
             else:

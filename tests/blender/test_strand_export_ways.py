@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import bpy
@@ -13,12 +14,14 @@ import pytest
 from strand_files import curves_of, hedgehog, needs_usd, straight
 from tfxbone_reader import read_tfxbone
 
+from hairloom.addon.blender.base.outcome import Outcome
 from hairloom.addon.blender.scene.curves import write_curves
 from hairloom.addon.blender.scene.groom_attributes import store_groom
 from hairloom.addon.blender.strands.read_hair import ExportRequest, still_hair
 from hairloom.addon.exchange.groom import Groom
 from hairloom.addon.exchange.hair_file import read_hair_file
 from hairloom.addon.exchange.tressfx import read_tfx
+from hairloom.addon.ui.strand_export import StrandExportOperator
 
 
 @pytest.fixture
@@ -278,3 +281,17 @@ def test_what_is_written_comes_in_again(
         np.testing.assert_array_equal(after.strands.group, before.strands.group)
         np.testing.assert_array_equal(after.strand_id, before.strand_id)
         assert dict(after.group_names) == dict(before.group_names)
+
+
+def test_esc_says_how_many_of_several_files_are_written() -> None:
+    """It is pressed as the frames of the second begin."""
+    still = SimpleNamespace(frames=None, write=lambda path: Outcome(f"Wrote {path}", {}))
+    moving = SimpleNamespace(frames=range(2), frame_count=2)
+    plans = [(Path("a.abc"), still), (Path("b.abc"), moving)]
+    operator = SimpleNamespace(
+        _plans=lambda _: plans, bl_idname="", bl_label="", report=lambda *_: None
+    )
+    steps = StrandExportOperator.steps(operator, bpy.context)
+    assert next(steps).text == "0 of 2 frames"
+    steps.close()
+    assert operator.unharmed == "1 of 2 files are written"
