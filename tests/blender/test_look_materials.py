@@ -97,3 +97,34 @@ def test_what_is_set_together_is_one_change(hair):
     finally:
         changed.unsubscribe(*listener)
     assert told == [hair.data, hair.data]
+
+
+def test_a_duplicate_follows_its_own_look(hair):
+    """Blender gives it the same material."""
+    hair.data.hairloom.shading.melanin = 0.2
+    twin = hair.copy()
+    twin.data = hair.data.copy()
+    bpy.context.collection.objects.link(twin)
+    assert twin.data.materials[0] == hair.data.materials[0]
+    for each in (hair, twin):
+        look = each.data.hairloom.shading
+        look.color_variation = look.tip_tint = look.grey_fraction = 0.0
+    twin.data.hairloom.shading.melanin = 0.8
+    assert (melanin(hair), melanin(twin)) == pytest.approx((0.2, 0.8))
+    hair.data.hairloom.shading.melanin = 0.4
+    assert (melanin(hair), melanin(twin)) == pytest.approx((0.4, 0.8))
+
+
+@pytest.mark.parametrize("also", ["a fake user", "a baked copy"])
+def test_hair_whose_material_nobody_else_has_keeps_it(also, hair):
+    material = hair.data.materials[0]
+    if also == "a fake user":
+        material.use_fake_user = True
+    else:
+        copy = bpy.data.objects.new("Baked", bpy.data.hair_curves.new("Baked"))
+        copy.data.materials.append(material)
+        hair.hairloom.bake.copy = copy
+    look = hair.data.hairloom.shading
+    look.color_variation = look.tip_tint = look.grey_fraction = 0.0
+    look.melanin = 0.8
+    assert hair.data.materials[0] == material and melanin(hair) == pytest.approx(0.8)

@@ -56,7 +56,7 @@ def put_look_material(
         the material, and notes on what of the look it does not have.
     """
     has_colors = put_colors(curves, shading, painted)
-    slots, material = curves.materials, look_material(curves)
+    slots, material = curves.materials, _own_material(curves)
     if material is None:
         material = bpy.data.materials.new(f"{curves.name} Look")
         material[_MARK] = True
@@ -121,7 +121,29 @@ def _digest(value: object) -> str:
 def look_material(curves: bpy.types.Curves) -> bpy.types.Material | None:
     """The material of an earlier look that the curves have."""
     marked = (each for each in curves.materials if each is not None and _MARK in each)
-    return next((each for each in marked if each.is_editable and each.users == 1), None)
+    return next((each for each in marked if each.is_editable), None)
+
+
+def _own_material(curves: bpy.types.Curves) -> bpy.types.Material | None:
+    """The same; a copy for these curves where others have it too, such as those of a duplicate,
+    whose look is another one. What renders show of a bake goes with its hair."""
+    material = look_material(curves)
+    if material is None or material.users - material.use_fake_user == 1:
+        return material
+    users = bpy.data.user_map(subset=[material])[material]
+    baked = {
+        obj.hairloom.bake.copy.data
+        for obj in bpy.data.objects
+        if obj.data == curves and obj.hairloom.bake.copy is not None
+    }
+    if users <= {curves, *baked}:
+        return material
+    own = material.copy()
+    for each in (curves, *baked):
+        for number, other in enumerate(each.materials):
+            if other == material:
+                each.materials[number] = own
+    return own
 
 
 def _copy_colors(curves: bpy.types.Curves) -> None:
