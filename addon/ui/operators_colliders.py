@@ -48,7 +48,7 @@ class HAIRLOOM_OT_fit_spheres(LongWork, bpy.types.Operator):
         for hair in spheres.grown_on(mesh, context.view_layer):
             spheres.use_spheres(hair, fitted.collection, context.scene)
         if self.replace_mesh:
-            mesh.hairloom.collider_shape = "none"
+            spheres.replace_mesh(mesh, fitted.collection)
         self._tell(mesh, fitted)
 
     def _tell(self, mesh: bpy.types.Object, fitted: FittedSpheres) -> None:
@@ -73,7 +73,7 @@ class HAIRLOOM_OT_fit_spheres(LongWork, bpy.types.Operator):
 
 class HAIRLOOM_OT_remove_spheres(bpy.types.Operator):
     """Remove the spheres fitted to the active mesh, or to the mesh that the active hair grows on.
-    The mesh itself collides again"""
+    The mesh itself collides again as it did before"""
 
     bl_idname = "hairloom.remove_spheres"
     bl_label = "Remove Spheres"
@@ -92,7 +92,10 @@ class HAIRLOOM_OT_remove_spheres(bpy.types.Operator):
         mesh = _mesh(context)
         assert mesh is not None
         count = spheres.remove_spheres(mesh)
-        report(self, "INFO", f"{count} spheres removed; {mesh.name} collides by itself again")
+        text = f"{count} spheres removed"
+        if mesh.hairloom.collider_shape != "none":
+            text += f"; {mesh.name} collides by itself again"
+        report(self, "INFO", text)
         return {"FINISHED"}
 
 

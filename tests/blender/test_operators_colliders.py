@@ -225,6 +225,16 @@ def test_removing_and_deleting(new_hair, sphere):
     Obstacles.of(hair, None, None, DynamicsSettings(), depsgraph, None).move(depsgraph, 0.1)
 
 
+@pytest.mark.parametrize("shape", ["automatic", "capsule", "none"])
+def test_a_mesh_collides_again_as_it_did_before_its_spheres(monkey, shape):
+    monkey.hairloom.collider_shape = shape
+    fit(4)
+    fit(5)
+    assert monkey.hairloom.collider_shape == "none"
+    assert bpy.ops.hairloom.remove_spheres() == {"FINISHED"}
+    assert monkey.hairloom.collider_shape == shape
+
+
 def test_undo(monkey):
     bpy.context.preferences.edit.use_global_undo = True
     bpy.ops.ed.undo_push(message="begin")

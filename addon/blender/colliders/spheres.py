@@ -28,11 +28,14 @@ __all__ = [
     "fitted_collections",
     "grown_on",
     "remove_spheres",
+    "replace_mesh",
     "use_spheres",
 ]
 
 #: Custom property of what was created here: on the collection the mesh, on each empty True.
 MARK = "hairloom_fitted"
+#: Custom property of the collection: how the mesh collided before its spheres did so instead.
+_BEFORE = "hairloom_collided_as"
 #: Vertices that a sphere may be parented to: their distance in radii, and their minimum number.
 _REACH, _LEAST = 1.3, 12
 #: Modifiers that make several vertices of one; Blender uses their centre as the parent.
@@ -97,15 +100,23 @@ def use_spheres(
         used.children.link(collection)
 
 
+def replace_mesh(mesh: bpy.types.Object, collection: bpy.types.Collection) -> None:
+    """Let its spheres, in this collection, collide instead of a mesh."""
+    if mesh.hairloom.collider_shape != "none":
+        collection[_BEFORE] = mesh.hairloom.collider_shape
+        mesh.hairloom.collider_shape = "none"
+
+
 def remove_spheres(mesh: bpy.types.Object) -> int:
-    """Remove all spheres fitted to a mesh, which then collides itself; returns their number."""
+    """Remove all spheres fitted to a mesh, which then collides as before; returns their number."""
     count = 0
     for collection in fitted_collections(mesh):
         count += _empty_out(collection)
+        before = collection.pop(_BEFORE, None)
+        if before is not None and mesh.hairloom.collider_shape == "none":
+            mesh.hairloom.collider_shape = before
         if not collection.all_objects and not collection.children:
             bpy.data.collections.remove(collection)
-    if mesh.hairloom.collider_shape == "none":
-        mesh.hairloom.collider_shape = "automatic"
     return count
 
 
