@@ -167,7 +167,7 @@ class _Running:
                 self._has_cursor = True
             manager.progress_update(progress.fraction)
         workspace = bpy.context.workspace
-        workspace.status_text_set(f"{self.label}: {progress.text}. Esc: cancel")
+        workspace.status_text_set(status(self.label, progress))
         redraw_panels()
 
     def end(self) -> None:
@@ -181,6 +181,11 @@ class _Running:
         if bpy.context.workspace is not None:
             bpy.context.workspace.status_text_set(None)
         redraw_panels()
+
+
+def status(label: str, progress: Progress) -> str:
+    """What the status bar says."""
+    return f"{label}: {progress.text}" + ("" if progress.is_committed else ". Esc: cancel")
 
 
 def _undoing() -> tuple[list[Any], ...]:

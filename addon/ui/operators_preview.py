@@ -22,6 +22,7 @@ from ..blender.base.suspension import is_suspended
 from ..blender.preview import fins, previews
 from ..blender.scene.source import mute_own_dynamics, own_dynamics
 from ..blender.sessions.fins import any_enabled
+from .long_work import running
 from .reports import reporting, tell, waiting
 from .selection import chosen_hair, needs_hair
 
@@ -183,7 +184,8 @@ class HAIRLOOM_OT_mute_hair_dynamics(bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         count = sum(mute_own_dynamics(hair) for hair in chosen_hair(context))
-        report(self, "INFO", f"Turned off {count} Hair Dynamics modifiers")
+        modifiers = "1 modifier" if count == 1 else f"{count} modifiers"
+        report(self, "INFO", f"Turned off {modifiers} of Hair Dynamics")
         return {"FINISHED"}
 
 
@@ -242,6 +244,9 @@ class _Ticks:
         return 1.0 / TICKS_PER_SECOND
 
     def tell(self) -> None:
+        if running():  # the bar is another's until it ends, and then empty
+            self._said = ""
+            return
         text = PAUSED if previews.is_paused() else STATUS
         if names := previews.waiting():
             text = WAITING.format(names=", ".join(names))

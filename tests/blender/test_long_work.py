@@ -13,7 +13,16 @@ from waiting import until
 from hairloom.addon.blender.base.thread_work import GivenUpError, ThreadWork
 from hairloom.addon.cards.steps import result_of
 from hairloom.addon.errors import HairloomError
-from hairloom.addon.ui.long_work import LongWork, Progress, Steps, as_progress, counted, threaded
+from hairloom.addon.ui import operators_preview
+from hairloom.addon.ui.long_work import (
+    LongWork,
+    Progress,
+    Steps,
+    as_progress,
+    counted,
+    status,
+    threaded,
+)
 
 seen: list[Any] = []
 
@@ -119,3 +128,18 @@ def test_closing_gives_the_thread_up() -> None:
     until(thread.run_main_thread_steps)
     with pytest.raises(GivenUpError):
         thread.result()
+
+
+def test_the_status_bar_offers_esc_as_long_as_it_cancels() -> None:
+    assert status("Bake", Progress("3 frames")) == "Bake: 3 frames. Esc: cancel"
+    assert status("Bake", Progress("Writing", is_committed=True)) == "Bake: Writing"
+
+
+def test_play_says_again_what_it_does_after_other_work(monkeypatch: pytest.MonkeyPatch) -> None:
+    shown: list[str | None] = []
+    monkeypatch.setattr(operators_preview, "_show_status", shown.append)
+    ticks = operators_preview._Ticks()
+    for label in ("", "", "Settle", "Settle", ""):
+        monkeypatch.setattr(operators_preview, "running", lambda label=label: label)
+        ticks.tell()
+    assert shown == [operators_preview.STATUS] * 2
