@@ -71,11 +71,14 @@ def test_a_time_ends_with_the_work_of_the_gpu() -> None:
         gpu.compute.dispatch(shader, 32, 32, 1)
         gpu.shader.unbind()
 
+    def with_its_end() -> float:
+        begin = time.perf_counter()
+        work()
+        target.read()
+        return 1000.0 * (time.perf_counter() - begin)
+
     taken = bench.time(work)
-    begin = time.perf_counter()
-    work()
-    target.read()
-    whole = 1000.0 * (time.perf_counter() - begin)
+    whole = min(with_its_end() for _ in range(3))  # what else the machine does makes it longer
     assert taken > 0.3 * whole > 0.3
 
 
