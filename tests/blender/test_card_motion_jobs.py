@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
-import time
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 bpy = pytest.importorskip("bpy", reason="writing cards needs Blender or the bpy module")
+
+from waiting import until  # noqa: E402
 
 from hairloom.addon.blender.cards.files import CardExport, CardOutput  # noqa: E402
 from hairloom.addon.blender.command_line import command_line  # noqa: E402
@@ -155,8 +156,7 @@ def test_cancelled_in_its_midst_it_leaves_the_old_files(
         CardOutput(settings=CardExportSettings(motion=kind)),
     )
     making = plan.building()
-    while not making.run_main_thread_steps():
-        time.sleep(0.001)
+    until(making.run_main_thread_steps)
     writing = plan.writing(making.result())
     for text, _ in writing:
         if text == amid:

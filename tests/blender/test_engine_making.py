@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import threading
-import time
 from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
 import pytest
-from waiting import take_steps_until
+from waiting import take_steps_until, until
 
 bpy = pytest.importorskip("bpy", reason="these tests need Blender or the bpy module")
 
@@ -67,13 +66,18 @@ class View:
         return tuple(groom.snapshot for groom in scene.grooms)
 
     def arrive(self) -> tuple[Any, ...]:
-        end, found = time.monotonic() + 60.0, ()
-        while self.reader.pending:
-            assert time.monotonic() < end, "it is never made"
+        found: tuple[Any, ...] = ()
+
+        def is_there() -> bool:
+            nonlocal found
+            if not self.reader.pending:
+                return True
             latest_job.take_steps()
             if not all(engine_hair.is_pending(uid) for uid in self.reader.pending):
                 found = self.read()
-            time.sleep(0.005)
+            return False
+
+        until(is_there)
         return found
 
 

@@ -1,11 +1,11 @@
 """Lines in the viewport for what acts on the hair: each lies on what it stands for."""
 
 import threading
-import time
 
 import bpy
 import numpy as np
 import pytest
+from waiting import until
 
 from hairloom.addon.blender.base import latest_job
 from hairloom.addon.blender.colliders import fields
@@ -58,8 +58,7 @@ def test_lines_of_a_collider_that_is_being_made_come_when_it_is_there(preview, m
     hair.hairloom.shown_overlays = {"colliders"}
     assert overlays(session) == () and latest_job.take_steps() == latest_job.ARRIVAL_TIME
     is_made.set()
-    while not fields.are_made():
-        time.sleep(0.001)
+    until(fields.are_made)
     assert latest_job.take_steps() is None
     assert len(overlays(session)) == 1
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -15,6 +14,7 @@ from bake_files import frames_in
 from grids import baked_grid
 from strand_files import curves_of, hedgehog, needs_usd, push_up, stage_of, straight, to_unreal
 from swinging import thrown
+from waiting import until
 
 from hairloom.addon.blender.bakes import playback
 from hairloom.addon.blender.preview.bake import Bake
@@ -227,13 +227,10 @@ def test_a_cancelled_export_leaves_the_old_file(swinging: Any, tmp_path: Path) -
         )
         positions = plan.positions()
         work = plan.writing(path, positions)
-        limit = time.monotonic() + 20.0
-        while plan.done < 3 and time.monotonic() < limit:
-            assert not work.run_main_thread_steps()
+        until(lambda w=work, p=plan: w.run_main_thread_steps() or p.done >= 3)
         work.give_up()
         positions.close()
-        while time.monotonic() < limit and not work.run_main_thread_steps():
-            time.sleep(0.01)
+        until(work.run_main_thread_steps)
         assert plan.done >= 3
         assert path.read_bytes() == b"old"
     assert {p.name for p in tmp_path.iterdir()} == {"bake", "hair.abc", "hair.usdc"}
@@ -251,8 +248,7 @@ def test_in_steps_the_same_file_is_written_as_at_once(swinging: Any, tmp_path: P
             plan.write(path)
         else:
             work = plan.writing(path, plan.positions())
-            while not work.run_main_thread_steps():
-                time.sleep(0.001)
+            until(work.run_main_thread_steps)
             assert "frames 1 to 6" in work.result().result
     once, steps = (curves_of(tmp_path / name) for name in ("once.abc", "steps.abc"))
     for name, curves in once.items():

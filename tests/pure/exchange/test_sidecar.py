@@ -190,14 +190,15 @@ def test_textures_beside_are_named_with_how_they_are_read() -> None:
     assert read(card_file(textures=roles))["textures"]["base"]["color_space"] == "linear"
 
 
-def test_a_sidecar_that_is_nested_deeply_is_none_of_ours(tmp_path: Path) -> None:
-    """Deep enough to be read, and too deep to be walked through."""
-    for depth in (400, 900, 100_000):
+def test_a_sidecar_that_is_nested_deeply_is_read_or_none_of_ours(tmp_path: Path) -> None:
+    """Deep enough to be read, perhaps too deep to be walked through, and too deep to be read."""
+    ours = {f"hair{suffix}" for suffix in (".hairloom.json", ".mtl", ".bin", ".glb")}
+    for depth, found in ((400, [ours]), (900, [ours, set()]), (100_000, [set()])):
         nested = (
             '{"hairloom_sidecar": 1, "file": "hair.glb", "x": ' + "[" * depth + "]" * depth + "}"
         )
         (tmp_path / "hair.hairloom.json").write_text(nested)
-        files_of_earlier(tmp_path / "hair.glb")
+        assert files_of_earlier(tmp_path / "hair.glb") in found
 
 
 def test_lists_of_numbers_stand_in_one_line() -> None:

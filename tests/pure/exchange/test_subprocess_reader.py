@@ -37,6 +37,19 @@ def run(path: Path, script: str, **options: object) -> None:
     run_reader(file, path, [path.with_name("result")], library="Alembic", **options)  # type: ignore
 
 
+@contextmanager
+def begun_processes() -> Iterator[list[subprocess.Popen[bytes]]]:
+    """Those that are started meanwhile."""
+    before, begun = subprocess.Popen, []
+
+    def popen(*arguments: Any, **options: Any) -> subprocess.Popen[bytes]:
+        begun.append(before(*arguments, **options))
+        return begun[-1]
+
+    with mock.patch.object(child_process.subprocess, "Popen", popen):
+        yield begun
+
+
 def test_a_script_has_the_file_the_result_and_all_packages(path: Path) -> None:
     run(
         path,
@@ -64,13 +77,14 @@ def test_every_bad_end_is_a_message(path: Path, script: str, message: str) -> No
 
 
 def test_a_script_without_an_end_is_ended(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """However slowly it starts."""
     monkeypatch.setattr(subprocess_reader, "_PATIENCE", 1.0)
-    number = path.with_name("number")
-    script = f"import os\nopen({str(number)!r}, 'w').write(str(os.getpid()))\nwhile True: pass"
-    with pytest.raises(HairloomError, match="could not read it within 1 s"):
-        run(path, script)
-    with pytest.raises(ProcessLookupError):
-        os.kill(int(number.read_text()), 0)
+    with (
+        begun_processes() as begun,
+        pytest.raises(HairloomError, match="could not read it within 1 s"),
+    ):
+        run(path, "while True: pass")
+    assert [each.returncode for each in begun] == [-signal.SIGKILL]
 
 
 def test_a_child_whose_work_is_given_up_is_ended(path: Path) -> None:
@@ -105,17 +119,7 @@ def test_a_child_whose_work_is_given_up_is_ended(path: Path) -> None:
         child_process.ending.set(at_once)
         child_process.run_child(command, seconds=60.0)
 
-    before = subprocess.Popen
-    begun: list[subprocess.Popen[bytes]] = []
-
-    def popen(*arguments: Any, **options: Any) -> subprocess.Popen[bytes]:
-        begun.append(before(*arguments, **options))
-        return begun[-1]
-
-    with (
-        mock.patch.object(child_process.subprocess, "Popen", popen),
-        pytest.raises(InterruptedError),
-    ):
+    with begun_processes() as begun, pytest.raises(InterruptedError):
         contextvars.Context().run(begin_it)
     assert [each.returncode for each in begun] == [-signal.SIGKILL]
 
