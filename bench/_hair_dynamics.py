@@ -8,10 +8,10 @@ one; everything else as shipped: 10 substeps of 15 constraint steps a frame.
 from __future__ import annotations
 
 import time
-from pathlib import Path
 
 import bpy
 import numpy as np
+from _blender_nodes import shipped_node_group
 
 from hairloom.addon.blender.scene.curves import write_curves
 from hairloom.addon.strands import StrandSet
@@ -29,7 +29,7 @@ class HairDynamics:
         self._shape = strands.grid.shape
         self._length = _segments(strands.grid)
         self._modifier = self.hair.modifiers.new(GROUP, "NODES")
-        self._modifier.node_group = _node_group()
+        self._modifier.node_group = shipped_node_group(GROUP, ASSETS)
         inputs = self._modifier.properties.inputs
         inputs.Socket_44.value = "Physics (Experimental)"  # Mode
         inputs.Socket_15.value = True  # Surface Collision
@@ -77,16 +77,6 @@ def animate(head: bpy.types.Object, places: list[float], fps: int) -> None:
     for frame, x in enumerate(places):
         head.location.x = x
         head.keyframe_insert("location", index=0, frame=frame)
-
-
-def _node_group() -> bpy.types.NodeTree:
-    known = bpy.data.node_groups.get(GROUP)
-    if known is not None:
-        return known
-    path = Path(bpy.utils.system_resource("DATAFILES")) / ASSETS
-    with bpy.data.libraries.load(str(path)) as (_, wanted):
-        wanted.node_groups = [GROUP]
-    return bpy.data.node_groups[GROUP]
 
 
 def _segments(grid: np.ndarray) -> np.ndarray:

@@ -15,11 +15,11 @@ import time
 import tracemalloc
 from collections.abc import Callable
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import bpy
 import numpy as np
+from _blender_nodes import shipped_node_group
 from _shaken_head import RADIUS, guides_on, surface_of
 
 from hairloom.addon.blender.scene.curves import read_curves, write_curves
@@ -42,7 +42,7 @@ class InterpolatedHair:
     def __init__(self, head: bpy.types.Object, guides: StrandSet) -> None:
         self._hair = write_curves("Guides", guides, head, bpy.context.scene.collection)
         self._modifier = self._hair.modifiers.new(GROUP, "NODES")
-        self._modifier.node_group = _node_group()
+        self._modifier.node_group = shipped_node_group(GROUP, ASSETS)
         self._set(Input_10=3)  # Interpolation Guides
 
     def strands(self, count: int) -> StrandSet:
@@ -193,13 +193,3 @@ def _strand_set(grid: np.ndarray, like: StrandSet | None = None) -> StrandSet:
         group=np.zeros(count),
         root_uv=None if like is None else like.root_uv,
     )
-
-
-def _node_group() -> bpy.types.NodeTree:
-    known = bpy.data.node_groups.get(GROUP)
-    if known is not None:
-        return known
-    path = Path(bpy.utils.system_resource("DATAFILES")) / ASSETS
-    with bpy.data.libraries.load(str(path)) as (_, wanted):
-        wanted.node_groups = [GROUP]
-    return bpy.data.node_groups[GROUP]

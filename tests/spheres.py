@@ -1,4 +1,4 @@
-"""A closed surface whose shadow is known."""
+"""Closed surfaces whose shadow is known."""
 
 from __future__ import annotations
 
@@ -19,3 +19,15 @@ def ball(radius: float) -> Surface:
         [np.stack([a, a + 65, a + 66], axis=1), np.stack([a, a + 66, a + 1], axis=1)]
     )
     return Surface(radius * points.reshape(-1, 3), triangles)
+
+
+def globe(rings: int, radius: float = 0.1) -> Surface:
+    """A sphere of this many circles of latitude."""
+    polar, around = np.meshgrid(np.linspace(0, np.pi, rings), np.linspace(0, 2 * np.pi, 2 * rings))
+    points = np.stack(
+        [np.sin(polar) * np.cos(around), np.sin(polar) * np.sin(around), np.cos(polar)], axis=-1
+    )
+    index = np.arange(2 * rings * rings).reshape(2 * rings, rings)
+    a, b, c, d = index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]
+    quads = np.stack([np.stack([a, d, c], -1), np.stack([a, c, b], -1)], axis=2)
+    return Surface(points.reshape(-1, 3) * radius, quads.reshape(-1, 3))

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from guide_cards import build_cards
+from spheres import globe
 
 from hairloom.addon.cards.card_mesh import OF_VERTICES, CardMesh
 from hairloom.addon.cards.occlusion import CardOccluder, even_axes, extent_of, vertex_occlusion
@@ -15,17 +16,6 @@ from hairloom.addon.cards.settings import CardSettings
 from hairloom.addon.strands import Surface
 
 RADIUS = 0.1
-
-
-def ball(rings: int = 16, radius: float = RADIUS) -> Surface:
-    polar, around = np.meshgrid(np.linspace(0, np.pi, rings), np.linspace(0, 2 * np.pi, 2 * rings))
-    points = np.stack(
-        [np.sin(polar) * np.cos(around), np.sin(polar) * np.sin(around), np.cos(polar)], axis=-1
-    )
-    index = np.arange(2 * rings * rings).reshape(2 * rings, rings)
-    a, b, c, d = index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]
-    quads = np.stack([np.stack([a, d, c], -1), np.stack([a, c, b], -1)], axis=2)
-    return Surface(points.reshape(-1, 3) * radius, quads.reshape(-1, 3))
 
 
 def hanging(count: int, seed: int = 1, layers: float = 0.02, **changed: object) -> CardMesh:
@@ -110,7 +100,7 @@ def brute_force(
 
 
 def test_the_mean_error_against_brute_force_is_below_two_hundredths() -> None:
-    mesh, head = hanging(40, width_factor=1.5, segment_count=4, column_count=1), ball(rings=8)
+    mesh, head = hanging(40, width_factor=1.5, segment_count=4, column_count=1), globe(8)
     alpha = np.random.default_rng(4).random((64, 64)).astype(np.float32)
     alpha[:, 20:40] = 1.0
     settings = CardOcclusionSettings()
@@ -137,13 +127,13 @@ def test_a_card_that_lies_open_on_the_head_has_nearly_all_light() -> None:
     along = np.linspace(-0.04, 0.04, 9)
     top = np.stack([along, 0.0 * along, np.sqrt(0.105**2 - along**2)], axis=1)[None]
     mesh = build_cards(top.astype(np.float32), np.array([[0, 0, 1]], np.float32), CardSettings())
-    found = vertex_occlusion(mesh, [CardOccluder(mesh)], [ball()], plain())
+    found = vertex_occlusion(mesh, [CardOccluder(mesh)], [globe(16)], plain())
     assert found.min() > 0.97
 
 
 @pytest.mark.slow(instead="test_the_mean_error_against_brute_force_is_below_two_hundredths")
 def test_deep_inside_it_is_dark_and_outside_light() -> None:
-    mesh, head = hanging(600, layers=0.04), ball()
+    mesh, head = hanging(600, layers=0.04), globe(16)
     found = vertex_occlusion(mesh, [CardOccluder(mesh)], [head], CardOcclusionSettings(rays=128))
     from_middle = np.linalg.norm(mesh.positions[:, :2], axis=1)
     ring = (np.abs(mesh.positions[:, 2]) < 0.02) & (mesh.along > 0.05)
@@ -205,7 +195,7 @@ def test_roots_below_the_skin_are_not_dark() -> None:
     mesh = build_cards(
         leaning[None].astype(np.float32), np.array([[1, 0, 0]], np.float32), CardSettings()
     )
-    found = vertex_occlusion(mesh, [CardOccluder(mesh)], [ball()], plain())
+    found = vertex_occlusion(mesh, [CardOccluder(mesh)], [globe(16)], plain())
     assert found[mesh.along == 0.0].min() > 0.4  # half its sky is below the horizon
 
 
@@ -237,7 +227,7 @@ def test_other_grooms_and_bodies_shade_as_well_and_only_within_the_reach() -> No
 @pytest.mark.parametrize("factor", [2.0**-10, 2.0**10])
 def test_occlusion_is_the_same_at_any_scale(factor: float) -> None:
     def found(scale: float) -> np.ndarray:
-        mesh, head = hanging(40), ball()
+        mesh, head = hanging(40), globe(16)
         mesh = replace(mesh, positions=mesh.positions * np.float32(scale))
         head = replace(head, positions=head.positions * np.float32(scale))
         return vertex_occlusion(mesh, [CardOccluder(mesh)], [head], CardOcclusionSettings(rays=64))
@@ -261,12 +251,14 @@ def test_a_mesh_of_other_cards_shades_as_the_cards_themselves() -> None:
 
 def test_strength_mixes_in_and_the_same_input_gives_the_same_bits() -> None:
     mesh = hanging(40)
-    full = vertex_occlusion(mesh, [CardOccluder(mesh)], [ball()], CardOcclusionSettings(rays=32))
+    full = vertex_occlusion(mesh, [CardOccluder(mesh)], [globe(16)], CardOcclusionSettings(rays=32))
     half = vertex_occlusion(
-        mesh, [CardOccluder(mesh)], [ball()], CardOcclusionSettings(rays=32, strength=0.5)
+        mesh, [CardOccluder(mesh)], [globe(16)], CardOcclusionSettings(rays=32, strength=0.5)
     )
     np.testing.assert_allclose(half, 0.5 + 0.5 * full, atol=1e-6)
-    again = vertex_occlusion(mesh, [CardOccluder(mesh)], [ball()], CardOcclusionSettings(rays=32))
+    again = vertex_occlusion(
+        mesh, [CardOccluder(mesh)], [globe(16)], CardOcclusionSettings(rays=32)
+    )
     np.testing.assert_array_equal(full, again)
     assert full.dtype == np.float32
 
@@ -279,7 +271,7 @@ def test_nothing_and_triangles_without_area() -> None:
         card=one.card[:0],
         **{name: getattr(one, name)[:0] for name in OF_VERTICES},
     )
-    assert vertex_occlusion(empty, [CardOccluder(empty)], [ball()], plain()).shape == (0,)
+    assert vertex_occlusion(empty, [CardOccluder(empty)], [globe(16)], plain()).shape == (0,)
     mesh = stacked([0.0, 1.0])
     assert vertex_occlusion(mesh, [CardOccluder(empty)], [], plain()).min() == 1.0
     flat = replace(mesh, positions=np.zeros_like(mesh.positions))

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from guide_cards import build_cards
+from spheres import globe
 from tiers import few_in_commits
 
 from hairloom.addon.cards.card_mesh import OF_CARDS, OF_VERTICES, CardMesh, joined
@@ -76,22 +77,11 @@ def shells(count: int = 60) -> tuple[CardMesh, np.ndarray]:
     return build_cards(guides.astype(np.float32), out.astype(np.float32), settings), distance
 
 
-def sphere(radius: float = 0.1, rings: int = 24) -> Surface:
-    polar, around = np.meshgrid(np.linspace(0, np.pi, rings), np.linspace(0, 2 * np.pi, 2 * rings))
-    points = np.stack(
-        [np.sin(polar) * np.cos(around), np.sin(polar) * np.sin(around), np.cos(polar)], axis=-1
-    )
-    index = np.arange(2 * rings * rings).reshape(2 * rings, rings)
-    a, b, c, d = index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]
-    quads = np.stack([np.stack([a, d, c], -1), np.stack([a, c, b], -1)], axis=2)
-    return Surface(points.reshape(-1, 3) * radius, quads.reshape(-1, 3))
-
-
 WAYS: tuple[SortBy, ...] = ("pieces", "cards", "distance")
 
 
 @pytest.mark.parametrize("by", WAYS)
-@pytest.mark.parametrize("head", [None, sphere()])
+@pytest.mark.parametrize("head", [None, globe(24)])
 def test_shells_are_drawn_from_the_inside_to_the_outside(head: Surface | None, by: SortBy) -> None:
     mesh, distance = shells()
     ordered = in_order(mesh, card_orders(mesh, head, by).front)
@@ -103,7 +93,7 @@ def test_shells_are_drawn_from_the_inside_to_the_outside(head: Surface | None, b
 @pytest.mark.parametrize("by", ["cards", "distance"])
 def test_triangles_of_a_card_stay_together_from_root_to_tip(by: SortBy) -> None:
     mesh = crossing_cards()
-    orders = card_orders(mesh, sphere(), by)
+    orders = card_orders(mesh, globe(24), by)
     lowest = mesh.along[mesh.triangles].min(axis=1)
     for order in (orders.front, orders.back):
         np.testing.assert_array_equal(np.sort(order), np.arange(len(order)))
@@ -137,7 +127,7 @@ def as_drawn(mesh: CardMesh, order: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize("by", WAYS)
-@pytest.mark.parametrize("head", [None, sphere()])
+@pytest.mark.parametrize("head", [None, globe(24)])
 def test_the_order_hangs_on_where_cards_are_alone(head: Surface | None, by: SortBy) -> None:
     group = np.arange(40) % 3
     mesh = replace(crossing_cards(), group=group)
@@ -153,8 +143,8 @@ def test_the_order_hangs_on_where_cards_are_alone(head: Surface | None, by: Sort
 def test_cards_that_are_sorted_stay_as_they_are(by: SortBy) -> None:
     mesh = replace(crossing_cards(), **{name: np.zeros(80) for name in OF_CARDS})
     twice = joined([mesh, replace(mesh, card=mesh.card + 40)])  # each card lies on one like it
-    once = in_order(twice, card_orders(twice, sphere(), by, view_count=8).front)
-    again = card_orders(once, sphere(), by, view_count=8)
+    once = in_order(twice, card_orders(twice, globe(24), by, view_count=8).front)
+    again = card_orders(once, globe(24), by, view_count=8)
     np.testing.assert_array_equal(again.front, np.arange(len(once.triangles)))
 
 
@@ -240,15 +230,15 @@ def test_what_is_learnt_is_better_than_the_distance() -> None:
     mesh = crossing_cards()
     share = {}
     for by in WAYS:
-        orders = card_orders(mesh, sphere(), by)
+        orders = card_orders(mesh, globe(24), by)
         share[by] = wrong_fraction(
-            mesh, sphere(), front=orders.front, back=orders.back, view_count=12
+            mesh, globe(24), front=orders.front, back=orders.back, view_count=12
         )
     assert 0.0 < share["pieces"] < 0.7 * share["cards"]
     assert (
         share["cards"]
         < 0.8 * share["distance"]
-        < 0.8 * wrong_fraction(mesh, sphere(), view_count=12)
+        < 0.8 * wrong_fraction(mesh, globe(24), view_count=12)
     )
 
 
@@ -276,15 +266,15 @@ def test_a_ponytail_is_drawn_on_its_own_after_the_rest(by: SortBy) -> None:
     owner = card_of_vertex(mesh)
     positions[np.isin(owner, np.arange(10, 15))] *= 2.5
     mesh = replace(mesh, positions=positions, group=group)
-    found = card_orders(mesh, sphere(), by)
+    found = card_orders(mesh, globe(24), by)
     for order in (found.front, found.back):
         drawn = group[mesh.card[order]]
         assert (drawn[-5 * 16 :] == 7).all()
         assert set(drawn[: -5 * 16]) == {0, 3}
-    named = card_orders(mesh, sphere(), by, apart=(3, 7))
+    named = card_orders(mesh, globe(24), by, apart=(3, 7))
     runs = group[mesh.card[named.front]]
     np.testing.assert_array_equal(runs, np.repeat([0, 3, 7], 16 * np.array([32, 3, 5])))
-    together = group[mesh.card[card_orders(mesh, sphere(), by, apart=()).back]]
+    together = group[mesh.card[card_orders(mesh, globe(24), by, apart=()).back]]
     assert (together[-5 * 16 :] != 7).any()
 
 
@@ -304,7 +294,7 @@ def test_coinciding_cards_keep_their_order_and_sorting_repeats_itself() -> None:
     six = {"group": np.zeros(6), "layer": np.zeros(6), "tile": np.zeros(6)}
     mesh = replace(mesh, **six)
     twice = joined([mesh, replace(mesh, card=mesh.card + 3)])
-    one, two = (card_orders(twice, sphere()) for _ in range(2))
+    one, two = (card_orders(twice, globe(24)) for _ in range(2))
     np.testing.assert_array_equal(one.front, two.front)
     np.testing.assert_array_equal(one.back, two.back)
     for order in (one.front, one.back):
@@ -316,7 +306,7 @@ def test_coinciding_cards_keep_their_order_and_sorting_repeats_itself() -> None:
 @pytest.mark.parametrize("count", [0, 1])
 def test_none_and_one_card(by: SortBy, count: int) -> None:
     mesh = crossing_cards(count) if count else empty_mesh()
-    for head in (None, sphere()):
+    for head in (None, globe(24)):
         orders = card_orders(mesh, head, by)
         for order in (orders.front, orders.back, order_from(mesh, np.array([1.0, 0.0, 0.0, 1.0]))):
             np.testing.assert_array_equal(np.sort(order), np.arange(len(mesh.triangles)))
@@ -330,7 +320,7 @@ def test_cards_without_area_and_with_gaps_in_their_numbers() -> None:
     keep = mesh.card != 4
     mesh = replace(mesh, positions=positions, triangles=mesh.triangles[keep], card=mesh.card[keep])
     for by in WAYS:
-        orders = card_orders(mesh, sphere(), by)
+        orders = card_orders(mesh, globe(24), by)
         for order in (orders.front, orders.back):
             np.testing.assert_array_equal(np.sort(order), np.arange(len(mesh.triangles)))
 
@@ -342,7 +332,7 @@ def test_cards_that_share_all_their_vertices() -> None:
     half = len(mesh.triangles) // 2
     mesh = replace(mesh, triangles=np.tile(mesh.triangles[:half], (2, 1)))
     for by in WAYS:
-        order = card_orders(mesh, sphere(), by).front
+        order = card_orders(mesh, globe(24), by).front
         np.testing.assert_array_equal(np.sort(order), np.arange(2 * half))
 
 
@@ -384,7 +374,7 @@ def test_cards_at_equal_distance_keep_their_order() -> None:
 
 def test_distance_is_the_median_from_the_surface() -> None:
     mesh, distance = shells()
-    measured = card_distances(mesh, sphere(rings=48))
+    measured = card_distances(mesh, globe(48))
     height = np.linspace(0.05, -0.05, 13)
     expected = [np.median(np.hypot(d, height)) - 0.1 for d in distance]
     np.testing.assert_allclose(measured, expected, atol=3e-3)

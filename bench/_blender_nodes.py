@@ -1,0 +1,22 @@
+"""Node groups from the assets that Blender ships."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import bpy
+
+
+def shipped_node_group(name: str, assets: str) -> bpy.types.NodeTree:
+    """The one of this name, read where the open file has none.
+
+    Args:
+        assets: the file, beneath Blender's own data.
+    """
+    known = bpy.data.node_groups.get(name)
+    if known is not None:
+        return known
+    path = Path(bpy.utils.system_resource("DATAFILES")) / assets
+    with bpy.data.libraries.load(str(path)) as (_, wanted):
+        wanted.node_groups = [name]
+    return bpy.data.node_groups[name]
