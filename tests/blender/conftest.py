@@ -9,6 +9,7 @@ import pytest
 bpy = pytest.importorskip("bpy", reason="these tests need Blender or the bpy module")
 
 from engine_stage import SIZE, set_world  # noqa: E402
+from hedgehogs import hedgehog  # noqa: E402
 
 import hairloom  # noqa: E402  it is loaded by tests/conftest.py
 from hairloom.addon import registration  # noqa: E402
@@ -101,19 +102,6 @@ def sphere() -> Any:
     return head
 
 
-def hedgehog(count: int = 60, points: int = 8, length: float = 0.08, seed: int = 1) -> StrandSet:
-    """Straight strands that stand on the sphere of radius 0.1 m."""
-    outward = np.random.default_rng(seed).normal(size=(count, 3))
-    outward /= np.linalg.norm(outward, axis=1, keepdims=True)
-    along = 0.1 + np.linspace(0.0, length, points)
-    return StrandSet(
-        points=(outward[:, None] * along[:, None]).reshape(-1, 3),
-        offsets=np.arange(count + 1) * points,
-        radius=np.full(count * points, 5.0e-5),
-        group=np.arange(count) % 2,
-    )
-
-
 @pytest.fixture
 def new_hair(extension: None) -> Callable[..., Any]:
     """Makes a hair curves object from strands (a hedgehog), on a head or on none."""
@@ -132,6 +120,15 @@ def new_hair(extension: None) -> Callable[..., Any]:
         return hair
 
     return make
+
+
+@pytest.fixture
+def preview(new_hair: Any, sphere: Any, evaluated: Any) -> tuple[Any, Any, Any]:
+    """Hair on a head, previewed: (hair, head, session)."""
+    from hairloom.addon.blender.preview import previews
+
+    hair = new_hair(sphere)
+    return hair, sphere, previews.start(hair, evaluated())
 
 
 @pytest.fixture

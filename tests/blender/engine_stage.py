@@ -88,3 +88,10 @@ def coded(path: Path) -> np.ndarray:
     pixels = np.empty(len(image.pixels), np.float32)
     image.pixels.foreach_get(pixels)
     return pixels.reshape(*image.size[::-1], 4)[..., :3]
+
+
+def view_shadings() -> list[Any]:
+    """The shading of all 3D views of the file."""
+    windows = bpy.context.window_manager.windows
+    areas = [area for window in windows for area in window.screen.areas]
+    return [area.spaces.active.shading for area in areas if area.type == "VIEW_3D"]

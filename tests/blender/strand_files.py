@@ -17,19 +17,6 @@ pytest.importorskip("alembic3d", reason="it is missing: `make setup` installs it
 from alembic3d import Abc, AbcGeom
 
 
-def hedgehog(count: int = 60, points: int = 8, seed: int = 1) -> StrandSet:
-    """Straight strands that stand on the sphere of radius 0.1 m, in two groups."""
-    outward = np.random.default_rng(seed).normal(size=(count, 3))
-    outward /= np.linalg.norm(outward, axis=1, keepdims=True)
-    along = 0.1 + np.linspace(0.0, 0.08, points)
-    return StrandSet(
-        points=(outward[:, None] * along[:, None]).reshape(-1, 3),
-        offsets=np.arange(count + 1) * points,
-        radius=np.full(count * points, 5.0e-5),
-        group=np.arange(count) % 2,
-    )
-
-
 def straight(place: tuple[float, float, float] = (1.0, 2.0, 3.0)) -> StrandSet:
     """Two strands, a metre long, the first of which stands at a place."""
     points = np.array(place) + np.linspace([0, 0, 0], [0, 0, 1], 5)

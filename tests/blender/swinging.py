@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +27,18 @@ def thrown(hair: Any, head: Any, last: int, bake: Path, peak: int = 4) -> tuple[
     hair.hairloom.bake.folder = str(bake)
     scene.frame_set(1)
     return hair, head
+
+
+def play(
+    evaluated: Callable[[], Any], frames: int, each: Callable[[int], None] = lambda frame: None
+) -> None:
+    """Let hair play freely, whatever `each` does before a frame."""
+    from hairloom.addon.blender.preview import previews
+
+    for frame in range(frames):
+        each(frame)
+        bpy.context.view_layer.update()
+        previews.advance(evaluated(), 1.0 / 60.0)
 
 
 def swings(session: Any) -> bool:

@@ -5,7 +5,7 @@ import json
 import bpy
 import numpy as np
 import pytest
-from strand_files import hedgehog
+from hedgehogs import hedgehog
 
 from hairloom.addon import motion_flow
 from hairloom.addon.blender.bakes import playback

@@ -9,7 +9,7 @@ from typing import Any
 import bpy
 import numpy as np
 import pytest
-from strand_files import hedgehog
+from hedgehogs import hedgehog
 
 from hairloom.addon.blender.preview import previews
 from hairloom.addon.blender.scene.hair_nodes import add_hair_nodes

@@ -23,13 +23,6 @@ from hairloom.addon.strands import Surface
 pytestmark = pytest.mark.draws(light=False)
 
 
-@pytest.fixture
-def preview(new_hair, sphere, evaluated):
-    """Hair on a head, previewed: (hair, head, session)."""
-    hair = new_hair(sphere)
-    return hair, sphere, previews.start(hair, evaluated())
-
-
 def drawing(session):
     return overlay.drawing_of(session.uid)
 

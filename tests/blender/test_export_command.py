@@ -12,7 +12,7 @@ import bpy
 import numpy as np
 import pytest
 from grids import baked_grid
-from strand_files import needs_usd
+from strand_files import needs_usd, stage_of
 
 from hairloom.addon.blender.bakes import playback
 from hairloom.addon.blender.command_line import command_line
@@ -39,15 +39,6 @@ def run(tmp_path: Path) -> Callable[..., dict[str, Any]]:
         return json.loads(report.read_text(encoding="utf-8"))
 
     return done
-
-
-def stage_of(path: Path) -> tuple[Any, Any]:
-    usd = pytest.importorskip("pxr.Usd", reason="usd-core is missing: `make setup` installs it")
-    from pxr import UsdGeom
-
-    stage = usd.Stage.Open(str(path))
-    (prim,) = (prim for prim in stage.Traverse() if prim.IsA(UsdGeom.BasisCurves))
-    return stage, UsdGeom.BasisCurves(prim)
 
 
 def on_sphere(*, coloured: bool = True) -> Groom:

@@ -9,6 +9,7 @@ from typing import Any
 import bpy
 import numpy as np
 import pytest
+from engine_stage import view_shadings
 
 from hairloom.addon.blender.preview import previews
 from hairloom.addon.blender.scene.lights import light_warnings, read_lights
@@ -132,13 +133,6 @@ def test_a_preview_tells_of_lights_that_it_leaves_out(new_hair: Any, sphere: Any
     assert len(session.snapshot.lights) == LIGHT_CAPACITY
 
 
-def views() -> list[Any]:
-    """The shading of all 3D views of the file."""
-    windows = bpy.context.window_manager.windows
-    areas = [area for window in windows for area in window.screen.areas]
-    return [area.spaces.active.shading for area in areas if area.type == "VIEW_3D"]
-
-
 @pytest.mark.parametrize("world", [None, (0.0, 0.0, 0.0), (0.2, 0.1, 0.3)])
 def test_a_scene_without_light_is_told_where_a_view_goes_by_it(
     new_hair: Any, sphere: Any, world: Any
@@ -149,11 +143,11 @@ def test_a_scene_without_light_is_told_where_a_view_goes_by_it(
         node = next(n for n in bpy.context.scene.world.node_tree.nodes if n.type == "BACKGROUND")
         node.inputs["Color"].default_value = (*world, 1.0)
     session = Session(hair, bpy.context.evaluated_depsgraph_get())
-    assert views()
-    for shading in views():
+    assert view_shadings()
+    for shading in view_shadings():
         shading.type = "SOLID"
     assert not any("no light" in warning for warning in session.warnings)
-    views()[0].type = "RENDERED"
+    view_shadings()[0].type = "RENDERED"
     (warning,) = (warning for warning in session.warnings if "no light" in warning)
     assert ("studio" in warning) is (world is None or not any(world))
     assert "Add a light" in warning and warning.endswith(".")

@@ -11,7 +11,7 @@ import bpy
 import numpy as np
 import pytest
 from engine_stage import add_ball, picture
-from strand_files import hedgehog
+from hedgehogs import hedgehog
 
 from hairloom.addon.blender.bakes.baked_rig import RestMatrices, rig_arrays
 from hairloom.addon.blender.bakes.baked_rig import rig_of as baked_rig_of

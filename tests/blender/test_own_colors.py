@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from strand_files import hedgehog
+from hedgehogs import hedgehog
 
 bpy = pytest.importorskip("bpy", reason="these tests need Blender or the bpy module")
 

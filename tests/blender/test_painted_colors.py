@@ -240,7 +240,7 @@ def test_what_is_transparent_has_the_curves_own_colour_or_the_looks(
 def test_brows_that_keep_their_colour_are_not_painted(
     new_hair: Any, sphere: Any, evaluated: Any
 ) -> None:
-    from strand_files import hedgehog
+    from hedgehogs import hedgehog
 
     strands = hedgehog()
     hair = new_hair(sphere, replace(strands, group=np.where(np.arange(60) < 30, 9001, 0)))

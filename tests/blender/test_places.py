@@ -10,7 +10,7 @@ from typing import Any
 
 import bpy
 import pytest
-from strand_files import hedgehog
+from hedgehogs import hedgehog
 
 from hairloom.addon.blender.command_line import command_line, job_steps
 from hairloom.addon.blender.command_line.places import check_outputs

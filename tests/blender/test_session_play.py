@@ -4,33 +4,14 @@ import bpy
 import numpy as np
 import pytest
 from grids import grid_of
+from swinging import play
 
 from hairloom.addon.blender.preview import previews
 
 
-@pytest.fixture
-def preview(new_hair, sphere, evaluated):
-    """Hair on a head, previewed: (hair, head, session)."""
-    hair = new_hair(sphere)
-    return hair, sphere, previews.start(hair, evaluated())
-
-
-def drawn(session):
-    """The strands as they are drawn, whether they lie on the GPU or in an array."""
-    return grid_of(session)
-
-
-def play(evaluated, frames, each=lambda frame: None):
-    """Let hair play freely, whatever `each` does before a frame."""
-    for frame in range(frames):
-        each(frame)
-        bpy.context.view_layer.update()
-        previews.advance(evaluated(), 1.0 / 60.0)
-
-
 def test_playing_hair_lags_behind_and_returns_when_stopped(preview, evaluated):
     _, head, session = preview
-    at_rest = drawn(session)
+    at_rest = grid_of(session)
     assert previews.play(evaluated()) == []
 
     def push(frame):
@@ -38,12 +19,12 @@ def test_playing_hair_lags_behind_and_returns_when_stopped(preview, evaluated):
 
     play(evaluated, 6, push)
     carried = at_rest + np.array([head.location.x, 0.0, 0.0])
-    offset = drawn(session) - carried
+    offset = grid_of(session) - carried
     assert np.abs(offset[:, 0]).max() < 1e-5, "roots go with the head"
     assert offset[:, -1, 0].mean() < -0.005, "tips stay behind"
     previews.rest(evaluated(), keep_playing=False)
     assert not previews.is_playing()
-    assert drawn(session) == pytest.approx(carried, abs=2e-6)
+    assert grid_of(session) == pytest.approx(carried, abs=2e-6)
 
 
 def test_a_head_that_stands_still_is_the_same_one_in_the_next_frame(preview, evaluated):
@@ -62,23 +43,23 @@ def test_a_head_that_stands_still_is_the_same_one_in_the_next_frame(preview, eva
 
 def test_without_motion_gravity_alone_pulls_unheld_hair_down(preview, evaluated):
     hair, _, session = preview
-    at_rest = drawn(session)
+    at_rest = grid_of(session)
     hair.hairloom.dynamics.sag_compensation = 0.0
     previews.play(evaluated())
     play(evaluated, 12)
-    assert (drawn(session) - at_rest)[:, -1, 2].mean() < -0.001
+    assert (grid_of(session) - at_rest)[:, -1, 2].mean() < -0.001
     previews.rest(evaluated(), keep_playing=False)
     bpy.context.scene.use_gravity = False
     previews.play(evaluated())
     play(evaluated, 12)
-    assert np.abs(drawn(session) - at_rest).max() < 1e-3
+    assert np.abs(grid_of(session) - at_rest).max() < 1e-3
 
 
 def test_hair_stays_out_of_the_head_that_moves_into_it(preview, evaluated):
     _, head, session = preview
     previews.play(evaluated())
     play(evaluated, 10, lambda frame: setattr(head.location, "z", 0.01 * (frame + 1)))
-    distance = np.linalg.norm(drawn(session) - np.array(head.location), axis=2)
+    distance = np.linalg.norm(grid_of(session) - np.array(head.location), axis=2)
     assert distance[:, 2:].min() > 0.098
 
 

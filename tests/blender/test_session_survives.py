@@ -10,18 +10,6 @@ from hairloom.addon.blender.viewport import overlay
 from hairloom.addon.errors import HairloomError
 
 
-@pytest.fixture
-def preview(new_hair, sphere, evaluated):
-    """Hair on a head, previewed: (hair, head, session)."""
-    hair = new_hair(sphere)
-    return hair, sphere, previews.start(hair, evaluated())
-
-
-def drawn(session):
-    """The strands as they are drawn, whether they lie on the GPU or in an array."""
-    return grid_of(session)
-
-
 def update():
     bpy.context.view_layer.update()
 
@@ -46,7 +34,7 @@ def test_curves_may_become_fewer_and_none(preview, evaluated):
     hair.data.remove_curves(indices=list(range(50)))
     update()
     scene_events.catch_up(evaluated())
-    assert drawn(session).shape[0] == 10
+    assert grid_of(session).shape[0] == 10
     hair.data.remove_curves()
     update()
     scene_events.catch_up(evaluated())
@@ -57,11 +45,11 @@ def test_curves_may_become_fewer_and_none(preview, evaluated):
 
 def test_renaming_is_no_matter(preview):
     hair, head, session = preview
-    before = drawn(session)
+    before = grid_of(session)
     hair.name, head.name = "Wig", "Bust"
     head.location.x = 1.0
     update()
-    assert drawn(session) == pytest.approx(before + np.array([1.0, 0.0, 0.0]), abs=1e-6)
+    assert grid_of(session) == pytest.approx(before + np.array([1.0, 0.0, 0.0]), abs=1e-6)
 
 
 @pytest.mark.parametrize("which", ["Hair", "Head"])
@@ -85,7 +73,7 @@ def test_undo_and_redo_of_a_moved_head_and_edited_hair(new_hair, sphere, evaluat
     hair = new_hair(sphere)
     bpy.ops.ed.undo_push(message="begin")
     session = previews.start(hair, evaluated())
-    begin = drawn(session)
+    begin = grid_of(session)
     sphere.location.x = 1.0
     hair.data.position_data[7].vector = (0.0, 0.0, 0.5)
     hair.data.hairloom.shading.ambient = 0.125
@@ -94,12 +82,12 @@ def test_undo_and_redo_of_a_moved_head_and_edited_hair(new_hair, sphere, evaluat
     bpy.ops.ed.undo()
     scene_events.catch_up(evaluated())
     assert previews.sessions() == (session,)
-    assert drawn(session) == pytest.approx(begin, abs=1e-6)
+    assert grid_of(session) == pytest.approx(begin, abs=1e-6)
     assert overlay.drawing_of(session.uid).snapshot.shading.ambient == 1.0
 
     bpy.ops.ed.redo()
     scene_events.catch_up(evaluated())
-    assert drawn(session)[0, -1] == pytest.approx([1.0, 0.0, 0.5], abs=1e-5)
+    assert grid_of(session)[0, -1] == pytest.approx([1.0, 0.0, 0.5], abs=1e-5)
     assert overlay.drawing_of(session.uid).snapshot.shading.ambient == 0.125
 
 
@@ -117,7 +105,7 @@ def test_loading_a_file_drops_all_previews_and_keeps_the_settings(preview, tmp_p
 
 def test_another_scene_in_the_window_does_not_end_the_preview(preview):
     _, head, session = preview
-    before, window, scene = drawn(session), bpy.context.window, bpy.context.scene
+    before, window, scene = grid_of(session), bpy.context.window, bpy.context.scene
     window.scene = bpy.data.scenes.new("Elsewhere")
     window.scene.collection.objects.link(bpy.data.objects.new("Thing", None))
     update()
@@ -129,7 +117,7 @@ def test_another_scene_in_the_window_does_not_end_the_preview(preview):
     head.location.x = 1.0
     update()
     assert overlay.drawing_of(session.uid).is_visible
-    assert drawn(session) == pytest.approx(before + np.array([1.0, 0.0, 0.0]), abs=1e-6)
+    assert grid_of(session) == pytest.approx(before + np.array([1.0, 0.0, 0.0]), abs=1e-6)
 
 
 def test_sculpting_hides_blenders_own_strands(preview, evaluated):
@@ -139,7 +127,7 @@ def test_sculpting_hides_blenders_own_strands(preview, evaluated):
     update()
     assert hair.evaluated_get(evaluated()).display_type == "WIRE"
     scene_events.catch_up(evaluated())
-    assert drawn(session)[0, -1] == pytest.approx([0.0, 0.0, 0.5], abs=1e-5)
+    assert grid_of(session)[0, -1] == pytest.approx([0.0, 0.0, 0.5], abs=1e-5)
     bpy.ops.object.mode_set(mode="OBJECT")
     update()
     assert hair.evaluated_get(evaluated()).display_type == "WIRE"
@@ -153,9 +141,9 @@ def test_a_final_render_does_not_disturb_the_preview(preview):
     scene.collection.objects.link(camera)
     scene.camera, scene.render.engine = camera, "BLENDER_WORKBENCH"
     scene.render.resolution_x = scene.render.resolution_y = 16
-    before = drawn(session)
+    before = grid_of(session)
     bpy.ops.render.render()
-    assert drawn(session) == pytest.approx(before, abs=1e-7)
+    assert grid_of(session) == pytest.approx(before, abs=1e-7)
     assert previews.sessions() == (session,)
 
 

@@ -11,6 +11,7 @@ import pytest
 pytest.importorskip("bpy", reason="runs inside Blender")
 
 import bpy
+from engine_stage import view_shadings
 
 from hairloom.addon.blender.command_line import command_line
 from hairloom.addon.blender.pictures.skin_picture import IMAGE as SKIN_IMAGE
@@ -133,12 +134,6 @@ def test_the_skin_shadow_of_previewed_hair(new_hair: Any, sphere: Any) -> None:
     assert previews.session_of(hair) is None
 
 
-def views() -> list[Any]:
-    windows = bpy.context.window_manager.windows
-    areas = [area for window in windows for area in window.screen.areas]
-    return [area.spaces.active.shading for area in areas if area.type == "VIEW_3D"]
-
-
 def test_a_lamp_amidst_the_hair_is_told_where_a_view_goes_by_it(new_hair: Any, sphere: Any) -> None:
     hair = new_hair(sphere)
     hair.data.hairloom.volume.shadows = "deep"
@@ -148,10 +143,10 @@ def test_a_lamp_amidst_the_hair_is_told_where_a_view_goes_by_it(new_hair: Any, s
     lamp.location = sphere.matrix_world.translation
     bpy.context.view_layer.update()
     session = Session(hair, bpy.context.evaluated_depsgraph_get())
-    for shading in views():
+    for shading in view_shadings():
         shading.type = "SOLID"
     assert not any("Candle" in warning for warning in session.warnings)
-    views()[0].type = "RENDERED"
+    view_shadings()[0].type = "RENDERED"
     (warning,) = (each for each in session.warnings if each.startswith("Candle: "))
     assert "amidst the hair" in warning
     lamp.location.x += 5.0

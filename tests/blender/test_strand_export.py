@@ -9,7 +9,8 @@ from typing import Any
 import bpy
 import numpy as np
 import pytest
-from strand_files import curves_of, hedgehog, needs_usd, push_up, stage_of, straight, to_unreal
+from hedgehogs import hedgehog
+from strand_files import curves_of, needs_usd, push_up, stage_of, straight, to_unreal
 
 from hairloom.addon.blender.scene.curves import write_curves
 from hairloom.addon.blender.scene.groom_attributes import store_groom

@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 from bake_files import frames_in
 from grids import baked_grid
-from strand_files import curves_of, hedgehog, needs_usd, push_up, stage_of, straight, to_unreal
+from hedgehogs import hedgehog
+from strand_files import curves_of, needs_usd, push_up, stage_of, straight, to_unreal
 from swinging import thrown
 from waiting import until
 

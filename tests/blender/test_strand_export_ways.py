@@ -11,7 +11,8 @@ from typing import Any
 import bpy
 import numpy as np
 import pytest
-from strand_files import curves_of, hedgehog, needs_usd, straight
+from hedgehogs import hedgehog
+from strand_files import curves_of, needs_usd, straight
 from tfxbone_reader import read_tfxbone
 
 from hairloom.addon.blender.base.outcome import Outcome

@@ -13,7 +13,8 @@ from typing import Any
 import bpy
 import numpy as np
 import pytest
-from strand_files import hedgehog, needs_usd
+from hedgehogs import hedgehog
+from strand_files import needs_usd
 from waiting import until
 
 from hairloom.addon.blender.base.outcome import collected_reports

@@ -27,6 +27,20 @@ def frame(gpu_context: Any) -> Any:
     return frame
 
 
+@pytest.fixture(scope="session")
+def square_camera(frame: Any) -> Callable[..., Any]:
+    """Makes an orthographic camera of x and z from 0 to `size` [m], along +y."""
+
+    def make(size: float) -> Any:
+        middle = size / 2
+        return frame.Camera(
+            frame.look_at((middle, -100.0, middle), (middle, 0.0, middle)),
+            frame.orthographic(size, 1.0, 0.0, 200.0),
+        )
+
+    return make
+
+
 @pytest.fixture
 def compute(gpu_context: Any) -> Callable[..., np.ndarray]:
     """Run a compute shader of tests/gpu/shaders over a grid, back comes (height, width, 4)."""

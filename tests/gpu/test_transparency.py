@@ -31,13 +31,9 @@ COLORED = replace(FLAT, tip_color=(0.1, 0.3, 1.0), tip_tint=1.0, tint_start=0.0,
 
 
 @pytest.fixture(scope="module")
-def front(frame: Any) -> Any:
+def front(square_camera: Any) -> Any:
     """A pixel is a metre; x and z from 0 to SIZE, along +y."""
-    middle = SIZE / 2
-    return frame.Camera(
-        frame.look_at((middle, -100.0, middle), (middle, 0.0, middle)),
-        frame.orthographic(SIZE, 1.0, 0.0, 200.0),
-    )
+    return square_camera(SIZE)
 
 
 def snapshot_of(frame: Any, strands: np.ndarray, radius: float, **more: Any) -> Any:
