@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import gpu
 import numpy as np
 
 from ..arrays import Floats
@@ -60,8 +59,7 @@ class Accumulation:
         shader = program(_ADDING)
         shader.bind(textures={"one_sample": sample}, images={"sum_of_samples": self.total})
         width, height = self._size
-        gpu.compute.dispatch(shader.shader, -(-width // 8), -(-height // 8), 1)
-        gpu.shader.unbind()
+        shader.dispatch(width, height)
         self.count += 1
 
     def mean(self) -> Floats:

@@ -19,7 +19,6 @@ from collections.abc import Generator, Iterator
 from dataclasses import dataclass
 from typing import Any
 
-import gpu
 import numpy as np
 
 from ..arrays import Floats
@@ -161,8 +160,7 @@ def _blocks(bake: _Bake) -> Iterator[tuple[Block, Floats]]:
                 )
             shader = program(_TEXEL_RECIPE)
             shader.bind(textures=samples, images=texels)
-            gpu.compute.dispatch(shader.shader, -(-width // _GROUP), -(-height // _GROUP), 1)
-            gpu.shader.unbind()
+            shader.dispatch(width, height)
             made = [texture_to_array(texels[name])[: block.height] for name in _TEXELS_OF]
             yield block, np.stack(made)
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import gpu
 import numpy as np
 
 from ..shading.bright_shafts import (
@@ -99,7 +98,7 @@ class BrightThings:
                 "largest": LARGEST,
             },
         )
-        gpu.compute.dispatch(part.shader, -(-width // 8), -(-height // 8), 1)
+        part.dispatch(width, height)
         side = cell_side(width, height)
         cells = gpu_objects.texture((-(-width // side), -(-height // side)), format="RGBA32F")
         counting = program(_CELLS)
@@ -108,8 +107,7 @@ class BrightThings:
             images={"cells": cells},
             integers={"cell_side": side},
         )
-        gpu.compute.dispatch(counting.shader, -(-cells.width // 8), -(-cells.height // 8), 1)
-        gpu.shader.unbind()
+        counting.dispatch(cells.width, cells.height)
         self.found = bright_regions(texture_to_array(cells), width, height)
 
     def _add_region(self, picture: Any, region: BrightRegion) -> None:
@@ -128,10 +126,9 @@ class BrightThings:
             images={"rays": rays},
             numbers={"node_spacing": node_spacing(width, height)},
         )
-        gpu.compute.dispatch(blur.shader, -(-grid.angles // 64), 1, 1)
+        blur.dispatch(grid.angles)
         add.bind(blocks={"shafts": block}, textures={"rays": rays}, images={"picture": picture})
-        gpu.compute.dispatch(add.shader, -(-width // 8), -(-height // 8), 1)
-        gpu.shader.unbind()
+        add.dispatch(width, height)
 
 
 def plain(color: tuple[float, float, float, float]) -> Any:

@@ -191,8 +191,7 @@ def _timed_dispatch() -> float | None:
     probed = gpu_objects.texture((_SIDE, _SIDE), format="RGBA32F")
     shader = program(_DISPATCH_RECIPE)
     shader.bind(images={"probed": probed})
-    gpu.compute.dispatch(shader.shader, _SIDE // 8, _SIDE // 8, 1)
-    gpu.shader.unbind()
+    shader.dispatch(_SIDE, _SIDE)
     numbers = texture_to_array(probed)[..., 0].ravel()
     took = 1.0e3 * (time.perf_counter() - begin)
     return took if np.array_equal(numbers, np.arange(_SIDE * _SIDE)) else None

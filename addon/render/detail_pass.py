@@ -20,7 +20,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-import gpu
 import numpy as np
 
 from ..arrays import Floats, Ints
@@ -212,9 +211,7 @@ class DetailPass:
             images=images,
             integers={"strand_count": count},
         )
-        across, _ = recipe.group_size
-        gpu.compute.dispatch(shader.shader, -(-count // across), 1, 1)
-        gpu.shader.unbind()
+        shader.dispatch(count)
         if is_counted:
             self._slots.count(self._totals, textures["strand_widths"], count, slot_pieces)
 

@@ -23,7 +23,6 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
-import gpu
 import numpy as np
 
 from . import gpu_objects
@@ -113,6 +112,4 @@ class DetailSlots:
     ) -> None:
         shader = program(recipe)
         shader.bind(textures=self._textures, images=images, integers=integers)
-        across, _ = recipe.group_size
-        gpu.compute.dispatch(shader.shader, -(-integers["strand_count"] // across), 1, 1)
-        gpu.shader.unbind()
+        shader.dispatch(integers["strand_count"])

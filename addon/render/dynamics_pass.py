@@ -42,7 +42,6 @@ from dataclasses import replace
 from functools import lru_cache, partial
 from typing import Any
 
-import gpu
 import numpy as np
 
 from ..arrays import Floats
@@ -354,8 +353,7 @@ class DynamicsPass:
             textures={name: textures[name] for _, name in recipe.textures},
             images={name: textures[name] for _, name, *_ in recipe.images},
         )
-        gpu.compute.dispatch(shader.shader, -(-state.guide_count // GROUP_SIZE), 1, 1)
-        gpu.shader.unbind()
+        shader.dispatch(state.guide_count)
 
     def _bridge(
         self, beside_root: Floats | None, simulated: Floats | None, turn: Floats | None
@@ -379,10 +377,7 @@ class DynamicsPass:
             integers={"cv_count": state.cv_count, "guide_count": state.guide_count},
             numbers=rows,
         )
-        across, down = recipe.group_size
-        groups = -(-state.cv_count // across), -(-state.guide_count // down)
-        gpu.compute.dispatch(shader.shader, *groups, 1)
-        gpu.shader.unbind()
+        shader.dispatch(state.cv_count, state.guide_count)
 
     def _grid(self, name: str) -> Floats:
         """A texture as (guide_count, cv_count, channels)."""

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import gpu
-
 from ..arrays import Floats
 from ..shading.lights import kept_lights
 from ..shading.mesh_shadow_settings import MeshShadowSettings
@@ -106,6 +104,5 @@ def _averaged(color: Any, samples: int) -> Any:
         images={"picture": picture},
         integers={"samples_across": samples},
     )
-    gpu.compute.dispatch(shader.shader, -(-width // 8), -(-height // 8), 1)
-    gpu.shader.unbind()
+    shader.dispatch(width, height)
     return picture

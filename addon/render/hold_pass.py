@@ -13,7 +13,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import gpu
 import numpy as np
 
 from ..arrays import Floats
@@ -78,8 +77,7 @@ class HoldPass:
             images={"cv_points": cv_points},
             integers={"held_count": count},
         )
-        gpu.compute.dispatch(shader.shader, -(-count // HOLD_RECIPE.group_size[0]), 1, 1)
-        gpu.shader.unbind()
+        shader.dispatch(count)
 
     def _upload(self, holds: Holds) -> None:
         strand, first, count = np.unique(holds.strand, return_index=True, return_counts=True)

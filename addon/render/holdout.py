@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-import gpu
-
 from . import gpu_objects
 from .accumulation import Target
 from .shader_program import ShaderRecipe, program, released_with_shaders
@@ -51,5 +49,4 @@ class Holdout:
         shader = program(_RECIPE)
         shader.bind(textures={"holes": self._holes}, images={"picture": target.color})
         width, height = self._holes.width, self._holes.height
-        gpu.compute.dispatch(shader.shader, -(-width // 8), -(-height // 8), 1)
-        gpu.shader.unbind()
+        shader.dispatch(width, height)

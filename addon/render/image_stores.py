@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import gpu
-
 from .shader_program import ShaderRecipe, program
 
 _RECIPE = ShaderRecipe(
@@ -15,5 +13,4 @@ def finish_stores() -> None:
     """What has been drawn so far has stored all that comes after it reads."""
     done = program(_RECIPE)
     done.bind()
-    gpu.compute.dispatch(done.shader, 1, 1, 1)
-    gpu.shader.unbind()
+    done.dispatch(1)

@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-import gpu
 import numpy as np
 
 from ..arrays import Floats
@@ -86,8 +85,7 @@ class InterGroomShadow:
                     "own_number": number,
                 },
             )
-            gpu.compute.dispatch(shader.shader, -(-size[0] // 8), -(-size[1] // 8), 1)
-            gpu.shader.unbind()
+            shader.dispatch(size[0], size[1])
         return self._found
 
 

@@ -20,7 +20,6 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
-import gpu
 import numpy as np
 
 from ..arrays import Ints, number_in_piece
@@ -243,8 +242,7 @@ class LeadOutPass:
         shader.bind(
             textures=textures, images={"cv_points": cv_points}, integers={"point_count": count}
         )
-        gpu.compute.dispatch(shader.shader, -(-count // _GROUP[0]), 1, 1)
-        gpu.shader.unbind()
+        shader.dispatch(count)
 
     def led(self) -> Ints:
         """The strands that `lead` has led out last, (n,), read back."""
@@ -300,8 +298,7 @@ class LeadOutPass:
                 integers={name: known[name] for name in recipe.integers},
                 numbers={name: numbers[name] for _, name in recipe.numbers},
             )
-            gpu.compute.dispatch(shader.shader, -(-invocations // _GROUP[0]), 1, 1)
-            gpu.shader.unbind()
+            shader.dispatch(invocations)
 
     def _points_at_once(self) -> int:
         """How many points of a strand one dispatch may lead, with what bends it before and puts it

@@ -122,16 +122,14 @@ class OpacityMaps:
             images={"spans": self.spans},
             integers={"map_index": number, "side": side},
         )
-        gpu.compute.dispatch(shader.shader, -(-side // 8), -(-side // 8), 1)
-        gpu.shader.unbind()
+        shader.dispatch(side, side)
 
     def forget_starts(self, number: int) -> None:
         """As if the light of this map had met no hair."""
         side = self.size.side // START_TEXELS
         shader = program(_NO_STARTS_RECIPE)
         shader.bind(images={"starts": self.starts}, integers={"map_index": number, "side": side})
-        gpu.compute.dispatch(shader.shader, -(-2 * side // 8), -(-side // 8), 1)
-        gpu.shader.unbind()
+        shader.dispatch(2 * side, side)
 
 
 def new_maps(values: Floats, size: MapSize) -> OpacityMaps:

@@ -9,8 +9,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-import gpu
-
 from . import gpu_objects
 from .opacity_maps import OpacityMaps
 from .shader_program import ShaderRecipe, program
@@ -38,9 +36,7 @@ def draw_starts(maps: OpacityMaps, number: int, side: int, draw: Callable[[], No
     }
     shader = program(_STARTS_RECIPE)
     shader.bind(textures=depths, images={"starts": maps.starts}, integers={"map_index": number})
-    groups = -(-maps.starts.width // 2 // 8)
-    gpu.compute.dispatch(shader.shader, groups, groups, 1)
-    gpu.shader.unbind()
+    shader.dispatch(maps.starts.width // 2, maps.starts.width // 2)
 
 
 def _depths(side: int, depth_test: str, none: float, draw: Callable[[], None]) -> Any:

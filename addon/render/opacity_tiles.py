@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gpu
 import numpy as np
 
 from ..arrays import Floats
@@ -70,6 +69,5 @@ def _tiles(maps: OpacityMaps, number: int, layer_count: int) -> Floats:
             "texels_across": across,
         },
     )
-    gpu.compute.dispatch(shader.shader, -(-width // 8), -(-height // 8), 1)
-    gpu.shader.unbind()
+    shader.dispatch(width, height)
     return texture_to_array(tiles)

@@ -34,7 +34,6 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any, Self
 
-import gpu
 import numpy as np
 
 from ..arrays import Floats, Ints
@@ -346,7 +345,7 @@ class RidePass:
             images=_named(textures, "frames", "root_motions"),
             integers={"strand_count": count},
         )
-        _dispatch(shader, count, 1)
+        shader.dispatch(count)
 
     def _run_guides(self, guides_now: Any) -> None:
         textures, count = self._textures, len(self._guides)
@@ -364,7 +363,7 @@ class RidePass:
                 "mover_count": self._mover_count,
             },
         )
-        _dispatch(shader, count, 1)
+        shader.dispatch(count)
 
     def _run_ride(
         self,
@@ -396,7 +395,7 @@ class RidePass:
             numbers = {"kept": seen.kept, "turned_back": seen.turned_back}
         shader = program(_ride_recipe(curls=is_curled, solids=solids))
         shader.bind(textures=taken, images=images, integers=integers, numbers=numbers)
-        _dispatch(shader, count, 1)
+        shader.dispatch(count)
         if seen is not None:
             carrying = _named(textures, "rest_points", "root_motions")
             self.leading.lead(self.points.texture, seen, carrying, self._mover_count)
@@ -426,12 +425,6 @@ def _cleared(size: tuple[int, int]) -> Any:
 
 def _named(textures: dict[str, Any], *names: str) -> dict[str, Any]:
     return {name: textures[name] for name in names}
-
-
-def _dispatch(shader: Any, width: int, height: int) -> None:
-    across, down = shader.recipe.group_size
-    gpu.compute.dispatch(shader.shader, -(-width // across), -(-height // down), 1)
-    gpu.shader.unbind()
 
 
 def matrix_motion(matrix: Floats) -> Floats:

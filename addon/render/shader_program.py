@@ -121,6 +121,13 @@ class ShaderProgram:
         for name, number in (numbers or {}).items():
             self.shader.uniform_float(name, number)
 
+    def dispatch(self, width: int, height: int = 1) -> None:
+        """Run what is bound, a compute shader, for this many invocations, up to whole groups, and
+        bind nothing."""
+        across, down = (*self.recipe.group_size, 1)[:2]
+        gpu.compute.dispatch(self.shader, -(-width // across), -(-height // down), 1)
+        gpu.shader.unbind()
+
     def _require(self, kind: str, declared: Any, given: Mapping[str, Any] | None) -> None:
         difference = set(declared) ^ set(given or {})
         if difference:

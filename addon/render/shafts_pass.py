@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-import gpu
-
 from ..shading.bright_shafts import wants_bright
 from ..shading.lights import Light
 from ..shading.shafts import LightOnScreen, PolarGrid, lights_on_screen
@@ -125,8 +123,7 @@ def put_under(picture: Any, background: tuple[float, float, float, float]) -> No
     """Put a premultiplied colour under a picture that was drawn over nothing."""
     shader = program(_UNDER)
     shader.bind(images={"picture": picture}, numbers={"background": background})
-    gpu.compute.dispatch(shader.shader, -(-picture.width // 8), -(-picture.height // 8), 1)
-    gpu.shader.unbind()
+    shader.dispatch(picture.width, picture.height)
 
 
 def _add_light(
@@ -137,14 +134,13 @@ def _add_light(
     block = gpu_objects.uniform_buffer(pack_shafts(light, grid))
     caster = gpu_objects.texture((width, height), format="R32F")
     rays = gpu_objects.texture((grid.radii, grid.angles), format="R32F")
-    pixels = -(-width // 8), -(-height // 8)
     integers = {"samples_across": drawn.width // width, "is_apart": int(is_apart)}
     steps: tuple[tuple[ShaderRecipe, dict[str, Any], dict[str, Any], tuple[int, int]], ...] = (
-        (_CASTER, {"samples_of": drawn, "depth_of": depth}, {"caster": caster}, pixels),
-        (_BLUR, {"caster": caster}, {"rays": rays}, (-(-grid.angles // 64), 1)),
-        (_ADD, {"rays": rays}, {"picture": picture}, pixels),
+        (_CASTER, {"samples_of": drawn, "depth_of": depth}, {"caster": caster}, (width, height)),
+        (_BLUR, {"caster": caster}, {"rays": rays}, (grid.angles, 1)),
+        (_ADD, {"rays": rays}, {"picture": picture}, (width, height)),
     )
-    for recipe, textures, images, groups in steps:
+    for recipe, textures, images, size in steps:
         shader = program(recipe)
         shader.bind(
             blocks={"shafts": block},
@@ -152,5 +148,4 @@ def _add_light(
             images=images,
             integers=integers if recipe.integers else {},
         )
-        gpu.compute.dispatch(shader.shader, *groups, 1)
-    gpu.shader.unbind()
+        shader.dispatch(*size)

@@ -16,7 +16,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import gpu
 import numpy as np
 
 from ..arrays import Floats, Ints
@@ -243,7 +242,7 @@ class SkinPass:
             integers={"light_count": wanted.light_count},
             numbers={"hair_forward": wanted.forward},
         )
-        _dispatch(shader, found)
+        shader.dispatch(found.width, found.height)
         return found
 
 
@@ -282,7 +281,7 @@ def spread(shadow: Any, textures: dict[str, Any], softness: float, axis: int) ->
         integers={"axis": axis},
         numbers={"softness": softness},
     )
-    _dispatch(shader, found)
+    shader.dispatch(found.width, found.height)
     return found
 
 
@@ -296,7 +295,7 @@ def closing_shifts(shadow: Any, textures: dict[str, Any]) -> Any:
         textures={"skin_shadow": shadow, **{name: textures[name] for name in names}},
         images={"shifts": found},
     )
-    _dispatch(shader, found)
+    shader.dispatch(found.width, found.height)
     return found
 
 
@@ -310,8 +309,3 @@ def _in_rows(values: Floats, across: int) -> Floats:
 
 def _like(texture: Any) -> Any:
     return gpu_objects.texture((texture.width, texture.height), format="RGBA32F")
-
-
-def _dispatch(shader: Any, image: Any) -> None:
-    gpu.compute.dispatch(shader.shader, -(-image.width // 8), -(-image.height // 8), 1)
-    gpu.shader.unbind()
