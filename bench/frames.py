@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import count
@@ -28,9 +28,10 @@ from hairloom.addon.groom.settings import GrowSettings
 from hairloom.addon.render.camera import Camera, frame_camera
 from hairloom.addon.render.groom_pass import GroomPass
 from hairloom.addon.render.kept_picture import KeptPicture
+from hairloom.addon.render.opacity_maps import OpacityMaps
 from hairloom.addon.render.snapshot import Snapshot
 from hairloom.addon.render.strand_layers import is_software
-from hairloom.addon.render.strand_pass import StrandPass
+from hairloom.addon.render.strand_pass import InView, StrandPass
 from hairloom.addon.render.textures import drawing_into
 from hairloom.addon.shading.lights import three_point_lights
 from hairloom.addon.strands import StrandSet
@@ -93,10 +94,18 @@ class Stage:
         direction = float(np.sin(angle)), -float(np.cos(angle)), 0.2
         return frame_camera(self.strands.bounds(), direction, 0.5, WIDTH / HEIGHT)
 
-    def draw(self, own: StrandPass, hair: Snapshot, angle: float, **options: Any) -> None:
-        camera = self.camera(angle)
-        lit, options = replace(hair, lights=three_point_lights(camera.view)), {"view": 0} | options
-        self.put(lambda: own.draw(lit, camera, WIDTH, HEIGHT, output="viewport", **options))
+    def draw(
+        self,
+        own: StrandPass,
+        hair: Snapshot,
+        angle: float,
+        others: Sequence[OpacityMaps] = (),
+        **options: Any,
+    ) -> None:
+        camera, view = self.camera(angle), InView(**{"name": 0} | options)
+        lit = replace(hair, lights=three_point_lights(camera.view))
+        shown = {"output": "viewport", "others": others, "view": view}
+        self.put(lambda: own.draw(lit, camera, WIDTH, HEIGHT, **shown))
 
     def put(self, draw: Callable[[], None]) -> None:
         with drawing_into(self.target):
@@ -141,7 +150,7 @@ class Stage:
 
         def keep() -> None:
             kept.begin()
-            own.draw(lit, camera, WIDTH, HEIGHT, output="viewport", picture=kept)
+            own.draw(lit, camera, WIDTH, HEIGHT, output="viewport", view=InView(picture=kept))
 
         camera = self.camera(0.0)
         lit = replace(hair, lights=three_point_lights(camera.view))
@@ -181,12 +190,12 @@ class Stage:
         alone, both = StrandPass(), StrandPass()
 
         def one() -> None:
-            self.draw(alone, self.hair(), 0.0, view="a", is_moving=True)
+            self.draw(alone, self.hair(), 0.0, name="a", is_moving=True)
 
         def two() -> None:
             hair = self.hair()
-            self.draw(both, hair, 0.0, view="a", is_moving=True)
-            self.draw(both, hair, 0.0 + TURN, view="b", is_moving=True)
+            self.draw(both, hair, 0.0, name="a", is_moving=True)
+            self.draw(both, hair, 0.0 + TURN, name="b", is_moving=True)
 
         in_one, in_two = self.least(one, two)
         return {"two_views_ratio": in_two / in_one}

@@ -68,6 +68,30 @@ CONTENTS = ("light", "tangents", "places")
 NUMBERED_VIEWS = ("guide", "group")
 
 
+@dataclass(frozen=True, eq=False)
+class InView:
+    """How a view that is drawn again and again is drawn now.
+
+    name: which one it is; what depends on a view is kept for each name.
+    is_turning: the lights are attached to the view, which moves, see OpacityDrawing.maps.
+    is_moving: what is seen differs from what the view showed before, and soon from this: what the
+        GPU would have to be waited for is taken from before, see StrandPass.is_behind.
+    picture: takes what is drawn, so that it can be shown again.
+    is_sample: it takes this alone, scene-linear, as one of many that are added up; the bound
+        framebuffer gets the depths.
+    """
+
+    name: Hashable = None
+    is_turning: bool = False
+    is_moving: bool = False
+    picture: KeptPicture | None = None
+    is_sample: bool = False
+
+
+#: Of whoever draws into one picture.
+NO_VIEW = InView()
+
+
 @dataclass(frozen=True)
 class Statistics:
     """What a draw has drawn: strands, their straight pieces, and the vertices of all instances.
@@ -152,11 +176,7 @@ class StrandPass:
         display: Display | None = None,
         samples: int = 1,
         others: Sequence[OpacityMaps] = (),
-        view: Hashable = None,
-        is_turning: bool = False,
-        is_moving: bool = False,
-        picture: KeptPicture | None = None,
-        is_sample: bool = False,
+        view: InView = NO_VIEW,
     ) -> None:
         """Draw all strands into the bound framebuffer, depth-tested against what is in it.
 
@@ -170,45 +190,38 @@ class StrandPass:
                 and the settings of detail count in the latter.
             others: maps of other hair that may be in the way of light. Counts where this hair has
                 maps itself, see `opacity`.
-            view: which one this is.
-            is_turning: as for `opacity`.
-            is_moving: what is seen differs from what the view showed before, and soon from this:
-                what the GPU would have to be waited for is taken from before, see `is_behind`.
-            picture: takes what is drawn, so that it can be shown again.
-            is_sample: it takes this alone, scene-linear, as one of many that are added up; the
-                bound framebuffer gets the depths.
 
         Raises:
             ShaderError: the shader does not compile here, or points on the GPU were released.
         """
         if content not in CONTENTS:
             raise ValueError(f"content {content!r} is none of {', '.join(CONTENTS)}")
-        own = self._views.setdefault(view, _View())
+        own = self._views.setdefault(view.name, _View())
         own.is_moving = False
         self.statistics = Statistics()
         if not snapshot.strand_count:
             return
-        if is_sample:
+        if view.is_sample:
             display = None
-        output_encoding = output_index("scene_linear" if is_sample else output)
+        output_encoding = output_index("scene_linear" if view.is_sample else output)
         self._upload(snapshot)
         size = width // samples, height // samples
         serial = self._points_serial
         is_debug = content == "light" and snapshot.debug_view != "none"
         transparency = "none" if is_debug else drawn_transparency(snapshot.strand_settings)
         is_layered = transparency == "layers"
-        own.is_moving = is_moving and is_layered and own.detail.may_move(snapshot)
+        own.is_moving = view.is_moving and is_layered and own.detail.may_move(snapshot)
         order = own.detail.order(
             *(snapshot, self._textures, serial, camera, size),
             by_depth=not is_layered,
-            counted=is_layered and view is not None,
+            counted=is_layered and view.name is not None,
             room=LAYERS_OF_PIXELS.room_for if own.is_moving else None,
         )
         if not order.classes:
             return
         maps = None
         if content == "light" and not is_debug:
-            maps = self.opacity(snapshot, view=view, is_turning=is_turning)
+            maps = self.opacity(snapshot, view=view.name, is_turning=view.is_turning)
         if content == "light" and not others:
             own.lit.between.release()  # else maps of grooms that are gone stay
         drawing = StrandDrawing(
@@ -239,9 +252,9 @@ class StrandPass:
                 is_own_target=output == "scene_linear",
                 in_parts=own.parts > 1,
                 is_moving=own.is_moving,
-                is_turning=is_turning,
-                picture=picture,
-                is_sample=is_sample,
+                is_turning=view.is_turning,
+                picture=view.picture,
+                is_sample=view.is_sample,
             )
             own.parts = own.parts if own.is_moving else layers.parts
         elif transparency == "hashed":
@@ -266,8 +279,7 @@ class StrandPass:
         have the same ones.
 
         Args:
-            view: as for `draw`.
-            is_turning: the lights are attached to a view that moves, see OpacityDrawing.maps.
+            view: the name of one; is_turning: see InView.
 
         Raises:
             ShaderError: as `draw`.

@@ -53,13 +53,14 @@ def drawn(grooms: Any, camera: Any, draw_hair: Any) -> np.ndarray:
 def test_what_is_shown_again_is_what_was_drawn(frame: Any, scene: Any) -> None:
     """Beside a mesh that hides some of it, of two grooms."""
     from hairloom.addon.render.kept_picture import KeptPicture
+    from hairloom.addon.render.strand_pass import InView
 
     (grooms, camera), kept = scene, KeptPicture()
     passes = [frame.StrandPass() for _ in grooms]
 
     def draw_hair(picture: Any) -> None:
         for own, groom in zip(passes, grooms, strict=True):
-            own.draw(groom, camera, SIZE, SIZE, output="viewport", picture=picture)
+            own.draw(groom, camera, SIZE, SIZE, output="viewport", view=InView(picture=picture))
 
     plain = drawn(grooms, camera, lambda: draw_hair(None))
 
@@ -80,12 +81,14 @@ def test_what_is_shown_again_is_what_was_drawn(frame: Any, scene: Any) -> None:
 
 def test_showing_again_reads_nothing_and_draws_two_triangles(frame: Any, scene: Any) -> None:
     from hairloom.addon.render.kept_picture import KeptPicture
+    from hairloom.addon.render.strand_pass import InView
 
     (grooms, camera), kept = scene, KeptPicture()
 
     def keep() -> None:
         kept.begin()
-        frame.StrandPass().draw(grooms[0], camera, SIZE, SIZE, output="viewport", picture=kept)
+        shown = InView(picture=kept)
+        frame.StrandPass().draw(grooms[0], camera, SIZE, SIZE, output="viewport", view=shown)
 
     drawn(grooms, camera, keep)
     calls: list[Any] = []
@@ -110,6 +113,7 @@ def test_a_groom_in_many_lengths_takes_few_draws(frame: Any, scene: Any) -> None
     """With three lights' maps, strands of 1 to 60 segments take at most 40 draws."""
     from hairloom.addon.render.kept_picture import KeptPicture
     from hairloom.addon.render.strand_layout import StrandLayout
+    from hairloom.addon.render.strand_pass import InView
 
     grooms, camera = scene
     random = np.random.default_rng(1)
@@ -129,7 +133,7 @@ def test_a_groom_in_many_lengths_takes_few_draws(frame: Any, scene: Any) -> None
 
     def draw() -> None:
         kept.begin()
-        own.draw(groom, camera, SIZE, SIZE, output="viewport", picture=kept)
+        own.draw(groom, camera, SIZE, SIZE, output="viewport", view=InView(picture=kept))
 
     drawn([groom], camera, lambda: calls.append(gpu_calls(draw)))
     assert own.statistics.strands == 300 and 10 < calls[0]["draws"] <= 40
@@ -170,6 +174,8 @@ def test_shadows_lag_while_a_view_turns_and_are_exact_once_it_rests(frame: Any, 
 
 def test_views_beside_each_other_keep_what_is_theirs(frame: Any, scene: Any) -> None:
     """Two views in turn compute no detail and draw no map again, and are what each is alone."""
+    from hairloom.addon.render.strand_pass import InView
+
     grooms, _ = scene
     cameras = {name: turned(frame, degrees) for name, degrees in (("a", 0.0), ("b", 120.0))}
     own = frame.StrandPass()
@@ -179,7 +185,7 @@ def test_views_beside_each_other_keep_what_is_theirs(frame: Any, scene: Any) -> 
         groom = replace(grooms[0], lights=studio(camera))
 
         def draw() -> None:
-            by.draw(groom, camera, SIZE, SIZE, output="viewport", view=name)
+            by.draw(groom, camera, SIZE, SIZE, output="viewport", view=InView(name))
 
         found = drawn([groom], camera, lambda: calls.append(gpu_calls(draw)))
         return found, calls[0]

@@ -57,6 +57,7 @@ def drawn(frame: Any, own: Any, groom: Any, camera: Any, **options: Any) -> Any:
     import gpu
 
     from hairloom.addon.render.mesh_pass import MeshPass
+    from hairloom.addon.render.strand_pass import InView
     from hairloom.addon.render.textures import drawing_into
 
     color = gpu.types.GPUTexture((SIZE, SIZE), format="RGBA32F")
@@ -64,7 +65,7 @@ def drawn(frame: Any, own: Any, groom: Any, camera: Any, **options: Any) -> Any:
     target = gpu.types.GPUFrameBuffer(depth_slot=depth, color_slots=(color,))
 
     def draw_hair() -> None:
-        own.draw(groom, camera, SIZE, SIZE, output="viewport", view=VIEW, **options)
+        own.draw(groom, camera, SIZE, SIZE, output="viewport", view=InView(VIEW, **options))
 
     with drawing_into(target):
         target.clear(color=(0.0, 0.0, 0.0, 0.0), depth=1.0)

@@ -27,6 +27,7 @@ def test_hair_stays_in_its_viewport(frame: Any, transparency: str, keeps: bool) 
     import gpu
 
     from hairloom.addon.render.kept_picture import KeptPicture
+    from hairloom.addon.render.strand_pass import InView
     from hairloom.addon.render.textures import drawing_into
 
     left, bottom, width, height = VIEWPORT
@@ -54,8 +55,8 @@ def test_hair_stays_in_its_viewport(frame: Any, transparency: str, keeps: bool) 
         picture = kept if keeps and transparency == "layers" else None
         if picture is not None:
             picture.begin()
-        options = {"view": 1, "is_moving": is_moving, "picture": picture}
-        own.draw(groom, camera, width, height, output="viewport", **options)
+        view = InView(1, is_moving=is_moving, picture=picture)
+        own.draw(groom, camera, width, height, output="viewport", view=view)
 
     for step in ("rests", "moves", "shown again"):
         with drawing_into(target):

@@ -134,6 +134,8 @@ class View:
     def draw_hair(
         self, grooms: Sequence[Snapshot], picture: Any, view: str = HARD, **options: Any
     ) -> None:
+        from hairloom.addon.render.strand_pass import InView
+
         pairs = list(zip(self.hair, grooms, strict=True))
         maps = {key: hair.maps(each, view=view) for key, (hair, each) in enumerate(pairs)}
         for key, (hair, each) in enumerate(pairs):
@@ -141,9 +143,7 @@ class View:
                 *(each, self.camera, SIZE, SIZE),
                 output="viewport",
                 others=hair.others(key, each, maps),
-                view=view,
-                picture=picture,
-                **options,
+                view=InView(view, picture=picture, **options),
             )
 
 

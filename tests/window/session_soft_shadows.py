@@ -46,7 +46,7 @@ def count_draws():
     draw = strands.draw
 
     def count(*values, **options):
-        counted["samples" if options.get("is_sample") else "drawn"] += 1
+        counted["samples" if options["view"].is_sample else "drawn"] += 1
         return draw(*values, **options)
 
     strands.draw = count

@@ -125,7 +125,7 @@ def what_moves_waits_for_nothing():
     draw = strands.draw
 
     def noted(*values, **options):
-        if options.get("is_moving"):
+        if options["view"].is_moving:
             reads.append(gpu_calls(lambda: draw(*values, **options))["reads"])
         else:
             draw(*values, **options)

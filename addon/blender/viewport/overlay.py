@@ -28,7 +28,7 @@ from ...render.own_depth import OwnDepth
 from ...render.scene_pass import ONE_AT_A_TIME
 from ...render.scene_snapshot import SceneSnapshot
 from ...render.snapshot import Snapshot
-from ...render.strand_pass import Statistics, drawn_transparency
+from ...render.strand_pass import InView, Statistics, drawn_transparency
 from ...shading.environment import Environment, world_suns
 from ...shading.lights import Light, brightest, three_point_lights
 from ...strands import Surface
@@ -395,7 +395,8 @@ class _Shown:
         """Its hair; strands go into the picture as well.
 
         Args:
-            maps: of all hair in the view, by session number. is_sample: as in StrandPass.draw.
+            maps: of all hair in the view, by session number.
+            picture, is_moving, is_sample: see InView.
         """
         _, _, width, height = gpu.state.viewport_get()
         snapshot, display, hair = self.snapshot, self.display, self.drawn.hair
@@ -407,11 +408,7 @@ class _Shown:
             output="viewport",
             display=display,
             others=hair.others(self.uid, snapshot, maps),
-            view=self.view,
-            is_turning=self.is_turning,
-            is_moving=is_moving,
-            picture=picture,
-            is_sample=is_sample,
+            view=InView(self.view, self.is_turning, is_moving, picture, is_sample),
         )
         if is_sample:
             return
