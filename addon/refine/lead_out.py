@@ -35,7 +35,7 @@ from ..dynamics.colliders.signed_distance import (
     nearer_than,
     poses_now,
 )
-from ..strands.vectors import GOLDEN_ANGLE, unit
+from ..strands.vectors import even_directions, unit
 
 #: How often a point goes straight out and back to its length, at most.
 SWEEPS = 2
@@ -327,11 +327,8 @@ def points_of(strands: Ints, offsets: Ints) -> Ints:
 
 @cache
 def directions() -> Floats:
-    """What is tried, (TRIES, 3): evenly over the sphere, on a spiral by the golden angle."""
-    number = np.arange(TRIES)
-    height = 1.0 - (2.0 * number + 1.0) / TRIES
-    angle, radius = GOLDEN_ANGLE * number, np.sqrt(1.0 - height * height)
-    return np.stack([radius * np.cos(angle), radius * np.sin(angle), height], axis=1)
+    """What is tried, (TRIES, 3)."""
+    return even_directions(TRIES)
 
 
 @dataclass(frozen=True, eq=False)

@@ -28,6 +28,14 @@ def unit_or(
     return np.where(length > shortest, vectors / np.maximum(length, shortest), fallback)
 
 
+def even_directions(count: int) -> Floats:
+    """Unit vectors evenly over the sphere, (count, 3), from its top on a spiral (Fibonacci)."""
+    number = np.arange(count)
+    height = 1.0 - (2.0 * number + 1.0) / count
+    angle, across = GOLDEN_ANGLE * number, np.sqrt(1.0 - height * height)
+    return np.stack([across * np.cos(angle), across * np.sin(angle), height], axis=1)
+
+
 def dot(one: Floats, two: Floats) -> Floats:
     """Of vectors (..., 3)."""
     return np.asarray(np.einsum("...i,...i->...", one, two))

@@ -33,6 +33,7 @@ from ...rig_flow import Pose, Rig
 from ...shading.ambient_settings import AmbientSettings
 from ...shading.lights import three_point_lights
 from ...strands import StrandSet
+from ...strands.vectors import even_directions
 from ..base.gpu_context import ensure_gpu
 from ..base.report import environment
 from ..sessions.prepared_groom import prepared
@@ -172,12 +173,8 @@ def _finish() -> None:
 
 def hair_ball(strand_count: int) -> Rig:
     """Strands of 15 cm out of a ball of 10 cm, evenly spread and bent downwards."""
-    along, numbers = np.linspace(0.0, 1.0, POINTS), np.arange(strand_count)
-    height = 1.0 - (2.0 * numbers + 1.0) / strand_count
-    turn = numbers * np.pi * (3.0 - np.sqrt(5.0))
-    across = np.sqrt(1.0 - height * height)
-    out = np.stack([across * np.cos(turn), across * np.sin(turn), height], axis=1)
-    points = out[:, None] * (0.1 + 0.15 * along[:, None])
+    along = np.linspace(0.0, 1.0, POINTS)
+    points = even_directions(strand_count)[:, None] * (0.1 + 0.15 * along[:, None])
     points[..., 2] -= 0.1 * along * along
     strands = StrandSet(
         points=points.reshape(-1, 3),

@@ -25,6 +25,7 @@ from ...arrays import Floats
 from ...errors import HairloomError
 from ...strands import Surface
 from ...strands.closest_point import ClosestPointSearch
+from ...strands.vectors import even_directions
 from ..colliders.sphere_set import SphereSetCollider
 from ..colliders.winding import winding_number
 from .settings import SphereFitSettings
@@ -73,11 +74,7 @@ def union_places(balls: SphereSetCollider) -> Floats:
     places = []
     for center, radius, fraction in zip(balls.centers, balls.radii, area / area.sum(), strict=True):
         count = max(int(2 * _PLACES * fraction), 16)
-        up = 1.0 - (2.0 * np.arange(count) + 1.0) / count
-        turn = np.pi * (3.0 - np.sqrt(5.0)) * np.arange(count)
-        across = np.sqrt(1.0 - up * up)
-        sphere = np.stack([across * np.cos(turn), across * np.sin(turn), up], axis=1)
-        places.append(center + float(radius) * sphere)
+        places.append(center + float(radius) * even_directions(count))
     every = np.concatenate(places)
     distance, _ = balls.distance(every.T.astype(np.float32))
     result: Floats = every[distance > -1.0e-5 * float(balls.radii.max())]
