@@ -46,6 +46,7 @@ from .strands.join import joined
 from .strands.kept import NOTHING_KEPT, Kept
 from .strands.needed_points import LOST, MAX_POINTS, with_needed_points, with_own_points
 from .strands.resample import resample
+from .strands.vectors import unit_or
 
 #: Of children that cannot be led out of the head, the part from which on a note says so.
 MANY_INSIDE = 0.01
@@ -614,6 +615,4 @@ def root_normals(rig: Rig) -> Floats:
     if rig.rest_frames is not None:
         return np.ascontiguousarray(rig.rest_frames.rotation[:, :, 2])
     outward = rig.strands.roots - rig.strands.points.mean(axis=0)
-    length = np.linalg.norm(outward, axis=1, keepdims=True)
-    up = np.array([0.0, 0.0, 1.0], np.float32)
-    return np.where(length > 0.0, outward / np.maximum(length, 1e-12), up).astype(np.float32)
+    return unit_or(outward, (0.0, 0.0, 1.0), 1.0e-12).astype(np.float32)

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays import Floats
+from ..strands.vectors import unit_or
 from .atlas import AtlasPlan
 
 #: Part of a card's width in which strands in front of another take light from it.
@@ -163,9 +164,7 @@ def _squeezed(across: Floats, half: Floats, plan: AtlasPlan) -> Floats:
 def _tangents(points: Floats, side: Floats, tangent: Floats, normal: Floats) -> Floats:
     slope = np.gradient(points, axis=1)
     parts = [np.einsum("sri,sri->sr", slope, axis) for axis in (side, tangent, normal)]
-    slopes = _finer(np.stack(parts, axis=-1))
-    length = np.linalg.norm(slopes, axis=-1, keepdims=True)
-    return np.where(length > _TINY, slopes / np.maximum(length, _TINY), (0.0, 1.0, 0.0))
+    return unit_or(_finer(np.stack(parts, axis=-1)), (0.0, 1.0, 0.0), _TINY)
 
 
 def _shades(plan: AtlasPlan, base: Floats | None, shape: tuple[int, ...]) -> tuple[Floats, float]:

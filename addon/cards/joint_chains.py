@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays import Floats, Ints
+from ..strands.vectors import unit_or
 from .joint_solve import Skin
 
 #: How much cards that lie apart are separated, beside how they move.
@@ -128,9 +129,8 @@ def middle_lines(lines: Floats, chains: Chains, joints: int) -> Floats:
 
 def turned_to(direction: Floats) -> Floats:
     """The least turns (..., 3, 3) that take y to these ways; Rodrigues' formula."""
-    length = np.linalg.norm(direction, axis=-1, keepdims=True)
     y = np.array([0.0, 1.0, 0.0])
-    unit = np.where(length > 1.0e-9, direction / np.maximum(length, 1.0e-9), y)
+    unit = unit_or(direction, y, 1.0e-9)
     axis, cosine = np.cross(y, unit), unit[..., 1]
     cross = np.zeros((*direction.shape, 3))
     cross[..., 0, 1], cross[..., 1, 0] = -axis[..., 2], axis[..., 2]

@@ -21,6 +21,7 @@ import numpy as np
 from ..arrays import Bools, Floats, Ints
 from ..strands.kept import NOTHING_KEPT, Kept
 from ..strands.nearest import nearest_points
+from ..strands.vectors import unit
 from .partings import Partings
 
 GUIDES_PER_STRAND = 3
@@ -238,9 +239,7 @@ def directions(grid: Floats | None, root: Floats) -> Floats:
         return np.zeros((len(root), 0), np.float32)
     third = max(1, grid.shape[1] // 3)
     chords = grid[:, [third, -1]] - grid[:, :1]
-    length = np.linalg.norm(chords, axis=2, keepdims=True)
-    unit = np.divide(chords, length, out=np.zeros_like(chords), where=length > 0.0)
-    return unit.reshape(len(grid), 6)
+    return unit(chords).reshape(len(grid), 6)
 
 
 def _spacing(guide_root: Floats) -> float:

@@ -13,6 +13,7 @@ import numpy as np
 
 from ..arrays import Floats, Ints
 from ..strands.catmull_rom import between, slope_between
+from ..strands.vectors import unit
 from .camera import Camera
 from .camera_window import view_depth
 from .scene_snapshot import SceneSnapshot
@@ -185,9 +186,3 @@ def _if_like(then: Floats | None, now: Floats) -> Floats:
 
 def _as_then(now: Snapshot, then: Snapshot | None) -> Snapshot:
     return now if then is None or not then.layout.is_as(now.layout) else then
-
-
-def unit(vectors: Floats) -> Floats:
-    """Of length 1, (height, width, 3); what has no direction stays 0."""
-    length = np.linalg.norm(vectors, axis=2, keepdims=True)
-    return np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0.0)

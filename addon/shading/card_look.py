@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..arrays import Floats
+from ..strands.vectors import unit_or
 from .kajiya_kay import strand_base
 from .marschner.pigment import COLOR_FACTOR
 from .settings import ShadingSettings
@@ -36,8 +37,7 @@ def mapped_tangent(texel: Floats, tangent: Floats, normal: Floats, shift_noise: 
     side = np.cross(tangent, normal)
     strand = direction[..., 0:1] * side + direction[..., 1:2] * tangent
     strand = strand + direction[..., 2:3] * (shift_noise * normal)
-    length = np.linalg.norm(strand, axis=-1, keepdims=True)
-    return np.where(length > 1.0e-6, strand / np.maximum(length, 1.0e-6), tangent)
+    return unit_or(strand, tangent)
 
 
 def mapped_normal(texel: Floats, tangent: Floats, normal: Floats) -> Floats:
@@ -50,8 +50,7 @@ def mapped_normal(texel: Floats, tangent: Floats, normal: Floats) -> Floats:
     direction = 2.0 * texel - 1.0
     side = np.cross(tangent, normal)
     bent = direction[..., 0:1] * side + direction[..., 1:2] * tangent + direction[..., 2:3] * normal
-    length = np.linalg.norm(bent, axis=-1, keepdims=True)
-    return np.where(length > 1.0e-6, bent / np.maximum(length, 1.0e-6), normal)
+    return unit_or(bent, normal)
 
 
 def view_compensated_alpha(

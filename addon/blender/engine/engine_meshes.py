@@ -11,6 +11,7 @@ from ...arrays import Floats, Ints
 from ...render.snapshot import MeshPictures, MeshSnapshot, Skin
 from ...strands import Surface
 from ...strands.affine import moved
+from ...strands.vectors import unit
 from ..scene.mesh_materials import MeshMaterial, material_of
 from ..scene.surfaces import read_corner_uv, triangle_loops
 
@@ -48,9 +49,7 @@ def _split(
     positions = moved(positions, matrix)
     if not np.isfinite(positions).all():
         return ()
-    normals = normals @ from_world.astype(np.float32)
-    length = np.linalg.norm(normals, axis=1, keepdims=True)
-    normals = np.divide(normals, length, out=np.zeros_like(normals), where=length > 0.0)
+    normals = unit(normals @ from_world.astype(np.float32))
     slots = np.zeros(len(triangles), np.int32)
     if len(obj.material_slots) > 1:
         mesh.loop_triangles.foreach_get("material_index", slots)

@@ -16,13 +16,14 @@ from ...render.camera import Camera
 from ...render.camera_window import Window, jittered
 from ...render.capabilities import CALM_SAMPLES, capabilities
 from ...render.lens import through
-from ...render.nearest import Moment, Nearest, background, motion, projected, unit, unprojected
+from ...render.nearest import Moment, Nearest, background, motion, projected, unprojected
 from ...render.pixel_filter import jitters
 from ...render.scene_pass import Rgba, ScenePass, ShaftsApart, shafts_of
 from ...render.scene_snapshot import SceneSnapshot
 from ...render.textures import texture_from
 from ...shading.bright_shafts import wants_bright
 from ...shading.picture_settings import PictureSettings
+from ...strands.vectors import unit
 from ..base.gpu_context import ensure_gpu
 from ..properties.properties import settings_of
 from . import hair_scene
