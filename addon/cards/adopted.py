@@ -19,6 +19,7 @@ from ..arrays import Bools, Floats, Ints
 from ..errors import HairloomError
 from ..strands import Surface
 from ..strands.closest_point import closest_point
+from ..strands.triangles import areas_of
 from ..strands.vectors import unit_or
 from .card_mesh import CardMesh
 from .sort import connected_components
@@ -250,7 +251,7 @@ def _shape_notes(source: Surface, card: Ints, is_mixed: Bools) -> Iterator[str]:
     if is_mixed.any():
         yield f"The faces of {_cards(int(is_mixed.sum()))} do not all look to the same side"
     a, b, c = np.moveaxis(source.corners.astype(np.float64), 1, 0)
-    area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    area = 2.0 * areas_of(source.corners.astype(np.float64))
     longest = np.max([((x - y) ** 2).sum(axis=1) for x, y in ((a, b), (b, c), (c, a))], axis=0)
     is_flat = np.bincount(card, area > _FLAT * longest, minlength=count) == 0
     if is_flat.any():

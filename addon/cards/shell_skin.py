@@ -17,6 +17,7 @@ from ..strands import Surface
 from ..strands.closest_point import search_of
 from ..strands.morton import morton_code
 from ..strands.nearest import nearest_points
+from ..strands.triangles import area_vectors, areas_of, quartered
 from ..strands.vectors import unit
 from ..strands.weld import same_places
 
@@ -35,15 +36,6 @@ _MAX_RAISED = 2.5
 _APART = 0.6
 #: A triangle of less than this fraction of the usual area has no direction, and shows nothing.
 _SLIVER = 0.02
-#: The four quarters of a triangle, by its corners and the middles of its edges.
-_QUARTERS = np.array(
-    [
-        [[2, 0, 0], [1, 1, 0], [1, 0, 1]],
-        [[1, 1, 0], [0, 2, 0], [0, 1, 1]],
-        [[1, 0, 1], [0, 1, 1], [0, 0, 2]],
-        [[0, 1, 1], [1, 0, 1], [1, 1, 0]],
-    ]
-) / 2.0  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,18 +104,6 @@ class FineSkin:
     area: Floats
 
 
-def areas_of(corners: Floats) -> Floats:
-    """Areas of triangles (n, 3, 3), (n,) [m^2]."""
-    area: Floats = np.linalg.norm(area_vectors(corners), axis=1)
-    return area
-
-
-def area_vectors(corners: Floats) -> Floats:
-    """Across triangles (n, 3, 3), as long as their areas, (n, 3) [m^2]."""
-    vectors: Floats = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) / 2.0
-    return vectors
-
-
 def fine_skin(head: Surface, roots: Floats, spacing: float, triangle_count: int) -> FineSkin:
     """The skin near roots, finely enough for this many coarse triangles.
 
@@ -135,17 +115,14 @@ def fine_skin(head: Surface, roots: Floats, spacing: float, triangle_count: int)
     size = np.linalg.norm(head.corners - middle[:, None], axis=2).max(axis=1)
     away = nearest_points(middle, roots, 1)[1][:, 0]
     chosen = np.flatnonzero(away <= reach + size)
-    corners = head.corners[chosen].astype(np.float64)
-    normals = head.vertex_normals()[head.triangles[chosen]].astype(np.float64)
+    corners: Floats = head.corners[chosen].astype(np.float64)
+    normals: Floats = head.vertex_normals()[head.triangles[chosen]].astype(np.float64)
     edge = _edge(min(float(areas_of(corners).sum()), len(roots) * spacing**2), triangle_count)
     while len(corners) and 4 * len(corners) <= _MAX_PIECES:
         longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
         if np.quantile(longest, 0.9) <= edge / _FINER:
             break
-        corners, normals = (
-            np.einsum("qck,nki->nqci", _QUARTERS, part).reshape(-1, 3, 3)
-            for part in (corners, normals)
-        )
+        corners, normals = quartered(corners), quartered(normals)
     number = same_places(corners.reshape(-1, 3).astype(np.float32))
     _, first = np.unique(number, return_index=True)
     positions, triangles = corners.reshape(-1, 3)[first], number.reshape(-1, 3)
@@ -209,8 +186,7 @@ def _of_cells(fine: FineSkin, head: Surface, count: int) -> ShellSkin:
     met = met[is_corner]
     _, first = np.unique(np.sort(met, axis=1), axis=0, return_index=True)
     triangles = met[np.sort(first)]
-    corners = on_skin.point[triangles]
-    face = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    face = area_vectors(on_skin.point[triangles])
     is_turned = np.einsum("ni,ni->n", face, normals[triangles].sum(axis=1)) < 0.0
     triangles[is_turned] = triangles[is_turned, ::-1]
     area = areas_of(on_skin.point[triangles])

@@ -23,6 +23,7 @@ from ..strands import StrandSet, Surface
 from ..strands.face import is_face_hair
 from ..strands.frames import volume_normals
 from ..strands.nearest import nearest_points
+from ..strands.triangles import area_vectors
 from ..strands.vectors import unit
 from .atlas_settings import AtlasSettings
 from .card_mesh import CardMesh
@@ -30,7 +31,7 @@ from .levels import CardLevel
 from .settings import CardSettings
 from .shell_hair import ShortHair
 from .shell_plan import Patches, ShellPlan, plan_shells
-from .shell_skin import FineSkin, ShellSkin, area_vectors, coarse_skin, fine_skin
+from .shell_skin import FineSkin, ShellSkin, coarse_skin, fine_skin
 from .strip import mean_spacing
 
 #: Hair is short if it is shorter than this fraction of the side of the square that its roots fill;

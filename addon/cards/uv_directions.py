@@ -13,6 +13,7 @@ from typing import Literal
 import numpy as np
 
 from ..arrays import Bools, Floats, Ints
+from ..strands.triangles import areas_of
 
 #: The way from root to tip in all UVs: found out, or known.
 type UvDirection = Literal["auto", "up", "down", "right", "left"]
@@ -69,7 +70,7 @@ def uv_axes(
         known_axis, known_end = _KNOWN[direction]
         nobody = np.zeros(count, bool)
         return UvAxes(np.full(count, known_axis), np.full(count, known_end), nobody, nobody)
-    area = _sums(island, _areas(corners))
+    area = _sums(island, areas_of(corners))
     lengths = _lengths(corners, uv, island)
     ratio = np.log(np.maximum(lengths[:, 1], 1e-12) / np.maximum(lengths[:, 0], 1e-12))
     usual = int((area * ratio).sum() >= 0.0)
@@ -115,7 +116,7 @@ def island_bounds(values: Floats, island: Ints) -> tuple[Floats, Floats]:
 def _lengths(corners: Floats, uv: Floats, island: Ints) -> Floats:
     """How long each island is along u and along v, (island_count, 2) [m]."""
     speed = np.linalg.norm(coordinate_gradients(corners, uv), axis=2)
-    weight = _areas(corners) * (speed > 0.0).all(axis=1)
+    weight = areas_of(corners) * (speed > 0.0).all(axis=1)
     total = np.maximum(_sums(island, weight), 1e-30)
     mean = np.stack([_sums(island, weight * speed[:, axis]) / total for axis in (0, 1)], axis=1)
     low, high = island_bounds(uv, island)
@@ -140,12 +141,6 @@ def _end_evidence(
         ends.append(_sums(whose, np.where(is_end, nearness, 0.0), len(axis)) / count)
     difference: Floats = ends[1] - ends[0]
     return difference
-
-
-def _areas(corners: Floats) -> Floats:
-    one, two = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    areas: Floats = 0.5 * np.linalg.norm(np.cross(one, two), axis=1)
-    return areas
 
 
 def _sums(island: Ints, values: Floats, count: int = 0) -> Floats:

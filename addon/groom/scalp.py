@@ -10,6 +10,7 @@ from ..arrays import Floats, Ints
 from ..errors import HairloomError
 from ..strands import Surface
 from ..strands.morton import morton_code
+from ..strands.triangles import areas_of, evenly_within
 
 #: The hairline in the cranium's own units (half its depth; y to the back, z up, from its middle):
 #: hair grows above the line from the forehead down to the nape, and between the ears.
@@ -78,9 +79,7 @@ def sample_roots(
         HairloomError: the surface has no area on which hair may grow.
     """
     corners = surface.corners.astype(np.float64)
-    area = np.linalg.norm(
-        np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
-    )
+    area = areas_of(corners)
     if density is not None:
         area = area * np.maximum(density, 0.0)[surface.triangles].mean(axis=1)
     if not area.sum() > 0.0:
@@ -95,19 +94,13 @@ def sample_roots(
     last = np.flatnonzero(area[order])[-1]  # rounding must not lead to a triangle without area
     place = np.minimum(np.searchsorted(along, stratum, side="right"), last)
     triangle = order[place]
-    barycentric = _inside_triangles(count, random)
+    barycentric = evenly_within(random.random(count), random.random(count))
     if density is None:
         return triangle, barycentric
     fraction = np.clip((along[place] - stratum) / area[triangle], 0.0, 1.0)  # left of the triangle
     return triangle, _towards_density(
         barycentric, np.maximum(density, 0.0)[surface.triangles[triangle]], fraction
     )
-
-
-def _inside_triangles(count: int, random: np.random.Generator) -> Floats:
-    """Uniform barycentric coordinates, (count, 3) (Turk 1990, Graphics Gems)."""
-    root, other = np.sqrt(random.random(count)), random.random(count)
-    return np.stack([1.0 - root, root * (1.0 - other), root * other], axis=1)
 
 
 def _towards_density(barycentric: Floats, density: Floats, chance: Floats) -> Floats:

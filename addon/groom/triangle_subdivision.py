@@ -8,18 +8,9 @@ import numpy as np
 
 from ..arrays import Bools, Floats, Ints
 from ..strands import Surface
+from ..strands.triangles import area_vectors, areas_of, quartered
 from ..strands.vectors import unit
 from .counter_random import named
-
-#: The four quarters of a triangle: for each the barycentric coordinates of its corners.
-_QUARTERS = np.array(
-    [
-        [[2, 0, 0], [1, 1, 0], [1, 0, 1]],
-        [[1, 1, 0], [0, 2, 0], [0, 1, 1]],
-        [[1, 0, 1], [0, 1, 1], [0, 0, 2]],
-        [[0, 1, 1], [1, 0, 1], [1, 1, 0]],
-    ]
-) / 2.0  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -67,18 +58,12 @@ class Pieces:
     @property
     def area(self) -> Floats:
         """(n,) [m^2]."""
-        area: Floats = 0.5 * np.linalg.norm(self._cross, axis=1)
-        return area
+        return areas_of(self.point)
 
     @property
     def normal(self) -> Floats:
         """Unit normals, (n, 3); zero for one without area."""
-        return unit(self._cross)
-
-    @property
-    def _cross(self) -> Floats:
-        edge = self.point[:, 1:] - self.point[:, :1]
-        return np.cross(edge[:, 0], edge[:, 1])
+        return unit(area_vectors(self.point))
 
     def with_density(self, surface: Surface, density: Floats | None) -> Pieces:
         """As if they were made of all triangles with this density (vertex_count,), see `of`."""
@@ -106,9 +91,6 @@ class Pieces:
 
     def split(self) -> Pieces:
         """Each in four."""
-        corner, point, density = (
-            np.einsum("qck,nk...->nqc...", _QUARTERS, part).reshape(-1, 3, *part.shape[2:])
-            for part in (self.corner, self.point, self.density)
-        )
+        corner, point, density = map(quartered, (self.corner, self.point, self.density))
         key = named(self.key[:, None], 1 + np.arange(4)).ravel()
         return Pieces(np.repeat(self.parent, 4), corner, point, density, key)

@@ -26,6 +26,7 @@ import numpy as np
 from ..arrays import Bools, Floats, Ints
 from ..strands import Surface
 from ..strands.closest_point import search_of
+from ..strands.triangles import area_vectors, areas_of
 from .detail import PictureView
 from .smooth import bezier
 
@@ -184,7 +185,7 @@ def _first_places(surface: Surface, low: Floats, high: Floats, count: int) -> Fl
 def _samples(surface: Surface) -> tuple[Floats, Floats]:
     """Triangles spread evenly over the surface: middles and normals, (n <= _SAMPLES, 3) each."""
     corners = surface.corners.astype(np.float64)
-    area = np.linalg.norm(_area_vectors(corners), axis=1).cumsum()
+    area = areas_of(corners).cumsum()
     chosen = np.searchsorted(area, area[-1] * (np.arange(_SAMPLES) + 0.5) / _SAMPLES)
     chosen = np.unique(np.minimum(chosen, len(corners) - 1))
     return corners[chosen].mean(axis=1), surface.triangle_normals()[chosen]
@@ -212,7 +213,7 @@ def _winding(centers: Floats, surface: Surface) -> Floats:
     """
     corners = surface.corners.astype(np.float64)
     away = corners.mean(axis=1) - centers[:, None]
-    flux = np.einsum("nij,ij->ni", away, _area_vectors(corners))
+    flux = np.einsum("nij,ij->ni", away, area_vectors(corners))
     return (flux / np.linalg.norm(away, axis=2) ** 3).sum(axis=1) / (4.0 * np.pi)
 
 
@@ -257,11 +258,6 @@ def _different(balls: Floats, count: int) -> Floats:
         apart = np.linalg.norm(balls[:, :3] - balls[best, :3], axis=1)
         news = np.minimum(news, apart + balls[:, 3] - balls[best, 3])
     return balls[chosen]
-
-
-def _area_vectors(corners: Floats) -> Floats:
-    """Area times normal of triangles (n, 3, 3), (n, 3)."""
-    return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) / 2.0
 
 
 def _parts(shades: Shades) -> tuple[Floats, Floats, Floats, Floats, Floats]:

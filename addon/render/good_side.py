@@ -22,6 +22,7 @@ from ..arrays import Bools, Floats, Ints
 from ..strands import StrandSet, Surface
 from ..strands.nearest import nearest_points
 from ..strands.resample import resample
+from ..strands.triangles import areas_of
 
 #: directions around the hair that are tried
 _AROUND = 16
@@ -216,9 +217,8 @@ def _places_on(body: Surface, middle: Floats, reach: float) -> Floats:
     near = np.linalg.norm(corners - middle, axis=2).min(axis=1) < reach
     corners = corners[near] if near.any() else corners
     a, b, c = corners.transpose(1, 0, 2)
-    area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
     random = np.random.default_rng(0)
-    ends = np.cumsum(area)
+    ends = np.cumsum(areas_of(corners))
     chosen = np.searchsorted(ends, random.random(_BODY) * ends[-1]).clip(0, len(ends) - 1)
     u, v = np.sort(random.random((2, _BODY)), axis=0)[:, :, None]
     return u * a[chosen] + (v - u) * b[chosen] + (1.0 - v) * c[chosen]

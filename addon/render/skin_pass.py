@@ -22,6 +22,7 @@ from ..arrays import Floats, Ints
 from ..shading.skin.layout import SkinLayout
 from ..shading.skin.settings import SkinSettings
 from ..strands import Surface
+from ..strands.triangles import areas_of
 from . import gpu_objects
 from .feature_programs import UniformBlocks, bound
 from .mesh_shadows import MeshShadows
@@ -248,8 +249,7 @@ class SkinPass:
 
 def head_size(surface: Surface) -> float:
     """What the softness of its shadow is a fraction of: the square root of its area [m]."""
-    a, b, c = surface.corners.astype(np.float64).transpose(1, 0, 2)
-    return float(np.sqrt(0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1).sum()))
+    return float(np.sqrt(areas_of(surface.corners.astype(np.float64)).sum()))
 
 
 def layout_textures(layout: SkinLayout) -> dict[str, Any]:

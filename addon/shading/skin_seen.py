@@ -24,6 +24,7 @@ import numpy as np
 
 from ..arrays import Bools, Floats
 from ..strands import StrandSet, Surface
+from ..strands.triangles import area_vectors
 from .ambient import Step, add_shifted, depth_towards, sky_directions, unit_steps, with_mean
 from .density_grid import Field, Grid, hair_depth, small_triangles
 
@@ -140,8 +141,7 @@ def _skin_cells(skin: Surface, grid: Grid) -> tuple[Floats, Bools]:
     pieces = small_triangles(corners, 0.5 * grid.cell, grid.low, high)
     cells = np.floor((pieces.mean(axis=1) - grid.low) / grid.cell).astype(np.int64)
     is_near = ((cells >= 0) & (cells < grid.shape)).all(axis=1)
-    a, b, c = np.moveaxis(pieces[is_near], 1, 0)
-    area = 0.5 * np.cross(b - a, c - a) / grid.cell**2
+    area = area_vectors(pieces[is_near]) / grid.cell**2
     index = np.ravel_multi_index(tuple(cells[is_near].T), grid.shape)
     count = int(np.prod(grid.shape))
     total = np.bincount(index, np.linalg.norm(area, axis=1), count)

@@ -9,6 +9,7 @@ import numpy as np
 from ..arrays import Floats, Ints
 from .surface import Surface
 from .triangle_tree import TriangleTree, build_tree
+from .triangles import area_vectors
 
 #: Segments looked at together, and pairs of them with boxes held at once.
 _CHUNK, _PAIR_LIMIT = 1 << 14, 100_000
@@ -68,7 +69,7 @@ def _places(start: Floats, end: Floats, corners: Floats) -> Floats:
     """
     a, b, c = np.moveaxis(corners - start[:, None], 1, 0)
     step = end - start
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normal = area_vectors(corners)
     before, after = (-np.einsum("ij,ij->i", normal, p) for p in (a, a - step))
     volumes = np.stack(
         [np.einsum("ij,ij->i", step, np.cross(*p)) for p in ((a, b), (b, c), (c, a))]

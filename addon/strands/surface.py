@@ -11,6 +11,7 @@ import numpy as np
 from ..arrays import Floats, Ints
 from ..errors import HairloomError
 from .affine import moved
+from .triangles import area_vectors
 from .vectors import unit
 from .weld import same_places
 
@@ -58,8 +59,7 @@ class Surface:
 
     def triangle_normals(self) -> Floats:
         """Unit normals, (triangle_count, 3); zero for a triangle without area."""
-        a, b, c = np.moveaxis(self.corners, 1, 0)
-        return unit(np.cross(b - a, c - a))
+        return unit(area_vectors(self.corners))
 
     def welded_triangles(self) -> Ints:
         """The triangles by numbers of places: vertices at one place have the same one."""

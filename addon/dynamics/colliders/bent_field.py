@@ -19,6 +19,7 @@ import numpy as np
 
 from ...arrays import Bools, Floats, Ints, number_in_piece
 from ...strands import Surface
+from ...strands.triangles import area_vectors
 from ...strands.vectors import cross_rows, dot_rows
 from .distance_field import MARGIN, DistanceField, covering, points_on
 
@@ -50,8 +51,7 @@ class BentField:
         self._rest = np.asarray(surface.positions, np.float32)
         self._triangles = surface.triangles
         corners = surface.corners.astype(np.float64)
-        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        volume = (corners.mean(axis=1) * normal).sum()
+        volume = (corners.mean(axis=1) * area_vectors(corners)).sum()
         self._outwards = np.float32(1.0 if volume >= 0.0 else -1.0)
 
     def at(self, positions: Floats) -> DistanceField:

@@ -21,6 +21,7 @@ from ...arrays import Floats, Ints
 from ...strands import Surface
 from ...strands.closest_point import search_of
 from ...strands.triangle_tree import TriangleTree
+from ...strands.triangles import area_vectors
 from ...strands.vectors import cross_rows, dot_rows
 
 #: A group of triangles is far at this many times its own radius from its centre.
@@ -228,9 +229,8 @@ def _without_repeats(leaves: Ints) -> Ints:
 
 def _dipoles(tree: TriangleTree, leaves: Ints, corners: Floats) -> list[_Dipoles]:
     """The dipoles of every level, from the root to the leaves."""
-    edge_one, edge_two = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    moment = np.cross(edge_one, edge_two) / 2.0
-    moment, center = np.vstack([moment, np.zeros(3)]), corners.mean(axis=1)  # row -1: no triangle
+    # row -1: no triangle
+    moment, center = np.vstack([area_vectors(corners), np.zeros(3)]), corners.mean(axis=1)
     center = np.vstack([center, center[-1]])
     weight = np.linalg.norm(moment, axis=1) + 1.0e-30
     levels = []

@@ -9,6 +9,7 @@ import numpy as np
 from ...arrays import Bools, Floats
 from ...errors import HairloomError
 from ...strands import Surface
+from ...strands.triangles import area_vectors, evenly_within
 from ..colliders.winding import winding_number
 from .holes import close_holes
 
@@ -53,7 +54,7 @@ def boundary_of(surface: Surface, place: str) -> Boundary:
     """
     closed, fans = close_holes(surface)
     corners = closed.corners.astype(np.float64)
-    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    cross = 2.0 * area_vectors(corners)
     area = np.linalg.norm(cross, axis=1)
     if not area.sum() > 0.0:
         raise _broken(place, "it has no faces, or they have no area")
@@ -74,15 +75,13 @@ def boundary_of(surface: Surface, place: str) -> Boundary:
 def samples_of(surface: Surface, count: int) -> SurfaceSamples:
     """`count` points spread by area, the same ones each time."""
     corners = surface.corners.astype(np.float64)
-    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    cross = 2.0 * area_vectors(corners)
     area = np.linalg.norm(cross, axis=1)
     along = np.cumsum(area)
     place = (np.arange(count) + 0.5) / count * along[-1]
     triangle = np.minimum(np.searchsorted(along, place, side="right"), len(area) - 1)
     one, other = (np.mod(0.5 + step * np.arange(1, count + 1), 1.0) for step in _R2)
-    root = np.sqrt(one)  # uniform within a triangle (Turk 1990, Graphics Gems)
-    fraction = np.stack([1.0 - root, root * (1.0 - other), root * other], axis=1)
-    point = np.einsum("nk,nkj->nj", fraction, corners[triangle])
+    point = np.einsum("nk,nkj->nj", evenly_within(one, other), corners[triangle])
     normal = cross[triangle] / np.maximum(area[triangle, None], 1.0e-300)
     return SurfaceSamples(point, normal)
 

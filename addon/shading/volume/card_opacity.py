@@ -23,6 +23,7 @@ import numpy as np
 from ...arrays import Floats, Ints
 from ...strands import StrandSet
 from ...strands.arc_length import along, steps
+from ...strands.triangles import areas_of
 from ..settings import StrandSettings
 
 #: a card lets at least as much light through as this leaves: four strands are as good as a wall
@@ -193,8 +194,7 @@ def card_shadow_area(
         positions: (vertex_count, 3) [m]. uv: (vertex_count, 2). alpha: (height, width).
         level: see lit_level.
     """
-    a, b, c = (positions[triangles[:, corner]] for corner in range(3))
-    area = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    area = areas_of(positions[triangles])
     at = np.einsum("pk,tkj->ptj", _PLACES, uv[triangles])
     alpha = _coarser(_coarser(alpha, 0, level), 1, level)
     size = np.array(alpha.shape)
