@@ -2,6 +2,7 @@
 //
 // SPARSE 1: some strands are thinner than a sample.
 #include "lib_atlas.glsl"
+#include "lib_unit.glsl"
 
 void main()
 {
@@ -13,6 +14,6 @@ void main()
   }
 #endif
   sample_place = vec4(along_and_side.x, strand_id, depth_and_fraction.x, base_and_occlusion.w);
-  sample_tangent = vec4(unit_of(strand_tangent, vec3(0.0, 1.0, 0.0)), along_and_side.y);
+  sample_tangent = vec4(unit_or(strand_tangent, vec3(0.0, 1.0, 0.0)), along_and_side.y);
   sample_base = vec4(base_and_occlusion.xyz, 1.0);
 }

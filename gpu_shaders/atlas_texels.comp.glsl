@@ -2,6 +2,7 @@
 //
 // Twin of _filtered in addon/cards/bake.py.
 #include "lib_atlas.glsl"
+#include "lib_unit.glsl"
 
 void main()
 {
@@ -30,8 +31,8 @@ void main()
   float covered = base_sum.w;
   float is_hair = covered > 0.0 ? 1.0 : 0.0;
   place_sum /= max(covered, 1.0);
-  vec3 tangent = 0.5 * unit_of(tangent_sum, vec3(0.0, 1.0, 0.0)) + 0.5;
-  vec3 normal = 0.5 * unit_of(normal_sum, vec3(0.0, 0.0, 1.0)) + 0.5;
+  vec3 tangent = 0.5 * unit_or(tangent_sum, vec3(0.0, 1.0, 0.0)) + 0.5;
+  vec3 normal = 0.5 * unit_or(normal_sum, vec3(0.0, 0.0, 1.0)) + 0.5;
   float alpha = covered / float({{atlas_samples}} * {{atlas_samples}});
   imageStore(texel_place, texel, vec4(place_sum.x, strand_id, place_sum.z, place_sum.w));
   imageStore(texel_base, texel, vec4(base_sum.xyz / max(covered, 1.0), alpha));

@@ -25,9 +25,3 @@ vec2 leaning(vec2 place, float size, vec2 start)
   vec2 upright = (place * size - start) * float({{atlas_samples}});
   return vec2(upright.x + upright.y / float({{atlas_samples}}) - 0.5, upright.y);
 }
-
-vec3 unit_of(vec3 vector, vec3 fallback)
-{
-  float size = length(vector);
-  return size > 1.0e-6 ? vector / size : fallback;
-}

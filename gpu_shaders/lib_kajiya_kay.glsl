@@ -14,15 +14,10 @@
 //
 // Limits: no shadows but those in the occlusion; no energy conservation.
 #include "lib_tint.glsl"
+#include "lib_unit.glsl"
 
 // GREY_COLOR of addon/shading/kajiya_kay.py
 const vec3 GREY_COLOR = vec3(0.42, 0.42, 0.43);
-
-vec3 unit_or(vec3 vector, vec3 fallback)
-{
-  float size = length(vector);
-  return size > 1.0e-6 ? vector / size : fallback;
-}
 
 // Normal of the hair's volume: away from its centre, made perpendicular to the strand. Where the
 // strand itself points away from the centre, any perpendicular will do.
@@ -30,10 +25,7 @@ vec3 strand_normal(vec3 point, vec3 tangent, vec3 center)
 {
   vec3 outward = unit_or(point - center, vec3(0.0, 0.0, 1.0));
   vec3 across = outward - tangent * dot(outward, tangent);
-  vec3 size = abs(tangent);
-  vec3 axis = size.x <= size.y && size.x <= size.z ? vec3(1.0, 0.0, 0.0) :
-              size.y <= size.z                     ? vec3(0.0, 1.0, 0.0) :
-                                                     vec3(0.0, 0.0, 1.0);
+  vec3 axis = axis_across(tangent);
   return unit_or(dot(across, across) > 1.0e-6 ? across : cross(tangent, axis), axis);
 }
 

@@ -1,6 +1,7 @@
 // Rotations of guides as quaternions, xyz and w last.
 //
 // Twin of minimal_rotation and turn_change in addon/refine/ride.py. Holds no resources.
+#include "lib_unit.glsl"
 
 // What a quaternion of any length adds to a vector by turning it.
 vec3 turn_change(vec4 turn, vec3 vector)
@@ -33,11 +34,7 @@ vec4 minimal_rotation(vec3 one, vec3 other)
   vec3 change = other - one;
   vec4 turn = vec4(cross(one, change), 2.0 - 0.5 * dot(change, change));
   if (turn.w < {{reversed_turn}}) {
-    vec3 size = abs(one);
-    vec3 axis = size.x <= size.y && size.x <= size.z ? vec3(1.0, 0.0, 0.0) :
-                size.y <= size.z                     ? vec3(0.0, 1.0, 0.0) :
-                                                       vec3(0.0, 0.0, 1.0);
-    turn = vec4(cross(one, axis), 0.0);
+    turn = vec4(cross(one, axis_across(one)), 0.0);
   }
   return turn / sqrt(dot(turn, turn));
 }

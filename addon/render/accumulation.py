@@ -19,7 +19,7 @@ _ADDING = ShaderRecipe(
 )
 _SHOWING = ShaderRecipe(
     name="accumulated",
-    vertex="accumulated.vert.glsl",
+    vertex="whole_target.vert.glsl",
     fragment="accumulated.frag.glsl",
     textures=(("FLOAT_2D", "sum_of_samples"),),
     integers=("sample_count", "left", "bottom"),

@@ -46,7 +46,7 @@ _DISPATCH_RECIPE = ShaderRecipe(
 )
 _ATOMICS_RECIPE = ShaderRecipe(
     name="probe_atomics",
-    vertex="strand_layers.vert.glsl",
+    vertex="whole_target.vert.glsl",
     fragment="probe_atomics.frag.glsl",
     images=(("R32UI", "probed", "READ_WRITE"),),
     outputs=(("VEC4", "color"),),

@@ -180,7 +180,7 @@ def bare_batch(kind: str, count: int) -> Any:
 
 
 def triangle() -> Any:
-    """By which strand_layers.vert.glsl covers a target."""
+    """By which whole_target.vert.glsl covers a target."""
     return bare_batch("TRIS", 3)
 
 

@@ -23,7 +23,7 @@ from .textures import drawing_into, drawing_state
 _NOTHING = (0.0, 0.0, 0.0, 0.0)
 _SHOWN_RECIPE = ShaderRecipe(
     name="kept_picture",
-    vertex="strand_layers.vert.glsl",
+    vertex="whole_target.vert.glsl",
     fragment="kept_picture.frag.glsl",
     textures=(("FLOAT_2D", "kept_color"), ("DEPTH_2D", "kept_depth")),
     integers=("writes_depth",),

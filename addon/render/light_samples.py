@@ -16,6 +16,7 @@ import numpy as np
 from ..arrays import Floats
 from ..shading.area_lights import Panel
 from ..shading.lights import Light
+from ..strands.vectors import both_across
 
 #: steps of a sequence that fills a square evenly, and no other sequence of a picture has
 _STEPS = np.sqrt([2.0, 3.0]) - 1.0
@@ -42,7 +43,7 @@ def _at(light: Light, place: Floats, center: Floats) -> Light:
 
 def _of_sun(light: Light, aside: Floats) -> Light:
     """Of the disk that fills its angle, as in Cycles."""
-    right, up = _across(np.array(light.vector))
+    right, up = both_across(np.array(light.vector))
     x, y = np.tan(0.5 * min(light.angle, 0.99 * np.pi)) * aside
     towards = np.array(light.vector) + x * right + y * up
     return replace(light, vector=_triple(towards / np.linalg.norm(towards)))
@@ -55,7 +56,7 @@ def _of_lamp(light: Light, aside: Floats, center: Floats) -> Light:
     distance = float(np.linalg.norm(away))
     if distance <= light.radius:  # hair inside a lamp sees no side of it
         return light
-    right, up = _across(away / distance)
+    right, up = both_across(away / distance)
     x, y = light.radius * aside
     at = _triple(np.array(light.vector) + x * right + y * up)
     farther = float(x * x + y * y)
@@ -89,14 +90,6 @@ def disk_place(place: Floats) -> Floats:
     else:
         radius, angle = y, 0.5 * np.pi - 0.25 * np.pi * x / y
     return radius * np.array([np.cos(angle), np.sin(angle)])
-
-
-def _across(along: Floats) -> tuple[Floats, Floats]:
-    """Two unit vectors across a unit vector and each other."""
-    axis = np.eye(3)[np.abs(along).argmin()]
-    right = np.cross(along, axis)
-    right /= np.linalg.norm(right)
-    return right, np.cross(along, right)
 
 
 def _triple(values: Floats) -> tuple[float, float, float]:

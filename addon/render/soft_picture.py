@@ -29,7 +29,7 @@ from .textures import drawing_state
 _PIXEL_BYTES = 52
 _RECIPE = ShaderRecipe(
     name="soft_picture",
-    vertex="strand_layers.vert.glsl",
+    vertex="whole_target.vert.glsl",
     fragment="soft_picture.frag.glsl",
     textures=(("FLOAT_2D", "hair_sum"), ("FLOAT_2D", "shadow_sum"), ("DEPTH_2D", "hair_depth")),
     integers=("sample_count",),

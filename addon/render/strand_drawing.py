@@ -70,7 +70,7 @@ _HASHED_RECIPE = ShaderRecipe(
 #: shades what two turns have found
 _HASHED_SHADE_RECIPE = ShaderRecipe(
     name="strand_hashed_shade",
-    vertex="strand_layers.vert.glsl",
+    vertex="whole_target.vert.glsl",
     fragment="strand_hashed_shade.frag.glsl",
     structs=_STRUCTS,
     settings=_SETTINGS,
@@ -122,7 +122,7 @@ _SHADE_RECIPE = ShaderRecipe(
 #: adds up each pixel's list
 _SHOWN_RECIPE = ShaderRecipe(
     name="strand_layers_shown",
-    vertex="strand_layers.vert.glsl",
+    vertex="whole_target.vert.glsl",
     fragment="strand_layers_shown.frag.glsl",
     images=(
         ("R32UI", "layer_heads", "READ"),

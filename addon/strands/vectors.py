@@ -36,6 +36,13 @@ def even_directions(count: int) -> Floats:
     return np.stack([across * np.cos(angle), across * np.sin(angle), height], axis=1)
 
 
+def both_across(along: Floats) -> tuple[Floats, Floats]:
+    """Two unit vectors (3,) across a unit vector and across each other."""
+    side = np.cross(along, np.eye(3)[np.abs(along).argmin()])
+    side /= np.linalg.norm(side)
+    return side, np.cross(along, side)
+
+
 def dot(one: Floats, two: Floats) -> Floats:
     """Of vectors (..., 3)."""
     return np.asarray(np.einsum("...i,...i->...", one, two))

@@ -26,6 +26,7 @@ from ...render import gpu_objects
 from ...rig_flow import root_normals
 from ...shading.lights import Light
 from ...strands.affine import moved
+from ...strands.vectors import both_across
 from ..scene.forces import force_fields_of
 from ..sessions.session import Session
 from .motion_lines import contact_lines, density_lines, painted_lines, stretch_lines
@@ -166,7 +167,7 @@ def wind_lines(air: Air | None, center: Floats, radius: float) -> Floats:
     length = wind_length(radius) * speed
     tip = center + length * along
     lines = [center, tip]
-    for side in _across(along):
+    for side in both_across(along):
         for sign in (1.0, -1.0):
             lines += [tip, tip + _HEAD * length * (0.5 * sign * side - along)]
     return np.array(lines)
@@ -197,7 +198,7 @@ def light_lines(lights: tuple[Light, ...], center: Floats, radius: float) -> Flo
         along = to_light / distance
         reach = _AWAY * radius * (1.0 if light.kind == "sun" else min(distance / radius / _AWAY, 1))
         end = center + reach * along
-        star = 0.1 * radius * np.array([along, *_across(along)])
+        star = 0.1 * radius * np.array([along, *both_across(along)])
         ends = np.stack([end - star, end + star], axis=1).reshape(-1, 3)
         lines += [np.array([center, end]), ends]
     return np.concatenate(lines)
@@ -215,7 +216,7 @@ def _capsule(capsule: CapsuleCollider) -> Floats:
     axis = capsule.end - capsule.start
     length = float(np.linalg.norm(axis))
     along = axis / length if length else np.array([0.0, 0.0, 1.0])
-    sides = [capsule.radius * side for side in _across(along)]
+    sides = [capsule.radius * side for side in both_across(along)]
     lines = []
     for end, out in ((capsule.start, -1.0), (capsule.end, 1.0)):
         lines.append(_circle(end, sides[0], sides[1]))
@@ -237,14 +238,6 @@ def _box(low: Floats, high: Floats) -> Floats:
     corners = np.array([[(low, high)[i >> axis & 1][axis] for axis in range(3)] for i in range(8)])
     edges = [(i, i | 1 << axis) for i in range(8) for axis in range(3) if not i >> axis & 1]
     return corners[np.array(edges)].reshape(-1, 3)
-
-
-def _across(along: Floats) -> tuple[Floats, Floats]:
-    """Two unit vectors across a unit vector, and across each other."""
-    least = np.eye(3)[int(np.abs(along).argmin())]
-    side = np.cross(along, least)
-    side /= np.linalg.norm(side)
-    return side, np.cross(along, side)
 
 
 def draw_lines(lines: Lines) -> None:
