@@ -1,4 +1,5 @@
-"""Array types for annotations; arrays that are the same; rows of pieces that follow each other.
+"""Array types for annotations; arrays that are the same; rows of pieces that follow each other;
+sums and means of rows by number.
 
 Shapes, units, dtype and space are said where an array is born.
 """
@@ -31,3 +32,18 @@ def number_in_piece(counts: Ints) -> Ints:
     """The number of each row in its piece, (row_count,), see `piece_starts`."""
     numbers: Ints = np.arange(counts.sum()) - np.repeat(piece_starts(counts), counts)
     return numbers
+
+
+def sums_by(number: Ints, rows: Floats, count: int = 0) -> Floats:
+    """The sum of the rows (n,) or (n, k) of each number, (count,) or (count, k) float64;
+    `count` is at least one more than the largest number."""
+    if rows.ndim == 1:
+        return np.bincount(number, rows, count)
+    return np.stack([np.bincount(number, column, count) for column in rows.T], axis=1)
+
+
+def means_by(number: Ints, rows: Floats, count: int) -> Floats:
+    """The same of their means; 0 where no row has the number."""
+    times = np.maximum(np.bincount(number, minlength=count), 1)
+    means: Floats = sums_by(number, rows, count) / times.reshape(-1, *(1,) * (rows.ndim - 1))
+    return means

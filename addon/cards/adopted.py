@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import Bools, Floats, Ints
+from ..arrays import Bools, Floats, Ints, sums_by
 from ..errors import HairloomError
 from ..strands import Surface
 from ..strands.closest_point import closest_point
@@ -162,7 +162,7 @@ def _looks_inwards(centers: Floats, outward: Floats, ahead: Floats, card: Ints) 
     """
     area = np.linalg.norm(outward, axis=1)
     total = np.maximum(np.bincount(card, area), 1e-30)
-    middle = np.stack([np.bincount(card, area * part) for part in centers.T], axis=1)
+    middle = sums_by(card, area[:, None] * centers)
     from_middle = centers - (middle / total[:, None])[card]
     volume = np.bincount(card, np.einsum("ti,ti->t", outward, from_middle))
     fraction = np.bincount(card, ahead) / total
@@ -205,7 +205,7 @@ def _tangents(
     for corner in range(3):
         np.add.at(total, triangles[:, corner], chosen)
     from_root = np.einsum("tc,tci->ti", along - along.mean(axis=1, keepdims=True), corners)
-    whole = np.stack([np.bincount(island, part) for part in from_root.T], axis=1)
+    whole = sums_by(island, from_root)
     fallback = np.zeros_like(total)
     fallback[triangles] = whole[island][:, None]
     return unit_or(total, unit_or(fallback, _DOWN, _SHORTEST), _SHORTEST)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import Bools, Floats, Ints, piece_starts
+from ..arrays import Bools, Floats, Ints, means_by, piece_starts, sums_by
 from ..errors import HairloomError
 from ..strands.face import is_face_hair
 from .atlas_grid import AtlasGrid
@@ -171,8 +171,7 @@ def _card_shapes(strips: Strips, grid: Floats, radius: Floats, cluster: Ints) ->
     card_count = len(strips)
     count = np.bincount(cluster, minlength=card_count)
     width = np.maximum(strips.width, _TINY)
-    thick = [np.bincount(cluster, 2.0 * row, card_count) for row in radius.T]
-    fill = np.stack(thick, axis=1) / width
+    fill = sums_by(cluster, 2.0 * radius, card_count) / width
     # n strands anywhere across, each of which covers fill / n of the width
     covered = 1.0 - (1.0 - np.clip(fill / count[:, None], 0.0, 1.0)) ** count[:, None]
     spacing = np.gradient(strips.frames.center, axis=1)
@@ -189,10 +188,7 @@ def _card_colors(color: Floats, cluster: Ints, card_count: int) -> Floats:
     """What tells the colours of cards apart, (card_count, 9): the means at root, middle and tip."""
     stations = color[:, [0, color.shape[1] // 2, -1]].reshape(len(color), -1)
     seen = np.sqrt(np.nan_to_num(stations, nan=_NO_COLOR))
-    sums = [np.bincount(cluster, channel, card_count) for channel in seen.T]
-    count = np.maximum(np.bincount(cluster, minlength=card_count), 1)
-    means: Floats = np.stack(sums, axis=1) / count[:, None] / _HUE
-    return means
+    return means_by(cluster, seen, card_count) / _HUE
 
 
 def _asides(frames: CardFrames, grid: Floats, cluster: Ints) -> Floats:
@@ -265,7 +261,7 @@ def medoids(features: Floats, count: int, random: np.random.Generator) -> tuple[
         label = _gaps(features, features[medoid]).argmin(axis=1)
         label[medoid] = np.arange(count)
         size = np.bincount(label, minlength=count)
-        mean = np.stack([np.bincount(label, f, count) for f in features.T], axis=1) / size[:, None]
+        mean = sums_by(label, features, count) / size[:, None]
         gap = ((features - mean[label]) ** 2).sum(axis=1)
         order = np.lexsort((gap, label))
         medoid = order[piece_starts(size)]

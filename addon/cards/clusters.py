@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..arrays import Bools, Floats, Ints
+from ..arrays import Bools, Floats, Ints, means_by
 from ..strands.face import is_face_hair
 from ..strands.nearest import nearest_points
 from ..strands.vectors import unit
@@ -166,8 +166,7 @@ def _k_means(features: Floats, count: int, random: np.random.Generator) -> Ints:
         # a mean that has lost all its strands goes to the strand that lies worst
         lost = np.flatnonzero(sizes == 0)
         worst = np.argsort(-gap, kind="stable")[: len(lost)]
-        sums = np.stack([np.bincount(label, part, count) for part in learnt.T], axis=1)
-        means = (sums / np.maximum(sizes, 1)[:, None]).astype(np.float32)
+        means = means_by(label, learnt, count).astype(np.float32)
         means[lost] = learnt[worst]
     label, _ = _nearest(features, means)
     # strands that are the same may differ by a rounding in the distances, where means coincide

@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..arrays import Bools, Floats, Ints
+from ..arrays import Bools, Floats, Ints, means_by
 from ..strands import Surface
 from ..strands.affine import moved
 from ..strands.closest_point import search_of
@@ -324,11 +324,7 @@ def _pieces(triangles: Ints, made: Ints | None) -> tuple[Ints, Ints]:
 def _middles(surface: Surface, piece: Ints, count: int) -> Floats:
     """The middle of the corners of each piece, (piece_count, 3) [m]."""
     at = surface.corners.reshape(-1, 3).astype(np.float64)
-    owner = np.repeat(piece, 3)
-    size = np.maximum(np.bincount(owner, minlength=count), 1)
-    sums = [np.bincount(owner, part, count) for part in at.T]
-    middles: Floats = np.stack(sums, axis=1) / size[:, None]
-    return middles
+    return means_by(np.repeat(piece, 3), at, count)
 
 
 def _away(middle: Floats, record: MadeCards, number: Ints) -> Floats:

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays import Bools, Floats, Ints
+from ..arrays import Bools, Floats, Ints, means_by
 from ..strands import Surface
 from ..strands.affine import moved
 from ..strands.closest_point import closest_point
@@ -252,8 +252,7 @@ def _carried(edits: CardEdits, before: MadeCards, moves: Floats) -> Floats:
         return places
     owner = np.zeros(len(places), np.int64)
     owner[edits.surface.triangles] = edits.piece[:, None]
-    middle = np.stack([np.bincount(owner, part, count) for part in places.T], axis=1)
-    middle = middle / np.maximum(np.bincount(owner, minlength=count), 1)[:, None]
+    middle = means_by(owner, places, count)
     centers = before.places[:, :4].mean(axis=1)
     number = np.array(edits.number)
     for index in np.flatnonzero(number < 0):
@@ -304,13 +303,8 @@ def _tiles_now(
 def tiles_of(edits: CardEdits, grid: AtlasGrid) -> Ints:
     """The tile on which the middle of each piece's UVs lies, (piece_count,)."""
     assert edits.surface.corner_uv is not None
-    count = len(edits.number)
-    owner = np.repeat(edits.piece, 3)
-    size = np.maximum(np.bincount(owner, minlength=count), 1)
     flat = edits.surface.corner_uv.reshape(-1, 2)
-    return grid.tile_at(
-        np.stack([np.bincount(owner, part, count) / size for part in flat.T], axis=1)
-    )
+    return grid.tile_at(means_by(np.repeat(edits.piece, 3), flat, len(edits.number)))
 
 
 def _adopted(

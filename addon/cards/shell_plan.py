@@ -22,7 +22,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..arrays import Floats, Ints
+from ..arrays import Floats, Ints, means_by
 from ..strands import StrandSet, Surface
 from ..strands.closest_point import search_of
 from ..strands.vectors import unit, unit_or
@@ -81,12 +81,9 @@ class Patches:
     ) -> tuple[Patches, Floats]:
         """The patches, and the places of their vertices in their planes, (len(vertex), 2) [m]."""
         count = int(of_triangle.max()) + 1
-        vertices = np.bincount(patch, minlength=count)[:, None]
 
         def mean(values: Floats) -> Floats:
-            rows = values[vertex].reshape(len(vertex), -1)
-            sums = [np.bincount(patch, row, count) for row in rows.T]
-            return np.stack(sums, axis=1) / vertices
+            return means_by(patch, values[vertex].reshape(len(vertex), -1), count)
 
         across = np.zeros((count, 3))
         np.add.at(across, of_triangle, skin.area_vectors)

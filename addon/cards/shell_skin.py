@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..arrays import Bools, Floats, Ints
+from ..arrays import Bools, Floats, Ints, sums_by
 from ..strands import Surface
 from ..strands.closest_point import search_of
 from ..strands.morton import morton_code
@@ -163,9 +163,9 @@ def gathered(places: Floats, normals: Floats, area: Floats, count: int) -> Ints:
     for _ in range(_ROUNDS):
         label = nearest_points(points, middle, 1)[0][:, 0]
         total = np.bincount(label, area, len(middle))
-        sums = [np.bincount(label, area * axis, len(middle)) for axis in points.T]
+        sums = sums_by(label, area[:, None] * points, len(middle))
         used = total > 0.0
-        middle = np.stack(sums, axis=1)[used] / total[used, None]
+        middle = sums[used] / total[used, None]
     return nearest_points(points, middle, 1)[0][:, 0]
 
 
@@ -176,7 +176,7 @@ def _of_cells(fine: FineSkin, head: Surface, count: int) -> ShellSkin:
     has_border = np.bincount(label, _is_border(fine)) > 0
     weight = np.where(has_border[label], weight, fine.area)
     total = np.maximum(np.bincount(label, weight), 1e-30)
-    place = np.stack([np.bincount(label, weight * axis) for axis in fine.positions.T], axis=1)
+    place = sums_by(label, weight[:, None] * fine.positions)
     on_skin = search_of(head).closest(place / total[:, None])
     normals = head.vertex_normals()[head.triangles[on_skin.triangle]]
     normals = unit(np.einsum("nk,nki->ni", on_skin.barycentric, normals))

@@ -14,7 +14,7 @@ from typing import Self
 
 import numpy as np
 
-from ..arrays import Floats, Ints
+from ..arrays import Floats, Ints, means_by
 from ..params import Settings
 from ..strands import StrandSet, Surface
 from ..strands.arc_length import reached
@@ -247,10 +247,7 @@ def between_pixels(
 
 def _mean_at_vertices(surface: Surface, corners: Floats) -> Floats:
     """The mean of values at corners around each vertex, (vertex_count,)."""
-    vertex, count = surface.triangles.ravel(), len(surface.positions)
-    total = np.bincount(vertex, corners.ravel(), count)
-    found: Floats = total / np.maximum(np.bincount(vertex, minlength=count), 1)
-    return found
+    return means_by(surface.triangles.ravel(), corners.ravel(), len(surface.positions))
 
 
 @dataclass(frozen=True, eq=False)

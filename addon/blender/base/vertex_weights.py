@@ -8,7 +8,7 @@ from typing import Self
 import bpy
 import numpy as np
 
-from ...arrays import Floats, Ints
+from ...arrays import Floats, Ints, means_by
 from ...errors import HairloomError
 from ...shading.luminance import LUMINANCE
 from .attributes import read_attribute
@@ -89,9 +89,7 @@ def read_weights(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, name: st
             return values
         corners, triangles = at_corners(mesh, values, domain), triangle_corners(mesh, "vertices")
         count = len(mesh.vertices)
-    around = np.bincount(triangles.ravel(), minlength=count)
-    total = np.bincount(triangles.ravel(), corners.ravel(), count)
-    return (total / np.maximum(around, 1)).astype(np.float32)
+    return means_by(triangles.ravel(), corners.ravel(), count).astype(np.float32)
 
 
 def has_weights(obj: bpy.types.Object, mesh: bpy.types.Mesh, name: str) -> bool:

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 import bpy
 import numpy as np
 
-from ...arrays import Floats, Ints
+from ...arrays import Floats, Ints, means_by
 from ...cards.adopted import AdoptedCards, adopt_cards
 from ...cards.occlusion import CardOccluder, occlusion_steps
 from ...cards.occlusion_settings import CardOcclusionSettings
@@ -281,9 +281,9 @@ def _write_occlusion(
 
 def _at_source(values: Floats, vertex: Ints, count: int) -> Floats:
     """Means over the copies of each of `count` vertices; 1 for a vertex of no face."""
-    copies = np.bincount(vertex, minlength=count)
-    total = np.bincount(vertex, values, minlength=count)
-    return np.divide(total, copies, out=np.ones(count), where=copies > 0).astype(np.float32)
+    means = means_by(vertex, values, count)
+    means[np.bincount(vertex, minlength=count) == 0] = 1.0
+    return means.astype(np.float32)
 
 
 def _face_order(polygon: Ints) -> Ints:
