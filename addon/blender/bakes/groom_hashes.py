@@ -21,6 +21,7 @@ from ...groom.width_settings import WidthSettings
 from ...rig_flow import Pose
 from ...wet_flow import heavier
 from ..base.attributes import read_attribute
+from ..base.mesh_arrays import corner_vertices, vertex_places
 from ..base.objects import head_of, matrix_of
 from ..base.vertex_weights import painted_attribute, weight_names, weights_on
 from ..colliders.carriers import is_deforming, is_left_out
@@ -28,7 +29,13 @@ from ..colliders.obstacles import shape_of, sources_of
 from ..colliders.ties import holders_of
 from ..properties.groom_settings import GroomSettings
 from ..properties.properties import settings_of
-from ..scene.curves import GROUP_ATTRIBUTES, VALUE_ATTRIBUTES, read_curves
+from ..scene.curves import (
+    GROUP_ATTRIBUTES,
+    VALUE_ATTRIBUTES,
+    curve_offsets,
+    curve_points,
+    read_curves,
+)
 from ..scene.forces import force_fields_of, gravity_of
 from ..scene.masks import image_values
 from ..scene.partings import parting_state, partings_of
@@ -244,13 +251,9 @@ def _paint(
 
 def _curves_parts(hair: bpy.types.Object) -> tuple[Floats | Ints | str, ...]:
     curves = hair.data
-    points = np.empty((len(curves.position_data), 3), np.float32)
-    curves.position_data.foreach_get("vector", points.ravel())
-    offsets = np.zeros(len(curves.curves) + 1, np.int32)
-    if len(curves.curves):
-        curves.curve_offset_data.foreach_get("value", offsets)
     modifiers = [(each.type, each.name) for each in hair.modifiers if each.show_viewport]
-    parts: list[Floats | Ints | str] = [points, offsets, repr(modifiers)]
+    parts: list[Floats | Ints | str] = [curve_points(curves), curve_offsets(curves)]
+    parts.append(repr(modifiers))
     for name in GROUP_ATTRIBUTES:
         attribute = curves.attributes.get(name)
         if attribute is not None and attribute.data_type == "INT":
@@ -267,9 +270,4 @@ def _curves_parts(hair: bpy.types.Object) -> tuple[Floats | Ints | str, ...]:
 
 def mesh_parts(obj: bpy.types.Object) -> tuple[Floats | Ints, ...]:
     """Vertices (vertex_count, 3) in object space, and the vertex of each polygon corner."""
-    mesh = obj.data
-    vertices = np.empty((len(mesh.vertices), 3), np.float32)
-    mesh.vertices.foreach_get("co", vertices.ravel())
-    corners = np.empty(len(mesh.loops), np.int32)
-    mesh.loops.foreach_get("vertex_index", corners)
-    return vertices, corners
+    return vertex_places(obj.data), corner_vertices(obj.data)

@@ -12,6 +12,7 @@ from ...arrays import Floats, Ints, means_by
 from ...errors import HairloomError
 from ...shading.luminance import LUMINANCE
 from .attributes import read_attribute
+from .mesh_arrays import of_triangles, triangle_corners
 from .objects import as_mesh
 
 #: Attributes that may be painted; colours count by their luminance.
@@ -87,7 +88,7 @@ def read_weights(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, name: st
         values, domain = weights_on(obj, mesh, name)
         if domain == "POINT":
             return values
-        corners, triangles = at_corners(mesh, values, domain), triangle_corners(mesh, "vertices")
+        corners, triangles = at_corners(mesh, values, domain), triangle_corners(mesh)
         count = len(mesh.vertices)
     return means_by(triangles.ravel(), corners.ravel(), count).astype(np.float32)
 
@@ -131,21 +132,10 @@ def painted_attribute(
 def at_corners(mesh: bpy.types.Mesh, values: Floats, domain: str) -> Floats:
     """Values at the corners of the mesh's triangles, (triangle_count, 3)."""
     if domain == "POINT":
-        return values[triangle_corners(mesh, "vertices")]
+        return values[triangle_corners(mesh)]
     if domain == "CORNER":
         return values[triangle_corners(mesh, "loops")]
-    mesh.calc_loop_triangles()
-    faces = np.empty(len(mesh.loop_triangles), np.int32)
-    mesh.loop_triangles.foreach_get("polygon_index", faces)
-    return np.repeat(values[faces][:, None], 3, axis=1)
-
-
-def triangle_corners(mesh: bpy.types.Mesh, of: str) -> Ints:
-    """Vertices or loops of the mesh's triangles, (triangle_count, 3)."""
-    mesh.calc_loop_triangles()
-    numbers = np.empty((len(mesh.loop_triangles), 3), np.int32)
-    mesh.loop_triangles.foreach_get(of, numbers.ravel())
-    return numbers
+    return np.repeat(values[of_triangles(mesh, "polygon_index")][:, None], 3, axis=1)
 
 
 def set_group(obj: bpy.types.Object, name: str, weights: Floats) -> None:

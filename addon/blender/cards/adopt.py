@@ -25,6 +25,7 @@ from ...cards.uv_directions import UvDirection
 from ...errors import HairloomError
 from ...strands import Surface
 from ..base.attributes import set_attribute
+from ..base.mesh_arrays import corner_vertices, of_triangles, triangle_corners, vertex_places
 from ..base.objects import matrix_of
 from ..base.vertex_weights import weights_on
 from ..scene.surfaces import (
@@ -206,27 +207,17 @@ def _read_faces(
 
 def _corners(mesh: bpy.types.Mesh) -> Ints:
     """Vertices of all faces, one after the other, and behind them where each face begins."""
-    loops, polygons = len(mesh.loops), len(mesh.polygons)
-    found = np.empty(loops + polygons, np.int32)
-    mesh.loops.foreach_get("vertex_index", found[:loops])
-    mesh.polygons.foreach_get("loop_start", found[loops:])
-    return found
+    starts = np.empty(len(mesh.polygons), np.int32)
+    mesh.polygons.foreach_get("loop_start", starts)
+    return np.append(corner_vertices(mesh), starts)
 
 
 def loop_triangles(mesh: bpy.types.Mesh) -> tuple[Floats, Ints, Ints, Ints]:
     """The vertices' places (n, 3) float32 in the mesh's own space, and of each triangle its
     vertices and loops, both (m, 3) int32, and its polygon, (m,) int32.
     """
-    mesh.calc_loop_triangles()
-    count = len(mesh.loop_triangles)
-    triangles, loops = np.empty((2, count, 3), np.int32)
-    polygon = np.empty(count, np.int32)
-    mesh.loop_triangles.foreach_get("vertices", triangles.ravel())
-    mesh.loop_triangles.foreach_get("loops", loops.ravel())
-    mesh.loop_triangles.foreach_get("polygon_index", polygon)
-    positions = np.empty((len(mesh.vertices), 3), np.float32)
-    mesh.vertices.foreach_get("co", positions.ravel())
-    return positions, triangles, loops, polygon
+    triangles, loops = triangle_corners(mesh), triangle_corners(mesh, "loops")
+    return vertex_places(mesh), triangles, loops, of_triangles(mesh, "polygon_index")
 
 
 def _triangles(mesh: bpy.types.Mesh, matrix: Floats) -> tuple[Surface, Ints, Ints]:

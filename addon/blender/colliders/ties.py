@@ -19,6 +19,7 @@ from ...errors import HairloomError
 from ...groom.holds import Holds, anchors_of
 from ...groom.ties import Holders, Tie, TipSurface, find_holds
 from ...strands.affine import moved
+from ..base.mesh_arrays import vertex_places
 from ..base.objects import (
     Body,
     Handle,
@@ -321,10 +322,7 @@ def _of_empty(obj: bpy.types.Object) -> tuple[Floats, bool]:
 def _points_of(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Floats:
     """(n, 3) object space, of a mesh or of a curve as it is drawn."""
     with as_mesh(obj, depsgraph) as mesh:
-        points = np.empty((0 if mesh is None else len(mesh.vertices), 3), np.float32)
-        if mesh is not None:
-            mesh.vertices.foreach_get("co", points.ravel())
-        return points
+        return np.empty((0, 3), np.float32) if mesh is None else vertex_places(mesh)
 
 
 def _fitted(points: Floats, name: str) -> tuple[Floats, bool]:

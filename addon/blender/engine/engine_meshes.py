@@ -12,8 +12,9 @@ from ...render.snapshot import MeshPictures, MeshSnapshot, Skin
 from ...strands import Surface
 from ...strands.affine import moved
 from ...strands.vectors import unit
+from ..base.mesh_arrays import corner_vertices, of_triangles, triangle_corners, vertex_places
 from ..scene.mesh_materials import MeshMaterial, material_of
-from ..scene.surfaces import read_corner_uv, triangle_loops
+from ..scene.surfaces import read_corner_uv
 
 #: types of objects that have faces; Blender hands out what texts and legacy curves become as meshes
 SOLID_TYPES = frozenset({"MESH", "META"})
@@ -50,11 +51,11 @@ def _split(
     if not np.isfinite(positions).all():
         return ()
     normals = unit(normals @ from_world.astype(np.float32))
-    slots = np.zeros(len(triangles), np.int32)
+    slots: Ints = np.zeros(len(triangles), np.int32)
     if len(obj.material_slots) > 1:
-        mesh.loop_triangles.foreach_get("material_index", slots)
+        slots = of_triangles(mesh, "material_index")
     found = []
-    corner_uv = read_corner_uv(mesh, triangle_loops(mesh))
+    corner_uv = read_corner_uv(mesh, triangle_corners(mesh, "loops"))
     is_skin = is_head and corner_uv is not None
     head = Surface(positions, triangles, corner_uv) if is_skin else None
     for slot in np.unique(slots):
@@ -70,21 +71,14 @@ def _split(
 
 def _corners(mesh: bpy.types.Mesh) -> tuple[Ints, Floats, Floats]:
     """Triangles, positions and normals; a vertex is there once for each of its normals."""
-    mesh.calc_loop_triangles()
-    triangles = np.empty((len(mesh.loop_triangles), 3), np.int32)
-    positions = np.empty((len(mesh.vertices), 3), np.float32)
-    mesh.vertices.foreach_get("co", positions.ravel())
+    positions = vertex_places(mesh)
     if mesh.normals_domain == "POINT":
-        mesh.loop_triangles.foreach_get("vertices", triangles.ravel())
         normals = np.empty_like(positions)
         mesh.vertex_normals.foreach_get("vector", normals.ravel())
-        return triangles, positions, normals
-    mesh.loop_triangles.foreach_get("loops", triangles.ravel())
-    vertices = np.empty(len(mesh.loops), np.int32)
-    mesh.loops.foreach_get("vertex_index", vertices)
+        return triangle_corners(mesh), positions, normals
     normals = np.empty((len(mesh.loops), 3), np.float32)
     mesh.corner_normals.foreach_get("vector", normals.ravel())
-    return triangles, positions[vertices], normals
+    return triangle_corners(mesh, "loops"), positions[corner_vertices(mesh)], normals
 
 
 def _material(obj: bpy.types.Object, slot: int) -> MeshMaterial:

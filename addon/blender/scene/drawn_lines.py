@@ -5,10 +5,11 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from ...arrays import Floats
+from ...arrays import Floats, Ints
 from ...errors import HairloomError
 from ...strands.affine import moved
 from ...strands.closest_point import search_of
+from ..base.mesh_arrays import edge_vertices, vertex_places
 from ..base.objects import as_mesh, head_of, link_into, matrix_of
 from .surfaces import read_surface
 
@@ -47,12 +48,10 @@ def pieces_of(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Floats:
                 place=obj.name,
                 remedy="Set its bevel and extrusion to 0, or delete its faces and keep the line",
             )
-        points, ends = np.empty((0, 3), np.float32), np.empty(0, np.int32)
+        points: Floats = np.empty((0, 3), np.float32)
+        ends: Ints = np.empty(0, np.int32)
         if mesh is not None and len(mesh.edges):
-            points = np.empty((len(mesh.vertices), 3), np.float32)
-            mesh.vertices.foreach_get("co", points.ravel())
-            ends = np.empty(2 * len(mesh.edges), np.int32)
-            mesh.edges.foreach_get("vertices", ends)
+            points, ends = vertex_places(mesh), edge_vertices(mesh).ravel()
     pieces = moved(points, matrix)[ends].reshape(-1, 2, 3)
     if not np.isfinite(pieces).all():
         raise HairloomError(

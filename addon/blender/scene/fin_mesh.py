@@ -1,4 +1,4 @@
-"""What the simulation of a fin reads from its original mesh: triangles and loose edges."""
+"""What the simulation of a fin reads from its original mesh, beside its triangles."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import numpy as np
 
 from ...arrays import Ints
 from ...errors import HairloomError
+from ..base.mesh_arrays import corner_vertices, edge_vertices
 from ..base.objects import Handle
 from .fin_modifier import fin_modifier, other_fin_with
 
@@ -32,26 +33,14 @@ def check_usable(obj: bpy.types.Object, handle: Handle) -> None:
         )
 
 
-def triangles_of(mesh: bpy.types.Mesh) -> Ints:
-    """(triangle_count, 3) int32."""
-    mesh.calc_loop_triangles()
-    triangles = np.empty((len(mesh.loop_triangles), 3), np.int32)
-    mesh.loop_triangles.foreach_get("vertices", triangles.ravel())
-    return triangles
-
-
 def loose_edges_of(mesh: bpy.types.Mesh) -> Ints:
     """Edges of no face, (n, 2) int32."""
-    edges, is_loose = np.empty((len(mesh.edges), 2), np.int32), np.empty(len(mesh.edges), bool)
-    mesh.edges.foreach_get("vertices", edges.ravel())
+    is_loose = np.empty(len(mesh.edges), bool)
     mesh.edges.foreach_get("is_loose", is_loose)
-    loose: Ints = edges[is_loose]
+    loose: Ints = edge_vertices(mesh)[is_loose]
     return loose
 
 
 def corners_of(mesh: bpy.types.Mesh) -> Ints:
     """The vertex of each polygon corner, then the number of vertices; int32."""
-    corners = np.empty(len(mesh.loops) + 1, np.int32)
-    mesh.loops.foreach_get("vertex_index", corners[:-1])
-    corners[-1] = len(mesh.vertices)
-    return corners
+    return np.append(corner_vertices(mesh), np.int32(len(mesh.vertices)))

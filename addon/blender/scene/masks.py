@@ -26,6 +26,7 @@ from ...groom.masks import (
 from ...params import Settings
 from ...shading.luminance import LUMINANCE
 from ...strands import StrandSet, Surface
+from ..base.mesh_arrays import triangle_corners
 from ..base.vertex_weights import (
     Memberships,
     at_corners,
@@ -35,7 +36,6 @@ from ..base.vertex_weights import (
     missing_weights,
     painted_attribute,
     read_weights,
-    triangle_corners,
     weights_on,
 )
 from .curves import curve_offsets
@@ -52,7 +52,7 @@ class _Groups:
     @classmethod
     def of(cls, surface: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Self:
         with evaluated_mesh(surface, depsgraph, surface.name) as mesh:
-            return cls(Memberships.of(mesh), triangle_corners(mesh, "vertices"))
+            return cls(Memberships.of(mesh), triangle_corners(mesh))
 
     def at_corners(self, index: int) -> Floats:
         """The weights in one group, (triangle_count, 3)."""

@@ -20,11 +20,12 @@ from ...groom.roots import bind_roots
 from ...paint_flow import with_colors
 from ...shading.settings import ShadingSettings
 from ..base.attributes import read_attribute
+from ..base.mesh_arrays import triangle_corners
 from ..base.objects import head_of
 from ..base.vertex_weights import at_corners, color_choices, image_names, is_color
 from .curves import read_own_curves
 from .masks import usable, usable_image
-from .surfaces import evaluated_mesh, read_corner_uv, read_surface, triangle_loops
+from .surfaces import evaluated_mesh, read_corner_uv, read_surface
 
 #: Colour spaces of images whose pixels Blender keeps as they are in scene-linear Rec. 709.
 _LINEAR = ("Linear Rec.709", "Non-Color")
@@ -127,7 +128,7 @@ def _of_attribute(mesh: bpy.types.Mesh, name: str, place: str) -> SurfaceColor |
 def _of_image(mesh: bpy.types.Mesh, name: str, place: str) -> ImageColor | None:
     if name not in image_names():
         return None
-    corner_uv = read_corner_uv(mesh, triangle_loops(mesh))
+    corner_uv = read_corner_uv(mesh, triangle_corners(mesh, "loops"))
     image = usable_image(name, corner_uv, place, instead="a colour attribute")
     assert corner_uv is not None
     (width, height), channels = image.size, image.channels

@@ -7,6 +7,7 @@ import numpy as np
 
 from ...arrays import Floats
 from ...errors import HairloomError
+from ..base.mesh_arrays import vertex_places
 from .drawn_lines import pieces_of
 from .own_collections import objects_in, put_into, take_out
 
@@ -36,9 +37,7 @@ def is_same_state(one: tuple[Floats | str, ...], other: tuple[Floats | str, ...]
 def _line_points(obj: bpy.types.Object) -> Floats:
     """The control points of a curve, or the vertices of a mesh, before modifiers."""
     if obj.type == "MESH":
-        places = np.empty(3 * len(obj.data.vertices), np.float32)
-        obj.data.vertices.foreach_get("co", places)
-        return places
+        return vertex_places(obj.data).ravel()
     splines = obj.data.splines if obj.type == "CURVE" else ()
     found = [
         coordinate

@@ -18,6 +18,7 @@ from ...arrays import Floats, Ints
 from ...errors import HairloomError
 from ...strands import Surface
 from ..base.attributes import read_attribute
+from ..base.mesh_arrays import of_triangles, triangle_corners
 from ..base.objects import as_mesh
 
 #: the UV map of cards that holds occlusion and along
@@ -60,8 +61,7 @@ def read_surface(
         HairloomError: not a mesh, no faces, or no UVs where they are needed.
     """
     with evaluated_mesh(obj, depsgraph, place) as mesh:
-        mesh.calc_loop_triangles()
-        loops = triangle_loops(mesh)
+        loops = triangle_corners(mesh, "loops")
         if not len(loops):
             raise HairloomError(
                 "this mesh has no faces", place=place, remedy="Choose a mesh with faces"
@@ -119,10 +119,7 @@ def read_material_slots(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -
         HairloomError: not a mesh.
     """
     with evaluated_mesh(obj, depsgraph, obj.name) as mesh:
-        mesh.calc_loop_triangles()
-        slots = np.empty(len(mesh.loop_triangles), np.int32)
-        mesh.loop_triangles.foreach_get("material_index", slots)
-    return slots
+        return of_triangles(mesh, "material_index")
 
 
 @contextmanager
@@ -147,19 +144,12 @@ def _positions(mesh: bpy.types.Mesh) -> Floats:
     return positions
 
 
-def triangle_loops(mesh: bpy.types.Mesh) -> Ints:
-    """The loops at each triangle's corners, (triangle_count, 3)."""
-    loops = np.empty((len(mesh.loop_triangles), 3), np.int32)
-    mesh.loop_triangles.foreach_get("loops", loops.ravel())
-    return loops
-
-
 def read_corner_uv(mesh: bpy.types.Mesh, loops: Ints) -> Floats | None:
     """UVs of the active map at each triangle's corners, (triangle_count, 3, 2), or None. Where that
     is the one in which we have written the occlusion of cards, those of the first other one.
 
     Args:
-        loops: see `triangle_loops`.
+        loops: (triangle_count, 3), see `mesh_arrays.triangle_corners`.
     """
     layer = mesh.uv_layers.active
     is_cards = all(name in mesh.attributes for name in CARD_ATTRIBUTES)

@@ -19,11 +19,12 @@ from ...errors import HairloomError
 from ...rig_flow import Solids
 from ..bakes.groom_hashes import collider_places, collider_shapes, frame_rate, mesh_parts
 from ..bakes.simulated import CLOTH_VERSION, Arrays, hashes
+from ..base.mesh_arrays import triangle_corners
 from ..base.objects import Body, matrix_of, objects_in
 from ..base.vertex_weights import read_weights
 from ..colliders.obstacles import Obstacles
 from ..properties.properties import settings_of
-from ..scene.fin_mesh import check_usable, corners_of, loose_edges_of, triangles_of
+from ..scene.fin_mesh import check_usable, corners_of, loose_edges_of
 from ..scene.fin_modifier import clear, fin_modifier, has_fins, read_carried, show
 from ..scene.forces import force_fields_of, gravity_of
 from .fabrics import ClothMesh, FabricJob
@@ -90,7 +91,7 @@ class FinSession:
         self.rest(depsgraph)
         mesh = ClothMesh(
             self._carried,
-            triangles_of(obj.data),
+            triangle_corners(obj.data),
             self._pins(obj, depsgraph),
             loose_edges_of(obj.data),
         )

@@ -23,6 +23,7 @@ from ...groom.head_fit import (
 )
 from ...strands import StrandSet, Surface
 from ...strands.rooted_shapes import RootedShapes
+from ..base.mesh_arrays import edge_vertices
 from ..base.objects import link_into
 from ..base.parts import Part, Parts
 from ..scene.built_in_head import built_in_head
@@ -199,9 +200,7 @@ def has_makehuman_topology(mesh: bpy.types.Mesh) -> bool:
     own = _makehuman_edges()
     if len(mesh.vertices) <= own.max():
         return False
-    edges = np.empty((len(mesh.edges), 2), np.int32)
-    mesh.edges.foreach_get("vertices", edges.ravel())
-    return bool(np.isin(_keys(own), _keys(edges)).mean() > _SAME_EDGES)
+    return bool(np.isin(_keys(own), _keys(edge_vertices(mesh))).mean() > _SAME_EDGES)
 
 
 @cache

@@ -1,0 +1,53 @@
+"""The arrays of a mesh: its vertices, its edges, the corners of its faces, its triangles."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+
+from ...arrays import Floats, Ints
+
+
+def vertex_places(mesh: bpy.types.Mesh) -> Floats:
+    """(vertex_count, 3) float32, in the mesh's own space."""
+    places = np.empty((len(mesh.vertices), 3), np.float32)
+    mesh.vertices.foreach_get("co", places.ravel())
+    return places
+
+
+def edge_vertices(mesh: bpy.types.Mesh) -> Ints:
+    """(edge_count, 2) int32."""
+    vertices = np.empty((len(mesh.edges), 2), np.int32)
+    mesh.edges.foreach_get("vertices", vertices.ravel())
+    return vertices
+
+
+def corner_vertices(mesh: bpy.types.Mesh) -> Ints:
+    """The vertex of each corner of a face, (corner_count,) int32; Blender calls corners loops."""
+    vertices = np.empty(len(mesh.loops), np.int32)
+    mesh.loops.foreach_get("vertex_index", vertices)
+    return vertices
+
+
+def triangle_corners(mesh: bpy.types.Mesh, of: str = "vertices") -> Ints:
+    """The mesh's triangles, (triangle_count, 3) int32.
+
+    Args:
+        of: "vertices", or "loops": the corners of faces.
+    """
+    mesh.calc_loop_triangles()
+    numbers = np.empty((len(mesh.loop_triangles), 3), np.int32)
+    mesh.loop_triangles.foreach_get(of, numbers.ravel())
+    return numbers
+
+
+def of_triangles(mesh: bpy.types.Mesh, what: str) -> Ints:
+    """A number of each triangle, (triangle_count,) int32.
+
+    Args:
+        what: "polygon_index" or "material_index".
+    """
+    mesh.calc_loop_triangles()
+    numbers = np.empty(len(mesh.loop_triangles), np.int32)
+    mesh.loop_triangles.foreach_get(what, numbers)
+    return numbers
