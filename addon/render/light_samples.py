@@ -16,7 +16,7 @@ import numpy as np
 from ..arrays import Floats
 from ..shading.area_lights import Panel
 from ..shading.lights import Light
-from ..strands.vectors import both_across
+from ..strands.vectors import both_across, triple
 
 #: steps of a sequence that fills a square evenly, and no other sequence of a picture has
 _STEPS = np.sqrt([2.0, 3.0]) - 1.0
@@ -46,7 +46,7 @@ def _of_sun(light: Light, aside: Floats) -> Light:
     right, up = both_across(np.array(light.vector))
     x, y = np.tan(0.5 * min(light.angle, 0.99 * np.pi)) * aside
     towards = np.array(light.vector) + x * right + y * up
-    return replace(light, vector=_triple(towards / np.linalg.norm(towards)))
+    return replace(light, vector=triple(towards / np.linalg.norm(towards)))
 
 
 def _of_lamp(light: Light, aside: Floats, center: Floats) -> Light:
@@ -58,14 +58,14 @@ def _of_lamp(light: Light, aside: Floats, center: Floats) -> Light:
         return light
     right, up = both_across(away / distance)
     x, y = light.radius * aside
-    at = _triple(np.array(light.vector) + x * right + y * up)
+    at = triple(np.array(light.vector) + x * right + y * up)
     farther = float(x * x + y * y)
     if light.cone is None and not light.is_ball:
         left = np.sqrt(max(light.radius**2 - farther, 0.0))
         return replace(light, vector=at, radius=float(left))
     # with a radius, a cone would blur its rim by it once more
     factor = (distance**2 + farther) / (distance**2 + light.softening[0])
-    power = _triple(factor * np.array(light.power))
+    power = triple(factor * np.array(light.power))
     return replace(light, vector=at, power=power, radius=0.0)
 
 
@@ -75,7 +75,7 @@ def _of_panel(light: Light, panel: Panel, place: Floats) -> Light:
     x, y = np.array([panel.half_width, panel.half_height]) * aside
     at = np.array(light.vector) + x * np.array(panel.right) + y * np.array(panel.up)
     point = replace(panel, half_width=0.0, half_height=0.0, is_round=False)
-    return replace(light, vector=_triple(at), panel=point)
+    return replace(light, vector=triple(at), panel=point)
 
 
 def disk_place(place: Floats) -> Floats:
@@ -90,8 +90,3 @@ def disk_place(place: Floats) -> Floats:
     else:
         radius, angle = y, 0.5 * np.pi - 0.25 * np.pi * x / y
     return radius * np.array([np.cos(angle), np.sin(angle)])
-
-
-def _triple(values: Floats) -> tuple[float, float, float]:
-    x, y, z = (float(value) for value in values)
-    return x, y, z

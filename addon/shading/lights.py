@@ -23,6 +23,7 @@ import numpy as np
 
 from ..arrays import Floats
 from ..errors import HairloomError
+from ..strands.vectors import triple
 from .area_lights import Panel, vector_irradiance
 
 type Color = tuple[float, float, float]
@@ -115,8 +116,8 @@ class Light:
             raise HairloomError(
                 "its direction has no length", place="sun light", remedy="Turn it to the hair"
             )
-        power = _triple(np.multiply(color, strength))
-        return cls("sun", _triple(-along / length), power, angle=angle)
+        power = triple(np.multiply(color, strength))
+        return cls("sun", triple(-along / length), power, angle=angle)
 
     @classmethod
     def point(
@@ -128,8 +129,8 @@ class Light:
         is_ball: bool = False,
     ) -> Light:
         """A point light at a position [m], of Blender's power [W]."""
-        rgb = _triple(np.multiply(color, power))
-        return cls("point", _triple(position), rgb, radius, is_ball)
+        rgb = triple(np.multiply(color, power))
+        return cls("point", triple(position), rgb, radius, is_ball)
 
     @classmethod
     def spot(
@@ -142,8 +143,8 @@ class Light:
         is_ball: bool = False,
     ) -> Light:
         """A spot at a position [m], of Blender's power [W]."""
-        rgb = _triple(np.multiply(color, power))
-        return cls("spot", _triple(position), rgb, radius, is_ball, cone)
+        rgb = triple(np.multiply(color, power))
+        return cls("spot", triple(position), rgb, radius, is_ball, cone)
 
     @classmethod
     def area(
@@ -154,7 +155,7 @@ class Light:
         panel: Panel,
     ) -> Light:
         """An area light around a position [m], of Blender's power [W]."""
-        return cls("area", _triple(position), _triple(np.multiply(color, power)), panel=panel)
+        return cls("area", triple(position), triple(np.multiply(color, power)), panel=panel)
 
     @property
     def softening(self) -> tuple[float, float]:
@@ -298,8 +299,3 @@ def _lanes(light: Light) -> Floats:
         lanes[3:, 3] = light.cone.fade
     lanes[0, 3] = _FORMS.index(form)
     return lanes
-
-
-def _triple(values: Sequence[float] | Floats) -> tuple[float, float, float]:
-    x, y, z = (float(value) for value in values)
-    return (x, y, z)

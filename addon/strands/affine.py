@@ -34,3 +34,12 @@ def moved(points: Floats, matrix: Floats) -> Floats:
 def mean_scale(matrix: Floats) -> float:
     """How much longer things get on average: the cube root of the change of volume."""
     return float(abs(np.linalg.det(np.asarray(matrix, np.float64)[:3, :3])) ** (1.0 / 3.0))
+
+
+def turned_about(middle: Floats, angle: float) -> Floats:
+    """A turn by an angle [rad] about the vertical through a point (3,), (4, 4)."""
+    cosine, sine = np.cos(angle), np.sin(angle)
+    turn = np.eye(4)
+    turn[:2, :2] = [[cosine, -sine], [sine, cosine]]
+    turn[:3, 3] = middle - turn[:3, :3] @ middle
+    return turn

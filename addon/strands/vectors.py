@@ -6,12 +6,20 @@ that move, where that is several times faster.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 
 from ..arrays import Floats
 
 #: From one point of an even spiral to the next [rad].
 GOLDEN_ANGLE = float(np.pi * (3.0 - np.sqrt(5.0)))
+
+
+def triple(values: Iterable[float]) -> tuple[float, float, float]:
+    """Three numbers as plain ones of Python."""
+    x, y, z = (float(value) for value in values)
+    return x, y, z
 
 
 def unit(vectors: Floats) -> Floats:

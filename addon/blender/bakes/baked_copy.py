@@ -11,7 +11,7 @@ from ...paint_flow import with_colors
 from ...shading.coat import coated
 from ...shading.settings import ShadingSettings
 from ..base.attributes import read_attribute, set_attribute
-from ..base.objects import link_into
+from ..base.objects import link_into, remove_hair
 from ..properties.properties import settings_of
 from ..scene.curves import set_colors
 from ..scene.hair_material import put_look_material
@@ -71,10 +71,7 @@ def remove(hair: bpy.types.Object) -> None:
         if copy.hairloom.bake.stands_for == hair:
             copy.hairloom.bake.stands_for = other
         return
-    curves = copy.data
-    bpy.data.objects.remove(copy)
-    if not curves.users:
-        bpy.data.hair_curves.remove(curves)
+    remove_hair(copy)
 
 
 def heal() -> list[str]:

@@ -159,6 +159,14 @@ def link_into(
             collection.objects.link(obj)
 
 
+def remove_hair(hair: bpy.types.Object) -> None:
+    """Delete hair, and its curves where nothing else has them."""
+    curves = hair.data
+    bpy.data.objects.remove(hair)
+    if not curves.users:
+        bpy.data.hair_curves.remove(curves)
+
+
 def head_of(hair: bpy.types.Object) -> bpy.types.Object | None:
     """The mesh that the hair grows from: its surface, else a mesh that is its parent.
 

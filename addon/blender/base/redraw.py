@@ -1,8 +1,9 @@
-"""Asking Blender to redraw what has changed of ours."""
+"""Asking Blender to redraw what has changed of ours, now or once all is quiet."""
 
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 
 import bpy
 
@@ -47,6 +48,13 @@ def refresh_panels() -> None:
     if now - _last >= _PAUSE:
         _last = now
         redraw_panels()
+
+
+def soon(timer: Callable[[], None], pause: float) -> None:
+    """Once, this long [s] after the last call."""
+    if bpy.app.timers.is_registered(timer):
+        bpy.app.timers.unregister(timer)
+    bpy.app.timers.register(timer, first_interval=pause)
 
 
 def _redraw(places: set[tuple[str, str]]) -> None:

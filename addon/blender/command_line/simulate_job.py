@@ -18,6 +18,7 @@ from ...errors import HairloomError
 from ...groom.children_settings import ChildrenSettings
 from ...groom.masks import Mask, StrandMask, SurfaceMask, mask_names
 from ...strands import StrandSet, Surface
+from ...strands.affine import turned_about
 from ..bakes.guide_motion import BakedGuides
 from ..base.attributes import set_attribute
 from ..colliders.copies import StillCopies, copy_colliders, copy_holders
@@ -197,11 +198,7 @@ def shake_matrix(centre: Floats, seconds: float) -> Floats:
     """(4, 4), where the shake has the head at a time."""
     phase = 2.0 * np.pi * SHAKE_RATE * seconds
     ease = min(seconds / 0.25, 1.0)
-    angle = ease * SHAKE_ANGLE * np.sin(phase)
-    cosine, sine = np.cos(angle), np.sin(angle)
-    matrix = np.eye(4)
-    matrix[:2, :2] = [[cosine, -sine], [sine, cosine]]
-    matrix[:3, 3] = centre - matrix[:3, :3] @ centre
+    matrix = turned_about(centre, ease * SHAKE_ANGLE * np.sin(phase))
     matrix[0, 3] += ease * SHAKE_SWAY * np.sin(phase)
     return matrix
 

@@ -22,6 +22,7 @@ from ...exchange.files.file_set import written_together
 from ...render.camera import Camera
 from ...rig_flow import Pose
 from ...shading.lights import Light
+from ...strands.affine import turned_about
 from .studio import Studio
 from .video import write_video
 
@@ -133,7 +134,8 @@ class Turntable:
     def camera(self, frame: int) -> Camera:
         """The camera of a frame, on a circle around the groom, from its front to its right."""
         first, middle = self._first
-        return replace(first, view=first.view @ _turned_about(middle, frame / self.settings.frames))
+        turns = frame / self.settings.frames % 1.0  # exactly 0 after whole ones
+        return replace(first, view=first.view @ turned_about(middle, 2.0 * np.pi * turns))
 
     @cached_property
     def _first(self) -> tuple[Camera, Floats]:
@@ -205,16 +207,6 @@ def turned_around(points: Floats, middle: Floats) -> Floats:
         for height in (heights.min(), heights.max()):
             rings.append(radius[each] * circle + [middle[0], middle[1], height])
     return np.concatenate(rings)
-
-
-def _turned_about(middle: Floats, turns: float) -> Floats:
-    """A rotation about the vertical through a point, (4, 4), exactly 1 after whole turns."""
-    angle = 2.0 * np.pi * (turns % 1.0)
-    cos, sin = np.cos(angle), np.sin(angle)
-    turn = np.eye(4)
-    turn[:2, :2] = [[cos, -sin], [sin, cos]]
-    turn[:3, 3] = middle - turn[:3, :3] @ middle
-    return turn
 
 
 @contextmanager

@@ -11,7 +11,7 @@ import numpy as np
 from ...errors import HairloomError
 from ..bakes.baked_copy import is_copy_gone
 from ..base.objects import head_of, objects_in
-from ..scene.curves import read_curves
+from ..scene.curves import attach, read_curves
 from ..scene.source import dynamics_warnings, own_dynamics
 from ..scene.surfaces import read_positions
 from ..sessions.session import Session
@@ -154,10 +154,5 @@ def surface_for(
 def set_surface(hair: bpy.types.Object, mesh: bpy.types.Object) -> None:
     """As Blender's own tools have it; the hair stays where it is."""
     place = hair.matrix_world.copy()
-    hair.data.surface = mesh
-    if mesh.data.uv_layers.active is not None:
-        hair.data.surface_uv_map = mesh.data.uv_layers.active.name
-    mesh.add_rest_position_attribute = True
-    hair.parent = mesh
-    hair.matrix_parent_inverse = mesh.matrix_world.inverted_safe()
+    attach(hair, mesh)
     hair.matrix_world = place

@@ -21,7 +21,7 @@ from ...shading.settings import ShadingSettings
 from ..bakes import playback
 from ..base import latest_job
 from ..base.originals import refresh_views
-from ..base.redraw import redraw_panels
+from ..base.redraw import redraw_panels, soon
 from ..cards.made_objects import card_objects
 from ..cards.occluders import occluder_objects
 from ..sessions.session import Session
@@ -154,11 +154,8 @@ def _go(preview: Preview, depsgraph: bpy.types.Depsgraph, light_changed: bool) -
 
 def _refine_soon(session: Session) -> None:
     """Once the slider rests; every move puts it off."""
-    if not session.is_coarse:
-        return
-    if bpy.app.timers.is_registered(_refine):
-        bpy.app.timers.unregister(_refine)
-    bpy.app.timers.register(_refine, first_interval=REFINING_TIME)
+    if session.is_coarse:
+        soon(_refine, REFINING_TIME)
 
 
 def _refine() -> None:

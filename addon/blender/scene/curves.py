@@ -136,7 +136,7 @@ def write_curves(
     obj = bpy.data.objects.new(name, curves)
     link_into(obj, [collection], bpy.context.scene)
     if surface is not None:
-        _attach(obj, surface)
+        attach(obj, surface)
     return obj
 
 
@@ -167,7 +167,7 @@ def set_colors(curves: bpy.types.Curves, strands: StrandSet) -> None:
         set_attribute(curves, COLOR_ATTRIBUTE, "POINT", opaque)
 
 
-def _attach(obj: bpy.types.Object, surface: bpy.types.Object) -> None:
+def attach(obj: bpy.types.Object, surface: bpy.types.Object) -> None:
     """Set what Blender's own hair tools and nodes expect of hair on a surface."""
     obj.data.surface = surface
     if surface.data.uv_layers.active is not None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import lru_cache
-from typing import Any
 
 import bpy
 import numpy as np
@@ -19,6 +18,7 @@ from ...dynamics.force_fields import (
     ForceField,
     ForceFields,
 )
+from ...strands.vectors import triple
 
 #: Blender's kinds that act on hair -> ours; and why the others do not.
 _KINDS = {
@@ -110,8 +110,8 @@ def _read(obj: bpy.types.Object, field: bpy.types.FieldSettings, frame: int) -> 
     matrix = np.array(obj.matrix_world, np.float64)
     one = ForceField(
         kind=_KINDS[field.type],
-        center=_vector(matrix[:3, 3]),
-        axis=_vector(_unit(matrix[:3, 2])),
+        center=triple(matrix[:3, 3]),
+        axis=triple(_unit(matrix[:3, 2])),
         strength=_limited(field.strength + _noise_of(field, frame)),
         shape=_SHAPES[field.shape],
         damping=_limited(field.harmonic_damping),
@@ -141,7 +141,7 @@ def _read(obj: bpy.types.Object, field: bpy.types.FieldSettings, frame: int) -> 
 def _at_point(one: ForceField, matrix: Floats, vertex: bpy.types.MeshVertex) -> ForceField:
     place = matrix[:3, :3] @ np.array(vertex.co, np.float64) + matrix[:3, 3]
     normal = _unit(matrix[:3, :3] @ np.array(vertex.normal, np.float64))
-    return replace(one, place=_vector(place), normal=_vector(normal))
+    return replace(one, place=triple(place), normal=triple(normal))
 
 
 def _noise_of(field: bpy.types.FieldSettings, frame: int) -> float:
@@ -161,11 +161,6 @@ def _limited(value: float) -> float:
 def _unit(vector: Floats) -> Floats:
     length = float(np.linalg.norm(vector))
     return vector / length if length else vector
-
-
-def _vector(values: Any) -> tuple[float, float, float]:
-    x, y, z = (float(value) for value in values)
-    return x, y, z
 
 
 @lru_cache(maxsize=1)

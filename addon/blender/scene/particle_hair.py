@@ -13,6 +13,7 @@ import bpy
 from ...errors import HairloomError
 from ...groom.roots import bind_roots
 from ...strands import StrandSet, Surface
+from ..base.objects import remove_hair
 from ..base.parts import Part, Parts
 from .curves import read_curves, write_curves
 from .surfaces import read_surface
@@ -72,8 +73,7 @@ def _read(
     depsgraph = context.evaluated_depsgraph_get()
     strands = replace(read_curves(converted, depsgraph).strands, root_uv=None)
     surface = read_surface(mesh, depsgraph, need_uv=False, place=mesh.name)
-    collection, curves = converted.users_collection[0], converted.data
-    bpy.data.objects.remove(converted)
-    bpy.data.hair_curves.remove(curves)
+    collection = converted.users_collection[0]
+    remove_hair(converted)
     context.view_layer.objects.active = mesh
     return strands, surface, collection

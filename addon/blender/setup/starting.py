@@ -12,7 +12,7 @@ from ...errors import HairloomError
 from ...groom.settings import GrowSettings
 from ...shading.coat import coated
 from ...shading.settings import ShadingSettings
-from ..base.objects import head_of, link_into
+from ..base.objects import head_of, link_into, remove_hair
 from ..base.parts import Part, Parts
 from ..properties.presets import apply, named_preset
 from ..properties.properties import settings_of
@@ -183,9 +183,6 @@ def _grown_in_place(
     name, collections = hair.name, list(hair.users_collection)
     grown = yield from grow_on(head, depsgraph, collections[0], settings)
     link_into(grown, collections, bpy.context.scene)
-    curves = hair.data
-    bpy.data.objects.remove(hair)
-    if not curves.users:
-        bpy.data.hair_curves.remove(curves)
+    remove_hair(hair)
     grown.name = name
     return grown, factor

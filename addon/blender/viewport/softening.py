@@ -22,8 +22,8 @@ from ...render.soft_picture import SoftPicture
 from ...render.strand_layers import is_software
 from ...render.strand_pass import StrandPass
 from ...shading.lights import Light
-from ..base.redraw import redraw_view
-from .views import View, known_views, soon
+from ..base.redraw import redraw_view, soon
+from .views import View, known_views
 
 #: [s] for which a view stays as it is before it gets samples; and how far apart draws of one that
 #: moves slowly may be: it is at rest after twice as long

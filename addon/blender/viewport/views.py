@@ -9,7 +9,7 @@ shadows are soft by then, it is one sample that tells whether they are still rig
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -19,7 +19,7 @@ import gpu
 from ...render.camera import Camera
 from ...render.kept_picture import KeptPicture, are_same
 from ...render.strand_pass import Statistics, StrandPass
-from ..base.redraw import redraw_views
+from ..base.redraw import redraw_views, soon
 
 #: what is in such views changes with the scene, the view and its switches alone
 STEADY = ("SOLID", "WIREFRAME")
@@ -166,13 +166,6 @@ def was_drawn(view: View) -> None:
     view.is_again, view.shown_again, view.drawn_at = False, 0, time.monotonic()
     if view.is_behind:
         soon(_catch_up, _LAG)
-
-
-def soon(timer: Callable[[], None], pause: float) -> None:
-    """Once, this long after the last call."""
-    if bpy.app.timers.is_registered(timer):
-        bpy.app.timers.unregister(timer)
-    bpy.app.timers.register(timer, first_interval=pause)
 
 
 def _draw_afresh() -> None:
