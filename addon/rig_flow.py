@@ -27,7 +27,7 @@ from .groom.children_settings import ChildrenSettings
 from .groom.counter_random import named, uniform
 from .groom.guides import choose_guides, grouped
 from .groom.holds import Holds
-from .groom.masks import NO_MASKS, Masks
+from .groom.masks import Masks
 from .groom.partings import Partings
 from .groom.roots import RootFrames, RootHolds, bind_roots, root_frames
 from .groom.settings import GuideSettings
@@ -258,6 +258,25 @@ class Rig:
         return Pose(None if self.head is None else self.head.positions, np.eye(4))
 
 
+@dataclass(frozen=True, eq=False)
+class ChildGround:
+    """What decides, beside their settings, where children grow; at rest.
+
+    density: (vertex_count,) how densely they grow on the head; None: wherever guides are near.
+    masks: by what their settings are multiplied on the head.
+    partings: (n, 2, 3) [m] the straight pieces of lines on the head; None: no line.
+    head_field: is called if there are children: what they are led out of; None: of nothing.
+    """
+
+    density: Floats | None = None
+    masks: Masks = field(default_factory=Masks)
+    partings: Floats | None = None
+    head_field: Callable[[], DistanceField | None] = lambda: None
+
+
+BARE = ChildGround()
+
+
 def prepare(
     strands: StrandSet,
     head: Surface | None,
@@ -265,12 +284,9 @@ def prepare(
     *,
     place: str,
     children: ChildrenSettings | None = None,
-    density: Floats | None = None,
-    masks: Masks = NO_MASKS,
+    ground: ChildGround = BARE,
     widths: str = "own",
     holders: Holders = NO_HOLDERS,
-    partings: Floats | None = None,
-    head_field: Callable[[], DistanceField | None] = lambda: None,
     kept: Kept = NOTHING_KEPT,
     is_animated: bool = False,
 ) -> Rig:
@@ -282,12 +298,9 @@ def prepare(
         head: world space at rest, or None for hair that only follows its object.
         place: names the groom in error messages.
         children: None is none.
-        density: (vertex_count,) how densely children grow; None: wherever guides are near.
-        masks: by what the settings of children are multiplied on the head.
+        ground: its partings part the artist's own strands, too.
         widths: one of `groom.widths.METHODS`.
         holders: ties and a surface of tips, at rest.
-        partings: (n, 2, 3) [m] the straight pieces of lines on the head, at rest; None: no line.
-        head_field: is called if there are children: what they are led out of; None: of nothing.
         kept: of the groom that was made last, which may be the same but for what an artist combs
             or paints; it changes nothing but the time.
         is_animated: whether the strands will have other shapes, so that all keep their own points.
@@ -314,18 +327,18 @@ def prepare(
     guides = choose_guides(lines, settings, kind)
     guide_lines = lines.take(guides)
     parted = None
-    if partings is not None and len(partings) and head is not None:
-        parted = Partings.of(partings, head)
+    if ground.partings is not None and len(ground.partings) and head is not None:
+        parted = Partings.of(ground.partings, head)
     guide_kind = None if kind is None else kind[guides]
     weights = _weights(lines, guide_lines, kind, guide_kind, parted)
     notes = (*_loose(away), *_lost_length(bound, own))
     rig = Rig(own, head, guides, guide_lines.grid, weights, _frames(own, head), notes)
-    ground = _Ground(density, masks, parted, head_field, kept, is_animated)
+    growing = _Growing(ground, parted, kept, is_animated)
     if children is not None and children.method == "auto":
-        rig = _automatic(rig, children, ground, widths, place)
+        rig = _automatic(rig, children, growing, widths, place)
     else:
         if children is not None and children.method != "none":
-            rig = _with_children(rig, children, ground, place)
+            rig = _with_children(rig, children, growing, place)
         strands, found = with_widths(
             rig.strands, widths, number=_numbers(rig), fineness=_fineness(rig), kept=kept
         )
@@ -349,13 +362,11 @@ def _loose(away: float) -> tuple[str, ...]:
 
 
 @dataclass(frozen=True)
-class _Ground:
-    """What matters to children beside the artist's strands; the arguments of `prepare`."""
+class _Growing:
+    """What matters to children beside the artist's strands, see `prepare`."""
 
-    density: Floats | None
-    masks: Masks
+    ground: ChildGround
     partings: Partings | None
-    field: Callable[[], DistanceField | None]
     kept: Kept
     is_animated: bool
 
@@ -394,7 +405,7 @@ def _hair_length(strands: StrandSet) -> float:
 def _automatic(
     rig: Rig,
     settings: ChildrenSettings,
-    ground: _Ground,
+    growing: _Growing,
     widths: str,
     place: str,
 ) -> Rig:
@@ -411,10 +422,10 @@ def _automatic(
         )
     if parts > 1.0 and rig.head is None:
         parts, line = 1.0, "Children: none, since the hair has no surface on which they could grow"
-    own, found = with_widths(rig.strands, widths, parts, kept=ground.kept)
+    own, found = with_widths(rig.strands, widths, parts, kept=growing.kept)
     rig = replace(rig, strands=own, widths=found)
     if parts > 1.0:
-        with_children = _with_children(rig, settings, ground, place)
+        with_children = _with_children(rig, settings, growing, place)
         rig = replace(with_children, widths=found)
         line = (
             f"Children: {rig.child_count:,} added, since {count:,} curves are too few for a body of"
@@ -449,11 +460,12 @@ def _weights(
 def _with_children(
     rig: Rig,
     settings: ChildrenSettings,
-    ground: _Ground,
+    growing: _Growing,
     place: str,
 ) -> Rig:
     """The artist's own strands, and children grown between them."""
-    own, head, kept = rig.strands, rig.head, ground.kept
+    own, head, kept = rig.strands, rig.head, growing.kept
+    ground = growing.ground
     if head is None:
         note = (
             "Children need a surface to grow from, so there are none. Give the hair a surface, or "
@@ -467,13 +479,13 @@ def _with_children(
         head,
         settings,
         ground.density,
-        ground.partings,
+        growing.partings,
         ground.masks.of(parents),
         place=place,
         kept=kept,
     )
-    made, chosen = _outside(made, ground.field(), _hair_length(shapes), kept)
-    if ground.is_animated:
+    made, chosen = _outside(made, ground.head_field(), _hair_length(shapes), kept)
+    if growing.is_animated:
         children = with_own_points(made.strands, cv_count)
     else:
         children = with_needed_points(made.strands, cv_count, kept=kept)
@@ -481,7 +493,7 @@ def _with_children(
     if len(rig.guides) < own.strand_count:
         # shaped by their neighbours among all strands, they move as guides do
         lines = center_lines(own.take(rig.guides), cv_count)
-        weights = _weights(_lines(made.strands, cv_count, kept), lines, partings=ground.partings)
+        weights = _weights(_lines(made.strands, cv_count, kept), lines, partings=growing.partings)
     else:
         weights = replace(made.weights, guide=parents[made.weights.guide])
     return Rig(

@@ -59,7 +59,7 @@ def ponytail(count: int, *, children: ChildrenSettings | None = None) -> Ponytai
         GuideSettings(cv_count=POINTS),
         place="ponytail",
         children=children,
-        density=bust.weights["scalp"] if children is not None else None,
+        ground=rig_flow.ChildGround(bust.weights["scalp"] if children is not None else None),
         widths="auto",
         holders=Holders((Tie("Scrunchy", shape),)),
     )

@@ -81,9 +81,11 @@ def rig_of(name: str, most: int = 1_000_000) -> tuple[Any, bpy.types.Object]:
         own["guides"],
         place=name,
         children=own["children"],
-        density=read.density,
+        ground=of_addon("rig_flow").ChildGround(
+            read.density,
+            head_field=lambda: of_addon("blender.colliders.fields").solid_of(read.head),
+        ),
         widths=own["widths"].method,
-        head_field=lambda: of_addon("blender.colliders.fields").solid_of(read.head),
     )
     return rig, hair
 

@@ -29,7 +29,7 @@ def rig_of(density: Floats | None, settings: ChildrenSettings, **others: object)
         GUIDES,
         place="a wig",
         children=settings,
-        density=density,
+        ground=rig_flow.ChildGround(density),
     )
 
 

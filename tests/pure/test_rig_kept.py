@@ -92,10 +92,12 @@ def test_it_is_what_is_made_from_nothing(
             GuideSettings(guide_count=guides, cv_count=8),
             place="a wig",
             children=settings,
-            density=density,
-            masks=Masks({name: SurfaceMask.of_vertices(HEAD, density) for name in PAINTED}),
+            ground=rig_flow.ChildGround(
+                density,
+                Masks({name: SurfaceMask.of_vertices(HEAD, density) for name in PAINTED}),
+                head_field=lambda: field,
+            ),
             widths="found",
-            head_field=lambda: field,
             **kept,
         )
 

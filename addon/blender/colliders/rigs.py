@@ -10,7 +10,7 @@ from ...groom.children_settings import ChildrenSettings
 from ...groom.settings import GuideSettings
 from ...groom.width_settings import WidthSettings
 from ...params import SettingsMap
-from ...rig_flow import Rig
+from ...rig_flow import ChildGround, Rig
 from ...strands.kept import NOTHING_KEPT, Kept
 from ..properties.groom_settings import GroomSettings
 from ..scene.source import Source
@@ -35,12 +35,11 @@ def rig_from(
         settings[GuideSettings],
         place=place,
         children=settings[ChildrenSettings],
-        density=source.density,
-        masks=source.masks,
+        ground=ChildGround(
+            source.density, source.masks, source.partings, lambda: solid_of(source.head)
+        ),
         widths=settings[WidthSettings].method,
         holders=source.holders,
-        partings=source.partings,
-        head_field=lambda: solid_of(source.head),
         kept=kept,
         is_animated=settings[DynamicsSettings].animated_style,
     )

@@ -58,7 +58,7 @@ def settle_hair(
         guides,
         place=hair.name,
         holders=read.holders,
-        partings=read.partings,
+        ground=rig_flow.ChildGround(partings=read.partings),
     )
     _check_roots(hair, rig)
     dynamics, pose = source.settings[DynamicsSettings], source.pose(rig, depsgraph)

@@ -54,8 +54,9 @@ def rig_of(
     kept: Kept = NOTHING_KEPT,
     own: StrandSet | None = None,
 ) -> rig_flow.Rig:
+    ground = rig_flow.ChildGround(masks=masks)
     return rig_flow.prepare(
-        own or curves(), HEAD, GUIDES, place="a wig", children=settings, masks=masks, kept=kept
+        own or curves(), HEAD, GUIDES, place="a wig", children=settings, ground=ground, kept=kept
     )
 
 
@@ -189,8 +190,9 @@ def test_widths_are_multiplied_whatever_their_method() -> None:
     for method in ("own", "found"):
 
         def radius(masks: Masks, method: str = method) -> Floats:
+            ground = rig_flow.ChildGround(masks=masks)
             rig = rig_flow.prepare(
-                curves(), HEAD, GUIDES, place="a wig", children=BOLD, masks=masks, widths=method
+                curves(), HEAD, GUIDES, place="a wig", children=BOLD, ground=ground, widths=method
             )
             return rig.strands.radius.reshape(rig.strands.strand_count, -1)[rig.own_count :, 0]
 
