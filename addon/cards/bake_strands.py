@@ -56,8 +56,14 @@ class FlatStrands:
         return len(self.strand_id)
 
 
+def strand_ids(count: int) -> Floats:
+    """A number of its own for each strand, evenly between 0 and 1 and at random, (count,)."""
+    ids: Floats = (np.random.default_rng(0).permutation(count) + 0.5) / count
+    return ids
+
+
 def flat_strands(
-    plan: AtlasPlan, grid: Floats, radius: Floats, base: Floats | None = None, seed: int = 0
+    plan: AtlasPlan, grid: Floats, radius: Floats, base: Floats | None = None
 ) -> FlatStrands:
     """The strands of the plan in its tiles; none reaches beyond its tile.
 
@@ -102,7 +108,7 @@ def flat_strands(
         "tangent": _tangents(points, *(axis[tile] for axis in axes)),
         "base": np.clip(_finer(shade), 0.0, 1.0),
         "occlusion": np.clip(occlusion, 0.0, 1.0),
-        "strand_id": (np.random.default_rng(seed).permutation(len(points)) + 0.5) / len(points),
+        "strand_id": strand_ids(len(points)),
     }
     single = {name: part.astype(np.float32) for name, part in parts.items()}
     return FlatStrands(**single, base_gain=gain)

@@ -29,7 +29,7 @@ from ..strands.vectors import unit, unit_or
 from .atlas import check_width, medoids
 from .atlas_grid import AtlasGrid
 from .atlas_settings import AtlasSettings
-from .bake_strands import FlatStrands
+from .bake_strands import FlatStrands, strand_ids
 from .shell_hair import ShortHair, between
 from .shell_skin import ShellSkin
 
@@ -397,7 +397,6 @@ def shell_strands(
     radius: Floats,
     upright_shown: float,
     base: Floats | None = None,
-    seed: int = 0,
 ) -> FlatStrands:
     """The pieces of the strands of the plan in its tiles, tile after tile.
 
@@ -443,7 +442,6 @@ def shell_strands(
     area = np.bincount(tile[:, 0], 2.0 * thick.mean(axis=1) * shown, len(plan.reach) * layers)
     shade = np.ones((len(points), 2, 3)) if base is None else base[plan.strands]
     gain = max(float(shade.max(initial=0.0)), 1.0)
-    ids = (np.random.default_rng(seed).permutation(len(points)) + 0.5) / len(points)
     parts = {
         "place": on_atlas,
         "half": edge - on_atlas,
@@ -452,7 +450,7 @@ def shell_strands(
         "tangent": np.repeat(_directions(step, mean, own, layer, axes)[:, None], 2, axis=1),
         "base": between(shade[strand], along) / gain,
         "occlusion": np.repeat(_beneath(area, side**2, layers)[tile], 2, axis=1),
-        "strand_id": ids[strand],
+        "strand_id": strand_ids(len(points))[strand],
     }
     single = {name: part[inside].astype(np.float32) for name, part in parts.items()}
     return FlatStrands(**single, base_gain=gain)

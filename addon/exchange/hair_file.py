@@ -134,7 +134,6 @@ def write_hair_file(
     scale: float = 1.0,
     parts: Literal["strands", "guides", "both"] = "strands",
     uv: bool = False,
-    info: str = "Hairloom",
 ) -> tuple[str, ...]:
     """Write a groom with thickness, and colours if known; what is one for all goes in the header.
 
@@ -144,7 +143,6 @@ def write_hair_file(
         scale: metres in one unit of the file.
         parts: the strands that are seen, the guides, or both.
         uv: write root UVs as LuxCore's UVs of points; other readers may refuse such a file.
-        info: up to 87 bytes for whoever opens it.
 
     Returns:
         What the file cannot say of this groom.
@@ -163,7 +161,7 @@ def write_hair_file(
     header["signature"] = b"HAIR"
     header["strand_count"], header["point_count"] = strands.strand_count, strands.point_count
     header["color"] = _WHITE
-    header["info"] = info.encode("utf-8", "replace")[:87]
+    header["info"] = b"Hairloom"
     unit = np.float32(scale)
     arrays: dict[int, NDArray[Any]] = {_POINTS: from_z_up(strands.points, up) / unit}
     segments = strands.point_counts - 1

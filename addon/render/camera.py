@@ -97,7 +97,6 @@ def frame_camera(
     aspect: float,
     *,
     margin: float = 1.08,
-    up: Sequence[float] = (0.0, 0.0, 1.0),
 ) -> Camera:
     """The perspective camera that just holds a bounding box, all eight corners.
 
@@ -110,7 +109,7 @@ def frame_camera(
     low, high = (np.asarray(corner, np.float64) for corner in bounds)
     center = (low + high) / 2.0
     size = max(float(np.linalg.norm(high - low)), 1.0e-9)
-    turn = look_at(center + np.asarray(direction, np.float64), center, up)[:3, :3]
+    turn = look_at(center + np.asarray(direction, np.float64), center)[:3, :3]
     corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
     seen = (low + corners * (high - low) - center) @ turn.T
     # A corner at (x, y, z) of view space is inside when |y| < (distance - z) tan(fov / 2).
@@ -120,7 +119,7 @@ def frame_camera(
     )
     distance = max(distance, 0.01 * size)
     near = max(distance - size, 0.02 * distance)
-    view = look_at(center + turn[2] * distance, center, up)
+    view = look_at(center + turn[2] * distance, center)
     return Camera(view, perspective(field_of_view, aspect, near, distance + size))
 
 
@@ -131,7 +130,6 @@ def frame_points(
     aspect: float,
     *,
     margin: float = 1.08,
-    up: Sequence[float] = (0.0, 0.0, 1.0),
 ) -> Camera:
     """The perspective camera that just holds points, in the middle of the picture.
 
@@ -141,7 +139,7 @@ def frame_points(
     places = np.asarray(points, np.float64)
     low, high = places.min(axis=0), places.max(axis=0)
     center = (low + high) / 2.0
-    turn = look_at(np.asarray(direction, np.float64), np.zeros(3), up)[:3, :3]
+    turn = look_at(np.asarray(direction, np.float64), np.zeros(3))[:3, :3]
     seen = (places - center) @ turn.T
     # A point at (x, y, z) of view space is inside for an eye at (u, v, distance) when
     # |x - u| < (distance - z) slope_x and |y - v| < (distance - z) slope_y.

@@ -232,16 +232,15 @@ def _unit(away: Floats) -> Floats:
     return away / np.maximum(np.linalg.norm(away, axis=-1, keepdims=True), 1e-15)
 
 
-def three_point_lights(view: Floats, strength: float = 1.0) -> tuple[Light, ...]:
+def three_point_lights(view: Floats) -> tuple[Light, ...]:
     """A studio's key, fill and rim light as suns that are attached to the camera.
 
     Args:
         view: (4, 4) world to view space, a rigid motion.
-        strength: factor of all three.
     """
     to_world = np.linalg.inv(np.asarray(view, np.float64))[:3, :3]
     return tuple(
-        Light.sun(-to_world @ np.array(towards), color, strength * irradiance)
+        Light.sun(-to_world @ np.array(towards), color, irradiance)
         for towards, color, irradiance in _STUDIO
     )
 

@@ -24,18 +24,16 @@ _STEP = 1.25
 _CHUNK = 100_000
 
 
-def with_own_points(strands: StrandSet, least: int, most: int = MAX_POINTS) -> StrandSet:
+def with_own_points(strands: StrandSet, least: int) -> StrandSet:
     """The same strands with all of their points, whatever their shape needs now: they may move.
 
-    One of fewer than `least` gets more between them, one of more than `most` has that many.
+    One of fewer than `least` gets more between them, one of more than MAX_POINTS has that many.
     """
     own = strands.point_counts
-    return with_points(strands, np.clip(own, least, most), own > most)
+    return with_points(strands, np.clip(own, least, MAX_POINTS), own > MAX_POINTS)
 
 
-def with_needed_points(
-    strands: StrandSet, least: int, most: int = MAX_POINTS, kept: Kept = NOTHING_KEPT
-) -> StrandSet:
+def with_needed_points(strands: StrandSet, least: int, kept: Kept = NOTHING_KEPT) -> StrandSet:
     """The same strands with fewer points where these do, and more where there are few.
 
     A strand is resampled evenly to as few points as it takes to lose at most LOST of its length and
@@ -51,12 +49,12 @@ def with_needed_points(
     stray = STRAY * typical(strands.lengths())
 
     def of(some: Ints) -> tuple[Ints, Bools]:
-        return _needed(strands.take(some), least, most, stray)
+        return _needed(strands.take(some), least, stray)
 
     if strands.is_uniform:
-        needed, is_even = kept.rows("points", (least, most, stray), (strands.grid,), of)
+        needed, is_even = kept.rows("points", (least, stray), (strands.grid,), of)
     else:
-        needed, is_even = _needed(strands, least, most, stray)
+        needed, is_even = _needed(strands, least, stray)
     return with_points(strands, needed, is_even)
 
 
@@ -82,7 +80,7 @@ def with_points(strands: StrandSet, counts: Ints, is_even: Bools) -> StrandSet:
     return replace(strands, points=points, offsets=offsets, radius=radius, color=color)
 
 
-def _needed(strands: StrandSet, least: int, most: int, stray: float) -> tuple[Ints, Bools]:
+def _needed(strands: StrandSet, least: int, stray: float) -> tuple[Ints, Bools]:
     """How many points each strand gets, and whether evenly, (strand_count,) each.
 
     The least of all strands is tried first, as it suffices for most, then the next below its own,
@@ -90,7 +88,7 @@ def _needed(strands: StrandSet, least: int, most: int, stray: float) -> tuple[In
     """
     own = strands.point_counts
     along = reached(strands.points, strands.offsets)
-    counts = np.array(_counts(least, most))
+    counts = np.array(_counts(least))
     # of each strand the counts that are left to try, from and up to; the last is its own
     low = np.zeros(len(own), np.int64)
     last = np.where(own == least, 0, np.maximum(counts.searchsorted(own), 1))
@@ -106,8 +104,9 @@ def _needed(strands: StrandSet, least: int, most: int, stray: float) -> tuple[In
         is_first = (low == 1) & (high == last) & (tried == 0)
         tried = np.where(is_first, high - 1, (low + high) // 2)
     is_even = low < last
-    needed = np.where(is_even, counts[np.minimum(low, len(counts) - 1)], np.clip(own, least, most))
-    return needed, is_even | (own > most)
+    kept = np.clip(own, least, MAX_POINTS)
+    needed = np.where(is_even, counts[np.minimum(low, len(counts) - 1)], kept)
+    return needed, is_even | (own > MAX_POINTS)
 
 
 def _suffice(strands: StrandSet, along: Floats, some: Ints, count: int, stray: float) -> Bools:
@@ -118,9 +117,9 @@ def _suffice(strands: StrandSet, along: Floats, some: Ints, count: int, stray: f
     return np.concatenate(found)
 
 
-def _counts(least: int, most: int) -> list[int]:
+def _counts(least: int) -> list[int]:
     counts, count = [], float(least)
-    while count < most:
+    while count < MAX_POINTS:
         counts.append(round(count))
         count *= _STEP
     return counts

@@ -100,11 +100,9 @@ def add_save_option(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def add_object_option(parser: Any, about: str, *, needed: bool = False) -> None:
+def add_object_option(parser: Any, about: str) -> None:
     """--object, as often as there are objects."""
-    parser.add_argument(
-        "--object", action="append", required=needed, default=[], metavar="NAME", help=about
-    )
+    parser.add_argument("--object", action="append", default=[], metavar="NAME", help=about)
 
 
 def add_frames_option(parser: Any, about: str) -> None:

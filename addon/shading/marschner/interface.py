@@ -103,7 +103,7 @@ def rest_energy(cos_d: Floats, index: float, absorption: tuple[float, float, flo
 
 
 @functools.cache
-def quarter_turn(count: int = 64) -> tuple[Floats, Floats]:
-    """Gauss-Legendre angles in [0, pi/2] and their weights."""
-    place, weight = np.polynomial.legendre.leggauss(count)
+def quarter_turn() -> tuple[Floats, Floats]:
+    """64 Gauss-Legendre angles in [0, pi/2] and their weights."""
+    place, weight = np.polynomial.legendre.leggauss(64)
     return 0.25 * np.pi * (place + 1.0), 0.25 * np.pi * weight
