@@ -128,7 +128,7 @@ def middle_lines(lines: Floats, chains: Chains, joints: int) -> Floats:
 
 
 def turned_to(direction: Floats) -> Floats:
-    """The least turns (..., 3, 3) that take y to these ways; Rodrigues' formula."""
+    """The least turns (..., 3, 3) that take y to these directions; Rodrigues' formula."""
     y = np.array([0.0, 1.0, 0.0])
     unit = unit_or(direction, y, 1.0e-9)
     axis, cosine = np.cross(y, unit), unit[..., 1]

@@ -142,8 +142,8 @@ def keyed_error(tracks: CardTracks, rig: JointRig, turn: Floats, place: Floats) 
 
 
 def joint_moves(rest: Floats, turn: Floats, place: Floats) -> tuple[Floats, Floats]:
-    """What joints do to points at rest: turns (n, frame_count, 3, 3) and ways (n, frame_count, 3)
-    such that a point goes to turn point + way.
+    """What joints do to points at rest: turns (n, frame_count, 3, 3) and shifts (n, frame_count,
+    3) such that a point goes to turn point + shift.
     """
     shape = turn.shape[2:]
     moves = (turn @ rest[:, :, None, :3, :3].swapaxes(-1, -2)).reshape(-1, *shape)

@@ -1,7 +1,7 @@
 """Ambient occlusion of card vertices by rays against cards, with their alpha, and bodies.
 
 For cards of which no strands are known, and for what other grooms shade; cards that are made from
-strands have the occlusion of these, see strand_occlusion.py.
+strands have the occlusion of these, see `build.CardGroom`.
 
 Stored is the light that a vertex gets from a uniform sky, as a fraction of what a surface of its
 normal gets in the open:  A = sum_i |n . d_i| T_i / sum_i |n . d_i|,  over directions d_i that

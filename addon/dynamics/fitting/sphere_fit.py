@@ -169,7 +169,7 @@ def _first_radii(samples: SurfaceSamples, widest: float) -> Floats:
 
 def _tangent_radius(displacement: Floats, inward: Floats, widest: Floats) -> Floats:
     """Radius (n,) of the ball that touches a place, with its center inwards (3,) or (n, 3), and
-    goes through another one, `way` (n, 3) from there; `widest` (n,) where none does."""
+    goes through another one, `displacement` (n, 3) from there; `widest` (n,) where none does."""
     along = (displacement * inward).sum(axis=1)
     squared = np.einsum("ij,ij->i", displacement, displacement)
     return np.divide(squared, 2.0 * along, out=widest.copy(), where=along > 0.0)
