@@ -132,14 +132,20 @@ def turned_to(direction: Floats) -> Floats:
     y = np.array([0.0, 1.0, 0.0])
     unit = unit_or(direction, y, 1.0e-9)
     axis, cosine = np.cross(y, unit), unit[..., 1]
-    cross = np.zeros((*direction.shape, 3))
-    cross[..., 0, 1], cross[..., 1, 0] = -axis[..., 2], axis[..., 2]
-    cross[..., 0, 2], cross[..., 2, 0] = axis[..., 1], -axis[..., 1]
-    cross[..., 1, 2], cross[..., 2, 1] = -axis[..., 0], axis[..., 0]
+    cross = cross_matrices(axis)
     fraction = 1.0 / np.maximum(1.0 + cosine, 1.0e-6)
     turns = np.eye(3) + cross + cross @ cross * fraction[..., None, None]
     turns[cosine < -1.0 + 1.0e-6] = np.diag([1.0, -1.0, -1.0])
     return turns
+
+
+def cross_matrices(axis: Floats) -> Floats:
+    """(..., 3, 3), what takes the cross product of vectors (..., 3) with others."""
+    cross = np.zeros((*axis.shape, 3))
+    cross[..., 0, 1], cross[..., 1, 0] = -axis[..., 2], axis[..., 2]
+    cross[..., 0, 2], cross[..., 2, 0] = axis[..., 1], -axis[..., 1]
+    cross[..., 1, 2], cross[..., 2, 1] = -axis[..., 0], axis[..., 0]
+    return cross
 
 
 def reach_of(points: Floats, skin: Skin, rest: Floats) -> Floats:

@@ -6,6 +6,7 @@ joint has its best rigid motion in closed form, with the motion fixed each point
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations, pairwise
 
@@ -30,6 +31,14 @@ class Skin:
 
     joint: Ints
     weight: Floats
+
+    @classmethod
+    def joined(cls, parts: Sequence[Skin]) -> Skin:
+        """All of them, one after the other, with the heaviest joint of each point first."""
+        joint = np.concatenate([each.joint for each in parts])
+        weight = np.concatenate([each.weight for each in parts])
+        order = np.argsort(-weight, axis=1, kind="stable")
+        return cls(np.take_along_axis(joint, order, 1), np.take_along_axis(weight, order, 1))
 
 
 def rigid_fits(

@@ -33,7 +33,7 @@ _LEARNT_VERTICES = 12_000
 _TURNS = 3
 #: Frames that are solved, and vertices that are placed, at once.
 _FRAMES_AT_ONCE = 64
-_VERTICES_AT_ONCE = 4096
+VERTICES_AT_ONCE = 4096
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,6 +59,16 @@ class CardTracks:
     @property
     def frame_count(self) -> int:
         return len(self.carrier)
+
+    def some_frames(self) -> Ints:
+        """The frames from which weights are learnt, evenly chosen, ascending."""
+        few = min(self.frame_count, _LEARNT_FRAMES)
+        return np.linspace(0, self.frame_count - 1, few).round().astype(int)
+
+    def some_vertices(self, count: int) -> Ints:
+        """This many vertices of the finest level, or all, chosen at random, ascending."""
+        there = len(self.levels[0].positions)
+        return np.sort(np.random.default_rng(0).permutation(there)[: min(there, count)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,6 +108,25 @@ class FitError:
         rms = float(np.sqrt(np.mean(np.square(every, dtype=np.float64))))
         return cls(rms, float(np.quantile(every, 0.99)), float(every.max(initial=0.0)))
 
+    @classmethod
+    def played(
+        cls, tracks: CardTracks, skins: Sequence[Skin], moves: tuple[Floats, Floats]
+    ) -> Self:
+        """Of all levels.
+
+        Args:
+            moves: of the joints, see `joint_moves`.
+        """
+        distances = []
+        for mesh, moved, skin in zip(tracks.levels, tracks.moved, skins, strict=True):
+            for begin in range(0, len(moved), VERTICES_AT_ONCE):
+                part = slice(begin, begin + VERTICES_AT_ONCE)
+                points = mesh.positions[part].astype(np.float64)
+                own = Skin(skin.joint[part], skin.weight[part])
+                miss = skinned(points, own, *moves) - moved[part]
+                distances.append(np.sqrt((miss * miss).sum(axis=-1)).astype(np.float32).ravel())
+        return cls.of(distances)
+
 
 def joint_steps(
     tracks: CardTracks, settings: CardExportSettings
@@ -129,16 +158,7 @@ def keyed_error(tracks: CardTracks, rig: JointRig, turn: Floats, place: Floats) 
     Args:
         turn, place: as those of the rig, which they may differ from by left out keys.
     """
-    moves = joint_moves(rig.rest, turn, place)
-    distances = []
-    for mesh, moved, skin in zip(tracks.levels, tracks.moved, rig.skins, strict=True):
-        for begin in range(0, len(moved), _VERTICES_AT_ONCE):
-            part = slice(begin, begin + _VERTICES_AT_ONCE)
-            points = mesh.positions[part].astype(np.float64)
-            own = Skin(skin.joint[part], skin.weight[part])
-            miss = skinned(points, own, *moves) - moved[part]
-            distances.append(np.sqrt((miss * miss).sum(axis=-1)).astype(np.float32).ravel())
-    return FitError.of(distances)
+    return FitError.played(tracks, rig.skins, joint_moves(rig.rest, turn, place))
 
 
 def joint_moves(rest: Floats, turn: Floats, place: Floats) -> tuple[Floats, Floats]:
@@ -169,14 +189,12 @@ class _Learnt:
     @classmethod
     def of(cls, tracks: CardTracks, most: int) -> _Learnt:
         mesh, moved = tracks.levels[0], tracks.moved[0]
-        few = min(tracks.frame_count, _LEARNT_FRAMES)
-        frames = np.linspace(0, tracks.frame_count - 1, few).round().astype(int)
+        frames = tracks.some_frames()
         _, lines = card_lines(mesh)
         shifts = [card_lines(replace(mesh, positions=moved[:, frame]))[1] for frame in frames]
         lines = lines.astype(np.float64)
         chains = card_chains(lines, np.stack(shifts, axis=2).astype(np.float64), most)
-        count = min(len(mesh.positions), _LEARNT_VERTICES)
-        picked = np.sort(np.random.default_rng(0).permutation(len(mesh.positions))[:count])
+        picked = tracks.some_vertices(_LEARNT_VERTICES)
         return cls(
             lines,
             chains,
@@ -257,16 +275,13 @@ def _skin_of(
     """The weights of all vertices of a level, heaviest first."""
     card = _card_places(mesh, finest)
     parts = []
-    for begin in range(0, len(moved), _VERTICES_AT_ONCE):
-        part = slice(begin, begin + _VERTICES_AT_ONCE)
+    for begin in range(0, len(moved), VERTICES_AT_ONCE):
+        part = slice(begin, begin + VERTICES_AT_ONCE)
         first = learnt.first_skin(card[part], mesh.along[part], joints)
         points = mesh.positions[part].astype(np.float64)
         shifts = moved[part][:, learnt.frames].astype(np.float64)
         parts.append(best_weights(points, shifts, first, turn, shift))
-    joint = np.concatenate([each.joint for each in parts])
-    weight = np.concatenate([each.weight for each in parts])
-    order = np.argsort(-weight, axis=1, kind="stable")
-    return Skin(np.take_along_axis(joint, order, 1), np.take_along_axis(weight, order, 1))
+    return Skin.joined(parts)
 
 
 def _card_places(mesh: CardMesh, finest: CardMesh) -> Ints:

@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays import Bools, Floats, Ints
+from .joint_chains import cross_matrices
 from .joint_keys import matrices, quaternions, slerp
 
 #: Steps [1/s] that the values are for: engines step once a frame.
@@ -192,10 +193,7 @@ def chained(rest: Floats, targets: Floats) -> Floats:
 def turned_by(one: Floats, other: Floats) -> Floats:
     """The least turns (..., 3, 3) that take unit vectors to others; Rodrigues' formula."""
     axis, cosine = np.cross(one, other), (one * other).sum(axis=-1)
-    cross = np.zeros((*axis.shape, 3))
-    cross[..., 0, 1], cross[..., 1, 0] = -axis[..., 2], axis[..., 2]
-    cross[..., 0, 2], cross[..., 2, 0] = axis[..., 1], -axis[..., 1]
-    cross[..., 1, 2], cross[..., 2, 1] = -axis[..., 0], axis[..., 0]
+    cross = cross_matrices(axis)
     fraction = 1.0 / np.maximum(1.0 + cosine, _REVERSED)
     turn: Floats = np.eye(3) + cross + cross @ cross * fraction[..., None, None]
     return turn

@@ -17,7 +17,7 @@ from .card_mesh import CardMesh
 from .follow import card_lines
 from .joint_chains import Chains, card_chains, middle_lines, turned_to
 from .joint_solve import INFLUENCES, Skin, best_weights, skinned
-from .joints import CardTracks, FitError, joint_moves
+from .joints import VERTICES_AT_ONCE, CardTracks, FitError, joint_moves
 from .sort import card_of_vertex
 from .spring_bones import (
     Balls,
@@ -37,10 +37,8 @@ _CHAINS = (1, 2, 4, 8, 12, 16, 24, 32, 48, 64, 96, 128)
 #: By this fraction an error may be larger than the least where fewer joints do; and by how much,
 #: of the hair's length, errors differ unseen.
 _WORTH, _UNSEEN = 0.03, 1.0e-4
-#: Frames and vertices that skins are learnt from, and vertices that are placed at once.
-_LEARNT_FRAMES = 24
+#: Vertices that skins are learnt from.
 _LEARNT_VERTICES = 4000
-_VERTICES_AT_ONCE = 4096
 #: The most that a bone keeps away from what it hits, a fraction of its length.
 _HIT_FRACTION = 0.1
 #: How far into a ball a bone's tail may lie at rest and still keep out of it, of its length.
@@ -133,15 +131,7 @@ def spring_error(
     Args:
         places: (frame_count, chains, joints, 3) [m].
     """
-    moves = _moves(rest, places)
-    distances = []
-    for mesh, moved, skin in zip(tracks.levels, tracks.moved, skins, strict=True):
-        for begin in range(0, len(moved), _VERTICES_AT_ONCE):
-            part = slice(begin, begin + _VERTICES_AT_ONCE)
-            points = mesh.positions[part].astype(np.float64)
-            miss = skinned(points, Skin(skin.joint[part], skin.weight[part]), *moves) - moved[part]
-            distances.append(np.sqrt((miss * miss).sum(axis=-1)).astype(np.float32).ravel())
-    return FitError.of(distances)
+    return FitError.played(tracks, skins, _moves(rest, places))
 
 
 def _moves(rest: Floats, places: Floats) -> tuple[Floats, Floats]:
@@ -170,10 +160,7 @@ class _Learnt:
             card_lines(replace(mesh, positions=moved[:, frame]))[1]
             for frame in range(tracks.frame_count)
         ]
-        few = min(tracks.frame_count, _LEARNT_FRAMES)
-        frames = np.linspace(0, tracks.frame_count - 1, few).round().astype(int)
-        count = min(len(mesh.positions), _LEARNT_VERTICES)
-        picked = np.sort(np.random.default_rng(0).permutation(len(mesh.positions))[:count])
+        frames, picked = tracks.some_frames(), tracks.some_vertices(_LEARNT_VERTICES)
         moved_lines = np.stack(every, axis=2).astype(np.float64)
         return cls(tracks, lines.astype(np.float64), moved_lines, picked, frames)
 
@@ -205,15 +192,12 @@ class _Learnt:
         """The weights of all vertices of a level with joints in these places, heaviest first."""
         moves = _moves(choice.rest, places[self.frames])
         parts = []
-        for begin in range(0, len(moved), _VERTICES_AT_ONCE):
-            part = np.arange(begin, min(begin + _VERTICES_AT_ONCE, len(moved)))
+        for begin in range(0, len(moved), VERTICES_AT_ONCE):
+            part = np.arange(begin, min(begin + VERTICES_AT_ONCE, len(moved)))
             points = mesh.positions[part].astype(np.float64)
             targets = moved[part][:, self.frames].astype(np.float64)
             parts.append(best_weights(points, targets, self._first(mesh, part, choice), *moves))
-        joint = np.concatenate([each.joint for each in parts])
-        weight = np.concatenate([each.weight for each in parts])
-        order = np.argsort(-weight, axis=1, kind="stable")
-        return Skin(np.take_along_axis(joint, order, 1), np.take_along_axis(weight, order, 1))
+        return Skin.joined(parts)
 
     def _first(self, mesh: CardMesh, vertices: Ints, choice: _Choice) -> Skin:
         """Each vertex on its bone and a little on the nearer neighbour."""
