@@ -22,10 +22,10 @@ from ...render.snapshot import Snapshot
 from ...render.strand_layout import from_strand_rows
 from ...render.textures import texture_to_array
 from ...rig_flow import Pose, Rig
-from .numpy_solver import carried_motion, let_go
+from .base_solver import BaseSolver
 
 
-class ComputeSolver:
+class ComputeSolver(BaseSolver):
     """On the GPU. Textures come with the first frame that is simulated or shown.
 
     Args:
@@ -39,14 +39,11 @@ class ComputeSolver:
     def __init__(
         self, rig: Rig, motion: Motion | None = None, texels: RideTexels | None = None
     ) -> None:
-        self._rig = rig
-        self._motion = motion or motion_flow.begin(rig, rig.rest_pose)
-        self._is_baked = False
+        super().__init__(rig, motion)
         self._is_resting = motion is None
         self._is_drawn = False
         self._since = np.inf  # time since the frame that leading out goes on from [s]
         self._dynamics: DynamicsPass | None = None
-        self._led = NOT_LED
         self._colliders = UploadedColliders()
         self._ride = RidePass(
             rig.strands,
@@ -61,24 +58,14 @@ class ComputeSolver:
         self._ride.leading.take(self._motion.clearance)
 
     @property
-    def pose(self) -> Pose:
-        return self._motion.pose
-
-    @property
     def motion(self) -> Motion:
-        if self._is_baked:
-            return let_go(self._rig, self._motion)
-        if self._dynamics is None:
-            return self._motion
+        if self._is_baked or self._dynamics is None:
+            return super().motion
         return replace(
             self._motion,
             dynamics=self._dynamics.read(),
             guides=self.guides(),
         )
-
-    @property
-    def size(self) -> float:
-        return self._motion.dynamics.rest.size
 
     def rest(self, pose: Pose, known: Motion | None = None) -> None:
         self._take(known or motion_flow.begin(self._rig, pose))
@@ -126,16 +113,6 @@ class ComputeSolver:
         self._ride.take_style(rig.strands, rig.guide_grid, rig.riders)
         if self._dynamics is not None:
             self._dynamics.take_rest(self._motion.dynamics.rest)
-
-    def has_jumped(self, pose: Pose, settings: DynamicsSettings, duration: float) -> bool:
-        return motion_flow.has_jumped(self._rig, self._motion, pose, settings, duration)
-
-    def go_along(self, frame: FrameInput) -> None:
-        self._take(motion_flow.go_along(self._rig, self.motion, frame))
-
-    def carry(self, pose: Pose, guides: Floats, led: LedOut = NOT_LED) -> None:
-        self._take(carried_motion(self._rig, self._motion, pose, guides))
-        self._led, self._is_baked = led, True
 
     def guides(self) -> Floats:
         texture = self._guides_texture

@@ -1,0 +1,75 @@
+"""What both solvers do alike: with the motion that is shown, and with baked guides."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ... import motion_flow
+from ...arrays import Floats
+from ...dynamics.settings import DynamicsSettings
+from ...dynamics.state import rows_of
+from ...errors import HairloomError
+from ...motion_flow import FrameInput, Motion
+from ...refine.lead_out import NOT_LED, LedOut
+from ...rig_flow import Pose, Rig
+
+
+class BaseSolver:
+    """Has a motion, of which baked guides may be shown; see `solvers.Solver`."""
+
+    def __init__(self, rig: Rig, motion: Motion | None) -> None:
+        self._rig = rig
+        self._motion = motion or motion_flow.begin(rig, rig.rest_pose)
+        self._led = NOT_LED
+        self._is_baked = False
+
+    @property
+    def pose(self) -> Pose:
+        return self._motion.pose
+
+    @property
+    def motion(self) -> Motion:
+        return let_go(self._rig, self._motion) if self._is_baked else self._motion
+
+    @property
+    def size(self) -> float:
+        return self._motion.dynamics.rest.size
+
+    def has_jumped(self, pose: Pose, settings: DynamicsSettings, duration: float) -> bool:
+        return motion_flow.has_jumped(self._rig, self._motion, pose, settings, duration)
+
+    def go_along(self, frame: FrameInput) -> None:
+        self._take(motion_flow.go_along(self._rig, self.motion, frame))
+
+    def carry(self, pose: Pose, guides: Floats, led: LedOut = NOT_LED) -> None:
+        self._take(carried_motion(self._rig, self._motion, pose, guides))
+        self._led, self._is_baked = led, True
+
+    def _take(self, motion: Motion) -> None:
+        """Show this motion; what was drawn, led out or baked before is over."""
+        raise NotImplementedError
+
+
+def carried_motion(rig: Rig, motion: Motion, pose: Pose, guides: Floats) -> Motion:
+    """A motion that shows baked guides, if they belong to this rig; colliders are no matter."""
+    wanted = rig.guide_grid.shape
+    if guides.shape != wanted:
+        raise HairloomError(
+            f"it holds guides of shape {guides.shape}, this groom has {wanted}",
+            place="bake",
+            remedy="Bake again",
+        )
+    guides = np.ascontiguousarray(guides, np.float32)
+    return replace(
+        motion, pose=pose, guides=guides, colliders=(), clearance=None, guide_clearance=None
+    )
+
+
+def let_go(rig: Rig, shown: Motion) -> Motion:
+    """The motion that starts from shown guides at no speed."""
+    begun = motion_flow.begin(rig, shown.pose)
+    rows = rows_of(shown.guides, "bake")
+    dynamics = replace(begun.dynamics, position=rows, previous=rows)
+    return replace(begun, dynamics=dynamics, guides=shown.guides)
