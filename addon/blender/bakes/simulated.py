@@ -6,15 +6,14 @@ can say which of them has changed.
 
 from __future__ import annotations
 
-import hashlib
 from typing import Any, Protocol
 
 import bpy
-import numpy as np
 from numpy.typing import NDArray
 
 from ...params import Settings
 from ...rig_flow import Solids
+from ..base.digests import digest
 
 type Arrays = dict[str, NDArray[Any]]
 type Hashed = NDArray[Any] | Settings | str | float | None
@@ -112,12 +111,5 @@ def _parts(named: str) -> dict[str, str]:
 
 
 def _hash(part: Hashed | tuple[Hashed, ...]) -> str:
-    state = hashlib.blake2b(digest_size=8)
-    for value in part if isinstance(part, tuple) else (part,):
-        if isinstance(value, np.ndarray):
-            state.update(f"{value.dtype} {value.shape}".encode())
-            state.update(np.ascontiguousarray(value).tobytes())
-        else:
-            state.update(repr(value).encode())
-        state.update(b"\0")
-    return state.hexdigest()
+    values = part if isinstance(part, tuple) else (part,)
+    return digest(*(each for value in values for each in (value, b"\0")), size=8)

@@ -7,15 +7,13 @@ builds it. That of the built-in head ships.
 
 from __future__ import annotations
 
-import hashlib
 from threading import Lock
-
-import numpy as np
 
 from ...dynamics.colliders import DistanceField
 from ...dynamics.settings import DynamicsSettings
 from ...errors import HairloomError
 from ...strands import Surface
+from ..base.digests import digest
 from ..base.thread_work import ThreadWork
 from .bust_field import shipped_field
 
@@ -101,9 +99,4 @@ def _made(surface: Surface, settings: DynamicsSettings, key: str) -> DistanceFie
 
 def field_key(surface: Surface, settings: DynamicsSettings) -> str:
     """What a field depends on."""
-    state = hashlib.blake2b(digest_size=16)
-    for array in (surface.positions, surface.triangles):
-        state.update(f"{array.dtype} {array.shape}".encode())
-        state.update(np.ascontiguousarray(array).tobytes())
-    state.update(f"{settings.collider_resolution}".encode())
-    return state.hexdigest()
+    return digest(surface.positions, surface.triangles, settings.collider_resolution)

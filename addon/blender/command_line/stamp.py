@@ -25,6 +25,7 @@ from ...errors import HairloomError
 from ...exchange.files.atomic import write_text_atomic
 from ...exchange.named_files import named_files
 from ...params.preset import preset_as_dict
+from ..base.digests import digest
 from ..base.report import Report, hairloom_version
 from ..properties.presets import named_preset
 from ..setup.hairstyles import files_of_hairstyle
@@ -60,7 +61,7 @@ class Stamp:
         self._folder = Path(os.path.abspath(self.path.parent))
         self._asked = _asked(options, self._folder)
         self._begun = time.time_ns()
-        self._inputs = {path: digest(Path(path)) for path in _files_read(options)}
+        self._inputs = {path: file_digest(Path(path)) for path in _files_read(options)}
 
     def why_not_done(self) -> str:
         """Why the job has to run; empty where it need not."""
@@ -68,7 +69,7 @@ class Stamp:
             known = json.loads(self.path.read_text(encoding="utf-8"))
             asked, inputs, outputs = known["asked"], known["inputs"], known["outputs"]
             pairs = _pairs(inputs, outputs)
-            changed = [path for path, was in pairs if digest(self._folder / path) != was]
+            changed = [path for path, was in pairs if file_digest(self._folder / path) != was]
         except FileNotFoundError:
             return "it was never done"
         except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
@@ -97,7 +98,9 @@ class Stamp:
                 for path, was in inputs.items()
                 if path not in outputs
             },
-            "outputs": {_seen_from(self._folder, path): digest(Path(path)) for path in outputs},
+            "outputs": {
+                _seen_from(self._folder, path): file_digest(Path(path)) for path in outputs
+            },
         }
         write_text_atomic(self.path, json.dumps(content, indent=2) + "\n")
 
@@ -105,18 +108,18 @@ class Stamp:
         """Of what the job has read; "" where that has changed since, so that it is done again."""
         files = path.rglob("*") if path.is_dir() else (path,) if path.exists() else ()
         is_newer = any(file.stat().st_mtime_ns > self._begun for file in files)
-        return "" if is_newer else digest(path)
+        return "" if is_newer else file_digest(path)
 
 
-def digest(path: Path) -> str:
+def file_digest(path: Path) -> str:
     """Of a file's content, or of all files in a folder with their names; "" for neither."""
     if path.is_dir():
         lines = [
-            f"{file.relative_to(path).as_posix()} {digest(file)}\n"
+            f"{file.relative_to(path).as_posix()} {file_digest(file)}\n"
             for file in sorted(path.rglob("*"))
             if file.is_file()
         ]
-        return hashlib.blake2b("".join(lines).encode(), digest_size=16).hexdigest()
+        return digest("".join(lines).encode())
     if not path.is_file():
         return ""
     with open(path, "rb") as file:
@@ -146,7 +149,7 @@ def _asked(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
     presets = [preset_as_dict(named_preset(name)) for name in getattr(options, "preset", ())]
     asked |= {"presets": presets, "made_by": [hairloom_version(), bpy.app.version_string]}
     if getattr(options, "style", None):
-        asked["style_files"] = [digest(path) for path in files_of_hairstyle(options.style)]
+        asked["style_files"] = [file_digest(path) for path in files_of_hairstyle(options.style)]
     plain: dict[str, Any] = json.loads(json.dumps(asked, default=str))
     return plain
 

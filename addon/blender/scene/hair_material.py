@@ -6,7 +6,6 @@ tips and the differences between strands, are nodes before its colour.
 
 from __future__ import annotations
 
-import hashlib
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,6 +18,7 @@ from ...shading.marschner.pigment import color_exponent
 from ...shading.marschner.principled import PrincipledHair, hair_from
 from ...shading.settings import ShadingSettings
 from ..base.attributes import read_attribute, set_attribute
+from ..base.digests import digest
 from .curves import COLOR_ATTRIBUTE
 from .principled import INPUTS
 
@@ -66,7 +66,8 @@ def put_look_material(
             slots.append(material)
     notes = _write(material, shading, has_colors=has_colors, are_final=are_final)
     if not are_final:
-        material[_LOOK], material[_NODES] = _digest(shading), _digest(_nodes(material))
+        material[_LOOK] = digest(shading, size=8)
+        material[_NODES] = digest(_nodes(material), size=8)
     return material, notes
 
 
@@ -86,14 +87,14 @@ def put_colors(curves: bpy.types.Curves, shading: ShadingSettings, painted: Floa
 
 def is_as_made(material: bpy.types.Material) -> bool:
     """Whether no artist has changed its nodes since it was made of a look."""
-    return bool(material.get(_NODES) == _digest(_nodes(material)))
+    return bool(material.get(_NODES) == digest(_nodes(material), size=8))
 
 
 def is_behind(material: bpy.types.Material, look: ShadingSettings) -> bool:
     """Whether it was made of another look, and is still as it was made: with nodes that an artist
     has changed it is the artist's own."""
     known = material.get(_LOOK)
-    return known not in (None, _digest(look)) and is_as_made(material)
+    return known not in (None, digest(look, size=8)) and is_as_made(material)
 
 
 def _nodes(material: bpy.types.Material) -> list[object]:
@@ -112,10 +113,6 @@ def _nodes(material: bpy.types.Material) -> list[object]:
 
 def _plain(value: Any) -> list[float]:
     return [float(each) for each in value] if hasattr(value, "__len__") else []
-
-
-def _digest(value: object) -> str:
-    return hashlib.blake2b(repr(value).encode(), digest_size=8).hexdigest()
 
 
 def look_material(curves: bpy.types.Curves) -> bpy.types.Material | None:

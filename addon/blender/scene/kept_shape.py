@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from dataclasses import dataclass
 
 import bpy
@@ -11,6 +10,7 @@ import numpy as np
 from ...arrays import Bools, Floats
 from ...errors import HairloomError
 from ..base.attributes import read_attribute, set_attribute
+from ..base.digests import digest
 from ..base.objects import check_shape_editable
 from .carried_weight import carry_as_before
 from .curves import curve_offsets, curve_points, put_points
@@ -39,7 +39,7 @@ class KeptShape:
     def before(self, hair: bpy.types.Object) -> Floats | None:
         """The shape, (point_count, 3); None if anything has changed the curves since the tool."""
         curves = hair.data
-        if curves.get(self.done) != _digest(curve_points(curves)):
+        if curves.get(self.done) != digest(curve_points(curves).tobytes()):
             return None
         kept: Floats | None = read_attribute(curves, self.attribute, "POINT", 3)
         return kept
@@ -54,7 +54,7 @@ class KeptShape:
 
     def seal(self, hair: bpy.types.Object) -> None:
         """The tool has changed the curves."""
-        hair.data[self.done] = _digest(curve_points(hair.data))
+        hair.data[self.done] = digest(curve_points(hair.data).tobytes())
 
     def back(self, hair: bpy.types.Object) -> bool:
         """Give curves their kept shape; those that were drawn since stay as they are. What other
@@ -97,10 +97,6 @@ KEPT_SHAPES = (COMBED, BEFORE_TRIM, BEFORE_FLOW)
 def _in_order(curves: bpy.types.Curves) -> list[str]:
     """The attributes with kept shapes, the latest last."""
     return str(curves.get(_ORDER, "")).split()
-
-
-def _digest(points: Floats) -> str:
-    return hashlib.blake2b(points.tobytes(), digest_size=16).hexdigest()
 
 
 def _have_extent(points: Floats, offsets: np.ndarray) -> Bools:

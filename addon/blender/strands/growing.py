@@ -6,7 +6,6 @@ if they are still as they grew.
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
@@ -21,6 +20,7 @@ from ...groom.settings import GrowSettings
 from ...groom.widths import with_widths
 from ...strands import StrandSet
 from ..base.attributes import read_attribute
+from ..base.digests import digest
 from ..base.objects import check_shape_editable, head_of
 from ..base.parts import Part, Parts, at_once
 from ..properties import changed
@@ -209,16 +209,12 @@ def _seal(curves: bpy.types.Curves) -> None:
 def _shape_digest(curves: bpy.types.Curves) -> str:
     radius: Floats | None = read_attribute(curves, "radius", "POINT")
     parts = (curve_offsets(curves), curve_points(curves), radius)
-    return _digest(b"".join(part.tobytes() for part in parts if part is not None))
+    return digest(*(part.tobytes() for part in parts if part is not None))
 
 
 def _settings_digest(own: Any) -> str:
     settings = settings_of(own, GrowSettings).as_dict()
-    return _digest(repr((settings, own.density_group, own.length_group)).encode())
-
-
-def _digest(data: bytes) -> str:
-    return hashlib.blake2b(data, digest_size=16).hexdigest()
+    return digest((settings, own.density_group, own.length_group))
 
 
 LISTENER = ("grow", follow_settings)
