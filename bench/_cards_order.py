@@ -22,7 +22,7 @@ from hairloom.addon.cards.atlas_settings import AtlasSettings
 from hairloom.addon.cards.build import CardBuild
 from hairloom.addon.cards.card_mesh import CardMesh
 from hairloom.addon.cards.order_check import seen_cards, views_of, wrong_pixels
-from hairloom.addon.cards.order_views import View
+from hairloom.addon.cards.order_views import BallView
 from hairloom.addon.cards.settings import CardSettings
 from hairloom.addon.cards.sort import (
     CardOrders,
@@ -45,7 +45,7 @@ FEWER_VIEWS = 40
 SORTED_TRIANGLES, ROUNDS = 100_000, 9
 
 #: The triangles for front faces and those for back faces in this view.
-type OrderOf = Callable[[View], tuple[np.ndarray, np.ndarray]]
+type OrderOf = Callable[[BallView], tuple[np.ndarray, np.ndarray]]
 
 
 def order_figures() -> dict[str, float]:
@@ -122,14 +122,14 @@ def both(orders: CardOrders) -> OrderOf:
 def others(
     mesh: CardMesh, head: Surface, learnt: CardOrders, alpha: np.ndarray
 ) -> dict[str, OrderOf]:
-    def per_view(view: View) -> tuple[np.ndarray, np.ndarray]:
+    def per_view(view: BallView) -> tuple[np.ndarray, np.ndarray]:
         away = mesh.positions[mesh.triangles].mean(axis=1) - eye_of(view)
         far = np.linalg.norm(away, axis=1)
         middle = np.bincount(mesh.card, far) / np.maximum(np.bincount(mesh.card), 1)
         order = np.argsort(-middle[mesh.card], kind="stable")
         return order, order
 
-    def per_view_triangles(view: View) -> tuple[np.ndarray, np.ndarray]:
+    def per_view_triangles(view: BallView) -> tuple[np.ndarray, np.ndarray]:
         order = order_from(mesh, np.append(eye_of(view), 1.0))
         return order, order
 
@@ -142,7 +142,7 @@ def others(
     }
 
 
-def eye_of(view: View) -> np.ndarray:
+def eye_of(view: BallView) -> np.ndarray:
     return view.middle + view.direction * view.distance
 
 

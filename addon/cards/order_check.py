@@ -23,8 +23,8 @@ from .card_mesh import CardMesh
 from .order_views import (
     MIN_ALPHA,
     OPAQUE_ALPHA,
+    BallView,
     Fragments,
-    View,
     alpha_at,
     fragments,
     nearest,
@@ -78,15 +78,15 @@ def wrong_fraction(
     return wrong / max(covered, 1)
 
 
-def views_of(mesh: CardMesh, count: int, size: int) -> list[View]:
+def views_of(mesh: CardMesh, count: int, size: int) -> list[BallView]:
     """Views around the head, other ones than those that the order is learnt from."""
     middle, radius = sphere_of(mesh)
     turned = view_directions(count, turn=0.5)
-    return [View(middle, radius, each, size, _DISTANCE * radius) for each in turned]
+    return [BallView(middle, radius, each, size, _DISTANCE * radius) for each in turned]
 
 
 def seen_cards(
-    mesh: CardMesh, head: Surface | None, view: View, alpha: Floats | None = None
+    mesh: CardMesh, head: Surface | None, view: BallView, alpha: Floats | None = None
 ) -> SeenCards:
     """What this view sees; the texture's nearest texel counts."""
     met = fragments(view, mesh.positions, mesh.triangles)

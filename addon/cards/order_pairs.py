@@ -17,8 +17,8 @@ from .order_views import (
     LOWEST,
     MIN_ALPHA,
     OPAQUE_ALPHA,
+    BallView,
     Fragments,
-    View,
     alpha_at,
     far_to_near,
     fragments,
@@ -99,7 +99,7 @@ def _both_directions(
 
     Parallel views from opposite sides have the same fragments in opposite order.
     """
-    view = View(*sphere_of(mesh), direction, size)
+    view = BallView(*sphere_of(mesh), direction, size)
     met = far_to_near(fragments(view, mesh.positions, mesh.triangles))
     if alpha is None:
         covers = np.full(len(met.pixel), OPACITY)

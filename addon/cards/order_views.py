@@ -23,7 +23,7 @@ _GOLDEN = (np.sqrt(5.0) - 1.0) / 2.0
 
 
 @dataclass(frozen=True)
-class View:
+class BallView:
     """A square picture that holds a sphere.
 
     middle: (3,) and radius: of the sphere [m].
@@ -64,7 +64,7 @@ class View:
 class Fragments:
     """Samples of triangles, one array each, (fragment_count,).
 
-    pixel: row * size + column. near: see View.project. is_front: counter-clockwise.
+    pixel: row * size + column. near: see BallView.project. is_front: counter-clockwise.
     second, third: barycentric coordinates on the triangle.
     """
 
@@ -95,7 +95,7 @@ def sphere_of(mesh: CardMesh) -> tuple[Floats, float]:
     return (low + high) / 2.0, max(float(np.linalg.norm(high - low)) / 2.0, 1e-9)
 
 
-def fragments(view: View, positions: Floats, triangles: Ints) -> Fragments:
+def fragments(view: BallView, positions: Floats, triangles: Ints) -> Fragments:
     """Samples of all triangles in this view, in the order of the triangles."""
     corners = view.project(positions)[:, triangles.T]
     column, row, triangle = _candidates(corners, view.size)
@@ -137,7 +137,7 @@ def _candidates(corners: Floats, size: int) -> tuple[Ints, Ints, Ints]:
     return low[0, triangle] + column, low[1, triangle] + row, triangle
 
 
-def nearest(view: View, surface: Surface | None) -> Floats:
+def nearest(view: BallView, surface: Surface | None) -> Floats:
     """Nearness of the surface in each pixel, (size * size,); -inf where there is none."""
     near = np.full(view.size * view.size, -np.inf, np.float32)
     if surface is not None:

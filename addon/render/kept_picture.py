@@ -60,7 +60,7 @@ class KeptPicture:
 
     def is_of(self, marks: tuple[Any, ...]) -> bool:
         """Whether it was drawn of the same objects and of equal numbers."""
-        return are_same(self.marks, marks)
+        return are_same_marks(self.marks, marks)
 
     def begin(self) -> None:
         """An empty picture, as large as the viewport reaches."""
@@ -101,7 +101,7 @@ class KeptPicture:
         self._triangle.draw(shader.shader)
 
 
-def are_same(marks: tuple[Any, ...], others: tuple[Any, ...]) -> bool:
+def are_same_marks(marks: tuple[Any, ...], others: tuple[Any, ...]) -> bool:
     """Whether both are of the same objects and of equal numbers; no marks are of nothing."""
     return (
         bool(marks)

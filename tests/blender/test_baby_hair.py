@@ -10,7 +10,7 @@ from baby_hair import short_strands, wig
 
 bpy = pytest.importorskip("bpy", reason="these tests need Blender or the bpy module")
 
-from hairloom.addon.blender.bakes.baked_rig import RestMatrices, rig_arrays, rig_of  # noqa: E402
+from hairloom.addon.blender.bakes.baked_rig import RestMatrices, baked_rig_of, rig_arrays  # noqa: E402
 from hairloom.addon.blender.cards.build import baked_atlas  # noqa: E402
 from hairloom.addon.card_flow import card_groom  # noqa: E402
 from hairloom.addon.cards.atlas_settings import AtlasSettings  # noqa: E402
@@ -21,7 +21,7 @@ from hairloom.addon.shading.settings import ShadingSettings, StrandSettings  # n
 
 def test_a_bake_knows_its_baby_hair() -> None:
     rig = wig()
-    found = rig_of(rig_arrays(rig, RestMatrices(np.eye(4), np.eye(4))), "here").rig
+    found = baked_rig_of(rig_arrays(rig, RestMatrices(np.eye(4), np.eye(4))), "here").rig
     np.testing.assert_array_equal(found.baby_hair, np.flatnonzero(short_strands(rig)))
 
 

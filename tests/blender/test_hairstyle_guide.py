@@ -9,7 +9,7 @@ import pytest
 
 from hairloom.addon.blender.scene.curves import curve_offsets, curve_points
 from hairloom.addon.blender.sessions.groom_source import GroomSource
-from hairloom.addon.blender.sessions.prepared_groom import rig_of
+from hairloom.addon.blender.sessions.prepared_groom import requested_rig
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 sys.path.append(str(REPOSITORY / "tools"))
@@ -98,5 +98,5 @@ def test_ringlets_wind_and_end_on_the_ball():
 
 
 def children_of(hair):
-    rig = rig_of(GroomSource(hair, bpy.context.evaluated_depsgraph_get()).request)
+    rig = requested_rig(GroomSource(hair, bpy.context.evaluated_depsgraph_get()).request)
     return rig.strands.take(np.arange(rig.own_count, rig.strands.strand_count))

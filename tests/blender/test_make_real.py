@@ -13,8 +13,7 @@ import pytest
 from engine_stage import add_ball, picture
 from hedgehogs import hedgehog
 
-from hairloom.addon.blender.bakes.baked_rig import RestMatrices, rig_arrays
-from hairloom.addon.blender.bakes.baked_rig import rig_of as baked_rig_of
+from hairloom.addon.blender.bakes.baked_rig import RestMatrices, baked_rig_of, rig_arrays
 from hairloom.addon.blender.colliders.rigs import rig_of
 from hairloom.addon.blender.scene.source import read_source
 from hairloom.addon.rig_flow import strand_seeds

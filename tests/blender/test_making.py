@@ -648,7 +648,7 @@ def test_hair_of_another_scale_is_told_of_a_dense_head_as_of_any(new_hair, evalu
     large = order.source.strands.transformed(np.diag([1000.0, 1000.0, 1000.0, 1.0]))
     order = replace(order, source=replace(order.source, strands=large))
     told = []
-    for make_it in (prepared_groom.placeholder, prepared_groom.rig_of):
+    for make_it in (prepared_groom.placeholder, prepared_groom.requested_rig):
         with pytest.raises(HairloomError) as error:
             make_it(order)
         told.append(str(error.value))

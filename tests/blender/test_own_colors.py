@@ -12,7 +12,7 @@ from hedgehogs import hedgehog
 
 bpy = pytest.importorskip("bpy", reason="these tests need Blender or the bpy module")
 
-from hairloom.addon.blender.bakes.baked_rig import RestMatrices, rig_arrays, rig_of  # noqa: E402
+from hairloom.addon.blender.bakes.baked_rig import RestMatrices, baked_rig_of, rig_arrays  # noqa: E402
 from hairloom.addon.blender.cards.show import without_strands  # noqa: E402
 from hairloom.addon.blender.preview import previews, scene_events  # noqa: E402
 from hairloom.addon.blender.strands.read_hair import ExportRequest, still_hair  # noqa: E402
@@ -73,7 +73,7 @@ def test_colours_of_wet_hair_are_seen_in_the_preview(
 
 def test_a_bake_keeps_the_colours(hair: Any, evaluated: Callable[[], Any]) -> None:
     rig = previews.start(hair, evaluated()).rig
-    found = rig_of(rig_arrays(rig, RestMatrices(np.eye(4), np.eye(4))), "here").rig
+    found = baked_rig_of(rig_arrays(rig, RestMatrices(np.eye(4), np.eye(4))), "here").rig
     np.testing.assert_array_equal(found.strands.color, rig.strands.color)
 
 
@@ -93,7 +93,7 @@ def test_a_bake_keeps_points_by_need(hair: Any, evaluated: Callable[[], Any]) ->
     )
     assert not uneven.is_uniform
     arrays = rig_arrays(replace(rig, strands=uneven), RestMatrices(np.eye(4), np.eye(4)))
-    found = rig_of(arrays, "here").rig.strands
+    found = baked_rig_of(arrays, "here").rig.strands
     for name in ("points", "offsets", "radius", "color"):
         np.testing.assert_array_equal(getattr(found, name), getattr(uneven, name))
 

@@ -18,7 +18,7 @@ from full_disk import full_disk
 from hairloom.addon.blender.pictures.film import write_picture
 from hairloom.addon.blender.viewport import view_transform
 from hairloom.addon.blender.viewport.view_transform import (
-    View,
+    ColorView,
     display_of,
     shown_by_blender,
     view_of,
@@ -61,16 +61,16 @@ def all_colours(count: int = 4000) -> np.ndarray[Any, Any]:
 
 
 LOOKS = {
-    "AgX": View(transform="AgX"),
-    "AgX with a look": View(transform="AgX", look="AgX - Medium High Contrast"),
-    "Filmic": View(transform="Filmic"),
-    "Standard": View(),
-    "white balance": View(transform="AgX", white_balance=(4000.0, 20.0)),
+    "AgX": ColorView(transform="AgX"),
+    "AgX with a look": ColorView(transform="AgX", look="AgX - Medium High Contrast"),
+    "Filmic": ColorView(transform="Filmic"),
+    "Standard": ColorView(),
+    "white balance": ColorView(transform="AgX", white_balance=(4000.0, 20.0)),
 }
 
 
 @pytest.mark.parametrize("view", LOOKS.values(), ids=LOOKS)
-def test_the_table_shows_what_blender_saves(view: View) -> None:
+def test_the_table_shows_what_blender_saves(view: ColorView) -> None:
     """A white balance turns the colours away from the axes along which the table is exact."""
     hair_worst = 3.0 if view.white_balance is None else 5.0
     display = Display(DisplayTable(shown_by_blender(view, table_radiances())))
@@ -83,7 +83,7 @@ def test_the_table_shows_what_blender_saves(view: View) -> None:
 
 def test_exposure_and_gamma_need_no_other_table() -> None:
     """They act in front of the transform and behind it, as Blender itself has it."""
-    table = DisplayTable(shown_by_blender(View(transform="AgX"), table_radiances()))
+    table = DisplayTable(shown_by_blender(ColorView(transform="AgX"), table_radiances()))
     scene, colours = bpy.context.scene, hair_colours(500)
     scene.view_settings.exposure, scene.view_settings.gamma = 1.5, 1.3
     shown = Display(table, 2.0**1.5, 1.3).shown(colours)
@@ -129,10 +129,10 @@ def test_each_mode_has_what_blender_applies_in_it() -> None:
     settings.exposure, settings.gamma = 2.0, 1.5
     settings.use_white_balance = True
     balance = settings.white_balance_temperature, settings.white_balance_tint
-    bare = View(transform="AgX", look="AgX - Punchy")
-    full = View(transform="AgX", look="AgX - Punchy", white_balance=balance)
+    bare = ColorView(transform="AgX", look="AgX - Punchy")
+    full = ColorView(transform="AgX", look="AgX - Punchy", white_balance=balance)
     for kind in ("WIREFRAME", "SOLID"):
-        assert view_of(shading(kind), scene) == (View(), 1.0, 1.0)
+        assert view_of(shading(kind), scene) == (ColorView(), 1.0, 1.0)
     for kind in ("MATERIAL", "RENDERED"):
         assert view_of(shading(kind), scene) == (full, 4.0, 1.5)
         assert view_of(shading(kind, lights=False), scene) == (full, 4.0, 1.5)
@@ -170,7 +170,7 @@ def test_nothing_is_left_in_the_file_and_it_is_as_saved_as_before() -> None:
 
     before, settings = state(), bpy.context.scene.view_settings
     kept = settings.view_transform, settings.exposure
-    shown_by_blender(View(transform="Filmic", exposure=1.0), hair_colours(10))
+    shown_by_blender(ColorView(transform="Filmic", exposure=1.0), hair_colours(10))
     assert state() == before
     assert (settings.view_transform, settings.exposure) == kept
 
@@ -217,4 +217,4 @@ def test_a_full_disk_is_no_other_colours_and_nothing_that_python_must_not_see(
 
 def test_a_look_that_this_blender_lacks_is_named(tmp_path: Path) -> None:
     with pytest.raises(TypeError, match="Nowhere"):
-        shown_by_blender(View(transform="Nowhere"), hair_colours(4))
+        shown_by_blender(ColorView(transform="Nowhere"), hair_colours(4))

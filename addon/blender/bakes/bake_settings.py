@@ -10,7 +10,7 @@ import bpy
 
 from ...errors import HairloomError
 from ...exchange.files.names import as_compared, folder_name
-from .cache import owner_of
+from .cache import owner_and_file
 
 #: Folder beside files, which has a folder for the bakes of each file.
 _BESIDE = "//hairloom_cache"
@@ -112,7 +112,7 @@ def is_own(obj: bpy.types.Object, folder: Path) -> bool:
 
 def _other_owner(obj: bpy.types.Object, folder: Path) -> str:
     """Another object or file whose bake is in a folder; empty where there is none."""
-    owner, file = owner_of(folder)
+    owner, file = owner_and_file(folder)
     if file and file != file_name(obj):
         return f"{owner} in {file}"
     is_own = owner in (obj.name, obj.hairloom.bake.owner)

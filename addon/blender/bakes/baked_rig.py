@@ -113,7 +113,7 @@ def led_in(frame: Arrays) -> LedOut:
 
 
 def rig_arrays(rig: Rig, rests: RestMatrices) -> Arrays:
-    """All that `rig_of` needs."""
+    """All that `baked_rig_of` needs."""
     strands = rig.strands
     arrays: Arrays = {
         "strands": strands.points,
@@ -196,21 +196,21 @@ def _holds_of(arrays: Arrays, strands: StrandSet) -> Holds | None:
     return holds
 
 
-def rig_of(arrays: Arrays, place: str) -> BakedRig:
+def baked_rig_of(arrays: Arrays, place: str) -> BakedRig:
     """The rig that these arrays were made from.
 
     Raises:
         HairloomError: arrays are missing or do not fit together.
     """
     try:
-        return _rig_of(arrays)
+        return _baked_rig_of(arrays)
     except (KeyError, ValueError, IndexError, HairloomError) as error:
         raise HairloomError(
             f"this bake is damaged ({error})", place=place, remedy="Bake again"
         ) from error
 
 
-def _rig_of(arrays: Arrays) -> BakedRig:
+def _baked_rig_of(arrays: Arrays) -> BakedRig:
     head, frames = None, None
     if "head_positions" in arrays:
         head = Surface(arrays["head_positions"], arrays["head_triangles"])

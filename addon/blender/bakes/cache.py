@@ -265,7 +265,7 @@ def _layout_of(arrays: Arrays) -> dict[str, tuple[str, tuple[int, ...]]]:
     }
 
 
-def owner_of(folder: Path) -> tuple[str, str]:
+def owner_and_file(folder: Path) -> tuple[str, str]:
     """The object and the file whose bake is in a folder; empty where that is not known."""
     try:
         cache = Cache.found(folder)

@@ -20,7 +20,7 @@ from ...errors import HairloomError
 from ...rig_flow import Pose, Solids
 from ..scene.fin_modifier import clear, fin_modifier, has_fins, show
 from .bake_settings import folder_of, shown_folder_of
-from .baked_rig import BakedRig, rig_of
+from .baked_rig import BakedRig, baked_rig_of
 from .baked_solids import BakedSolids, solids_between
 from .cache import FACTS, Cache
 from .simulated import Arrays
@@ -89,7 +89,10 @@ def rig_in(cache: Cache) -> BakedRig:
     with _known.lock:
         known = _known.rigs.get(cache.folder)
         if known is None or known[0] is not cache:
-            known = _known.rigs[cache.folder] = cache, rig_of(cache.constants(), str(cache.folder))
+            known = _known.rigs[cache.folder] = (
+                cache,
+                baked_rig_of(cache.constants(), str(cache.folder)),
+            )
         return known[1]
 
 

@@ -41,7 +41,7 @@ from ..properties.groom_settings import GroomSettings
 from ..scene.painted_colors import read_colors
 from ..scene.partings import partings_of
 from ..sessions.groom_source import GroomSource
-from ..sessions.prepared_groom import prepared, rig_of
+from ..sessions.prepared_groom import prepared, requested_rig
 from ..sessions.snapshots import snapshot_of, with_all_strands, with_settings
 
 
@@ -313,7 +313,7 @@ def _of_curves(
         settings[AmbientSettings],
     )
     made = _made(
-        hair, made_from, settings, lambda: rig_of(request), is_baked=False, blocking=blocking
+        hair, made_from, settings, lambda: requested_rig(request), is_baked=False, blocking=blocking
     )
     return made, source.colors
 

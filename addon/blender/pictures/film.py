@@ -11,7 +11,7 @@ from ...arrays import Floats
 from ...errors import HairloomError
 from ...shading.stage_settings import StageSettings
 from ..base.images import save_coded_png, straight_alpha
-from ..viewport.view_transform import View, shown_by_blender
+from ..viewport.view_transform import ColorView, shown_by_blender
 
 #: view of the settings -> Blender's names of transform and look
 _TRANSFORMS = {
@@ -39,7 +39,7 @@ def write_picture(path: Path, linear: Floats, stage: StageSettings) -> None:
 def _developed(colors: Floats, stage: StageSettings) -> Floats:
     """Code values in [0, 1] of scene-linear colours."""
     transform, look = _TRANSFORMS[stage.view]
-    view = View(transform=transform, look=look, exposure=stage.exposure)
+    view = ColorView(transform=transform, look=look, exposure=stage.exposure)
     try:
         return shown_by_blender(view, colors)
     except TypeError as error:  # this Blender has another configuration of colours

@@ -37,7 +37,7 @@ _LONGEST_DROP = 1.0
 
 
 @dataclass(frozen=True)
-class Bake:
+class KnownBake:
     """The bake of a groom or fin, as it stands to the scene.
 
     changed: what has changed since, in words; nothing: it is up to date.
@@ -65,7 +65,7 @@ class Preview:
         self.session = session
         self.phase = Phase.REST
         self.frame: int | None = None
-        self.bake: Bake | None = None
+        self.bake: KnownBake | None = None
         self.rig_hash = ""
         self.problem = self.bake_problem = ""
         self.cards_are_stale = False
@@ -198,7 +198,7 @@ class Preview:
             if self.session.frame_hash(depsgraph) == self.bake.frame_hash:
                 return
             facts = self.bake.facts
-            self.bake = Bake(facts, self._changed(facts, depsgraph))
+            self.bake = KnownBake(facts, self._changed(facts, depsgraph))
         elif not self.groom.has_moved(depsgraph):
             return
         self.go(Event.RESET, depsgraph)
@@ -248,9 +248,9 @@ class Preview:
         self.bake = self._state(cache.facts, depsgraph)
         return True
 
-    def _state(self, facts: Facts, depsgraph: bpy.types.Depsgraph) -> Bake:
+    def _state(self, facts: Facts, depsgraph: bpy.types.Depsgraph) -> KnownBake:
         frame_hash = self.session.frame_hash(depsgraph)
-        return Bake(facts, self._changed(facts, depsgraph, frame_hash), frame_hash)
+        return KnownBake(facts, self._changed(facts, depsgraph, frame_hash), frame_hash)
 
     def _changed(
         self, facts: Facts, depsgraph: bpy.types.Depsgraph, frame_hash: str = ""

@@ -30,7 +30,7 @@ from ..sessions.together import Together
 from ..viewport import overlay
 from ..viewport.debug_lines import is_combed
 from .phases import Event, Phase
-from .preview import Bake, Preview, rig_for
+from .preview import KnownBake, Preview, rig_for
 
 #: What is reported of hair that is about to play, and of hair that is not there yet.
 WAITING, BUILDING = "plays as soon as its collider is made", "is being made"
@@ -175,7 +175,7 @@ def simulated_of(obj: bpy.types.Object | None) -> Simulated | None:
     return None if found is None else found.session
 
 
-def bake_of(obj: bpy.types.Object) -> Bake | None:
+def bake_of(obj: bpy.types.Object) -> KnownBake | None:
     """What is known of the bake of a previewed object."""
     preview = previews.get(obj.session_uid)
     return None if preview is None else preview.bake

@@ -40,7 +40,7 @@ from ..scene.source import (
     read_source_colors,
     usable_curves,
 )
-from .prepared_groom import BuildRequest, rig_of
+from .prepared_groom import BuildRequest, requested_rig
 
 #: Points that lie nearer than this to where they were have not moved, as a part of how far they are
 #: from the origin.
@@ -126,7 +126,7 @@ class GroomSource:
         Raises:
             HairloomError: the groom is of another scale than the head.
         """
-        return rig_of(self.request)
+        return requested_rig(self.request)
 
     def use_bake(self, baked: BakedRig | None) -> None:
         """Request the rig of a bake of this very groom, to be the same to the bit."""

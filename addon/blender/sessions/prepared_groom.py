@@ -106,7 +106,7 @@ class PreparedGroom:
         return int((away > reach).sum())
 
 
-def rig_of(request: BuildRequest) -> Rig:
+def requested_rig(request: BuildRequest) -> Rig:
     """The groom made ready to move.
 
     Raises:
@@ -135,12 +135,12 @@ def build(
         report: see `prepared`.
 
     Raises:
-        HairloomError: as `rig_of`.
+        HairloomError: as `requested_rig`.
     """
     report("strands")
     known = None if before is None or before[1].is_placeholder else before[1]
     is_same = before is not None and known is not None and request.gives_rig_of(before[0])
-    rig = known.rig if known is not None and is_same else rig_of(request)
+    rig = known.rig if known is not None and is_same else requested_rig(request)
     ambient = request.settings[AmbientSettings]
     if not is_drawn:
         return PreparedGroom(rig, ambient)
@@ -216,7 +216,7 @@ def placeholder(request: BuildRequest) -> PreparedGroom:
     """What a session moves until its groom is made: a few of its strands.
 
     Raises:
-        HairloomError: as `rig_of`.
+        HairloomError: as `requested_rig`.
     """
     rig = request.rig
     if rig is None:
@@ -231,7 +231,7 @@ def _quickly_bound(few: StrandSet, head: Surface | None, request: BuildRequest) 
     """A few strands on a head of any size; of a large one the triangles near their roots will do.
 
     Raises:
-        HairloomError: as `rig_of`.
+        HairloomError: as `requested_rig`.
     """
     if head is not None and len(head.triangles) > _LARGE:
         near = _triangles_near(few.roots, head)

@@ -38,7 +38,7 @@ type WhiteBalance = tuple[float, float]
 
 
 @dataclass(frozen=True)
-class View:
+class ColorView:
     """What decides how colours are shown, but for exposure and gamma; equal ones need one table.
 
     space: what scene-linear colours of this file mean.
@@ -60,9 +60,9 @@ class _Known:
     theirs, in order; and why a view cannot have one."""
 
     def __init__(self) -> None:
-        self.tables: OrderedDict[View, DisplayTable] = OrderedDict()
-        self.wanted: dict[View, None] = {}
-        self.failed: dict[View, str] = {}
+        self.tables: OrderedDict[ColorView, DisplayTable] = OrderedDict()
+        self.wanted: dict[ColorView, None] = {}
+        self.failed: dict[ColorView, str] = {}
 
 
 _known = _Known()
@@ -76,7 +76,7 @@ def display_of(shading: bpy.types.View3DShading, scene: bpy.types.Scene) -> Disp
     nothing flickers while a curve is dragged.
     """
     view, gain, gamma = view_of(shading, scene)
-    if (view, gain, gamma) == (View(), 1.0, 1.0):
+    if (view, gain, gamma) == (ColorView(), 1.0, 1.0):
         return None
     if view in _known.failed:
         return None
@@ -91,13 +91,15 @@ def display_of(shading: bpy.types.View3DShading, scene: bpy.types.Scene) -> Disp
     )
 
 
-def view_of(shading: bpy.types.View3DShading, scene: bpy.types.Scene) -> tuple[View, float, float]:
+def view_of(
+    shading: bpy.types.View3DShading, scene: bpy.types.Scene
+) -> tuple[ColorView, float, float]:
     """What this view applies: table, gain and gamma."""
     settings, space = scene.view_settings, bpy.data.colorspace.working_space
     device = scene.display_settings.display_device
     if shading.type not in ("MATERIAL", "RENDERED"):
-        return View(space, device), 1.0, 1.0
-    view = View(space, device, settings.view_transform, settings.look)
+        return ColorView(space, device), 1.0, 1.0
+    view = ColorView(space, device, settings.view_transform, settings.look)
     is_workbench = shading.type == "RENDERED" and scene.render.engine == "BLENDER_WORKBENCH"
     if not is_workbench and not any(uses_scene_light(shading)):
         return view, 1.0, 1.0
@@ -136,7 +138,7 @@ def forget() -> None:
         bpy.app.timers.unregister(_make_wanted)
 
 
-def _want(view: View) -> None:
+def _want(view: ColorView) -> None:
     _known.wanted[view] = None
     if not bpy.app.timers.is_registered(_make_wanted):
         bpy.app.timers.register(_make_wanted, first_interval=0.0)
@@ -161,7 +163,7 @@ def _make_wanted() -> None:
     redraw_views()
 
 
-def shown_by_blender(view: View, radiances: Floats) -> Floats:
+def shown_by_blender(view: ColorView, radiances: Floats) -> Floats:
     """Code values of scene-linear colours (..., 3) in [0, 1], as Blender saves them; float32.
 
     Raises:
@@ -176,7 +178,7 @@ def shown_by_blender(view: View, radiances: Floats) -> Floats:
     return pixels[:, :3].reshape(radiances.shape)
 
 
-def _show(view: View, pixels: Floats) -> Exception | None:
+def _show(view: ColorView, pixels: Floats) -> Exception | None:
     """Replace these colours, (count, 4), by what is shown of them.
 
     Returns:
@@ -205,7 +207,7 @@ def _show(view: View, pixels: Floats) -> Exception | None:
     return None
 
 
-def _scene_with(view: View, data: bpy.types.BlendData) -> bpy.types.Scene:
+def _scene_with(view: ColorView, data: bpy.types.BlendData) -> bpy.types.Scene:
     """A scene that shows colours like this, and saves 16 bits a channel."""
     scene = data.scenes.new("Colors")
     scene.display_settings.display_device = view.device

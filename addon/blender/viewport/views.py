@@ -17,7 +17,7 @@ import bpy
 import gpu
 
 from ...render.camera import Camera
-from ...render.kept_picture import KeptPicture, are_same
+from ...render.kept_picture import KeptPicture, are_same_marks
 from ...render.strand_pass import Statistics, StrandPass
 from ..base.redraw import redraw_views, soon
 
@@ -69,7 +69,7 @@ class View:
     def moves_to(self, marks: tuple[Any, ...]) -> bool:
         """Whether something else was drawn before."""
         before, self.marks = self.marks, marks
-        return not are_same(before, marks)
+        return not are_same_marks(before, marks)
 
 
 class _Known:

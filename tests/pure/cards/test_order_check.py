@@ -15,7 +15,7 @@ from hairloom.addon.cards.order_check import (
     wrong_fraction,
     wrong_pixels,
 )
-from hairloom.addon.cards.order_views import View
+from hairloom.addon.cards.order_views import BallView
 from hairloom.addon.strands import Surface
 
 
@@ -79,7 +79,7 @@ def test_alpha_is_read_where_the_texture_says() -> None:
     picture = np.array([[0.0, 1.0], [0.0, 0.5]])
     mesh = sheets((0.1,))
     for distance in (np.inf, 3.0):
-        view = View(VIEW.middle, VIEW.radius, VIEW.direction, VIEW.size, distance)
+        view = BallView(VIEW.middle, VIEW.radius, VIEW.direction, VIEW.size, distance)
         seen = seen_cards(mesh, None, view, picture)
         row, column = np.divmod(seen.met.pixel, VIEW.size)
         assert column.min() >= VIEW.size // 2

@@ -16,8 +16,8 @@ from hairloom.addon.cards.order_pairs import (
     pairs_of,
 )
 from hairloom.addon.cards.order_views import (
+    BallView,
     Fragments,
-    View,
     far_to_near,
     fragments,
     nearest,
@@ -48,7 +48,9 @@ def as_cards(points: np.ndarray, triangles: np.ndarray) -> CardMesh:
     )
 
 
-def hits(view: View, corners: np.ndarray) -> dict[tuple[int, int], tuple[float, bool, np.ndarray]]:
+def hits(
+    view: BallView, corners: np.ndarray
+) -> dict[tuple[int, int], tuple[float, bool, np.ndarray]]:
     """(pixel, triangle) -> how far towards the eye, whether from the front, barycentric: a ray
     through each pixel's middle, met with each triangle's plane.
     """
@@ -81,7 +83,7 @@ def hits(view: View, corners: np.ndarray) -> dict[tuple[int, int], tuple[float, 
 def test_fragments_are_where_rays_meet_triangles(distance: float) -> None:
     points, triangles = loose_triangles()
     direction = np.array([0.48, -0.6, 0.64])
-    view = View(np.array([0.1, 0.0, -0.1]), 1.6, direction, 28, distance)
+    view = BallView(np.array([0.1, 0.0, -0.1]), 1.6, direction, 28, distance)
     met = fragments(view, points, triangles)
     truth = hits(view, points[triangles])
     assert len(truth) > 150
@@ -104,7 +106,7 @@ def test_fragments_are_where_rays_meet_triangles(distance: float) -> None:
 
 def test_what_is_behind_the_eye_is_not_seen() -> None:
     points, triangles = loose_triangles(4)
-    view = View(np.zeros(3), 1.0, np.array([0.0, -1.0, 0.0]), 16, 2.0)
+    view = BallView(np.zeros(3), 1.0, np.array([0.0, -1.0, 0.0]), 16, 2.0)
     assert len(fragments(view, points, triangles).pixel)
     for shift in (-4.0, -9.0):
         assert not len(fragments(view, points + [0.0, shift, 0.0], triangles).pixel)
@@ -168,7 +170,7 @@ def test_a_view_from_behind_is_the_view_from_the_front_turned_over() -> None:
         for sign in (1.0, -1.0):
             if sign * direction[2] < np.sin(np.radians(-20.0)):
                 continue
-            view = View(*sphere_of(mesh), sign * direction, 32)
+            view = BallView(*sphere_of(mesh), sign * direction, 32)
             seen = seen_cards(mesh, head, view, alpha)
             is_blended = seen.alpha < 1.0
             pairs = pairs_of(seen.met[is_blended], seen.alpha[is_blended])
