@@ -11,6 +11,7 @@ The recipes are in tools/style_recipes.py, what they grow with in tools/style_gr
 import argparse
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -67,26 +68,12 @@ def rig_of(name: str, most: int = 1_000_000) -> tuple[Any, bpy.types.Object]:
     hair = at_once(setup.add_hairstyle(style, head, depsgraph, collection)).hair
     children = hair.data.hairloom.children
     children.strand_count = min(children.strand_count, most)
-    inputs = of_addon("blender.command_line.inputs")
-    sources = inputs.Sources(
-        groom=hair.name,
-        children_density=hair.hairloom.children_density,
-        with_face=not setup.is_of_face(style),
-    )
-    own = of_addon("blender.command_line.object_settings").own_settings(hair)
-    read = inputs.read_inputs(sources, of_addon("groom.settings").GrowSettings())
-    rig = of_addon("rig_flow").prepare(
-        read.strands,
-        read.head,
-        own["guides"],
-        place=name,
-        children=own["children"],
-        ground=of_addon("rig_flow").ChildGround(
-            read.density,
-            head_field=lambda: of_addon("blender.colliders.fields").solid_of(read.head),
-        ),
-        widths=own["widths"].method,
-    )
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    source = of_addon("blender.scene.source").read_source(hair, depsgraph)
+    if setup.is_bust(head) and not setup.is_of_face(style):
+        face = at_once(setup.face_hair(head, source.head, depsgraph))
+        source = replace(source, strands=of_addon("strands.join").joined(source.strands, face))
+    rig = of_addon("blender.colliders.rigs").rig_of(hair, source)
     return rig, hair
 
 
