@@ -45,7 +45,6 @@ class SkinLayout:
     copies: (n, 3) x, y and island of all places of the vertices at seams' ends; end_copies:
         (seam_count, 2, 2) the first one of a start and of an end, and how many there are.
     place: (triangle_count, 3, 2) of the corners; triangle_island: (triangle_count,).
-    overlapping: fraction of the covered texels where triangles overlap.
     """
 
     island: Ints
@@ -59,7 +58,6 @@ class SkinLayout:
     end_copies: Ints
     place: Floats
     triangle_island: Ints
-    overlapping: float
 
     @property
     def is_empty(self) -> bool:
@@ -120,7 +118,6 @@ def skin_layout(surface: Surface, resolution: int) -> SkinLayout:
         *_copies(surface, chart, seams, triangle_island),
         chart.place,
         triangle_island,
-        float(overlaps.sum() / max(int(covered.sum()), 1)),
     )
 
 
