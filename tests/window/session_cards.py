@@ -252,10 +252,10 @@ def is_making():
     return of_hairloom("long_work").running() == "Make Cards"
 
 
-def progress():
-    """The fraction that is done; 1 once nothing is being made."""
+def stage():
+    """What making cards does now; empty once nothing is being made."""
     work = of_hairloom("long_work")._running
-    return 1.0 if work is None else work.progress.fraction or 0.0
+    return "" if work is None else work.progress.text
 
 
 def make_cards():
@@ -266,11 +266,12 @@ def make_cards():
 
 def making_is_cancelled():
     """Esc leaves nothing half made, at whatever stage."""
-    for percent in (0, 30):
+    reading = "Reading the hair"
+    for name, is_there in (("reading", lambda: True), ("amid", lambda: stage() != reading)):
         make_cards()
-        yield from until(lambda p=percent: progress() >= p / 100.0, f"it is never {percent} %")
+        yield from until(is_there, f"it does not come past {reading}")
         assert is_making(), "it has ended before it could be cancelled"
-        driver.screenshot(f"making-{percent}")
+        driver.screenshot(f"making-{name}")
         yield from press("ESC")
         yield from until(lambda: not is_making(), "Esc does not cancel")
         assert card_objects() == [] and bpy.ops.hairloom.make_cards.poll()
