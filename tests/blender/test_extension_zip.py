@@ -196,7 +196,7 @@ def used_permissions():
     uses = {
         "files": r"write_bytes|open\(",
         "clipboard": r"\.clipboard\b",
-        "network": r"^\s*(import|from) (socket|ssl|urllib|http|requests|ftplib|smtplib)\b",
+        "network": r"^\s*(import|from) (socket|ssl|urllib(?!\.parse)|http|requests|ftplib)\b",
         "camera": r"^\s*(import|from) cv2\b",
         "microphone": r"^\s*(import|from) (pyaudio|sounddevice)\b",
     }
