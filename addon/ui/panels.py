@@ -26,7 +26,7 @@ from .operators_start import (
     HAIRLOOM_OT_use_groom,
 )
 from .sections import SECTIONS, SESSION_SECTIONS, SUB_SECTIONS, SWITCHES
-from .selection import active_mesh, chosen_hair
+from .selection import active_mesh, chosen_hair, pinned_hair
 from .state import NAMES, draw_notice, draw_problems_row, draw_state
 
 
@@ -136,7 +136,8 @@ class HAIRLOOM_PT_data(bpy.types.Panel):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return context.object is not None and context.object.type == "CURVES"
+        is_hair = context.object is not None and context.object.type == "CURVES"
+        return is_hair or pinned_hair(context) is not None
 
     def draw_header_preset(self, _context: bpy.types.Context) -> None:
         draw_help(self.layout, "")

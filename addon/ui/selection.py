@@ -15,13 +15,29 @@ from ..errors import HairloomError
 def chosen_hair(context: bpy.types.Context) -> list[bpy.types.Object]:
     """The hair that buttons and panels apply to, the active first.
 
-    These are the selected hair curves; else the hair whose cards are selected; else the hair on
+    In a pinned Properties editor that is the hair it shows. Else these are the selected hair
+    curves; else the hair whose cards are selected; else the hair on
     selected meshes, as when the head is being moved; else previewed hair.
     """
+    pinned = pinned_hair(context)
+    if pinned is not None:
+        return [pinned]
     candidates = [context.active_object, *context.selected_objects]
     selected = list(dict.fromkeys(obj for obj in candidates if obj is not None))
     hair = [obj for obj in selected if obj.type == "CURVES"]
     return hair or _made_into(selected) or _grown_on(selected, context) or _previewed()
+
+
+def pinned_hair(context: bpy.types.Context) -> bpy.types.Object | None:
+    """The hair that a pinned Properties editor shows, whatever is selected."""
+    space = context.space_data
+    if not isinstance(space, bpy.types.SpaceProperties) or not space.use_pin_id:
+        return None
+    pinned = space.pin_id
+    if isinstance(pinned, bpy.types.Object):
+        return pinned if pinned.type == "CURVES" else None
+    users = (obj for obj in objects_in(context.view_layer) if obj.data == pinned)
+    return next((obj for obj in users if obj.type == "CURVES"), None)
 
 
 def once_each(grooms: Iterable[bpy.types.Object]) -> list[bpy.types.Object]:

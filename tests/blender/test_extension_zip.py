@@ -193,10 +193,11 @@ def used_permissions():
     code = "\n".join(
         path.read_text(encoding="utf-8") for path in (REPOSITORY / "addon").rglob("*.py")
     )
+    network = r"socket|ssl|urllib(?!\.parse)|http|requests|ftplib|smtplib"
     uses = {
         "files": r"write_bytes|open\(",
         "clipboard": r"\.clipboard\b",
-        "network": r"^\s*(import|from) (socket|ssl|urllib(?!\.parse)|http|requests|ftplib)\b",
+        "network": rf"^\s*(import|from) ({network})\b",
         "camera": r"^\s*(import|from) cv2\b",
         "microphone": r"^\s*(import|from) (pyaudio|sounddevice)\b",
     }

@@ -14,6 +14,7 @@ from hairloom.addon.blender.preview.diagnostics import surface_for
 from hairloom.addon.blender.sessions.fins import fins_in
 from hairloom.addon.cards.occlusion_settings import CardOcclusionSettings
 from hairloom.addon.ui import menus
+from hairloom.addon.ui.panels import HAIRLOOM_PT_data
 from hairloom.addon.ui.selection import chosen_hair
 
 
@@ -66,6 +67,27 @@ def test_hair_on_a_selected_mesh_is_not_that_which_is_hidden(hair, sphere):
     combed.hide_render = combed.hide_viewport = True
     bpy.context.view_layer.update()
     assert set(chosen_hair(bpy.context)) == {hair, combed}
+
+
+def test_a_pinned_properties_editor_is_about_the_hair_that_it_shows(hair, new_hair):
+    """The object or its curves may be pinned; a mesh is no hair."""
+    other = new_hair()
+    screens = (each for each in bpy.data.screens if each.name == "Layout")
+    area = next(each for each in next(screens).areas if each.type == "PROPERTIES")
+    space = area.spaces.active
+    with bpy.context.temp_override(area=area):
+        assert chosen_hair(bpy.context)[0] == other
+        for pinned in (hair, hair.data):
+            space.pin_id = None  # Blender takes only what is of the kind that is pinned
+            space.pin_id, space.use_pin_id = pinned, True
+            assert chosen_hair(bpy.context) == [hair]
+            assert HAIRLOOM_PT_data.poll(bpy.context)
+        space.use_pin_id = False
+        assert chosen_hair(bpy.context)[0] == other
+        space.pin_id = None
+        space.pin_id, space.use_pin_id = hair.data.surface, True
+        assert chosen_hair(bpy.context)[0] == other
+        space.pin_id, space.use_pin_id = None, False
 
 
 def test_hair_of_another_view_layer_is_not_selected_but_told(hair, sphere):
