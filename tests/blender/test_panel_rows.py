@@ -93,6 +93,7 @@ def height(draw, *arguments):
 def context_of(width):
     """Blender's context, as a panel of this width has it."""
     return SimpleNamespace(
+        space_data=None,
         region=SimpleNamespace(width=width),
         preferences=SimpleNamespace(system=SimpleNamespace(ui_scale=1.0)),
         scene=bpy.context.scene,
