@@ -6,6 +6,7 @@ import bpy
 import numpy as np
 import pytest
 from bake_files import contents, frames_in
+from hedgehogs import hedgehog
 
 from hairloom.addon.blender.bakes import playback
 from hairloom.addon.blender.bakes.stale_bakes import changed_since
@@ -14,22 +15,8 @@ from hairloom.addon.blender.preview.bake import Bake
 from hairloom.addon.blender.preview.diagnostics import unfelt_note
 from hairloom.addon.blender.sessions.session import Session
 from hairloom.addon.errors import HairloomError
-from hairloom.addon.strands import StrandSet
 
 LAST = 6
-
-
-def standing(seed, count=150, points=8):
-    """Straight strands that stand on the head, 8 cm long."""
-    outward = np.random.default_rng(seed).normal(size=(count, 3))
-    outward /= np.linalg.norm(outward, axis=1, keepdims=True)
-    along = 0.1 + np.linspace(0.0, 0.08, points)
-    return StrandSet(
-        points=(outward[:, None] * along[:, None]).reshape(-1, 3),
-        offsets=np.arange(count + 1) * points,
-        radius=np.full(count * points, 5.0e-5),
-        group=np.zeros(count, np.int32),
-    )
 
 
 @pytest.fixture
@@ -42,7 +29,7 @@ def two(new_hair, sphere, tmp_path):
         sphere.keyframe_insert("rotation_euler", frame=frame)
     found = []
     for name, seed, stiff in (("One", 1, 0.05), ("Two", 2, 0.8)):
-        hair = new_hair(sphere, standing(seed))
+        hair = new_hair(sphere, hedgehog(150, seed=seed, groups=1))
         hair.name = name
         dynamics = hair.hairloom.dynamics
         dynamics.collider_resolution, dynamics.volume = 8, 1.0
