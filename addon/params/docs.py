@@ -38,7 +38,7 @@ def _row(parameter: Parameter) -> str:
         f"**{parameter.label}** `{parameter.name}`",
         _shown(parameter, parameter.default),
         _span(parameter, parameter.soft_range),
-        _span(parameter, parameter.hard_range),
+        _allowed(parameter),
         _unit(parameter),
         parameter.description,
         parameter.source,
@@ -54,9 +54,16 @@ def _unit(parameter: Parameter) -> str:
     return _UNIT_SYMBOLS[parameter.unit]
 
 
-def _span(parameter: Parameter, span: tuple[float, float] | None) -> str:
+def _allowed(parameter: Parameter) -> str:
+    """As `code`: what a preset and the command line take; what panels say stands beside it."""
     if parameter.kind == "choice":
-        return ", ".join(label for _, label, _ in parameter.choices)
+        return "; ".join(f"`{identifier}` {label}" for identifier, label, _ in parameter.choices)
+    if parameter.kind == "toggle":
+        return "`true`; `false`"
+    return _span(parameter, parameter.hard_range)
+
+
+def _span(parameter: Parameter, span: tuple[float, float] | None) -> str:
     if span is None:
         return ""
     return f"{_shown(parameter, span[0])} to {_shown(parameter, span[1])}"
@@ -66,7 +73,9 @@ def _shown(parameter: Parameter, value: object) -> str:
     if isinstance(value, tuple):
         return ", ".join(f"{channel:g}" for channel in value)
     if isinstance(value, bool):
-        return "on" if value else "off"
+        return f"`{str(value).lower()}`"
+    if parameter.kind == "choice":
+        return f"`{value}`"
     if parameter.kind == "integer" and isinstance(value, (int, float)):
         return str(int(value))
     if isinstance(value, (int, float)):

@@ -133,6 +133,8 @@ class Parameter:
     def _remedy(self) -> str:
         if self.choices:
             return "Use one of " + ", ".join(identifier for identifier, _, _ in self.choices)
+        if self.kind == "toggle":
+            return f"Use true or false (default {str(self.default).lower()})"
         if self.kind == "mask":
             return "Use the name of a vertex group, of an attribute or of an image"
         if self.kind == "map":

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import math
+import re
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -33,6 +35,19 @@ def test_angles_are_shown_in_degrees() -> None:
     assert table(Tilt).splitlines()[-1] == (
         "| **Angle** `angle` | 45 | 0 to 90 | -180 to 180 | ° | How far it tilts | Euclid |"
     )
+
+
+@pytest.mark.parametrize("kind", ALL_SETTINGS.values(), ids=ALL_SETTINGS)
+def test_what_the_table_allows_as_code_is_taken(kind: type[Settings]) -> None:
+    """Of a choice all that there is, and the default among it."""
+    rows = [line for line in table(kind).splitlines() if line.startswith("| **")]
+    for row, parameter in zip(rows, kind.parameters(), strict=True):
+        default, allowed = (re.findall("`(.+?)`", row.split("|")[cell]) for cell in (2, 4))
+        if parameter.kind in ("choice", "toggle"):
+            assert default[0] in allowed and len(allowed) == (len(parameter.choices) or 2)
+        for text in allowed:
+            value = json.loads(text) if parameter.kind == "toggle" else text
+            kind.from_dict({parameter.name: value}, "--set")
 
 
 def test_a_factor_without_those_limits_is_not_called_one_from_0_to_1() -> None:
