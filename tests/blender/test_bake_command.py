@@ -1,6 +1,8 @@
 """The verb `bake`: scene in, bakes and report out, one line and exit code 1 for bad input."""
 
 import json
+import re
+from pathlib import Path
 
 import bpy
 import numpy as np
@@ -120,6 +122,28 @@ def test_bad_input_is_one_line_and_exit_code_1(arguments, message, file, tmp_pat
     told = [line for line in capfd.readouterr().err.splitlines() if line.startswith("hairloom:")]
     assert len(told) == 1 and message in told[0]
     assert not (tmp_path / "hairloom_cache").exists()
+
+
+def test_hair_without_a_surface_is_baked_and_noted(file, tmp_path):
+    """The task of a farm is done, and its report says why the motion may be none that is meant."""
+    bpy.ops.wm.open_mainfile(filepath=str(file))
+    bpy.data.objects["Hair"].data.surface = bpy.data.objects["Hair"].parent = None
+    bpy.ops.wm.save_mainfile()
+    report = tmp_path / "report.json"
+    assert command_line.run(["bake", "--scene", str(file), "--report", str(report)]) == 0
+    (note,) = json.loads(report.read_text())["notes"]
+    assert note.startswith("Hair: it has no surface") and "Set Surface" in note
+
+
+def test_the_failed_task_of_the_farm_page_fails_as_it_says(file, tmp_path):
+    page = (Path(__file__).parents[2] / "docs" / "farm" / "README.md").read_text(encoding="utf-8")
+    (said,) = re.findall(r"^```json\n(.+?)^```", page, flags=re.M | re.S)
+    report = tmp_path / "report.json"
+    arguments = ["bake", "--scene", str(file), "--frames", "250", "1", "--report", str(report)]
+    assert command_line.run(arguments) == 1
+    failed = json.loads(report.read_text())
+    for key, value in json.loads(said).items():
+        assert failed[key] == value
 
 
 def test_an_empty_scene_has_nothing_to_bake(extension, capfd):

@@ -16,6 +16,7 @@ import bpy
 import pytest
 
 from hairloom.addon.blender.base.images import read_texture
+from hairloom.addon.cards.export_settings import CardExportSettings
 
 pytest.importorskip("openjd.cli", reason="openjd-cli runs the template")
 yaml = pytest.importorskip("yaml", reason="openjd-cli brings it along")
@@ -116,6 +117,18 @@ def test_the_template_is_valid_and_names_verbs_and_options_that_there_are() -> N
         plain = [chosen.get(word, word) for word in plain]
         options = parser().parse_args(plain)
         assert options.skip_existing and options.progress == "openjd" and options.report
+
+
+def test_the_template_and_its_page_offer_all_that_moves_cards() -> None:
+    declared = {
+        each["name"]: each for each in yaml.safe_load(TEMPLATE.read_text())["parameterDefinitions"]
+    }
+    (choices,) = (each.choices for each in CardExportSettings.parameters() if each.name == "motion")
+    there_is = {identifier for identifier, *_ in choices}
+    assert set(declared["CardMotion"]["allowedValues"]) == there_is
+    page = TEMPLATE.with_name("README.md").read_text()
+    (said,) = re.findall(r"`CardMotion` \(([^)]+)\)", page)
+    assert set(re.findall("`([^`]+)`", said)) == there_is
 
 
 @pytest.mark.slow

@@ -71,7 +71,9 @@ class _Part:
             session.play(depsgraph)
             self.rig_hash = session.rig_hash(depsgraph)
             if isinstance(session, Session):
-                self.notes, self.measure = session.rig.notes, session.new_measure()
+                of_rig = (f"{self.handle.name}: {note}" for note in session.rig.notes)
+                self.notes = (*session.source.warnings, *of_rig)
+                self.measure = session.new_measure()
             self.writer = CacheWriter(self.folder)
             self.writer.add_constants(session.constants())
         else:
@@ -180,8 +182,8 @@ class Bake:
     @property
     def notes(self) -> list[str]:
         """What the artist should know about what was baked so far."""
-        own = [f"{part.handle.name}: {note}" for part in self.parts for note in part.notes]
-        return own + self.unfelt
+        own = dict.fromkeys(note for part in self.parts for note in part.notes)
+        return [*own, *self.unfelt]
 
     @property
     def unfelt(self) -> list[str]:

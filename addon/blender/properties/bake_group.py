@@ -33,7 +33,7 @@ class HAIRLOOM_PG_bake(bpy.types.PropertyGroup):
     )
     first: IntProperty(
         name="First",
-        description="Frame at which the hair is at rest",
+        description="First frame to bake; the hair begins at rest here, or Pre-Roll frames before",
         default=1,
         min=-99999,
         max=999999,
