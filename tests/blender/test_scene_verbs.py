@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -18,8 +19,12 @@ from hairloom.addon.blender.colliders.spheres import fitted_collections
 from hairloom.addon.blender.command_line import command_line
 from hairloom.addon.blender.command_line.run_job import OPERATORS
 from hairloom.addon.blender.properties import presets
+from hairloom.addon.blender.properties.groom_settings import GroomSettings
 from hairloom.addon.blender.scene.fin_modifier import fin_modifier
+from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.exchange.tressfx import read_tfx
+from hairloom.addon.parameters import ALL_SETTINGS
+from hairloom.addon.shading.settings import ShadingSettings
 
 FEW = [
     "--set",
@@ -45,6 +50,13 @@ def scene(sphere: Any, new_hair: Callable[..., Any], tmp_path: Path) -> Path:
     return path
 
 
+def make_active(obj: bpy.types.Object) -> None:
+    for other in bpy.context.selected_objects:
+        other.select_set(False)
+    obj.select_set(True)
+    bpy.context.view_layer.objects.active = obj
+
+
 def run(scene: Path, verb: str, *arguments: str) -> dict[str, Any]:
     """Change the scene into another file, which is open then; gives the report."""
     report, output = scene.with_name("report.json"), scene.with_name("out.blend")
@@ -67,6 +79,26 @@ def test_hair_grows_on_a_mesh(scene: Path) -> None:
     blond = presets.named_preset("looks/blond").settings.as_dict()
     assert list(hair.data.hairloom.shading.base_color) == pytest.approx(blond["base_color"])
     assert hair.data.hairloom.shading.primary_strength == 3.0
+
+
+def test_the_verb_grows_hair_as_the_button_does_but_for_what_its_row_names(scene: Path) -> None:
+    page = (Path(__file__).parents[2] / "docs" / "command-line.md").read_text(encoding="utf-8")
+    (row,) = re.findall(r"^\| `grow` \| (.+) \| scene \|$", page, flags=re.M)
+    options = " ".join(re.findall("`([^`]+)`", row)).split()
+    assert "--fit" in options
+    for name, more in (("Plain", []), ("Dressed", options)):
+        run(scene, "grow", "--head", "Head", "--name", name, *FEW, *more)
+        make_active(bpy.data.objects["Head"])
+        few = {"method": "normals", "strand_count": 40, "length": 0.05}
+        assert bpy.ops.hairloom.add_groom(plays=False, **few) == {"FINISHED"}
+        bpy.context.object.data.hairloom.children.method = "none"
+        # hair that has grown brings no colours, so that either source is the look
+        bpy.data.objects[name].data.hairloom.shading.color_source = "own"
+        verb, button = (
+            GroomSettings.of(each).sections for each in (bpy.data.objects[name], bpy.context.object)
+        )
+        other = {each for each in ALL_SETTINGS.values() if verb[each] != button[each]}
+        assert other == ({ShadingSettings, DynamicsSettings} if name == "Plain" else set())
 
 
 def test_hair_grows_where_a_group_says(scene: Path) -> None:

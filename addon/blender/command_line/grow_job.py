@@ -49,8 +49,8 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
     what.add_argument(
         "--fit",
         action="store_true",
-        help="hair as long for this mesh as it would be on a head, and what moves it as strong, "
-        "if its size is none of a head; presets and --set go over that",
+        help="scale lengths and motion to the mesh, unless it has the size of a head or body; "
+        "presets and --set override this",
     )
     what.add_argument(
         "--density-group",
