@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -10,6 +11,7 @@ import pytest
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.parameters import ALL_SETTINGS
 from hairloom.addon.params.preset import preset_as_dict, read_any_preset
+from hairloom.addon.shading.settings import ShadingSettings
 from hairloom.addon.shading.shafts_settings import ShaftSettings
 
 pytestmark = pytest.mark.portable
@@ -63,6 +65,30 @@ def test_what_a_preset_brings_along_is_checked(tmp_path: Path, also: object) -> 
     path.write_text(json.dumps(data))
     with pytest.raises(HairloomError, match="no known kind"):
         read_any_preset(path, ALL_SETTINGS)
+
+
+def test_the_strengths_and_widths_of_the_looks_are_those_of_their_page() -> None:
+    """Other strengths than 1, of each look or of all others that are as lit hair is."""
+    page = (FOLDER.parent / "docs" / "shading.md").read_text(encoding="utf-8")
+    said: dict[str, dict[str, float]] = {}
+    rows = re.findall(r"^\| ([a-z ]+) \| ((?:R|TRT) [^|]+)\|", page, flags=re.M)
+    for look, values in rows:
+        for part in values.split(", "):
+            found = re.match(r"(?:([a-z]+) |(R|TRT) )([\d.]+)", part)
+            if found:
+                lobe = found.group(2) or "TRT"
+                said.setdefault(found.group(1) or look, {})[lobe] = float(found.group(3))
+    everywhere = said.pop("all natural looks")
+    for path in PRESETS:
+        settings = read_any_preset(path, ALL_SETTINGS).settings
+        if not isinstance(settings, ShadingSettings) or settings.model != "marschner":
+            continue
+        of_look = said.get(path.stem, {})
+        is_water = path.stem == "under_water"
+        strengths = {"R": 1.0, "TRT": 1.0, **({} if is_water else everywhere), **of_look}
+        assert {"R": settings.strength_r, "TRT": settings.strength_trt} == strengths, path
+        assert settings.ambient == settings.strength_tt == settings.strength_higher == 1.0, path
+        assert (1.45 < settings.width_trt / settings.width_r < 2.05) is not is_water, path
 
 
 def test_only_the_look_under_water_has_shafts_of_light() -> None:
