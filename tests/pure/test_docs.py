@@ -69,6 +69,12 @@ def test_every_page_is_reached_from_the_readme() -> None:
     assert [str(page) for page in PAGES if page.resolve() not in reached] == []
 
 
+def test_the_list_of_the_readme_has_every_page_but_those_for_programmers() -> None:
+    pages = texts_of(REPOSITORY / "README.md").partition("\n## Pages\n")[2]
+    listed = set(re.findall(r"\]\((docs/[^/)]+\.md)\)", pages))
+    assert {f"docs/{page.name}" for page in (REPOSITORY / "docs").glob("*.md")} == listed
+
+
 def test_every_picture_is_shown_and_small() -> None:
     shown = {
         (page.parent / link).resolve()
