@@ -152,7 +152,6 @@ def _steps() -> tuple[Step, ...]:
         (menus.register, menus.unregister),
         (help.register, help.unregister),
         (translations.register, translations.unregister),
-        (operators_adopted.register, operators_adopted.unregister),
         (handlers.register, handlers.unregister),
         (growing.register, growing.unregister),
         (look_materials.register, look_materials.unregister),

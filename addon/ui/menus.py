@@ -65,6 +65,7 @@ class HAIRLOOM_MT_object(bpy.types.Menu):
         if active_mesh(context) is not None:
             layout.operator("hairloom.add_groom", text="Add Hair", icon="OUTLINER_OB_CURVES")
             layout.operator("hairloom.choose_hairstyle", icon="USER")
+            layout.operator("hairloom.sort_cards", icon="SORTSIZE")
             layout.separator()
         layout.operator("hairloom.preview", icon="HIDE_OFF")
         layout.operator("hairloom.play", icon="PLAY")

@@ -166,16 +166,4 @@ def _named_image(name: str) -> bpy.types.Image | None:
     return image
 
 
-def draw_sort(self: Any, _context: bpy.types.Context) -> None:
-    self.layout.operator("hairloom.sort_cards", icon="SORTSIZE")
-
-
-def register() -> None:
-    bpy.types.VIEW3D_MT_object.append(draw_sort)
-
-
-def unregister() -> None:
-    bpy.types.VIEW3D_MT_object.remove(draw_sort)
-
-
 CLASSES = (HAIRLOOM_OT_sort_cards,)

@@ -36,7 +36,8 @@ WAITING = "{names}: plays as soon as all that it needs is made. Esc: cancel"
 
 
 class HAIRLOOM_OT_preview(bpy.types.Operator):
-    """Draw the selected hair in the 3D viewport as it will look in a game engine"""
+    """Draw the selected hair in the 3D viewport, with its look, shadows and children. Press again
+    to stop"""
 
     bl_idname = "hairloom.preview"
     bl_label = "Preview"

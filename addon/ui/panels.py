@@ -13,7 +13,6 @@ from ..blender.setup.foreign_heads import may_be_head
 from .drawing import Draw, draw_button, draw_overlays
 from .help import draw_help
 from .long_work import draw_progress
-from .operators_adopted import draw_sort
 from .operators_hairstyles import (
     HAIRLOOM_OT_add_hairstyle,
     HAIRLOOM_OT_fit_again,
@@ -219,7 +218,7 @@ class HAIRLOOM_PT_sidebar_mesh_cards(bpy.types.Panel):
         draw_help(self.layout, "mesh_cards")
 
     def draw(self, context: bpy.types.Context) -> None:
-        draw_sort(self, context)
+        self.layout.operator("hairloom.sort_cards", icon="SORTSIZE")
 
 
 CLASSES: tuple[type[Any], ...] = (

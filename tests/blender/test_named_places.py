@@ -1,0 +1,97 @@
+"""What a page says of a button, its name and where it is, is so in the panels and menus."""
+
+from __future__ import annotations
+
+import ast
+import re
+from pathlib import Path
+from types import SimpleNamespace
+
+import bpy
+import pytest
+from panel_layout import Layout
+
+from hairloom.addon.registration import CLASSES
+from hairloom.addon.ui.menus import HAIRLOOM_MT_object
+from hairloom.addon.ui.sections import SECTIONS, SESSION_SECTIONS
+
+pytestmark = pytest.mark.usefixtures("extension")
+
+REPOSITORY = Path(__file__).parents[2]
+#: pages that speak to artists; decisions name what was then
+PAGES = [
+    REPOSITORY / "README.md",
+    *sorted((REPOSITORY / "docs").glob("*.md")),
+    *sorted((REPOSITORY / "docs" / "tutorials").glob("*.md")),
+]
+OPERATORS = {
+    each.bl_idname: each.bl_label for each in CLASSES if issubclass(each, bpy.types.Operator)
+}
+
+
+def buttons() -> dict[str, set[str]]:
+    """Operator -> the texts of its buttons, other than of an icon alone; what is not constant in
+    the code is left out with its operator."""
+    found: dict[str, set[str]] = {}
+    unknown = {""}
+    for file in sorted((REPOSITORY / "addon" / "ui").rglob("*.py")):
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+            if not isinstance(node, ast.Call):
+                continue
+            names = [each.value for each in node.args if isinstance(each, ast.Constant)]
+            operator = next((name for name in names if name in OPERATORS), "")
+            called = node.func.attr if isinstance(node.func, ast.Attribute) else ""
+            is_helped = isinstance(node.func, ast.Name) and node.func.id == "draw_button"
+            if called != "operator" and not is_helped:
+                continue
+            texts = [each.value for each in node.keywords if each.arg == "text"]
+            texts += node.args[3:4] if is_helped else []
+            text = texts[0] if texts else ast.Constant(OPERATORS.get(operator, ""))
+            if not isinstance(text, ast.Constant):
+                unknown.add(operator)
+            elif text.value:
+                found.setdefault(operator, set()).add(text.value)
+    return {name: texts for name, texts in found.items() if name not in unknown}
+
+
+def test_pages_name_a_button_by_what_stands_on_it() -> None:
+    """Not by the operator's own name, where no button says that."""
+    texts = set().union(*buttons().values())
+    unseen = {
+        OPERATORS[name] for name, on in buttons().items() if OPERATORS[name] not in on | texts
+    }
+    assert "Look from Material" in unseen
+    wrong = [
+        (page.name, name)
+        for page in PAGES
+        for name in sorted(unseen)
+        if f"*{name}*" in page.read_text(encoding="utf-8")
+    ]
+    assert wrong == []
+
+
+def test_what_pages_place_in_the_menu_of_objects_is_there(sphere: bpy.types.Object) -> None:
+    texts: list[tuple[str, float]] = []
+    bpy.context.view_layer.objects.active = sphere
+    HAIRLOOM_MT_object.draw(SimpleNamespace(layout=Layout(texts)), bpy.context)
+    drawn = {OPERATORS.get(text, text) for text, _ in texts}
+    cards = (REPOSITORY / "docs" / "cards.md").read_text(encoding="utf-8")
+    (button,) = re.findall(r"^\*([^*]+)\* sorts .*\n.* in \*Object > Hairloom\*", cards, flags=re.M)
+    assert button in drawn
+    chains = [
+        chain.split(" > ")[-1]
+        for page in PAGES
+        for chain in re.findall(r"\*(?:Object > )?Hairloom > ([^*]+)\*", page.read_text("utf-8"))
+    ]
+    assert chains and set(chains) <= drawn
+
+
+@pytest.mark.parametrize("name", ["quick_start.md", "styling.md"])
+def test_pages_say_where_a_section_is_that_the_sidebar_lacks(name: str) -> None:
+    text = (REPOSITORY / "docs" / name).read_text(encoding="utf-8")
+    elsewhere = [label for section, label, _ in SECTIONS if section not in SESSION_SECTIONS]
+    named = [each for each in elsewhere if f"*{each} > " in text]
+    unsaid = [
+        each for each in named if not re.search(rf"\*{each}\* is in\s+\*Properties > Data\*", text)
+    ]
+    assert unsaid == []
