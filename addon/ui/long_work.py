@@ -79,10 +79,7 @@ class LongWork:
     @classmethod
     def is_free(cls: Any) -> bool:
         """For `poll`: whether no other long operator runs; the greyed button says which does."""
-        if _running is None:
-            return True
-        cls.poll_message_set(f"{_running.label} goes on; Esc cancels it")
-        return False
+        return is_free(cls)
 
     @reporting
     def execute(self: Any, context: bpy.types.Context) -> set[str]:
@@ -106,7 +103,7 @@ class LongWork:
         """Block all other events: edits in between would affect only part of the work."""
         if _running is None:
             return {"CANCELLED"}
-        if event.type == "ESC" and event.value == "PRESS" and not _running.progress.is_committed:
+        if event.type == "ESC" and event.value == "PRESS" and _is_cancellable():
             stop()
             report(self, "INFO", f"{self.bl_label} was cancelled; {self.unharmed}")
             return {"CANCELLED"}
@@ -206,6 +203,24 @@ def running() -> str:
     return "" if _running is None else _running.label
 
 
+def is_free(operator: Any) -> bool:
+    """For the `poll` of any operator, see `LongWork.is_free`."""
+    if _running is None:
+        return True
+    esc = "; Esc cancels it" if _is_cancellable() else ""
+    operator.poll_message_set(f"{_running.label} goes on{esc}")
+    return False
+
+
+def _is_cancellable() -> bool:
+    return _running is not None and not _running.progress.is_committed
+
+
+def draw_esc(row: bpy.types.UILayout) -> None:
+    """The key that cancels what runs; room for it once it is too late for that."""
+    row.label(text="", icon="EVENT_ESC" if _is_cancellable() else "BLANK1")
+
+
 def draw_progress(layout: bpy.types.UILayout, operator: type[LongWork]) -> bool:
     """Draw the progress instead of the operator's button. Returns False if it does not run."""
     if _running is None or _running.operator is not operator:
@@ -216,7 +231,7 @@ def draw_progress(layout: bpy.types.UILayout, operator: type[LongWork]) -> bool:
         row.label(text=text, icon="SORTTIME")
     else:
         row.progress(factor=fraction, text=text)
-    row.label(text="", icon="EVENT_ESC")
+    draw_esc(row)
     return True
 
 

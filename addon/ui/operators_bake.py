@@ -13,10 +13,9 @@ from ..blender.preview.bake import Bake, bakeable, free, show_in_renders
 from ..blender.scene.fin_modifier import fin_modifier
 from ..blender.sessions.measures import table_of
 from ..errors import HairloomError
-from . import long_work
 from .drawing import draw_idle
 from .help import WithHelp
-from .long_work import LongWork, Steps, counted, draw_progress
+from .long_work import LongWork, Steps, counted, draw_progress, is_free
 from .operators_measure import draw_figures
 from .reports import reporting
 from .selection import chosen_hair
@@ -62,7 +61,9 @@ class HAIRLOOM_OT_bake_free(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if not long_work.running() and any(has_bake(obj) for obj in chosen(context)):
+        if not is_free(cls):
+            return False
+        if any(has_bake(obj) for obj in chosen(context)):
             return True
         cls.poll_message_set("Nothing selected has a bake")
         return False

@@ -17,7 +17,7 @@ from ..blender.sessions.measures import PARTS, array_bytes
 from ..blender.sessions.session import Session
 from ..blender.viewport import view_transform
 from ..blender.viewport.overlay import notes_of, statistics_of
-from .long_work import running
+from .long_work import draw_esc, running
 from .messages import draw_lines, draw_message
 
 _MEGABYTE = 1 << 20
@@ -46,7 +46,7 @@ def draw_state(layout: bpy.types.UILayout, session: Session | None) -> None:
         row = parts.row(align=True)
         if name == "State" and running():
             row.label(text=running())
-            row.label(text="", icon="EVENT_ESC")
+            draw_esc(row)
             continue
         row.label(text=text)
         if name == "State" and session is not None and not session.is_made:

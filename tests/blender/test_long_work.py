@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Generator
+from types import SimpleNamespace
 from typing import Any
 
 import bpy
@@ -13,13 +14,14 @@ from waiting import until
 from hairloom.addon.blender.base.thread_work import GivenUpError, ThreadWork
 from hairloom.addon.cards.steps import result_of
 from hairloom.addon.errors import HairloomError
-from hairloom.addon.ui import operators_preview
+from hairloom.addon.ui import long_work, operators_preview
 from hairloom.addon.ui.long_work import (
     LongWork,
     Progress,
     Steps,
     as_progress,
     counted,
+    draw_progress,
     status,
     threaded,
 )
@@ -133,6 +135,32 @@ def test_closing_gives_the_thread_up() -> None:
 def test_the_status_bar_offers_esc_as_long_as_it_cancels() -> None:
     assert status("Bake", Progress("3 frames")) == "Bake: 3 frames. Esc: cancel"
     assert status("Bake", Progress("Writing", is_committed=True)) == "Bake: Writing"
+
+
+@pytest.mark.parametrize("is_committed", [False, True])
+def test_esc_is_offered_as_long_as_it_cancels(
+    is_committed: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Beside the progress, and by a button that is greyed out meanwhile."""
+    work, progress = HAIRLOOM_OT_test_work, Progress("3 of 4", 0.75, is_committed=is_committed)
+    running = SimpleNamespace(operator=work, label=work.bl_label, progress=progress)
+    monkeypatch.setattr(long_work, "_running", running)
+    icons: list[str] = []
+    row = SimpleNamespace(progress=lambda **_: None, label=lambda icon="", **_: icons.append(icon))
+    assert draw_progress(SimpleNamespace(row=lambda **_: row), work)
+    assert icons == ["BLANK1" if is_committed else "EVENT_ESC"]
+    with pytest.raises(RuntimeError, match="Test Work goes on") as refused:
+        bpy.ops.hairloom.test_work()
+    assert ("Esc" in str(refused.value)) is not is_committed
+
+
+@pytest.mark.usefixtures("extension")
+def test_a_bake_is_not_deleted_while_other_work_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Which the button says, rather than that there is no bake."""
+    running = SimpleNamespace(label="Make Cards", progress=Progress("3 of 4"))
+    monkeypatch.setattr(long_work, "_running", running)
+    with pytest.raises(RuntimeError, match="Make Cards goes on; Esc cancels it"):
+        bpy.ops.hairloom.bake_free()
 
 
 def test_play_says_again_what_it_does_after_other_work(monkeypatch: pytest.MonkeyPatch) -> None:
