@@ -46,8 +46,8 @@ class HAIRLOOM_PT_engine_sampling(_RenderPanel):
         layout.use_property_split = True
         layout.use_property_decorate = False
         column = layout.column(align=True)
-        column.prop(picture, "viewport_samples", text="Viewport")
-        column.prop(picture, "samples", text="Render")
+        column.prop(picture, "viewport_samples")
+        column.prop(picture, "samples")
 
 
 class HAIRLOOM_PT_engine_mesh_shadows(_RenderPanel):

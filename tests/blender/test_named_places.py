@@ -12,6 +12,7 @@ import pytest
 from panel_layout import Layout
 
 from hairloom.addon.registration import CLASSES
+from hairloom.addon.ui.engine_panels import HAIRLOOM_PT_engine_sampling, HAIRLOOM_PT_hair_scene
 from hairloom.addon.ui.menus import HAIRLOOM_MT_object
 from hairloom.addon.ui.sections import SECTIONS, SESSION_SECTIONS
 
@@ -84,6 +85,17 @@ def test_what_pages_place_in_the_menu_of_objects_is_there(sphere: bpy.types.Obje
         for chain in re.findall(r"\*(?:Object > )?Hairloom > ([^*]+)\*", page.read_text("utf-8"))
     ]
     assert chains and set(chains) <= drawn
+
+
+def test_samples_have_one_name_in_both_panels_and_on_the_page() -> None:
+    of_engine: list[tuple[str, float]] = []
+    HAIRLOOM_PT_engine_sampling.draw(SimpleNamespace(layout=Layout(of_engine)), bpy.context)
+    of_hair_scene: list[tuple[str, float]] = []
+    HAIRLOOM_PT_hair_scene.draw(SimpleNamespace(layout=Layout(of_hair_scene)), bpy.context)
+    page = (REPOSITORY / "docs" / "engine.md").read_text(encoding="utf-8")
+    named = set(re.findall(r"^\| Sampling > ([^|]+) \|", page, flags=re.M))
+    assert len(named) == 2 and named == {text for text, _ in of_engine}
+    assert named <= {text for text, _ in of_hair_scene}
 
 
 @pytest.mark.parametrize("name", ["quick_start.md", "styling.md"])
