@@ -54,7 +54,7 @@ class MotionSettings(Settings):
     wind_speed: float = number(
         0.0,
         label="Wind Speed",
-        description="Speed of the air, or of the current under water, wherever the hair is",
+        description="Speed of the air, or of the current under water; the same everywhere",
         soft=(0.0, 20.0),
         hard=(0.0, 200.0),
         unit="speed",

@@ -37,8 +37,8 @@ _UNSEEN = frozenset(("CAMERA", "EMPTY", "LIGHT", "LIGHT_PROBE", "SPEAKER"))
 
 class HAIRLOOM_OT_add_hairstyle(LongWork, bpy.types.Operator):
     """Add this hairstyle as hair curves to the selected head, or to the built-in one in the scene.
-    Fur grows on the selected mesh. Without one, a head with brows and lashes is added too. Esc
-    cancels"""
+    Fur grows on the selected mesh. Without one, a head is added too, with brows and lashes if the
+    hairstyle is neither. Esc cancels"""
 
     bl_idname = "hairloom.add_hairstyle"
     bl_label = "Hairloom Hairstyle"
@@ -155,11 +155,17 @@ class HAIRLOOM_OT_place_landmarks(LongWork, bpy.types.Operator):
         adding = add_landmarks(head, context.evaluated_depsgraph_get(), context.collection)
         made, is_sure = yield from in_parts(adding)
         if is_sure:
-            report(self, "INFO", f"{head.name}: placed {len(made)} landmarks it lacked")
+            report(self, "INFO", f"{head.name}: {_placed(len(made))}")
         else:
             report(
                 self, "WARNING", f"{head.name}: it is unlike a head: drag all landmarks yourself"
             )
+
+
+def _placed(count: int) -> str:
+    if not count:
+        return "it has all landmarks already"
+    return "placed 1 missing landmark" if count == 1 else f"placed {count} missing landmarks"
 
 
 class HAIRLOOM_OT_fit_again(LongWork, bpy.types.Operator):

@@ -1,12 +1,16 @@
 """Translations of the interface, one file per language.
 
-translations/template.json holds all texts, {context: {text: ""}}; tools/make_docs.py writes it. To
-add a language, copy it, for example to translations/de_DE.json, and fill in texts.
+translations/template.json holds texts, {context: {text: ""}}: all of registered classes, and those
+that stand in the code of panels and menus as they are; tools/make_docs.py writes it. Texts with
+numbers or names in them, and reports, stay English. To add a language, copy it, for example to
+translations/de_DE.json, and fill in texts.
 """
 
 from __future__ import annotations
 
+import ast
 import json
+import re
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -17,6 +21,12 @@ from .preferences import ROOT_PACKAGE
 
 FOLDER = Path(__file__).resolve().parents[2] / "translations"
 TEMPLATE = "template"
+
+#: what draws -> the context in which Blender looks up its texts, if that is not "*"; the first of
+#: its arguments that is a text
+_DRAWN = {"operator": ("Operator", 1), "draw_button": ("Operator", 2), "draw_idle": ("*", 3)}
+#: keywords that are texts
+_TEXTS = ("text", "heading", "idle")
 
 type Table = dict[tuple[str, str], str]
 
@@ -41,8 +51,8 @@ def table_of(content: dict[str, dict[str, str]]) -> Table:
 
 
 def texts(classes: Iterable[type[Any]]) -> dict[str, dict[str, str]]:
-    """All texts of registered classes that Blender shows: context -> text -> "", in order."""
-    found: set[tuple[str, str]] = set()
+    """All texts that the template holds: context -> text -> "", in order."""
+    found = _drawn()
     for each in classes:
         found |= _of_class(each)
     for name in dir(bpy.ops.hairloom):
@@ -53,6 +63,28 @@ def texts(classes: Iterable[type[Any]]) -> dict[str, dict[str, str]]:
         if text:
             ordered.setdefault(context, {})[text] = ""
     return ordered
+
+
+def _drawn() -> set[tuple[str, str]]:
+    """What the code of this room draws as it stands there."""
+    found: set[tuple[str, str]] = set()
+    for file in Path(__file__).parent.rglob("*.py"):
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Call):
+                called = getattr(node.func, "attr", getattr(node.func, "id", ""))
+                context, first = _DRAWN.get(called, ("*", len(node.args)))
+                given = [each.value for each in node.keywords if each.arg in _TEXTS]
+                for text in (*node.args[first:], *given):
+                    found |= {(context, each) for each in _constants(text)}
+    return found
+
+
+def _constants(text: ast.expr) -> set[str]:
+    """The text, or either of two."""
+    if isinstance(text, ast.IfExp):
+        return _constants(text.body) | _constants(text.orelse)
+    value = text.value if isinstance(text, ast.Constant) else ""
+    return {value} if isinstance(value, str) and re.search("[a-z]", value) else set()
 
 
 def _of_class(each: Any) -> set[tuple[str, str]]:

@@ -163,7 +163,7 @@ def _names(path: Path) -> str:
 
 
 def test_every_recipe_is_walked() -> None:
-    assert set(recipes()) == {*USES, "A force or constraint"}
+    assert set(recipes()) == {*USES, "A force or constraint", "A translation"}
 
 
 def test_every_block_fits_the_sources(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 import importlib
 import json
+import re
 import shutil
 import sys
 from dataclasses import replace
@@ -14,6 +15,7 @@ from mathutils import Euler, Matrix, Vector
 from tiers import few_in_commits
 
 from hairloom.addon.blender.base.attributes import read_attribute
+from hairloom.addon.blender.base.outcome import past_reports
 from hairloom.addon.blender.base.parts import at_once
 from hairloom.addon.blender.command_line.command_line import run
 from hairloom.addon.blender.preview import previews
@@ -157,9 +159,11 @@ def test_fur_grows_on_the_selected_mesh_in_one_step() -> None:
 
 @pytest.mark.slow(instead="test_from_nothing_there_is_a_head_with_brows_and_lashes")
 @pytest.mark.usefixtures("few")
-def test_brows_from_nothing_come_once() -> None:
-    bpy.ops.hairloom.add_hairstyle(style="brows", plays=False)
-    assert {obj.name for obj in bpy.data.objects} == {"Head", "Head Brows"}
+@pytest.mark.parametrize("style", ["brows", "lashes"])
+def test_brows_and_lashes_from_nothing_come_once(style: str) -> None:
+    """With a head that has none of the other."""
+    bpy.ops.hairloom.add_hairstyle(style=style, plays=False)
+    assert {obj.name for obj in bpy.data.objects} == {"Head", f"Head {style.title()}"}
 
 
 @pytest.mark.usefixtures("few")
@@ -215,6 +219,14 @@ def test_from_nothing_there_is_a_head_with_brows_and_lashes() -> None:
     # the next one grows on the same head, whatever is active
     bpy.ops.hairloom.add_hairstyle(style="stubble", plays=False)
     assert sum(is_bust(obj) for obj in bpy.data.objects) == 1
+
+
+def test_landmarks_are_placed_once_and_the_report_counts_them(head: bpy.types.Object) -> None:
+    bpy.context.view_layer.objects.active = head
+    for said in (r"placed \d+ missing landmarks$", "it has all landmarks already$"):
+        head.select_set(True)
+        assert bpy.ops.hairloom.place_landmarks() == {"FINISHED"}
+        assert re.search(said, past_reports[-1].text)
 
 
 @pytest.mark.slow(

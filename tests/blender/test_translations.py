@@ -16,6 +16,13 @@ TEXTS_OF_ALL_KINDS = (
     "Colour and shine of the strands",
 )
 
+#: context -> what panels draw beside the names of operators and settings: a text, either of two,
+#: what a button or a field says while it is idle, a heading
+DRAWN = {
+    "*": ("No problems", "Hairstyles", "as the scene", "Cryptomatte"),
+    "Operator": ("Add Hair", "To Material", "Select a Head"),
+}
+
 
 def test_the_template_is_current(extension):
     path = translations.FOLDER / f"{translations.TEMPLATE}.json"
@@ -28,6 +35,8 @@ def test_texts_of_every_kind_are_found(extension):
     for text in TEXTS_OF_ALL_KINDS:
         assert text in found["*"], text
     assert "Make Cards" in found["Operator"] and "" not in found["*"]
+    for context, drawn in DRAWN.items():
+        assert set(drawn) <= set(found[context])
     assert "Bl Label" not in found["*"], "Blender translates its own"
 
 

@@ -316,7 +316,8 @@ class HAIRLOOM_PG_character(bpy.types.PropertyGroup):
             type=bpy.types.Collection,
             name="Colliders",
             description="Collection of the other objects that this hair or cloth stays out of; "
-            "each has its own. Empty: the surface alone. Read as Play begins",
+            "each has its own. Empty: for hair its surface alone, for cloth nothing. Read as Play "
+            "begins",
             override=OVERRIDABLE,
         ),
         "field_collection": PointerProperty(
