@@ -1,5 +1,7 @@
 """Fins in Blender: a mesh moves as cloth, and is bit for bit the same afterwards."""
 
+from pathlib import Path
+
 import bpy
 import numpy as np
 import pytest
@@ -23,6 +25,15 @@ def test_the_operator_adds_one_modifier_and_takes_the_active_group(flag):
     bpy.ops.hairloom.fin_add()
     assert other.modifiers[0].node_group == flag.modifiers[0].node_group
     assert len(bpy.data.node_groups) == 1
+
+
+def test_new_cloth_collides_with_nothing_as_the_page_says(flag, evaluated):
+    """Even where the hair of the scene has colliders."""
+    assert flag.hairloom.collider is None and flag.hairloom.collider_collection is None
+    assert started(flag, evaluated).obstacles.parts == []
+    page = (Path(__file__).parents[2] / "docs" / "dynamics.md").read_text(encoding="utf-8")
+    cloth = " ".join(page.partition("\n## Cloth\n")[2].partition("\n## ")[0].split())
+    assert "until you set one it collides with nothing" in cloth
 
 
 def test_removing_it_leaves_nothing(flag, evaluated):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import re
 from pathlib import Path
 
@@ -73,6 +74,23 @@ def test_the_list_of_the_readme_has_every_page_but_those_for_programmers() -> No
     pages = texts_of(REPOSITORY / "README.md").partition("\n## Pages\n")[2]
     listed = set(re.findall(r"\]\((docs/[^/)]+\.md)\)", pages))
     assert {f"docs/{page.name}" for page in (REPOSITORY / "docs").glob("*.md")} == listed
+
+
+def test_the_table_of_the_report_has_every_key_that_verbs_write() -> None:
+    """Those that stand in their code; of figures it says itself which there are."""
+    verbs = REPOSITORY / "addon" / "blender" / "command_line"
+    written = set()
+    for file in verbs.glob("*.py"):
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Call) and ast.unparse(node.func).endswith("facts.update"):
+                written |= {each.arg for each in node.keywords if each.arg}
+            if isinstance(node, ast.Subscript) and ast.unparse(node.value).endswith("report.facts"):
+                written |= {each.value for each in [node.slice] if isinstance(each, ast.Constant)}
+    page = (REPOSITORY / "docs" / "command-line.md").read_text(encoding="utf-8")
+    table = page.partition("\n## The report\n")[2].partition("\n## ")[0]
+    rows = " ".join(re.findall(r"^\| (`.+?) \|", table, flags=re.M))
+    assert {"held_strands", "drawn", "capabilities"} <= written
+    assert written <= set(re.findall("`([^`]+)`", rows))
 
 
 def test_every_picture_is_shown_and_small() -> None:

@@ -1,6 +1,7 @@
 """Fins: a mesh that moves as cloth keeps its edges, its pins and its energy."""
 
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -116,6 +117,14 @@ def test_normals_are_those_of_the_surface():
 
 
 # --------------------------------------------------------------------------------------- motion
+
+
+def test_distances_are_fractions_of_what_the_page_says():
+    points, _ = sheet(4, 40, 3.0)
+    quarter = 0.25 * np.linalg.norm(np.ptp(points, axis=0))
+    assert hanging(4, 40, 3.0).fabric.size == pytest.approx(quarter, rel=1e-6)
+    page = (Path(__file__).parents[3] / "docs" / "dynamics.md").read_text(encoding="utf-8")
+    assert "or of a quarter of the cloth's extent." in " ".join(page.split())
 
 
 @pytest.mark.slow
