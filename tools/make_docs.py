@@ -87,9 +87,11 @@ def make_pictures() -> None:
         write_small(Path(folder) / "ties_shake.png", IMAGES / "ponytail.jpg")
     tools = ("refinement", "preset", "shading", "volume", "engine", "styling")
     tools += ("hairstyle", "web_page", "tutorial", "cards", "shells", "motion")
-    for name in (*(f"{each}_pictures" for each in tools), "preset_thumbnails"):
-        tool = [sys.executable, str(REPOSITORY / "tools" / f"{name}.py")]
+    for name in tools:
+        tool = [sys.executable, str(REPOSITORY / "tools" / f"{name}_pictures.py")]
         subprocess.run([*tool, str(IMAGES)], check=True)
+    thumbnails = [sys.executable, str(REPOSITORY / "tools" / "preset_thumbnails.py")]
+    subprocess.run(thumbnails, check=True)
 
 
 def main() -> int:

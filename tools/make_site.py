@@ -101,9 +101,10 @@ def write_site(site: Path, repository: Path = REPOSITORY) -> Path:
 
 
 def _gather(repository: Path, pages: Path) -> None:
-    """Copy what becomes pages, the first of them with the menu."""
+    """Copy what becomes pages, the first of them with the menu, and the pictures of presets."""
     shutil.copytree(repository / "docs", pages / "docs")
-    for page in PAGES:
+    pictures = [each.relative_to(repository) for each in (repository / "presets").rglob("*.png")]
+    for page in (*PAGES, *pictures):
         (pages / page).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(repository / page, pages / page)
     with (pages / PAGES[0]).open("a", encoding="utf-8") as first:

@@ -1,13 +1,11 @@
 """Draws a thumbnail beside each preset that is not a look: dynamics, shadows and cards.
 
-python tools/preset_thumbnails.py FOLDER
+python tools/preset_thumbnails.py
 
-FOLDER gets presets.png, all of them on one sheet. Those of looks: tools/preset_pictures.py.
+Those of looks: tools/preset_pictures.py.
 """
 
-import sys
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import bpy  # noqa: F401  it must come before gpu, which lives inside it
@@ -48,12 +46,11 @@ def moved(rig: Any, dynamics: Any) -> tuple[Any, Any]:
     return motion.pose, motion_flow.strands_and_led(rig, motion)[0]
 
 
-def main(folder: Path) -> None:
+def main() -> None:
     gpu.init()
     load_package().register()
     presets = of_addon("blender.properties.presets")
     settings, rig = of_addon("parameters").ALL_SETTINGS, wig(STRANDS)
-    images = of_addon("blender.base.images")
     studio = studio_of(rig, presets.named_preset(LOOK).settings)
     plain = studio.settings
 
@@ -68,17 +65,14 @@ def main(folder: Path) -> None:
         shown = settings["card_drawing"](shown_as="cards")
         return plain.with_settings(chosen["cards"], atlas, shown), at_rest
 
-    sheet = []
     for section in ("dynamics", "volume", "cards"):
         for entry in presets.shipped(section):
             studio.settings, (pose, points) = look_and_motion(presets.named_preset(entry.name))
             size = THUMBNAIL, THUMBNAIL, SAMPLES
             picture = studio.picture(pose, points, *size, is_transparent=True)
             write_thumbnail(entry.path.with_suffix(".png"), picture)
-            sheet.append(picture)
             print(f"Drew {entry.name}", flush=True)
-    images.write_png(folder / "presets.png", images.contact_sheet(sheet, 5))
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    main()

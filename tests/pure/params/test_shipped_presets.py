@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -22,6 +23,24 @@ PRESETS = sorted(FOLDER.rglob("*.json"))
 
 def test_presets_ship() -> None:
     assert {path.parent.name for path in PRESETS} >= {"looks", "dynamics"}
+
+
+def test_the_quick_start_shows_each_preset_above_its_name() -> None:
+    """But looks and stages, which have sheets of their own."""
+    page = (FOLDER.parent / "docs" / "quick_start.md").read_text(encoding="utf-8")
+    rows = [line.strip("| ").split(" | ") for line in page.splitlines() if line.startswith("|")]
+    named: dict[str, str] = {}
+    for above, below in pairwise(row for row in rows if "---" not in row):
+        named |= {
+            link: name.strip(" *")
+            for picture, name in zip(above, below, strict=False)
+            for link in re.findall(r"\(\.\./presets/(\w+/\w+)\.png\)", picture)
+        }
+    assert named == {
+        f"{path.parent.name}/{path.stem}": json.loads(path.read_text(encoding="utf-8"))["title"]
+        for path in PRESETS
+        if path.parent.name not in ("looks", "stage")
+    }
 
 
 @pytest.mark.parametrize("path", PRESETS, ids=lambda path: path.stem)
