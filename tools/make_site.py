@@ -62,6 +62,7 @@ MENU = {
         "docs/figures",
         "docs/dev/shading",
         "docs/dev/dynamics",
+        "docs/dev/cards",
         "docs/dev/refinement",
         "docs/dev/hairstyles",
         "gpu_shaders/README",
@@ -104,9 +105,9 @@ def _gather(repository: Path, pages: Path) -> None:
     """Copy what becomes pages, the first of them with the menu, and the pictures of presets."""
     shutil.copytree(repository / "docs", pages / "docs")
     pictures = [each.relative_to(repository) for each in (repository / "presets").rglob("*.png")]
-    for page in (*PAGES, *pictures):
-        (pages / page).parent.mkdir(parents=True, exist_ok=True)
-        shutil.copy(repository / page, pages / page)
+    for file in (*map(Path, PAGES), *pictures):
+        (pages / file).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(repository / file, pages / file)
     with (pages / PAGES[0]).open("a", encoding="utf-8") as first:
         for title, names in MENU.items():
             lines = ("```{toctree}", ":hidden:", f":caption: {title}", "", *names, "```")

@@ -291,8 +291,9 @@ class DynamicsSettings(MotionSettings):
     jump_distance: float = number(
         3.0,
         label="Jump Distance",
-        description="Take a frame for a cut, across which hair goes along without speed, where its "
-        "roots move this much farther than in the frame before, in extents of the hair; 0: never",
+        description="Treat a frame as a cut if the roots move farther than in the frame before "
+        "by this many extents of the hair. The hair goes along without gaining speed. 0 turns this "
+        "off",
         soft=(0.0, 10.0),
         hard=(0.0, 1.0e6),
         panel="Shot",
@@ -300,8 +301,8 @@ class DynamicsSettings(MotionSettings):
     jump_turn: float = number(
         math.radians(120.0),
         label="Jump Turn",
-        description="Take a frame for a cut, across which hair goes along without speed, where its "
-        "roots turn by more than this; 0: never",
+        description="Treat a frame as a cut if the roots turn by more than this. The hair goes "
+        "along without gaining speed. 0 turns this off",
         soft=(0.0, math.pi),
         hard=(0.0, math.pi),
         unit="angle",

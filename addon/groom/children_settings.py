@@ -63,8 +63,8 @@ class ChildrenSettings(Settings):
     scatter: float = number(
         0.0,
         label="Scatter",
-        description="Take the shape of each child from hair up to this far away, at random, in "
-        "distances between guides, as fur needs it: its hairs differ from their neighbours",
+        description="How far away, in distances between guides, each child may take its shape "
+        "from, at random. Fur needs this: its hairs differ from their neighbours",
         soft=(0.0, 2.0),
         hard=(0.0, 100.0),
         shown_when=when("children.method", "multi"),

@@ -63,11 +63,11 @@ class HAIRLOOM_OT_fit_spheres(LongWork, bpy.types.Operator):
         report(
             self,
             "INFO",
-            f"{count} spheres in {fitted.collection.name}: "
-            f"{error.gap_mean * _MILLIMETRES:.1f} mm of the mesh stick out of them on average "
-            f"({error.gap_max * _MILLIMETRES:.1f} mm at most), they stick out of the mesh by "
+            f"{count} spheres in {fitted.collection.name}. "
+            f"The mesh sticks out of them by {error.gap_mean * _MILLIMETRES:.1f} mm on average "
+            f"(at most {error.gap_max * _MILLIMETRES:.1f} mm), they out of the mesh by "
             f"{error.outside_mean * _MILLIMETRES:.1f} mm "
-            f"({error.outside_max * _MILLIMETRES:.1f} mm at most)",
+            f"(at most {error.outside_max * _MILLIMETRES:.1f} mm)",
         )
 
 

@@ -109,7 +109,7 @@ _ENGINE = {
 
 
 class HAIRLOOM_OT_check_export(LongWork, bpy.types.Operator):
-    """Say what an engine will see of the hair, and write nothing. Esc cancels"""
+    """Show what an engine will receive, without writing a file. Esc cancels"""
 
     bl_idname = "hairloom.check_export"
     bl_label = "Check for Export"

@@ -17,7 +17,7 @@ from .verb import Verb
 
 
 def self_test(job: Job) -> None:
-    """Try out on this machine what Hairloom stands on: shaders, simulation, drawing and files."""
+    """Check that this machine has what Hairloom needs: shaders, simulation, drawing and files."""
     with job.report.stage("self-test"):
         checks = tests.run()
     job.report.facts["checks"] = [

@@ -45,8 +45,8 @@ def _verb_lines(verb: Verb, groups: Groups) -> Iterator[str]:
     yield from (f"## `{verb.name}`", "", verb.about, "")
     actions = [action for group in groups.values() for action in group]
     yield from _table(actions)
-    also = ["what to work on"] * verb.takes_hair + ["settings"] * verb.takes_settings + ["the job"]
-    yield f"And the options of {', '.join(also)} ([below](#options-that-verbs-share))."
+    also = ["What to work on"] * verb.takes_hair + ["Settings"] * verb.takes_settings + ["The job"]
+    yield f"It also takes the [shared options](#options-that-verbs-share): {', '.join(also)}."
     yield ""
 
 
