@@ -71,6 +71,29 @@ def test_pages_name_a_button_by_what_stands_on_it() -> None:
     assert wrong == []
 
 
+def test_each_button_is_named_on_a_page() -> None:
+    """By what stands on it, or by its operator's name, which is that of one with an icon alone.
+    Those of a dialog or a list of reports explain themselves."""
+    icons = {f"hairloom.{name}" for name in ("bake_free", "fin_remove", "remove_spheres")}
+    explained = ("hairloom.export_", "hairloom.import_", "hairloom.copy_reports")
+    text = " ".join(
+        " ".join(page.read_text(encoding="utf-8").split())
+        for page in PAGES
+        if page.name not in ("verbs.md", "parameters.md")
+    )
+    on_buttons = {name: {OPERATORS[name]} for name in icons} | buttons()
+    unnamed = [
+        name
+        for name, labels in on_buttons.items()
+        if name in OPERATORS and not name.startswith(explained)
+        if not any(
+            re.search(rf"\*([^*]* > )?{re.escape(each)}( > [^*]*)?\*", text)
+            for each in labels | {OPERATORS[name]}
+        )
+    ]
+    assert unnamed == []
+
+
 def test_what_pages_place_in_the_menu_of_objects_is_there(sphere: bpy.types.Object) -> None:
     texts: list[tuple[str, float]] = []
     bpy.context.view_layer.objects.active = sphere
