@@ -136,7 +136,7 @@ class Rig:
 
     strands: as many points as each needs, world space at rest; bound when there is a head.
     guides: (guide_count,) indices of the strands that are simulated.
-    guide_grid: (guide_count, cv_count, 3) [m], their centre lines, which are simulated.
+    guide_grid: (guide_count, cv_count, 3) [m], their centre lines, evenly, which are simulated.
     rest_frames: of all strands, or None without a head.
     notes: what the artist should know, each with its remedy.
     own_count: how many strands, the first ones, are the artist's own; children follow in the order

@@ -50,8 +50,6 @@ class Holds:
 
     def on_lines(self, strands: StrandSet, cv_count: int) -> Holds:
         """The same places on centre lines of `cv_count` CVs, see `strands.center_lines`."""
-        if (strands.point_counts == cv_count).all():
-            return self
         fraction, first = along(strands.points, strands.offsets), self.place.astype(np.int64)
         before = strands.offsets[self.strand] + first
         after = np.minimum(before + 1, strands.offsets[self.strand + 1] - 1)

@@ -16,7 +16,7 @@ import numpy as np
 
 from ..arrays import Floats
 from .arc_length import first_as_far
-from .resample import resample
+from .resample import evenly_spaced
 from .strand_set import StrandSet
 
 #: A strand that loses less of its length by resampling has no curls that its CVs cannot show.
@@ -28,11 +28,12 @@ _CHUNK = 32_768
 
 
 def center_lines(strands: StrandSet, cv_count: int) -> StrandSet:
-    """The same strands with `cv_count` CVs each, at equal fractions of their lengths; roots and
-    tips stay where they are. Strands that CVs can follow are merely resampled.
+    """The same strands with `cv_count` CVs each, at equal fractions of their lengths, also where
+    they have this many points: strands ride by these fractions. Roots and tips stay where they are.
+    Strands that CVs can follow are merely resampled.
     """
-    lines = resample(strands, cv_count)
-    if lines is strands or cv_count < 3:
+    lines = evenly_spaced(strands, cv_count)
+    if cv_count < 3:
         return lines
     length = strands.lengths()
     lost = np.flatnonzero(length - lines.lengths() > _FAITHFUL * length)

@@ -54,7 +54,7 @@ def test_no_strand_of_the_artist_is_lost(method: str) -> None:
 
 def test_at_rest_nothing_moves_and_each_guide_moves_itself() -> None:
     rig = rig_of(ChildrenSettings(method="multi", strand_count=200), sheet())
-    guides = rig.strands.grid[rig.guides]
+    guides = rig.guide_grid
     np.testing.assert_array_equal(
         motion_flow.strands_at(rig, rig.rest_pose, guides), rig.strands.points
     )

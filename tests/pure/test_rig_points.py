@@ -1,9 +1,11 @@
-"""`rig_flow.prepare`: what is said of strands that need more points than there are."""
+"""`rig_flow.prepare`: strands of any points, and what is said of those that need too many."""
 
 import numpy as np
+import pytest
 
-from hairloom.addon import rig_flow
+from hairloom.addon import motion_flow, rig_flow
 from hairloom.addon.groom.settings import GuideSettings
+from hairloom.addon.groom.ties import Holders, Tie
 from hairloom.addon.strands import StrandSet
 
 
@@ -24,3 +26,55 @@ def test_too_many_turns_are_counted_with_what_they_lose() -> None:
     # an even polygon of five segments a turn is by 6.5 % shorter than the circle
     lost = float(note.split("up to ")[1].split(" %")[0])
     assert abs(lost - 100.0 * (1.0 - np.sinc(100.0 / 511.0))) < 0.2
+
+
+def straight(count: int, lengthening: float) -> StrandSet:
+    """Eight strands down, 25 cm long, whose segments get longer to the tip by this factor each."""
+    steps = lengthening ** np.arange(count - 1)
+    place = np.concatenate([[0.0], np.cumsum(steps) / steps.sum()])
+    roots = np.arange(8)[:, None, None] * np.array([0.05, 0.0, 0.0])
+    points = (roots + place[:, None] * np.array([0.0, 0.0, -0.25])).reshape(-1, 3)
+    return StrandSet(points, np.arange(9) * count, np.full(8 * count, 4e-5), np.zeros(8))
+
+
+def bent(guides: np.ndarray) -> np.ndarray:
+    """Even guides that bend ever more towards the tip, in the plane of x and z."""
+    step = np.linalg.norm(np.diff(guides, axis=1), axis=2, keepdims=True)
+    angle = 1.5 * ((np.arange(step.shape[1]) + 0.5) / step.shape[1])[:, None] ** 2
+    away = np.concatenate([np.sin(angle), 0.0 * angle, -np.cos(angle)], axis=1)
+    moved = guides.copy()
+    moved[:, 1:] = guides[:, :1] + np.cumsum(step * away, axis=1)
+    return moved
+
+
+@pytest.mark.parametrize("count", [15, 16, 17])
+@pytest.mark.parametrize("lengthening", [1.0, 1.06, 1.3])
+def test_strands_go_with_their_guides_whatever_their_spacing(
+    count: int, lengthening: float
+) -> None:
+    """Also where they have as many points as guides have: each tip is on its own guide's."""
+    settings = GuideSettings(guide_count=8, cv_count=16)
+    rig = rig_flow.prepare(straight(count, lengthening), None, settings, place="wig")
+    step = np.linalg.norm(np.diff(rig.guide_grid, axis=1), axis=2)
+    np.testing.assert_allclose(step, 0.25 / 15, rtol=1e-4)
+    now = bent(rig.guide_grid)
+    strands = motion_flow.strands_at(rig, rig.rest_pose, now)
+    tips = strands[rig.strands.offsets[1:] - 1][rig.guides]
+    assert np.linalg.norm(now[:, -1] - rig.guide_grid[:, -1], axis=1).min() > 0.1
+    assert np.linalg.norm(tips - now[:, -1], axis=1).max() < 0.01 * 0.25
+
+
+@pytest.mark.parametrize("count", [16, 17])
+def test_guides_are_held_where_their_strands_are(count: int) -> None:
+    """A ring 10 cm below the roots, around strands whose points lie close there."""
+    shape = np.diag([0.3, 0.3, 0.3, 1.0])
+    shape[:3, 3] = [0.175, 0.0, -0.1]
+    rig = rig_flow.prepare(
+        straight(count, 1.2),
+        None,
+        GuideSettings(guide_count=8, cv_count=16),
+        place="wig",
+        holders=Holders((Tie("Ring", shape),)),
+    )
+    assert rig.guide_holds is not None
+    np.testing.assert_allclose(rig.guide_holds.place, 15 * 0.1 / 0.25, atol=1e-3)

@@ -58,9 +58,12 @@ def test_what_cvs_can_follow_is_merely_resampled() -> None:
     assert not np.array_equal(lines.grid[2], plain.grid[2])
 
 
-def test_strands_of_that_many_points_are_returned_as_they_are() -> None:
-    strands = resample(coils((20,)), 16)
-    assert center_lines(strands, 16) is strands
+def test_strands_of_that_many_points_become_even_too() -> None:
+    """As those of any other count: strands ride by how far along their guides they are."""
+    place = np.linspace(0.0, 1.0, 16) ** 2
+    straight = strand_set(place[None, :, None] * np.array([0.0, 0.0, -0.25]))
+    lines = center_lines(straight, 16).grid
+    np.testing.assert_allclose(lines[0, :, 2], -0.25 * np.linspace(0.0, 1.0, 16), atol=1e-7)
 
 
 def test_the_mean_is_that_of_the_strand_around_each_cv() -> None:
