@@ -70,7 +70,7 @@ class Widths:
     """How wide the strands of a groom are, and what one of them stands for.
 
     is_found: whether the widths were found, rather than being the groom's own.
-    median: the width of the median strand at its root [m].
+    median: the width of the median strand where it is widest [m].
     hairs: how many hairs a strand stands for.
     extinction: factor on the light that a strand blocks. It is above 1 where few strands stand for
         more hairs than it could be wide without looking like a ribbon.
@@ -127,7 +127,7 @@ def with_widths(
     """
     if not strands.strand_count:
         return strands, Widths()
-    own = 2.0 * strands.radius[strands.offsets[:-1]]
+    own = 2.0 * np.maximum.reduceat(strands.radius, strands.offsets[:-1])
     median = float(np.median(own))
     if method == "own":
         return strands, Widths(False, median)

@@ -17,6 +17,8 @@ from .strand_set import DEFAULT_RADIUS, StrandSet
 SHORTEST_STRAND = 1.0e-6
 #: A radius that is larger than the median of all by this factor is a broken number.
 _STRAY = 100.0
+#: A tip that ends in a point is as wide as this part of the median of all: no width is no fibre.
+_POINTED = 1.0e-3
 #: A point farther from the origin is a broken number, of hair of any size [m].
 FARTHEST_POINT = 1.0e6
 
@@ -46,8 +48,8 @@ def clean(
     Args:
         points: (point_count, 3) [m].
         offsets: (curve_count + 1,), ascending from 0 to point_count.
-        radius: (point_count,) [m]; a median takes the place of those that are not finite, not
-            positive or far larger than the others, and 0.04 mm where there is none.
+        radius: (point_count,) [m]; 0 where a strand ends in a point becomes very small. A median
+            replaces those that are no radii, see `are_widths`, and 0.04 mm where there is none.
         group: (curve_count,); absent: one group, 0.
         root_uv: (curve_count, 2); values that are not finite become 0.
         color: (point_count, 3) scene-linear; see `usable_colors`.
@@ -86,10 +88,10 @@ def clean(
     strands = StrandSet(
         points=points[point_kept],
         offsets=np.concatenate([[0], np.cumsum(counts[kept])]).astype(np.int32),
-        radius=_usable_radius(radius, len(points))[point_kept],
+        radius=_usable_radius(radius, offsets)[point_kept],
         group=np.zeros(len(kept), np.int32) if group is None else np.asarray(group)[kept],
         root_uv=None if root_uv is None else np.nan_to_num(root_uv, posinf=0, neginf=0)[kept],
-        has_widths=radius is not None and bool(are_widths(np.asarray(radius)).any()),
+        has_widths=radius is not None and bool(are_widths(np.asarray(radius), offsets).any()),
         color=None if color is None else color[point_kept],
         seed=None if seed is None else np.asarray(seed)[kept],
     )
@@ -130,22 +132,28 @@ def _no_length(points: Floats, offsets: Ints) -> Bools:
     return (box <= SHORTEST_STRAND * away.max(axis=1, keepdims=True)).all(axis=1)
 
 
-def _usable_radius(radius: Floats | None, point_count: int) -> Floats:
+def _usable_radius(radius: Floats | None, offsets: Ints) -> Floats:
     if radius is None:
-        return np.full(point_count, DEFAULT_RADIUS, np.float32)
+        return np.full(offsets[-1], DEFAULT_RADIUS, np.float32)
     radius = np.asarray(radius, np.float32)
-    is_width = are_widths(radius)
-    known = _middle(radius[is_width]) if is_width.any() else np.float32(DEFAULT_RADIUS)
-    return np.where(is_width, radius, known)
+    is_width = are_widths(radius, offsets)
+    is_positive = is_width & (radius > 0.0)
+    known = _middle(radius[is_positive]) if is_positive.any() else np.float32(DEFAULT_RADIUS)
+    return np.where(is_positive, radius, np.where(is_width, known * np.float32(_POINTED), known))
 
 
-def are_widths(radius: Floats) -> Bools:
+def are_widths(radius: Floats, offsets: Ints) -> Bools:
     """Which of these can be radii or widths of one groom: those that are finite, positive, and not
-    far larger than the others."""
+    far larger than the others, and 0 in a strand that has others, which is pointed there.
+
+    Args:
+        radius: (point_count,). offsets: (strand_count + 1,), see `clean`.
+    """
     is_width: Bools = np.isfinite(radius) & (radius > 0.0)
     if is_width.any():
         is_width &= radius <= _STRAY * _middle(radius[is_width])
-    return is_width
+    has_others = np.repeat(_any_per_curve(is_width, offsets), np.diff(offsets))
+    return is_width | (has_others & (radius == 0.0))
 
 
 def _middle(values: Floats) -> Floats:

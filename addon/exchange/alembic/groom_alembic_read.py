@@ -15,7 +15,6 @@ from typing import Any
 
 import numpy as np
 
-from ...arrays import Floats
 from ...errors import HairloomError
 from ...strands.clean import clean
 from ..files.file_space import FileSpace
@@ -132,7 +131,9 @@ def _groom(curves: Joined, space: FileSpace, path: Path, notes: list[str]) -> Gr
     # What overflows becomes infinite, and what is not finite is dropped and counted.
     with np.errstate(over="ignore", invalid="ignore"):
         points = space.from_file(curves.points)
-        radius = None if curves.widths is None else _radius(curves.widths, space)
+        radius = None
+        if curves.widths is not None:
+            radius = curves.widths.astype(np.float32) / np.float32(2.0 * space.per_metre)
         cleaned = clean(
             points,
             curves.offsets,
@@ -166,15 +167,6 @@ def _groom(curves: Joined, space: FileSpace, path: Path, notes: list[str]) -> Gr
         source=path,
         **optional,
     )
-
-
-def _radius(widths: Floats, space: FileSpace) -> Floats:
-    """Of a strand that ends in a point the tip stays thin; where no width is known NaN, which
-    `clean` replaces."""
-    radius = widths.astype(np.float32) / np.float32(2.0 * space.per_metre)
-    if not (radius > 0.0).any():
-        return np.full_like(radius, np.nan)
-    return np.where(radius == 0.0, np.float32(1.0e-7), radius)
 
 
 def _version(found: Arrays) -> str:

@@ -140,7 +140,7 @@ def _radius(
         return None, ()
     with np.errstate(over="ignore", invalid="ignore"):
         radius = radius * np.float32(0.5 * scale)
-    wrong = int((~are_widths(radius)).sum())
+    wrong = int((~are_widths(radius, values.on_curves.offsets)).sum())
     notes = (f"{wrong:,} widths are none of hair and were replaced",) if wrong else ()
     return radius, notes
 

@@ -473,7 +473,7 @@ def test_widths_of_nothing_are_hair_and_tips_stay_thin(tmp_path: Path) -> None:
     path, hair = tmp_path / "a.abc", straight(3)
     for width, expected in (
         ([0.0, 0.0, 0.0], [DEFAULT_RADIUS] * 3),
-        ([6e-5, 3e-5, 0.0], [3e-5, 1.5e-5, 1e-7]),
+        ([6e-5, 3e-5, 0.0], [3e-5, 1.5e-5, 3e-8]),
     ):
         archive = Abc.OArchive(str(path))
         schema = AbcGeom.OCurves(archive.getTop(), "hair").getSchema()

@@ -108,6 +108,15 @@ def test_own_widths_are_kept_where_they_can_be_hair() -> None:
         assert with_widths(own, method)[1].is_found == is_found
 
 
+def test_own_widths_of_strands_that_are_pointed_at_both_ends_are_kept() -> None:
+    strands = head_of_hair(20_000, has_widths=True)
+    place = np.linspace(0.0, 1.0, strands.point_count // 20_000)
+    spindle = np.tile(1e-4 * np.sin(np.pi * place), 20_000)
+    own = clean(strands.points, strands.offsets, radius=spindle).strands
+    kept, widths = with_widths(own)
+    assert kept is own and not widths.is_found
+
+
 @pytest.mark.alike
 @pytest.mark.parametrize(("radius", "why"), [(4e-6, "bald"), (0.5, "bury"), (5e-3, "bury")])
 def test_widths_that_cannot_be_hair_are_found(radius: float, why: str) -> None:
@@ -122,9 +131,9 @@ def test_numbers_that_are_no_widths_are_not_known(bad: float) -> None:
     strands = head_of_hair(500)
     cleaned = clean(strands.points, strands.offsets, radius=np.full(strands.point_count, bad))
     assert not cleaned.strands.has_widths
-    some = np.full(strands.point_count, 2e-4)
+    some = np.full((500, strands.point_count // 500), 2e-4)
     some[::2] = bad
-    mixed = clean(strands.points, strands.offsets, radius=some).strands
+    mixed = clean(strands.points, strands.offsets, radius=some.ravel()).strands
     assert mixed.has_widths and np.allclose(mixed.radius, 2e-4)
 
 

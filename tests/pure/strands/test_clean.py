@@ -72,3 +72,21 @@ def test_an_empty_curve_at_the_end_is_dropped_and_spares_its_neighbour() -> None
     cleaned = clean(*flat([STRAIGHT, []]))
     assert cleaned.strands.strand_count == 1
     assert cleaned.dropped == {"fewer than two points": 1}
+
+
+def test_a_strand_that_ends_in_a_point_stays_pointed() -> None:
+    """At its tip, or at both ends; what is no width at all is as wide as most of the hair."""
+    points = np.zeros((20, 3))
+    points[:, 2] = np.arange(20)
+    tapered, spindle = np.linspace(1e-2, 0.0, 5), np.float64([0.0, 2e-3, 1e-2, 2e-3, 0.0])
+    broken = np.float64([1e-2, -1.0, np.nan, 1e3, 0.0])
+    radius = np.concatenate([tapered, spindle, np.zeros(5), broken])
+    cleaned = clean(points, np.arange(5) * 5, radius=radius).strands.radius.reshape(4, 5)
+    median = 7.5e-3
+    assert (np.diff(cleaned[0]) < 0.0).all()
+    np.testing.assert_allclose(cleaned[0, :-1], tapered[:-1])
+    np.testing.assert_allclose(cleaned[1, 1:-1], spindle[1:-1])
+    assert (cleaned > 0.0).all()
+    assert cleaned[[0, 1, 1, 3], [4, 0, 4, 4]].max() < 1e-2 * median
+    np.testing.assert_allclose(cleaned[2], median)
+    np.testing.assert_allclose(cleaned[3, 1:4], median)
