@@ -1,15 +1,24 @@
 """Hair curves in and out of Blender."""
 
 import math
+from itertools import pairwise
 
 import bpy
 import numpy as np
 import pytest
 from mathutils import Euler, Matrix
 
-from hairloom.addon.blender.scene.curves import read_curves, write_curves
+from hairloom.addon.blender.base.attributes import set_attribute
+from hairloom.addon.blender.scene.curves import (
+    read_curves,
+    read_own_curves,
+    unfit_curves,
+    write_curves,
+    write_own_curves,
+)
 from hairloom.addon.blender.scene.curves_motion import store_motion
 from hairloom.addon.errors import HairloomError
+from hairloom.addon.refine.smooth import points_at
 from hairloom.addon.strands import StrandSet
 from hairloom.addon.strands.clean import clean
 
@@ -99,8 +108,8 @@ def test_modifiers_are_applied(evaluated):
         ("GeometryNodeSetPosition", {"Offset": (0.0, 0.0, 1.0)}),
         ("GeometryNodeResampleCurve", {"Count": 5}),
     )
+    assert len(obj.evaluated_get(evaluated()).data.points) == 10
     read = read_curves(obj, evaluated()).strands
-    assert read.point_counts.tolist() == [5, 5]
     assert read.roots == pytest.approx(strands.roots + np.array([0.0, 0.0, 1.0]), abs=1e-6)
 
 
@@ -230,3 +239,115 @@ def test_imported_motion_goes_straight_from_frame_to_frame_on_both_sides_of_0(ne
         read = read_curves(hair, evaluated()).strands
         expected = rest + [10.0 + np.clip(time, -2.0, 2.0), 0.0, 0.0]
         np.testing.assert_allclose(read.points, expected, atol=2e-6, err_msg=f"{time}")
+
+
+ZIGZAG = 0.05 * np.array([[0, 0, 0], [1, 0, 1], [0, 0.2, 2], [1, 0, 3], [0, 0, 4], [1, 0.5, 5]])
+
+
+def typed(kind, points=ZIGZAG, **attributes):
+    """Two curves of this type, the second straight up, with radii that grow to the tip."""
+    straight = np.linspace(0.0, 0.4, len(points))[:, None] * [0, 0, 1] + [1.0, 0, 0]
+    obj = raw_curves(np.concatenate([points, straight]), (len(points),) * 2)
+    curves = obj.data
+    curves.set_types(type=kind)
+    set_attribute(curves, "radius", "POINT", np.tile(np.linspace(1e-3, 2e-3, len(points)), 2))
+    for name, values in attributes.items():
+        domain = "CURVE" if len(values) == 2 else "POINT"
+        if name in ("nurbs_order", "knots_mode"):
+            attribute = curves.attributes.new(name, "INT8", domain)
+            attribute.data.foreach_set("value", np.asarray(values, np.int32))
+        else:
+            set_attribute(curves, name, domain, np.asarray(values))
+    return obj
+
+
+HANDLES = {
+    name: np.concatenate([ZIGZAG, ZIGZAG + [1.0, 0, 0]]) + side * np.array([0.015, 0.01, 0.01])
+    for name, side in (("handle_left", -1.0), ("handle_right", 1.0))
+}
+WEIGHTS = np.tile(np.float32([1.0, 3.0, 1.0, 0.5, 1.0, 1.0]), 2)
+
+
+@pytest.mark.parametrize(
+    ("kind", "attributes"),
+    [
+        ("POLY", {}),
+        ("BEZIER", HANDLES),
+        ("BEZIER", {**HANDLES, "resolution": np.int32([24, 24])}),
+        ("NURBS", {}),
+        ("NURBS", {"nurbs_order": [3, 3], "nurbs_weight": WEIGHTS}),
+        ("NURBS", {"nurbs_order": [6, 6], "knots_mode": [1, 1]}),
+        ("NURBS", {"nurbs_order": [4, 2], "knots_mode": [1, 1], "nurbs_weight": WEIGHTS}),
+        ("NURBS", {"nurbs_order": [4, 4], "knots_mode": [2, 2]}),
+        ("NURBS", {"nurbs_order": [3, 3], "knots_mode": [3, 2]}),
+        ("NURBS", {"nurbs_order": [7, 7]}),
+    ],
+)
+def test_curves_of_every_type_are_where_blender_draws_them(kind, attributes, evaluated):
+    """Against Blender's own conversion to a mesh, within 1 mm all along curves of 35 cm."""
+    obj = typed(kind, **attributes)
+    read = read_curves(obj, evaluated())
+    assert read.dropped == {}
+    obj.select_set(True)
+    bpy.context.view_layer.objects.active = obj
+    bpy.ops.object.convert(target="MESH")
+    mesh = bpy.context.object.data
+    vertex = np.array([each.co for each in mesh.vertices])
+    for number, strand in enumerate(read.strands.strands()):
+        drawn = smoothed(strand)
+        own = vertex[vertex[:, 0] > 0.7] if number else vertex[vertex[:, 0] <= 0.7]
+        line = np.concatenate([np.linspace(a, b, 60) for a, b in pairwise(own)])
+        away = np.linalg.norm(drawn[:, None] - line[None], axis=2)
+        assert away.min(axis=1).max() < 1e-3, "nothing is drawn beside the curve"
+        assert away.min(axis=0).max() < 2e-3, "and all of it is drawn"
+        np.testing.assert_allclose(strand[[0, -1]], own[[0, -1]], atol=1e-5)
+    radius = read.strands.radius.reshape(2, -1)[0] if read.strands.is_uniform else None
+    if radius is not None:
+        assert (np.diff(radius) >= 0.0).all() and 1e-3 <= radius[0] < radius[-1] <= 2e-3
+
+
+def smoothed(strand):
+    """Points along the curve that is drawn of a strand (count, 3)."""
+    u = np.tile(np.linspace(0.0, 1.0, 80), len(strand) - 1)
+    segment = np.repeat(np.arange(len(strand) - 1), 80)
+    return points_at(strand[None], np.zeros(len(u), int), segment, u)
+
+
+def test_curves_that_are_no_hair_are_named(evaluated):
+    closed = typed("BEZIER", cyclic=np.array([True, False]), **HANDLES)
+    assert read_curves(closed, evaluated()).dropped == {"no end (Toggle Cyclic opens them)": 1}
+    own = read_own_curves(closed, evaluated())
+    assert own.kept.tolist() == [1] and own.strands.point_count == 6
+
+
+def test_custom_knots_are_named(extension):
+    """Without evaluating them: Blender crashes where there are none."""
+    curves = bpy.data.hair_curves.new("NURBS")
+    curves.add_curves([6, 6])
+    curves.set_types(type="NURBS")
+    knots = curves.attributes.new("knots_mode", "INT8", "CURVE")
+    knots.data.foreach_set("value", [4, 0])
+    ((reason, which),) = unfit_curves(curves).items()
+    assert reason.startswith("knots of their own") and which.tolist() == [True, False]
+    curves.set_types(type="POLY")
+    assert unfit_curves(curves) == {}
+
+
+def test_curves_of_several_types_keep_their_order_and_points(evaluated):
+    """Catmull-Rom curves among others stay bit for bit."""
+    obj = typed("CATMULL_ROM")
+    obj.data.set_types(type="NURBS", indices=[1])
+    read = read_curves(obj, evaluated()).strands
+    counts = read.point_counts.tolist()
+    assert counts[0] == 6 and counts[1] > 6
+    np.testing.assert_array_equal(read.points[:6], ZIGZAG.astype(np.float32))
+
+
+def test_handles_go_with_the_points_that_are_combed(evaluated):
+    """Combing, settling and trimming move points: the curve keeps its shape there."""
+    obj = typed("BEZIER", **HANDLES)
+    before = read_curves(obj, evaluated()).strands.points.copy()
+    own = read_own_curves(obj, evaluated())
+    write_own_curves(obj, own, own.strands.points + np.float32([0, 0.2, 0]), evaluated())
+    after = read_curves(obj, evaluated()).strands.points
+    np.testing.assert_allclose(after, before + [0, 0.2, 0], atol=1e-6)

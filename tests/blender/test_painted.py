@@ -117,6 +117,22 @@ def test_each_kind_of_map_is_what_guides_are_painted_with(
     assert (np.median(widths), widths.max()) == pytest.approx((1.0, 1.0), abs=1e-6)
 
 
+def test_points_of_nurbs_are_painted_where_they_are_drawn(
+    hair: Any, sphere: Any, evaluated: Any
+) -> None:
+    paint("point", hair, sphere)
+    hair.data.set_types(type="NURBS")
+    ends = hair.data.attributes.new("knots_mode", "INT8", "CURVE")
+    ends.data.foreach_set("value", [1] * len(ends.data))  # it reaches its first and last point
+    hair.hairloom.dynamics.style_root_mask = "Top"
+    session = started(hair, evaluated)
+    assert session.warnings == ()
+    found = factors(session)["style_root"]
+    height = session.rig.strands.roots[session.rig.guides, 2]
+    assert 0.0 < found.mean() < 1.0
+    assert found[:, height > FAR].mean() > 0.99 and found[:, height < -FAR].mean() < 0.01
+
+
 def test_what_is_painted_moves_otherwise(hair: Any, sphere: Any, evaluated: Any) -> None:
     """Stiff above and limp below, on a head that is moved aside."""
     scene, dynamics = bpy.context.scene, hair.hairloom.dynamics

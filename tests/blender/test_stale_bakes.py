@@ -162,3 +162,11 @@ def test_widths_that_were_edited_make_a_bake_out_of_date(baked: Any, changed: An
     for value in hair.data.attributes["radius"].data:
         value.value *= 2.0
     assert "hair" in changed()
+
+
+def test_curves_of_another_type_make_a_bake_out_of_date(baked: Any, changed: Any) -> None:
+    hair, _ = baked
+    hair.data.set_types(type="NURBS")
+    assert "hair" in changed()
+    hair.data.set_types(type="CATMULL_ROM")
+    assert changed() == ()

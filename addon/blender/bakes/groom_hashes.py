@@ -31,6 +31,7 @@ from ..properties.groom_settings import GroomSettings
 from ..properties.properties import settings_of
 from ..scene.curves import (
     GROUP_ATTRIBUTES,
+    SHAPE_ATTRIBUTES,
     VALUE_ATTRIBUTES,
     curve_offsets,
     curve_points,
@@ -265,6 +266,10 @@ def _curves_parts(hair: bpy.types.Object) -> tuple[Floats | Ints | str, ...]:
             values = read_attribute(curves, name, domain, size)
             if values is not None:
                 parts.append(values)
+    for name, domain, size in SHAPE_ATTRIBUTES:
+        values = read_attribute(curves, name, domain, size)
+        if values is not None:
+            parts.append(values)
     return tuple(parts)
 
 

@@ -7,12 +7,13 @@ from typing import Any
 import bpy
 import numpy as np
 
-from ...arrays import Floats, Ints, number_in_piece
+from ...arrays import Bools, Floats, Ints, number_in_piece
 from ...errors import HairloomError
 from ...groom.widths import with_widths
 from ...strands import StrandSet
 from ...strands.affine import mean_scale, moved
 from ...strands.clean import Cleaned, clean
+from ...strands.curve_types import CurveShapes, CurveType, DrawnCurves, Knots, drawn_curves
 from ..base.attributes import read_attribute, set_attribute
 from ..base.objects import link_into
 
@@ -30,6 +31,18 @@ VALUE_ATTRIBUTES = (
     (SEED_ATTRIBUTE, 1),
     (COLOR_ATTRIBUTE, 4),
 )
+#: What Blender keeps of curves that are not all open Catmull-Rom curves: of each curve, or of each
+#: of their points.
+SHAPE_ATTRIBUTES = (
+    ("curve_type", "CURVE", 1),
+    ("cyclic", "CURVE", 1),
+    ("resolution", "CURVE", 1),
+    ("nurbs_order", "CURVE", 1),
+    ("knots_mode", "CURVE", 1),
+    ("nurbs_weight", "POINT", 1),
+    ("handle_left", "POINT", 3),
+    ("handle_right", "POINT", 3),
+)
 _REMEDIES = {
     "CURVE": "Convert them: Object > Convert > Curves (hair)",
     "MESH": "Select hair curves; particle hair converts by Object > Convert > Curves (hair)",
@@ -38,19 +51,21 @@ _REMEDIES = {
 
 def read_curves(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Cleaned:
     """The hair as Blender shows it after all modifiers, in world space, without unusable curves.
+    Curves of all types have points on the curve, see `curve_types`.
 
     Raises:
         HairloomError: the object holds no hair curves.
     """
     _check_curves(obj)
     evaluated = obj.evaluated_get(depsgraph)
-    return _read(evaluated.data, np.array(evaluated.matrix_world))
+    curves = evaluated.data
+    return _read(curves, np.array(evaluated.matrix_world), drawn=curves_as_drawn(curves))
 
 
 def read_own_curves(
     obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, points: Floats | None = None
 ) -> Cleaned:
-    """The same before all modifiers, as brushes comb it.
+    """The same before all modifiers, as brushes comb it: by control points, whatever their type.
 
     Args:
         points: (point_count, 3) object space, instead of the curves' own.
@@ -74,20 +89,78 @@ def _check_curves(obj: bpy.types.Object) -> None:
         )
 
 
-def _read(curves: bpy.types.Curves, matrix: Floats, points: Floats | None = None) -> Cleaned:
+def _read(
+    curves: bpy.types.Curves,
+    matrix: Floats,
+    points: Floats | None = None,
+    drawn: DrawnCurves | None = None,
+) -> Cleaned:
+    """Args: drawn: the points to take in place of control points."""
     radius = read_attribute(curves, "radius", "POINT")
+    color, offsets = _colors(curves), curve_offsets(curves)
     group = next(
         filter(_is_there, (read_attribute(curves, n, "CURVE") for n in GROUP_ATTRIBUTES)), None
     )
+    if points is None:
+        points = curve_points(curves) if drawn is None else drawn.points
+    if drawn is not None:
+        offsets = drawn.offsets
+        radius = None if radius is None else drawn.of(radius)
+        color = None if color is None else drawn.of(color)
     return clean(
-        moved(curve_points(curves) if points is None else points, matrix),
-        curve_offsets(curves),
+        moved(points, matrix),
+        offsets,
         radius=None if radius is None else radius * np.float32(mean_scale(matrix)),
         group=group,
         root_uv=read_attribute(curves, "surface_uv_coordinate", "CURVE", 2),
-        color=_colors(curves),
+        color=color,
         seed=_seeds(curves),
+        unfit=unfit_curves(curves),
     )
+
+
+def curves_as_drawn(curves: bpy.types.Curves) -> DrawnCurves | None:
+    """Points on the curves, object space; None where these are their own, as on Catmull-Rom
+    curves."""
+    kind = read_attribute(curves, "curve_type", "CURVE")
+    if kind is None or not (kind != CurveType.CATMULL_ROM).any():
+        return None
+    points, offsets = curve_points(curves), curve_offsets(curves)
+    found = {
+        name: read_attribute(curves, name, domain, width)
+        for name, domain, width in SHAPE_ATTRIBUTES
+    }
+
+    def of_curves(name: str, default: int) -> Ints:
+        values = found[name]
+        return np.full(len(kind), default, np.int32) if values is None else values
+
+    left, right, weight = (found[n] for n in ("handle_left", "handle_right", "nurbs_weight"))
+    shapes = CurveShapes(
+        kind,
+        # what Blender takes where a curve says nothing
+        of_curves("resolution", 12),
+        of_curves("nurbs_order", 4),
+        of_curves("knots_mode", Knots.NORMAL),
+        np.ones(len(points), np.float32) if weight is None else weight,
+        points if left is None else left,
+        points if right is None else right,
+    )
+    return drawn_curves(points, offsets, shapes)
+
+
+def unfit_curves(curves: bpy.types.Curves) -> dict[str, Bools]:
+    """What is no hair, or cannot be read: reason -> (curve_count,) which curves."""
+    found = {}
+    cyclic = read_attribute(curves, "cyclic", "CURVE")
+    if cyclic is not None and cyclic.any():
+        found["no end (Toggle Cyclic opens them)"] = cyclic
+    kind, knots = (read_attribute(curves, name, "CURVE") for name in ("curve_type", "knots_mode"))
+    if kind is not None and knots is not None:
+        is_custom = (kind == CurveType.NURBS) & (knots == Knots.CUSTOM)
+        if is_custom.any():
+            found["knots of their own (set another Knot Mode)"] = is_custom
+    return found
 
 
 def write_own_curves(
@@ -108,7 +181,11 @@ def write_own_curves(
 
 
 def put_points(curves: bpy.types.Curves, points: Floats) -> None:
-    """Move all points, (point_count, 3) [m] object space."""
+    """Move all points, (point_count, 3) [m] object space, and Bezier curves' handles with them."""
+    for name in ("handle_left", "handle_right"):
+        handles = read_attribute(curves, name, "POINT", 3)
+        if handles is not None:
+            set_attribute(curves, name, "POINT", handles + (points - curve_points(curves)))
     curves.position_data.foreach_set("vector", np.ascontiguousarray(points, np.float32).ravel())
     curves.update_tag()
 

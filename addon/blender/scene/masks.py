@@ -38,7 +38,7 @@ from ..base.vertex_weights import (
     read_weights,
     weights_on,
 )
-from .curves import curve_offsets
+from .curves import curve_offsets, curves_as_drawn
 from .surfaces import evaluated_mesh, read_surface
 
 
@@ -207,7 +207,10 @@ class Canvas:
             return None
         values, domain = found
         values = usable(values, name, self.hair.name)
-        offsets, strands = curve_offsets(curves), self.strands
+        drawn, strands = curves_as_drawn(curves), self.strands
+        offsets = curve_offsets(curves) if drawn is None else drawn.offsets
+        if drawn is not None and domain == "POINT":
+            values = drawn.of(values)
         counts = np.diff(offsets)
         is_known = self.kept.max(initial=-1) < len(counts)
         if not (is_known and np.array_equal(counts[self.kept], strands.point_counts)):

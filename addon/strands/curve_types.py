@@ -1,0 +1,231 @@
+"""Curves of other types than Catmull-Rom: from control points to the points that Blender draws.
+
+Strands are smooth curves through their points, as Catmull-Rom curves are. So those of other types
+get points on the curve: Bezier curves and NURBS where Blender evaluates them, polygons more where
+their corners are sharp. Handles lie beside each point of a Bezier curve; knots of NURBS are those
+of Blender's modes, see its `curve_nurbs.cc`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+
+from ..arrays import Bools, Floats, Ints
+
+
+class CurveType(IntEnum):
+    """Blender's numbers."""
+
+    CATMULL_ROM = 0
+    POLY = 1
+    BEZIER = 2
+    NURBS = 3
+
+
+class Knots(IntEnum):
+    """Where the knots of a NURBS curve lie; Blender's numbers."""
+
+    NORMAL = 0
+    ENDPOINT = 1
+    BEZIER = 2
+    ENDPOINT_BEZIER = 3
+    CUSTOM = 4
+
+
+#: A smooth curve leaves a corner by this part of its pieces times how far directions differ there.
+_ROUNDING = 2.0 / 27.0
+#: A polygon may be rounded by this part of its length. Blender's Resample Curve makes polygons of
+#: all curves, and those of hair stay as they are.
+_ROUNDED = 2.0e-3
+#: Pieces that a segment of a polygon gets at most.
+_MAX_PIECES = 64
+
+
+@dataclass(frozen=True, eq=False)
+class CurveShapes:
+    """What curves are beside their points.
+
+    kind: (curve_count,) of `CurveType`. knots: of `Knots`. order: NURBS', one more than the degree.
+    resolution: (curve_count,) pieces of each segment of a Bezier or NURBS curve.
+    weight: (point_count,) NURBS'.
+    left, right: (point_count, 3) handles, in the space of the points.
+    """
+
+    kind: Ints
+    resolution: Ints
+    order: Ints
+    knots: Ints
+    weight: Floats
+    left: Floats
+    right: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class _Alike:
+    """Some curves that are evaluated by the same matrix.
+
+    inner: (n, count) their control points. outer: (n, samples) their points.
+    mix: (samples, count) how values at control points are blended.
+    weight: (n, count) by which they are multiplied first; None: by 1.
+    """
+
+    inner: Ints
+    outer: Ints
+    mix: Floats
+    weight: Floats | None = None
+
+    def of(self, values: Floats) -> Floats:
+        """(n, samples, width) from values of control points (point_count, width)."""
+        some = values[self.inner].astype(np.float64)
+        if self.weight is None:
+            return np.asarray(self.mix @ some)
+        whole = self.mix @ self.weight[..., None]
+        return np.asarray((self.mix @ (some * self.weight[..., None])) / whole)
+
+
+@dataclass(frozen=True, eq=False)
+class DrawnCurves:
+    """points: (point_count, 3) on the curves. offsets: (curve_count + 1,), where each begins."""
+
+    points: Floats
+    offsets: Ints
+    _parts: tuple[_Alike, ...]
+
+    def of(self, values: Floats) -> Floats:
+        """Values at these points, (point_count, ...) float32, from those at control points."""
+        flat = values.reshape(len(values), -1)
+        found = np.empty((self.offsets[-1], flat.shape[1]), np.float32)
+        for part in self._parts:
+            found[part.outer] = part.of(flat)
+        return found.reshape(-1, *values.shape[1:])
+
+
+def drawn_curves(points: Floats, offsets: Ints, shapes: CurveShapes) -> DrawnCurves:
+    """Open curves as Blender draws them.
+
+    Args:
+        points: (point_count, 3) control points. offsets: (curve_count + 1,), where each begins.
+    """
+    counts = np.diff(offsets)
+    is_nurbs = (shapes.kind == CurveType.NURBS) & _have_knots(counts, shapes)
+    kind = np.where((shapes.kind == CurveType.NURBS) & ~is_nurbs, CurveType.POLY, shapes.kind)
+    pieces = np.where(kind == CurveType.CATMULL_ROM, 1, np.maximum(shapes.resolution, 1))
+    is_poly = kind == CurveType.POLY
+    pieces[is_poly] = _pieces(points, offsets)[is_poly]
+    pieces[counts < 2] = 1
+    order, knots = (np.where(is_nurbs, each, 0) for each in (shapes.order, shapes.knots))
+    traits = np.stack([kind, counts, pieces, order, knots], axis=1)
+    unique, which = np.unique(traits, axis=0, return_inverse=True)
+    mixes = [_mix(*row) for row in unique.tolist()]
+    sizes = np.array([len(mix) for mix in mixes], np.int64)[which.ravel()]
+    outer = np.concatenate([[0], np.cumsum(sizes)])
+    found = np.empty((outer[-1], 3), np.float32)
+    parts = []
+    for number, (row, mix) in enumerate(zip(unique.tolist(), mixes, strict=True)):
+        chosen = np.flatnonzero(which.ravel() == number)
+        inner_rows = offsets[chosen, None] + np.arange(row[1])
+        outer_rows = outer[chosen, None] + np.arange(len(mix))
+        weight = shapes.weight[inner_rows] if row[0] == CurveType.NURBS else None
+        part = _Alike(inner_rows, outer_rows, mix, weight)
+        parts.append(part)
+        if row[0] == CurveType.BEZIER and row[1] > 1:
+            found[outer_rows] = _bezier(points, shapes, inner_rows, row[2])
+        else:
+            found[outer_rows] = part.of(points)
+    return DrawnCurves(found, outer, tuple(parts))
+
+
+def _have_knots(counts: Ints, shapes: CurveShapes) -> Bools:
+    """Which NURBS curves have enough points; Blender draws others through their points."""
+    order = shapes.order
+    needs_more = shapes.knots == Knots.BEZIER
+    return (order >= 2) & (counts >= order + needs_more)
+
+
+def _pieces(points: Floats, offsets: Ints) -> Ints:
+    """Into how many pieces each segment of a polygon goes, (curve_count,), so that a smooth curve
+    through their ends rounds its corners by no more than _ROUNDED of its length."""
+    counts, found = np.diff(offsets), np.ones(len(offsets) - 1, np.int64)
+    for count in np.unique(counts[counts > 2]).tolist():
+        chosen = np.flatnonzero(counts == count)
+        edge = np.diff(points[offsets[chosen, None] + np.arange(count)].astype(np.float64), axis=1)
+        length = np.linalg.norm(edge, axis=2)
+        edge /= np.maximum(length, 1.0e-30)[..., None]
+        corner = np.linalg.norm(np.diff(edge, axis=1), axis=2)
+        beside = np.maximum(length[:, 1:], length[:, :-1])
+        allowed = _ROUNDED * np.maximum(length.sum(axis=1), 1.0e-30)
+        needed = _ROUNDING * (corner * beside).max(axis=1) / allowed
+        found[chosen] = np.ceil(np.nan_to_num(needed, posinf=1.0)).clip(1, _MAX_PIECES)
+    return found
+
+
+def _mix(kind: int, count: int, pieces: int, order: int, knots: int) -> Floats:
+    """How curves of `count` control points blend values at these, (samples, count)."""
+    if kind == CurveType.NURBS:
+        return _nurbs(count, pieces, order, knots)
+    if count < 2:
+        return np.eye(count)
+    place = np.linspace(0.0, count - 1.0, (count - 1) * pieces + 1)
+    before = np.minimum(place.astype(np.int64), count - 2)
+    mix, row = np.zeros((len(place), count)), np.arange(len(place))
+    mix[row, before] = 1.0 - (place - before)
+    mix[row, before + 1] = place - before
+    return mix
+
+
+def _bezier(points: Floats, shapes: CurveShapes, inner: Ints, pieces: int) -> Floats:
+    """(n, samples, 3) on Bezier curves with these control points (n, count)."""
+    u = np.linspace(0.0, 1.0, pieces + 1)[:-1, None]
+    v = 1.0 - u
+    corners = (
+        points[inner[:, :-1]],
+        shapes.right[inner[:, :-1]],
+        shapes.left[inner[:, 1:]],
+        points[inner[:, 1:]],
+    )
+    weights = (v**3, 3.0 * u * v**2, 3.0 * u**2 * v, u**3)
+    found = sum(
+        weight * corner[:, :, None].astype(np.float64)
+        for weight, corner in zip(weights, corners, strict=True)
+    )
+    grid = np.asarray(found).reshape(len(inner), -1, 3)
+    return np.concatenate([grid, points[inner[:, -1:]]], axis=1)
+
+
+def _nurbs(count: int, pieces: int, order: int, mode: int) -> Floats:
+    """B-spline basis functions (samples, count), `pieces` times between knots that differ."""
+    knots = _knot_places(count, order, mode)
+    ends = np.unique(knots[order - 1 : count + 1])
+    inside = ends[:-1, None] + np.diff(ends)[:, None] * np.arange(pieces) / pieces
+    place = np.append(inside.ravel(), ends[-1])
+    # of the last sample the span before it, as Cox and de Boor's are open at their ends
+    span = np.searchsorted(knots, place, side="right") - 1
+    span[-1] = np.searchsorted(knots, ends[-1], side="left") - 1
+    basis = np.zeros((len(place), len(knots) - 1))
+    basis[np.arange(len(place)), span] = 1.0
+    for degree in range(1, order):
+        near, far = knots[degree:-1] - knots[: -degree - 1], knots[degree + 1 :] - knots[1:-degree]
+        rise = (place[:, None] - knots[: -degree - 1]) / np.where(near > 0.0, near, 1.0)
+        fall = (knots[degree + 1 :] - place[:, None]) / np.where(far > 0.0, far, 1.0)
+        basis = rise * (near > 0.0) * basis[:, :-1] + fall * (far > 0.0) * basis[:, 1:]
+    return basis
+
+
+def _knot_places(count: int, order: int, mode: int) -> Floats:
+    """The knots of an open curve, (count + order,), in Blender's modes."""
+    is_bezier = mode in (Knots.BEZIER, Knots.ENDPOINT_BEZIER)
+    reaches_ends = mode in (Knots.ENDPOINT, Knots.ENDPOINT_BEZIER)
+    repeated = order - 1 if is_bezier else 1
+    left = order if reaches_ends else min(2, repeated) if is_bezier else 1
+    knots, current = np.empty(count + order), 0.0
+    last = count if reaches_ends else count + order
+    for number in range(last):
+        knots[number] = current
+        left -= 1
+        if not left:
+            current, left = current + 1.0, repeated
+    knots[last:] = current
+    return knots
