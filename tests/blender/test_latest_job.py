@@ -31,11 +31,13 @@ class Workshop:
         self.errors: list[HairloomError] = []
         self.job = LatestJob[str, str]("test", self._take)
 
-    def want(self, key: str, *, fails: bool = False) -> None:
+    def want(self, key: str, *, fails: bool = False, error: Exception | None = None) -> None:
+        if fails:
+            error = HairloomError("it cannot be", place=key, remedy="Undo")
         self.gates.setdefault(key, threading.Event())
-        self.job.want(key, lambda: self._begin(key, fails))
+        self.job.want(key, lambda: self._begin(key, error))
 
-    def _begin(self, key: str, fails: bool) -> Work[str]:
+    def _begin(self, key: str, error: Exception | None) -> Work[str]:
         assert threading.current_thread() is threading.main_thread()
         self.begun.append(key)
 
@@ -45,8 +47,8 @@ class Workshop:
                 thread.report("last part")
             finally:
                 self.ended.append(key)
-            if fails:
-                raise HairloomError("it cannot be", place=key, remedy="Undo")
+            if error is not None:
+                raise error
             return key.upper()
 
         return work
@@ -112,6 +114,26 @@ def test_a_failure_counts_only_of_what_is_still_wanted(shop: Workshop) -> None:
     shop.want("c")
     shop.open("c")
     take_steps_until(lambda: shop.taken == [None, "C"])
+
+
+def test_any_failure_counts_only_of_what_is_still_wanted(
+    shop: Workshop, capsys: pytest.CaptureFixture[str]
+) -> None:
+    shop.want("a", error=MemoryError("far too much"))
+    shop.want("b")
+    shop.open("a", "b")
+    take_steps_until(lambda: shop.taken == [None, "B"])
+    assert "MemoryError: far too much" in capsys.readouterr().err
+
+
+def test_a_job_whose_step_is_dropped_can_be_wanted_again(shop: Workshop) -> None:
+    shop.want("a")
+    latest_job.unwatch_all()
+    assert not shop.job.is_pending
+    shop.want("a")
+    shop.open("a")
+    take_steps_until(lambda: shop.taken == ["A"])
+    assert shop.begun == ["a", "a"]
 
 
 def test_cancelled_work_ends_by_itself_and_is_not_wanted_any_more(shop: Workshop) -> None:

@@ -5,6 +5,7 @@
     the same is wanted again     nothing is made twice
     it fails                     that counts only if it is still wanted
     it is cancelled              nobody waits; its thread ends by itself
+    a file is opened             all are cancelled, as Blender drops the timer
 
 One timer of Blender's looks after all of it: `watch` has a step taken in the main thread.
 """
@@ -57,7 +58,11 @@ def unwatch(key: Hashable) -> None:
 
 
 def unwatch_all() -> None:
-    """Leave no step and no timer behind."""
+    """Leave no step and no timer behind, and no job that waits for its step: it could never be
+    begun again."""
+    for key in tuple(_steps):
+        if isinstance(key, LatestJob):
+            key.cancel()
     _steps.clear()
     if bpy.app.timers.is_registered(take_steps):
         bpy.app.timers.unregister(take_steps)
@@ -145,7 +150,7 @@ class LatestJob[Key, Result]:
         None where it failed and something else is wanted.
 
         Raises:
-            HairloomError: it is wanted, and cannot be made.
+            HairloomError: it is wanted, and cannot be made; or whatever else its work raises.
         """
         running, self._running = self._running, None
         assert running is not None, "nothing is being made"
@@ -153,9 +158,11 @@ class LatestJob[Key, Result]:
         try:
             running.work.wait()
             return running.work.result()
-        except HairloomError:
+        except Exception as error:
             if is_latest:
                 raise
+            if not isinstance(error, HairloomError):
+                traceback.print_exc()
             return None
         finally:
             if not is_latest:
