@@ -17,7 +17,7 @@ from bpy.app.handlers import persistent
 
 from ..blender.base.outcome import report
 from ..blender.base.parts import Part, Parts
-from ..blender.base.redraw import redraw_panels
+from ..blender.base.redraw import redraw_panels, show_status
 from ..blender.base.thread_work import ThreadWork
 from .reports import reporting, waiting
 
@@ -163,8 +163,7 @@ class _Running:
                 manager.progress_begin(0.0, 1.0)
                 self._has_cursor = True
             manager.progress_update(progress.fraction)
-        workspace = bpy.context.workspace
-        workspace.status_text_set(status(self.label, progress))
+        show_status(status(self.label, progress))
         redraw_panels()
 
     def end(self) -> None:
@@ -175,8 +174,7 @@ class _Running:
         manager.event_timer_remove(self._timer)
         if self._has_cursor:
             manager.progress_end()
-        if bpy.context.workspace is not None:
-            bpy.context.workspace.status_text_set(None)
+        show_status(None)
         redraw_panels()
 
 

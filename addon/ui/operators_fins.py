@@ -86,7 +86,6 @@ class HAIRLOOM_OT_fin_preview(bpy.types.Operator):
         assert obj is not None
         session = previews.simulated_of(obj)
         if session is not None:
-            session.stop(depsgraph)
             previews.stop(session)
             return {"FINISHED"}
         with waiting(context):

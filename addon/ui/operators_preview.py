@@ -16,8 +16,8 @@ import bpy
 from ..blender.bakes.groom_hashes import frame_rate
 from ..blender.base.frame_clock import FrameClock
 from ..blender.base.latest_job import is_watched, unwatch, watch
-from ..blender.base.objects import is_elsewhere
 from ..blender.base.outcome import Outcome, report
+from ..blender.base.redraw import show_status
 from ..blender.base.suspension import is_suspended
 from ..blender.preview import fins, previews
 from ..blender.scene.source import mute_own_dynamics, own_dynamics
@@ -104,7 +104,9 @@ class HAIRLOOM_OT_play(bpy.types.Operator):
         if bpy.app.background:
             cls.poll_message_set("Play needs a window; use the command line's simulate or bake")
             return False
-        if any_enabled(context.view_layer) or previews.simulated():
+        depsgraph = context.view_layer.depsgraph
+        is_previewed = depsgraph is not None and bool(previews.simulated_in(depsgraph))
+        if is_previewed or any_enabled(context.view_layer) or previews.is_playing():
             return True
         return needs_hair(cls, context)
 
@@ -118,7 +120,7 @@ class HAIRLOOM_OT_play(bpy.types.Operator):
             stop_ticking()
             return {"FINISHED"}
         with waiting(context):
-            if not previews.simulated():
+            if not previews.simulated_in(context.evaluated_depsgraph_get()):
                 start_preview(self, context, chosen_hair(context))
             depsgraph = context.evaluated_depsgraph_get()
             fin_warnings = fins.start_enabled(depsgraph)
@@ -218,30 +220,35 @@ def stop_ticking() -> None:
     """Take no step any more, and remove the text in the status bar."""
     if is_watched(TICKS):
         unwatch(TICKS)
-        _show_status(None)
+        show_status(None)
 
 
 class _Ticks:
-    """Play's clock, and what the status bar says of it."""
+    """Play's clocks, one for each scene, and what the status bar says of it."""
 
     def __init__(self) -> None:
-        self._clock, self._said = FrameClock(time.perf_counter()), ""
+        self._clocks: dict[int, FrameClock] = {}
+        self._said = ""
 
     def tick(self) -> float | None:
-        """Simulate the scene's frames that are due, in one step: the head has moved only once."""
+        """Simulate the scenes' frames that are due, in one step: the head has moved only once."""
         if not previews.is_playing():
-            _show_status(None)
+            show_status(None)
             return None
         self.tell()
-        now, window = time.perf_counter(), _window_of_play()
-        if previews.is_paused() or is_suspended() or window is None:
-            self._clock.skip(now)
-            return 1.0 / TICKS_PER_SECOND
-        rate = frame_rate(window.scene)
-        frames = self._clock.due(now, rate)
-        if frames:
-            with bpy.context.temp_override(window=window):
-                previews.advance(bpy.context.evaluated_depsgraph_get(), frames / rate)
+        now, windows = time.perf_counter(), previews.windows_of_play()
+        # a scene that is shown again goes on from there
+        clocks = {uid: self._clocks.get(uid) or FrameClock(now) for uid in windows}
+        self._clocks = clocks
+        for uid, window in windows.items():
+            if previews.is_paused() or is_suspended():
+                clocks[uid].skip(now)
+                continue
+            rate = frame_rate(window.scene)
+            frames = clocks[uid].due(now, rate)
+            if frames:
+                with bpy.context.temp_override(window=window):
+                    previews.advance(bpy.context.evaluated_depsgraph_get(), frames / rate)
         return 1.0 / TICKS_PER_SECOND
 
     def tell(self) -> None:
@@ -253,20 +260,7 @@ class _Ticks:
             text = WAITING.format(names=", ".join(names))
         if text != self._said:
             self._said = text
-            _show_status(text)
-
-
-def _window_of_play() -> bpy.types.Window | None:
-    """One that shows a scene with what plays."""
-    for window in bpy.context.window_manager.windows:
-        if any(not is_elsewhere(s.uid, s.name, window.scene) for s in previews.simulated()):
-            return window
-    return None
-
-
-def _show_status(text: str | None) -> None:
-    for window in bpy.context.window_manager.windows:
-        window.workspace.status_text_set(text)
+            show_status(text)
 
 
 def start_preview(

@@ -61,6 +61,44 @@ def test_a_saved_file_keeps_fin_and_settings(flag, evaluated, tmp_path):
     started(flag, evaluated)
 
 
+@pytest.mark.parametrize("end", ["stop", "by itself", "a file that cannot be opened"])
+def test_however_its_preview_ends_it_is_at_rest(end, flag, evaluated, tmp_path):
+    before = shown(flag, evaluated)
+    fins.start(flag, evaluated())
+    previews.play(evaluated())
+    previews.advance(evaluated(), 0.5)
+    update()
+    assert np.abs(shown(flag, evaluated) - before).max() > 0.05
+    if end == "stop":
+        previews.stop_all()
+    elif end == "by itself":
+        flag.modifiers.new("Array", "ARRAY")
+        flag.modifiers.move(1, 0)
+        update()
+        previews.advance(evaluated(), 0.5)
+        assert "Preview of Flag ended" in previews.notice()
+    else:
+        (tmp_path / "bad.blend").write_bytes(b"no file of Blender's")
+        with pytest.raises(RuntimeError):
+            bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "bad.blend"))
+    assert previews.simulated() == () and not is_shown(flag)
+
+
+def test_a_bake_is_shown_after_the_preview_too(flag, evaluated, tmp_path):
+    for _ in Bake.of([flag], bpy.context.scene, frames=range(1, 4), folder=tmp_path).steps():
+        pass
+    bpy.context.scene.frame_set(3)
+    baked = shown(flag, evaluated)
+    fins.start(flag, evaluated())
+    previews.play(evaluated())
+    previews.advance(evaluated(), 0.5)
+    update()
+    assert np.abs(shown(flag, evaluated) - baked).max() > 0.05
+    previews.stop_all()
+    update()
+    assert np.array_equal(shown(flag, evaluated), baked)
+
+
 def test_buttons_say_why_they_are_grey(extension):
     for operator in ("fin_add", "fin_remove", "fin_preview", "fin_reset"):
         assert not getattr(bpy.ops.hairloom, operator).poll()
@@ -110,7 +148,6 @@ def test_playback_simulates_it_and_a_bake_shows_exactly_that(flag, evaluated, tm
     simulated = frames_of(flag, range(1, 9))
     assert np.array_equal(simulated[1], rest_of(flag))
     assert simulated[8][:, 2].min() < -0.1
-    session.stop(evaluated())
     previews.stop(session)
     for _ in Bake.of([flag], bpy.context.scene, frames=range(1, 9), folder=tmp_path).steps():
         pass

@@ -8,7 +8,7 @@ from hairloom.addon import registration
 from hairloom.addon.blender.preview import previews, scene_events
 from hairloom.addon.blender.properties import groups
 from hairloom.addon.blender.viewport import overlay
-from hairloom.addon.ui import menus
+from hairloom.addon.ui import menus, operators_preview
 
 pytestmark = pytest.mark.portable
 
@@ -166,3 +166,35 @@ def test_shortcuts_are_offered_without_keys(extension):
     assert all(item.type == "NONE" and item.name for item in ours)
     (pie,) = (item for item in ours if item.idname == "wm.call_menu_pie")
     assert hasattr(bpy.types, pie.properties.name)
+
+
+def test_what_the_status_bar_says_goes_in_all_workspaces(preview, evaluated, monkeypatch):
+    """Blender writes into the workspace of its context, whatever it is asked for."""
+    said = {}
+
+    def status_text_set(_workspace, text):
+        said[bpy.context.workspace.name] = text
+
+    monkeypatch.setattr(bpy.types.WorkSpace, "status_text_set", status_text_set)
+    everywhere = [workspace.name for workspace in bpy.data.workspaces]
+    assert len(everywhere) > 1
+    previews.play(evaluated())
+    operators_preview.start_ticking()
+    assert said == dict.fromkeys(everywhere, operators_preview.STATUS)
+    operators_preview.stop_ticking()
+    assert said == dict.fromkeys(everywhere, None)
+    operators_preview.start_ticking()
+    with pytest.raises(RuntimeError):
+        bpy.ops.wm.open_mainfile(filepath=__file__)
+    assert said == dict.fromkeys(everywhere, None), "nothing plays any more"
+
+
+def test_a_failure_to_draw_is_forgotten_with_the_last_preview(preview, monkeypatch):
+    said = []
+    monkeypatch.setattr(overlay, "show_status", said.append)
+    overlay._fail(ValueError("a defect"))
+    bpy.app.timers.unregister(overlay._tell_failure)
+    overlay._tell_failure()
+    assert "a defect" in previews.notice() and "a defect" in said[-1]
+    previews.stop_all()
+    assert previews.notice() == "" and said[-1] is None

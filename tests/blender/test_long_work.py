@@ -165,7 +165,7 @@ def test_a_bake_is_not_deleted_while_other_work_goes_on(monkeypatch: pytest.Monk
 
 def test_play_says_again_what_it_does_after_other_work(monkeypatch: pytest.MonkeyPatch) -> None:
     shown: list[str | None] = []
-    monkeypatch.setattr(operators_preview, "_show_status", shown.append)
+    monkeypatch.setattr(operators_preview, "show_status", shown.append)
     ticks = operators_preview._Ticks()
     for label in ("", "", "Settle", "Settle", ""):
         monkeypatch.setattr(operators_preview, "running", lambda label=label: label)

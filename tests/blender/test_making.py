@@ -2,7 +2,6 @@
 
 import threading
 from dataclasses import replace
-from types import SimpleNamespace
 
 import bpy
 import numpy as np
@@ -657,8 +656,26 @@ def test_hair_of_another_scale_is_told_of_a_dense_head_as_of_any(new_hair, evalu
 
 def test_hair_of_another_scene_is_not_waited_for(hair, evaluated, in_window):
     """Previewed in one scene, and another is shown before it is made."""
-    previews.start(hair, evaluated())
-    elsewhere = bpy.data.scenes.new("Elsewhere")
-    session = previews.session_of(hair)
+    session = previews.start(hair, evaluated())
+    bpy.context.window.scene = bpy.data.scenes.new("Elsewhere")
     with pytest.raises(HairloomError, match="another scene"):
-        previews.finish(session, SimpleNamespace(scene=elsewhere))
+        previews.finish(session, evaluated())
+
+
+def test_hair_that_is_made_while_another_scene_is_shown_arrives_with_its_own(
+    hair, evaluated, in_window, monkeypatch
+):
+    bpy.context.scene.frame_set(5)  # at its first frame hair begins to play, which waits
+    session = previews.start(hair, evaluated())
+    window, scene, refreshed = bpy.context.window, bpy.context.scene, []
+    monkeypatch.setattr(previews, "refresh_views", lambda: refreshed.append(True))
+    window.scene = bpy.data.scenes.new("Elsewhere")
+    evaluated()
+    until(lambda: session.has_arrived)
+    for _ in range(3):
+        latest_job.take_steps()
+    assert not refreshed and not session.is_made, "the other scene is left alone"
+    window.scene = scene
+    evaluated()
+    take_steps_until(lambda: session.is_made)
+    assert refreshed and overlay.drawing_of(session.uid).is_made

@@ -103,6 +103,17 @@ def test_loading_a_file_drops_all_previews_and_keeps_the_settings(preview, tmp_p
     assert bpy.data.objects["Hair"].data.hairloom.shading.ambient == 0.125
 
 
+def test_a_new_file_knows_nothing_of_the_one_before(preview, evaluated):
+    _, head, _ = preview
+    previews.play(evaluated())
+    previews.pause(True)
+    bpy.data.objects.remove(head)
+    previews.advance(evaluated(), 1.0)
+    previews.previews.notice = "Preview of Hair ended"
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    assert previews.notice() == "" and not previews.previews.is_paused
+
+
 def test_another_scene_in_the_window_does_not_end_the_preview(preview):
     _, head, session = preview
     before, window, scene = grid_of(session), bpy.context.window, bpy.context.scene

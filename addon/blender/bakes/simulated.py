@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from ...params import Settings
 from ...rig_flow import Solids
 from ..base.digests import digest
+from ..base.objects import Body
 
 type Arrays = dict[str, NDArray[Any]]
 type Hashed = NDArray[Any] | Settings | str | float | None
@@ -28,7 +29,8 @@ class Simulated(Protocol):
 
     uid: session number of its object. is_playing: whether it is being simulated.
     is_stale: whether what it was read from has been edited since.
-    All but `uid`, `name` and `stop` raise HairloomError when what it is made of is gone or broken.
+    All but `uid`, `name`, `bodies`, `stop` and `forget` raise HairloomError when what it is made
+    of is gone or broken.
     """
 
     is_playing: bool
@@ -39,6 +41,10 @@ class Simulated(Protocol):
 
     @property
     def name(self) -> str: ...
+
+    @property
+    def bodies(self) -> tuple[Body, ...]:
+        """Its object, and what that grows on."""
 
     @property
     def is_made(self) -> bool:
@@ -67,6 +73,9 @@ class Simulated(Protocol):
 
     def stop(self, depsgraph: bpy.types.Depsgraph) -> None:
         """Simulate no longer; back to rest."""
+
+    def forget(self) -> None:
+        """Nobody waits any more for what is on its way; touches no object."""
 
     def advance(self, depsgraph: bpy.types.Depsgraph, duration: float) -> None:
         """Simulate the time [s] in which everything moved to where it is now."""

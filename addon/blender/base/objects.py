@@ -229,32 +229,15 @@ def layer_key(scene: bpy.types.Scene, layer: bpy.types.ViewLayer) -> LayerKey:
 
 
 def spaces_without(obj: bpy.types.Object) -> frozenset[int]:
-    """The 3D views in which an object cannot be seen, by address: local view, local collections."""
+    """The 3D views in which an object cannot be seen, by address: local view, local collections.
+    Those of workspaces that no window shows are among them, since nothing reports when one does."""
     return frozenset(
         space.as_pointer()
-        for window in bpy.context.window_manager.windows
-        for area in window.screen.areas
+        for screen in bpy.data.screens
+        for area in screen.areas
         for space in area.spaces
         if space.type == "VIEW_3D" and not obj.visible_in_viewport_get(space)
     )
-
-
-def is_elsewhere(uid: int, name: str, scene: bpy.types.Scene) -> bool:
-    """Whether an object is in other scenes only; one that no longer exists is in none."""
-    named = scene.objects.get(name)
-    if named is not None and named.session_uid == uid:
-        return False
-    here, everywhere = (
-        any(obj.session_uid == uid for obj in objects)
-        for objects in (scene.objects, bpy.data.objects)
-    )
-    return everywhere and not here
-
-
-def is_on_screen(uid: int, name: str) -> bool:
-    """Whether an object is in the scene of any window."""
-    scenes = {window.scene for window in bpy.context.window_manager.windows}
-    return not all(is_elsewhere(uid, name, scene) for scene in scenes)
 
 
 def _without_area() -> Any:

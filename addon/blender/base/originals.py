@@ -40,6 +40,12 @@ def all_depsgraphs() -> tuple[bpy.types.Depsgraph, ...]:
     return tuple(layer.depsgraph for layer in layers if layer.depsgraph is not None)
 
 
+def shown_depsgraphs() -> tuple[bpy.types.Depsgraph, ...]:
+    """Of the view layers that windows show."""
+    found = (window.view_layer.depsgraph for window in bpy.context.window_manager.windows)
+    return tuple(depsgraph for depsgraph in found if depsgraph is not None)
+
+
 def refresh_views() -> None:
     """Solid view shows the samples it has collected until it hears of an update."""
     bpy.context.scene.update_tag()

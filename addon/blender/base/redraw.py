@@ -50,6 +50,20 @@ def refresh_panels() -> None:
         redraw_panels()
 
 
+def show_status(text: str | None) -> None:
+    """Write it into the status bar, whatever workspace its window shows now or later; None: what
+    Blender itself says there.
+
+    Blender writes into the workspace of its context, not into the one that it is asked for; and
+    where a window is overridden, it takes that one's.
+    """
+    override = bpy.context.temp_override
+    for window in bpy.context.window_manager.windows:
+        for workspace in bpy.data.workspaces:
+            with override(window=window), override(workspace=workspace):
+                workspace.status_text_set(text)
+
+
 def soon(timer: Callable[[], None], pause: float) -> None:
     """Once, this long [s] after the last call."""
     if bpy.app.timers.is_registered(timer):

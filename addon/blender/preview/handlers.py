@@ -11,6 +11,7 @@ from bpy.app.handlers import persistent
 from ..bakes import baked_copy, playback
 from ..base import suspension
 from ..base.latest_job import unwatch_all
+from ..base.redraw import show_status
 from ..cards.made_objects import remember_names, remember_numbers
 from ..properties import changed, library_overrides
 from ..scene import mesh_materials
@@ -25,6 +26,7 @@ def on_load_pre(*_: Any) -> None:
     registry.forget_all()
     mesh_materials.forget()
     unwatch_all()  # Blender drops the timer itself
+    show_status(None)  # Play's ticks, which would have removed it, are among these
 
 
 @persistent
@@ -36,8 +38,8 @@ def on_load_post(*_: Any) -> None:
 
 @persistent
 def on_load_fail(*_: Any) -> None:
-    """The scene that was open stays, and its hair, which is previewed no longer, is to be seen."""
-    registry.show_all_originals()
+    """The scene that was open stays, in which nothing is previewed any longer."""
+    registry.show_all_without()
 
 
 @persistent

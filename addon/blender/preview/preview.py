@@ -57,6 +57,7 @@ class Preview:
         not asked for yet.
     problem, bake_problem: why it is not simulated, or its bake not shown.
     cards_are_stale: whether its cards are to be shaded again once edits have settled.
+    is_to_rest: whether it was stopped where it could not be read, and rests once it is read again.
 
     Methods raise HairloomError when what it is made of is gone or broken.
     """
@@ -68,7 +69,7 @@ class Preview:
         self.bake: KnownBake | None = None
         self.rig_hash = ""
         self.problem = self.bake_problem = ""
-        self.cards_are_stale = False
+        self.cards_are_stale = self.is_to_rest = False
 
     @property
     def uid(self) -> int:
@@ -90,6 +91,11 @@ class Preview:
         return self.session.is_made and fields.are_made()
 
     @property
+    def is_playing(self) -> bool:
+        """Whether it plays freely, by the clock, or is about to."""
+        return self.phase in (Phase.FREE, Phase.WAITING)
+
+    @property
     def is_deferred(self) -> bool:
         """Whether it stands at rest while Blender plays."""
         return self.phase is Phase.DEFERRED and not _is_exact()
@@ -98,6 +104,28 @@ class Preview:
     def problems(self) -> str:
         """Why it is not simulated, or its bake not shown; empty while all is well."""
         return " ".join(filter(None, (self.problem, self.bake_problem)))
+
+    def is_left_out(self, depsgraph: bpy.types.Depsgraph) -> bool:
+        """Whether this evaluation leaves out what it is made of: that is in another scene, in a
+        collection that is excluded, or disabled in viewports. Blender gives the original of such
+        an object, which no modifier has changed. What is gone is not left out.
+        """
+        bodies = (body.handle.find() for body in self.session.bodies)
+        return not all(
+            body is None or body.evaluated_get(depsgraph).is_evaluated for body in bodies
+        )
+
+    def stop(self, depsgraph: bpy.types.Depsgraph) -> None:
+        """Play it no longer: it rests, or shows the scene's frame from its bake."""
+        self.act(Event.STOP, depsgraph)
+        self.show_frame(depsgraph)
+
+    def halt(self, depsgraph: bpy.types.Depsgraph) -> None:
+        """As `stop` where it is left out. Cloth rests, hair does so once it is read again."""
+        self.phase, self.session.is_playing = Phase.REST, False
+        self.session.is_stale = self.is_to_rest = True
+        if self.groom is None:
+            self.session.stop(depsgraph)
 
     def found(self) -> bpy.types.Object:
         """Its object."""
@@ -137,7 +165,7 @@ class Preview:
         if self.phase not in SIMULATED:
             session.is_playing = False
         if action is not Action.NONE:
-            self.problem = ""
+            self.problem, self.is_to_rest = "", False
         try:
             match action:
                 case Action.BEGIN:

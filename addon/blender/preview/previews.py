@@ -21,10 +21,15 @@ from ..bakes.simulated import Simulated
 from ..base import latest_job
 from ..base.gpu_context import is_interrupted
 from ..base.latest_job import ARRIVAL_TIME, unwatch, watch
-from ..base.objects import is_elsewhere, is_on_screen
-from ..base.originals import all_depsgraphs, refresh_views, show_originals
+from ..base.originals import (
+    all_depsgraphs,
+    refresh_views,
+    show_originals,
+    shown_depsgraphs,
+)
 from ..base.redraw import redraw_panels, redraw_views, refresh_panels
 from ..colliders import fields
+from ..scene.fin_modifier import clear, is_shown
 from ..sessions.session import Session
 from ..sessions.together import Together
 from ..viewport import overlay
@@ -87,8 +92,8 @@ def add(session: Simulated, depsgraph: bpy.types.Depsgraph) -> None:
         preview.take_bake(depsgraph)
     previews.notice = ""
     before = previews.get(session.uid)
-    if before is not None and before.groom is not None:
-        before.groom.forget()
+    if before is not None:
+        before.session.forget()
     previews[session.uid] = preview
     publish(preview, depsgraph)
     redraw_panels()
@@ -106,28 +111,34 @@ def forget_all() -> None:
     """As `stop_all` when the objects are about to go: touches none of them."""
     for uid in tuple(previews):
         _forget(uid)
+    previews.notice, previews.is_paused = "", False
     playback.forget()
 
 
 def stop(session: Simulated) -> None:
-    """Preview it no longer."""
+    """Preview it no longer: hair is Blender's own again, cloth as it is without a preview."""
     _forget(session.uid)
     redraw_panels()
-    if not isinstance(session, Session):
-        return
-    hair = session.hair.handle.find()
-    if hair is not None:
-        for depsgraph in all_depsgraphs():
-            show_originals(hair, depsgraph, show=True)
+    obj = session.bodies[0].handle.find()
+    if obj is not None:
+        _show_without(obj)
         refresh_views()
 
 
-def show_all_originals() -> None:
-    """Blender draws all hair itself, whatever was previewed."""
-    for hair in bpy.data.objects:
-        for depsgraph in all_depsgraphs() if hair.type == "CURVES" else ():
-            show_originals(hair, depsgraph, show=True)
+def show_all_without() -> None:
+    """All hair and cloth, as without a preview, whatever was previewed."""
+    for obj in bpy.data.objects:
+        _show_without(obj)
     refresh_views()
+
+
+def _show_without(obj: bpy.types.Object) -> None:
+    if obj.type == "CURVES":
+        for depsgraph in all_depsgraphs():
+            show_originals(obj, depsgraph, show=True)
+    elif is_shown(obj):
+        clear(obj.data)
+        playback.show_fins(bpy.context.scene)  # its bake is shown without a preview too
 
 
 def stop_all() -> None:
@@ -139,8 +150,8 @@ def _forget(uid: int) -> None:
     """As `stop` when its object is about to go: touches nothing of it."""
     preview = previews.pop(uid, None)
     unwatch((uid, "lines"))
-    if preview is not None and preview.groom is not None:
-        preview.groom.forget()
+    if preview is not None:
+        preview.session.forget()
     overlay.drop(uid)
     if not bpy.app.background and not bpy.app.timers.is_registered(_free_unused):
         bpy.app.timers.register(_free_unused, first_interval=0.0, persistent=True)
@@ -162,6 +173,11 @@ def sessions() -> tuple[Session, ...]:
 def simulated() -> tuple[Simulated, ...]:
     """The grooms and fins that are previewed."""
     return tuple(each.session for each in previews.values())
+
+
+def simulated_in(depsgraph: bpy.types.Depsgraph) -> tuple[Simulated, ...]:
+    """Those of them that this evaluation does not leave out."""
+    return tuple(each.session for each in previews.values() if not each.is_left_out(depsgraph))
 
 
 def session_of(hair: bpy.types.Object | None) -> Session | None:
@@ -188,7 +204,18 @@ def notice() -> str:
 
 def is_playing() -> bool:
     """Whether hair plays freely, by the clock, or is about to."""
-    return any(each.phase in (Phase.FREE, Phase.WAITING) for each in previews.values())
+    return any(each.is_playing for each in previews.values())
+
+
+def windows_of_play() -> dict[int, bpy.types.Window]:
+    """For each scene in which hair or cloth plays, by session number, a window that shows it."""
+    playing = [each for each in previews.values() if each.is_playing]
+    found: dict[int, bpy.types.Window] = {}
+    for window in bpy.context.window_manager.windows:
+        depsgraph = window.view_layer.depsgraph
+        if depsgraph is not None and not all(each.is_left_out(depsgraph) for each in playing):
+            found.setdefault(window.scene.session_uid, window)
+    return found
 
 
 def waiting() -> tuple[str, ...]:
@@ -207,7 +234,8 @@ def pause(is_paused: bool) -> None:
 
 
 def play(depsgraph: bpy.types.Depsgraph, *, blocking: bool = True) -> list[str]:
-    """Let all previewed grooms and fins play freely, from rest; returns warnings.
+    """Let all that is previewed, and is in this evaluation, play freely, from rest; returns
+    warnings.
 
     Args:
         blocking: False: what lacks hair or a collider that is being made begins later, in
@@ -216,7 +244,7 @@ def play(depsgraph: bpy.types.Depsgraph, *, blocking: bool = True) -> list[str]:
     pause(False)
     fields.trim()
     warnings = []
-    for session in simulated():
+    for session in simulated_in(depsgraph):
         try:
             begin(session, depsgraph, blocking=blocking)
         except HairloomError as error:
@@ -251,8 +279,7 @@ def advance(depsgraph: bpy.types.Depsgraph, duration: float) -> None:
 @contextmanager
 def together(depsgraph: bpy.types.Depsgraph) -> Iterator[None]:
     """A frame of all previewed grooms of the scene: those that feel each other go on at its end."""
-    scene = depsgraph.scene
-    here = [each for each in sessions() if not is_elsewhere(each.uid, each.name, scene)]
+    here = [each for each in simulated_in(depsgraph) if isinstance(each, Session)]
     with Together([] if is_interrupted() else here) as frame:
         yield
         for session in frame.go_on():
@@ -268,6 +295,11 @@ def _begin(preview: Preview, depsgraph: bpy.types.Depsgraph) -> None:
 def rest(depsgraph: bpy.types.Depsgraph, *, keep_playing: bool) -> None:
     """All hair back into its style; if it is to play no longer and is baked, to the baked frame."""
     for preview in tuple(previews.values()):
+        if preview.is_playing and not keep_playing and preview.is_left_out(depsgraph):
+            preview.halt(depsgraph)
+            for each in shown_depsgraphs():
+                each.scene.update_tag()  # another window that shows it reads it again
+            continue
         back = partial(_put_back, preview, depsgraph, keep_playing)
         attempt(preview, depsgraph, back)
 
@@ -276,8 +308,7 @@ def _put_back(preview: Preview, depsgraph: bpy.types.Depsgraph, keep_playing: bo
     if keep_playing:
         preview.act(Event.RESET, depsgraph)
     else:
-        preview.act(Event.STOP, depsgraph)
-        preview.show_frame(depsgraph)
+        preview.stop(depsgraph)
 
 
 def bake_changed(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> None:
@@ -314,12 +345,11 @@ def attempt(
         needs_gpu: where there is no GPU for a moment, do nothing but read it again later.
     """
     session = preview.session
-    if is_elsewhere(session.uid, session.name, depsgraph.scene):
-        if is_on_screen(session.uid, session.name):
-            return  # in another window: what happens here is nothing to it
-        session.is_stale = True  # until its scene is shown again, in which it is evaluated
-        overlay.hide(session.uid)
-        return
+    if preview.is_left_out(depsgraph):
+        if all(map(preview.is_left_out, shown_depsgraphs())):
+            session.is_stale = True  # until it is evaluated again
+            overlay.hide(session.uid)
+        return  # if it is in another window, what happens here is nothing to it
     if needs_gpu and is_interrupted():
         session.is_stale = True
         redraw_views()
@@ -380,27 +410,39 @@ def _take_arrivals(session: Session) -> None:
     preview = previews.get(session.uid)
     if preview is None or preview.session is not session:
         return
+    depsgraph = _shown_depsgraph(preview)
+    if depsgraph is None:
+        return  # it is offered until it is shown again
     if session.has_arrived:
-        depsgraph = bpy.context.evaluated_depsgraph_get()
         attempt(preview, depsgraph, partial(_take_made, preview, session, depsgraph))
         refresh_views()  # Blender's own strands, which were shown until now
     elif session.cards.has_arrived:
-        attempt(preview, bpy.context.view_layer.depsgraph, session.take_cards)
+        attempt(preview, depsgraph, session.take_cards)
     redraw_panels()
+
+
+def _shown_depsgraph(preview: Preview) -> bpy.types.Depsgraph | None:
+    """Of a window that shows it, evaluated; None where no window does."""
+    for window in bpy.context.window_manager.windows:
+        depsgraph = window.view_layer.depsgraph
+        if depsgraph is not None and not preview.is_left_out(depsgraph):
+            with bpy.context.temp_override(window=window):
+                return bpy.context.evaluated_depsgraph_get()
+    return None
 
 
 def finish(session: Session, depsgraph: bpy.types.Depsgraph) -> None:
     """Wait for hair that is being made; one that cannot be made ends its preview.
 
     Raises:
-        HairloomError: it is in another scene, where it is made when that is shown again.
+        HairloomError: it is left out here, and made when it is shown again.
     """
     preview = previews[session.uid]
-    if is_elsewhere(session.uid, session.name, depsgraph.scene):
+    if preview.is_left_out(depsgraph):
         raise HairloomError(
-            "it is in another scene",
+            "it is in another scene, or its collection is hidden",
             place=session.name,
-            remedy="Show that scene, or select hair of this one",
+            remedy="Show these, or select other hair",
         )
     while session.is_pending and previews.get(session.uid) is preview:
         take = partial(_take_made, preview, session, depsgraph)

@@ -94,7 +94,7 @@ def updated(depsgraph: bpy.types.Depsgraph) -> None:
             session.forget_shown_map()
             _read_again_soon()
         elif session.is_stale and not bpy.app.timers.is_registered(_read_again):
-            _read_again_soon()  # its scene is shown again
+            _read_again_soon()  # it is shown again
         if occluders_changed(session, moved, depsgraph.view_layer) or cards_edited(session, edited):
             _look_at_cards_soon(preview)
         follows = preview.phase is not Phase.FREE and is_among(session, moved)
@@ -227,6 +227,8 @@ def _read(preview: Preview, depsgraph: bpy.types.Depsgraph) -> None:
         registry.start(session.hair.found(), depsgraph)
     else:
         session.read_again(depsgraph, blocking=latest_job.is_blocking())
+        if preview.is_to_rest:
+            preview.stop(depsgraph)
         preview.check(depsgraph)
 
 
@@ -303,6 +305,5 @@ def cards_edited(session: Session, edited: set[int]) -> bool:
 
 def is_among(session: Session, moved: set[int]) -> bool:
     """Whether the groom, its head, or what holds its hair has moved."""
-    bodies = (session.hair, session.head)
-    uids = {body.handle.uid for body in bodies if body is not None}
+    uids = {body.handle.uid for body in session.bodies}
     return not moved.isdisjoint(uids | session.holder_uids)

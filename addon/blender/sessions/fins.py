@@ -58,6 +58,11 @@ class FinSession:
         return self.body.handle.name
 
     @property
+    def bodies(self) -> tuple[Body, ...]:
+        """See `simulated.Simulated`."""
+        return (self.body,)
+
+    @property
     def is_made(self) -> bool:
         """Whether nothing of it is being made just now."""
         return not self._fabric.is_pending
@@ -107,10 +112,14 @@ class FinSession:
     def stop(self, depsgraph: bpy.types.Depsgraph) -> None:
         """Back to where the animation carries it."""
         self.is_playing = False
-        self._fabric.cancel()
+        self.forget()
         obj = self.body.handle.find()
         if obj is not None and obj.type == "MESH":
             clear(obj.data)
+
+    def forget(self) -> None:
+        """Nobody waits any more for its fabric."""
+        self._fabric.cancel()
 
     def advance(self, depsgraph: bpy.types.Depsgraph, duration: float) -> None:
         """Simulate the time [s] in which everything moved to where it is now.

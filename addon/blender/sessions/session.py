@@ -32,6 +32,7 @@ from ..bakes.baked_solids import solid_arrays, solid_constants
 from ..bakes.groom_hashes import frame_rate
 from ..bakes.simulated import Arrays
 from ..base.latest_job import LatestJob
+from ..base.objects import Body
 from ..base.thread_work import ThreadWork
 from ..colliders.fields import NotMadeYetError
 from ..colliders.obstacles import Obstacles
@@ -227,6 +228,11 @@ class Session:
         standing = tuple(each.at_end() for each in self._posed)
         settings = self.settings[DynamicsSettings]
         return _Moment(self.solver.pose, standing, settings, self.solver.size)
+
+    @property
+    def bodies(self) -> tuple[Body, ...]:
+        """See `simulated.Simulated`."""
+        return (self.hair,) if self.head is None else (self.hair, self.head)
 
     @property
     def snapshot(self) -> Snapshot:

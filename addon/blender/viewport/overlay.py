@@ -33,7 +33,7 @@ from ...shading.environment import Environment, world_suns
 from ...shading.lights import Light, brightest, three_point_lights
 from ...strands import Surface
 from ..base.objects import LayerKey, is_solid, layer_key, layers_with, spaces_without
-from ..base.redraw import redraw_panels, redraw_views
+from ..base.redraw import redraw_panels, redraw_views, show_status
 from ..cards.show import as_shown, without_strands
 from ..scene.lights import uses_scene_light
 from ..scene.world import studio_environment
@@ -185,10 +185,12 @@ def hide(uid: int) -> None:
 
 
 def drop(uid: int) -> None:
-    """No longer draw this groom; with the last one the draw handlers go."""
+    """No longer draw this groom; with the last one the draw handlers go, and what is said of a
+    failure."""
     _overlay.drawn.pop(uid, None)
     if not _overlay.drawn:
         _remove_handlers()
+        retry()
     redraw_views()
 
 
@@ -207,7 +209,7 @@ def retry() -> None:
     """Draw again after a failure."""
     if _overlay.failure:
         _overlay.failure = ""
-        bpy.context.workspace.status_text_set(None)
+        show_status(None)
 
 
 def _draw(what: Callable[[Any], None]) -> None:
@@ -588,7 +590,8 @@ def _fail(error: Exception) -> None:
 def _tell_failure() -> None:
     """Outside of drawing, where the handler may be removed and the status text be set."""
     _remove_handlers()
-    bpy.context.workspace.status_text_set(_overlay.failure.splitlines()[0])
+    if _overlay.failure:
+        show_status(_overlay.failure.splitlines()[0])
     bpy.context.scene.update_tag()  # Blender's own strands are to be seen again
     redraw_panels()
 

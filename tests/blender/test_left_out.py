@@ -1,0 +1,141 @@
+"""Previews of what another scene has, or of what is hidden so that Blender evaluates it no more."""
+
+from types import SimpleNamespace
+
+import bpy
+import numpy as np
+import pytest
+from fin_motion import started, update
+from grids import grid_of
+from swinging import play
+
+from hairloom.addon.blender.preview import previews, scene_events
+from hairloom.addon.blender.preview.phases import Phase
+from hairloom.addon.blender.scene.fin_modifier import is_shown
+from hairloom.addon.blender.viewport import overlay
+
+FRAME = 1.0 / 24.0
+
+
+def show(name):
+    """The scene of this name, which is made if there is none, in the window."""
+    scene = bpy.data.scenes.get(name) or bpy.data.scenes.new(name)
+    bpy.context.window.scene = scene
+    update()
+    return scene
+
+
+def phase_of(session):
+    return previews.previews[session.uid].phase
+
+
+def hide_objects(is_hidden):
+    for name in ("Hair", "Head"):
+        bpy.data.objects[name].hide_viewport = is_hidden
+
+
+def hide_collection(is_hidden):
+    bpy.data.collections["Groom"].hide_viewport = is_hidden
+
+
+def exclude(is_hidden):
+    bpy.context.view_layer.layer_collection.children["Groom"].exclude = is_hidden
+
+
+@pytest.fixture
+def groom(preview, evaluated):
+    """Hair and a head with a modifier in a collection of their own, previewed: head, session."""
+    hair, head, session = preview
+    previews.stop(session)
+    collection = bpy.data.collections.new("Groom")
+    bpy.context.scene.collection.children.link(collection)
+    for obj in (hair, head):
+        for each in obj.users_collection:
+            each.objects.unlink(obj)
+        collection.objects.link(obj)
+    head.modifiers.new("Subdivision", "SUBSURF").levels = 1
+    return head, previews.start(hair, evaluated())
+
+
+@pytest.mark.parametrize("hide", [hide_objects, hide_collection, exclude])
+def test_hidden_hair_is_read_again_when_it_is_shown(hide, groom, evaluated):
+    head, session = groom
+    at_rest = grid_of(session)
+    hide(True)
+    update()
+    bpy.context.scene.frame_set(2)
+    head.location.x = 1.0
+    scene_events.undone()
+    scene_events.catch_up(evaluated())
+    assert previews.sessions() == (session,) and previews.notice() == ""
+    assert not overlay.drawing_of(session.uid).is_visible
+    hide(False)
+    update()
+    scene_events.catch_up(evaluated())
+    assert overlay.drawing_of(session.uid).is_visible and not session.is_stale
+    assert grid_of(session) == pytest.approx(at_rest + np.array([1.0, 0.0, 0.0]), abs=1e-6)
+
+
+def test_hidden_hair_that_plays_goes_on_when_it_is_shown(groom, evaluated):
+    _, session = groom
+    previews.play(evaluated())
+    play(evaluated, 3)
+    hide_collection(True)
+    play(evaluated, 3)
+    assert previews.is_playing() and previews.notice() == ""
+    hide_collection(False)
+    play(evaluated, 3)
+    assert phase_of(session) is Phase.FREE and session.is_playing
+
+
+def test_play_begins_hair_of_its_own_scene_alone(groom, evaluated, new_hair):
+    _, session = groom
+    show("Other")
+    bpy.ops.mesh.primitive_uv_sphere_add(radius=0.1)
+    other = previews.start(new_hair(bpy.context.object), evaluated())
+    assert previews.play(evaluated()) == []
+    assert (phase_of(session), phase_of(other)) == (Phase.REST, Phase.FREE)
+
+
+def test_stop_stops_hair_and_cloth_of_another_scene(groom, flag, evaluated):
+    head, session = groom
+    scene, at_rest = bpy.context.scene, grid_of(session)
+    started(flag, evaluated)
+    previews.play(evaluated())
+    for step in range(4):
+        head.location.x = 0.02 * (step + 1)
+        play(evaluated, 1)
+    assert is_shown(flag)
+    show("Other")
+    assert previews.is_playing()
+    previews.rest(evaluated(), keep_playing=False)
+    assert not previews.is_playing() and not bpy.ops.hairloom.stop.poll()
+    assert not is_shown(flag)
+    show(scene.name)
+    scene_events.catch_up(evaluated())
+    carried = at_rest + np.array([head.location.x, 0.0, 0.0])
+    assert grid_of(session) == pytest.approx(carried, abs=2e-6)
+
+
+def test_each_scene_that_plays_goes_on_in_a_window_of_its_own(
+    groom, evaluated, new_hair, monkeypatch
+):
+    here, _ = bpy.context.scene, groom
+    other_scene = show("Other")
+    bpy.ops.mesh.primitive_uv_sphere_add(radius=0.1)
+    other = previews.start(new_hair(bpy.context.object), evaluated())
+    previews.play(evaluated())
+    windows = [
+        SimpleNamespace(scene=each, view_layer=each.view_layers[0])
+        for each in (here, here, other_scene)
+    ]
+    context = SimpleNamespace(window_manager=SimpleNamespace(windows=windows))
+    with monkeypatch.context() as patch:
+        patch.setattr(previews, "bpy", SimpleNamespace(context=context))
+        assert list(previews.windows_of_play().values()) == [windows[2]]
+    show(here.name)
+    previews.play(evaluated())
+    with monkeypatch.context() as patch:
+        patch.setattr(previews, "bpy", SimpleNamespace(context=context))
+        assert list(previews.windows_of_play().values()) == [windows[0], windows[2]]
+    assert phase_of(other) is Phase.FREE
