@@ -235,6 +235,21 @@ def test_an_artists_compositor_is_extended_and_given_back(
     assert differs(inverted, plain).mean() > 0.02
 
 
+def test_scenes_that_have_a_compositor_in_common_keep_their_own_hair(
+    cycles: Any, hairy: Any
+) -> None:
+    cycles.hairloom.use_hair_scene = True
+    tree = cycles.compositing_node_group
+    alone = links_of(tree)
+    other = bpy.data.scenes.new("Other")
+    other.compositing_node_group = tree
+    tree.nodes.new("CompositorNodeRLayers").scene = other
+    other.hairloom.use_hair_scene = True
+    assert hair_scene.problem_of(other) == hair_scene.problem_of(cycles) == ""
+    other.hairloom.use_hair_scene = False
+    assert hair_scene.problem_of(cycles) == "" and links_of(tree) == alone
+
+
 def test_hairlooms_own_engine_draws_hair_once(
     stage: Any, sphere: Any, new_hair: Any, tmp_path: Path
 ) -> None:

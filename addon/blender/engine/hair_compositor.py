@@ -39,11 +39,12 @@ def link(scene: bpy.types.Scene, hair: bpy.types.Scene, layer: str) -> None:
 
 
 def unlink(scene: bpy.types.Scene, hair: bpy.types.Scene | None) -> None:
-    """Give the picture back to what asked for it, and remove our nodes."""
+    """Give the picture back to what asked for it, and remove our nodes, but for those of another
+    scene with the same compositor."""
     tree = scene.compositing_node_group
     if tree is None:
         return
-    for group in list(_groups(tree)):
+    for group in [each for each in _groups(tree) if _lays(each, hair)]:
         sources = [each.from_socket for each in group.inputs[IMAGE].links]
         for old in list(group.outputs[IMAGE].links):
             if sources:
@@ -64,7 +65,8 @@ def is_linked(scene: bpy.types.Scene, hair: bpy.types.Scene) -> bool:
     tree = scene.compositing_node_group
     if tree is None or not any(_hair_layers(tree, hair)):
         return False
-    return any(group.inputs[HAIR].is_linked and not group.mute for group in _groups(tree))
+    groups = (group for group in _groups(tree) if not group.mute)
+    return any(group.inputs[HAIR].is_linked and _lays(group, hair) for group in groups)
 
 
 def _pictures(tree: Any, scene: bpy.types.Scene) -> Iterator[Any]:
@@ -83,6 +85,20 @@ def _groups(tree: Any) -> Iterator[Any]:
         for each in tree.nodes
         if each.bl_idname == "CompositorNodeGroup" and group and each.node_tree == group
     )
+
+
+def _lays(group: Any, hair: bpy.types.Scene | None) -> bool:
+    """Whether the hair of this scene is what a group lays over a picture, or that of no scene."""
+    scenes, seen = set(), set()
+    asked = [link.from_node for link in group.inputs[HAIR].links]
+    while asked:
+        node = asked.pop()
+        if node.bl_idname == _LAYERS:
+            scenes.add(node.scene)
+        elif node.name not in seen:  # the artist's, such as a blur
+            seen.add(node.name)
+            asked += [link.from_node for each in node.inputs for link in each.links]
+    return not scenes or hair in scenes
 
 
 def _new_compositor(scene: bpy.types.Scene) -> Any:
