@@ -101,10 +101,12 @@ def free_unused() -> None:
 
 
 def hand_over() -> None:
-    """At the end of a render thread: what is still in use belongs to the main thread."""
+    """At the end of a render: what is unused is freed, what is still in use belongs to the main
+    thread."""
     main = threading.main_thread().ident
     assert main is not None
     if threading.get_ident() == main:
+        free_unused()
         return
     # reading waits for all that this thread's context has still to do
     texture((1, 1), format="R32F").read()
@@ -114,7 +116,7 @@ def hand_over() -> None:
 
 
 def forget() -> None:
-    """At exit, and for unregistering: free what nothing uses, and keep nothing else alive."""
+    """At exit: free what nothing uses, and keep nothing else alive."""
     _KEPT.owned.clear()
 
 

@@ -1,7 +1,7 @@
 """From a recipe to a compiled shader, kept for ever, and its resources bound completely.
 
 Shaders are never dropped while Blender runs: one that is collected while bound is used after it
-is freed. `release()` is for unregistering, and for the end: a GPU object that outlives Blender's
+is freed. `release()` is for the end: a GPU object that outlives Blender's
 GPU, as those do that are alive when a script calls sys.exit(), crashes it.
 """
 
@@ -163,7 +163,7 @@ def released_with_shaders(keeper: Releasable) -> None:
 
 @atexit.register
 def release() -> None:
-    """Let go of all shaders and of what passes keep. For unregistering, and at exit."""
+    """At exit: let go of all shaders and of what passes keep."""
     for keeper in list(_KEEPERS):
         keeper.release()
     if _PROGRAMS:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,9 @@ from tiers import few_in_commits
 bpy = pytest.importorskip("bpy", reason="these tests need Blender or the bpy module")
 
 from engine_stage import SIZE, add_ball, coded, passes_in, picture, rendered  # noqa: E402
+
+from hairloom.addon.blender.engine import engine_view  # noqa: E402
+from hairloom.addon.render import gpu_objects  # noqa: E402
 
 pytestmark = [pytest.mark.draws, pytest.mark.usefixtures("gpu_context", "extension")]
 
@@ -322,3 +326,24 @@ def test_a_blurred_render_that_is_cancelled_goes_to_no_other_frame(
     (found,) = cancelled
     assert len(found.places) == 3, "two moments, and back"
     assert found.places[-1] == stage.frame_current
+
+
+def test_a_render_leaves_nothing_unused_on_the_gpu(stage: Any, tmp_path: Path) -> None:
+    bpy.ops.mesh.primitive_cube_add(size=0.2)
+    rendered(tmp_path)
+    left = gpu_objects.bytes_in_use()
+    gc.collect()
+    gpu_objects.free_unused()
+    assert gpu_objects.bytes_in_use() == left
+
+
+def test_what_a_view_had_on_the_gpu_is_freed_as_it_leaves_rendered_mode(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    asked: list[bool] = []
+    monkeypatch.setattr(engine_view, "free_soon", lambda: asked.append(True))
+    view = engine_view.EngineView()
+    assert not asked
+    del view
+    gc.collect()
+    assert asked

@@ -7,6 +7,7 @@ asking crashes Blender; so another process tries first.
 from __future__ import annotations
 
 import sys
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
@@ -17,6 +18,7 @@ import gpu
 
 from ...errors import HairloomError
 from ...exchange.files.child_process import run_child
+from ...render import gpu_objects
 
 #: Exits with 0 where OpenGL or Vulkan finds a device without a window, as Blender's do.
 _TRIAL = """
@@ -57,6 +59,8 @@ sys.exit(0 if works(opengl) or works(vulkan) else 1)
 _REFUSAL = "gpu."
 #: Seconds for a driver to answer, on a busy machine too.
 _PATIENCE = 60.0
+#: Seconds until a window context is looked for again.
+_PAUSE = 0.05
 
 
 def ensure_gpu() -> None:
@@ -117,6 +121,21 @@ def is_interrupted() -> bool:
     except RuntimeError:
         return True
     return False
+
+
+def free_soon() -> None:
+    """Once whatever goes just now is gone, free what nothing uses any more on the GPU."""
+    is_main = threading.current_thread() is threading.main_thread()
+    if bpy.app.background or not is_main or bpy.app.timers.is_registered(_free_unused):
+        return
+    bpy.app.timers.register(_free_unused, first_interval=0.0, persistent=True)
+
+
+def _free_unused() -> float | None:
+    if is_interrupted():
+        return _PAUSE
+    gpu_objects.free_unused()
+    return None
 
 
 def gpu_in_use() -> dict[str, str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import weakref
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -20,6 +21,7 @@ from ...shading.lights import three_point_lights
 from ...shading.mesh_shadow_settings import MeshShadowSettings
 from ...shading.picture_settings import PictureSettings
 from ..base import latest_job
+from ..base.gpu_context import free_soon
 from ..properties.properties import settings_of
 from ..scene.lights import uses_scene_light
 from ..sessions.snapshots import with_all_strands
@@ -54,6 +56,8 @@ class EngineView:
     """One 3D view that is drawn by the engine."""
 
     def __init__(self) -> None:
+        # Blender drops it as the view leaves Rendered mode, and may draw nothing of ours after that
+        weakref.finalize(self, free_soon).atexit = False
         self._reader, self._pass = SceneReader(), ScenePass()
         self._target, self._picture = Target(), Accumulation()
         self._scene: SceneSnapshot | None = None

@@ -13,13 +13,12 @@ from functools import partial
 import bpy
 
 from ...errors import HairloomError
-from ...render import gpu_objects
 from ...shading.volume.settings import VolumeSettings
 from ..bakes import playback
 from ..bakes.bake_settings import folder_of
 from ..bakes.simulated import Simulated
 from ..base import latest_job
-from ..base.gpu_context import is_interrupted
+from ..base.gpu_context import free_soon, is_interrupted
 from ..base.latest_job import ARRIVAL_TIME, unwatch, watch
 from ..base.originals import (
     all_depsgraphs,
@@ -153,16 +152,7 @@ def _forget(uid: int) -> None:
     if preview is not None:
         preview.session.forget()
     overlay.drop(uid)
-    if not bpy.app.background and not bpy.app.timers.is_registered(_free_unused):
-        bpy.app.timers.register(_free_unused, first_interval=0.0, persistent=True)
-
-
-def _free_unused() -> float | None:
-    """A timer: what is gone from the views goes from the GPU too, once nothing refers to it."""
-    if is_interrupted():
-        return ARRIVAL_TIME
-    gpu_objects.free_unused()
-    return None
+    free_soon()
 
 
 def sessions() -> tuple[Session, ...]:
