@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import traceback
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -150,6 +151,81 @@ def test_hair_that_nobody_sees_any_more_is_not_waited_for(hair: Any, gate: Gate)
     assert latest_job.take_steps() is None
     latest_job.unwatch_all()
     assert not bpy.app.timers.is_registered(latest_job.take_steps)
+
+
+def test_two_views_of_other_hair_leave_each_other_theirs(
+    hair: Any, new_hair: Callable[..., Any], sphere: Any, gate: Gate
+) -> None:
+    other = new_hair(sphere)
+    gate.opened.set()
+    views = {each.name: View() for each in (hair, other)}
+    for _ in range(2):
+        for name, view in views.items():
+            view.read(is_shown=lambda obj, name=name: obj.name in (name, "Head"))
+    until(lambda: latest_job.take_steps() is None)
+    for name, view in views.items():
+        shown = view.read(is_shown=lambda obj, name=name: obj.name in (name, "Head"))
+        assert len(shown) == 1 and not view.reader.pending
+    assert len(gate.makers) == 2, "each is made once"
+
+
+def test_view_layers_of_other_hair_have_it_made_for_the_first_frame_alone(
+    hair: Any, new_hair: Callable[..., Any], sphere: Any, gate: Gate
+) -> None:
+    scene, other = bpy.context.scene, new_hair(sphere)
+    layers = [scene.view_layers[0], scene.view_layers.new("Too")]
+    for layer, each in zip(layers, (hair, other), strict=True):
+        collection = bpy.data.collections.new(each.name)
+        scene.collection.children.link(collection)
+        scene.collection.objects.unlink(each)
+        collection.objects.link(each)
+        layer.layer_collection.children[collection.name].exclude = True
+    layers[0].layer_collection.children[other.name].exclude = False
+    layers[1].layer_collection.children[hair.name].exclude = False
+    for frame in (1, 2, 3):
+        scene.frame_set(frame)
+        for layer in layers:
+            layer.update()
+            (groom,) = SceneReader().read(layer.depsgraph).grooms
+            assert groom.name == (other if layer == layers[0] else hair).name
+    assert len(gate.makers) == 2
+
+
+def test_hair_is_made_again_after_a_file_that_could_not_be_opened(
+    hair: Any, gate: Gate, tmp_path: Any
+) -> None:
+    view = View()
+    view.read()
+    (tmp_path / "bad.blend").write_bytes(b"no file of Blender's")
+    with pytest.raises(RuntimeError):
+        bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "bad.blend"))
+    gate.opened.set()
+    view.read()
+    (shown,) = view.arrive()
+    assert shown.strand_count == COUNT
+
+
+def test_an_error_that_is_told_again_and_again_does_not_grow(
+    hair: Any, gate: Gate, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: Any, **__: Any) -> None:
+        raise HairloomError("it cannot be", place="Hair", remedy="Undo")
+
+    monkeypatch.setattr(rig_flow, "prepare", fail)
+    lengths = []
+
+    def read() -> None:
+        try:
+            engine_hair.read_groom(hair, bpy.context.evaluated_depsgraph_get(), blocking=False)
+        except (HairloomError, engine_hair.HairNotMadeYetError) as error:
+            causes = error, error.__cause__
+            lengths.append(sum(len(list(traceback.walk_tb(e.__traceback__))) for e in causes if e))
+
+    read()
+    until(lambda: latest_job.take_steps() is None)
+    for _ in range(4):
+        read()
+    assert len(set(lengths[1:])) == 1
 
 
 def test_the_picture_keeps_its_hair_until_the_preview_has_its_own(

@@ -1,7 +1,8 @@
 """The grooms of a render: as they were baked, or else as Blender has evaluated their curves.
 
 What costs time and seldom changes, such as children and ambient occlusion, is kept from frame to
-frame as long as curves, head and settings are the same. For Rendered mode it is made beside the
+frame as long as curves, head and settings are the same, for all views, view layers and renders:
+what one of them does not show another one may. For Rendered mode it is made beside the
 window's work: until it is there the picture has what was drawn before, or none. Renders wait.
 """
 
@@ -18,6 +19,7 @@ from ...arrays import Floats, are_same
 from ...cards.edits import CardEdits
 from ...cards.follow import moved_mesh
 from ...cards.occlusion_settings import CardOcclusionSettings
+from ...errors import HairloomError
 from ...groom.painted_color import PaintedColor
 from ...paint_flow import colored
 from ...render.snapshot import Snapshot
@@ -122,18 +124,20 @@ class _Kept:
         Raises:
             HairloomError: it cannot be made of these values.
         """
-        if self.is_of(made_from):
-            if not blocking:
-                self.cancel()
-        elif blocking:
-            self.made = make()
+        made = self.made
+        if blocking:
+            # a render's thread, beside which the window may have other hair made
+            if made is None or not _alike(made.made_from, made_from):
+                self.made = made = make()
+        elif self.is_of(made_from):
+            self.cancel()
         else:
             if not self._job.wants(made_from):
                 self._error = None
                 self._job.want(made_from, lambda: lambda _: make())
             if self._error is not None:
-                raise self._error
-        return self.made
+                raise _again(self._error) from self._error
+        return made
 
     def cancel(self) -> None:
         """Nobody waits any more for other hair of this groom."""
@@ -147,6 +151,14 @@ class _Kept:
         except Exception as error:
             self._error = error
         redraw_views()
+
+
+def _again(error: Exception) -> Exception:
+    """The same error, to be raised once more. One that is raised refers to all that goes on where
+    it is, and one that is raised again and again to more and more of it."""
+    if isinstance(error, HairloomError):
+        return HairloomError(error.problem, place=error.place, remedy=error.remedy)
+    return type(error)(*error.args)
 
 
 _kept: dict[int, _Kept] = {}
@@ -269,11 +281,15 @@ def is_pending(uid: int) -> bool:
 
 def forget() -> None:
     """Keep no groom in memory, and wait for none."""
-    forget_but(set())
+    _keep_only(set())
 
 
-def forget_but(uids: set[int]) -> None:
-    """Keep these alone, by session number of their objects."""
+def forget_gone() -> None:
+    """Keep no groom whose object is gone."""
+    _keep_only({obj.session_uid for obj in bpy.data.objects})
+
+
+def _keep_only(uids: set[int]) -> None:
     for uid in set(_kept) - uids:
         _kept.pop(uid).cancel()
 

@@ -100,7 +100,6 @@ class SceneReader:
         casters: list[MeshSnapshot] = []
         grooms: dict[Key, _ReadGroom] = {}
         read: dict[Key, _ReadMesh] = {}
-        uids: set[int] = set()
         self.previewed, self.pending = {}, set()
         self._heads = _heads(depsgraph)
         behind = hair_scene.drawn_by(depsgraph.scene)
@@ -120,20 +119,18 @@ class SceneReader:
                 if visibility.casts:
                     casters += read[key].meshes
             elif obj.type == "CURVES" and is_previewed(obj.original.session_uid):
-                uids.add(engine_hair.owner_of(obj.original).session_uid)
                 self.previewed[obj.original.session_uid] = visibility
             elif obj.type == "CURVES" and is_expected(obj.original.session_uid):
-                uids.add(engine_hair.owner_of(obj.original).session_uid)
                 grooms |= {key: self._grooms[key]} if key in self._grooms else {}
             elif obj.type == "CURVES" and visibility.is_seen:
                 hair = obj.original
-                uids.add(engine_hair.owner_of(hair).session_uid)
                 groom = self._read_groom(
                     key, hair, matrix, depsgraph, changed, warnings, visibility.is_holdout, blocking
                 )
                 grooms |= {} if groom is None else {key: groom}
         self._meshes, self._grooms = read, grooms
-        engine_hair.forget_but(uids)
+        if not blocking:  # the thread of a render asks for no list that the window may change
+            engine_hair.forget_gone()
         found = tuple(each.groom for each in grooms.values())
         center = _center(found, drawn)
         of_meshes = [note for each in read.values() for note in each.notes]
