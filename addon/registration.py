@@ -124,11 +124,19 @@ def register() -> None:
 
 
 def unregister() -> None:
-    """The exact mirror image, after the previews have ended."""
-    end_all()
-    engine.unregister()
-    for _, undo in reversed(_steps()):
-        undo()
+    """The exact mirror image, after the previews have ended.
+
+    Raises:
+        ExceptionGroup: of what failed; all the rest is done, so that it can be registered again.
+    """
+    errors = []
+    for undo in (end_all, *(undo for _, undo in reversed(_steps()))):
+        try:
+            undo()
+        except Exception as error:
+            errors.append(error)
+    if errors:
+        raise ExceptionGroup("Hairloom could not be disabled completely", errors)
 
 
 def end_all() -> None:
@@ -156,6 +164,7 @@ def _steps() -> tuple[Step, ...]:
         (growing.register, growing.unregister),
         (look_materials.register, look_materials.unregister),
         (hair_scene.register, hair_scene.unregister),
+        (engine.register, engine.unregister),
         (_register_command, _unregister_command),
     )
 

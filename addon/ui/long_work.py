@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 import bpy
 from bpy.app.handlers import persistent
 
+from ..blender.base import event_handlers
 from ..blender.base.outcome import report
 from ..blender.base.parts import Part, Parts
 from ..blender.base.redraw import redraw_panels, show_status
@@ -149,8 +150,7 @@ class _Running:
         manager = bpy.context.window_manager
         self._timer = manager.event_timer_add(_PAUSE, window=window)
         manager.modal_handler_add(operator)
-        for each in _undoing():
-            each.append(_on_undo)
+        event_handlers.append(_HANDLERS)
 
     def tell(self, progress: Progress) -> None:
         """Show the progress in the status bar, at the mouse pointer and in panels."""
@@ -168,8 +168,7 @@ class _Running:
 
     def end(self) -> None:
         """Remove the timer, the handlers and the text."""
-        for each in _undoing():
-            each.remove(_on_undo)
+        event_handlers.remove(_HANDLERS)
         manager = bpy.context.window_manager  # another than before, when a file is loaded
         manager.event_timer_remove(self._timer)
         if self._has_cursor:
@@ -183,14 +182,16 @@ def status(label: str, progress: Progress) -> str:
     return f"{label}: {progress.text}" + ("" if progress.is_committed else ". Esc: cancel")
 
 
-def _undoing() -> tuple[list[Any], ...]:
-    return (bpy.app.handlers.undo_pre, bpy.app.handlers.redo_pre)
-
-
 @persistent  # it goes when the work ends, which may be after a file is loaded
 def _on_undo(*_: Any) -> None:
     """Keys cannot undo during the work, but scripts can; its references would then be invalid."""
     stop()
+
+
+_HANDLERS = (
+    (bpy.app.handlers.undo_pre, _on_undo),
+    (bpy.app.handlers.redo_pre, _on_undo),
+)
 
 
 _running: _Running | None = None

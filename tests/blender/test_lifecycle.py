@@ -5,6 +5,7 @@ import pytest
 
 import hairloom
 from hairloom.addon import registration
+from hairloom.addon.blender.engine import hair_scene
 from hairloom.addon.blender.preview import previews, scene_events
 from hairloom.addon.blender.properties import groups
 from hairloom.addon.blender.viewport import overlay
@@ -135,6 +136,30 @@ def test_a_late_failure_rolls_everything_back(monkeypatch, commands):
     monkeypatch.setattr(bpy.utils, "register_cli_command", fail)
     with pytest.raises(RuntimeError, match="no commands today"):
         hairloom.register()
+    assert traces() == before
+
+
+def test_disabling_survives_a_script_that_has_cleared_a_list(commands):
+    before = traces()
+    hairloom.register()
+    for handlers, _ in registration.handlers.HANDLERS + hair_scene.HANDLERS:
+        handlers[:] = [each for each in handlers if "hairloom" not in each.__module__]
+    hairloom.unregister()
+    assert traces() == before
+
+
+def test_disabling_goes_on_after_a_step_that_fails(commands, monkeypatch):
+    before = traces()
+    hairloom.register()
+
+    def fail():
+        raise RuntimeError("this one fails")
+
+    undo = registration.look_materials.unregister
+    monkeypatch.setattr(registration.look_materials, "unregister", fail)
+    with pytest.RaisesGroup(pytest.RaisesExc(RuntimeError, match="this one fails")):
+        hairloom.unregister()
+    undo()
     assert traces() == before
 
 

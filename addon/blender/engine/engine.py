@@ -7,10 +7,12 @@ import traceback
 from typing import Any
 
 import bpy
+from bpy.app.handlers import persistent
 
 from ...errors import HairloomError
 from ...render import gpu_objects, skin_layouts
 from ...render.shader_source import ShaderError
+from ..base import event_handlers
 from ..base.gpu_context import can_draw
 from ..viewport.overlay import ENGINE
 from . import engine_hair
@@ -104,10 +106,23 @@ def _views(render: Any) -> list[str]:
     return [view.name for view in render.views if view.use]
 
 
+@persistent
+def on_load_pre(*_: Any) -> None:
+    """Hair of the file before is kept no longer, nor waited for."""
+    engine_hair.forget()
+
+
 CLASSES = (HAIRLOOM_RE_engine,)
+
+HANDLERS = ((bpy.app.handlers.load_pre, on_load_pre),)
+
+
+def register() -> None:
+    event_handlers.append(HANDLERS)
 
 
 def unregister() -> None:
     """Keep nothing in memory."""
+    event_handlers.remove(HANDLERS)
     engine_hair.forget()
     skin_layouts.forget()

@@ -17,6 +17,7 @@ from typing import Any
 import bpy
 from bpy.app.handlers import persistent
 
+from ..base import event_handlers
 from ..properties import changed
 from ..viewport.overlay import ENGINE
 from . import hair_compositor
@@ -252,8 +253,7 @@ LISTENERS = (("hair_scene", switched), ("passes", passes_changed))
 
 
 def register() -> None:
-    for handlers, handler in HANDLERS:
-        handlers.append(handler)
+    event_handlers.append(HANDLERS)
     for listener in LISTENERS:
         changed.subscribe(*listener)
 
@@ -261,5 +261,4 @@ def register() -> None:
 def unregister() -> None:
     for listener in LISTENERS:
         changed.unsubscribe(*listener)
-    for handlers, handler in reversed(HANDLERS):
-        handlers.remove(handler)
+    event_handlers.remove(HANDLERS)

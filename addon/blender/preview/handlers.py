@@ -9,7 +9,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ..bakes import baked_copy, playback
-from ..base import suspension
+from ..base import event_handlers, suspension
 from ..base.latest_job import unwatch_all
 from ..base.redraw import show_status
 from ..cards.made_objects import remember_names, remember_numbers
@@ -134,8 +134,7 @@ LISTENERS = (
 
 
 def register() -> None:
-    for handlers, handler in HANDLERS:
-        handlers.append(handler)
+    event_handlers.append(HANDLERS)
     for kind, listener in LISTENERS:
         changed.subscribe(kind, listener)
 
@@ -143,5 +142,4 @@ def register() -> None:
 def unregister() -> None:
     for kind, listener in reversed(LISTENERS):
         changed.unsubscribe(kind, listener)
-    for handlers, handler in reversed(HANDLERS):
-        handlers.remove(handler)
+    event_handlers.remove(HANDLERS)

@@ -1,0 +1,21 @@
+"""What Blender calls at its events, put into its lists and taken out again."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import Any
+
+#: one of the lists in bpy.app.handlers, and what is in it
+type Listed = tuple[list[Any], Callable[..., None]]
+
+
+def append(listed: Iterable[Listed]) -> None:
+    for handlers, handler in listed:
+        handlers.append(handler)
+
+
+def remove(listed: Iterable[Listed]) -> None:
+    """Those that are still there: any script may have emptied a list."""
+    for handlers, handler in listed:
+        if handler in handlers:
+            handlers.remove(handler)
