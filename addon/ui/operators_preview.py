@@ -238,14 +238,13 @@ class _Ticks:
         self.tell()
         now, windows = time.perf_counter(), previews.windows_of_play()
         # a scene that is shown again goes on from there
-        clocks = {uid: self._clocks.get(uid) or FrameClock(now) for uid in windows}
-        self._clocks = clocks
+        self._clocks = {uid: self._clocks.get(uid) or FrameClock(now) for uid in windows}
         for uid, window in windows.items():
             if previews.is_paused() or is_suspended():
-                clocks[uid].skip(now)
+                self._clocks[uid].skip(now)
                 continue
             rate = frame_rate(window.scene)
-            frames = clocks[uid].due(now, rate)
+            frames = self._clocks[uid].due(now, rate)
             if frames:
                 with bpy.context.temp_override(window=window):
                     previews.advance(bpy.context.evaluated_depsgraph_get(), frames / rate)

@@ -13,6 +13,7 @@ from hairloom.addon.blender.preview import previews, scene_events
 from hairloom.addon.blender.preview.phases import Phase
 from hairloom.addon.blender.scene.fin_modifier import is_shown
 from hairloom.addon.blender.viewport import overlay
+from hairloom.addon.ui import operators_preview
 
 FRAME = 1.0 / 24.0
 
@@ -139,3 +140,16 @@ def test_each_scene_that_plays_goes_on_in_a_window_of_its_own(
         patch.setattr(previews, "bpy", SimpleNamespace(context=context))
         assert list(previews.windows_of_play().values()) == [windows[0], windows[2]]
     assert phase_of(other) is Phase.FREE
+
+
+def test_each_scene_that_plays_goes_by_a_clock_of_its_own(preview, evaluated, monkeypatch):
+    now, window, advanced = [100.0], bpy.context.window, []
+    monkeypatch.setattr(operators_preview, "time", SimpleNamespace(perf_counter=lambda: now[0]))
+    monkeypatch.setattr(previews, "windows_of_play", lambda: {1: window, 2: window})
+    monkeypatch.setattr(previews, "advance", lambda _, duration: advanced.append(duration))
+    previews.play(evaluated())
+    ticks = operators_preview._Ticks()
+    for _ in range(3):
+        ticks.tick()
+        now[0] += 1.01 * FRAME
+    assert advanced == 4 * [pytest.approx(FRAME)]
