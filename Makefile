@@ -12,8 +12,10 @@ help: ## this list
 setup: ## make .venv from the lock file; nothing to do when it is there
 	@tools/setup
 
-demo: setup ## the whole way on a groom: GROOM=x.tfx HEAD=x.obj COLLIDER=x.obj OPTIONS="..." OUT=out, all optional
-	$(PYTHON) tools/headless.py demo $(if $(GROOM),--groom "$(GROOM)") $(if $(HEAD),--head "$(HEAD)") \
+STYLE = long_wavy
+
+demo: setup ## the whole way, on STYLE=bob or a groom: GROOM=x.tfx HEAD=x.obj COLLIDER=x.obj OPTIONS="..." OUT=out, all optional
+	$(PYTHON) tools/headless.py demo $(if $(GROOM),--groom "$(GROOM)",--style $(STYLE)) $(if $(HEAD),--head "$(HEAD)") \
 	    $(if $(COLLIDER),--collider "$(COLLIDER)") --output "$(OUT)" $(OPTIONS)
 
 lint: setup

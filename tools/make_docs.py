@@ -71,20 +71,19 @@ def texts_to_translate() -> str:
 
 
 def make_pictures() -> None:
-    """Run the demo on the built-in head, in air and under water, shake a ponytail, and keep their
-    pictures."""
+    """Run the demo in air and under water, shake a ponytail, and keep their pictures."""
     IMAGES.mkdir(exist_ok=True)
     with tempfile.TemporaryDirectory() as folder:
-        headless = [sys.executable, str(REPOSITORY / "tools" / "headless.py")]
-        subprocess.run([*headless, "demo", "--output", folder], check=True)
+        demo = ["make", "-C", str(REPOSITORY), "demo", f"OUT={folder}"]
+        subprocess.run(demo, check=True)
         for name in ("still", "close_up", "motion", "cards"):
             write_small(Path(folder) / f"{name}.png", IMAGES / f"{name}.jpg")
-        preset = ["--preset", "dynamics/under_water"]
-        subprocess.run([*headless, "demo", *preset, "--output", folder], check=True)
+        subprocess.run([*demo, "OPTIONS=--preset dynamics/under_water"], check=True)
         write_small(Path(folder) / "motion.png", IMAGES / "under_water.jpg")
-        ties = [sys.executable, str(REPOSITORY / "tools" / "bench.py"), "ties"]
-        subprocess.run([*ties, "--strands", "3000", "--pictures", folder], check=True)
-        write_small(Path(folder) / "ties_shake.png", IMAGES / "ponytail.jpg")
+        shaken = Path(folder) / "ponytail.png"
+        sheet = [sys.executable, str(REPOSITORY / "tools" / "headless.py"), "sheet"]
+        subprocess.run([*sheet, "--style", "ponytail", "--output", str(shaken)], check=True)
+        write_small(shaken, IMAGES / "ponytail.jpg")
     tools = ("refinement", "preset", "shading", "volume", "engine", "styling")
     tools += ("hairstyle", "web_page", "tutorial", "cards", "shells", "motion")
     for name in tools:

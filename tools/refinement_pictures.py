@@ -60,7 +60,11 @@ def picture(rig: Any, look: dict[str, Any], camera: Any = None, samples: int = S
     sections = of_addon("params").SettingsMap(settings["detail"](**look))
     groom_settings = of_addon("blender.properties.groom_settings")
     chosen = groom_settings.GroomSettings(sections, debug_view=view)
-    made = studio.Studio(of_addon("blender.sessions.prepared_groom").prepared(rig, ambient), chosen)
+    made = studio.Studio(
+        of_addon("blender.sessions.prepared_groom").prepared(rig, ambient),
+        chosen,
+        look=of_addon("blender.scene.built_in_head").built_in_head().look("light"),
+    )
     return made.picture(rig.rest_pose, rig.strands.points, WIDTH, HEIGHT, samples, camera)
 
 

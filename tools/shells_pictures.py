@@ -33,7 +33,11 @@ def pictures_of(style: str) -> list[Any]:
     rig, groom = inputs.rig, of_addon("blender.properties.groom_settings").GroomSettings.of(hair)
     ambient = inputs.settings[of_addon("shading.ambient_settings").AmbientSettings]
     prepared = of_addon("blender.sessions.prepared_groom").prepared(rig, ambient)
-    studio = of_addon("blender.pictures.studio").Studio(prepared, groom)
+    head = of_addon("blender.scene.built_in_head").built_in_head()
+    is_bust = of_addon("blender.setup.hairstyles").is_bust(hair.parent)
+    studio = of_addon("blender.pictures.studio").Studio(
+        prepared, groom, look=head.look("light") if is_bust else None
+    )
     size = WIDTH, HEIGHT, SAMPLES
     strands = studio.picture(rig.rest_pose, rig.strands.points, *size)
     made = builds.BuiltCards.now(inputs)

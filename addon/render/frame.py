@@ -1,20 +1,29 @@
-"""The recipe of one still frame: meshes, strands, cards, and the samples averaged to pixels."""
+"""The recipe of one picture: meshes, strands, cards, and the samples averaged to pixels.
+
+A still is the mean of several, each lit by another point of every light that has a size, so that
+shadows have penumbras, and what one shadow map cannot resolve differs from picture to picture.
+"""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
+
+import numpy as np
 
 from ..arrays import Floats
 from ..shading.lights import kept_lights
 from ..shading.mesh_shadow_settings import MeshShadowSettings
 from . import gpu_objects
 from .camera import Camera, frame_camera, look_at, orthographic, perspective
+from .camera_window import jittered
 from .card_pass import CardPass
+from .light_samples import lights_at
 from .mesh_pass import MeshPass
 from .shader_program import ShaderRecipe, program
 from .shafts_pass import finish_with_shafts
 from .snapshot import MeshSnapshot, Snapshot
-from .strand_pass import StrandPass
+from .strand_pass import StrandPass, calm_samples
 from .textures import drawing_into, texture_to_array
 
 __all__ = [
@@ -26,6 +35,7 @@ __all__ = [
     "orthographic",
     "perspective",
     "render_image",
+    "render_still",
 ]
 
 #: the largest side that a target may have on every GPU that Blender supports
@@ -92,6 +102,42 @@ def render_image(
             picture, color, depth, camera, snapshot.lights, snapshot.shafts, background
         )
     return texture_to_array(picture)
+
+
+def render_still(
+    snapshot: Snapshot,
+    camera: Camera,
+    width: int,
+    height: int,
+    samples: int,
+    *,
+    center: Floats,
+    passes: tuple[MeshPass, StrandPass],
+    card_pass: CardPass,
+) -> Floats:
+    """As `render_image`, with soft shadows: each sample of a pixel is a picture of its own, in the
+    light of one point of each light.
+
+    Args:
+        center: (3,) [m], what the disks of lamps face.
+
+    Raises:
+        ValueError, ShaderError: as `render_image`.
+    """
+    total = np.zeros((height, width, 4), np.float64)
+    count = max(samples**2, calm_samples(snapshot.strand_settings))
+    for sample in range(count):
+        place = (np.array(divmod(sample % samples**2, samples)) + 0.5) / samples - 0.5
+        total += render_image(
+            replace(snapshot, lights=lights_at(snapshot.lights, sample, center)),
+            jittered(camera, place, width, height, sample),
+            width,
+            height,
+            1,
+            passes=passes,
+            card_pass=card_pass,
+        )
+    return (total / count).astype(np.float32)
 
 
 def _averaged(color: Any, samples: int) -> Any:

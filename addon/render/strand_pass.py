@@ -545,12 +545,11 @@ def drawn_transparency(settings: StrandSettings) -> str:
     return "hashed" if wanted == "layers" and not capabilities().image_atomics else wanted
 
 
-def calm_draws(settings: StrandSettings, samples: int) -> int:
-    """How many draws with this many samples across a pixel make a still whose strands are calm that
-    are hashed because their lists cannot be made.
+def calm_samples(settings: StrandSettings) -> int:
+    """How many samples of a pixel make a still whose strands are calm that are hashed because their
+    lists cannot be made; else 1.
     """
-    is_noisy = drawn_transparency(settings) != settings.transparency
-    return -(-CALM_SAMPLES // samples**2) if is_noisy else 1
+    return CALM_SAMPLES if drawn_transparency(settings) != settings.transparency else 1
 
 
 def _half_texture(layout: StrandLayout, values: Floats) -> Any:

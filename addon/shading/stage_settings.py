@@ -63,10 +63,10 @@ class StageSettings(Settings):
     owner = "job"
 
     key: float = _strength(3.8, "Key", "Main light")
-    key_side: float = _side(42.0, "Key Side", "main light")
+    key_side: float = _side(62.0, "Key Side", "main light")
     key_height: float = _height(40.0, "Key Height", "main light")
-    fill: float = _strength(1.2, "Fill", "Light into the shadows of the main light")
-    fill_side: float = _side(-60.0, "Fill Side", "fill light")
+    fill: float = _strength(1.3, "Fill", "Light into the shadows of the main light")
+    fill_side: float = _side(-30.0, "Fill Side", "fill light")
     fill_height: float = _height(5.0, "Fill Height", "fill light")
     rim: float = _strength(1.4, "Rim", "Light from behind, which shines through the hair")
     rim_side: float = _side(130.0, "Rim Side", "light from behind")

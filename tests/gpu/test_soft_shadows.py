@@ -1,7 +1,10 @@
-"""The penumbra of a sun that fills an angle, against the part of its disk that an edge leaves."""
+"""The penumbra of a sun that fills an angle, against the part of its disk that an edge leaves: in
+scenes, and in stills of one groom.
+"""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -32,16 +35,21 @@ def matt(surface: Surface) -> MeshSnapshot:
     return MeshSnapshot(surface, normals, WHITE, specular=0.0)
 
 
+def camera_above() -> Camera:
+    """From above the ground and below what shades it."""
+    return Camera(
+        look_at((0.0, 0.0, 4.0), (0.0, 0.0, 0.0), up=(0.0, 1.0, 0.0)),
+        orthographic(0.6, 1.0, 3.7, 5.0),
+    )
+
+
 def mean_row(scene: SceneSnapshot) -> np.ndarray:
-    """The middle row of the picture, from above and below what shades, of all samples."""
+    """The middle row of the picture, of all samples."""
     from hairloom.addon.render.accumulation import Target
     from hairloom.addon.render.scene_pass import ScenePass
     from hairloom.addon.render.textures import texture_to_array
 
-    camera = Camera(
-        look_at((0.0, 0.0, 4.0), (0.0, 0.0, 0.0), up=(0.0, 1.0, 0.0)),
-        orthographic(0.6, 1.0, 3.7, 5.0),
-    )
+    camera = camera_above()
     drawing, target = ScenePass(), Target()
     total = np.zeros((SIZE, 3))
     for sample in range(SAMPLES):
@@ -56,6 +64,12 @@ def segment_left(place: np.ndarray) -> np.ndarray:
     return 0.5 + (np.arcsin(x) + x * np.sqrt(1.0 - x * x)) / np.pi
 
 
+def shaded_by_disk() -> np.ndarray:
+    """The part of the sun's disk that an edge above x = 0 leaves along a row."""
+    place = (np.arange(SIZE) + 0.5) / SIZE * 0.6 - 0.3
+    return segment_left(place / (HEIGHT * np.tan(0.5 * ANGLE)))
+
+
 def test_an_edge_has_the_penumbra_of_the_disk(gpu_context: Any) -> None:
     """A sheet covers all to the left of x = 0, above what the camera sees."""
     ground = matt(square((-4.0, -4.0), (4.0, 4.0), 0.0))
@@ -67,33 +81,79 @@ def test_an_edge_has_the_penumbra_of_the_disk(gpu_context: Any) -> None:
         lights=(sun,),
         mesh_shadows=MeshShadowSettings(mesh_resolution=2048),
     )
-    found = mean_row(scene)[:, 0]
-    place = (np.arange(SIZE) + 0.5) / SIZE * 0.6 - 0.3
-    expected = segment_left(place / (HEIGHT * np.tan(0.5 * ANGLE)))
+    found, expected = mean_row(scene)[:, 0], shaded_by_disk()
     assert np.abs(found - expected).max() < 0.05
     assert np.sqrt(np.mean((found - expected) ** 2)) < 0.02
+
+
+def curtain() -> Snapshot:
+    """Hair over the left half of what the camera sees."""
+    x = np.linspace(-0.5, 0.0, 400)
+    ends = np.array([[[0.0, -0.5, HEIGHT], [0.0, 0.5, HEIGHT]]])
+    strands = (ends + x[:, None, None] * [1.0, 0.0, 0.0]).astype(np.float32)
+    radius = np.full(strands.shape[:2], 0.003, np.float32)
+    return Snapshot(strands, radius, volume=VolumeSettings(shadows="deep"))
+
+
+def shaded_row(found: np.ndarray) -> np.ndarray:
+    """How much of the sun is left along a row under the curtain, as fractions of its open end."""
+    open_, closed = found[-8:].mean(), found[:8].mean()
+    assert open_ == pytest.approx(1.0, abs=0.02) and closed < 0.4
+    return (found - closed) / (open_ - closed)
 
 
 def test_hair_shades_a_mesh_softly(gpu_context: Any) -> None:
     """A curtain of hair, whose edge is at x = 0: as far as its opacity goes."""
     ground = matt(square((-4.0, -4.0), (4.0, 4.0), 0.0))
-    x = np.linspace(-0.5, 0.0, 400)
-    ends = np.array([[[0.0, -0.5, HEIGHT], [0.0, 0.5, HEIGHT]]])
-    strands = (ends + x[:, None, None] * [1.0, 0.0, 0.0]).astype(np.float32)
-    hair = Snapshot(
-        strands,
-        np.full(strands.shape[:2], 0.003, np.float32),
-        volume=VolumeSettings(shadows="deep"),
-    )
     scene = SceneSnapshot(
         meshes=(ground,),
         casters=(ground,),
-        grooms=(DrawnGroom("hair", hair),),
+        grooms=(DrawnGroom("hair", curtain()),),
         lights=(Light.sun((0.0, 0.0, -1.0), WHITE, np.pi, ANGLE),),
     )
-    found = mean_row(scene)[:, 1]
-    open_, closed = found[-8:].mean(), found[:8].mean()
-    place = (np.arange(SIZE) + 0.5) / SIZE * 0.6 - 0.3
-    expected = segment_left(place / (HEIGHT * np.tan(0.5 * ANGLE)))
-    assert open_ == pytest.approx(1.0, abs=0.02) and closed < 0.4
-    assert (found - closed) / (open_ - closed) == pytest.approx(expected, abs=0.08)
+    found = shaded_row(mean_row(scene)[:, 1])
+    assert found == pytest.approx(shaded_by_disk(), abs=0.08)
+
+
+def still(snapshot: Snapshot, samples: int) -> np.ndarray:
+    from hairloom.addon.render.card_pass import CardPass
+    from hairloom.addon.render.frame import render_still
+    from hairloom.addon.render.mesh_pass import MeshPass
+    from hairloom.addon.render.strand_pass import StrandPass
+
+    return render_still(
+        snapshot,
+        camera_above(),
+        *(SIZE, SIZE, samples),
+        center=np.zeros(3),
+        passes=(MeshPass(), StrandPass()),
+        card_pass=CardPass(),
+    )
+
+
+def test_a_still_is_shaded_softly(gpu_context: Any) -> None:
+    ground = matt(square((-4.0, -4.0), (4.0, 4.0), 0.0))
+    sun = Light.sun((0.0, 0.0, -1.0), WHITE, np.pi, ANGLE)
+    shown = replace(curtain(), meshes=(ground,), lights=(sun,), ambient=(0.0, 0.0, 0.0))
+    found = still(shown, 6)[SIZE // 2, :, 1]
+    assert shaded_row(found) == pytest.approx(shaded_by_disk(), abs=0.08)
+
+
+def test_the_samples_of_a_still_fill_its_pixels_evenly(gpu_context: Any) -> None:
+    """In the light of a point they are those of one picture that is drawn larger."""
+    from hairloom.addon.render.frame import render_image
+
+    tilted = matt(square((-0.2, -0.1), (0.17, 0.21), 0.0))
+    turn = np.array([[0.8, -0.6, 0.0], [0.6, 0.8, 0.0], [0.0, 0.0, 1.0]])
+    surface = replace(tilted.surface, positions=np.float32(tilted.surface.positions @ turn))
+    none = np.zeros((0, 3), np.float32)
+    shown = Snapshot(
+        none,
+        none[:, 0],
+        meshes=(replace(tilted, surface=surface),),
+        lights=(Light.sun((0.0, 0.0, -1.0), WHITE, np.pi),),
+    )
+    expected = render_image(shown, camera_above(), SIZE, SIZE, 3)
+    edge = (expected[..., 3] > 0.0) & (expected[..., 3] < 1.0)
+    assert edge.sum() > 100
+    assert still(shown, 3) == pytest.approx(expected, abs=1.0e-3)

@@ -168,10 +168,11 @@ def add_moment_options(parser: argparse.ArgumentParser, beside: str = "") -> Non
 def add_picture_options(parser: argparse.ArgumentParser, width: int, height: int) -> None:
     """The size of a picture [pixels], its samples and its stage."""
     picture = parser.add_argument_group("the picture")
+    samples = "samples of a pixel along each side, each lit by other points of the lights"
     for name, default, what in (
         ("--width", width, "pixels across"),
         ("--height", height, "pixels down"),
-        ("--samples", 2, "samples of a pixel along each side"),
+        ("--samples", 2, samples),
     ):
         about = f"{what} (default: {default})"
         picture.add_argument(name, type=int, default=default, metavar="COUNT", help=about)
@@ -317,7 +318,7 @@ def _range_of(kind: type[Settings], name: str) -> tuple[float, float]:
 _LIMITS = (
     ("width", 1, 4096),
     ("height", 1, 4096),
-    ("samples", 1, 4),  # times 4096 pixels is the largest texture that every GPU has
+    ("samples", 1, 16),
     ("seconds", 0.0, 3600.0),
     ("frame_rate", 1.0, 1000.0),
     ("groom_scale", 1e-6, 1e6),

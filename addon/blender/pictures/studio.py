@@ -15,12 +15,12 @@ from ...motion_flow import style_of_guides
 from ...render.camera import Camera, frame_points
 from ...render.card_pass import CardPass
 from ...render.card_snapshot import CardSnapshot
-from ...render.frame import render_image
+from ...render.frame import render_still
 from ...render.good_side import GoodSide, good_side
 from ...render.hair_ball import HairBall
 from ...render.mesh_pass import MeshPass
 from ...render.snapshot import MeshSnapshot, Snapshot
-from ...render.strand_pass import Statistics, StrandPass, calm_draws
+from ...render.strand_pass import Statistics, StrandPass
 from ...rig_flow import Pose
 from ...shading.lights import Light
 from ...shading.skin.notes import skin_notes
@@ -118,19 +118,16 @@ class Studio:
     def _drawn(
         self, snapshot: Snapshot, camera: Camera, width: int, height: int, samples: int
     ) -> Floats:
-        pictures = [
-            render_image(
-                snapshot,
-                replace(camera, sample=number),
-                width,
-                height,
-                samples,
-                passes=self._passes,
-                card_pass=self._card_pass,
-            )
-            for number in range(calm_draws(snapshot.strand_settings, samples))
-        ]
-        picture = np.mean(pictures, axis=0)
+        picture = render_still(
+            snapshot,
+            camera,
+            width,
+            height,
+            samples,
+            center=self._ball.center,
+            passes=self._passes,
+            card_pass=self._card_pass,
+        )
         self._notes |= dict.fromkeys((*self.statistics.notes, *self._card_pass.notes))
         return picture
 

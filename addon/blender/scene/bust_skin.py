@@ -43,9 +43,9 @@ _SCLERA: Color = (0.66, 0.60, 0.57)
 _PUPIL: Color = (0.004, 0.004, 0.004)
 #: what is hidden in folds keeps its red longest
 _FOLD: Color = (0.36, 0.17, 0.14)
-#: skin between hairs, as a factor
-_SCALP: Color = (0.52, 0.47, 0.44)
-_BROW: Color = (0.72, 0.68, 0.66)
+#: skin between the hairs of scalp and brows, as a factor: a parting does not shine, and a head that
+#: wears a beard alone has no cap
+_BETWEEN_HAIRS: Color = (0.72, 0.68, 0.66)
 _BELOW_EYES: Color = (0.90, 0.83, 0.85)
 #: where more blood shows: place of the left side or of the middle [m], reach [m], strength
 _FLUSHED = (
@@ -115,8 +115,8 @@ def _skin(points: Floats, weights: dict[str, Floats], colors: Tone) -> Floats:
     is_front = points[:, 1] < -0.05
     shade = np.exp(-(below**2).sum(axis=1)) * is_front
     color *= _mixed(np.ones(3), _BELOW_EYES, shade[:, None])
-    color *= _mixed(np.ones(3), _SCALP, weights["scalp"])
-    color *= _mixed(np.ones(3), _BROW, weights["brows"])
+    for place in ("scalp", "brows"):
+        color *= _mixed(np.ones(3), _BETWEEN_HAIRS, weights[place])
     color = _mixed(color, colors.lips, 0.85 * weights["lips"])
     for size, strength in _MOTTLE:
         light = strength * _noise(points, size)[:, None]
