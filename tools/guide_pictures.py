@@ -2,12 +2,15 @@
 
 make test-ui SESSIONS=session_guide_pictures
 python tools/guide_pictures.py FOLDER
+
+What stands on the panels is kept beside them, see tools/panel_texts.py.
 """
 
 import shutil
 import sys
 from pathlib import Path
 
+import panel_texts
 from extension_loader import REPOSITORY
 
 FROM, SESSION = REPOSITORY / "out" / "window", "guide_pictures-opengl-"
@@ -22,6 +25,7 @@ def main(folder: Path) -> int:
         made = folder / path.name.removeprefix(SESSION)
         shutil.copyfile(path, made)
         print(f"{made.name}: {made.stat().st_size:,} bytes")
+    panel_texts.keep()
     return 0
 
 

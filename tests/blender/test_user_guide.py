@@ -11,6 +11,7 @@ from hairloom.addon import registration
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 sys.path.append(str(REPOSITORY / "tests" / "window"))
+import panel_texts  # noqa: E402
 from guide_panels import OTHERS, PICTURES, pictured  # noqa: E402
 
 pytestmark = pytest.mark.usefixtures("extension")
@@ -33,6 +34,21 @@ def test_the_user_guide_shows_all_of_these_pictures():
     guide = (REPOSITORY / "docs" / "user_guide.md").read_text(encoding="utf-8")
     shown = set(re.findall(r"!\[[^\]]+\]\(images/panel_(\w+)\.png\)", guide))
     assert shown == {*PICTURES, *OTHERS}
+
+
+@pytest.mark.slow
+def test_the_pictures_show_what_stands_on_the_panels():
+    kept, now = panel_texts.kept(), panel_texts.texts()
+    stale = [name for name in now if now[name] != kept.get(name)]
+    assert stale == [], "make test-ui SESSIONS=session_guide_pictures; tools/guide_pictures.py"
+
+
+def test_what_is_kept_of_panels_has_labels_defaults_buttons_and_keyframes():
+    """So that the test above can fail."""
+    now = panel_texts.texts()
+    assert {"Guides: 762, no keyframes", "Add Modifier", "Detail: adaptive"} <= set(now["strands"])
+    assert "Look: Brown" in now["preferences"]
+    assert set(now) == {*PICTURES, "preferences"}
 
 
 def test_a_panel_that_is_in_none_is_found():

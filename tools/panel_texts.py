@@ -1,0 +1,125 @@
+"""What stands on the panels that docs/user_guide.md pictures: texts, fields, their defaults and
+whether they take keyframes. It is kept beside the pictures, so that a test says which of them show
+what is no more.
+
+tools/guide_pictures.py writes it as it takes the pictures.
+"""
+
+import importlib
+import json
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from types import SimpleNamespace
+from typing import Any
+from unittest import mock
+
+import bpy
+from extension_loader import PACKAGE, REPOSITORY, load_package
+
+sys.path.append(str(REPOSITORY / "tests" / "window"))
+from guide_panels import PICTURES
+
+KEPT = REPOSITORY / "docs" / "images" / "panels.json"
+#: what is drawn of a mesh
+OF_MESHES = ("collider", "fin", "sidebar_mesh_cards", "sidebar_fin")
+
+
+class Recorder:
+    """In place of Blender's UILayout: notes what stands there, and changes nothing."""
+
+    def __init__(self) -> None:
+        self.noted: list[str] = []
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        if name == "noted":
+            object.__setattr__(self, name, value)
+
+    def __getattr__(self, name: str) -> Callable[..., Any]:
+        """Any other call of a layout: its text is noted, and what it gives is drawn into."""
+
+        def call(*_: Any, text: str = "", heading: str = "", **__: Any) -> Any:
+            self.noted += [each for each in (text, heading) if each]
+            return self
+
+        return call
+
+    def panel(self, *_: Any, **__: Any) -> Any:
+        return self, self
+
+    def operator(self, name: str, text: str | None = None, **_: Any) -> Any:
+        operator = getattr(bpy.ops.hairloom, name.partition(".")[2])
+        self.noted.append(operator.get_rna_type().name if text is None else text)
+        return SimpleNamespace()
+
+    def prop(self, data: Any, name: str, text: str | None = None, **_: Any) -> None:
+        self.noted.append(_field(data.bl_rna.properties[name], text))
+
+    def prop_search(
+        self, data: Any, name: str, *_: Any, text: str | None = None, **__: Any
+    ) -> None:
+        self.prop(data, name, text)
+
+
+def _field(known: Any, text: str | None) -> str:
+    default = getattr(known, "default", "")
+    if getattr(known, "is_array", False):
+        default = [round(each, 4) for each in known.default_array]
+    elif isinstance(default, float):
+        default = round(default, 4)
+    dot = "" if known.is_animatable else ", no keyframes"
+    return f"{known.name if text is None else text}: {default}{dot}"
+
+
+@contextmanager
+def _lines_unbroken() -> Iterator[None]:
+    """Lines are broken by the width of a panel's region, and there is none without a window."""
+
+    def draw(layout: Any, _context: Any, text: str, *_: Any, **__: Any) -> None:
+        layout.label(text=text)
+
+    rooms = [each for name, each in sys.modules.items() if name.startswith(f"{PACKAGE}.addon.ui.")]
+    with ExitStack() as stack:
+        for room in rooms:
+            for name in ("draw_lines", "draw_message"):
+                if hasattr(room, name):
+                    stack.enter_context(mock.patch.object(room, name, draw))
+        yield
+
+
+def texts() -> dict[str, list[str]]:
+    """Picture -> what stands on its panels, of new hair on a mesh that is cloth, which it adds to
+    the open scene."""
+    bpy.ops.mesh.primitive_uv_sphere_add(radius=0.1)
+    mesh = bpy.context.object
+    bpy.ops.hairloom.fin_add()
+    bpy.ops.hairloom.grow(strand_count=60, length=0.1, cv_count=8)
+    hair = bpy.context.object
+    with _lines_unbroken():
+        found = {name: list(_of_picture(name, hair, mesh)) for name in PICTURES}
+    preferences = importlib.import_module(f"{PACKAGE}.addon.ui.preferences").HAIRLOOM_AP_preferences
+    declared = [each.keywords for each in preferences.__annotations__.values()]
+    return found | {
+        "preferences": [f"{each['name']}: {each.get('default', '')}" for each in declared]
+    }
+
+
+def _of_picture(name: str, hair: bpy.types.Object, mesh: bpy.types.Object) -> Iterator[str]:
+    for panel in (each for column in PICTURES[name] for each in column):
+        active = mesh if panel.startswith(OF_MESHES) else hair
+        recorder, kind = Recorder(), getattr(bpy.types, f"HAIRLOOM_PT_{panel}")
+        with bpy.context.temp_override(active_object=active, object=active):
+            kind.draw(SimpleNamespace(layout=recorder), bpy.context)
+        yield from (f"# {kind.bl_label}", *recorder.noted)
+
+
+def kept() -> dict[str, list[str]]:
+    found: dict[str, list[str]] = json.loads(KEPT.read_text(encoding="utf-8"))
+    return found
+
+
+def keep() -> None:
+    """Write down what stands on the panels now."""
+    load_package().register()
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    KEPT.write_text(json.dumps(texts(), indent=1) + "\n", encoding="utf-8")
