@@ -89,11 +89,11 @@ void main()
       float wanted = heuristic_pieces(
           clip_from, clip_to, max(angle_from, angle_to), seen.picture.xy, detail.piece_length);
       angle_from = angle_to;
-#else
-      float wanted = float(detail.subdivisions);
 #endif
+#if MODE == {{mode_fixed}}
+      int pieces = detail.subdivisions;
+#else
       int pieces = wanted > 1.0 ? int(min(wanted, float(detail.max_subdivisions))) : 1;
-#if MODE != {{mode_fixed}}
       pieces = is_outside(control) ? 1 : pieces;
 #endif
       total += pieces;

@@ -76,15 +76,15 @@ class PictureView:
 
 
 def detail_factors(points: Floats, view: PictureView, settings: DetailSettings) -> Ints:
-    """Pieces of each segment, (strand_count, cv_count - 1) int32 from 1 to max_subdivisions.
+    """Pieces of each segment, (strand_count, cv_count - 1) int32 from 1 on, to max_subdivisions
+    where the number is not fixed.
 
     Args:
         points: (strand_count, cv_count, 3) [m], world space.
     """
     segment_count = points.shape[1] - 1
     if settings.mode == "fixed":
-        pieces = min(settings.subdivisions, settings.max_subdivisions)
-        return np.full((len(points), segment_count), pieces, np.int32)
+        return np.full((len(points), segment_count), settings.subdivisions, np.int32)
     factors = np.empty((len(points), segment_count), np.int32)
     with np.errstate(all="ignore"):  # points that are not finite end in one piece or in the most
         for start in range(0, len(points), _CHUNK):

@@ -295,7 +295,7 @@ class GroomExtent:
 
 def _even_order(snapshot: Snapshot) -> DetailOrder:
     """All strands in the pieces of the fixed mode, which no pass has to find out."""
-    subdivisions = min(snapshot.detail.subdivisions, snapshot.detail.max_subdivisions)
+    subdivisions = snapshot.detail.subdivisions
     pieces = (snapshot.layout.cv_count - 1) * subdivisions
     drawn = DetailClass(pieces, 0, snapshot.strand_count)
     counts = snapshot.strand_count, pieces * snapshot.strand_count

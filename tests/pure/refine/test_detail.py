@@ -206,12 +206,12 @@ def test_nothing_depends_on_what_else_is_there(mode: str) -> None:
     assert (detail_factors(points[:, :2], view, settings) == expected).all()
 
 
-def test_fixed_takes_the_same_everywhere_but_no_more_than_allowed() -> None:
+def test_fixed_takes_the_same_everywhere_whatever_other_modes_may_take() -> None:
     view = PictureView(np.eye(4), PROJECTIONS["usual"], WIDTH, HEIGHT)
     points = np.zeros((3, 4, 3), np.float32)
     assert (detail_factors(points, view, DetailSettings(mode="fixed", subdivisions=5)) == 5).all()
-    limited = DetailSettings(mode="fixed", subdivisions=9, max_subdivisions=6)
-    assert (detail_factors(points, view, limited) == 6).all()
+    other = DetailSettings(mode="fixed", subdivisions=9, max_subdivisions=6)
+    assert (detail_factors(points, view, other) == 9).all()
 
 
 def test_the_heuristic_counts_pixels_and_the_larger_angle() -> None:
