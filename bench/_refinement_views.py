@@ -42,7 +42,7 @@ from hairloom.addon.shading.lights import three_point_lights
 REPOSITORY = Path(__file__).resolve().parents[1]
 SINTEL = Path("sintel") / "SintelHairOriginal-sintel_hair.16points.tfx"
 WIDTH, HEIGHT, STRANDS, ROUNDS = 960, 720, 11_400, 15
-BARE = DetailSettings(culling="none", lod_height=0.0)
+BARE = DetailSettings(culling="none", lod_size=0.0)
 UNDIVIDED = replace(BARE, mode="fixed", subdivisions=1)
 #: corners of the exact curve between two of the drawn line
 PROBES = 8
@@ -241,7 +241,7 @@ def coverage_eighth_difference(shown: Groom) -> float:
         covered = {}
         for name, detail in (
             ("all", BARE),
-            ("eighth", replace(BARE, lod_height=1.0e5, min_density=0.125)),
+            ("eighth", replace(BARE, lod_size=1.0e5, min_density=0.125)),
         ):
             snapshot = shown.snapshot(detail, rank=rank)
             covered[name] = float(render_image(snapshot, shown.camera(), *size, 4)[..., 3].mean())

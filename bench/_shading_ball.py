@@ -122,7 +122,7 @@ def snapshot_of(
         ambient=(0.0, 0.0, 0.0),
         shading=shading,
         strand_settings=StrandSettings(tip_width=1.0, minimum_width=0.0),
-        detail=DetailSettings(culling="none", lod_height=0.0),
+        detail=DetailSettings(culling="none", lod_size=0.0),
         volume_center=np.zeros(3, np.float32),
     )
 

@@ -115,7 +115,7 @@ def _ours(points: np.ndarray, sun: np.ndarray, camera: Camera) -> np.ndarray:
         ambient=(0.0, 0.0, 0.0),
         shading=plain_look(COLORS[COLOR])[1],
         strand_settings=StrandSettings(tip_width=1.0, minimum_width=0.0),
-        detail=DetailSettings(culling="none", lod_height=0.0),
+        detail=DetailSettings(culling="none", lod_size=0.0),
         volume=VolumeSettings(strand_fraction=1.0),
     )
     picture = render_image(snapshot, camera, SIZE, SIZE, SAMPLES)

@@ -191,7 +191,7 @@ def snapshot_of(
         ambient=(0.0, 0.0, 0.0),
         shading=hair_settings(absorption, stand_ins),
         strand_settings=StrandSettings(tip_width=1.0, minimum_width=0.0, transparency="none"),
-        detail=DetailSettings(culling="none", lod_height=0.0),
+        detail=DetailSettings(culling="none", lod_size=0.0),
         volume=volume,
     )
 

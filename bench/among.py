@@ -303,7 +303,7 @@ def draw(folder: Path) -> None:
     from hairloom.addon.shading.ambient_settings import AmbientSettings
 
     hair = ponytail(8000)
-    settings = GroomSettings().with_settings(DetailSettings(lod_height=0.0))
+    settings = GroomSettings().with_settings(DetailSettings(lod_size=0.0))
     studio = Studio(prepared(hair.rig, AmbientSettings()), settings, look=hair.bust.look("light"))
     points = hair.rig.strands.points
     box = points.min(axis=0) - 0.03, points.max(axis=0) + 0.03

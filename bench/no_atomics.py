@@ -71,7 +71,7 @@ def shown(sitter: Sitter, transparency: str) -> Snapshot:
         meshes=(MeshSnapshot.of(sitter.head, color=SKIN),),
         shading=ShadingSettings(model="marschner"),
         strand_settings=StrandSettings(transparency=transparency),
-        detail=DetailSettings(lod_height=0.0),
+        detail=DetailSettings(lod_size=0.0),
     )
 
 

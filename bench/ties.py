@@ -121,7 +121,7 @@ def draw(tail: Ponytail, shown: list, path: Path) -> None:
     from hairloom.addon.render.frame import frame_camera
     from hairloom.addon.shading.ambient_settings import AmbientSettings
 
-    settings = GroomSettings().with_settings(DetailSettings(lod_height=0.0))
+    settings = GroomSettings().with_settings(DetailSettings(lod_size=0.0))
     groom = prepared(tail.rig, AmbientSettings())
     studio = Studio(groom, settings, look=tail.bust.look("light"))
     rest = tail.rig.strands.points

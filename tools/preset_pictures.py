@@ -48,7 +48,7 @@ def studio_of(rig: Any, *settings: Any) -> Any:
     return of_addon("blender.pictures.studio").Studio(
         of_addon("blender.sessions.prepared_groom").prepared(rig, all_settings["ambient"]()),
         of_addon("blender.properties.groom_settings").GroomSettings(
-            of_addon("params").SettingsMap(*settings, all_settings["detail"](lod_height=0.0))
+            of_addon("params").SettingsMap(*settings, all_settings["detail"](lod_size=0.0))
         ),
         look=of_addon("blender.scene.built_in_head").built_in_head().look("light"),
     )

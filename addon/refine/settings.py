@@ -83,11 +83,11 @@ class DetailSettings(Settings):
         description="Which strands are not drawn because the head hides them",
         source=_SSALOD,
     )
-    lod_height: float = number(
+    lod_size: float = number(
         300.0,
-        label="LOD Height",
-        description="Height of the groom in the picture below which fewer but wider strands are "
-        "drawn; 0 always draws all",
+        label="LOD Size",
+        description="Size of the groom in the picture, the larger of width and height, below which "
+        "fewer but wider strands are drawn; 0 always draws all",
         soft=(0.0, 1000.0),
         hard=(0.0, 100_000.0),
         unit="pixels",
@@ -99,5 +99,5 @@ class DetailSettings(Settings):
         unit="factor",
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),
-        shown_when=when("detail.lod_height"),
+        shown_when=when("detail.lod_size"),
     )

@@ -66,10 +66,11 @@ def thinning(
         minimum_width: strands are drawn no thinner [pixels].
     """
     size = groom_size(bounds, view)
-    fraction = drawn_fraction(size[1], settings)
+    larger = int(np.argmax(size))  # brows and lashes are near though they are not high
+    fraction = drawn_fraction(size[larger], settings)
     if fraction >= WHOLE:
         return Thinning()
-    pixels_per_metre = size[1] / max(_height(bounds, view), 1.0e-9)
+    pixels_per_metre = size[larger] / max(_extents(bounds, view)[larger], 1.0e-9)
     width = max(2.0 * radius * pixels_per_metre, minimum_width)
     across, up = (max(side, 1.0) for side in size)
     layers = total_length * pixels_per_metre * width / (across * up)
@@ -90,15 +91,15 @@ def groom_size(bounds: tuple[Floats, Floats], view: PictureView) -> tuple[float,
     return float(across), float(up)
 
 
-def drawn_fraction(height_px: float, settings: DetailSettings) -> float:
+def drawn_fraction(size_px: float, settings: DetailSettings) -> float:
     """Strands of a lower rank than this are drawn: WHOLE is all of them in full width.
 
     Args:
-        height_px: of the groom in the picture.
+        size_px: of the groom in the picture, the larger of its width and its height.
     """
-    if settings.lod_height <= 0.0 or settings.min_density >= 1.0:
+    if settings.lod_size <= 0.0 or settings.min_density >= 1.0:
         return WHOLE
-    fraction = WHOLE * height_px / settings.lod_height
+    fraction = WHOLE * size_px / settings.lod_size
     return float(min(max(fraction, settings.min_density), WHOLE))
 
 
@@ -164,9 +165,10 @@ def _corners(bounds: tuple[Floats, Floats]) -> Floats:
     return np.hstack([np.where(is_high, high, low), np.ones((8, 1))])
 
 
-def _height(bounds: tuple[Floats, Floats], view: PictureView) -> float:
-    """Of a box along the picture's upright [m]."""
-    return float(np.ptp(_corners(bounds) @ np.asarray(view.view, np.float64)[1]))
+def _extents(bounds: tuple[Floats, Floats], view: PictureView) -> Floats:
+    """Of a box across and up the picture, (2,) [m]."""
+    extents: Floats = np.ptp(_corners(bounds) @ np.asarray(view.view, np.float64)[:2].T, axis=0)
+    return extents
 
 
 def _mean_factor(fraction: float) -> float:

@@ -177,9 +177,9 @@ class DetailPass:
         self._strand_widths: tuple[Any, ...] = ()
 
     def _thinned(self, snapshot: Snapshot, view: PictureView) -> Thinning:
-        if snapshot.rank is None or snapshot.detail.lod_height <= 0.0:
+        if snapshot.rank is None or snapshot.detail.lod_size <= 0.0:
             return Thinning()
-        if self._extent is None or self._extent.rank is not snapshot.rank:
+        if self._extent is None or not self._extent.is_of(snapshot):
             self._extent = GroomExtent.of(snapshot)
         return self._extent.thinning(snapshot, view)
 
@@ -259,14 +259,16 @@ class DetailPass:
 
 @dataclass(frozen=True, eq=False)
 class GroomExtent:
-    """How large a groom is, which hardly changes as it moves: found once for its ranks.
+    """How large a groom is, which hardly changes as it moves: found once for its ranks and its
+    widths. An instance that is scaled has other widths.
 
-    rank: those of the groom that this is of.
+    rank, widths: those of the groom that this is of.
     low, high: (3,) corners of all strands around its center [m].
     total_length: of all strands [m]. radius: the mean [m].
     """
 
     rank: Floats
+    widths: Floats
     low: Floats
     high: Floats
     total_length: float
@@ -278,7 +280,11 @@ class GroomExtent:
         points, roots = snapshot.points, snapshot.roots.mean(axis=0, dtype=np.float64)
         length = float(steps(points, snapshot.layout.offsets).sum())
         low, high = points.min(axis=0) - roots, points.max(axis=0) - roots
-        return cls(snapshot.rank, low, high, length, float(snapshot.radius.mean()))
+        radius = float(snapshot.radius.mean())
+        return cls(snapshot.rank, snapshot.radius, low, high, length, radius)
+
+    def is_of(self, snapshot: Snapshot) -> bool:
+        return self.rank is snapshot.rank and self.widths is snapshot.radius
 
     def thinning(self, snapshot: Snapshot, view: PictureView) -> Thinning:
         """How the groom is thinned out where it is now."""

@@ -443,10 +443,10 @@ def test_a_picture_of_children_says_what_was_drawn(sphere, tmp_path, gpu_context
     arguments += ["--set", "children.method=multi", "--set", "children.strand_count=400"]
     arguments += ["--output", str(tmp_path / "still.png"), "--report", str(report)]
     drawn = {}
-    for lod_height in (0, 300):
-        more = ["--set", f"detail.lod_height={lod_height}", "--set", "detail.culling=none"]
+    for lod_size in (0, 300):
+        more = ["--set", f"detail.lod_size={lod_size}", "--set", "detail.culling=none"]
         assert command_line.run([*arguments, *more]) == 0
-        drawn[lod_height] = json.loads(report.read_text())["drawn"]
+        drawn[lod_size] = json.loads(report.read_text())["drawn"]
     assert drawn[0]["strands"] == 480 and drawn[0]["pieces"] >= 480 * 15
     assert drawn[300]["strands"] < 480 and drawn[300]["vertices"] < drawn[0]["vertices"]
 

@@ -43,7 +43,7 @@ def test_detail_acts_at_once(preview):
     hair, _, session = preview
     rig, before = session.rig, drawing(session).snapshot
     detail = hair.data.hairloom.detail
-    detail.mode, detail.subdivisions, detail.lod_height = "fixed", 7, 0.0
+    detail.mode, detail.subdivisions, detail.lod_size = "fixed", 7, 0.0
     snapshot = drawing(session).snapshot
     assert (snapshot.detail.mode, snapshot.detail.subdivisions) == ("fixed", 7)
     assert session.rig is rig and not session.is_stale
@@ -152,7 +152,7 @@ def test_the_counts_are_what_was_drawn(preview, gpu_context):
     hair.data.hairloom.detail.mode = "fixed"
     hair.data.hairloom.detail.subdivisions = 3
     hair.data.hairloom.detail.culling = "none"
-    hair.data.hairloom.detail.lod_height = 0.0
+    hair.data.hairloom.detail.lod_size = 0.0
     shown, strand_pass = drawing(session).snapshot, StrandPass()
     low, high = shown.points.min(axis=0), shown.points.max(axis=0)
     camera = frame_camera((low, high), (0.0, -1.0, 0.0), 0.5, 1.0)

@@ -59,7 +59,7 @@ def snapshot_of(frame: Any, strands: np.ndarray, **more: Any) -> Any:
         "ambient": (0.0, 0.0, 0.0),
         "shading": PLAIN,
         "strand_settings": WIDE,
-        "detail": DetailSettings(culling="none", lod_height=0.0),
+        "detail": DetailSettings(culling="none", lod_size=0.0),
         # so that the hair's volume faces the light
         "volume_center": np.array([0.0, 0.0, -9.0], np.float32),
         "table_size": PREVIEW_SIZE,

@@ -66,7 +66,7 @@ def drawn(
         ambient=(0.0, 0.0, 0.0),
         shading=settings_from(node, alike)[0],
         strand_settings=StrandSettings(tip_width=1.0, minimum_width=0.0, transparency="none"),
-        detail=DetailSettings(culling="none", lod_height=0.0),
+        detail=DetailSettings(culling="none", lod_size=0.0),
         volume=VolumeSettings(shadows="deep", strand_fraction=1.0, resolution=resolution),
         volume_center=np.zeros(3, np.float32),
     )

@@ -25,7 +25,7 @@ from hairloom.addon.strands import Surface
 pytestmark = pytest.mark.usefixtures("gpu_context")
 
 #: every strand in its own pieces, none left out
-BARE = DetailSettings(culling="none", lod_height=0.0)
+BARE = DetailSettings(culling="none", lod_size=0.0)
 #: a ball that hides nothing in these pictures, but has to be looked at
 OCCLUDER_SPHERES = np.array([[3.0, 3.0, 3.0, 0.1]], np.float32)
 

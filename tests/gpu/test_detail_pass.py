@@ -25,7 +25,7 @@ pytestmark = pytest.mark.usefixtures("gpu_context")
 
 WIDTH, HEIGHT = 320, 240
 #: every strand in its own pieces, none left out
-BARE = DetailSettings(culling="none", lod_height=0.0)
+BARE = DetailSettings(culling="none", lod_size=0.0)
 #: balls inside of the one that `curly` grows from
 OCCLUDER_SPHERES = np.array([[0.0, 0.0, 0.0, 0.095], [0.02, 0.0, 0.03, 0.06]], np.float32)
 FIXED_64 = dataclasses.replace(BARE, mode="fixed", subdivisions=64)
@@ -253,7 +253,7 @@ def test_two_views_in_turn_and_nothing_computed_twice(frame: Any, monkeypatch: A
     assert shown(finer, other)[1] == 1
     moved = dataclasses.replace(finer, points=finer.points + np.float32(0.01))
     assert shown(moved, other)[1] == 1
-    detail = DetailSettings(lod_height=1e4)
+    detail = DetailSettings(lod_size=1e4)
     culled = dataclasses.replace(moved, detail=detail, occluder_spheres=OCCLUDER_SPHERES[:0])
     assert shown(culled, one)[1] == 1
     for spheres in (OCCLUDER_SPHERES, OCCLUDER_SPHERES[::-1]):
@@ -346,7 +346,7 @@ def test_an_eighth_of_the_strands_covers_as_much_as_all(frame: Any, shared_data:
     strands = groom.strands.grid
     rank = even_ranks(strands[:, 0])
     camera = frame.frame_camera(groom.strands.bounds(), (-0.55, -1, 0.18), np.radians(30), 4 / 3)
-    thinned = dataclasses.replace(BARE, lod_height=1e5, min_density=0.125)
+    thinned = dataclasses.replace(BARE, lod_size=1e5, min_density=0.125)
     for height in (144, 72, 45):
         passes, covered = (frame.MeshPass(), frame.StrandPass()), []
         for detail in (BARE, thinned):
@@ -365,13 +365,31 @@ def test_thinned_strands_are_those_of_low_rank_and_fade(frame: Any) -> None:
     strands = curly(400, 5)
     rank = np.random.default_rng(7).permutation(400) / 400.0
     camera, shares = cameras(frame)["whole"], []
-    for lod_height in (100.0, 250.0, 400.0, 1000.0):
-        detail = dataclasses.replace(BARE, lod_height=lod_height)
+    for lod_size in (100.0, 250.0, 400.0, 1000.0):
+        detail = dataclasses.replace(BARE, lod_size=lod_size)
         _, order = computed(strands, camera, detail, rank=rank)
         drawn = drawn_of(order)
         assert rank[drawn].max() < np.delete(rank, drawn).min(initial=1.0)
         shares.append(len(drawn) / len(strands))
     assert shares[0] == 1.0 and (np.diff(shares) <= 0.0).all() and 0.125 <= shares[-1] < 0.5
+
+
+def test_an_instance_that_is_scaled_is_thinned_as_large_as_it_is(frame: Any) -> None:
+    """The same ranks, as the engine places an instance of a groom."""
+    strands, rank = curly(400, 5), np.random.default_rng(7).permutation(400) / 400.0
+    detail, camera = dataclasses.replace(BARE, lod_size=1000.0), cameras(frame)["whole"]
+    small = snapshot_of(frame, strands * np.float32(0.2), detail, rank=rank)
+    small = dataclasses.replace(small, radius=small.radius * np.float32(0.2))
+    large = snapshot_of(frame, strands, detail, rank=rank)
+
+    def drawn(passes: Any, snapshot: Any) -> int:
+        frame.render_image(snapshot, camera, WIDTH, HEIGHT, 1, passes=passes)
+        return int(passes[1].statistics.strands)
+
+    fresh = [drawn((frame.MeshPass(), frame.StrandPass()), each) for each in (small, large)]
+    assert fresh[0] < fresh[1]
+    passes = frame.MeshPass(), frame.StrandPass()
+    assert [drawn(passes, each) for each in (small, large, small)] == [*fresh, fresh[0]]
 
 
 def head_of_hair(frame: Any, detail: DetailSettings) -> Any:

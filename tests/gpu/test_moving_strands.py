@@ -39,7 +39,7 @@ def curls(frame: Any, *, outward: float = 1.0, **more: Any) -> Any:
         "shading": ShadingSettings(
             model="kajiya_kay", base_color=(1.0, 1.0, 1.0), color_variation=0.5
         ),
-        "detail": DetailSettings(lod_height=0.0),
+        "detail": DetailSettings(lod_size=0.0),
         "volume": VolumeSettings(shadows="none"),
     }
     radius = np.full(strands.shape[:2], 3e-4, np.float32)
@@ -130,7 +130,7 @@ def test_a_jump_coarsens_strands_and_loses_none(frame: Any, monkeypatch: Any) ->
     from hairloom.addon.render.known_detail import KnownDetail
 
     spheres = np.array([[0.0, 0.0, 0.0, 0.098]], np.float32)
-    detail = DetailSettings(lod_height=0.0, culling="hidden")
+    detail = DetailSettings(lod_size=0.0, culling="hidden")
     groom = curls(frame, outward=0.0, detail=detail, occluder_spheres=spheres)
     own = frame.StrandPass()
     drawn(frame, own, groom, seen_from(frame, distance=3.0))

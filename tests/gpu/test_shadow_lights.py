@@ -55,7 +55,7 @@ def snapshot_of(frame: Any, volume: VolumeSettings, *lights: Light, **more: Any)
         "ambient": (0.0, 0.0, 0.0),
         "shading": PLAIN,
         "strand_settings": StrandSettings(tip_width=1.0, minimum_width=0.0, transparency="none"),
-        "detail": DetailSettings(culling="none", lod_height=0.0),
+        "detail": DetailSettings(culling="none", lod_size=0.0),
         "volume_center": np.array([-9.0, 0.0, 0.0], np.float32),
         "table_size": PREVIEW_SIZE,
     }

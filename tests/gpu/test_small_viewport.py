@@ -42,7 +42,7 @@ def test_hair_stays_in_its_viewport(frame: Any, transparency: str, keeps: bool) 
         np.full((300, 2), 4e-3, np.float32),
         lights=three_point_lights(camera.view),
         strand_settings=StrandSettings(transparency=transparency),
-        detail=DetailSettings(lod_height=0.0),
+        detail=DetailSettings(lod_size=0.0),
     )
     color = gpu.types.GPUTexture(SIZE, format="RGBA32F")
     depth = gpu.types.GPUTexture(SIZE, format="DEPTH_COMPONENT32F")

@@ -49,7 +49,7 @@ def hair(frame: Any, ends: np.ndarray, brightness: np.ndarray, **more: Any) -> A
             model="kajiya_kay", base_color=(1.0, 1.0, 1.0), color_variation=0.0
         ),
         "strand_settings": StrandSettings(tip_width=1.0, opacity=0.6),
-        "detail": DetailSettings(lod_height=0.0),
+        "detail": DetailSettings(lod_size=0.0),
         "volume": VolumeSettings(shadows="none"),
     }
     return frame.Snapshot(

@@ -41,7 +41,7 @@ def snapshot_of(frame: Any, strands: np.ndarray, radius: float, **more: Any) -> 
         "ambient": WHITE,
         "shading": FLAT,
         "strand_settings": StrandSettings(tip_width=1.0),
-        "detail": DetailSettings(lod_height=0.0),
+        "detail": DetailSettings(lod_size=0.0),
         "volume": VolumeSettings(shadows="none"),
     }
     shape = strands.shape[:2]
@@ -207,7 +207,7 @@ def test_hair_is_as_bright_in_small_pictures(frame: Any, front: Any, opacity: fl
         width / 2.0,
         occlusion=np.repeat(brightness[:, None], 2, axis=1).astype(np.float32),
         strand_settings=settings,
-        detail=DetailSettings(lod_height=0.0, mode="fixed", subdivisions=1),
+        detail=DetailSettings(lod_size=0.0, mode="fixed", subdivisions=1),
     )
     pictures = {
         size: frame.render_image(shown, front, size, size, 1) for size in (12, 24, 48, 96, 384)
@@ -256,7 +256,7 @@ def test_no_order_of_strands_changes_the_picture(frame: Any, mode: str) -> None:
         seed=np.arange(600),
         shading=replace(COLORED, color_variation=1.0),
         strand_settings=StrandSettings(tip_width=1.0, opacity=0.7),
-        detail=DetailSettings(mode=mode, lod_height=0.0),
+        detail=DetailSettings(mode=mode, lod_size=0.0),
     )
     first = frame.render_image(shown, camera, SIZE, SIZE, 1)
     assert first[..., 3].mean() > 0.5

@@ -24,7 +24,7 @@ pytestmark = pytest.mark.usefixtures("gpu_context")
 SIZE, FEW, MANY = 96, 4, 128
 LIGHTS = (Light.sun((0.3, 0.9, -0.4), (1.0, 0.95, 0.9), 3.0),)
 TINTED = ShadingSettings(tip_tint=1.0, tip_color=(0.9, 0.1, 0.0), tint_start=0.0, tint_end=1.0)
-DETAIL = DetailSettings(culling="none", lod_height=0.0)
+DETAIL = DetailSettings(culling="none", lod_size=0.0)
 
 
 def straight(count: int, cv_count: int, start: float = -0.4, end: float = 0.4) -> np.ndarray:

@@ -134,7 +134,7 @@ def debug_views_and_counts():
 
 def what_the_head_hides():
     detail, shading = hair().data.hairloom.detail, viewport().spaces.active.shading
-    detail.lod_height = 0.0
+    detail.lod_size = 0.0
     detail.culling = "none"
     yield from until(draws_all, "strands are missing")
     everything = yield from pixels_at_rest("nothing-left-out")
@@ -154,7 +154,7 @@ def what_the_head_hides():
     driver.screenshot("hidden-head")
     bpy.data.objects["Head"].hide_set(False)
     yield
-    detail.lod_height = 300.0
+    detail.lod_size = 300.0
     yield
 
 

@@ -76,7 +76,7 @@ def parted():
     page.step(2)
     groom = hair().data.hairloom
     groom.children.method = "none"  # fewer strands are drawn faster
-    groom.detail.lod_height, groom.detail.min_density = FAR, SPARSE
+    groom.detail.lod_size, groom.detail.min_density = FAR, SPARSE
     yield from still()
     page.says("Properties > Data")
     yield from open_tab("DATA")

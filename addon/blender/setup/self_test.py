@@ -148,7 +148,7 @@ def _drawn(shading: ShadingSettings, volume: VolumeSettings) -> str:
         snapshot_of(prepared(rig, AmbientSettings(), with_occluders=False)),
         shading=shading,
         volume=volume,
-        detail=DetailSettings(lod_height=0.0),
+        detail=DetailSettings(lod_size=0.0),
     )
     points = rig.strands.points
     box = points.min(axis=0), points.max(axis=0)

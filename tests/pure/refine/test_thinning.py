@@ -69,11 +69,11 @@ def test_ranks_hang_on_roots_and_seed_alone() -> None:
 
 def test_all_strands_are_drawn_from_the_full_size_on() -> None:
     ranks = np.linspace(0.0, 1.0, 101)
-    settings = DetailSettings(lod_height=200.0)
-    for height in (200.0, 1000.0, np.inf):
-        assert drawn_fraction(height, settings) == WHOLE
+    settings = DetailSettings(lod_size=200.0)
+    for size in (200.0, 1000.0, np.inf):
+        assert drawn_fraction(size, settings) == WHOLE
     assert width_factor(ranks, WHOLE) == pytest.approx(1.0)
-    assert drawn_fraction(1.0, DetailSettings(lod_height=0.0)) == WHOLE
+    assert drawn_fraction(1.0, DetailSettings(lod_size=0.0)) == WHOLE
     assert drawn_fraction(1.0, DetailSettings(min_density=1.0)) == WHOLE
     assert drawn_fraction(1.0, DetailSettings(min_density=0.125)) == 0.125
     assert (width_factor(ranks, 0.125) > 0.0).tolist() == (ranks < 0.125).tolist()
@@ -82,7 +82,7 @@ def test_all_strands_are_drawn_from_the_full_size_on() -> None:
 def test_a_strand_gets_thin_before_it_is_gone() -> None:
     """From pixel to pixel of the groom's height no width changes by more than a tenth."""
     ranks = np.linspace(0.0, 0.999, 500)
-    settings = DetailSettings(lod_height=300.0, min_density=0.0)
+    settings = DetailSettings(lod_size=300.0, min_density=0.0)
     before = width_factor(ranks, drawn_fraction(310.0, settings))
     for height in np.arange(309.0, 60.0, -1.0):
         now = width_factor(ranks, drawn_fraction(height, settings))
@@ -114,8 +114,25 @@ def test_the_size_in_the_picture() -> None:
     assert groom_size(bounds, near) == pytest.approx((100.0, 100.0))  # the face at 4 m
     inside = PictureView(look_at((0, 0, 0), (0, 1, 0)), lens, 800, 400)
     assert groom_size(bounds, inside) == (np.inf, np.inf)
-    settings = DetailSettings(lod_height=1000.0)
+    settings = DetailSettings(lod_size=1000.0)
     assert thinning(bounds, 100.0, 4e-5, 1.0, inside, settings) == Thinning()
+
+
+def test_a_flat_groom_is_as_large_as_it_is_wide_however_the_camera_is_rolled() -> None:
+    brows = np.array([-0.06, -0.01, -0.008]), np.array([0.06, 0.01, 0.008])
+
+    def of(roll: float, distance: float) -> Thinning:
+        turned = np.eye(4)
+        turned[:2, :2] = [[np.cos(roll), -np.sin(roll)], [np.sin(roll), np.cos(roll)]]
+        view = turned @ look_at((0, -distance, 0), (0, 0, 0))
+        seen = PictureView(view, perspective(0.5, 1.0, 0.01, 100.0), 1080, 1080)
+        return thinning(brows, 600 * 0.01, 4e-5, 1.0, seen, DetailSettings())
+
+    assert of(0.0, 0.57) == Thinning()  # 450 x 60 pixels, in a portrait
+    far, rolled = of(0.0, 2.0), of(np.pi / 2.0, 2.0)
+    assert 0.125 < far.fraction < 0.8 and far.widening > 1.0
+    assert rolled.fraction == pytest.approx(far.fraction)
+    assert rolled.widening == pytest.approx(far.widening)
 
 
 @pytest.mark.alike
@@ -131,7 +148,8 @@ def test_the_groom_covers_as_much_when_it_is_thinned(shared_data: Path, height: 
     tall = groom_size((low, high), metre)[1] / height
     seen = PictureView(view, orthographic(tall, 1.0, 0.01, 10.0), size, size)
     length = float(np.linalg.norm(np.diff(grid, axis=1), axis=2).sum())
-    settings = DetailSettings(lod_height=1.25 * 8.0 * height)  # an eighth is left
+    in_picture = max(groom_size((low, high), seen))
+    settings = DetailSettings(lod_size=1.25 * 8.0 * in_picture)  # an eighth is left
     thinned = thinning((low, high), length, 4e-5, 1.0, seen, settings)
     assert thinned.fraction == pytest.approx(0.125)
     factors = width_factor(even_ranks(grid[:, 0]), thinned.fraction, thinned.widening)
