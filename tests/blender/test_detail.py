@@ -108,21 +108,26 @@ def test_balls_stay_inside_a_head_that_bends(sphere):
         assert (away >= balls[:, 3]).all()
 
 
-@pytest.mark.parametrize("how", ["eye", "wire"])
+@pytest.mark.parametrize("how", ["eye", "wire", "glass"])
 def test_a_head_that_is_not_seen_hides_nothing(how, preview):
     hair, head, session = preview
     assert drawing(session).snapshot.occluder_spheres is not None
+    assert drawing(session).head is session.posed_head
     if how == "eye":
         head.hide_set(True)
-    else:
+    elif how == "wire":
         head.display_type = "WIRE"
+    else:
+        head.color[3] = 0.5
     for culling in ("hidden", "away"):
         hair.data.hairloom.detail.culling = culling
         update()
         shown = drawing(session).snapshot
         assert shown.occluder_spheres is None and shown.detail.culling == "none"
+    # what is not solid is not in the way without overlays either
+    assert (drawing(session).head is None) is (how != "glass")
     head.hide_set(False)
-    head.display_type = "TEXTURED"
+    head.display_type, head.color[3] = "TEXTURED", 1.0
     update()
     assert drawing(session).snapshot.detail.culling == "away"
     hair.data.hairloom.detail.culling = "hidden"

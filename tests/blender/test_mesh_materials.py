@@ -10,7 +10,11 @@ import numpy as np
 import pytest
 
 from hairloom.addon.blender.scene import mesh_materials
-from hairloom.addon.blender.scene.mesh_materials import MeshMaterial, material_of
+from hairloom.addon.blender.scene.mesh_materials import (
+    MeshMaterial,
+    can_be_seen_through,
+    material_of,
+)
 from hairloom.addon.render.snapshot import MeshPictures
 from hairloom.addon.shading.lights import Light
 from hairloom.addon.strands import Surface
@@ -339,3 +343,27 @@ def test_few_pictures_are_kept(material: bpy.types.Material) -> None:
     assert len(mesh_materials._pictures) == mesh_materials._KEPT
     mesh_materials.forget()
     assert not mesh_materials._pictures
+
+
+@pytest.mark.parametrize(
+    "how", ["object", "colour", "method", "alpha", "picture", "mixed", "nothing"]
+)
+def test_what_can_be_seen_through(material: bpy.types.Material, how: str) -> None:
+    bpy.ops.mesh.primitive_plane_add()
+    plane, node = bpy.context.object, material.node_tree.nodes["Principled BSDF"]
+    assert not can_be_seen_through(plane), "without a material it cannot"
+    plane.data.materials.append(bpy.data.materials.new("Opaque"))
+    plane.data.materials.append(material)
+    if how == "object":
+        plane.color[3] = 0.5
+    elif how == "colour":
+        material.diffuse_color[3] = 0.5
+    elif how == "method":
+        material.surface_render_method = "BLENDED"
+    elif how == "alpha":
+        node.inputs["Alpha"].default_value = 0.5
+    elif how == "picture":
+        give(material, None, "Alpha")
+    elif how == "mixed":
+        material.node_tree.nodes.new("ShaderNodeBsdfTransparent")
+    assert can_be_seen_through(plane) is (how != "nothing")

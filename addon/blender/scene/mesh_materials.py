@@ -86,6 +86,24 @@ def material_notes(obj: bpy.types.Object) -> tuple[str, ...]:
     return tuple(dict.fromkeys(note for notes in found for note in notes))
 
 
+def can_be_seen_through(obj: bpy.types.Object) -> bool:
+    """Whether a view may show what is behind an object: by its colour, or by a material's colour,
+    method, shader or alpha."""
+    materials = (slot.material for slot in obj.material_slots)
+    return obj.color[3] < 1.0 or any(_lets_through(each) for each in materials if each is not None)
+
+
+def _lets_through(material: bpy.types.Material) -> bool:
+    if material.diffuse_color[3] < 1.0 or material.surface_render_method == "BLENDED":
+        return True
+    nodes = () if material.node_tree is None else material.node_tree.nodes
+    if any(each.type == "BSDF_TRANSPARENT" for each in nodes):
+        return True
+    node = _shader(material)
+    alpha = None if node is None else node.inputs.get("Alpha")
+    return alpha is not None and (_giver(alpha) is not None or alpha.default_value < 1.0)
+
+
 class _Reader:
     """Reads one material and notes what it leaves out."""
 

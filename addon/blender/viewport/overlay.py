@@ -36,6 +36,7 @@ from ..base.objects import LayerKey, is_solid, layer_key, layers_with, spaces_wi
 from ..base.redraw import redraw_panels, redraw_views, show_status
 from ..cards.show import as_shown, without_strands
 from ..scene.lights import uses_scene_light
+from ..scene.mesh_materials import can_be_seen_through
 from ..scene.world import studio_environment
 from ..sessions.measures import FrameTimes
 from ..sessions.session import Session
@@ -62,7 +63,7 @@ class Drawing:
     is_made: whether there is hair yet.
     seen_in: the view layers that show it; None is all.
     hidden_in: addresses of the 3D views that do not show it.
-    head: what it grows on, world space.
+    head: what it grows on, world space; None where that is not drawn as a solid.
     bare_in: of those that do not show its head, which hides nothing there.
     card_counts: cards, triangles and vertices where it is shown as cards.
     counts_of: the name under which its counts are written; empty: they are not.
@@ -132,7 +133,8 @@ def read_drawing(
         snapshot = without_strands(snapshot)
     if session.head is not None:
         head = session.head.handle.find()
-    if head is None or not is_solid(head):
+    is_drawn = head is not None and is_solid(head)
+    if head is None or not is_drawn or can_be_seen_through(head):
         snapshot = with_all_strands(snapshot)
     if snapshot.debug_view == "stretch" and len(snapshot.points):
         snapshot = replace(snapshot, rest=session.rest_points())
@@ -145,7 +147,7 @@ def read_drawing(
         is_made=session.is_made,
         seen_in=seen_in,
         hidden_in=spaces_without(hair),
-        head=session.posed_head,
+        head=session.posed_head if is_drawn else None,
         bare_in=frozenset() if head is None else spaces_without(head),
         guide_count=len(session.rig.guides),
         card_counts=session.cards.counts if snapshot.cards is not None else (),
@@ -433,7 +435,9 @@ def _shown_now(context: Any, camera: Camera, *, has_turned: bool) -> Iterator[_S
     found = sorted(shown_in(context), key=lambda each: each[1].snapshot.cards is not None)
     snapshots = _in_one_light([lit(each.snapshot, space.shading, studio) for _, each in found])
     for (uid, drawing), snapshot in zip(found, snapshots, strict=True):
-        sees_all = is_seen_through(space.shading) or address in drawing.bare_in
+        # of a head that a clipping region cuts, what is before the hair may be gone
+        is_open = is_seen_through(space.shading) or context.region_data.use_clip_planes
+        sees_all = is_open or address in drawing.bare_in
         if sees_all:
             snapshot = with_all_strands(snapshot)
         yield _Shown(
