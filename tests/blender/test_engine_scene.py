@@ -99,6 +99,26 @@ def test_previewed_hair_is_seen_as_its_object_is(
     assert (found.is_seen, found.is_holdout) == (False, False)
 
 
+def test_instances_of_previewed_hair_are_drawn_and_leave_it_as_it_is(
+    stage: Any, new_hair: Callable[..., Any]
+) -> None:
+    from hairloom.addon.blender.engine.engine_scene import SceneReader
+
+    hair, inside = new_hair(), bpy.data.collections.new("Inside")
+    inside.objects.link(hair)
+    empty = bpy.data.objects.new("Empty", None)
+    empty.instance_type, empty.instance_collection = "COLLECTION", inside
+    empty.location.x, empty.is_holdout = 1.0, True
+    stage.collection.objects.link(empty)
+    reader, depsgraph = SceneReader(), bpy.context.evaluated_depsgraph_get()
+    both = [groom.key for groom in reader.read(depsgraph).grooms]
+    assert len(both) == 2
+    (found,) = reader.read(depsgraph, is_previewed=lambda _: True).grooms
+    assert found.key in both and len(found.key) > 1 and found.is_holdout
+    seen = reader.previewed[hair.session_uid]
+    assert (seen.is_seen, seen.is_holdout) == (True, False)
+
+
 def test_texts_metaballs_and_instances_are_drawn(stage: Any, tmp_path: Path) -> None:
     stage.render.film_transparent = True
     add: list[Callable[[], Any]] = [

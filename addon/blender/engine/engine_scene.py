@@ -91,7 +91,7 @@ class SceneReader:
             changed: session numbers of what may have another shape or material than when it was
                 read last; None: all.
             is_shown: whether an object is seen at all.
-            is_previewed: whether a groom is left out, by its session number.
+            is_previewed: whether a groom is left out, by its session number; its instances are not.
             is_expected: whether a groom stays as it was, as its preview is about to be there.
             blocking: False: hair is made in a thread, and is as it was until then.
         """
@@ -110,6 +110,8 @@ class SceneReader:
                 continue
             key, matrix = _key(instance), np.array(instance.matrix_world)
             visibility = _visibility(instance, layer)
+            # a preview draws a groom once; its instances are read as of any other hair
+            is_own = obj.type == "CURVES" and not instance.is_instance
             if behind is not None and obj.type in SOLID_TYPES:
                 visibility = replace(visibility, is_holdout=True)
             if obj.type in SOLID_TYPES:
@@ -118,7 +120,7 @@ class SceneReader:
                     drawn += read[key].meshes
                 if visibility.casts:
                     casters += read[key].meshes
-            elif obj.type == "CURVES" and is_previewed(obj.original.session_uid):
+            elif is_own and is_previewed(obj.original.session_uid):
                 self.previewed[obj.original.session_uid] = visibility
             elif obj.type == "CURVES" and is_expected(obj.original.session_uid):
                 grooms |= {key: self._grooms[key]} if key in self._grooms else {}
