@@ -254,3 +254,32 @@ def test_the_picture_keeps_its_hair_until_the_preview_has_its_own(
     assert overlay.drawn() == {hair.session_uid} and not overlay.expected()
     assert read() == (), "the preview draws it from now on"
     scene_events.clear()
+
+
+def test_hair_is_made_again_whatever_of_it_is_other_now(hair: Any, sphere: Any) -> None:
+    """Seeds, UVs of roots, the head's triangles and its UVs."""
+
+    def made() -> Any:
+        return engine_hair.read_groom(hair, bpy.context.evaluated_depsgraph_get())
+
+    def curves_have(name: str, kind: str, field: str, values: np.ndarray) -> None:
+        attribute = hair.data.attributes.new(name, kind, "CURVE")
+        attribute.data.foreach_set(field, values.ravel())
+        hair.data.update_tag()
+
+    before = made()
+    assert made().seed is before.seed, "the same hair is kept"
+    curves_have("strand_seed", "INT", "value", np.arange(COUNT, dtype=np.int32) + 1000)
+    seeded = made()
+    np.testing.assert_array_equal(seeded.seed, np.arange(COUNT) + 1000)
+    others = np.full((COUNT, 2), 0.25, np.float32)
+    curves_have("surface_uv_coordinate", "FLOAT2", "vector", others)
+    with_uv = made()
+    assert with_uv.seed is not seeded.seed
+    sphere.data.uv_layers.active.data.foreach_set("uv", np.zeros(2 * len(sphere.data.loops)))
+    sphere.data.update_tag()
+    with_other_uv = made()
+    assert with_other_uv.seed is not with_uv.seed
+    sphere.data.flip_normals()
+    assert made().seed is not with_other_uv.seed
+    engine_hair.forget()

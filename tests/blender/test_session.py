@@ -108,6 +108,18 @@ def test_edited_curves_are_read_again_and_others_left_alone(preview, evaluated):
     update()
     scene_events.catch_up(evaluated())
     assert session.rig is rig, "tagged but not changed"
+    attributes, uv = hair.data.attributes, np.full(120, 0.25, np.float32)
+    attributes.new("strand_seed", "INT", "CURVE").data.foreach_set("value", [7] * 60)
+    hair.data.update_tag()
+    update()
+    scene_events.catch_up(evaluated())
+    assert (session.snapshot.seed == 7).all()
+    attributes.new("surface_uv_coordinate", "FLOAT2", "CURVE").data.foreach_set("vector", uv)
+    hair.data.update_tag()
+    update()
+    scene_events.catch_up(evaluated())
+    assert (session.rig.strands.root_uv == 0.25).all()
+    rig = session.rig
     hair.data.position_data[7].vector = (0.0, 0.0, 0.5)
     update()
     scene_events.catch_up(evaluated())

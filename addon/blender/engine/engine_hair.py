@@ -9,7 +9,7 @@ window's work: until it is there the picture has what was drawn before, or none.
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import bpy
@@ -26,6 +26,7 @@ from ...render.snapshot import Snapshot
 from ...rig_flow import Rig
 from ...shading.ambient_settings import AmbientSettings
 from ...shading.settings import ShadingSettings
+from ...strands import StrandSet, Surface
 from ...strands.affine import mean_scale, moved
 from ..bakes import playback
 from ..bakes.baked_rig import BakedRig
@@ -315,12 +316,8 @@ def _of_curves(
     request = GroomSource(hair, depsgraph).request
     source = request.source
     made_from = (
-        source.strands.points,
-        source.strands.offsets,
-        source.strands.radius,
-        source.strands.group,
-        source.strands.color,
-        None if source.head is None else source.head.positions,
+        *_values(source.strands),
+        *(() if source.head is None else _values(source.head)),
         source.density,
         source.masks,
         source.partings,
@@ -354,6 +351,11 @@ def _made(
     if made is None or (is_baked and not kept.is_of(made_from)):
         raise HairNotMadeYetError
     return made
+
+
+def _values(made: StrandSet | Surface) -> tuple[Any, ...]:
+    """All that it holds."""
+    return tuple(getattr(made, each.name) for each in fields(made))
 
 
 def _alike(one: tuple[Any, ...], other: tuple[Any, ...]) -> bool:

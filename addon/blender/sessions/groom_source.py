@@ -428,6 +428,8 @@ def _same(one: StrandSet, other: StrandSet, back: Floats) -> bool:
         and np.allclose(one.radius, other.radius, rtol=1e-5)
         and np.array_equal(one.group, other.group)
         and are_same(one.color, other.color)
+        and are_same(one.seed, other.seed)
+        and are_same(one.root_uv, other.root_uv)
     )
 
 
