@@ -129,6 +129,49 @@ def test_a_preview_begun_elsewhere_shows_the_very_same_strands(swinging, evaluat
     np.testing.assert_array_equal(drawn(hair), baked_grid(cache, 2))
 
 
+def test_baked_hair_has_the_size_of_its_bake(swinging, evaluated):
+    """Also where that is baked again or deleted while it is previewed."""
+    hair, head = swinging
+    previews.start(hair, evaluated())
+    bake(hair)
+    bpy.context.scene.frame_set(3)
+    small = drawn(hair)
+    head.scale = (2.0, 2.0, 2.0)
+    bpy.context.view_layer.update()
+    session = previews.session_of(hair)
+    scene_events.catch_up(evaluated())
+    assert previews.session_of(hair) is session, "it does not begin over again and again"
+    bpy.context.scene.frame_set(4)
+    bpy.context.scene.frame_set(3)
+    np.testing.assert_array_equal(drawn(hair), small)
+    bake(hair)
+    large = baked_grid(playback.cache_of(hair), 3)
+    np.testing.assert_array_equal(drawn(hair), large)
+    lengths = [np.linalg.norm(np.diff(grid, axis=1), axis=2).sum(axis=1) for grid in (small, large)]
+    np.testing.assert_allclose(lengths[1], 2.0 * lengths[0], rtol=0.02)
+    head.scale = (1.0, 1.0, 1.0)
+    bpy.context.view_layer.update()
+    scene_events.catch_up(evaluated())
+    free(hair, evaluated())
+    rendered = engine_hair.read_groom(hair, evaluated()).points
+    np.testing.assert_allclose(previews.session_of(hair).strands, rendered, atol=1e-6)
+
+
+def test_a_preview_that_began_in_another_size_shows_the_bake_that_is_made(swinging, evaluated):
+    hair, head = swinging
+    for frame, size in ((1, 1.0), (LAST, 2.0)):
+        head.scale = (size, size, size)
+        head.keyframe_insert("scale", frame=frame)
+    bake(hair)
+    alone = baked_grid(playback.cache_of(hair), 5)
+    free(hair, evaluated())
+    bpy.context.scene.frame_set(5)
+    previews.start(hair, evaluated())
+    bake(hair)
+    np.testing.assert_array_equal(baked_grid(playback.cache_of(hair), 5), alone)
+    np.testing.assert_array_equal(drawn(hair), alone)
+
+
 def test_a_deformed_head_carries_baked_hair(swinging, evaluated):
     hair, head = swinging
     swell = head.modifiers.new("Swell", "DISPLACE")

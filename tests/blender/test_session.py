@@ -14,6 +14,7 @@ from mathutils import Matrix
 from swinging import play
 
 from hairloom.addon.blender.base.objects import layer_key
+from hairloom.addon.blender.engine import engine_hair
 from hairloom.addon.blender.preview import previews, scene_events
 from hairloom.addon.blender.viewport import overlay
 from hairloom.addon.groom.settings import GuideSettings
@@ -310,3 +311,69 @@ def test_the_preview_button_reports_bad_input_without_a_traceback(new_hair, capf
         bpy.ops.hairloom.preview()
     assert "Traceback" not in capfd.readouterr().err
     assert previews.session_of(hair) is None
+
+
+@pytest.mark.parametrize("scale", [(2.0, 2.0, 2.0), (1.0, 3.0, 0.5), (-1.0, 1.0, 1.0)])
+@pytest.mark.parametrize("is_headless", [False, True])
+def test_scaled_or_mirrored_hair_is_as_the_engine_renders_it(
+    new_hair, sphere, evaluated, is_headless, scale
+):
+    """As long, as thick and as wide apart, once edits have settled."""
+    hair = new_hair(None if is_headless else sphere)
+    hair.data.hairloom.widths.method = "own"
+    first = previews.start(hair, evaluated())
+    carrier = hair if is_headless else sphere
+    carrier.matrix_world = Matrix.LocRotScale((0.3, 0, 0), Matrix.Rotation(0.5, 3, "X"), scale)
+    update()
+    scene_events.catch_up(evaluated())
+    session, rendered = previews.session_of(hair), engine_hair.read_groom(hair, evaluated())
+    assert session is not first
+    shown = session.snapshot
+    np.testing.assert_allclose(session.strands, rendered.points, atol=1e-6)
+    np.testing.assert_allclose(shown.radius, rendered.radius, rtol=1e-5)
+    assert shown.spacing == pytest.approx(rendered.spacing)
+    assert shown.extinction == pytest.approx(rendered.extinction)
+    carrier.location.y = 1.0
+    carrier.rotation_euler.z = 1.0
+    update()
+    scene_events.catch_up(evaluated())
+    assert previews.session_of(hair) is session, "moved and turned it is carried"
+
+
+def test_hair_that_plays_keeps_its_size_until_it_is_at_rest(preview, evaluated):
+    hair, head, session = preview
+    length = session.rig.rest_lengths
+    previews.play(evaluated())
+    head.scale = (2.0, 2.0, 2.0)
+    update()
+    scene_events.catch_up(evaluated())
+    previews.advance(evaluated(), 1.0 / 24.0)
+    assert previews.session_of(hair) is session and previews.is_playing()
+    previews.rest(evaluated(), keep_playing=False)
+    again = previews.session_of(hair)
+    assert again.rig.rest_lengths == pytest.approx(2.0 * length, rel=1e-5)
+    assert not previews.is_playing()
+
+
+def test_hair_of_no_size_is_not_made_again(new_hair, evaluated):
+    hair = new_hair()
+    session = previews.start(hair, evaluated())
+    update()
+    hair.scale = (0.0, 0.0, 0.0)
+    update()
+    scene_events.catch_up(evaluated())
+    assert previews.session_of(hair) is session, previews.notice()
+    hair.scale = (1.0, 1.0, 1.0)
+    update()
+    scene_events.catch_up(evaluated())
+    assert previews.session_of(hair) is session
+
+
+def test_hair_that_was_scaled_goes_on_with_the_timeline(preview, evaluated):
+    hair, head, _ = preview
+    bpy.context.scene.frame_set(1)
+    head.scale = (2.0, 2.0, 2.0)
+    update()
+    scene_events.catch_up(evaluated())
+    bpy.context.scene.frame_set(2)
+    assert previews.session_of(hair).is_playing, "from this frame on"

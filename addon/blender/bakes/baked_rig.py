@@ -21,6 +21,9 @@ from ...rig_flow import Pose, Rig
 from ...strands import StrandSet, Surface
 from .simulated import Arrays
 
+#: Sizes that differ by less than this part are the same, as Blender's matrices are rounded.
+_ROUNDING = 1.0e-4
+
 
 @dataclass(frozen=True)
 class RestMatrices:
@@ -32,6 +35,19 @@ class RestMatrices:
     hair: Floats
     head: Floats | None
     ties: Floats = field(default_factory=lambda: np.zeros((0, 4, 4)))
+
+    @property
+    def has_size(self) -> bool:
+        """Whether neither hair nor head is flattened to nothing."""
+        matrices = (self.hair,) if self.head is None else (self.hair, self.head)
+        return all(np.linalg.matrix_rank(each[:3, :3]) == 3 for each in matrices)
+
+    def has_size_of(self, other: RestMatrices) -> bool:
+        """Whether hair and head are as large as with the others, in each direction, and mirrored as
+        they are; wherever they stand and however they are turned."""
+        if self.head is None or other.head is None:
+            return self.head is other.head and _is_as_large(self.hair, other.hair)
+        return _is_as_large(self.hair, other.hair) and _is_as_large(self.head, other.head)
 
 
 @dataclass(frozen=True, eq=False)
@@ -251,6 +267,14 @@ def _baked_rig_of(arrays: Arrays) -> BakedRig:
     ties = arrays.get("tie_rests", np.zeros((0, 4, 4)))
     rests = RestMatrices(arrays["hair_rest"], arrays.get("head_rest"), ties)
     return BakedRig(rig, rests)
+
+
+def _is_as_large(one: Floats, other: Floats) -> bool:
+    """Whether two (4, 4) matrices give all things the same lengths and the same handedness."""
+    one, other = one[:3, :3], other[:3, :3]
+    lengths, known = one.T @ one, other.T @ other
+    is_mirrored = np.linalg.det(one) * np.linalg.det(other) < 0.0
+    return not is_mirrored and np.allclose(lengths, known, 0.0, _ROUNDING * np.abs(known).max())
 
 
 def _check_indices(indices: Ints, count: int) -> None:

@@ -287,7 +287,8 @@ def _named(frame: int) -> Iterator[None]:
 
 
 def simulated_for(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Simulated:
-    """What simulates this object: that of its preview, where there is one.
+    """What simulates this object: that of its preview, where there is one in the size that the
+    object has at the beginning.
 
     Raises:
         HairloomError: it cannot be simulated.
@@ -295,7 +296,7 @@ def simulated_for(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Simu
     known = previews.simulated_of(obj)
     if known is None and obj.type == "MESH":
         return FinSession(obj, depsgraph)
-    if known is None:
+    if known is None or (isinstance(known, Session) and known.is_resized(depsgraph)):
         return Session(obj, depsgraph, is_drawn=False)
     if isinstance(known, Session):
         if known.is_stale:

@@ -219,22 +219,31 @@ class Preview:
         )
         self.go(event, depsgraph, frames / rate, blocking=_is_exact())
 
-    def keep_or_rest(self, depsgraph: bpy.types.Depsgraph) -> None:
-        """Blender has evaluated the body again, within a frame; the hair rests if that moved."""
+    def keep_or_rest(self, depsgraph: bpy.types.Depsgraph) -> bool:
+        """Blender has evaluated the body again, within a frame; the hair rests if that moved.
+        Returns whether it rests."""
         assert self.groom is not None
         if self.phase is Phase.BAKED and self.bake is not None:
             if self.session.frame_hash(depsgraph) == self.bake.frame_hash:
-                return
+                return False
             facts = self.bake.facts
             self.bake = KnownBake(facts, self._changed(facts, depsgraph))
         elif not self.groom.has_moved(depsgraph):
-            return
+            return self.phase is Phase.REST
         self.go(Event.RESET, depsgraph)
+        return True
 
     def take_bake(self, depsgraph: bpy.types.Depsgraph) -> None:
         """Find its bake, and show the scene's frame of it."""
         self.check(depsgraph)
         self.show_frame(depsgraph)
+
+    def is_resized(self, depsgraph: bpy.types.Depsgraph) -> bool:
+        """Whether its hair is to be made again, since its object or its head has another size now;
+        what plays keeps its size until it is at rest, and what is baked keeps that of its bake."""
+        if self.groom is None or self.bake is not None or playback.is_played():
+            return False
+        return self.phase not in (Phase.FREE, Phase.WAITING) and self.groom.is_resized(depsgraph)
 
     def check(self, depsgraph: bpy.types.Depsgraph) -> None:
         """Find out again whether there is a bake, and whether it is up to date."""

@@ -80,6 +80,16 @@ def start(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Session:
     return session
 
 
+def begin_over(preview: Preview, depsgraph: bpy.types.Depsgraph) -> None:
+    """Preview a groom as it is now: in another size, or on another head. The timeline goes on.
+
+    Raises:
+        HairloomError: as `start`.
+    """
+    session = start(preview.found(), depsgraph)
+    previews[session.uid].frame = preview.frame
+
+
 def add(session: Simulated, depsgraph: bpy.types.Depsgraph) -> None:
     """Let the timeline and Play move it from now on, in place of what was there for its object.
 
@@ -299,6 +309,8 @@ def _put_back(preview: Preview, depsgraph: bpy.types.Depsgraph, keep_playing: bo
         preview.act(Event.RESET, depsgraph)
     else:
         preview.stop(depsgraph)
+        if preview.is_resized(depsgraph):
+            begin_over(preview, depsgraph)
 
 
 def bake_changed(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> None:
@@ -317,7 +329,13 @@ def _take_other_bake(preview: Preview, depsgraph: bpy.types.Depsgraph) -> None:
     preview.forget_bake()
     preview.release()
     preview.act(Event.STOP, depsgraph)
-    preview.take_bake(depsgraph)
+    groom = preview.groom
+    baked = None if groom is None else rig_for(preview.found(), depsgraph.scene)
+    is_other = groom is not None and baked is not None and not baked.rests.has_size_of(groom.rests)
+    if is_other or preview.is_resized(depsgraph):
+        begin_over(preview, depsgraph)
+    else:
+        preview.take_bake(depsgraph)
 
 
 def attempt(

@@ -120,8 +120,9 @@ def _update(
         session.light(depsgraph)
     for brush in (*colors, *(brushes if preview.phase is Phase.REST else ())):
         brush(depsgraph)
-    if follows:
-        preview.keep_or_rest(depsgraph)
+    if follows and preview.keep_or_rest(depsgraph) and preview.is_resized(depsgraph):
+        session.is_stale = True
+        _read_again_soon()
 
 
 def frame_changed(depsgraph: bpy.types.Depsgraph) -> None:
@@ -208,7 +209,7 @@ def _read_again() -> float | None:
 
 
 def catch_up(depsgraph: bpy.types.Depsgraph) -> None:
-    """Read what was edited; hair on another head starts over."""
+    """Read what was edited; hair in another size or on another head begins over."""
     for preview in tuple(previews.values()):
         if preview.session.is_stale:
             attempt(preview, depsgraph, partial(_read, preview, depsgraph))
@@ -223,8 +224,8 @@ def _read(preview: Preview, depsgraph: bpy.types.Depsgraph) -> None:
     session = preview.groom
     if session is None:
         preview.act(Event.RESET, depsgraph)
-    elif session.has_another_head():
-        registry.start(session.hair.found(), depsgraph)
+    elif session.has_another_head() or preview.is_resized(depsgraph):
+        registry.begin_over(preview, depsgraph)
     else:
         session.read_again(depsgraph, blocking=latest_job.is_blocking())
         if preview.is_to_rest:

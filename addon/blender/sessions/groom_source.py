@@ -97,6 +97,17 @@ class GroomSource:
         head = None if self.head is None else self.head.rest
         return RestMatrices(self.hair.rest, head, self._holding.rests)
 
+    def is_resized(self, depsgraph: bpy.types.Depsgraph) -> bool:
+        """Whether hair or head has been scaled or mirrored since rest; not where one has no size,
+        as no hair can be made of that.
+
+        Raises:
+            ObjectGoneError: one of them no longer exists.
+        """
+        head = None if self.head is None else matrix_of(self.head.found(), depsgraph)
+        now = RestMatrices(matrix_of(self.hair.found(), depsgraph), head)
+        return now.has_size and not now.has_size_of(self.rests)
+
     @property
     def warnings(self) -> tuple[str, ...]:
         """What the artist should know about what was read, and about what holds the hair now."""

@@ -27,7 +27,7 @@ from ...render.snapshot import Snapshot
 from ...rig_flow import Begun, Pose, Rig, SimulatedSolids, Solids
 from ...strands import Surface
 from ...strands.arc_length import lengths
-from ..bakes.baked_rig import BakedRig, frame_arrays, led_in, rig_arrays
+from ..bakes.baked_rig import BakedRig, RestMatrices, frame_arrays, led_in, rig_arrays
 from ..bakes.baked_solids import solid_arrays, solid_constants
 from ..bakes.groom_hashes import frame_rate
 from ..bakes.simulated import Arrays
@@ -173,6 +173,20 @@ class Session:
     def has_another_head(self) -> bool:
         """Whether the artist has set another surface since the session began."""
         return self._source.has_another_head()
+
+    @property
+    def rests(self) -> RestMatrices:
+        """Where hair, head and ties were when the hair was made."""
+        return self._source.rests
+
+    def is_resized(self, depsgraph: bpy.types.Depsgraph) -> bool:
+        """Whether hair or head has been scaled or mirrored since the hair was made, which no motion
+        of the roots follows.
+
+        Raises:
+            HairloomError: the hair or its head is gone.
+        """
+        return self._source.is_resized(depsgraph)
 
     @property
     def holder_uids(self) -> frozenset[int]:
