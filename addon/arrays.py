@@ -16,7 +16,7 @@ type Ints = NDArray[np.integer[Any]]
 type Bools = NDArray[np.bool_]
 
 
-def are_same(one: Floats | None, other: Floats | None) -> bool:
+def are_same(one: Floats | Ints | None, other: Floats | Ints | None) -> bool:
     """Whether two arrays are equal, with NaN in the same places, or both missing."""
     if one is None or other is None:
         return one is other
