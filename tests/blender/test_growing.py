@@ -4,6 +4,7 @@ import bpy
 import numpy as np
 import pytest
 
+from hairloom.addon.blender.base.attributes import read_attribute, set_attribute
 from hairloom.addon.blender.preview import previews, scene_events
 from hairloom.addon.blender.properties.properties import settings_of, weights_of_surface
 from hairloom.addon.blender.scene.curves import curve_points, put_points, read_curves
@@ -203,3 +204,52 @@ def test_a_copy_follows_its_own_settings(grown):
     copy.data.hairloom.grow.length = 0.05
     assert np.array_equal(curve_points(grown.data), points)
     assert lengths(copy).max() < 0.052
+
+
+@pytest.mark.parametrize("scale", [0.1, 3.0])
+def test_hair_of_a_scaled_head_keeps_its_widths(grown, sphere, scale):
+    sphere.scale = (scale,) * 3
+    bpy.context.view_layer.update()
+    before = read_attribute(grown.data, "radius", "POINT")
+    for length in (0.11, 0.12, 0.13):
+        grown.data.hairloom.grow.length = length
+    bpy.ops.hairloom.grow_again()
+    assert read_attribute(grown.data, "radius", "POINT") == pytest.approx(before, rel=1e-5)
+
+
+def test_curves_that_grow_again_are_all_selected(grown):
+    """As Blender takes curves without its attribute; with one, new curves would not be."""
+    set_attribute(grown.data, ".selection", "POINT", np.ones(len(grown.data.points), bool))
+    grown.data.hairloom.grow.length = 0.05
+    assert lengths(grown).max() < 0.052
+    assert ".selection" not in grown.data.attributes
+
+
+def test_hair_that_blender_does_not_evaluate_says_so(grown, sphere):
+    """It would grow on a head without its modifiers, and where that has been before."""
+    collection = bpy.data.collections.new("Kept")
+    bpy.context.scene.collection.children.link(collection)
+    for obj in (sphere, grown):
+        bpy.context.scene.collection.objects.unlink(obj)
+        collection.objects.link(obj)
+    layer = bpy.context.view_layer.layer_collection.children["Kept"]
+    layer.exclude = True
+    points = curve_points(grown.data)
+    own = grown.data.hairloom.grow
+    own.length = 0.05
+    assert "Head: it is disabled in viewports or excluded from the view layer" in own.problem
+    assert np.array_equal(curve_points(grown.data), points)
+    layer.exclude = False
+    own.length = 0.06
+    assert own.problem == "" and not np.array_equal(curve_points(grown.data), points)
+
+
+@pytest.mark.parametrize("operator", ["settle", "mirror_hair", "grow_again"])
+def test_hair_without_an_extent_along_an_axis_stays_as_it_is(grown, sphere, operator):
+    sphere.scale = (1.0, 1.0, 0.0)
+    bpy.context.view_layer.update()
+    names, points = grown.data.attributes.keys(), curve_points(grown.data)
+    with pytest.raises(RuntimeError, match="scaled to 0 along an axis"):
+        getattr(bpy.ops.hairloom, operator)()
+    assert np.array_equal(curve_points(grown.data), points)
+    assert grown.data.attributes.keys() == names

@@ -19,6 +19,9 @@ from ...errors import HairloomError
 
 type LayerKey = tuple[int, str]
 
+#: how many times longer along one axis than along another nothing is that has a volume
+_FLAT = 1e6
+
 
 class ObjectGoneError(HairloomError):
     """An object no longer exists."""
@@ -142,6 +145,21 @@ def check_shape_editable(obj: bpy.types.Object) -> None:
             f"it overrides the settings of another file, whose {kind} it cannot change",
             place=obj.name,
             remedy="Make object and data local in Blender (Object > Relations > Make Local)",
+        )
+
+
+def check_curves_editable(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> None:
+    """As `check_shape_editable`, for what places points in world space.
+
+    Raises:
+        HairloomError: see there; or no point of its own is where a point of the world is.
+    """
+    check_shape_editable(hair)
+    if not np.linalg.cond(matrix_of(hair, depsgraph)[:3, :3]) < _FLAT:
+        raise HairloomError(
+            "it, or what it is a child of, is scaled to 0 along an axis",
+            place=hair.name,
+            remedy="Set another Scale in the Object properties",
         )
 
 

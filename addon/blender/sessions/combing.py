@@ -13,7 +13,7 @@ from ...errors import HairloomError
 from ...groom.roots import bind_roots
 from ...refine.lead_out_at_rest import led_out_at_rest
 from ...strands import StrandSet, Surface
-from ..base.objects import check_shape_editable, head_of
+from ..base.objects import check_curves_editable, head_of
 from ..base.parts import Part, Parts
 from ..colliders.fields import solid_of
 from ..scene.curves import read_own_curves, write_own_curves
@@ -34,9 +34,10 @@ def surface_to_comb_on(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -
     """What the hair grows on, in world space.
 
     Raises:
-        HairloomError: it has no surface, or one that cannot be used; or see `check_shape_editable`.
+        HairloomError: it has no surface, or one that cannot be used; or as
+            `check_curves_editable`.
     """
-    check_shape_editable(hair)
+    check_curves_editable(hair, depsgraph)
     head = head_of(hair)
     if head is None:
         raise HairloomError(

@@ -22,7 +22,7 @@ from ...rig_flow import Rig
 from ...shading.ambient_settings import AmbientSettings
 from ...strands import StrandSet
 from ...strands.clean import Cleaned
-from ..base.objects import check_shape_editable
+from ..base.objects import check_curves_editable
 from ..base.outcome import Outcome
 from ..colliders.fields import solid_of
 from ..colliders.obstacles import Obstacles
@@ -47,7 +47,7 @@ def settle_hair(
         HairloomError: no hair that can be used, it is linked from another file, its roots are away
             from its surface, or the surface is gone.
     """
-    check_shape_editable(hair)
+    check_curves_editable(hair, depsgraph)
     source = GroomSource(hair, depsgraph)
     own = read_own_curves(hair, depsgraph, COMBED.before(hair))
     guides = settle_flow.guides_that_fall(own.strands, source.settings[GuideSettings])

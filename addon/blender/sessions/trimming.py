@@ -8,7 +8,7 @@ import bpy
 
 from ...errors import HairloomError
 from ...groom.trim import trimmed
-from ..base.objects import check_shape_editable
+from ..base.objects import check_curves_editable
 from ..base.outcome import Outcome
 from ..base.parts import Part, Parts
 from ..scene.curves import read_own_curves, write_own_curves
@@ -23,7 +23,7 @@ def trim_to_shapes(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Pa
     Raises:
         HairloomError: no hair that can be used, no shape, or it is linked from another file.
     """
-    check_shape_editable(hair)
+    check_curves_editable(hair, depsgraph)
     shapes, unusable = read_shapes(trim_shapes_of(hair), depsgraph)
     if not shapes:
         reason = " ".join(unusable)

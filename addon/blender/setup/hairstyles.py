@@ -26,7 +26,7 @@ from ...strands import StrandSet, Surface
 from ...strands.affine import mean_scale
 from ...strands.face import is_face_hair
 from ...strands.rooted_shapes import RootedShapes
-from ..base.objects import check_shape_editable, head_of
+from ..base.objects import check_curves_editable, check_shape_editable, head_of
 from ..base.parts import Part, Parts, taken_back
 from ..base.vertex_weights import read_weights, set_group, weight_names
 from ..colliders.fields import solid_of
@@ -233,7 +233,7 @@ def fit_again(
 
 
 def _grown_again(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Parts[_Growth]:
-    check_shape_editable(hair)
+    check_curves_editable(hair, depsgraph)
     head = head_of(hair)
     if not hair.hairloom.hairstyle or head is None:
         raise HairloomError(

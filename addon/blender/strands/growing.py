@@ -19,9 +19,10 @@ from ...groom.grow import grow, scalp_density
 from ...groom.settings import GrowSettings
 from ...groom.widths import with_widths
 from ...strands import StrandSet
+from ...strands.affine import mean_scale
 from ..base.attributes import read_attribute
 from ..base.digests import digest
-from ..base.objects import check_shape_editable, head_of
+from ..base.objects import check_curves_editable, head_of, matrix_of
 from ..base.parts import Part, Parts, at_once
 from ..properties import changed
 from ..properties.properties import settings_of
@@ -32,7 +33,7 @@ from ..scene.look_materials import follow_curves
 from ..scene.masks import read_map
 from ..scene.surfaces import read_surface
 
-#: what hair has as it grows; Blender's own names of what is selected or hidden begin with a dot
+#: what hair has as it grows
 _OWN_ATTRIBUTES = ("position", "radius", "surface_uv_coordinate")
 
 
@@ -71,8 +72,8 @@ def grow_again(grooms: Sequence[bpy.types.Object], depsgraph: bpy.types.Depsgrap
     """Give hair the curves that its settings make now, whatever was done to those that it has.
 
     Raises:
-        HairloomError: some has no mesh to grow on, is linked from another file, or as `grow_on`.
-            All is as it was then.
+        HairloomError: some has no mesh to grow on, Blender does not evaluate it or its head, it is
+            linked from another file, or as `grow_on`. All is as it was then.
     """
     made = []
     for hair in grooms:
@@ -84,7 +85,7 @@ def grow_again(grooms: Sequence[bpy.types.Object], depsgraph: bpy.types.Depsgrap
 
 
 def _grown_again(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Parts[StrandSet]:
-    check_shape_editable(hair)
+    check_curves_editable(hair, depsgraph)
     head, own = head_of(hair), hair.data.hairloom.grow
     if head is None:
         raise HairloomError(
@@ -92,6 +93,14 @@ def _grown_again(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Part
             place=hair.name,
             remedy="Set Surface in its Data properties",
         )
+    for obj in (head, hair):
+        if not _is_evaluated(obj, depsgraph):
+            raise HairloomError(
+                "it is disabled in viewports or excluded from the view layer, so that nothing says "
+                "where it is now",
+                place=obj.name,
+                remedy="Enable it in the Outliner, then press Grow Again",
+            )
     return (
         yield from _grown(
             head,
@@ -99,7 +108,7 @@ def _grown_again(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Part
             settings_of(own, GrowSettings),
             own.density_group,
             own.length_group,
-            before=hair.data,
+            before=hair,
         )
     )
 
@@ -110,10 +119,10 @@ def replace_curves(
     """Give hair other curves, in world space. All that went with those before is gone, but the
     colours that its material reads: they are found again."""
     curves = hair.data
-    back = np.linalg.inv(np.array(hair.evaluated_get(depsgraph).matrix_world, np.float64))
+    back = np.linalg.inv(matrix_of(hair, depsgraph))
     has_colors = MATERIAL_COLOR in curves.attributes
     curves.remove_curves()
-    for name in (*_other_attributes(curves), *([MATERIAL_COLOR] if has_colors else [])):
+    for name in set(curves.attributes.keys()).difference(_OWN_ATTRIBUTES):
         curves.attributes.remove(curves.attributes[name])
     fill_curves(curves, strands.transformed(back))
     curves.update_tag()
@@ -128,11 +137,12 @@ def follow_settings(curves: bpy.types.ID) -> None:
     own = curves.hairloom.grow
     if not curves.is_editable or own.made_by == _settings_digest(own) or losses(curves):
         return
-    users = (obj for obj in bpy.data.objects if obj.data == curves)
-    hair = next((obj for obj in users if head_of(obj) is not None), None)
+    users = [obj for obj in bpy.data.objects if obj.data == curves and head_of(obj) is not None]
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    users.sort(key=lambda obj: not _is_evaluated(obj, depsgraph))
     try:
-        if hair is not None:
-            at_once(grow_again([hair], bpy.context.evaluated_depsgraph_get()))
+        if users:
+            at_once(grow_again(users[:1], depsgraph))
     except HairloomError as error:  # the panel shows it; the settings may be on their way
         own.problem = str(error)
 
@@ -163,18 +173,20 @@ def _grown(
     settings: GrowSettings,
     density_group: str,
     length_group: str,
-    before: bpy.types.Curves | None = None,
+    before: bpy.types.Object | None = None,
 ) -> Parts[StrandSet]:
     """In world space, on the head as it is posed now.
 
     Args:
-        before: the curves that these replace, whose widths they keep.
+        before: the hair whose curves these replace, and whose widths they keep.
     """
     surface = read_surface(head, depsgraph, need_uv=False, place=head.name)
     density = read_map(head, depsgraph, density_group) if density_group else None
     length = read_map(head, depsgraph, length_group) if length_group else None
-    radius: Floats | None = None if before is None else read_attribute(before, "radius", "POINT")
-    offsets = np.zeros(1, np.int32) if before is None else curve_offsets(before)
+    radius: Floats | None = None
+    offsets = np.zeros(1, np.int32)
+    if before is not None:
+        radius, offsets = _radius_in_world(before, depsgraph), curve_offsets(before.data)
 
     def work() -> StrandSet:
         by_default = density is None and settings.method == "combed"
@@ -182,6 +194,16 @@ def _grown(
         return _with_widths(grow(surface, settings, dense, length), radius, offsets)
 
     return (yield Part(f"Growing {settings.strand_count:,} strands", work))
+
+
+def _is_evaluated(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bool:
+    return bool(obj.evaluated_get(depsgraph).is_evaluated)
+
+
+def _radius_in_world(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Floats | None:
+    """Of the points of its curves, (point_count,) [m]; None where they have no widths."""
+    own: Floats | None = read_attribute(hair.data, "radius", "POINT")
+    return None if own is None else own * np.float32(mean_scale(matrix_of(hair, depsgraph)))
 
 
 def _with_widths(strands: StrandSet, radius: Floats | None, offsets: Ints) -> StrandSet:
@@ -193,8 +215,8 @@ def _with_widths(strands: StrandSet, radius: Floats | None, offsets: Ints) -> St
 
 
 def _other_attributes(curves: bpy.types.Curves) -> tuple[str, ...]:
-    """Names of what curves have beside what has grown, such as painted colours, and what follows
-    from the look."""
+    """Names of what curves have beside what has grown, such as painted colours, what follows from
+    the look, and what is selected or hidden, whose names begin with a dot in Blender."""
     names = (attribute.name for attribute in curves.attributes)
     own = (*_OWN_ATTRIBUTES, MATERIAL_COLOR)
     return tuple(n for n in names if n not in own and not n.startswith("."))
