@@ -10,7 +10,7 @@ from typing import Any
 import bpy
 from bpy.props import BoolProperty, EnumProperty
 
-from ..blender.base.outcome import report
+from ..blender.base.outcome import Outcome, report
 from ..blender.base.parts import at_once, together
 from ..blender.preview import previews
 from ..blender.scene.bust_skin import TONES
@@ -22,7 +22,7 @@ from .grow_options import GROW_PROPERTIES, draw_where_settings_are
 from .long_work import LongWork, Progress, Steps, in_parts
 from .operators_preview import start_preview
 from .preferences import NEW_GROOM, chosen_presets, preferences
-from .reports import reporting
+from .reports import reporting, tell
 from .selection import (
     active_mesh,
     chosen_hair,
@@ -179,13 +179,14 @@ class HAIRLOOM_OT_convert_particles(LongWork, bpy.types.Operator):
         chosen, mesh = preferences(context), active_mesh(context)
         assert mesh is not None, "poll has looked"
         yield Progress("Reading the particles")
-        made = yield from in_parts(convert_particle_hair(context, mesh))
+        made, dropped = yield from in_parts(convert_particle_hair(context, mesh))
         for hair in made:
             depsgraph = context.evaluated_depsgraph_get()
             _, done = at_once(take_over(hair, depsgraph, chosen_presets(chosen)))
             for one in done:
                 report(self, "INFO", f"{hair.name}: {one}")
-        report(self, "INFO", f"{mesh.name}: its particle hair is hidden, curves took its place")
+        result = f"{mesh.name}: its particle hair is hidden, curves took its place"
+        tell(self, Outcome(result, dropped))
         yield from beginning(self, context, made, plays=chosen.plays)
 
 

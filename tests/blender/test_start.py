@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from grids import grid_of
 
-from hairloom.addon.blender.base.outcome import past_reports
+from hairloom.addon.blender.base.outcome import collected_reports, past_reports
 from hairloom.addon.blender.base.parts import at_once, together
 from hairloom.addon.blender.preview import previews, scene_events
 from hairloom.addon.blender.properties.presets import named_preset
@@ -228,7 +228,42 @@ def test_particle_hair_becomes_curves_on_its_mesh(sphere):
     away = np.linalg.norm(strands.roots - np.array(sphere.location), axis=1)
     assert away == pytest.approx(np.full(80, 0.1), rel=0.05)
     assert [obj.type for obj in bpy.data.objects].count("CURVES") == 1
-    assert particle_hair.hair_systems(sphere)
+    assert len(sphere.particle_systems) == 1 and not particle_hair.hair_systems(sphere)
+    make_active(sphere)
+    with pytest.raises(RuntimeError, match="no particle hair"):
+        bpy.ops.hairloom.convert_particles()
+
+
+def fur(mesh, name, count):
+    modifier = mesh.modifiers.new(name, "PARTICLE_SYSTEM")
+    settings = modifier.particle_system.settings
+    settings.type, settings.count, settings.hair_length = "HAIR", count, 0.05
+    return modifier
+
+
+def test_particles_without_hair_or_not_shown_add_none(sphere):
+    fur(sphere, "None", 0)
+    hidden = fur(sphere, "Hidden", 40)
+    hidden.show_viewport = False
+    with pytest.raises(RuntimeError, match="no particle hair that can be converted"):
+        bpy.ops.hairloom.convert_particles()
+    assert [obj.name for obj in bpy.data.objects] == ["Head"] and hidden.show_render
+    fur(sphere, "Fur", 50)
+    assert bpy.ops.hairloom.convert_particles() == {"FINISHED"}
+    (hair,) = (obj for obj in bpy.data.objects if obj.type == "CURVES")
+    assert len(hair.data.curves) == 50 and len(previews.sessions()) == 1
+    assert hidden.show_render, "it is still there to be converted"
+
+
+def test_particle_hair_that_is_dropped_is_reported(sphere):
+    group = sphere.vertex_groups.new(name="long")
+    group.add([v.index for v in sphere.data.vertices if v.co.x > 0.0], 1.0, "REPLACE")
+    fur(sphere, "Fur", 100).particle_system.vertex_group_length = "long"
+    with collected_reports() as reports:
+        bpy.ops.hairloom.convert_particles()
+    count = len(bpy.context.object.data.curves)
+    assert 20 < count < 80
+    assert f"curves took its place; dropped {100 - count} (" in reports.warnings[-1]
 
 
 @pytest.mark.slow

@@ -5,6 +5,7 @@ Blender's own conversion copies positions only: no surface, no parent, no root U
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import replace
 from functools import partial
 
@@ -12,7 +13,8 @@ import bpy
 
 from ...errors import HairloomError
 from ...groom.roots import bind_roots
-from ...strands import StrandSet, Surface
+from ...strands import Surface
+from ...strands.clean import Cleaned
 from ..base.objects import remove_hair
 from ..base.parts import Part, Parts
 from .curves import read_curves, write_curves
@@ -20,27 +22,35 @@ from .surfaces import read_surface
 
 
 def hair_systems(mesh: bpy.types.Object) -> list[bpy.types.ParticleSystem]:
-    """The hair of a mesh that is still particles."""
-    return [system for system in mesh.particle_systems if system.settings.type == "HAIR"]
+    """The hair of a mesh that is still particles: not of those that are hidden everywhere."""
+    shown = [
+        each.particle_system
+        for each in mesh.modifiers
+        if each.type == "PARTICLE_SYSTEM" and (each.show_viewport or each.show_render)
+    ]
+    return [system for system in shown if system.settings.type == "HAIR"]
 
 
 def convert_particle_hair(
     context: bpy.types.Context, mesh: bpy.types.Object
-) -> Parts[list[bpy.types.Object]]:
-    """Hair curves that replace a mesh's particle hair, which is hidden, not deleted.
+) -> Parts[tuple[list[bpy.types.Object], dict[str, int]]]:
+    """Hair curves that replace a mesh's particle hair, which is hidden, not deleted; and reason ->
+    number of hairs that were dropped.
 
     Raises:
         HairloomError: it has no particle hair, or none that Blender can convert.
     """
-    read = []
+    read, dropped = [], Counter[str]()
     for name in [system.name for system in hair_systems(mesh)]:
         found = _read(context, mesh, name)
         if found is not None:
-            strands, surface, collection = found
+            cleaned, surface, collection = found
+            strands = cleaned.strands
             place = f"{mesh.name} {name}"
             work = partial(bind_roots, strands, surface, place=place)
             bound = yield Part(f"Converting {strands.strand_count:,} strands", work)
             read.append((name, place, bound.strands, collection))
+            dropped.update(cleaned.dropped)
     made = []
     for name, place, strands, collection in read:
         system = mesh.particle_systems[name]
@@ -54,26 +64,31 @@ def convert_particle_hair(
         raise HairloomError(
             "it has no particle hair that can be converted",
             place=mesh.name,
-            remedy="Press Add Hair to grow some",
+            remedy="Show it in the viewport (Particle System in Modifiers), or press Add Hair to "
+            "grow some",
         )
-    return made
+    return made, dict(dropped)
 
 
 def _read(
     context: bpy.types.Context, mesh: bpy.types.Object, name: str
-) -> tuple[StrandSet, Surface, bpy.types.Collection] | None:
-    """The strands of a particle system, as Blender converts them, what they grow on, and where
-    Blender puts them; the object that it makes is removed. None where it makes none."""
+) -> tuple[Cleaned, Surface, bpy.types.Collection] | None:
+    """The hair of a particle system, as Blender converts it, what it grows on, and where Blender
+    puts it; the object that it makes is removed. None where there is no hair in it, as of particles
+    that are not shown."""
     mesh.particle_systems.active_index = mesh.particle_systems.find(name)
+    was_selected = mesh.select_get()
     with context.temp_override(object=mesh, active_object=mesh):
         bpy.ops.curves.convert_from_particle_system()
     converted = context.view_layer.objects.active
     if converted is mesh or converted is None or converted.type != "CURVES":
         return None
     depsgraph = context.evaluated_depsgraph_get()
-    strands = replace(read_curves(converted, depsgraph).strands, root_uv=None)
+    cleaned = read_curves(converted, depsgraph)
+    cleaned = replace(cleaned, strands=replace(cleaned.strands, root_uv=None))
     surface = read_surface(mesh, depsgraph, need_uv=False, place=mesh.name)
     collection = converted.users_collection[0]
     remove_hair(converted)
     context.view_layer.objects.active = mesh
-    return strands, surface, collection
+    mesh.select_set(was_selected)
+    return (cleaned, surface, collection) if cleaned.strands.strand_count else None
