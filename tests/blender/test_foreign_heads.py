@@ -6,7 +6,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
-from mathutils import Vector
+from mathutils import Matrix, Vector
 from mathutils.bvhtree import BVHTree
 from overriding import overridden
 from tiers import few_in_commits
@@ -16,6 +16,7 @@ from hairloom.addon.blender.command_line.command_line import run
 from hairloom.addon.blender.preview import previews
 from hairloom.addon.blender.scene.bust_data import load_bust
 from hairloom.addon.blender.scene.curves import read_curves
+from hairloom.addon.blender.scene.hair_nodes import add_hair_nodes
 from hairloom.addon.blender.scene.surfaces import read_surface
 from hairloom.addon.blender.setup import foreign_heads
 from hairloom.addon.blender.setup.foreign_heads import (
@@ -23,6 +24,7 @@ from hairloom.addon.blender.setup.foreign_heads import (
     has_makehuman_topology,
     landmarks_of,
     own_positions,
+    placed_landmarks,
 )
 from hairloom.addon.blender.setup.hairstyles import (
     AddedHair,
@@ -283,6 +285,74 @@ def test_a_dragged_landmark_moves_the_hair_when_it_is_fitted_again() -> None:
     assert 0.008 < (after[near] - before[near])[:, 2].mean() < 0.03
     assert away(after[::40], head) < 2e-5
     assert hair.data.hairloom.children.strand_count == 1234
+
+
+@pytest.mark.slow
+def test_hair_follows_a_head_whose_shape_has_changed_and_landmarks_that_were_dragged_stay() -> None:
+    head = scan()
+    hair = added("buzz_cut", head).hair
+    larger = 1.3 * np.array([vertex.co[:] for vertex in head.data.vertices]) - (0.0, 0.0, 0.5)
+    head.data.vertices.foreach_set("co", larger.ravel())
+    head.data.update()
+    assert not at_once(fit_again([hair], depsgraph()))
+    fresh = bpy.data.objects.new("Fresh", head.data.copy())
+    bpy.context.collection.objects.link(fresh)
+    wanted = added("buzz_cut", fresh).hair
+    assert len(hair.data.curves) == len(wanted.data.curves)
+    there, wanted_there = (placed_landmarks(one, depsgraph()) for one in (head, fresh))
+    for name in LANDMARKS:
+        assert there[name] == pytest.approx(wanted_there[name], abs=1e-4)
+    lengths = [read_curves(one, depsgraph()).strands.lengths() for one in (hair, wanted)]
+    assert np.median(lengths[0]) == pytest.approx(np.median(lengths[1]), rel=0.01)
+    assert roots_of(hair) == pytest.approx(roots_of(wanted), abs=1e-3)
+    # one that lies down is the same head, whose landmarks are not guessed again as it lies
+    head.matrix_world = Matrix.Rotation(1.3, 4, "X") @ Matrix.Translation((0.3, 0.0, 0.0))
+    before = roots_of(hair)
+    at_once(fit_again([hair], depsgraph()))
+    assert roots_of(hair) == pytest.approx(before, abs=1e-3)
+    nose = landmarks_of(head)["nose"]
+    nose.location.z += 0.004
+    dragged = nose.location[:]
+    at_once(fit_again([hair], depsgraph()))
+    assert nose.location[:] == dragged
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("nodes", ["Duplicate Hair Curves", "Half"])
+def test_modifiers_that_change_how_many_curves_there_are_do_not_take_others_away(nodes) -> None:
+    """Which of the curves they have brought into the head is not known then."""
+    head = scan()
+    hair = added("curls", head).hair
+    count = len(hair.data.curves)
+    if nodes == "Duplicate Hair Curves":
+        add_hair_nodes(hair, nodes, {"Amount": 3}, 1.0)
+    else:
+        hair.modifiers.new("Half", "NODES").node_group = every_second_curve()
+    warnings = at_once(fit_again([hair], depsgraph()))
+    assert any("change how many curves there are" in each for each in warnings)
+    hair.modifiers.clear()
+    at_once(fit_again([hair], depsgraph()))
+    assert len(hair.data.curves) >= count, "all that it was made with"
+
+
+def every_second_curve() -> bpy.types.NodeTree:
+    """Nodes that delete every second curve."""
+    tree = bpy.data.node_groups.new("Half", "GeometryNodeTree")
+    for side in ("INPUT", "OUTPUT"):
+        tree.interface.new_socket("Geometry", in_out=side, socket_type="NodeSocketGeometry")
+    kinds = ("NodeGroupInput", "NodeGroupOutput", "GeometryNodeDeleteGeometry")
+    come, go, delete = (tree.nodes.new(kind) for kind in kinds)
+    number, odd = tree.nodes.new("GeometryNodeInputIndex"), tree.nodes.new("ShaderNodeMath")
+    delete.domain, odd.operation = "CURVE", "MODULO"
+    odd.inputs[1].default_value = 2.0
+    for start, end in (
+        (number.outputs[0], odd.inputs[0]),
+        (odd.outputs[0], delete.inputs["Selection"]),
+        (come.outputs[0], delete.inputs["Geometry"]),
+        (delete.outputs[0], go.inputs[0]),
+    ):
+        tree.links.new(start, end)
+    return tree
 
 
 @pytest.mark.slow(instead="test_no_heads_empty_groups_and_empty_meshes_are_refused")

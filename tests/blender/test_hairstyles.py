@@ -110,6 +110,23 @@ def test_each_style_that_ships_is_curves_on_the_scalp_with_its_settings(
         assert found and (np.array(place) - root) @ (np.array(place) - root) < 1e-8
 
 
+def test_guides_outside_of_the_hairline_are_left_out_on_the_built_in_head_too(head) -> None:
+    style = named_hairstyle("bob")
+    group = head.vertex_groups.new(name="front")
+    vertices = head.data.vertices
+    group.add([v.index for v in vertices if v.co.y < -0.02 and v.co.z > 0.03], 1.0, "REPLACE")
+    adding = add_hairstyle(style, head, depsgraph(), bpy.context.collection, hairline="front")
+    hair = at_once(adding).hair
+    roots = read_curves(hair, depsgraph()).strands.roots
+    assert 200 < len(roots) < 500 and (roots[:, 1] < 0.0).all() and (roots[:, 2] > 0.01).all()
+    group.remove(range(len(vertices)))
+    chin = [v.index for v in vertices if v.co.z < -0.1 and v.co.y < -0.06]
+    group.add(chin, 1.0, "REPLACE")
+    with pytest.raises(HairloomError, match="zero wherever this hair grows"):
+        at_once(hairstyles.fit_again([hair], depsgraph()))
+    assert len(hair.data.curves) == len(roots)
+
+
 def monkey(size: float) -> bpy.types.Object:
     bpy.ops.mesh.primitive_monkey_add(size=size, location=(1.0, 2.0, 3.0))
     bpy.context.view_layer.update()

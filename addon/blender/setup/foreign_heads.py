@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cache
 
 import bpy
 import numpy as np
+from mathutils import Vector
 
 from ...arrays import Floats, Ints
 from ...errors import HairloomError
@@ -22,9 +23,10 @@ from ...groom.head_fit import (
     guess_landmarks,
 )
 from ...strands import StrandSet, Surface
+from ...strands.affine import moved
 from ...strands.rooted_shapes import RootedShapes
 from ..base.mesh_arrays import edge_vertices
-from ..base.objects import link_into
+from ..base.objects import link_into, matrix_of
 from ..base.parts import Part, Parts
 from ..scene.built_in_head import built_in_head
 from ..scene.bust_data import SKIN, load_bust
@@ -50,6 +52,8 @@ _LOOSE = 0.002
 _LOOSE_ROOT, _MAX_LOOSE = 0.004, 0.05
 #: of vertex groups: what is farther from the fitted skin has no weight [m]
 _GROUP_REACH = 0.02
+#: custom property of landmarks: where each was guessed, as its location
+_GUESSED = "hairloom_guessed"
 #: how large landmarks are shown, as a part of a head of 1 m
 _SHOWN = 0.006
 
@@ -120,14 +124,31 @@ class ReadHead:
     """What is read of a mesh that hair of the built-in head is to grow on.
 
     own: where its vertices are, see `own_positions`, if it is MakeHuman's; else None.
-    placed: landmarks that an artist has.
+    landmarks: those that it has. guessed: which of them still stand where they were guessed.
+    upright: (4, 4), from where the mesh is now to where it was when they were guessed.
     """
 
     name: str
     surface: Surface
     built_in: Surface
     own: Floats | None
-    placed: Mapping[str, Floats]
+    landmarks: Mapping[str, Floats]
+    guessed: frozenset[str] = frozenset()
+    upright: Floats = field(default_factory=lambda: np.eye(4))
+
+    def points(self) -> dict[str, Floats] | None:
+        """Where to fit the built-in head to: landmarks that an artist has dragged or that a mesh
+        unlike a head has, and a guess of the others; None if it has none."""
+        if not self.landmarks:
+            return None
+        dragged = {name: at for name, at in self.landmarks.items() if name not in self.guessed}
+        if len(dragged) == len(LANDMARKS):
+            return dragged
+        stood = replace(self.surface, positions=moved(self.surface.positions, self.upright))
+        guess, is_sure = guess_landmarks(fit_model(), stood)
+        back = moved(np.array(list(guess.values())), np.linalg.inv(self.upright))
+        places = dict(zip(guess, back.astype(np.float64), strict=True))
+        return {**places, **(dragged if is_sure else self.landmarks)}
 
 
 def read_foreign_head(head: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> ReadHead:
@@ -146,7 +167,14 @@ def read_foreign_head(head: bpy.types.Object, depsgraph: bpy.types.Depsgraph) ->
             place=head.name,
             remedy="Select a head, or nothing to add one; fur and Add Hair take any mesh",
         )
-    return ReadHead(head.name, surface, built_in, None, placed_landmarks(head, depsgraph))
+    there = landmarks_of(head)
+    guessed = [name for name, empty in there.items() if _is_as_guessed(empty)]
+    upright = np.eye(4)
+    if guessed:
+        was = np.linalg.inv(np.array(there[guessed[0]].matrix_parent_inverse, np.float64))
+        upright = was @ np.linalg.pinv(matrix_of(head, depsgraph))
+    landmarks = placed_landmarks(head, depsgraph)
+    return ReadHead(head.name, surface, built_in, None, landmarks, frozenset(guessed), upright)
 
 
 def fitted_to(read: ReadHead) -> ForeignHead:
@@ -159,12 +187,7 @@ def fitted_to(read: ReadHead) -> ForeignHead:
         warp, positions = _by_topology(read.own)
         skin = _skin(positions)
         return ForeignHead(read.name, read.surface, read.built_in, skin, warp, {}, 0.0)
-    points = None
-    if read.placed:
-        is_whole = len(read.placed) == len(LANDMARKS)
-        guess = {} if is_whole else guess_landmarks(fit_model(), read.surface)[0]
-        points = {**guess, **read.placed}
-    fit = fit_head(fit_model(), read.surface, points, read.name)
+    fit = fit_head(fit_model(), read.surface, read.points(), read.name)
     skin = _skin(fit.warp(load_bust().positions))
     return ForeignHead(
         read.name, read.surface, read.built_in, skin, fit.warp, fit.landmarks, fit.away
@@ -302,8 +325,28 @@ def put_landmarks(
         empty.empty_display_type, empty.show_in_front = "SPHERE", True
         empty.parent = head
         empty.matrix_parent_inverse = head.matrix_world.inverted_safe()
-        empty.location = place.tolist()
+        _put_guess(empty, Vector(place))
         empty.empty_display_size = _SHOWN * extent / 0.3
         link_into(empty, [collection], bpy.context.scene)
         made.append(empty)
     return made
+
+
+def move_landmarks(head: bpy.types.Object, places: Mapping[str, Floats]) -> None:
+    """Move the landmarks that nobody has dragged to where they are now, in world space."""
+    for name, empty in landmarks_of(head).items():
+        if name in places and _is_as_guessed(empty):
+            to_world = head.matrix_world @ empty.matrix_parent_inverse
+            _put_guess(empty, to_world.inverted_safe() @ Vector(places[name]))
+
+
+def _put_guess(empty: bpy.types.Object, location: Vector) -> None:
+    empty.location = location
+    empty[_GUESSED] = empty.location[:]
+
+
+def _is_as_guessed(empty: bpy.types.Object) -> bool:
+    """Whether a landmark still stands where it was guessed, by its place on its head."""
+    guessed = empty.get(_GUESSED)
+    is_of_object = empty.parent_type == "OBJECT"
+    return guessed is not None and is_of_object and tuple(guessed) == empty.location[:]

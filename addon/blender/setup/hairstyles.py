@@ -40,7 +40,13 @@ from ..scene.hair_material import put_look_material
 from ..scene.hair_nodes import add_hair_nodes
 from ..scene.surfaces import read_surface
 from ..strands.growing import replace_curves
-from .foreign_heads import fitted_to, own_positions, put_landmarks, read_foreign_head
+from .foreign_heads import (
+    fitted_to,
+    move_landmarks,
+    own_positions,
+    put_landmarks,
+    read_foreign_head,
+)
 from .starting import REAL, fit_motion, fitted, fitting_factor
 
 HAIRSTYLE_FOLDER = Path(__file__).resolve().parents[3] / "hairstyles"
@@ -187,13 +193,12 @@ def add_hairstyle(
                 apply(settings, hair)
         _put_settings(style, hair)
         fit_motion(hair, growth.factor)
-        if growth.solid is not None and hair.modifiers:
-            _leave_out_inside(hair, growth.solid, _DEEP * growth.size)
+        warnings = (*growth.warnings, *_leave_out_inside(hair, growth))
     hair.hairloom.children_density = masks.get("children", "")
     hair.hairloom.hairstyle = style.name
     put_look_material(hair.data, coated(settings_of(hair.data.hairloom.shading, ShadingSettings)))
     done = _put(growth, head, collection)
-    return AddedHair(hair, done, growth.warnings)
+    return AddedHair(hair, done, warnings)
 
 
 def _put(
@@ -204,6 +209,7 @@ def _put(
     for name, weights in growth.groups.items():
         set_group(head, name, weights)
         done.append(f"{head.name} has a vertex group '{name}' now: paint it to move the hairline")
+    move_landmarks(head, growth.landmarks)
     if growth.landmarks and put_landmarks(head, growth.landmarks, collection):
         done.append(
             f"{head.name} has landmarks now: drag those that are not at their places, and press "
@@ -225,11 +231,14 @@ def fit_again(
     grown = []
     for hair in grooms:
         grown.append((yield from _grown_again(hair, depsgraph)))
+    warnings: list[str] = []
     for hair, growth in zip(grooms, grown, strict=True):
         replace_curves(hair, growth.strands, depsgraph)
-        if growth.solid is not None and hair.modifiers:
-            _leave_out_inside(hair, growth.solid, _DEEP * growth.size)
-    return tuple(warning for growth in grown for warning in growth.warnings)
+        warnings += (*growth.warnings, *_leave_out_inside(hair, growth))
+        head = head_of(hair)
+        assert head is not None, "it has grown on it"
+        move_landmarks(head, growth.landmarks)
+    return tuple(warnings)
 
 
 def _grown_again(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Parts[_Growth]:
@@ -279,7 +288,7 @@ def _growth(
     if style.guides is None:
         title, work = f"Growing {style.title}", _fur(style, head, depsgraph)
     elif is_bust(head):
-        title, work = f"Placing {style.title}", _on_bust(style.guides, head, depsgraph)
+        title, work = f"Placing {style.title}", _on_bust(style.guides, head, depsgraph, masks)
     else:
         title = f"Fitting {style.title}"
         work = _on_foreign(style.guides, head, depsgraph, masks)
@@ -301,11 +310,22 @@ def _fur(
 
 
 def _on_bust(
-    guides: RootedShapes, head: bpy.types.Object, depsgraph: bpy.types.Depsgraph
+    guides: RootedShapes,
+    head: bpy.types.Object,
+    depsgraph: bpy.types.Depsgraph,
+    masks: Mapping[str, str],
 ) -> Callable[[], _Growth]:
     surface = read_surface(head, depsgraph, need_uv=True, place=head.name)
-    size = _size_of(head)
-    return lambda: _Growth(guides.on(surface, size), size, 1.0)
+    size, name, mask = _size_of(head), head.name, masks.get("children", "")
+    weights = read_weights(head, depsgraph, mask) if mask else None
+
+    def work() -> _Growth:
+        strands = guides.on(surface, size)
+        if weights is not None:
+            strands = _within(strands, weights, surface, name, mask)
+        return _Growth(strands, size, 1.0)
+
+    return work
 
 
 def _on_foreign(
@@ -365,15 +385,21 @@ def _within(
     return strands.take(kept)
 
 
-def _leave_out_inside(hair: bpy.types.Object, solid: DistanceField, deep: float) -> None:
-    """Take away the curves that their modifiers, such as curls, bring into the head."""
+def _leave_out_inside(hair: bpy.types.Object, growth: _Growth) -> tuple[str, ...]:
+    """Take away the curves that their modifiers, such as curls, bring into the head; warnings."""
+    if growth.solid is None or not hair.modifiers:
+        return ()
     bpy.context.view_layer.update()
     made = read_curves(hair, bpy.context.evaluated_depsgraph_get())
-    if made.dropped:
-        return  # which curves are left cannot be said
-    inside = np.flatnonzero(are_inside(made.strands, solid, deep))
+    if made.dropped or made.strands.strand_count != len(hair.data.curves):
+        return (
+            f"{hair.name}: its modifiers change how many curves there are, so that curves which "
+            "they bring into the head could not be left out. Turn those off and press Fit Again",
+        )
+    inside = np.flatnonzero(are_inside(made.strands, growth.solid, _DEEP * growth.size))
     if 0 < len(inside) < made.strands.strand_count:
         hair.data.remove_curves(indices=inside.tolist())
+    return ()
 
 
 def _outside(strands: StrandSet, solid: DistanceField | None) -> StrandSet:
