@@ -277,7 +277,7 @@ def test_hair_that_is_fitted_again_is_as_it_was_added(head: bpy.types.Object) ->
     COMBED.keep(hair)
     put_points(hair.data, added_points * np.float32(1.05))
     COMBED.seal(hair)
-    assert carry_whole_weight(hair) and COMBED.is_there(hair)
+    assert carry_whole_weight(hair.data) and COMBED.is_there(hair)
     bpy.context.view_layer.objects.active = hair
     assert bpy.ops.hairloom.fit_again() == {"FINISHED"}
     assert curve_points(hair.data) == pytest.approx(added_points, abs=1e-5)

@@ -18,8 +18,13 @@ from hairloom.addon.blender.properties import presets
 from hairloom.addon.blender.properties.groom_settings import GroomSettings
 from hairloom.addon.blender.properties.properties import masks_of_groom
 from hairloom.addon.blender.scene.curves import read_curves
+from hairloom.addon.blender.scene.masks import read_map
+from hairloom.addon.blender.scene.painted_colors import painted_colors
+from hairloom.addon.blender.scene.surfaces import read_surface
+from hairloom.addon.blender.sessions.groom_source import GroomSource
 from hairloom.addon.blender.sessions.session import Session
 from hairloom.addon.blender.viewport import motion_lines, overlay
+from hairloom.addon.errors import HairloomError
 
 #: how far [m] from the border between the halves is far enough: the sphere's faces are coarse
 FAR = 0.05
@@ -193,6 +198,23 @@ def test_a_map_of_zeros_is_said_with_what_is_to_be_done(
     (warning,) = started(hair, evaluated).warnings
     assert "'Nothing' is 0 everywhere, and so is Bend Stiffness" in warning
     assert "Paint it" in warning
+
+
+def test_an_image_of_several_tiles_is_refused(hair: Any, sphere: Any, evaluated: Any) -> None:
+    """Blender gives the pixels of the first tile, which would be all of the surface's."""
+    image = bpy.data.images.new("Film", 8, 8, tiled=True)
+    assert read_map(sphere, evaluated(), "Film").shape == (len(sphere.data.vertices),)
+    image.tiles.new(1002)
+    triangles = len(read_surface(sphere, evaluated(), need_uv=True, place="Head").triangles)
+    for read in (
+        lambda: read_map(sphere, evaluated(), "Film"),
+        lambda: painted_colors(sphere, "Film", evaluated(), triangles, place="Hair"),
+    ):
+        with pytest.raises(HairloomError, match="has several tiles") as error:
+            read()
+        assert "Use an image of one tile" in str(error.value)
+    hair.hairloom.dynamics.gravity_mask = "Film"
+    assert any("several tiles" in each for each in GroomSource(hair, evaluated()).warnings)
 
 
 def test_an_image_is_read_again_once_it_is_painted(hair: Any, sphere: Any, evaluated: Any) -> None:

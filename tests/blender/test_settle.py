@@ -5,10 +5,12 @@ import numpy as np
 import pytest
 from tiers import few_in_commits
 
+from hairloom.addon.blender.base.attributes import set_attribute
 from hairloom.addon.blender.base.outcome import past_reports
 from hairloom.addon.blender.command_line import command_line
 from hairloom.addon.blender.preview import previews
 from hairloom.addon.blender.scene.curves import curve_offsets, curve_points
+from hairloom.addon.blender.scene.hair_nodes import add_hair_nodes
 from hairloom.addon.blender.scene.kept_shape import BEFORE_TRIM, COMBED
 from hairloom.addon.blender.sessions.settling import settle_hair
 from hairloom.addon.dynamics.settle_settings import SettleSettings
@@ -229,6 +231,43 @@ def test_what_is_taken_back_takes_later_tools_along(order, new_hair, sphere):
     assert COMBED.is_there(twin) is (second == "take_trim_back")
     assert twin.hairloom.dynamics.sag_compensation == (0.5 if second == "back_to_combed" else 1.0)
     assert len([each for each in past_reports if "is gone too" in each.text]) == 1
+
+
+def test_linked_duplicates_share_settled_curves_and_carry_their_weight_alike(new_hair, sphere):
+    hair = new_hair(sphere)
+    twin = hair.copy()
+    bpy.context.collection.objects.link(twin)
+    twin.select_set(False)
+    sags = {hair: 0.5, twin: 0.25}
+    for each, sag in sags.items():
+        each.hairloom.dynamics.sag_compensation = sag
+    settle(seconds=0.2)
+    assert {each.hairloom.dynamics.sag_compensation for each in sags} == {1.0}
+    hair.select_set(False)
+    twin.select_set(True)
+    bpy.context.view_layer.objects.active = twin
+    bpy.ops.hairloom.back_to_combed()
+    assert {each: each.hairloom.dynamics.sag_compensation for each in sags} == sags
+
+
+@pytest.mark.parametrize("domain", ["surface", "curves"])
+def test_hair_falls_as_painted_where_a_modifier_adds_curves(domain, new_hair, sphere):
+    """Those that fall are from before it; a selection that does not act changes nothing."""
+    hair = new_hair(sphere, lying())
+    if domain == "surface":
+        sphere.vertex_groups.new(name="Few").add(range(len(sphere.data.vertices)), 0.0, "REPLACE")
+        moving = []
+    else:
+        few = hair.data.attributes.new("Few", "FLOAT", "CURVE")
+        few.data.foreach_set("value", [0.0, 0.0, 1.0, 1.0, 1.0])
+        moving = [2, 3, 4]
+    set_attribute(hair.data, ".selection", "CURVE", np.ones(5, bool))
+    hair.hairloom.dynamics.gravity_mask = "Few"
+    add_hair_nodes(hair, "Duplicate Hair Curves", {"Amount": 3}, 1.0)
+    settle(stiffness=0.0, seconds=1.0)
+    tips = curve_points(hair.data).reshape(5, 12, 3)[:, -1, 2]
+    assert np.flatnonzero(tips < -0.2).tolist() == moving
+    assert np.abs(np.delete(tips, moving)).max() < 1e-4
 
 
 def test_until_its_end_nothing_changes(new_hair, sphere, evaluated):

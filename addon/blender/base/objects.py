@@ -198,6 +198,11 @@ def head_of(hair: bpy.types.Object) -> bpy.types.Object | None:
     return carrier if carrier is not None and carrier.data == surface.data else surface
 
 
+def objects_with(data: bpy.types.ID) -> list[bpy.types.Object]:
+    """Those that share it, such as linked duplicates."""
+    return [obj for obj in bpy.data.objects if obj.data == data]
+
+
 def is_solid(obj: bpy.types.Object) -> bool:
     """Whether 3D views draw it as a solid object that hides what is behind it."""
     with _without_area():

@@ -84,7 +84,7 @@ class KeptShape:
             curves.attributes.remove(curves.attributes[name])
         curves[_ORDER] = " ".join(order[:place])
         if not COMBED.is_there(hair):
-            carry_as_before(hair)
+            carry_as_before(curves)
         return is_changed
 
 

@@ -65,6 +65,7 @@ class Canvas:
     """On what a groom may be painted.
 
     hair: its curves; None: they are of a file. surface: the object that it grows on, or None.
+    is_own: whether the strands are the hair's curves before their modifiers.
     head: that as it was read. strands: those of the curves that are usable. kept: which these are.
     good: every mask by its name, as it could be used last.
 
@@ -77,6 +78,7 @@ class Canvas:
     strands: StrandSet
     kept: Ints
     good: dict[str, Mask] = field(default_factory=dict)
+    is_own: bool = False
     _groups: list[_Groups] = field(default_factory=list, init=False)
 
     def masks(
@@ -194,14 +196,19 @@ class Canvas:
         return StrandMask(values[:, None])
 
     def _has_selection(self, depsgraph: bpy.types.Depsgraph) -> bool:
-        curves = None if self.hair is None else self.hair.evaluated_get(depsgraph).data
-        return curves is not None and painted_attribute(curves, SELECTION) is not None
+        return self.hair is not None and (
+            painted_attribute(self._curves(self.hair, depsgraph), SELECTION) is not None
+        )
+
+    def _curves(self, hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bpy.types.Curves:
+        curves: bpy.types.Curves = (hair if self.is_own else hair.evaluated_get(depsgraph)).data
+        return curves
 
     def _on_curves(self, name: str, depsgraph: bpy.types.Depsgraph) -> tuple[Floats, str] | None:
         """An attribute of the curves that are usable, or of their points, and its domain."""
         if self.hair is None:
             return None
-        curves = self.hair.evaluated_get(depsgraph).data
+        curves = self._curves(self.hair, depsgraph)
         found = painted_attribute(curves, name)
         if found is None:
             return None
@@ -278,13 +285,14 @@ def image_mask(name: str, head: Surface | None, place: str) -> ImageMask:
 def usable_image(
     name: str, corner_uv: Floats | None, place: str, *, instead: str
 ) -> bpy.types.Image:
-    """An image with pixels, for a surface with UVs.
+    """An image of one tile with pixels, for a surface with UVs.
 
     Args:
         place: names the surface in messages. instead: what else may be painted.
 
     Raises:
-        HairloomError: there are no UVs, or no pixels.
+        HairloomError: there are no UVs, no pixels, or several tiles: Blender gives the pixels of
+            the first alone.
     """
     if corner_uv is None:
         raise HairloomError(
@@ -298,6 +306,12 @@ def usable_image(
             f"the image '{name}' has no pixels",
             place=place,
             remedy="Find its file (File > External Data > Find Missing Files)",
+        )
+    if image.source == "TILED" and len(image.tiles) > 1:
+        raise HairloomError(
+            f"the image '{name}' has several tiles, and hair has one for all of its surface",
+            place=place,
+            remedy=f"Use an image of one tile, or paint {instead}",
         )
     return image
 

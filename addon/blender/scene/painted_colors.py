@@ -144,12 +144,6 @@ def _meaning(image: bpy.types.Image, place: str) -> Callable[[Floats], Floats]:
     """What its pixels mean; those of floats are scene-linear and multiplied by opacity, whatever
     its colour space, others are as the file has them."""
     space, has_opacity = image.colorspace_settings.name, image.alpha_mode in ("STRAIGHT", "PREMUL")
-    if image.source == "TILED" and len(image.tiles) > 1:
-        raise HairloomError(
-            f"the image '{image.name}' has several tiles, and hair has one for all of its surface",
-            place=place,
-            remedy="Use an image of one tile, or a colour attribute",
-        )
     if image.is_float:
         return partial(_whole, has_opacity=has_opacity)
     if space != "sRGB" and space not in _LINEAR:

@@ -18,11 +18,12 @@ from ...dynamics.settings import DynamicsSettings
 from ...dynamics.settle_settings import SettleSettings
 from ...errors import HairloomError
 from ...groom.settings import GuideSettings
+from ...paint_flow import painted_guides
 from ...rig_flow import Rig
 from ...shading.ambient_settings import AmbientSettings
 from ...strands import StrandSet
 from ...strands.clean import Cleaned
-from ..base.objects import check_curves_editable
+from ..base.objects import check_curves_editable, head_of
 from ..base.outcome import Outcome
 from ..colliders.fields import solid_of
 from ..colliders.obstacles import Obstacles
@@ -30,6 +31,7 @@ from ..scene.carried_weight import carry_whole_weight
 from ..scene.curves import read_own_curves, write_own_curves
 from ..scene.forces import gravity_of
 from ..scene.kept_shape import COMBED
+from ..scene.masks import Canvas
 from .groom_source import GroomSource
 from .prepared_groom import PreparedGroom
 
@@ -63,7 +65,11 @@ def settle_hair(
     _check_roots(hair, rig)
     dynamics, pose = source.settings[DynamicsSettings], source.pose(rig, depsgraph)
     posed, warnings = _colliders(hair, source, rig, dynamics, depsgraph)
-    gravity, painted = gravity_of(depsgraph.scene), source.painted_guides(rig)
+    canvas = Canvas(hair, head_of(hair), read.head, own.strands, own.kept, is_own=True)
+    masks, notes = canvas.masks(dynamics, depsgraph)
+    warnings += tuple(note for note in notes if note not in warnings)
+    gravity = gravity_of(depsgraph.scene)
+    painted = painted_guides(rig, masks) if masks else None
     fallen = yield from settle_flow.settle(rig, pose, posed, dynamics, settings, gravity, painted)
     head = solid_of(rig.head)
     settled, is_out = settle_flow.as_curves(own.strands, rig, fallen, head)
@@ -87,7 +93,7 @@ def _stored(
     COMBED.keep(hair)
     write_own_curves(hair, own, settled.points, depsgraph)
     COMBED.seal(hair)
-    warnings += carry_whole_weight(hair)
+    warnings += carry_whole_weight(hair.data)
     lost = int((~is_out).sum())
     if lost:
         are = "1 curve is" if lost == 1 else f"{lost:,} curves are"

@@ -22,7 +22,7 @@ from ...strands import StrandSet
 from ...strands.affine import mean_scale
 from ..base.attributes import read_attribute
 from ..base.digests import digest
-from ..base.objects import check_curves_editable, head_of, matrix_of
+from ..base.objects import check_curves_editable, head_of, matrix_of, objects_with
 from ..base.parts import Part, Parts, at_once
 from ..properties import changed
 from ..properties.properties import settings_of
@@ -126,7 +126,7 @@ def replace_curves(
         curves.attributes.remove(curves.attributes[name])
     fill_curves(curves, strands.transformed(back))
     curves.update_tag()
-    carry_as_before(hair)
+    carry_as_before(curves)
     if has_colors:
         follow_curves(hair)
 
@@ -137,7 +137,7 @@ def follow_settings(curves: bpy.types.ID) -> None:
     own = curves.hairloom.grow
     if not curves.is_editable or own.made_by == _settings_digest(own) or losses(curves):
         return
-    users = [obj for obj in bpy.data.objects if obj.data == curves and head_of(obj) is not None]
+    users = [obj for obj in objects_with(curves) if head_of(obj) is not None]
     depsgraph = bpy.context.evaluated_depsgraph_get()
     users.sort(key=lambda obj: not _is_evaluated(obj, depsgraph))
     try:
