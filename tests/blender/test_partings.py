@@ -1,5 +1,6 @@
 """Partings in a scene: drawn, read, followed by the preview, combed from, taken away."""
 
+import bmesh
 import bpy
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from hairloom.addon.blender.preview import previews
 from hairloom.addon.blender.properties.groom_settings import GroomSettings
 from hairloom.addon.blender.scene.curves import curve_points
 from hairloom.addon.blender.scene.drawn_lines import new_line, pieces_of
-from hairloom.addon.blender.scene.partings import partings_of
+from hairloom.addon.blender.scene.partings import is_same_state, parting_state, partings_of
 from hairloom.addon.strands import StrandSet
 
 RADIUS = 0.1
@@ -97,6 +98,42 @@ def test_no_child_blends_both_sides_and_the_preview_follows(hair, evaluated):
     assert line.name in bpy.context.scene.objects
     session.read_again(evaluated())
     assert mixes_both_sides(session) > 50
+
+
+def wire():
+    """A line over the sphere as a mesh of three edges."""
+    mesh = bpy.data.meshes.new("Wire")
+    corners = [(0.0, -0.1, 0.0), (0.0, -0.07, 0.07), (0.0, 0.0, 0.1), (0.0, 0.07, 0.07)]
+    mesh.from_pydata(corners, [(0, 1), (1, 2), (2, 3)], [])
+    line = bpy.data.objects.new("Wire", mesh)
+    bpy.context.collection.objects.link(line)
+    return line
+
+
+@pytest.mark.parametrize("edit", ["cyclic", "edge", "parent"])
+def test_all_that_changes_a_line_is_seen_and_what_carries_it_is_not(edit, hair, sphere):
+    line = wire() if edit == "edge" else arch()
+    handle, body = bpy.data.objects.new("Handle", None), bpy.data.objects.new("Body", None)
+    for each in (handle, body):
+        bpy.context.collection.objects.link(each)
+    line.parent, handle.parent, sphere.parent = handle, body, body
+    bpy.context.view_layer.update()
+    add(hair, line)
+    before = parting_state(hair)
+    body.location.x += 0.5
+    sphere.rotation_euler.z = 0.5
+    assert is_same_state(parting_state(hair), before)
+    if edit == "cyclic":
+        line.data.splines[0].use_cyclic_u = True
+    elif edit == "edge":
+        mesh = bmesh.new()
+        mesh.from_mesh(line.data)
+        mesh.edges.ensure_lookup_table()
+        mesh.edges.remove(mesh.edges[2])
+        mesh.to_mesh(line.data)
+    else:
+        handle.location.x = 0.01
+    assert not is_same_state(parting_state(hair), before)
 
 
 @pytest.mark.slow

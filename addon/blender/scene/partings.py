@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import bpy
 import numpy as np
 
 from ...arrays import Floats
 from ...errors import HairloomError
-from ..base.mesh_arrays import vertex_places
+from ..base.mesh_arrays import edge_vertices, vertex_places
+from ..base.objects import head_of
 from .drawn_lines import pieces_of
 from .own_collections import objects_in, put_into, take_out
 
@@ -20,13 +23,32 @@ def partings_of(hair: bpy.types.Object) -> tuple[bpy.types.Object, ...]:
 
 
 def parting_state(hair: bpy.types.Object) -> tuple[Floats | str, ...]:
-    """Which lines part the hair, and where the artist has put them; what only carries them, such as
-    a head that turns, is not in it."""
+    """Which lines part the hair, and where the artist has put them; what carries them with the
+    surface, such as a head that turns, or by itself, as an animation does, is not in it."""
     state: list[Floats | str] = []
     for obj in partings_of(hair):
         state += [f"{obj.session_uid} {obj.type}", _line_points(obj)]
-        state += [np.array(obj.matrix_parent_inverse), np.array(obj.matrix_basis)]
+        for each in (obj, *_placed_by(obj, head_of(hair))):
+            state += [np.array(each.matrix_parent_inverse), np.array(each.matrix_basis)]
     return tuple(state)
+
+
+def _placed_by(line: bpy.types.Object, head: bpy.types.Object | None) -> Iterator[bpy.types.Object]:
+    """The parents by which an artist moves a line over a head: neither that, nor what carries
+    both."""
+    carriers = [] if head is None else [head, *_parents(head)]
+    for each in _parents(line):
+        if each in carriers:
+            return
+        if each.animation_data is None and not len(each.constraints):
+            yield each
+
+
+def _parents(obj: bpy.types.Object) -> Iterator[bpy.types.Object]:
+    """The parent, its parent, and so on."""
+    while obj.parent is not None:
+        obj = obj.parent
+        yield obj
 
 
 def is_same_state(one: tuple[Floats | str, ...], other: tuple[Floats | str, ...]) -> bool:
@@ -35,19 +57,21 @@ def is_same_state(one: tuple[Floats | str, ...], other: tuple[Floats | str, ...]
 
 
 def _line_points(obj: bpy.types.Object) -> Floats:
-    """The control points of a curve, or the vertices of a mesh, before modifiers."""
+    """The control points of a curve and how they are joined, or the vertices and edges of a mesh,
+    before modifiers."""
     if obj.type == "MESH":
-        return vertex_places(obj.data).ravel()
-    splines = obj.data.splines if obj.type == "CURVE" else ()
-    found = [
-        coordinate
-        for spline in splines
-        for point in spline.bezier_points
-        for place in (point.handle_left, point.co, point.handle_right)
-        for coordinate in place
-    ]
-    found += [each for spline in splines for point in spline.points for each in point.co[:3]]
-    return np.array(found, np.float32)
+        places, edges = vertex_places(obj.data), edge_vertices(obj.data)
+        return np.concatenate([places.ravel(), edges.ravel()]).astype(np.float64)
+    found: list[float] = []
+    for spline in obj.data.splines if obj.type == "CURVE" else ():
+        for point in spline.bezier_points:
+            for place in (point.handle_left, point.co, point.handle_right):
+                found.extend(place)
+        for point in spline.points:
+            found.extend(point.co)
+        found += (len(spline.points), len(spline.bezier_points), spline.type == "NURBS")
+        found += (spline.use_cyclic_u, spline.resolution_u, spline.order_u, spline.use_endpoint_u)
+    return np.array(found, np.float64)
 
 
 def read_partings(
