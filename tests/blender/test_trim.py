@@ -1,5 +1,7 @@
 """Hair in a scene trimmed to meshes and Empties, trimmed again, and taken back."""
 
+from itertools import pairwise
+
 import bpy
 import numpy as np
 import pytest
@@ -75,6 +77,69 @@ def test_hair_passes_no_plane_and_follows_it_again_when_it_moves(hair):
     assert bpy.ops.hairloom.take_trim_back() == {"FINISHED"}
     assert np.array_equal(curve_points(hair.data), before)
     assert not bpy.ops.hairloom.take_trim_back.poll()
+
+
+def bezier_hair(sphere):
+    """Legacy Bézier curves that rise from the sphere, converted to hair curves; the last is low."""
+    data = bpy.data.curves.new("Bezier", "CURVE")
+    data.dimensions = "3D"
+    for height in (0.02, 0.02, 0.001):
+        spline = data.splines.new("BEZIER")
+        spline.bezier_points.add(2)
+        for number, point in enumerate(spline.bezier_points):
+            point.co = (0.1 + 0.03 * number, 0.01 * len(data.splines), height * number**2)
+            point.handle_left_type = point.handle_right_type = "AUTO"
+    obj = bpy.data.objects.new("Bezier", data)
+    bpy.context.collection.objects.link(obj)
+    for each in bpy.context.selected_objects:
+        each.select_set(False)
+    obj.select_set(True)
+    bpy.context.view_layer.objects.active = obj
+    bpy.ops.object.convert(target="CURVES")
+    bpy.context.object.data.surface = sphere
+    return bpy.context.object
+
+
+def drawn(hair):
+    """Where Blender draws the curves, as points of each."""
+    tree = bpy.data.node_groups.new("Drawn", "GeometryNodeTree")
+    for side in ("INPUT", "OUTPUT"):
+        tree.interface.new_socket("Geometry", in_out=side, socket_type="NodeSocketGeometry")
+    kinds = "NodeGroupInput", "GeometryNodeCurveToPoints", "GeometryNodePointsToVertices"
+    nodes = [tree.nodes.new(kind) for kind in (*kinds, "NodeGroupOutput")]
+    nodes[1].mode = "EVALUATED"
+    for one, following in pairwise(nodes):
+        tree.links.new(one.outputs[0], following.inputs[0])
+    modifier = hair.modifiers.new("Drawn", "NODES")
+    modifier.node_group = tree
+    evaluated = hair.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    geometry = evaluated.evaluated_geometry()
+    places = np.array([vertex.co[:] for vertex in geometry.mesh.vertices])
+    hair.modifiers.remove(modifier)
+    return places
+
+
+def test_nodes_find_curves_where_they_have_been_trimmed_to(hair):
+    """Even if they have gone along them before, so that Blender has kept what they found."""
+    before = drawn(hair)[:, 2].max()
+    shape = empty(0.12)
+    trim(hair, shape)
+    assert before > 0.15 and drawn(hair)[:, 2].max() < 0.12 + 1e-6
+    assert bpy.ops.hairloom.take_trim_back() == {"FINISHED"}
+    assert drawn(hair)[:, 2].max() == pytest.approx(before, abs=1e-7)
+
+
+def test_bezier_curves_are_drawn_where_they_have_been_trimmed_to(extension, sphere):
+    """And not by handles that stay where they were, or as long as they were."""
+    hair = bezier_hair(sphere)
+    before = drawn(hair)
+    assert before[:, 2].max() > 0.07
+    trim(hair, empty(0.01))
+    after = drawn(hair)
+    assert after[:, 2].max() < 0.0101
+    assert np.array_equal(after[after[:, 1] > 0.025], before[before[:, 1] > 0.025]), "it was low"
+    assert bpy.ops.hairloom.take_trim_back() == {"FINISHED"}
+    assert drawn(hair) == pytest.approx(before, abs=1e-6)
 
 
 def test_the_report_counts_what_is_trimmed_left_and_outside(hair, tmp_path, capsys):

@@ -18,6 +18,7 @@ import numpy as np
 from ...arrays import Floats
 from ...errors import HairloomError
 from ...rig_flow import Pose, Solids
+from ..scene.curves import put_points
 from ..scene.fin_modifier import clear, fin_modifier, has_fins, show
 from .bake_settings import folder_of, shown_folder_of
 from .baked_rig import BakedRig, baked_rig_of
@@ -240,8 +241,7 @@ def _write(curves: bpy.types.Curves, folder: Path, scene: bpy.types.Scene) -> No
         raise HairloomError(
             "these curves are not those of the bake", place=curves.name, remedy="Bake again"
         )
-    curves.position_data.foreach_set("vector", points.ravel())
-    curves.update_tag()
+    put_points(curves, points)
 
 
 def _attempt(folder: Path, show: Callable[[], object]) -> None:

@@ -177,16 +177,32 @@ def write_own_curves(
     number = number_in_piece(counts)
     back = np.linalg.inv(np.array(obj.evaluated_get(depsgraph).matrix_world, np.float64))
     moved_points[np.repeat(offsets[own.kept], counts) + number] = moved(points, back)
-    put_points(curves, moved_points)
+    move_curves(curves, moved_points)
+
+
+def move_curves(curves: bpy.types.Curves, points: Floats) -> None:
+    """As `put_points`, and with them the handles of Bezier curves, each as much longer as the piece
+    of the curve on its side."""
+    before = curve_points(curves)
+    for name, side in (("handle_left", 1), ("handle_right", -1)):
+        handles = read_attribute(curves, name, "POINT", 3)
+        if handles is None:
+            continue
+        # a curve's outer handles act nowhere, so that it need not be known where curves begin
+        was, now = (np.linalg.norm(p - np.roll(p, side, axis=0), axis=1) for p in (before, points))
+        longer = np.divide(now, was, out=np.ones_like(was), where=was > 0.0)
+        set_attribute(curves, name, "POINT", points + longer[:, None] * (handles - before))
+    put_points(curves, points)
 
 
 def put_points(curves: bpy.types.Curves, points: Floats) -> None:
-    """Move all points, (point_count, 3) [m] object space, and Bezier curves' handles with them."""
-    for name in ("handle_left", "handle_right"):
-        handles = read_attribute(curves, name, "POINT", 3)
-        if handles is not None:
-            set_attribute(curves, name, "POINT", handles + (points - curve_points(curves)))
-    curves.position_data.foreach_set("vector", np.ascontiguousarray(points, np.float32).ravel())
+    """Move all points, (point_count, 3) [m] object space, and nothing else of the curves.
+
+    As an attribute: nodes that go along curves would find them where they were, by what Blender
+    keeps of `position_data`.
+    """
+    places = curves.attributes["position"].data
+    places.foreach_set("vector", np.ascontiguousarray(points, np.float32).ravel())
     curves.update_tag()
 
 

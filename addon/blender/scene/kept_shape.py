@@ -13,7 +13,7 @@ from ..base.attributes import read_attribute, set_attribute
 from ..base.digests import digest
 from ..base.objects import check_shape_editable
 from .carried_weight import carry_as_before
-from .curves import curve_offsets, curve_points, put_points
+from .curves import curve_offsets, curve_points, move_curves
 
 #: custom property of the curves: the attributes of their kept shapes, in the order of time
 _ORDER = "hairloom_kept"
@@ -77,7 +77,7 @@ class KeptShape:
         points, offsets = curve_points(curves), curve_offsets(curves)
         is_known = np.repeat(_have_extent(kept, offsets), np.diff(offsets))
         points[is_known] = kept[is_known]
-        put_points(curves, points)
+        move_curves(curves, points)
         order = _in_order(curves)
         place = order.index(self.attribute) if self.attribute in order else len(order)
         for name in {self.attribute, *order[place:]}.intersection(curves.attributes.keys()):
