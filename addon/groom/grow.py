@@ -47,8 +47,9 @@ _MAX_PILE, _MAX_CLEARANCE = 0.12, 0.06
 #: It is as high as it will be at 1 / _RISEN of its length. Where it rose within some centimetres,
 #: hair beside the parting stood in loops before the light.
 _RISEN = 1.6
-#: Hair shorter than this turns within its own length, but is stiffer, as a shorter beam is [m].
-_STIFF = 0.05
+#: Hair shorter than this turns within its own length, but is stiffer, as a shorter beam is; in
+#: units of half the cranium's depth. On the built-in head it is 5 cm.
+_STIFF = 0.48
 #: How often hair is drawn out of hollows, how far towards the middle of its neighbours each time,
 #: and how often the directions in which it goes are averaged over neighbours.
 _PULLS, _PULL, _NORMALS_BLURRED = 40, 0.9, 6
@@ -106,7 +107,8 @@ def _grow_combed(
     comb = _combed(cranium, root, normal, settings)
     comb = unit(comb + uncombed[:, None] * (grown - comb))
     lift = settings.lift * (1.0 + uncombed * random.normal(0.0, _LIFT_VARIES, len(root)))
-    grid = _fallen(root, normal, comb, np.clip(lift, 0.0, 1.0), plan, settings)
+    stiff = _STIFF * cranium.half_depth
+    grid = _fallen(root, normal, comb, np.clip(lift, 0.0, 1.0), plan, stiff, settings)
     grid = _laid(_taut(style_clumps(grid, clump, settings, random), plan), plan)
     return bound_strands(grid, triangle, barycentric, surface)
 
@@ -218,12 +220,17 @@ def _fallen(
     comb: Floats,
     lift: Floats,
     plan: _Plan,
+    stiff: float,
     settings: GrowSettings,
 ) -> Floats:
-    """Grow segment by segment, turning from the comb to the fall, (strand_count, cv_count, 3)."""
+    """Grow segment by segment, turning from the comb to the fall, (strand_count, cv_count, 3).
+
+    Args:
+        stiff: the length [m] below which hair is stiffer.
+    """
     grid = np.repeat(root[:, None], settings.cv_count, axis=1)
     direction = unit(lift[:, None] * normal + (1.0 - lift[:, None]) * comb)
-    step = _DROOP_STEP * np.sqrt(np.minimum(plan.length / _STIFF, 1.0))
+    step = _DROOP_STEP * np.sqrt(np.minimum(plan.length / stiff, 1.0))
     step = np.maximum(step, 1e-30)
     for cv in range(1, settings.cv_count):
         fraction = cv / (settings.cv_count - 1)

@@ -12,8 +12,10 @@ from hairloom.addon.blender.properties.presets import named_preset
 from hairloom.addon.blender.scene import particle_hair
 from hairloom.addon.blender.scene.curves import read_curves
 from hairloom.addon.blender.scene.source import own_dynamics
+from hairloom.addon.blender.scene.surfaces import read_surface
 from hairloom.addon.blender.setup import starting
 from hairloom.addon.blender.viewport import overlay
+from hairloom.addon.groom.grow import grow
 from hairloom.addon.groom.settings import GrowSettings
 from hairloom.addon.shading.settings import ShadingSettings
 from hairloom.addon.ui import operators_start
@@ -88,6 +90,23 @@ def test_only_meshes_that_are_no_head_or_body_change_the_lengths(size, factor):
     assert fitted.length == pytest.approx(GrowSettings().length * factor)
     assert fitted.volume == pytest.approx(GrowSettings().volume * factor)
     assert fitted.strand_count == GrowSettings().strand_count
+
+
+@pytest.mark.parametrize("length", [0.03, 0.25], ids=["short and stiff", "long"])
+def test_hair_fitted_to_a_doll_and_to_a_giant_falls_as_on_a_head(length):
+    bpy.ops.mesh.primitive_uv_sphere_add(radius=0.095)
+    head = bpy.context.object
+    mine = GrowSettings(strand_count=80, length=length)
+    found = []
+    for factor in (1.0, 0.1, 20.0):
+        head.scale = (factor,) * 3
+        surface = read_surface(
+            head, bpy.context.evaluated_depsgraph_get(), need_uv=False, place="Head"
+        )
+        found.append(grow(surface, starting.fitted(mine, factor)).points / factor)
+    for other in found[1:]:
+        away = np.linalg.norm(other - found[0], axis=1)
+        assert np.quantile(away, 0.95) < 0.01 * length
 
 
 def swing_of_new_hair(size):

@@ -55,7 +55,9 @@ def fitted(settings: GrowSettings, factor: float) -> GrowSettings:
     """The same hair on a head that is larger by a factor, within the declared limits."""
     if factor == 1.0:
         return settings
-    return settings.multiplied(**dict.fromkeys(_LENGTHS, factor))
+    longer = settings.multiplied(**dict.fromkeys(_LENGTHS, factor))
+    # which is a turn in each 2 cm, whatever the size
+    return longer.clipped(droop=1.0 - (1.0 - settings.droop) ** (1.0 / factor))
 
 
 def fit_motion(hair: bpy.types.Object, factor: float) -> None:
