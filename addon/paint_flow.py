@@ -20,7 +20,7 @@ from .arrays import Floats, Ints
 from .comb_flow import put_children
 from .dynamics.painted import PaintedGuides
 from .groom.child_roots import ChildRoots, child_roots
-from .groom.masks import NO_MASKS, Masks, Places
+from .groom.masks import NO_MASKS, Masks, Places, StrandMask
 from .groom.painted_color import PaintedColor
 from .groom.roots import RootFrames, root_frames
 from .rig_flow import Grown, Rig
@@ -28,6 +28,7 @@ from .shading.coat import coated_color
 from .shading.drawn_strands import look_color, natural_strands
 from .shading.settings import ShadingSettings
 from .strands import StrandSet, Surface
+from .strands.arc_length import along
 from .strands.kept import same_rows
 
 #: Less opaque paint counts as if it were so opaque where its colour is found.
@@ -138,6 +139,27 @@ def painted_guides(rig: Rig, masks: Masks) -> PaintedGuides | None:
         return None
     places, cv_count = Places.of_strands(rig.strands, rig.guides), rig.guide_grid.shape[1]
     return PaintedGuides({of: each.along(places, cv_count) for of, each in masks.masks.items()})
+
+
+def painted_strands(rig: Rig, mask: StrandMask) -> Floats:
+    """What is painted on the artist's own strands at all strands of a rig, of children as they mix
+    it: (strand_count,), or (point_count,) where it is not alike along each."""
+    strands, count = rig.strands, mask.grid.shape[1]
+    own = strands.strand_count if rig.own_count is None else rig.own_count
+    values = mask.along(Places.of_strands(strands, np.arange(own)), count)
+    if rig.grown is not None:
+        weights, kept = rig.grown.growth.weights, rig.grown.kept
+        between = Places(None, None, weights.guide[kept], weights.weight[kept])
+        of_children = mask.of(rig.grown.parents).along(between, count)
+        values = np.concatenate([values, of_children], axis=1)
+    if count == 1:
+        return values[0].astype(np.float32)
+    strand = np.repeat(np.arange(strands.strand_count), strands.point_counts)
+    place = along(strands.points, strands.offsets) * (count - 1)
+    left = np.minimum(place.astype(np.int32), count - 2)
+    low, high = values[left, strand], values[left + 1, strand]
+    found: Floats = (low + (place - left) * (high - low)).astype(np.float32)
+    return found
 
 
 def _masked(rig: Rig, masks: Masks) -> Rig:

@@ -14,8 +14,13 @@ from engine_stage import add_ball, picture
 from hedgehogs import hedgehog
 
 from hairloom.addon.blender.bakes.baked_rig import RestMatrices, baked_rig_of, rig_arrays
+from hairloom.addon.blender.base.attributes import set_attribute
 from hairloom.addon.blender.colliders.rigs import rig_of
+from hairloom.addon.blender.scene.curves import curve_points
+from hairloom.addon.blender.scene.masks import Canvas
 from hairloom.addon.blender.scene.source import read_source
+from hairloom.addon.blender.sessions.groom_source import GroomSource
+from hairloom.addon.groom.masks import SELECTION
 from hairloom.addon.rig_flow import strand_seeds
 from hairloom.addon.strands import StrandSet
 
@@ -64,6 +69,39 @@ def test_every_strand_keeps_its_noise(hair: Any) -> None:
     assert strand_seeds(rig).tolist() == [*seeds, len(seeds)]
     baked = baked_rig_of(rig_arrays(rig, RestMatrices(np.eye(4), np.eye(4))), "bake").rig
     np.testing.assert_array_equal(strand_seeds(baked), strand_seeds(rig))
+
+
+@pytest.mark.parametrize("domain", ["CURVE", "POINT"])
+@pytest.mark.parametrize("children", ["none", "multi"])
+def test_it_moves_as_it_was_painted_on_the_curves(
+    hair: Any, domain: str, children: str, evaluated: Any
+) -> None:
+    """Of children, as they are mixed; what is held still stays so."""
+    hair.data.hairloom.children.method = children
+    is_left = curve_points(hair.data)[:, 0] < 0.0
+    place = np.tile(np.linspace(0.0, 1.0, 8), len(hair.data.curves))
+    values = (is_left * (1.0 + place)).astype(np.float32)
+    is_left = is_left[::8]
+    painted = values if domain == "POINT" else is_left.astype(np.float32)
+    set_attribute(hair.data, "Stiff", domain, painted)
+    set_attribute(hair.data, SELECTION, "CURVE", is_left)
+    dynamics = hair.hairloom.dynamics
+    dynamics.style_root_mask, dynamics.only_selected = "Stiff", True
+    source = read_source(hair, evaluated())
+    canvas = Canvas(hair, hair.parent, source.head, source.strands, source.kept)
+    was = {name: canvas.mask(name, evaluated()).grid for name in ("Stiff", SELECTION)}
+    real = made_real()
+    assert not [each for each in GroomSource(real, evaluated()).warnings if "Stiff" in each]
+    made = read_source(real, evaluated())
+    canvas = Canvas(real, real.parent, made.head, made.strands, made.kept)
+    roots = source.strands.roots
+    for name, before in was.items():
+        now = canvas.mask(name, evaluated()).grid
+        assert now[: len(roots)] == pytest.approx(before, abs=2e-3)
+        assert now.min() >= 0.0 and now.max() <= before.max() + 1e-5
+        far = np.abs(made.strands.roots[:, 0]) > 0.07  # whose guides are on their side
+        sides = made.strands.roots[far, 0] < 0.0
+        assert (now[far].max(axis=1) > 0.0).tolist() == sides.tolist()
 
 
 @pytest.mark.slow

@@ -10,9 +10,11 @@ import bpy
 import numpy as np
 
 from ...cards.drawing_settings import CardDrawingSettings
+from ...dynamics.settings import DynamicsSettings
 from ...groom.children_settings import ChildrenSettings
+from ...groom.masks import Masks, StrandMask, mask_names
 from ...groom.width_settings import WidthSettings
-from ...paint_flow import with_colors
+from ...paint_flow import painted_strands, with_colors
 from ...parameters import ALL_SETTINGS, sections_of
 from ...rig_flow import Rig, strand_seeds
 from ...shading.drawn_strands import drawn_radius, strand_colors
@@ -20,6 +22,7 @@ from ...shading.settings import ShadingSettings, StrandSettings
 from ...shading.strand_noise import SEED_LIMIT
 from ...strands import StrandSet
 from ...strands.arc_length import along
+from ..base.attributes import set_attribute
 from ..base.objects import head_of
 from ..base.outcome import Outcome, notes_of
 from ..base.parts import Part, Parts
@@ -29,6 +32,7 @@ from ..properties.presets import apply
 from ..scene.curves import write_curves
 from ..scene.groom_attributes import group_names, store_group_names
 from ..scene.hair_material import put_look_material
+from ..scene.masks import Canvas
 from ..scene.source import Source, read_source
 
 #: what of the scene moves hair, as properties of an object's group
@@ -52,12 +56,13 @@ class MadeReal(NamedTuple):
 
 
 class _Drawn(NamedTuple):
-    """What is drawn of hair, as arrays alone."""
+    """What is drawn of hair, as arrays alone. masks: of its motion."""
 
     source: Source
     settings: GroomSettings
     rig: Rig
     strands: StrandSet
+    masks: Masks
 
 
 def make_real(
@@ -82,12 +87,14 @@ def make_real(
 def _drawn(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Parts[_Drawn]:
     name, settings = hair.name, GroomSettings.of(hair)
     source = read_source(hair, depsgraph)
+    canvas = Canvas(hair, head_of(hair), source.head, source.strands, source.kept)
+    masks, _ = canvas.masks(settings[DynamicsSettings], depsgraph)
     rig = yield Part(
         "Making strands",
         lambda: rig_from(source, settings.sections, place=name),
     )
     strands = yield Part("Colouring strands", lambda: _coloured(rig, source, settings))
-    return _Drawn(source, settings, rig, strands)
+    return _Drawn(source, settings, rig, strands, masks)
 
 
 def _coloured(rig: Rig, source: Source, settings: GroomSettings) -> StrandSet:
@@ -112,10 +119,11 @@ def _coloured(rig: Rig, source: Source, settings: GroomSettings) -> StrandSet:
 
 
 def _written(hair: bpy.types.Object, drawn: _Drawn) -> MadeReal:
-    source, settings, rig, strands = drawn
+    source, settings, rig, strands, masks = drawn
     real = write_curves(f"{hair.name} Real", strands, head_of(hair), hair.users_collection[0])
     store_group_names(real.data, group_names(hair))
     _keep_settings(real, hair, settings)
+    _keep_masks(real.data, rig, masks, settings[DynamicsSettings])
     _, notes = put_look_material(real.data, real_look(settings[ShadingSettings]), are_final=True)
     _hide(hair)
     result = f"Made {strands.strand_count:,} strands real: {real.name}. {hair.name} is hidden"
@@ -151,6 +159,18 @@ def _keep_settings(real: bpy.types.Object, hair: bpy.types.Object, settings: Gro
         apply(own[ALL_SETTINGS[name]], real)
     for name in _POINTERS:
         setattr(real.hairloom, name, getattr(hair.hairloom, name))
+
+
+def _keep_masks(
+    curves: bpy.types.Curves, rig: Rig, masks: Masks, dynamics: DynamicsSettings
+) -> None:
+    """What is painted on the curves that these are made from; on their surface it is there."""
+    for of, name in mask_names(dynamics).items():
+        mask = masks.masks.get(of)
+        if isinstance(mask, StrandMask) and name not in curves.attributes:
+            values = painted_strands(rig, mask)
+            is_along = mask.grid.shape[1] > 1
+            set_attribute(curves, name, "POINT" if is_along else "CURVE", values)
 
 
 def _hide(hair: bpy.types.Object) -> None:
