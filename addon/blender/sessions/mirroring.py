@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import bpy
 import numpy as np
 
@@ -12,13 +14,14 @@ from ...groom.mirror_settings import MirrorSettings
 from ...refine.lead_out_at_rest import led_out_at_rest
 from ...strands import Surface
 from ...strands.affine import moved
+from ...strands.nearest import nearest_points
 from ..base.attributes import copy_elements, read_attribute, set_attribute
 from ..base.objects import head_of, matrix_of
 from ..base.outcome import Outcome
 from ..base.parts import Part, Parts
 from ..colliders.fields import solid_of
 from ..scene.curves import curve_offsets, curve_points, put_points, read_own_curves
-from ..scene.groom_attributes import CLOSEST_GUIDES, STRAND_ID
+from ..scene.groom_attributes import CLOSEST_GUIDES, GUIDE, STRAND_ID
 from ..scene.kept_shape import KEPT_SHAPES
 from .combing import surface_to_comb_on
 
@@ -109,6 +112,7 @@ def _replace(
     count = len(curves.curves)
     stays = np.ones(count, bool)
     stays[replaced] = False
+    gone = _Gone.of(curves, replaced)
     if len(replaced):
         curves.remove_curves(indices=replaced.tolist())
     source = (np.cumsum(stays) - 1)[source]
@@ -134,8 +138,8 @@ def _replace(
         uv = np.zeros((len(curves.curves), 2), np.float32) if uv is None else uv
         uv[new_curves] = made.strands.root_uv
         set_attribute(curves, "surface_uv_coordinate", "CURVE", uv)
-    _name_again(curves, source, new_curves)
     put_points(curves, points)
+    _name_again(curves, source, new_curves, gone)
 
 
 def _inside(counts: Ints) -> Ints:
@@ -143,24 +147,51 @@ def _inside(counts: Ints) -> Ints:
     return number_in_piece(counts)
 
 
-def _name_again(curves: bpy.types.Curves, source: Ints, new: Ints) -> None:
-    """IDs of their own for mirrored curves, and mirrored guides as their closest ones."""
+@dataclass(frozen=True)
+class _Gone:
+    """Curves that mirrored ones replace. id: (n,), root: (n, 3) object space [m]."""
+
+    id: Ints
+    root: Floats
+
+    @classmethod
+    def of(cls, curves: bpy.types.Curves, replaced: Ints) -> _Gone:
+        ids = read_attribute(curves, STRAND_ID, "CURVE")
+        ids = np.zeros(len(curves.curves), np.int32) if ids is None else ids
+        return cls(ids[replaced], curve_points(curves)[curve_offsets(curves)[replaced]])
+
+
+def _name_again(curves: bpy.types.Curves, source: Ints, new: Ints, gone: _Gone) -> None:
+    """IDs of their own for mirrored curves, and mirrored guides as their closest ones; a guide that
+    is gone is named by the mirrored one whose root is nearest."""
     ids = read_attribute(curves, STRAND_ID, "CURVE")
     if ids is None:
         return
-    known = ids[source]
-    ids[new] = ids[: new[0]].max() + 1 + np.arange(len(new))
-    order = np.argsort(known, kind="stable")
+    known, there = ids[source], np.arange(new[0])
+    ids[new] = ids[there].max() + 1 + np.arange(len(new))
+    is_guide = read_attribute(curves, GUIDE, "CURVE")
+    guides = np.arange(len(new)) if is_guide is None else np.flatnonzero(is_guide[new])
+    guides = guides if len(guides) else np.arange(len(new))
+    is_gone = ~np.isin(gone.id, ids[there])
+    roots = curve_points(curves)[curve_offsets(curves)[new[guides]]]
+    instead = guides[nearest_points(gone.root[is_gone], roots, 1)[0][:, 0]]
+    before = np.concatenate([known, gone.id[is_gone]])
+    mirrored_ones = np.concatenate([ids[new], known[instead]])
     for name in CLOSEST_GUIDES:
         closest = read_attribute(curves, name, "CURVE")
         if closest is not None:
-            closest[new] = _renamed(closest[new], known[order], ids[new][order])
+            closest[there] = _renamed(closest[there], gone.id[is_gone], ids[new[instead]])
+            closest[new] = _renamed(closest[new], before, mirrored_ones)
             set_attribute(curves, name, "CURVE", closest)
     set_attribute(curves, STRAND_ID, "CURVE", ids)
 
 
 def _renamed(values: Ints, known: Ints, other: Ints) -> Ints:
-    """Values that are among the known ones, ascending, replaced by their others."""
+    """Values that are among the known ones replaced by their others."""
+    if not len(known):
+        return values
+    order = np.argsort(known, kind="stable")
+    known, other = known[order], other[order]
     place = np.minimum(np.searchsorted(known, values), len(known) - 1)
     is_known: Bools = known[place] == values
     return np.where(is_known, other[place], values)
