@@ -184,7 +184,7 @@ def _grown(
     density = read_map(head, depsgraph, density_group) if density_group else None
     length = read_map(head, depsgraph, length_group) if length_group else None
     radius: Floats | None = None
-    offsets = np.zeros(1, np.int32)
+    offsets: Ints = np.zeros(1, np.int32)
     if before is not None:
         radius, offsets = _radius_in_world(before, depsgraph), curve_offsets(before.data)
 
