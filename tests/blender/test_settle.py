@@ -250,7 +250,7 @@ def test_linked_duplicates_share_settled_curves_and_carry_their_weight_alike(new
     assert {each: each.hairloom.dynamics.sag_compensation for each in sags} == sags
 
 
-@pytest.mark.parametrize("domain", ["surface", "curves"])
+@pytest.mark.parametrize("domain", ["surface", "curves", "control points"])
 def test_hair_falls_as_painted_where_a_modifier_adds_curves(domain, new_hair, sphere):
     """Those that fall are from before it; a selection that does not act changes nothing."""
     hair = new_hair(sphere, lying())
@@ -261,6 +261,8 @@ def test_hair_falls_as_painted_where_a_modifier_adds_curves(domain, new_hair, sp
         few = hair.data.attributes.new("Few", "FLOAT", "CURVE")
         few.data.foreach_set("value", [0.0, 0.0, 1.0, 1.0, 1.0])
         moving = [2, 3, 4]
+    if domain == "control points":
+        hair.data.set_types(type="NURBS")
     set_attribute(hair.data, ".selection", "CURVE", np.ones(5, bool))
     hair.hairloom.dynamics.gravity_mask = "Few"
     add_hair_nodes(hair, "Duplicate Hair Curves", {"Amount": 3}, 1.0)

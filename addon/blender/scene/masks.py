@@ -214,7 +214,8 @@ class Canvas:
             return None
         values, domain = found
         values = usable(values, name, self.hair.name)
-        drawn, strands = curves_as_drawn(curves), self.strands
+        strands = self.strands
+        drawn = None if self.is_own else curves_as_drawn(curves)
         offsets = curve_offsets(curves) if drawn is None else drawn.offsets
         if drawn is not None and domain == "POINT":
             values = drawn.of(values)
