@@ -29,10 +29,10 @@ pytest.importorskip("bpy", reason="writing cards needs Blender or the bpy module
 from engine_assets import OUTPUT, Asset, written_asset
 from hlsl_on_gpu import probed, probed_hlsl
 
-from hairloom.addon.blender.cards.textures import texture_roles
+from hairloom.addon.blender.cards.textures import texture_channels, texture_roles
 from hairloom.addon.cards.export_settings import CardExportSettings
 from hairloom.addon.exchange.textures.card_textures import WrittenTexture
-from hairloom.addon.exchange.textures.texture_packing import PRESETS, packed
+from hairloom.addon.exchange.textures.texture_packing import MEANINGS, PRESETS, packed
 
 HERE = Path(__file__).parent / "unreal"
 FOLDER = REPOSITORY / "docs" / "engines" / "unreal"
@@ -115,6 +115,27 @@ def test_directions_are_read_from_the_channels_that_hold_them(
         found = (found.r, found.g, found.b) if found is texel else found
         z = 0.5 if len(entry["tangent"]["channels"]) == 2 else tangent[2]
         np.testing.assert_allclose(found, [*tangent[:2], z], atol=1e-6)
+
+
+@pytest.mark.parametrize("packing", PRESETS)
+def test_each_picture_has_the_colour_space_of_its_file(importer: ModuleType, packing: str) -> None:
+    """Though a file of colours may hold alpha as well, which is linear."""
+    shapes = {"base": (1, 1, 3), "color": (1, 1, 3), "tangent": (1, 1, 3)}
+    maps = {name: np.ones(shapes.get(name, (1, 1)), np.float32) for name in MEANINGS}
+    maps["normal"] = maps["tangent"]
+    written = [
+        WrittenTexture(Path(f"cards{texture.suffix}.png"), texture.layout)
+        for texture in packed(maps, packing)
+    ]
+    files, roles = texture_channels(written), texture_roles(written, maps)
+    for role, entry in roles.items():
+        entry.setdefault("color_space", "sRGB" if role in ("base", "color") else "linear")
+    assert {each["color_space"] for each in files.values()} == {"sRGB", "linear"}
+    for file, each in files.items():
+        found = sys.modules["hairloom_plan"]._picture(
+            Path("cards.fbx"), file, {"texture_files": files}, roles
+        )
+        assert found.is_color == (each["color_space"] == "sRGB"), file
 
 
 def test_all_of_an_export_comes_into_the_project(

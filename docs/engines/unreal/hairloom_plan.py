@@ -223,8 +223,7 @@ def _is_texture(entry: Any) -> bool:
 
 def _picture(mesh: Path, file: str, sidecar: dict[str, Any], roles: dict[str, Any]) -> Picture:
     own = [role for role, entry in roles.items() if entry["file"] == file]
-    entries = [roles[role] for role in own] or [sidecar["texture_files"][file]]
-    is_color = entries[0]["color_space"] == "sRGB"
+    is_color = sidecar["texture_files"][file]["color_space"] == "sRGB"  # alpha beside it is linear
     is_direction = any(role in DIRECTIONS for role in own)
     if is_color:
         how = ("TC_DEFAULT", "SAMPLERTYPE_COLOR")
