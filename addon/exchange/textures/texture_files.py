@@ -36,6 +36,8 @@ DEPTHS = {
 
 #: The chunk IEND with its checksum.
 _END_OF_PNG = b"\0\0\0\0IEND\xaeB`\x82"
+#: In EXR and TIFF files, which otherwise have the time: the same pixels are the same bytes.
+_NO_DATE = "1970:01:01 00:00:00"
 #: In EXR files, whose alpha is multiplied otherwise: this one's is not.
 _STRAIGHT = "hairloom_straight_alpha"
 
@@ -132,6 +134,8 @@ def write_texture(
         spec.attribute("oiio:UnassociatedAlpha", int(not is_multiplied))
         spec.attribute(_STRAIGHT, int(not is_multiplied))
     spec.attribute("oiio:ColorSpace", _space(is_color=is_color, depth=depth))
+    if path.suffix.lower() != ".png":
+        spec.attribute("DateTime", _NO_DATE)
     if compression is not None:
         spec.attribute("compression", compression)
     with atomic_write(path) as temporary:

@@ -225,3 +225,12 @@ def test_without_openimageio_there_is_a_plain_message(
         with pytest.raises(HairloomError, match=r"OpenImageIO.*missing.*install"):
             call()
     assert not texture_files.has_openimageio()
+
+
+@pytest.mark.parametrize(("suffix", "depth"), FORMATS)
+def test_a_file_has_no_time(suffix: str, depth: str, tmp_path: Path) -> None:
+    """So that the same pixels are the same bytes whenever they are written."""
+    path = tmp_path / f"texture{suffix}"
+    write_texture(path, random_picture(3), is_color=False, depth=depth)
+    date = oiio.ImageInput.open(str(path)).spec().get_string_attribute("DateTime")
+    assert date == ("" if suffix == ".png" else "1970:01:01 00:00:00")
