@@ -123,4 +123,5 @@ def test_our_module_hands_springs_to_three_vrm(
     found = json.loads((site / "joints.json").read_text(encoding="utf-8"))
     assert found["said"] == []
     assert found["isWhole"]  # a copy is bound to joints of its own
+    assert not found["hasSprings"]  # which those of the original do not move
     check(told, found["frames"])

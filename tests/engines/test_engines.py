@@ -171,6 +171,7 @@ def test_three_js_draws_cards_as_we_do(asset: Asset, sandbox: str) -> None:
     shown = json.loads((site / "levels.json").read_text(encoding="utf-8"))
     sidecar = json.loads((asset.folder / "cards.hairloom.json").read_text(encoding="utf-8"))
     assert shown.pop("begins") == pytest.approx([begin for begin, _ in ranges_of(asset)], rel=1e-5)
+    assert shown.pop("shared") is True  # passes have the vertices in common
     assert shown == {"plain": ["cards_LOD0"], "second": sidecar["levels"][1]["triangles"]}
 
 
@@ -238,6 +239,33 @@ def test_three_js_fades_levels_pixel_by_pixel(baked: Asset, sandbox: str) -> Non
     result = subprocess.run(command, capture_output=True, text=True, timeout=300)
     assert result.returncode == 0, result.stderr
     check_fade(site, "both", "copy", "scaled")
+
+
+def test_three_js_draws_hair_in_scenes_of_many_kinds(baked: Asset, sandbox: str) -> None:
+    """A mirror that draws the hair from far away changes no pixel of it; a logarithmic depth buffer
+    hides none; clipping planes cut it."""
+    if not THREE.is_dir():
+        pytest.skip("three.js is missing: `make setup` installs it")
+    site = baked.folder / "web_scene"
+    shutil.copytree(HERE / "three_scene", site)
+    shutil.copytree(ENGINES / "three", site / "hairloom")
+    shutil.copytree(THREE, site / "three")
+    fading(baked, site / "asset")
+    shutil.copy2(REPOSITORY / "tools" / "draw_page.py", site)
+    command = [sandbox, "run", "python3", str(site / "draw_page.py")]
+    result = subprocess.run(command, capture_output=True, text=True, timeout=300)
+    assert result.returncode == 0, result.stderr
+    plain, mirror, logarithmic, clipped, bare = (
+        read_texture(site / f"{name}.png", is_color=False)[..., :3]
+        for name in ("plain", "mirror", "logarithmic", "clipped", "bare")
+    )
+    assert json.loads((site / "mirrors.json").read_text(encoding="utf-8"))["mirrors"] == 1
+    assert (np.abs(plain - bare).max(axis=-1) > 0.1).mean() > 0.1, "there is hair in it"
+    np.testing.assert_array_equal(mirror, plain)
+    # cards that touch are told apart by other bits of depth
+    assert (np.abs(logarithmic - plain).max(axis=-1) > 8.0 / 255.0).mean() < 0.002
+    np.testing.assert_array_equal(clipped[..., 0], bare[..., 0])  # the ball is blue alone
+    assert clipped[..., 2].max() == 0.0, "the planes cut all meshes"
 
 
 def test_three_js_shows_what_can_be_shown_and_says_what_is_wrong(

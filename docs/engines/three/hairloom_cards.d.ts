@@ -24,7 +24,7 @@ export class HairLevels extends LOD {
 
 /**
  * Hair of a GLB with its sidecar and textures. Without a sidecar that fits it is the scene of the file, in its plain
- * material. Throws where the GLB itself cannot be read.
+ * material. Throws where the GLB itself cannot be read. In an address, signs of a name such as # and % are escaped.
  */
 export function loadHairloomCards(
   url: string | URL,

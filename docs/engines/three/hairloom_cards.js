@@ -45,12 +45,12 @@ export class HairLevels extends THREE.LOD {
   addLevel(object, distance, hysteresis) {
     super.addLevel(object, distance, hysteresis);
     const level = this.levels.find((each) => each.object === object);
-    level.part = [0, 1]; // of the pixels, see hair_level_has
+    level.parts = new WeakMap(); // camera -> part of the pixels, see hair_level_has
     object.children.forEach((mesh) => {
-      // copies of a hair share their materials
+      // copies of a hair share their materials, and a mirror draws in the middle of another camera's picture
       mesh.onBeforeRender = (renderer, scene, camera, geometry, material) => {
         if (!material.uniforms?.part) return;
-        material.uniforms.part.value.fromArray(this.autoUpdate ? level.part : [0, 1]);
+        material.uniforms.part.value.fromArray((this.autoUpdate && level.parts.get(camera)) || [0, 1]);
         material.uniformsNeedUpdate = true;
       };
     });
@@ -64,11 +64,12 @@ export class HairLevels extends THREE.LOD {
     let share = 1; // how far this level has taken over from those before it
     this.levels.forEach((level, number) => {
       const next = this.levels[number + 1];
-      level.part = [next ? Math.min(share, this.shareOf(next, distance)) : 0, share];
-      if (level.part[0] < 0.5 && share >= 0.5) this._currentLevel = number;
-      [share] = level.part;
+      const part = [next ? Math.min(share, this.shareOf(next, distance)) : 0, share];
+      if (part[0] < 0.5 && share >= 0.5) this._currentLevel = number;
+      for (const each of [camera, ...(camera.cameras ?? [])]) level.parts.set(each, part); // the eyes of a headset
+      level.object.visible = part[0] < part[1];
+      [share] = part;
     });
-    this.levels.forEach(({ object, part: [low, high] }) => { object.visible = low < high; });
   }
 
   shareOf({ distance: begin, hysteresis, object }, distance) {
@@ -86,9 +87,7 @@ export async function loadHairloomCards(
   url,
   { level, fieldOfView = 50, crossFade = 0.1, addressOf, plugins = [], warn = console.warn } = {},
 ) {
-  const name = addressOf
-    ? url.toString().split('/').pop()
-    : decodeURIComponent(addressBeside(url).pathname.split('/').pop());
+  const name = nameOf(url);
   addressOf ??= (file) => {
     const address = new URL(encodeURIComponent(file), addressBeside(url));
     address.search = addressBeside(url).search;
@@ -133,7 +132,11 @@ export async function loadHairloomCards(
     hair.attach(carrierOf(root)); // all levels are bound to its joints
     hair.animations = gltf.animations;
   }
-  Object.assign(hair.userData, gltf.userData);
+  for (const [key, value] of Object.entries(gltf.userData)) {
+    // three.js copies userData as JSON, and what a plug-in has made, such as springs, is no such data
+    const enumerable = Object.hasOwn(gltf.parser.json.extras ?? {}, key);
+    Object.defineProperty(hair.userData, key, { value, enumerable, writable: true, configurable: true });
+  }
   return hair;
 }
 
@@ -157,6 +160,11 @@ function carrierOf(joint) {
 
 function addressBeside(url) {
   return new URL(url, document.baseURI);
+}
+
+// Of the file at an address. Any base does: a page may have none that is one, such as a blob.
+function nameOf(url) {
+  return decodeURIComponent(new URL(url, 'file:').pathname.split('/').pop());
 }
 
 // The sidecar of a GLB; null, with a sentence, where the file has to be shown without.
@@ -238,7 +246,7 @@ function boundsOf({ bounds: { minimum, maximum } }) {
 function passesOf(node, sidecar, backIndex, uniforms) {
   return sidecar.passes.map((pass, number) => {
     const isBack = backIndex && pass.cull === 'front';
-    const geometry = isBack ? node.geometry.clone().setIndex(backIndex) : node.geometry;
+    const geometry = isBack ? reordered(node.geometry, backIndex) : node.geometry;
     const material = materialOf(pass, sidecar, uniforms);
     const mesh = node.isSkinnedMesh
       ? new THREE.SkinnedMesh(geometry, material)
@@ -253,6 +261,13 @@ function passesOf(node, sidecar, backIndex, uniforms) {
     mesh.renderOrder = 1 + number; // after all opaque meshes, including the head
     return mesh;
   });
+}
+
+// The same vertices, which the GPU has once, in triangles of another order.
+function reordered(geometry, index) {
+  const made = new THREE.BufferGeometry().setIndex(index);
+  Object.entries(geometry.attributes).forEach(([name, values]) => made.setAttribute(name, values));
+  return made;
 }
 
 // All indices of the index buffer; null if back faces have no order of their own.
@@ -282,6 +297,7 @@ function materialOf(pass, sidecar, uniforms) {
     glslVersion: THREE.GLSL3,
     lights: true,
     fog: true,
+    clipping: true,
     uniforms: {
       ...THREE.UniformsUtils.clone(THREE.UniformsLib.lights),
       ...THREE.UniformsUtils.clone(THREE.UniformsLib.fog),
@@ -407,8 +423,11 @@ async function tableOf(file) {
 }
 
 const VERTEX = /* glsl */ `
+#include <common>
 #include <fog_pars_vertex>
 #include <skinning_pars_vertex>
+#include <logdepthbuf_pars_vertex>
+#include <clipping_planes_pars_vertex>
 in vec2 uv1;
 in vec4 tangent;
 out vec2 card_uv;
@@ -433,20 +452,22 @@ void main() {
   objectTangent = turned * objectTangent;
 #include <skinning_vertex>
 #endif
-  vec4 place = modelViewMatrix * vec4(transformed, 1.0);
-  card_point = place.xyz;
+  vec4 mvPosition = modelViewMatrix * vec4(transformed, 1.0);
+  card_point = mvPosition.xyz;
   card_normal = normalMatrix * objectNormal;
   card_tangent = mat3(modelViewMatrix) * objectTangent;
-  gl_Position = projectionMatrix * place;
-#ifdef USE_FOG
-  vFogDepth = -place.z;
-#endif
+  gl_Position = projectionMatrix * mvPosition;
+#include <fog_vertex>
+#include <logdepthbuf_vertex>
+#include <clipping_planes_vertex>
 }`;
 
 const FRAGMENT = /* glsl */ `
 #include <common>
 #include <lights_pars_begin>
 #include <fog_pars_fragment>
+#include <logdepthbuf_pars_fragment>
+#include <clipping_planes_pars_fragment>
 #define gl_FragColor color // what three.js mixes fog into
 #include <hair_shading>
 
@@ -502,6 +523,8 @@ HairPlace place() {
 }
 
 void main() {
+#include <clipping_planes_fragment>
+#include <logdepthbuf_fragment>
   if (!hair_level_has(gl_FragCoord.xy, part)) discard;
   float alpha = dot(texture(alpha_texture, card_uv), alpha_mask);
 #if VIEW_COMPENSATED_ALPHA && !IS_PRIME

@@ -44,7 +44,7 @@ async function show() {
   renderer.shadowMap.type = THREE.PCFShadowMap;
   renderer.shadowMap.autoUpdate = false;
   const scene = new THREE.Scene();
-  const hair = await loadHairloomCards(asset.mesh, {
+  const hair = await loadHairloomCards(encodeURIComponent(asset.mesh), {
     fieldOfView: FIELD_OF_VIEW,
     addressOf: (name) => addresses.get(name),
   });
