@@ -15,6 +15,7 @@ import pytest
 from glb_files import Glb, validated
 from glb_player import Player
 from shaken import MadeMotion, shaken_poses
+from test_card_page import asset_of
 from tiers import few_in_commits
 
 bpy = pytest.importorskip("bpy", reason="writing cards needs Blender or the bpy module")
@@ -70,6 +71,25 @@ def motion() -> GuideMotion:
 def write(path: Path, motion: GuideMotion, kind: str, **more: Any) -> WrittenCards:
     output = CardOutput(settings=CardExportSettings(motion=kind, **more))
     return write_cards(path, CardInputs(motion.rig, SETTINGS), output, motion=motion)
+
+
+def test_the_first_view_of_a_page_holds_all_places_that_hair_is_carried_to(
+    motion: GuideMotion, tmp_path: Path
+) -> None:
+    low, high = {}, {}
+    for space in ("head", "world"):
+        path = tmp_path / space / "hair.glb"
+        path.parent.mkdir()
+        write(path, motion, kind="joints", motion_space=space, page=True, page_texture="512")
+        corners = np.array(asset_of(path.with_suffix(".html"))["corners"])
+        low[space], high[space] = corners.min(axis=0), corners.max(axis=0)
+    roots = np.concatenate([motion.at(frame)[1][:, 0] for frame in motion.frames])
+    way = np.ptp(GLB.placed(roots), axis=0) - np.ptp(GLB.placed(motion.at(0)[1][:, 0]), axis=0)
+    assert way.max() > 0.02, "the head moves [m]"
+    wider = (high["world"] - low["world"]) - (high["head"] - low["head"])
+    assert (wider > 0.9 * way).all()
+    assert (low["world"] < GLB.placed(roots).min(axis=0) + 0.005).all()
+    assert (high["world"] > GLB.placed(roots).max(axis=0) - 0.005).all()
 
 
 def simulated(motion: GuideMotion, written: WrittenCards, frame: int) -> list[np.ndarray]:

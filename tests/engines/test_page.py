@@ -19,6 +19,7 @@ from engine_assets import (
     FIELD_OF_VIEW,
     IRRADIANCE,
     NEAR,
+    OUTPUT,
     SIZE,
     TARGET,
     TO_SUN,
@@ -27,7 +28,9 @@ from engine_assets import (
     read_encoded,
     written_asset,
 )
+from test_card_motion import motion, write  # noqa: F401
 
+from hairloom.addon.blender.bakes.guide_motion import GuideMotion
 from hairloom.addon.cards.export_settings import CardExportSettings
 from hairloom.addon.exchange.textures.texture_files import read_texture
 
@@ -176,3 +179,45 @@ def test_motion_plays_unless_less_of_it_is_wanted(asset: Asset, sandbox: str) ->
     still = driven(sandbox, asset, "still", STILL, *steps, begin, *[frame] * 10, end)
     assert moving["values"][2] == "true"
     assert still["values"][3] == "false" and still["values"][4] == still["values"][-1]
+
+
+#: the median way of the roots of the hair since the page has opened, as the head sees it and as the
+#: world does [m]
+WAY_OF_ROOTS = """(() => {
+  const { hair, scene } = hairloom;
+  const [mesh] = hair.levels[0].object.children;
+  const { position, uv1 } = mesh.geometry.attributes;
+  let head;
+  scene.traverse((each) => { if (Array.isArray(each.material)) head = each; });
+  scene.updateMatrixWorld(true);
+  const places = [];
+  for (let number = 0; number < position.count; number++) {
+    if (uv1.getY(number) > 0.01) continue;
+    const world = mesh.getVertexPosition(number, hair.center.clone());
+    mesh.localToWorld(world);
+    places.push([head.worldToLocal(world.clone()), world]);
+  }
+  globalThis.atFirst ??= places;
+  const way = (which) => places.map((each, at) => each[which].distanceTo(atFirst[at][which]));
+  const median = (which) => way(which).sort((one, two) => one - two)[places.length >> 1];
+  return [median(0), median(1)];
+})()"""
+
+
+def test_the_head_moves_with_hair_that_has_its_motion(
+    motion: GuideMotion,  # noqa: F811
+    sandbox: str,
+) -> None:
+    folder = OUTPUT / "page_in_world"
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
+    more = {"motion_space": "world", "page": True, "page_texture": "512"}
+    write(folder / "cards.glb", motion, kind="joints", **more)
+    asset = Asset(folder, np.empty(0))
+    steps: list[dict[str, Any]] = [STILL, {"screen": [300, 300, 1]}, {"open": True}]
+    steps += [{"evaluate": WAY_OF_ROOTS}, chosen("#play")]
+    steps += [{"wait": f"(globalThis.seen = {WAY_OF_ROOTS})[1] > 0.02"}, {"evaluate": "seen"}]
+    report = driven(sandbox, asset, "moving", *steps)
+    assert report["complaints"] == []
+    to_head, in_world = report["values"][-1]
+    assert in_world > 0.02 and to_head < 0.1 * in_world

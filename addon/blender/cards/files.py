@@ -387,7 +387,10 @@ class _Writer:
                 head = None
                 if self.head is not None and settings.page_head:
                     head = PageHead.of(path, self.head, self.output.head_look, self.file_format)
-                write_page(path, self._name, sidecar, self.made, shading, backs, head, settings)
+                carrier = skeleton.carrier if isinstance(skeleton, JointMotion) else np.eye(4)[None]
+                write_page(
+                    path, self._name, sidecar, self.made, shading, backs, head, settings, carrier
+                )
             if self.motion.get("kind") in ("texture", "springs"):
                 notes += (PAGE_AT_REST,)
         path.with_name(path.stem + SUFFIX).write_text(sidecar_text(sidecar), encoding="utf-8")

@@ -145,6 +145,13 @@ class JointMotion:
     settings: CardExportSettings
 
     @property
+    def carrier(self) -> Floats:
+        """(frame_count, 4, 4): where the root joint takes what lies on it at rest, world space."""
+        if self.settings.motion_space == "world":
+            return self.tracks.carrier
+        return np.eye(4)[None]
+
+    @property
     def relative_error(self) -> float:
         """The error as a fraction of the hair's length."""
         return self.error.mean_square_root / self.tracks.hair_length

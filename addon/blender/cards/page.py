@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+
+import numpy as np
 
 from ...arrays import Floats, Ints
 from ...cards.export_settings import CardExportSettings
@@ -58,6 +61,7 @@ def write_page(
     backs: Sequence[Ints],
     head: PageHead | None,
     settings: CardExportSettings,
+    carrier: Floats,
 ) -> None:
     """Write NAME.html beside the files of an export, all of which are there but the sidecar.
 
@@ -66,6 +70,7 @@ def write_page(
         name: of the hair.
         sidecar: of the GLB; the page holds one for its own, smaller files.
         backs: of each level, see `index_buffer`.
+        carrier: (frame_count, 4, 4): where the motion takes hair and head as a whole, world space.
     """
     maps = small_maps(_shown(made.maps), made.build.finest.atlas, int(settings.page_texture))
     files = {
@@ -105,7 +110,7 @@ def write_page(
         files,
         levels,
         [] if head is None else head.parts,
-        _corners(sidecar),
+        _corners(sidecar, carrier),
         [
             {"title": _TITLES[role], "file": f"{role}.png", "meaning": ROLES[role][1]}
             for role in maps
@@ -125,7 +130,11 @@ def _channels(values: Floats) -> str:
     return "rgb" if values.ndim == 3 else "r"
 
 
-def _corners(sidecar: CardFile) -> list[list[float]]:
-    """Of the hair's bounds."""
-    points = sidecar.format.placed(sidecar.levels[0].positions)
+def _corners(sidecar: CardFile, carrier: Floats) -> list[list[float]]:
+    """Of the bounds of the hair at rest, in all places to which it is carried."""
+    rest = sidecar.levels[0].positions
+    extent = zip(rest.min(axis=0), rest.max(axis=0), strict=True)
+    corners = np.array(list(itertools.product(*extent)))
+    carried = np.einsum("fab,cb->fca", carrier[:, :3, :3], corners) + carrier[:, None, :3, 3]
+    points = sidecar.format.placed(carried.reshape(-1, 3))
     return [points.min(axis=0).tolist(), points.max(axis=0).tolist()]

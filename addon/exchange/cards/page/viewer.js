@@ -50,7 +50,7 @@ async function show() {
   });
   scene.add(hair);
   const head = await headOf(addresses);
-  if (head) scene.add(head);
+  if (head) (hair.getObjectByName('hair_root') ?? scene).attach(head); // so that it moves with the hair
 
   const camera = new THREE.PerspectiveCamera(FIELD_OF_VIEW, 1, 1, 2);
   const controls = new OrbitControls(camera, renderer.domElement);
