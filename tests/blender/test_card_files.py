@@ -500,3 +500,18 @@ def test_a_sidecar_says_how_colours_are_stored(suffix: str, space: str) -> None:
     assert [each["color_space"] for each in texture_channels(written).values()] == [space, "linear"]
     named = texture_roles(written, ["color", "alpha"])
     assert named["color"].get("color_space", "sRGB") == space
+
+
+def test_a_glb_changes_with_its_look_and_with_nothing_else(tmp_path: Path) -> None:
+    """Engines look at its bytes to see whether there is anything to import again."""
+    looks = {"one": "1", "two": "1", "three": "3"}
+    written = {}
+    for folder, strength in looks.items():
+        (tmp_path / folder).mkdir()
+        path = tmp_path / folder / "hair.glb"
+        assert cards(path, "--levels", "1", "--set", f"shading.strength_r={strength}") == 0
+        written[folder] = {each.name: each.read_bytes() for each in path.parent.iterdir()}
+    assert written["one"] == written["two"] and "hair_paths.exr" in written["one"]
+    changed = {name for name, data in written["one"].items() if data != written["three"].get(name)}
+    assert changed == {"hair.glb", "hair.hairloom.json"}
+    validated(tmp_path / "three" / "hair.glb")

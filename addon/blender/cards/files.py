@@ -3,6 +3,7 @@ the cards are drawn and what the hair's look is made of."""
 
 from __future__ import annotations
 
+import hashlib
 import os
 from collections.abc import Generator, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -382,6 +383,8 @@ class _Writer:
             page=path.stem + PAGE_SUFFIX if settings.page else "",
             generator=hairloom_version(),
         )
+        content = sidecar_text(sidecar)
+        self._complete_with_digest(content)
         if settings.page:
             with self.stage("write page"):
                 head = None
@@ -393,8 +396,22 @@ class _Writer:
                 )
             if self.motion.get("kind") in ("texture", "springs"):
                 notes += (PAGE_AT_REST,)
-        path.with_name(path.stem + SUFFIX).write_text(sidecar_text(sidecar), encoding="utf-8")
+        path.with_name(path.stem + SUFFIX).write_text(content, encoding="utf-8")
         return notes
+
+    def _complete_with_digest(self, sidecar: str) -> None:
+        """Give a GLB the digest of what lies beside it: engines that import a file again only where
+        its bytes have changed, as Godot does, then see another look.
+        """
+        if self.file_format != GLB:
+            return
+        digest = hashlib.sha256(sidecar.encode())
+        for path in sorted(self.path.parent.iterdir()):
+            if path != self.path:
+                digest.update(path.read_bytes())
+        file = GlbFile.of(self.path.read_bytes(), str(self.path))
+        file.content["asset"].setdefault("extras", {})["hairloom_files"] = digest.hexdigest()
+        self.path.write_bytes(file.data())
 
     def _complete(self, levels: Sequence[CardMesh], nodes: Sequence[str]) -> tuple[str, ...]:
         """What Blender's exporters do not write: which level is shown, and maps of a GLB."""
