@@ -22,6 +22,7 @@ from typing import Any
 import bpy
 import numpy as np
 from _cards_strands import _differences, _shown
+from _report import chosen
 from _sight_grooms import GROOMS, rig_of
 from extension_loader import REPOSITORY
 
@@ -52,6 +53,7 @@ from hairloom.addon.shading.volume.settings import VolumeSettings
 
 OUTPUT = REPOSITORY / "out" / "bench_engines"
 HAIR, FURS, STYLES = ("sintel", "ponytail"), ("bear", "mohawk"), ("short_coat", "shaggy_coat")
+GROOMS_OF_ATLAS = (*GROOMS, *STYLES, "few")
 FEW = 20
 SIDES = ((0, -1, 0.2), (1, 0, 0.2), (0, 1, 0.2), (0.3, -0.3, 1))
 SIZE, SAMPLES, FIELD_OF_VIEW = 320, 2, np.radians(30.0)
@@ -61,8 +63,8 @@ SUN, STRENGTH, WORLD = (0.4, 0.6, -0.8), 4.0, (0.3, 0.3, 0.3)
 def atlas_figures(names: list[str]) -> dict[str, Any]:
     """Of these grooms, or of all; and the worst of each figure."""
     found: dict[str, Any] = {}
-    chosen = names or [*HAIR, "mohawk", *STYLES, "few"]
-    for name in chosen:
+    chosen(names, GROOMS_OF_ATLAS)
+    for name in names or [*HAIR, "mohawk", *STYLES, "few"]:
         inputs = _inputs(name)
         made = result_of(build_steps(inputs))
         figures = _of_atlas(name, inputs, made)

@@ -29,6 +29,7 @@ import bpy
 import flip_evaluator
 import numpy as np
 from _engines_plain import _export_head
+from _report import chosen
 
 import hairloom
 from hairloom.addon.blender.base.images import write_png
@@ -60,15 +61,13 @@ def level_figures(names: list[str]) -> dict[str, Any]:
     """Of these grooms, or of both: the worst of each figure."""
     shutil.rmtree(OUTPUT, ignore_errors=True)
     found: dict[str, Any] = {}
-    for name, write in {"sample": _sample, "sintel": _sintel}.items():
-        if names and name not in names:
-            continue
+    for name in chosen(names, GROOMS_OF_LEVELS):
         site = OUTPUT / name
         shutil.copytree(REPOSITORY / "docs" / "engines" / "three", site / "hairloom")
         bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
         if not hasattr(bpy.types.Scene, "hairloom"):
             hairloom.register()
-        write(site)
+        GROOMS_OF_LEVELS[name](site)
         for key, value in _of(name, site).items():
             print(f"{name}_{key} {value:.4f}", flush=True)
             found[f"levels_{key}"] = max(value, found.get(f"levels_{key}", 0.0))
@@ -91,6 +90,9 @@ def _sintel(site: Path) -> None:
     strands = folder / "SintelHairOriginal-sintel_hair.16points.tfx"
     verb = ["cards", "--groom", str(strands), "--head", str(head)]
     assert command_line.run([*verb, "--output", str(site / "cards.glb")]) == 0
+
+
+GROOMS_OF_LEVELS = {"sample": _sample, "sintel": _sintel}
 
 
 def _of(name: str, site: Path) -> dict[str, float]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import operator
 import platform
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from typing import Any
@@ -27,10 +27,16 @@ def measured(
     parts: Mapping[str, Callable[[], Mapping[str, Any]]], names: Sequence[str]
 ) -> dict[str, Any]:
     """The figures of these parts of a benchmark, or of all where none is named."""
-    unknown = [name for name in names if name not in parts]
+    return {key: value for name in chosen(names, parts) for key, value in parts[name]().items()}
+
+
+def chosen(names: Sequence[str], parts: Iterable[str]) -> list[str]:
+    """These parts of a benchmark, or all where none is named; it ends where one is unknown."""
+    known = list(parts)
+    unknown = [name for name in names if name not in known]
     if unknown:
-        raise SystemExit(f"There is no part {', '.join(unknown)}; there are {', '.join(parts)}.")
-    return {key: value for name in names or parts for key, value in parts[name]().items()}
+        raise SystemExit(f"There is no part {', '.join(unknown)}; there are {', '.join(known)}.")
+    return list(names) or known
 
 
 def report(
@@ -40,7 +46,8 @@ def report(
     at_most: Mapping[str, float] | None = None,
     at_least: Mapping[str, float] | None = None,
 ) -> int:
-    """Print the figures and what is missed; the exit status: 1 if a figure misses its limit.
+    """Print the figures and what is missed; the exit status: 1 if a figure misses its limit, or if
+    there is none.
 
     found: figures by name; None is one that has not been measured. reference: what ratios and
     errors are against. at_most, at_least: limits by name, or by a pattern of names such as
@@ -56,7 +63,7 @@ def report(
         print(f"{name:40} {shown}{told}{', missed' if name in missed else ''}")
     about = {"limits": {name: str(limit) for name, limit in limits.items()}, "missed": missed}
     print(json.dumps({**_rounded(found), "reference": reference, **about, **machine()}), flush=True)
-    return int(bool(missed))
+    return int(bool(missed) or not found)
 
 
 @dataclass(frozen=True)

@@ -12,14 +12,14 @@ from __future__ import annotations
 
 import dataclasses
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 from _cards_groom import sintel_rig
 from _forms import ComputeForm, Form, NumpyForm, has_compute
-from _report import report
+from _report import chosen, report
 from _report import start as start_bench
 from shaken import GRAVITY
 
@@ -318,7 +318,10 @@ def eared_ball() -> tuple[Surface, np.ndarray]:
     return Surface(positions, triangles.astype(np.int32)), core
 
 
-def figures(make: Callable[..., Form], asked: set[str]) -> dict[str, dict[str, float]]:
+HEADS: dict[str, Callable[[], Rig]] = {"sintel": sintel_rig, "built_in": built_in_rig}
+
+
+def figures(make: Callable[..., Form], asked: Sequence[str]) -> dict[str, dict[str, float]]:
     found: dict[str, dict[str, float]] = {}
     settings = DynamicsSettings()
     for name, solid in (
@@ -327,14 +330,14 @@ def figures(make: Callable[..., Form], asked: set[str]) -> dict[str, dict[str, f
         ("finger_mesh", finger_mesh),
         ("ear", ear),
     ):
-        if not asked or "thin" in asked:
+        if "thin" in asked:
             for speed in SPEEDS:
                 found[f"{name}_{speed}"] = swung(solid(settings), make, settings, speed)
                 print(name, speed, found[f"{name}_{speed}"], flush=True)
-    for name, made in (("sintel", sintel_rig), ("built_in", built_in_rig)):
-        if asked and name not in asked:
+    for name in HEADS:
+        if name not in asked:
             continue
-        rig = made()
+        rig = HEADS[name]()
         low, high = rig.head.bounds()
         centre = (low + high) / 2.0
         for kind, motion, seconds in (
@@ -348,10 +351,14 @@ def figures(make: Callable[..., Form], asked: set[str]) -> dict[str, dict[str, f
 
 def main(arguments: list[str]) -> int:
     start_bench()
-    use_compute = "compute" in arguments and has_compute()
-    found = figures(ComputeForm if use_compute else NumpyForm, set(arguments) - {"compute"})
+    use_compute = "compute" in arguments
+    if use_compute and not has_compute():
+        raise SystemExit("There are no compute shaders here.")
+    parts = chosen([each for each in arguments if each != "compute"], ("thin", *HEADS))
+    found = figures(ComputeForm if use_compute else NumpyForm, parts)
     flat = {f"{name}_{key}": value for name, part in found.items() for key, value in part.items()}
-    return report(flat, REFERENCE, at_most=AT_MOST)
+    form = {"form": "compute shaders" if use_compute else "numpy"}
+    return report(form | flat, REFERENCE, at_most=AT_MOST)
 
 
 sys.exit(main(sys.argv[1:]))

@@ -17,13 +17,13 @@ from __future__ import annotations
 import sys
 from typing import Any
 
-from _engines_atlas import atlas_figures
-from _engines_levels import level_figures
+from _engines_atlas import GROOMS_OF_ATLAS, atlas_figures
+from _engines_levels import GROOMS_OF_LEVELS, level_figures
 from _engines_page import page_figures
 from _engines_plain import plain_figures
 from _engines_shells import shell_figures
 from _engines_springs import spring_figures
-from _report import report, start
+from _report import chosen, report, start
 
 REFERENCE = "our own picture of the strands, drawn as they come, under the same suns"
 PARTS = {
@@ -54,9 +54,8 @@ AT_LEAST = {"*opaque_percent": 25.0, "*strand_texels": 1.5}
 
 def main(arguments: list[str]) -> int:
     start()
-    known = (*PARTS, "levels", "atlas")
-    parts = [each for each in arguments if each in known] or known
-    names = [each for each in arguments if each not in known]
+    names = [each for each in arguments if each in {*GROOMS_OF_LEVELS, *GROOMS_OF_ATLAS}]
+    parts = chosen([each for each in arguments if each not in names], (*PARTS, "levels", "atlas"))
     found: dict[str, Any] = {}
     for name, figures in PARTS.items():
         if name in parts:

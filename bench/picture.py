@@ -20,6 +20,7 @@ import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +30,7 @@ import numpy as np
 import OpenImageIO as oiio
 from _picture_environment import environment
 from _picture_soft_shadows import soft_shadows
-from _report import report, start
+from _report import measured, report, start
 
 import hairloom
 from hairloom.addon.blender.base.parts import at_once
@@ -186,18 +187,14 @@ def _cover_flip(scene: Any) -> float:
 
 def main() -> int:
     start()
-    parts = sys.argv[1:] or [*ENGINES, "blur", "environment", "soft_shadows"]
-    found: dict[str, Any] = {}
-    for name in ENGINES:
-        found |= over(name) if name in parts else {}
-    if "blur" in parts:
-        found |= blur()
-    if "environment" in parts:
-        found |= environment()
-    if "soft_shadows" in parts:
-        empty_file()
-        found |= soft_shadows(rendered)
-    return report(found, REFERENCE, at_most=AT_MOST)
+    parts = {name: partial(over, name) for name in ENGINES}
+    parts |= {"blur": blur, "environment": environment, "soft_shadows": _soft_shadows}
+    return report(measured(parts, sys.argv[1:]), REFERENCE, at_most=AT_MOST)
+
+
+def _soft_shadows() -> dict[str, Any]:
+    empty_file()
+    return soft_shadows(rendered)
 
 
 if __name__ == "__main__":

@@ -35,7 +35,7 @@ import numpy as np
 from _combing import combed, styled
 from _growing import edited
 from _jobs import silent
-from _report import report, start
+from _report import measured, report, start
 
 import hairloom
 from hairloom.addon.blender.base.parts import at_once
@@ -65,20 +65,15 @@ LOOKS = "black", "brown", "blond"
 def main(parts: list[str]) -> int:
     start()
     hairloom.register()
-    found: dict[str, float] = {}
-    if "comb" in parts or not parts:
-        found |= combed(styled("long_straight"))
-    if "grow" in parts or not parts:
-        found |= edited()
-    if "jobs" in parts or not parts:
-        found |= silent()
-    if "real" in parts or not parts:
-        found |= _figures({})
-        found |= {f"{name}_tinted": value for name, value in _figures(TINTED).items()}
-        lights = {name: _light_in_cycles(name) for name in LOOKS}
-        found |= {f"real_light_percent_{name}": value for name, value in lights.items()}
-        found["real_light_percent"] = max(lights.values())
-    return report(found, REFERENCE, at_most=AT_MOST)
+    return report(measured(PARTS, parts), REFERENCE, at_most=AT_MOST)
+
+
+def _made_real_figures() -> dict[str, float]:
+    found = _figures({})
+    found |= {f"{name}_tinted": value for name, value in _figures(TINTED).items()}
+    lights = {name: _light_in_cycles(name) for name in LOOKS}
+    found |= {f"real_light_percent_{name}": value for name, value in lights.items()}
+    return {**found, "real_light_percent": max(lights.values())}
 
 
 def _figures(look: dict[str, float]) -> dict[str, float]:
@@ -144,4 +139,10 @@ def _picture(scene: bpy.types.Scene, kind: str = "PNG") -> np.ndarray:
     return np.ascontiguousarray(pixels.reshape(height, width, -1)[..., :3])
 
 
+PARTS = {
+    "comb": lambda: combed(styled("long_straight")),
+    "grow": edited,
+    "jobs": silent,
+    "real": _made_real_figures,
+}
 sys.exit(main(sys.argv[1:]))

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import json
+import subprocess
 import sys
 from pathlib import Path
 from typing import Any
 
+import figures
 import pytest
+from tiers import few_in_commits
 
 sys.path.append(str(Path(__file__).parents[2] / "bench"))
-from _report import report
+from _report import chosen, report
 
 
 @pytest.mark.parametrize(
@@ -51,3 +54,27 @@ def test_the_json_has_the_limits_in_words(
     report({"bytes": 5, "kept": 0.9}, "", at_most={"bytes": 6e6}, at_least={"kept": 0.8})
     told = json.loads(capsys.readouterr().out.splitlines()[-1])
     assert told["limits"] == {"bytes": "at most 6,000,000", "kept": "at least 0.8"}
+
+
+def test_a_benchmark_that_measured_nothing_has_failed(
+    capsys: pytest.CaptureFixture[str], gpu_context: object
+) -> None:
+    assert report({}, "") == 1
+
+
+def test_a_part_that_is_unknown_ends_a_benchmark() -> None:
+    assert chosen([], ("one", "two")) == ["one", "two"]
+    assert chosen(["two"], ("one", "two")) == ["two"]
+    with pytest.raises(SystemExit, match="no part too; there are one, two"):
+        chosen(["two", "too"], ("one", "two"))
+
+
+@pytest.mark.parametrize(
+    "name",
+    few_in_commits(sorted(name for name, short in figures.BENCHES.items() if short.arguments)),
+)
+def test_each_benchmark_refuses_a_part_that_it_has_not(name: str) -> None:
+    """And does not measure all or nothing instead."""
+    command = [sys.executable, str(figures.REPOSITORY / "tools" / "bench.py"), name, "mistyped"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300)
+    assert done.returncode != 0, done.stdout
