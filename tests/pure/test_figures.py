@@ -100,3 +100,28 @@ def test_arguments_are_words_that_benchmarks_know() -> None:
         )
         for word in re.findall(r"--[a-z-]+", short.arguments):
             assert f'"{word}"' in family, (name, word)
+
+
+def typed(text: str, names: list[str]) -> list[str]:
+    """Numbers that a page has typed beside the name of a figure, in a sentence or a row."""
+    name = rf"(?<![\w.])`?(?:{'|'.join(map(re.escape, names))})`?"
+    in_sentences = re.findall(rf"{name}(?:(?: is|:)?\s+\d[\d.,]*|,\s+\d[\d.]*,)", text)
+    in_rows = re.findall(rf"^\| *{name}[^|]*\| *\d[^|]*\|", text, re.M)
+    return [*in_sentences, *in_rows]
+
+
+def test_a_number_beside_the_name_of_a_figure_is_a_quote() -> None:
+    """One that somebody has typed stays as it was when the next one is found."""
+    found = figures.known()["benches"].values()
+    names = [name for each in found for name in each.get("figures", {}) if "_" in name]
+    for path in sorted((figures.REPOSITORY / "docs").rglob("*.md")):
+        if path != figures.PAGE and path.name != "decisions.md":  # what was found when it was made
+            assert typed(path.read_text(encoding="utf-8"), names) == [], path.name
+
+
+@pytest.mark.parametrize(
+    "text", ["a_ratio, 11, is", "(`a_ratio`: 1.00)", "a_ratio is 5", "| `a_ratio`, x | 0.1 | |"]
+)
+def test_a_typed_number_is_found(text: str) -> None:
+    assert typed(text, ["a_ratio"])
+    assert not typed('| `a_ratio`, of 4 | [1](figures.md "b.a_ratio") | 2 |', ["a_ratio"])
