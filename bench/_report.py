@@ -14,6 +14,8 @@ import bpy
 import gpu
 import numpy as np
 
+from hairloom.addon.render.strand_layers import is_software
+
 #: that of a figure in the JSON
 DIGITS = 6
 
@@ -90,11 +92,12 @@ def _limits(
     }
 
 
-def machine() -> dict[str, str]:
+def machine() -> dict[str, str | bool]:
     """What computed and drew; `gpu` must be there."""
     return {
         "backend": gpu.platform.backend_type_get(),
         "renderer": gpu.platform.renderer_get(),
+        "is_software": is_software(),
         "blender": bpy.app.version_string,
         "python": platform.python_version(),
         "numpy": np.__version__,

@@ -33,7 +33,8 @@ LONGEST = 600.0
 #: processors that may be busy before a benchmark begins, and for how long they are watched [s]
 MAX_BUSY, WATCHED = 0.3, 1.0
 #: what says how the figures of a benchmark came about, beside the figures
-ABOUT = ("reference", "limits", "missed", "backend", "renderer", "blender", "python", "numpy")
+ABOUT = ("reference", "limits", "missed")
+ABOUT += ("backend", "renderer", "is_software", "blender", "python", "numpy")
 _QUOTE = re.compile(
     r'\[(?P<shown>[^\]]+)\]\((?P<page>(?:\.\./)*(?:\w+/)*figures\.md) "(?P<name>[\w.]+)"\)'
 )
@@ -88,7 +89,6 @@ def measure(names: list[str]) -> int:
         missed = ", ".join(found.get("missed", [])) or "none"
         said = f"missed: {missed}" if found["ended"] else "did not end"
         print(f"    {found['seconds']:.0f} s, {said}", flush=True)
-        kept |= {"date": datetime.now(UTC).date().isoformat(), "machine": machine()}
         measured = kept["benches"]
         kept["benches"] = {each: measured[each] for each in BENCHES if each in measured}
         write(kept)
@@ -111,6 +111,8 @@ def run(name: str) -> dict[str, Any]:
     command = [sys.executable, str(REPOSITORY / "tools" / "bench.py"), name]
     command += BENCHES[name].arguments.split()
     ran = {
+        "date": datetime.now(UTC).date().isoformat(),
+        "machine": machine(),
         "arguments": BENCHES[name].arguments,
         "left_out": BENCHES[name].left_out,
         "other_work": busy_processors(),
@@ -147,7 +149,7 @@ def busy_processors() -> float:
 
 
 def machine() -> dict[str, str]:
-    """On what all of it was computed."""
+    """On what it is computed."""
     cores = os.cpu_count() or 1
     names = Path("/proc/cpuinfo")
     text = names.read_text(encoding="utf-8") if names.is_file() else ""
@@ -171,7 +173,6 @@ def page(kept: Mapping[str, Any]) -> str:
     missed = [f"`{name}.{key}`" for name, found in ended.items() for key in found["missed"]]
     if not ended:
         return "# Figures\n\nNothing has been measured yet: `make bench` does.\n"
-    first = next(iter(ended.values()))
     lines = [
         "# Figures",
         "",
@@ -179,11 +180,6 @@ def page(kept: Mapping[str, Any]) -> str:
         "`bench/` found, run short so that all of them take half an hour. `make bench NAME=x` runs",
         "one whole. The other pages quote these figures.",
         "",
-        f"Measured on {kept['date']} with {kept['machine']['cores']} cores of "
-        f"{kept['machine']['processor']}, Blender {first['blender']}, "
-        f"{first['renderer']} ({first['backend']}), Python {first['python']}, "
-        f"numpy {first['numpy']}.",
-        "**This is a software driver: no GPU drew these figures.** "
         "[gpu.md](dev/gpu.md#how-fast-a-machine-is) says which GPUs have been measured.",
         "",
         f"Of {limits} limits {len(missed)} are missed{': ' if missed else ''}{', '.join(missed)}.",
@@ -211,6 +207,8 @@ def section(name: str, found: Mapping[str, Any]) -> list[str]:
         "",
         f"`{command}`, {found['seconds']:.0f} s. Beside: {found['reference']}.{left_out}",
         "",
+        measured_on(found),
+        "",
         "| figure | found | limit |",
         "| --- | ---: | --- |",
     ]
@@ -219,6 +217,16 @@ def section(name: str, found: Mapping[str, Any]) -> list[str]:
         mark = f"**{told}, missed**" if key in found["missed"] else told
         lines.append(f"| `{key}` | {number(value)} | {mark} |")
     return lines
+
+
+def measured_on(found: Mapping[str, Any]) -> str:
+    """When a benchmark ran, and what computed and drew."""
+    drawn = "**A software driver, no GPU**" if found["is_software"] else "A GPU"
+    return (
+        f"Measured on {found['date']} with {found['machine']['cores']} cores of "
+        f"{found['machine']['processor']}, Blender {found['blender']}, Python {found['python']}, "
+        f"numpy {found['numpy']}. {drawn} drew: {found['renderer']} ({found['backend']})."
+    )
 
 
 def about(name: str) -> str:

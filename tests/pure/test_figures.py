@@ -2,12 +2,23 @@
 
 from __future__ import annotations
 
+import json
 import re
+from pathlib import Path
 
 import figures
 import pytest
 
 KEPT = {"benches": {"ties": {"figures": {"ratio": 41.26, "part": 0.0123, "off_percent": 0.5}}}}
+
+
+#: when and by what a benchmark was measured
+SETUP = {
+    "date": "2026-01-02",
+    "machine": {"cores": "2", "processor": "x"},
+    "is_software": True,
+    **dict.fromkeys(("blender", "renderer", "backend", "python", "numpy"), "x"),
+}
 
 
 def test_all_benchmarks_are_run() -> None:
@@ -65,10 +76,9 @@ def test_what_is_missed_is_said_first_and_in_its_row() -> None:
         "limits": {"escape_mm": "at most 1", "kept": "at least 1"},
         "missed": ["escape_mm"],
         "figures": {"escape_mm": 2.5, "kept": 1.0, "strands": 12000, "seeds": []},
-        **dict.fromkeys(("blender", "renderer", "backend", "python", "numpy"), "x"),
+        **SETUP,
     }
-    machine = {"cores": "2", "processor": "x"}
-    kept = {"date": "2026-01-02", "machine": machine, "benches": {"ties": found}}
+    kept = {"benches": {"ties": found}}
     page = figures.page(kept)
     assert "Of 2 limits 1 are missed: `ties.escape_mm`." in page
     assert "`tools/bench.py ties --strands 8`, 2 s. Beside: a ring. Left out: most strands." in page
@@ -81,6 +91,26 @@ def test_what_is_missed_is_said_first_and_in_its_row() -> None:
     assert "Did not end: cards." in figures.page(kept)
 
 
+def test_each_section_has_its_own_date_and_setup(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """Those of the others stay where one is measured again, on another machine."""
+    plain = {"arguments": "", "left_out": "", "other_work": 0.0, "seconds": 1.0, "ended": True}
+    plain |= {"reference": "a ring", "limits": {}, "missed": [], "figures": {}}
+    kept = {"benches": {"ties": plain | SETUP, "house": plain | SETUP}}
+    (tmp_path / "figures.json").write_text(json.dumps(kept), encoding="utf-8")
+    monkeypatch.setattr(figures, "FIGURES", tmp_path / "figures.json")
+    monkeypatch.setattr(figures, "PAGE", tmp_path / "figures.md")
+    again = {"date": "2026-03-04", "is_software": False, "renderer": "NVIDIA H100"}
+    monkeypatch.setattr(figures, "run", lambda name: plain | SETUP | again)
+    assert figures.measure(["ties"]) == 0
+    page = figures.PAGE.read_text(encoding="utf-8")
+    head, ties, house = re.split(r"^## .*$", page, flags=re.M)
+    assert "Measured on 2026-03-04" in ties and "A GPU drew: NVIDIA H100 (x)." in ties
+    assert "Measured on 2026-01-02" in house and "A software driver, no GPU" in house
+    assert "Measured" not in head and "driver" not in head + ties
+
+
 def test_a_benchmark_that_fails_is_not_taken_for_one_that_found_something(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -89,6 +119,7 @@ def test_a_benchmark_that_fails_is_not_taken_for_one_that_found_something(
 
     monkeypatch.setattr(figures.subprocess, "run", lambda *_, **__: Done)
     found = figures.run("ties")
+    assert found["date"] and found["machine"]["cores"]
     assert not found["ended"] and "figures" not in found
 
 
