@@ -11,7 +11,6 @@ keep their lengths would take.
 
 from __future__ import annotations
 
-import time
 import tracemalloc
 from collections.abc import Callable
 from functools import partial
@@ -21,6 +20,7 @@ import bpy
 import numpy as np
 from _blender_nodes import shipped_node_group
 from _shaken_head import RADIUS, guides_on, surface_of
+from _turns import in_turns, milliseconds
 
 from hairloom.addon.blender.scene.curves import read_curves, write_curves
 from hairloom.addon.groom.weights import GuideWeights, guide_weights
@@ -31,7 +31,7 @@ from hairloom.addon.strands import StrandSet
 GUIDES, POINTS, COUNTS = 762, 30, (4095, 20_000, 100_000)
 GROUP = "Interpolate Hair Curves"
 ASSETS = "assets/nodes/procedural_hair_node_assets.blend"
-NODE_ROUNDS, ROUNDS, CHUNK = 5, 25, 512
+ROUNDS, CHUNK = 25, 512
 
 Mix = Callable[[np.ndarray, np.ndarray, GuideWeights], np.ndarray]
 
@@ -54,11 +54,6 @@ class InterpolatedHair:
             density *= count / made.strand_count
         return made
 
-    def milliseconds(self) -> float:
-        begin = time.perf_counter()
-        self._evaluate()
-        return (time.perf_counter() - begin) * 1000.0
-
     def remove(self) -> None:
         bpy.data.objects.remove(self._hair)
 
@@ -66,12 +61,12 @@ class InterpolatedHair:
         for name, value in values.items():
             getattr(self._modifier.properties.inputs, name).value = value
 
-    def _evaluate(self) -> None:
+    def evaluate(self) -> None:
         self._hair.data.update_tag()
         bpy.context.view_layer.update()
 
     def _evaluated(self) -> StrandSet:
-        self._evaluate()
+        self.evaluate()
         return read_curves(self._hair, bpy.context.evaluated_depsgraph_get()).strands
 
 
@@ -102,7 +97,7 @@ PLAIN: tuple[Mix, ...] = (gathered, summed, summed_in_chunks)
 
 
 def node_figures() -> dict[str, float]:
-    """Milliseconds (the least of some rounds) and ratios, see bench/refinement.py.
+    """Milliseconds, the least of ROUNDS in which all take turns, and ratios (bench/refinement.py).
 
     node_ratio_N: times faster than the node. numpy_ratio_N: the time as a factor of the fastest
     plain form's. peak_memory_ratio: the most memory that was taken, over that of the result.
@@ -121,14 +116,18 @@ def node_figures() -> dict[str, float]:
         made = node.strands(count)
         assert abs(made.strand_count / count - 1.0) < 0.02, made.strand_count
         assert made.grid.shape[1] == POINTS
-        node_ms = min(node.milliseconds() for _ in range(NODE_ROUNDS))
-        node_ms *= count / made.strand_count
         weights = _weights(made.grid[:, 0], guides, count)
         rest = summed_in_chunks(np.zeros((count, POINTS, 3), np.float32), guide_rest, weights)
         strands = _strand_set(rest)
         riders = Riders.of(strands, guide_rest, weights)
         carry = partial(ride, strands.points, riders, guide_rest, guide_now)
-        ours, plain = _least([carry, *(partial(mix, rest, motion, weights) for mix in PLAIN)])
+        works = {"node": node.evaluate, "ride": carry}
+        works |= {mix.__name__: partial(mix, rest, motion, weights) for mix in PLAIN}
+        times = in_turns(
+            {name: partial(milliseconds, work) for name, work in works.items()}, ROUNDS
+        )
+        node_ms = min(times["node"]) * count / made.strand_count
+        ours, plain = min(times["ride"]), min(min(times[mix.__name__]) for mix in PLAIN)
         figures |= {
             f"node_ms_{count}": round(node_ms, 2),
             f"ride_ms_{count}": round(ours, 3),
@@ -140,21 +139,6 @@ def node_figures() -> dict[str, float]:
     node.remove()
     bpy.data.objects.remove(head)
     return figures | {"peak_memory_ratio": round(max(peaks), 2)}
-
-
-def _least(works: list[Callable[[], np.ndarray]]) -> tuple[float, float]:
-    """Milliseconds of the first, and of the fastest of the others.
-
-    In turns, so that a busy moment of the machine meets all of them.
-    """
-    times = np.empty((ROUNDS, len(works)))
-    for round_times in times:
-        for index, work in enumerate(works):
-            begin = time.perf_counter()
-            work()
-            round_times[index] = (time.perf_counter() - begin) * 1000.0
-    ours, *plain = times.min(axis=0)
-    return float(ours), float(min(plain))
 
 
 def _with_points(grid: np.ndarray) -> np.ndarray:

@@ -6,7 +6,7 @@ Dynamics" on the same guides in the same process (see `_hair_dynamics`). Every t
 the medians of several rounds, in which all contestants take turns, so that a busy moment of the
 machine meets all of them.
 
-make bench NAME=dynamics            about three minutes
+make bench NAME=dynamics            about four minutes
 make bench NAME="dynamics --peer-10k"   the peer with 10,000 guides too: three minutes more
 """
 
@@ -16,6 +16,7 @@ import argparse
 import statistics
 import sys
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import bpy
@@ -24,6 +25,7 @@ from _forms import ComputeForm, Form, NumpyForm, has_compute, play
 from _hair_dynamics import HairDynamics, animate
 from _report import report
 from _shaken_head import RADIUS, Shake, depth_in, guides_on, new_head, surface_of, sway
+from _turns import in_turns
 
 from hairloom.addon.dynamics.colliders import DistanceField, SphereCollider
 from hairloom.addon.dynamics.measure import deepest_penetration, max_stretch
@@ -36,10 +38,10 @@ REFERENCE = "Hair Dynamics, Physics, surface collision, 10 x 15 (as shipped)"
 AT_MOST = {"stretch_max_percent": 1.0, "penetration_sphere_mm": 0.001, "penetration_mesh_mm": 0.1}
 #: times faster than the peer
 AT_LEAST = {"ratio_numpy": 1.0, "ratio_compute": 1.0}
-GUIDES, FPS, WARM_UP = 762, 60.0, 10
-#: A busy minute of the machine shall not meet all rounds, nor a busy second all plays of a round.
-ROUNDS, PLAYS, SCALING_ROUNDS = 7, 4, 3
-PLAY = 1.0 + WARM_UP / FPS  # [s], a whole swing is measured
+GUIDES, FPS, WARM_UP, SWING = 762, 60.0, 10, 60
+#: A busy minute of the machine shall not meet all rounds.
+ROUNDS, SCALING_ROUNDS = 7, 3
+FRAMES = WARM_UP + SWING  # of a play, whose whole swing is measured
 SIZES = (1_000, 3_000, 10_000, 30_000, 50_000)
 FRAME_RATES = (24.0, 30.0, 60.0, 120.0)
 SETTINGS = DynamicsSettings()
@@ -81,25 +83,31 @@ def race(
     field: DistanceField,
     rounds: int,
 ) -> dict[str, float]:
-    """Milliseconds a frame of all contestants, and how far the medians of the rounds lie apart."""
+    """Milliseconds a frame of all contestants, and how far the medians of the rounds lie apart.
+
+    In each round each of them plays one swing.
+    """
     shake = Shake(guides.grid, (field,))
     balls = Shake(guides.grid, (SphereCollider((0.0, 0.0, 0.0), RADIUS),))
-    animate(head, [sway(frame / FPS) for frame in range(61)], int(FPS))
-    medians: dict[str, list[float]] = {}
+    animate(head, [sway(frame / FPS) for frame in range(FRAMES + 1)], int(FPS))
     peer_stretch = idle = 0.0
 
-    def note(name: str, times: list[float]) -> None:
-        medians.setdefault(name, []).append(statistics.median(times))
-
-    for number in range(rounds):
-        for name, make in list(forms.items()) * PLAYS:
-            note(f"{name}_ms", timed(make, shake, PLAY))
-            note(f"{name}_sphere_ms", timed(make, balls, PLAY))
+    def peer_plays() -> float:
+        nonlocal peer_stretch, idle
         peer = HairDynamics(head, guides)
-        times, stretch = peer.play(25 if number else 60, WARM_UP)
-        note("hair_dynamics_ms", times)
+        times, stretch = peer.play(FRAMES, WARM_UP)
         peer_stretch, idle = max(peer_stretch, stretch), peer.idle_ms(30)
         peer.remove()
+        return statistics.median(times)
+
+    def plays(make: Callable[[DynamicsState], Form], shaken: Shake) -> float:
+        return statistics.median(timed(make, shaken, FRAMES / FPS))
+
+    contestants: dict[str, Callable[[], float]] = {"hair_dynamics_ms": peer_plays}
+    for name, make in forms.items():
+        contestants[f"{name}_ms"] = partial(plays, make, shake)
+        contestants[f"{name}_sphere_ms"] = partial(plays, make, balls)
+    medians = in_turns(contestants, rounds)
     found = {name: min(values) for name, values in medians.items()}
     found |= {f"{name}_worst_round": max(values) for name, values in medians.items()}
     return found | {

@@ -1,4 +1,4 @@
-"""What a benchmark prints, and how it ends."""
+"""What a benchmark prints, how it ends, and what it compares."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from tiers import few_in_commits
 
 sys.path.append(str(Path(__file__).parents[2] / "bench"))
 from _report import chosen, report
+from _turns import in_turns
 
 
 @pytest.mark.parametrize(
@@ -78,3 +79,15 @@ def test_each_benchmark_refuses_a_part_that_it_has_not(name: str) -> None:
     command = [sys.executable, str(figures.REPOSITORY / "tools" / "bench.py"), name, "mistyped"]
     done = subprocess.run(command, capture_output=True, text=True, timeout=300)
     assert done.returncode != 0, done.stdout
+
+
+def test_contestants_have_as_many_times_of_each_round() -> None:
+    played = []
+
+    def plays(name: str) -> float:
+        played.append(name)
+        return float(len(played))
+
+    contestants = {name: lambda name=name: plays(name) for name in ("ours", "peer")}
+    assert in_turns(contestants, 3) == {"ours": [1.0, 3.0, 5.0], "peer": [2.0, 4.0, 6.0]}
+    assert played == ["ours", "peer"] * 3
