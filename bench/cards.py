@@ -1,7 +1,7 @@
 """Hair cards of Sintel: how long they take, order, occlusion, passes, and cards beside strands.
 
 See `_cards_build`, `_cards_atlas`, `_cards_order`, `_cards_occlusion`, `_cards_passes` and
-`_cards_strands` for what is compared with what.
+`_cards_strands` for what is compared with what. Limits are twice what was found when they were set.
 
 make bench NAME=cards           some minutes; writes out/cards_sheet.png
 tools/bench.py cards build        some parts: build, atlas, order, occlusion, passes, strands
@@ -23,6 +23,12 @@ REFERENCE = (
     "rays one by one; cards sorted for each view and pixels sorted; the strands "
     "themselves; the three-pass scheme"
 )
+#: fractions of pixels that blend in the wrong order, with the orders that the files have
+AT_MOST = {
+    "order_wrong_sorted": 0.038,
+    "order_wrong_baked_sorted": 0.088,
+    "order_wrong_guides_sorted": 0.035,
+}
 PARTS = {
     "build": build_figures,
     "atlas": atlas_figures,
@@ -36,7 +42,7 @@ PARTS = {
 def main(names: list[str]) -> int:
     start()
     found = measured(PARTS, names)
-    return report(found, REFERENCE)
+    return report(found, REFERENCE, at_most=AT_MOST)
 
 
 sys.exit(main(sys.argv[1:]))

@@ -1,7 +1,7 @@
 """The render engine: clean stills, the same everywhere, and animations that do not grow.
 
 See the modules `_engine_...` for what is compared with what. The reference of stills is the same
-scene at 1,024 samples.
+scene at 1,024 samples. Limits are twice what was found when they were set.
 
 make bench NAME=engine          some minutes
 tools/bench.py engine picture        some parts: picture, skin, shafts, frames
@@ -18,6 +18,8 @@ from _engine_skin import skin_figures
 from _report import measured, report, start
 
 REFERENCE = "the same scene at 1,024 samples; another process; the tenth frame"
+#: coordinates that go wrong show a picture from elsewhere, and a difference near 1
+AT_MOST = {"polar_difference": 0.006}
 PARTS = {
     "picture": picture_figures,
     "skin": skin_figures,
@@ -29,7 +31,7 @@ PARTS = {
 def main(names: list[str]) -> int:
     start()
     found = measured(PARTS, names)
-    return report(found, REFERENCE)
+    return report(found, REFERENCE, at_most=AT_MOST)
 
 
 sys.exit(main(sys.argv[1:]))

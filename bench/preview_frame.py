@@ -7,6 +7,9 @@ ribbons with width and adaptive detail, lit by three lights and with two shifted
 The same frames once more with guides that stay on the GPU: `gpu_simulate_ms` and `gpu_ride_ms`
 end when the GPU has done it, `gpu_draw_ms` has nothing to pack and to upload. `cpu_frame_ms` and
 `gpu_frame_ms` are the three stages of either way together.
+
+`draw_ratio` is how fast ours draws beside the lines. Its limit is half of what a software driver
+found when it was set; times have none, since each machine has its own.
 """
 
 import statistics
@@ -34,6 +37,7 @@ from hairloom.addon.render.strand_pass import StrandPass
 from hairloom.addon.shading.lights import three_point_lights
 
 STRANDS, WIDTH, HEIGHT, FRAMES = 11_400, 960, 720, 30
+AT_LEAST = {"draw_ratio": 0.024}
 WAYS = {
     "cpu": ("simulate_ms", "interpolate_ms", "draw_ms"),
     "gpu": ("gpu_simulate_ms", "gpu_ride_ms", "gpu_draw_ms"),
@@ -142,7 +146,8 @@ def main() -> int:
     for way, stages in WAYS.items():
         medians[f"{way}_frame_ms"] = round(sum(medians[stage] for stage in stages), 3)
     medians |= {"strands": STRANDS, "draw_ratio": medians["lines_ms"] / medians["draw_ms"]}
-    return report(medians, "LINES, builtin UNIFORM_COLOR, batch_for_shader each frame")
+    reference = "LINES, builtin UNIFORM_COLOR, batch_for_shader each frame"
+    return report(medians, reference, at_least=AT_LEAST)
 
 
 sys.exit(main())

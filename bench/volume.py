@@ -2,7 +2,8 @@
 against sorting, the cost beside EEVEE.
 
 See `_volume_shadows`, `_volume_balls`, `_volume_sintel`, `_volume_transparency` and `_volume_cost`
-for what is compared with what.
+for what is compared with what. Limits are twice what was found when they were set; layers, whose
+order strands must not change, were the same to the last bit.
 
 make bench NAME=volume          some minutes; writes out/volume_sheet.png and out/volume_sintel.png
 tools/bench.py volume cost        some parts: cost, shadows, transparency, balls, sintel
@@ -23,6 +24,7 @@ REFERENCE = (
     "strands counted one by one; Cycles' Principled Hair, path traced; ribbons "
     "sorted; EEVEE at 1 sample"
 )
+AT_MOST = {"transparency_error": 0.19, "permutation_difference": 1.0e-6}
 PARTS = {
     "cost": cost_figures,
     "shadows": shadow_figures,
@@ -35,7 +37,7 @@ PARTS = {
 def main(names: list[str]) -> int:
     start()
     found = measured(PARTS, names)
-    return report(found, REFERENCE)
+    return report(found, REFERENCE, at_most=AT_MOST)
 
 
 sys.exit(main(sys.argv[1:]))

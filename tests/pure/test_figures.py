@@ -38,6 +38,12 @@ def test_what_was_measured_is_what_would_be_measured_today() -> None:
         assert each["arguments"] == figures.BENCHES[name].arguments, f"run tools/figures.py {name}"
 
 
+def test_each_benchmark_has_a_limit() -> None:
+    """One without could find anything, and `make bench` would pass."""
+    found = figures.known()["benches"]
+    assert [name for name, each in found.items() if each["ended"] and not each["limits"]] == []
+
+
 def test_quotes_are_as_they_were_found() -> None:
     pages = figures.pages_that_quote()
     assert pages
