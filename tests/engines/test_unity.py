@@ -302,7 +302,16 @@ def test_textures_keep_their_values(asset: Asset, hair: dict[str, Any]) -> None:
         color = "linear" if is_table else sidecar["texture_files"][file]["color_space"]
         assert how["sRGB"] == (color == "sRGB"), file
         assert (how["format"] == "RGBAFloat") == is_table, file
+        assert how["size"] >= 4096, "an atlas of 4,096 is not halved"
     assert any(how["sRGB"] for how in hair["textures"].values())
+
+
+def test_what_comes_after_the_glb_is_noticed(asset: Asset, hair: dict[str, Any]) -> None:
+    """Textures that were imported without their sidecar are imported again, once."""
+    sidecar = sidecar_of(asset.folder)
+    sidecar_file = next(asset.folder.glob("*.hairloom.json")).name
+    assert set(hair["sources"]) == {sidecar_file, sidecar["index_buffer"]["file"]}
+    assert sorted(hair["reimported"]) == sorted(hair["textures"])
 
 
 def test_in_the_high_definition_pipeline_its_own_material_is_used(

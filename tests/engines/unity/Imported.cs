@@ -22,8 +22,11 @@ public static class Imported
             UnityEngine.Rendering.GraphicsSettings.currentRenderPipeline =
                 new UnityEngine.Rendering.HDRenderPipelineAsset();
         }
-        Call(typeof(CardPostprocessor), null, "OnPostprocessAllAssets", new[] { path }, new string[0], new string[0], new string[0]);
         var before = (string[])Call(typeof(CardImporter), null, "GatherDependenciesFromSourceFile", path);
+        foreach (var texture in before.Where(File.Exists))  // imported before their sidecar was there
+            AssetImporter.Known[texture] = new TextureImporter { assetPath = texture };
+        foreach (var each in new[] { path, Sidecar.PathOf(path) })
+            Call(typeof(CardPostprocessor), null, "OnPostprocessAllAssets", new[] { each }, new string[0], new string[0], new string[0]);
         var context = new AssetImportContext { assetPath = path };
         var importer = new CardImporter();
         if (arguments.Contains("at_once"))
@@ -34,6 +37,8 @@ public static class Imported
         {
             ["importer"] = AssetDatabase.GetImporterOverride(path)?.Name,
             ["before"] = before,
+            ["sources"] = context.Sources.Select(Path.GetFileName).ToArray(),
+            ["reimported"] = AssetImporter.Reimported.Select(Path.GetFileName).ToArray(),
             ["errors"] = context.Errors,
             ["warnings"] = context.Warnings,
             ["meshes"] = context.Assets.OfType<Mesh>().Select(Told).ToArray(),
@@ -80,6 +85,7 @@ public static class Imported
         return new Dictionary<string, object>
         {
             ["sRGB"] = importer.sRGBTexture,
+            ["size"] = importer.maxTextureSize,
             ["mipmaps"] = importer.mipmapEnabled,
             ["wrap"] = importer.wrapMode.ToString(),
             ["format"] = importer.platform.format.ToString(),

@@ -194,7 +194,14 @@ namespace UnityEditor
 {
     public class AssetImporter : UnityEngine.Object
     {
+        public static readonly Dictionary<string, AssetImporter> Known = new Dictionary<string, AssetImporter>();
+        public static readonly List<string> Reimported = new List<string>();
         public string assetPath;
+        public static AssetImporter GetAtPath(string path)
+        {
+            return Known.TryGetValue(path, out var importer) ? importer : null;
+        }
+        public void SaveAndReimport() { Reimported.Add(assetPath); }
     }
 
     public class AssetPostprocessor
@@ -214,6 +221,7 @@ namespace UnityEditor
     public class TextureImporter : AssetImporter
     {
         public bool sRGBTexture = true, mipmapEnabled = true, alphaIsTransparency;
+        public int maxTextureSize = 2048;
         public TextureImporterNPOTScale npotScale = TextureImporterNPOTScale.ToNearest;
         public TextureWrapMode wrapMode;
         public TextureImporterPlatformSettings platform = new TextureImporterPlatformSettings();

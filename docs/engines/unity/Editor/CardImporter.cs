@@ -33,6 +33,8 @@ namespace Hairloom
         {
             var sidecar = Sidecar.Of(path);
             context.DependsOnSourceAsset(Sidecar.PathOf(path));
+            if (!string.IsNullOrEmpty(sidecar.index_buffer?.file))
+                context.DependsOnSourceAsset(Sidecar.Beside(path, sidecar.index_buffer.file));
             if (sidecar.file != Path.GetFileName(path))
                 context.LogImportWarning(
                     $"{Sidecar.PathOf(path)}: it names {sidecar.file}; rename both files back if the hair looks wrong");
@@ -100,9 +102,29 @@ namespace Hairloom
     {
         static void OnPostprocessAllAssets(string[] imported, string[] deleted, string[] moved, string[] movedFrom)
         {
-            foreach (var path in imported.Concat(moved).Where(Sidecar.IsBeside))
-                if (AssetDatabase.GetImporterOverride(path) != typeof(CardImporter))
-                    AssetDatabase.SetImporterOverride<CardImporter>(path);
+            foreach (var glb in imported.Concat(moved).Select(Sidecar.GlbOf).Distinct().Where(Sidecar.IsBeside))
+            {
+                if (AssetDatabase.GetImporterOverride(glb) != typeof(CardImporter))
+                    AssetDatabase.SetImporterOverride<CardImporter>(glb);
+                SetUpTextures(glb);
+            }
+        }
+
+        /// Those that came before their sidecar have been imported as any others.
+        static void SetUpTextures(string glb)
+        {
+            try
+            {
+                var sidecar = Sidecar.Of(glb);
+                foreach (var path in CardMaterials.TexturePaths(sidecar, glb).Distinct())
+                    if (AssetImporter.GetAtPath(path) is TextureImporter importer
+                        && CardMaterials.SetUp(importer, sidecar, Path.GetFileName(path)))
+                        importer.SaveAndReimport();
+            }
+            catch (CardFileException)
+            {
+                return;  // the importer of the GLB says what is wrong
+            }
         }
 
         void OnPreprocessTexture()

@@ -25,6 +25,9 @@ namespace Hairloom
         const string Validation =
             "UnityEngine.Rendering.HighDefinition.HDMaterial, Unity.RenderPipelines.HighDefinition.Runtime";
 
+        /// Of a texture [pixels]; Unity's own 2,048 would halve the largest atlas.
+        const int MaxSize = 8192;
+
         /// Opaque pixels, then transparent back faces, then transparent front faces; all after other meshes.
         public static readonly CardPass[] Passes =
         {
@@ -66,9 +69,11 @@ namespace Hairloom
                 .Select(each => Sidecar.Beside(glb, each.Value.file));
         }
 
-        /// Values that a shader reads keep their bits: no sRGB, and of tables no compression either.
-        public static void SetUp(TextureImporter importer, Sidecar sidecar, string file)
+        /// Values that a shader reads keep their bits: no sRGB, and of tables no compression either. Whether any
+        /// of that was otherwise: such a texture is new here, and keeps its size until somebody chooses another one.
+        public static bool SetUp(TextureImporter importer, Sidecar sidecar, string file)
         {
+            var before = Settings(importer);
             var isTable = Tables(sidecar).Any(each => each.Value.file == file);
             var used = sidecar.textures.Used().Where(each => each.Value.file == file).ToArray();
             if (isTable)
@@ -89,6 +94,19 @@ namespace Hairloom
                 var repeats = used.All(each => each.Key == "shift" || each.Key == "noise");
                 importer.wrapMode = repeats ? TextureWrapMode.Repeat : TextureWrapMode.Clamp;
             }
+            var isNew = !before.SequenceEqual(Settings(importer));
+            if (isNew)
+                importer.maxTextureSize = MaxSize;
+            return isNew;
+        }
+
+        static object[] Settings(TextureImporter importer)
+        {
+            return new object[]
+            {
+                importer.sRGBTexture, importer.alphaIsTransparency, importer.mipmapEnabled, importer.npotScale,
+                importer.wrapMode,
+            };
         }
 
         static Dictionary<string, SidecarTexture> Tables(Sidecar sidecar)

@@ -33,9 +33,16 @@ namespace Hairloom
             return Path.ChangeExtension(glb, null) + Ending;
         }
 
+        /// The GLB of a sidecar; any other path as it is.
+        public static string GlbOf(string path)
+        {
+            return path.EndsWith(Ending) ? path.Substring(0, path.Length - Ending.Length) + ".glb" : path;
+        }
+
         public static bool IsBeside(string path)
         {
-            return path.EndsWith(".glb", StringComparison.OrdinalIgnoreCase) && File.Exists(PathOf(path));
+            return path.EndsWith(".glb", StringComparison.OrdinalIgnoreCase) && File.Exists(path)
+                && File.Exists(PathOf(path));
         }
 
         /// A file of the same export, as Unity writes paths on every system.
