@@ -80,9 +80,12 @@ def make_pictures() -> None:
             write_small(Path(folder) / f"{name}.png", IMAGES / f"{name}.jpg")
         subprocess.run([*demo, "OPTIONS=--preset dynamics/under_water"], check=True)
         write_small(Path(folder) / "motion.png", IMAGES / "under_water.jpg")
+        headless = [sys.executable, str(REPOSITORY / "tools" / "headless.py")]
+        style, bake = ["--style", "ponytail"], str(Path(folder) / "bake")
+        subprocess.run([*headless, "simulate", *style, "--output", bake], check=True)
         shaken = Path(folder) / "ponytail.png"
-        sheet = [sys.executable, str(REPOSITORY / "tools" / "headless.py"), "sheet"]
-        subprocess.run([*sheet, "--style", "ponytail", "--output", str(shaken)], check=True)
+        pictures = ["--output", str(Path(folder) / "still.png"), "--sheet", str(shaken)]
+        subprocess.run([*headless, "render", *style, "--bake", bake, *pictures], check=True)
         write_small(shaken, IMAGES / "ponytail.jpg")
     tools = ("refinement", "preset", "shading", "volume", "engine", "styling")
     tools += ("hairstyle", "web_page", "tutorial", "cards", "shells", "motion")

@@ -77,7 +77,7 @@ def write_sheet(job: Job, path: Path, studio: Studio, motion: BakedGuides) -> No
             hair = PosedHair.of_motion(motion, motion.rig, motion.frames[place])
         with job.report.stage("draw frame"):
             picture = studio.picture(
-                hair.pose, hair.points, *SHEET_SIZE, samples=2, guides=hair.guides
+                *(hair.pose, hair.points, *SHEET_SIZE), 2, guides=hair.guides, is_soft=False
             )
         pictures.append(picture)
         progress.show(len(pictures))
