@@ -318,7 +318,7 @@ def test_a_bake_keeps_what_there_was_to_say(new_hair, evaluated, tmp_path):
     plan = Bake.of([hair], bpy.context.scene)
     list(plan.steps())
     (note,) = previews.start(hair, evaluated()).rig.notes
-    assert plan.notes == [f"Hair: {note}"]
+    assert f"Hair: {note}" in plan.notes
     assert playback.rig_in(playback.cache_of(hair)).rig.notes == (note,)
 
 
