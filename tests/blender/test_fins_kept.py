@@ -61,14 +61,19 @@ def test_a_saved_file_keeps_fin_and_settings(flag, evaluated, tmp_path):
     started(flag, evaluated)
 
 
-@pytest.mark.parametrize("end", ["stop", "by itself", "a file that cannot be opened"])
-def test_however_its_preview_ends_it_is_at_rest(end, flag, evaluated, tmp_path):
-    before = shown(flag, evaluated)
+def play_away_from(before, flag, evaluated):
+    """Preview and play until it is well away from where it was."""
     fins.start(flag, evaluated())
     previews.play(evaluated())
     previews.advance(evaluated(), 0.5)
     update()
     assert np.abs(shown(flag, evaluated) - before).max() > 0.05
+
+
+@pytest.mark.parametrize("end", ["stop", "by itself", "a file that cannot be opened"])
+def test_however_its_preview_ends_it_is_at_rest(end, flag, evaluated, tmp_path):
+    before = shown(flag, evaluated)
+    play_away_from(before, flag, evaluated)
     if end == "stop":
         previews.stop_all()
     elif end == "by itself":
@@ -89,11 +94,7 @@ def test_a_bake_is_shown_after_the_preview_too(flag, evaluated, tmp_path):
         pass
     bpy.context.scene.frame_set(3)
     baked = shown(flag, evaluated)
-    fins.start(flag, evaluated())
-    previews.play(evaluated())
-    previews.advance(evaluated(), 0.5)
-    update()
-    assert np.abs(shown(flag, evaluated) - baked).max() > 0.05
+    play_away_from(baked, flag, evaluated)
     previews.stop_all()
     update()
     assert np.array_equal(shown(flag, evaluated), baked)
