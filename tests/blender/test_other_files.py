@@ -11,12 +11,14 @@ from tiers import few_in_commits
 
 from hairloom.addon.blender.bakes import playback
 from hairloom.addon.blender.bakes.cache import Cache
+from hairloom.addon.blender.command_line import command_line
 from hairloom.addon.blender.engine import engine_hair
 from hairloom.addon.blender.preview import previews
 from hairloom.addon.blender.preview.bake import Bake, free, show_in_renders
 from hairloom.addon.blender.properties.groom_settings import GroomSettings
 from hairloom.addon.blender.viewport import overlay
 from hairloom.addon.dynamics.settings import DynamicsSettings
+from hairloom.addon.errors import HairloomError
 from hairloom.addon.shading.settings import ShadingSettings
 from hairloom.addon.shading.volume.settings import VolumeSettings
 
@@ -164,6 +166,48 @@ def test_an_override_plays_the_bake_of_the_library_until_it_is_baked_itself(libr
     assert Cache(baked).facts.frame_count == 2
     free(hair, bpy.context.evaluated_depsgraph_get())
     assert not own.folder.exists() and baked.exists()
+
+
+@pytest.fixture
+def shot(library, tmp_path):
+    """A file in a folder of its own that links hair which is baked in its library; that bake."""
+    bpy.ops.wm.open_mainfile(filepath=library)
+    hair, scene = bpy.data.objects["Hair"], bpy.context.scene
+    hair.hairloom.dynamics.device = "numpy"
+    hair.hairloom.dynamics.collider_resolution = 8
+    scene.frame_start, scene.frame_end = 1, 3
+    list(Bake.of([hair], scene).steps())
+    baked = playback.cache_of(hair).folder
+    bpy.ops.wm.save_mainfile()
+    (tmp_path / "shot").mkdir()
+    file = str(tmp_path / "shot" / "shot.blend")
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    bpy.context.scene.frame_start, bpy.context.scene.frame_end = 1, 2
+    bpy.ops.wm.save_as_mainfile(filepath=file)
+    bpy.context.scene.collection.children.link(brought(library, link=True))
+    bpy.ops.wm.save_mainfile()
+    return file, baked
+
+
+def test_linked_hair_is_not_baked_over_the_bake_of_its_library(shot, capfd):
+    file, baked = shot
+    assert command_line.run(["bake", "--scene", file]) == 1
+    assert "it is linked from groom.blend" in capfd.readouterr().err
+    with pytest.raises(HairloomError, match="Make a library override"):
+        free(bpy.data.objects["Hair"], bpy.context.evaluated_depsgraph_get())
+    assert Cache(baked).facts.frame_count == 3
+
+
+def test_a_scene_that_would_not_play_the_bake_of_linked_hair_is_not_saved(shot, tmp_path, capfd):
+    """The bake itself may go into a folder, for an export of it."""
+    file, folder, saved = shot[0], tmp_path / "out", tmp_path / "played.blend"
+    bake = ["bake", "--scene", file, "--output", str(folder)]
+    for option in (["--save"], ["--save-as", str(saved)]):
+        assert command_line.run([*bake, *option]) == 1
+        assert "would not play its bake" in capfd.readouterr().err
+    assert not folder.exists() and not saved.exists()
+    assert command_line.run(bake) == 0
+    assert Cache(folder).facts.frame_count == 2 and Cache(shot[1]).facts.frame_count == 3
 
 
 def test_saving_leaves_the_file_of_the_library_as_it_is(override, library, tmp_path):

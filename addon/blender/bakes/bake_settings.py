@@ -15,6 +15,9 @@ from .cache import owner_and_file
 #: Folder beside files, which has a folder for the bakes of each file.
 _BESIDE = "//hairloom_cache"
 
+#: what to do with an object that is linked
+OVERRIDE = "Make a library override of it (Object > Library Override > Make)"
+
 
 def frames_of(obj: bpy.types.Object, scene: bpy.types.Scene) -> range:
     """The scene frames to bake.
@@ -71,8 +74,9 @@ def choose_folder(obj: bpy.types.Object) -> Path:
     original, and a file that was saved under another name those of the first; both get others.
 
     Raises:
-        HairloomError: a folder beside a file that has not been saved.
+        HairloomError: a folder beside a file that has not been saved, or a linked object.
     """
+    check_not_linked(obj)
     bake = obj.hairloom.bake
     beside = _beside(obj)
     is_of_another_file = bake.folder.startswith(f"{_BESIDE}/") and not bake.folder.startswith(
@@ -88,6 +92,20 @@ def choose_folder(obj: bpy.types.Object) -> Path:
             remedy="Save the file, or choose a cache folder with a full path",
         )
     return folder
+
+
+def check_not_linked(obj: bpy.types.Object) -> None:
+    """Refuse an object whose bake is that of the library's own file, where all who link it look.
+
+    Raises:
+        HairloomError: it is linked, and no override.
+    """
+    if obj.library is not None:
+        raise HairloomError(
+            f"it is linked from {file_name(obj)}, and its bake belongs to that file",
+            place=obj.name,
+            remedy=f"{OVERRIDE}, or bake on the command line with --output FOLDER",
+        )
 
 
 def check_owner(obj: bpy.types.Object, folder: Path) -> None:

@@ -8,8 +8,9 @@ from pathlib import Path
 
 import bpy
 
+from ...errors import HairloomError
 from ..bakes import playback
-from ..bakes.bake_settings import folder_of
+from ..bakes.bake_settings import OVERRIDE, folder_of
 from ..base.report import Report
 from ..preview.bake import Bake, bakeable, free, show_in_renders
 from .job_options import add_frames_option, add_object_option, frames_of_option
@@ -33,8 +34,25 @@ def bake(job: Job) -> None:
             report.add_output(save_scene(options.save_as))
 
 
+def _check_saved_with(objects: list[bpy.types.Object]) -> None:
+    """Refuse what a saved scene would not play: Blender saves nothing of linked objects.
+
+    Raises:
+        HairloomError: naming the first of them.
+    """
+    for obj in objects:
+        if obj.library is not None:
+            raise HairloomError(
+                "it is linked from another file, so the saved scene would not play its bake",
+                place=obj.name,
+                remedy=f"{OVERRIDE}, or save no scene and export with --bake FOLDER",
+            )
+
+
 def _bake(objects: list[bpy.types.Object], job: Job) -> None:
     report, options = job.report, job.options
+    if options.save or options.save_as:
+        _check_saved_with(objects)
     for obj in objects:
         put_settings(obj, options.preset, options.set)
     folder = None if options.output is None else options.output.resolve()

@@ -17,6 +17,7 @@ from ...dynamics.figures import Measure
 from ...errors import HairloomError
 from ..bakes import baked_copy, playback
 from ..bakes.bake_settings import (
+    check_not_linked,
     check_owner,
     choose_folder,
     file_name,
@@ -144,7 +145,7 @@ class Bake:
 
         Raises:
             HairloomError: nothing to bake, no frames, no place that can be written to, or no such
-                weights as children are to grow by.
+                weights as children are to grow by; or a linked object without a folder.
         """
         if not objects:
             raise HairloomError(
@@ -340,8 +341,9 @@ def free(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> None:
     A bake that belongs to another object or another file stays, and is shown here no longer.
 
     Raises:
-        HairloomError: the files cannot be deleted.
+        HairloomError: the files cannot be deleted, or the object is linked.
     """
+    check_not_linked(obj)
     folder = folder_of(obj)
     if folder is not None and is_own(obj, folder):
         delete(folder)
