@@ -140,6 +140,71 @@ def test_a_linked_library_is_an_input(
     assert task()["status"] == "done"
 
 
+def test_a_picture_that_is_missing_is_an_input(
+    task: Callable[..., dict[str, Any]], scene: Path, tmp_path: Path
+) -> None:
+    """As on a machine that does not see its disk: once it is there, the task is done again."""
+    picture = tmp_path / "skin.png"
+    shutil.copy(REPOSITORY / "docs" / "images" / "still.jpg", picture)
+    bpy.ops.wm.open_mainfile(filepath=str(scene))
+    bpy.data.images.load(str(picture)).use_fake_user = True
+    bpy.ops.wm.save_mainfile()
+    away = picture.rename(tmp_path / "away.png")
+    task()
+    assert task()["status"] == "skipped"
+    away.rename(picture)
+    assert task()["status"] == "done"
+
+
+@pytest.fixture
+def export(scene: Path, tmp_path: Path) -> Callable[..., int]:
+    """Exports the motion of the scene's hair as a farm's task does; gives the exit code."""
+
+    def run(*more: str) -> int:
+        arguments = ["export", "--scene", str(scene), "--frames", "1", "3", "--skip-existing"]
+        return command_line.run([*arguments, "--output", str(tmp_path / "a.abc"), *more])
+
+    return run
+
+
+def test_hair_whose_bake_is_not_there_is_exported_in_no_other_motion(
+    export: Callable[..., int],
+    scene: Path,
+    tmp_path: Path,
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    bake = ["bake", "--scene", str(scene), "--frames", "1", "3", *QUICK, "--save"]
+    assert command_line.run([*bake, "--output", str(tmp_path / "bake")]) == 0
+    away = (tmp_path / "bake").rename(tmp_path / "away")
+    for more in ([], ["--use-bake"]):
+        assert export(*more) == 1
+        assert "its bake is not in" in capfd.readouterr().err
+    assert not list(tmp_path.glob("a.abc*"))
+    assert export("--no-use-bake") == 0
+    away.rename(tmp_path / "bake")
+    assert export() == 0
+    assert "Nothing to do" not in capfd.readouterr().out
+
+
+def test_hair_that_was_never_baked_is_exported_again_once_it_is(
+    export: Callable[..., int],
+    scene: Path,
+    tmp_path: Path,
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    bpy.ops.wm.open_mainfile(filepath=str(scene))
+    bpy.data.objects["Hair"].hairloom.bake.folder = "//bake"
+    bpy.ops.wm.save_mainfile()
+    assert export("--use-bake") == 1
+    assert "it has no bake" in capfd.readouterr().err
+    assert export() == 0 and export() == 0
+    assert "Nothing to do" in capfd.readouterr().out
+    bake = ["bake", "--scene", str(scene), "--frames", "1", "3", *QUICK]
+    assert command_line.run([*bake, "--output", str(tmp_path / "bake")]) == 0
+    assert export() == 0
+    assert "bake is not as it was" in capfd.readouterr().out
+
+
 def test_what_a_heads_file_names_is_an_input(extension: None, tmp_path: Path) -> None:
     head, output = tmp_path / "head.obj", tmp_path / "a.tfx"
     head.write_text("mtllib skin.mtl\nv 0 0 0\n")

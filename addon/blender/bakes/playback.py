@@ -81,6 +81,24 @@ def cache_of(obj: bpy.types.Object) -> Cache | None:
     return None if folder is None else cache_in(folder)
 
 
+def cache_if_baked(obj: bpy.types.Object) -> Cache | None:
+    """The same for what goes into files: None where the object was never baked. One whose bake is
+    gone, or lies where this machine does not see it, would be written in another motion.
+
+    Raises:
+        HairloomError: it was baked and its bake is not there, or is damaged.
+    """
+    cache, folder = cache_of(obj), folder_of(obj)
+    if cache is None and folder is not None and obj.hairloom.bake.owner:
+        raise HairloomError(
+            f"it was baked, and its bake is not in {folder}",
+            place=obj.name,
+            remedy="Bring that folder here or bake again; or export without Use Bake "
+            "(--no-use-bake)",
+        )
+    return cache
+
+
 def rig_in(cache: Cache) -> BakedRig:
     """The rig of a groom's bake.
 

@@ -20,6 +20,7 @@ from ...exchange.strand_formats import STRAND_FORMATS, StrandFormat, format_of
 from ...groom.widths import as_wide
 from ...rig_flow import Rig
 from ...shading.settings import ShadingSettings
+from ..bakes.bake_settings import folder_of
 from ..base.objects import head_of
 from ..scene.source import check_density
 from ..scene.surfaces import read_surface
@@ -102,12 +103,26 @@ def _of_objects(
     with job.report.stage("read hair"):
         at = range(options.frame, options.frame + 1) if still else frames
         plan = StrandExport.of(hair, depsgraph, kind, settings, frames=at)
-        for part in plan.moving:
-            if isinstance(part, BakedMotion):
-                job.report.add_input(part.cache.folder)
+        if options.use_bake:
+            _check_baked(plan)
+        for folder in filter(None, map(folder_of, hair if plan.moving else ())):
+            job.report.add_input(folder)  # also one that is empty: a bake may come into it
         plan = plan.standing() if still else plan
     tell_drops(job, plan.dropped, ", ".join(each.name for each in hair))
     return plan
+
+
+def _check_baked(plan: StrandExport) -> None:
+    """Raises:
+    HairloomError: hair that has no bake, where --use-bake asks for it.
+    """
+    for part in plan.moving:
+        if not isinstance(part, BakedMotion):
+            raise HairloomError(
+                "it has no bake",
+                place=part.out.groom.name,
+                remedy="Bake it, or leave out --use-bake to write Blender's own animation of it",
+            )
 
 
 def _of_rig(

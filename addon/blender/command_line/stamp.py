@@ -180,5 +180,6 @@ def _files_of_scene() -> list[str]:
     paths: list[str] = bpy.utils.blend_paths(absolute=True, packed=False, local=False)
     folders = [bpy.utils.resource_path(kind) for kind in ("LOCAL", "SYSTEM")]
     of_blender = tuple(os.path.join(os.path.abspath(each), "") for each in folders if each)
-    found = [os.path.abspath(path) for path in paths if Path(path).is_file()]
+    # one that is missing may come
+    found = [os.path.abspath(path) for path in paths if not Path(path).is_dir()]
     return [path for path in found if not path.startswith(of_blender)]

@@ -107,7 +107,7 @@ class ExportCheck:
 
     def _moved_by(self, hair: bpy.types.Object, use_bake: bool) -> str:
         try:
-            cache = playback.cache_of(hair) if use_bake else None
+            cache = playback.cache_if_baked(hair) if use_bake else None
             if cache is None:
                 return ("no bake, " if use_bake else "") + "as modifiers and animation move it"
         except HairloomError as error:

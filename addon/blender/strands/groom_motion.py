@@ -126,9 +126,10 @@ def moving_hair(
         use_bake: go by its bake, if it has one.
 
     Raises:
-        HairloomError: frames that are not in the bake, a damaged bake, or no usable hair.
+        HairloomError: frames that are not in the bake, a damaged bake or one that is gone, or no
+            usable hair.
     """
-    cache = playback.cache_of(hair) if use_bake else None
+    cache = playback.cache_if_baked(hair) if use_bake else None
     if cache is not None:
         check_frames(hair.name, frames, cache)
         motion = BakedMotion(baked_hair(hair, depsgraph, cache, request), cache)
