@@ -1,11 +1,13 @@
-"""Array types for annotations; arrays that are the same; rows of pieces that follow each other;
-sums and means of rows by number.
+"""Array types for annotations; arrays and what holds them that are the same; rows of pieces that
+follow each other; sums and means of rows by number.
 
 Shapes, units, dtype and space are said where an array is born.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass
 from typing import Any
 
 import numpy as np
@@ -21,6 +23,30 @@ def are_same(one: Floats | Ints | None, other: Floats | Ints | None) -> bool:
     if one is None or other is None:
         return one is other
     return np.array_equal(one, other, equal_nan=True)
+
+
+def same_content(one: Any, other: Any) -> bool:
+    """Whether the same comes of both, to the last bit: of arrays, and of data classes, tuples and
+    mappings that hold them. What a data class has found of itself does not count."""
+    if one is other:
+        return True
+    if type(one) is not type(other):
+        return False
+    if isinstance(one, np.ndarray):
+        shape = one.shape == other.shape and one.dtype == other.dtype
+        return shape and bool(np.array_equal(_bits(one), _bits(other)))
+    if isinstance(one, Mapping):
+        return list(one) == list(other) and all(same_content(one[key], other[key]) for key in one)
+    if isinstance(one, tuple):
+        return len(one) == len(other) and all(map(same_content, one, other))
+    if is_dataclass(one):
+        names = (each.name for each in fields(one))
+        return all(same_content(getattr(one, name), getattr(other, name)) for name in names)
+    return bool(one == other)
+
+
+def _bits(array: Any) -> Ints:
+    return np.ascontiguousarray(array).reshape(-1).view(np.uint8)
 
 
 def piece_starts(counts: Ints) -> Ints:

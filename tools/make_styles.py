@@ -73,7 +73,7 @@ def rig_of(name: str, most: int = 1_000_000) -> tuple[Any, bpy.types.Object]:
     if setup.is_bust(head) and not setup.is_of_face(style):
         face = at_once(setup.face_hair(head, source.head, depsgraph))
         source = replace(source, strands=of_addon("strands.join").joined(source.strands, face))
-    rig = of_addon("blender.colliders.rigs").rig_of(hair, source)
+    rig = of_addon("blender.colliders.rigs").MadeRig.of(hair, source).rig
     return rig, hair
 
 

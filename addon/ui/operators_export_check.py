@@ -8,7 +8,9 @@ import bpy
 from bpy.props import EnumProperty
 
 from ..blender.base.outcome import Outcome
+from ..blender.colliders.rigs import MadeRig
 from ..blender.preview.bake import bakeable
+from ..blender.preview.previews import made_rigs
 from ..blender.strands.export_check import ExportCheck
 from ..exchange.strand_export_settings import StrandExportSettings
 from ..exchange.strand_formats import STRAND_FORMATS, StrandFormat
@@ -32,6 +34,11 @@ def end(of: ExportCheck | None = None) -> None:
     global _check
     if of is None or of is _check:
         _check = None
+
+
+def made() -> tuple[MadeRig, ...]:
+    """Hair that was made ready, by the dialog that is open and by previews."""
+    return (*(() if _check is None else _check.made), *made_rigs().values())
 
 
 def count() -> int:
@@ -121,7 +128,7 @@ class HAIRLOOM_OT_check_export(LongWork, bpy.types.Operator):
         return cls.is_free() and needs_hair(cls, context)
 
     def steps(self, context: bpy.types.Context) -> Steps[None]:
-        own = ExportCheck.of(writable(chosen_hair(context)))
+        own = ExportCheck.of(writable(chosen_hair(context)), made_rigs())
         reading = own.reading(context.evaluated_depsgraph_get(), *_choice(self.engine))
         yield from in_parts(reading)
         begin(own)

@@ -15,6 +15,8 @@ from ..blender.bakes.bake_settings import frame_range
 from ..blender.base.file_names import file_stem, files_of
 from ..blender.base.objects import without_hidden
 from ..blender.base.outcome import Outcome, report
+from ..blender.colliders.rigs import MadeRig
+from ..blender.preview.previews import made_rigs
 from ..blender.properties.properties import property_annotations, settings_of
 from ..blender.strands.export_check import ExportCheck
 from ..blender.strands.strand_export import StrandExport
@@ -98,7 +100,7 @@ class StrandExportOperator(LongWork, ExportHelper):
         if hair and not self.filepath:
             folder = Path(bpy.data.filepath).parent if bpy.data.filepath else Path()
             self.properties.filepath = str(folder / (file_stem(hair[0].name) + self.filename_ext))
-        export_check.begin(ExportCheck.of(hair))
+        export_check.begin(ExportCheck.of(hair, made_rigs()))
         self._refresh(context)
         return super().invoke(context, event)
 
@@ -111,8 +113,9 @@ class StrandExportOperator(LongWork, ExportHelper):
         return export_check.refresh(context, self.kind, settings_of(self, StrandExportSettings))
 
     def steps(self: Any, context: bpy.types.Context) -> Steps[None]:
+        made = export_check.made()
         export_check.end()
-        plans = self._plans(context)
+        plans = self._plans(context, made)
         for done, (path, plan) in enumerate(plans):
             if done:
                 self.unharmed = f"{done:,} of {len(plans):,} files are written"
@@ -125,7 +128,9 @@ class StrandExportOperator(LongWork, ExportHelper):
         export_check.end()
         super().cancel(context)
 
-    def _plans(self, context: bpy.types.Context) -> list[tuple[Path, StrandExport]]:
+    def _plans(
+        self, context: bpy.types.Context, known: tuple[MadeRig, ...]
+    ) -> list[tuple[Path, StrandExport]]:
         """What is written where: one file of all hair, or a file of each."""
         hair, path = self._hair(context), Path(bpy.path.abspath(self.filepath))
         parts = [hair] if self.several == "one" else [[each] for each in hair]
@@ -140,6 +145,7 @@ class StrandExportOperator(LongWork, ExportHelper):
                     self.kind,
                     settings_of(self, StrandExportSettings),
                     frames=self._frames(context.scene),
+                    known=known,
                 ),
             )
             for file, part in zip(files, parts, strict=True)

@@ -290,7 +290,7 @@ def test_esc_says_how_many_of_several_files_are_written() -> None:
     moving = SimpleNamespace(frames=range(2), frame_count=2)
     plans = [(Path("a.abc"), still), (Path("b.abc"), moving)]
     operator = SimpleNamespace(
-        _plans=lambda _: plans, bl_idname="", bl_label="", report=lambda *_: None
+        _plans=lambda *_: plans, bl_idname="", bl_label="", report=lambda *_: None
     )
     steps = StrandExportOperator.steps(operator, bpy.context)
     assert next(steps).text == "0 of 2 frames"

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import bpy
 
 from ... import rig_flow
+from ...arrays import same_content
 from ...dynamics.settings import DynamicsSettings
 from ...groom.children_settings import ChildrenSettings
 from ...groom.settings import GuideSettings
@@ -15,6 +18,9 @@ from ...strands.kept import NOTHING_KEPT, Kept
 from ..properties.groom_settings import GroomSettings
 from ..scene.source import Source
 from .fields import solid_of
+
+#: What a rig is made from of what is read.
+_OF_RIG = ("strands", "head", "density", "masks", "partings", "holders")
 
 
 def rig_from(
@@ -45,10 +51,32 @@ def rig_from(
     )
 
 
-def rig_of(hair: bpy.types.Object, source: Source) -> Rig:
-    """The hair made ready by its own settings, at rest as it was read.
+@dataclass(frozen=True, eq=False)
+class MadeRig:
+    """Hair made ready, and what it was made from: who needs it again need not make it again."""
 
-    Raises:
-        HairloomError: no hair that can be used.
-    """
-    return rig_from(source, GroomSettings.of(hair).sections, place=hair.name)
+    source: Source
+    settings: GroomSettings
+    rig: Rig
+
+    @classmethod
+    def of(cls, hair: bpy.types.Object, source: Source, known: tuple[MadeRig, ...] = ()) -> MadeRig:
+        """The hair made ready by its own settings, at rest as it was read.
+
+        Args:
+            known: what was made before, maybe of this hair; one that is the same is taken.
+
+        Raises:
+            HairloomError: no hair that can be used.
+        """
+        settings = GroomSettings.of(hair)
+        for made in known:
+            if made.is_of(source, settings):
+                return made
+        return cls(source, settings, rig_from(source, settings.sections, place=hair.name))
+
+    def is_of(self, source: Source, settings: GroomSettings) -> bool:
+        """Whether the same rig is made of that, to the last bit."""
+        return self.settings.of_rig == settings.of_rig and all(
+            same_content(getattr(self.source, name), getattr(source, name)) for name in _OF_RIG
+        )

@@ -28,6 +28,7 @@ from ..base.originals import (
 )
 from ..base.redraw import redraw_panels, redraw_views, refresh_panels
 from ..colliders import fields
+from ..colliders.rigs import MadeRig
 from ..scene.fin_modifier import clear, is_shown
 from ..sessions.session import Session
 from ..sessions.together import Together
@@ -178,6 +179,12 @@ def simulated() -> tuple[Simulated, ...]:
 def simulated_in(depsgraph: bpy.types.Depsgraph) -> tuple[Simulated, ...]:
     """Those of them that this evaluation does not leave out."""
     return tuple(each.session for each in previews.values() if not each.is_left_out(depsgraph))
+
+
+def made_rigs() -> dict[int, MadeRig]:
+    """Of the previewed grooms, by session number: each made ready, as it was read last."""
+    made = {session.uid: session.made_rig for session in sessions()}
+    return {uid: each for uid, each in made.items() if each is not None}
 
 
 def session_of(hair: bpy.types.Object | None) -> Session | None:

@@ -36,6 +36,7 @@ from ..base.objects import Body
 from ..base.thread_work import ThreadWork
 from ..colliders.fields import NotMadeYetError
 from ..colliders.obstacles import Obstacles
+from ..colliders.rigs import MadeRig
 from ..properties.groom_settings import GroomSettings
 from ..scene.forces import force_fields_of, gravity_of
 from ..scene.source import Source, dynamics_warnings, refuse_own_dynamics
@@ -139,6 +140,15 @@ class Session:
     def rig(self) -> Rig:
         """The groom in the style of the frame that is shown."""
         return self._styled or self.groom.rig
+
+    @property
+    def made_rig(self) -> MadeRig | None:
+        """The groom made ready, and from what; None without children of its own, as before it is
+        made and where it comes from a bake."""
+        request, groom = self._made
+        if groom.rig.grown is None:
+            return None
+        return MadeRig(request.source, request.settings, groom.rig)
 
     @property
     def posed(self) -> tuple[PosedCollider, ...]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
@@ -14,14 +15,13 @@ from ...exchange.joined_grooms import joined_grooms
 from ...exchange.strand_check import check_lines
 from ...exchange.strand_export_settings import StrandExportSettings
 from ...exchange.strand_formats import StrandFormat
-from ...rig_flow import Rig
 from ..bakes import playback
 from ..bakes.stale_bakes import changed_since
 from ..base.objects import Handle
 from ..base.parts import Part, Parts
-from ..colliders.rigs import rig_from
+from ..colliders.rigs import MadeRig, rig_from
 from ..properties.groom_settings import GroomSettings
-from ..scene.source import Source, read_source
+from ..scene.source import read_source
 from .read_hair import ExportRequest, needs_rig, still_hair
 from .strand_export import StrandExport, request_of
 
@@ -37,13 +37,26 @@ class ExportCheck:
     lines: list[str] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
     _read: dict[ExportRequest, tuple[Groom, tuple[str, ...]]] = field(default_factory=dict)
-    _made: dict[int, tuple[Source, Rig]] = field(default_factory=dict)
+    _made: dict[int, MadeRig] = field(default_factory=dict)
     _stale: dict[int, tuple[str, ...]] = field(default_factory=dict)
     _checked: tuple[StrandFormat, StrandExportSettings] | None = None
 
     @classmethod
-    def of(cls, hair: list[bpy.types.Object]) -> ExportCheck:
-        return cls([Handle.of(each) for each in hair])
+    def of(
+        cls, hair: list[bpy.types.Object], known: Mapping[int, MadeRig] | None = None
+    ) -> ExportCheck:
+        """Args:
+        known: what was made ready of hair, by its session number.
+        """
+        check = cls([Handle.of(each) for each in hair])
+        uids = {each.uid for each in check.hair}
+        check._made = {uid: made for uid, made in (known or {}).items() if uid in uids}
+        return check
+
+    @property
+    def made(self) -> tuple[MadeRig, ...]:
+        """The hair made ready, of which a file is written without making it again."""
+        return tuple(self._made.values())
 
     def reading(
         self,
@@ -57,11 +70,14 @@ class ExportCheck:
             uid, name = hair.session_uid, hair.name
             if not needs_rig(hair, request):
                 continue
-            sections = GroomSettings.of(hair).sections
+            groom = GroomSettings.of(hair)
             with suppress(HairloomError):  # which `refresh` meets as well, and keeps
                 source = read_source(hair, depsgraph)
-                make = partial(rig_from, source, sections, place=name)
-                self._made[uid] = source, (yield Part("Making strands", make))
+                known = self._made.get(uid)
+                if known is None or not known.is_of(source, groom):
+                    make = partial(rig_from, source, groom.sections, place=name)
+                    rig = yield Part("Making strands", make)
+                    self._made[uid] = MadeRig(source, groom, rig)
 
     def refresh(
         self,
@@ -96,10 +112,10 @@ class ExportCheck:
             found = [hair for hair in (each.find() for each in self.hair) if hair is not None]
             if not found:
                 raise HairloomError("it is gone", place="hair", remedy="Export again")
-            outs = [
-                still_hair(each, depsgraph, request, self._made.get(each.session_uid))
-                for each in found
-            ]
+            outs = [still_hair(each, depsgraph, request, self.made) for each in found]
+            for each, out in zip(found, outs, strict=True):
+                if out.made is not None:
+                    self._made[each.session_uid] = out.made
             groom, lost = joined_grooms([out.groom for out in outs], found[0].name)
             notes = dict.fromkeys([note for out in outs for note in out.notes])
             self._read[request] = groom, (*notes, *lost)

@@ -22,8 +22,8 @@ from ..bakes.playback import check_frames
 from ..bakes.stale_bakes import stale_notes
 from ..base.objects import Body, Handle, head_of
 from ..base.suspension import suspended
-from ..colliders.rigs import rig_of
-from ..scene.source import read_source, usable_curves
+from ..colliders.rigs import MadeRig
+from ..scene.source import usable_curves
 from ..scene.surfaces import read_positions
 from .read_hair import ExportRequest, ExportStrands, baked_hair, still_hair
 
@@ -116,6 +116,7 @@ def moving_hair(
     depsgraph: bpy.types.Depsgraph,
     frames: range,
     request: ExportRequest,
+    known: tuple[MadeRig, ...] = (),
     *,
     use_bake: bool,
 ) -> tuple[Moving, tuple[str, ...]]:
@@ -123,6 +124,7 @@ def moving_hair(
 
     Args:
         frames: scene frames.
+        known: see `still_hair`.
         use_bake: go by its bake, if it has one.
 
     Raises:
@@ -137,10 +139,10 @@ def moving_hair(
     rate = frame_rate(depsgraph.scene)
     with _scene_kept() as go_to:
         depsgraph = go_to(frames[0])
-        out = still_hair(hair, depsgraph, request)
+        out = still_hair(hair, depsgraph, request, known)
         moving: Moving = ShownMotion(out, Handle.of(hair), rate)
-        if out.has_children:
-            moving = _children_motion(hair, depsgraph, out, rate)
+        if out.has_children and out.made is not None:
+            moving = _children_motion(hair, depsgraph, out, out.made, rate)
     notes: tuple[str, ...] = ()
     if use_bake:
         notes = (
@@ -205,11 +207,13 @@ def _scene_kept() -> Iterator[Callable[[int], bpy.types.Depsgraph]]:
 
 
 def _children_motion(
-    hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph, out: ExportStrands, rate: float
+    hair: bpy.types.Object,
+    depsgraph: bpy.types.Depsgraph,
+    out: ExportStrands,
+    made: MadeRig,
+    rate: float,
 ) -> ChildrenMotion:
-    source = read_source(hair, depsgraph)
-    rig = rig_of(hair, source)
-    head = head_of(hair)
+    rig, head = made.rig, head_of(hair)
     body = hair if head is None or rig.head is None else head
     return ChildrenMotion(
         out,
@@ -217,7 +221,7 @@ def _children_motion(
         rate,
         rig,
         rig.guides,
-        source.strands.strand_count,
+        made.source.strands.strand_count,
         Body.at_rest(body, depsgraph),
     )
 

@@ -25,7 +25,7 @@ from ...strands.resample import resample
 from ..bakes import playback
 from ..bakes.cache import Cache
 from ..base.outcome import notes_of
-from ..colliders.rigs import rig_of
+from ..colliders.rigs import MadeRig
 from ..properties.groom_settings import GroomSettings
 from ..scene.groom_attributes import group_names, stored_groom
 from ..scene.painted_colors import read_colors
@@ -56,6 +56,7 @@ class ExportStrands:
     copied: indices of the points of `seen` that are there once more behind them.
     dropped: reason -> number of curves left out.
     notes: what the artist should know.
+    made: its hair made ready, where it had to be.
     has_children: whether there are strands that are no curves.
     """
 
@@ -64,6 +65,7 @@ class ExportStrands:
     copied: Ints
     dropped: Mapping[str, int] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    made: MadeRig | None = None
     has_children: bool = False
 
     def points(self, seen: Floats) -> Floats:
@@ -80,34 +82,35 @@ def still_hair(
     hair: bpy.types.Object,
     depsgraph: bpy.types.Depsgraph,
     request: ExportRequest,
-    known: tuple[Source, Rig] | None = None,
+    known: tuple[MadeRig, ...] = (),
 ) -> ExportStrands:
     """All strands after the modifiers, with their own points; or guides and children if there are.
 
     Guides that the hair has marked stay; else there are copies of those that Hairloom chooses.
 
     Args:
-        known: the same hair as it was read and made ready before.
+        known: what was made ready before, maybe of the same hair.
 
     Raises:
         HairloomError: no hair that can be used, or one of another scale than its head.
     """
-    source, rig = (read_source(hair, depsgraph), None) if known is None else known
+    source = read_source(hair, depsgraph)
     has_children = hair.data.hairloom.children.method != "none"
-    if has_children and rig is None:
-        rig = rig_of(hair, source)
-    if has_children and rig is not None and rig.own_count is not None:
+    made = MadeRig.of(hair, source, known) if has_children else None
+    if made is not None and made.rig.own_count is not None:
+        rig = made.rig
         strands = with_colors(rig.strands, source.colors, _look(hair))
         groom = Groom(strands, hair.name, group_names=group_names(hair))
-        out = replace(_out(groom, rig, request, _look(hair)), has_children=True)
+        out = replace(_out(groom, rig, request, _look(hair)), made=made, has_children=True)
         return _with_notes(hair, source, out, rig)
     said = _without_empty_marks(stored_groom(hair, depsgraph, source.kept))
     if request.guides and "is_guide" not in said:
-        rig = rig or rig_of(hair, source)
-        strands = _as_wide_as_drawn(hair, source.strands)
+        made = made or MadeRig.of(hair, source, known)
+        rig, strands = made.rig, _as_wide_as_drawn(hair, source.strands)
         strands = with_colors(_bound_as(strands, rig.strands), source.colors, _look(hair))
         groom = Groom(strands, hair.name, **said)
-        return _with_notes(hair, source, _out(groom, rig, request, _look(hair)), rig)
+        out = replace(_out(groom, rig, request, _look(hair)), made=made)
+        return _with_notes(hair, source, out, rig)
     strands = _as_wide_as_drawn(hair, source.strands)
     needs_roots = request.roots or strands.root_uv is None or source.colors is not None
     if source.head is not None and needs_roots:

@@ -23,6 +23,7 @@ from ...exchange.strand_writing import WrittenStrands, write_strands
 from ...exchange.tfxbone import BoneWeights
 from ..base.outcome import Outcome
 from ..base.thread_work import ThreadWork
+from ..colliders.rigs import MadeRig
 from ..scene.bone_weights import bones_of, has_bones, unmoved_by
 from .groom_motion import Moving, common_rate, moving_hair, positions_of
 from .read_hair import ExportRequest, ExportStrands, still_hair
@@ -62,11 +63,13 @@ class StrandExport:
         settings: StrandExportSettings,
         *,
         frames: range | None = None,
+        known: tuple[MadeRig, ...] = (),
     ) -> StrandExport:
         """Read hair of the scene; several become one groom, each with groups of its own.
 
         Args:
             frames: scene frames; None: as it is now.
+            known: see `still_hair`.
 
         Raises:
             HairloomError: no hair that can be used, frames that were not baked, or an engine or
@@ -76,10 +79,10 @@ class StrandExport:
         has_roots = with_bones and any(has_bones(each) for each in hair)
         request = replace(request_of(kind, settings), roots=has_roots)
         if frames is None:
-            outs, moving, notes = _still(hair, depsgraph, request)
+            outs, moving, notes = _still(hair, depsgraph, request, known)
         else:
             outs, moving, notes = _moving(
-                hair, depsgraph, request, frames, use_bake=settings.use_bake
+                hair, depsgraph, request, frames, known, use_bake=settings.use_bake
             )
         groom, lost = joined_grooms([out.groom for out in outs], hair[0].name)
         bones, missing = None, tuple[str, ...]()
@@ -181,9 +184,12 @@ def request_of(kind: StrandFormat, settings: StrandExportSettings) -> ExportRequ
 
 
 def _still(
-    hair: list[bpy.types.Object], depsgraph: bpy.types.Depsgraph, request: ExportRequest
+    hair: list[bpy.types.Object],
+    depsgraph: bpy.types.Depsgraph,
+    request: ExportRequest,
+    known: tuple[MadeRig, ...],
 ) -> tuple[list[ExportStrands], tuple[Moving, ...], tuple[str, ...]]:
-    return [still_hair(each, depsgraph, request) for each in hair], (), ()
+    return [still_hair(each, depsgraph, request, known) for each in hair], (), ()
 
 
 def _moving(
@@ -191,13 +197,14 @@ def _moving(
     depsgraph: bpy.types.Depsgraph,
     request: ExportRequest,
     frames: range,
+    known: tuple[MadeRig, ...],
     *,
     use_bake: bool,
 ) -> tuple[list[ExportStrands], tuple[Moving, ...], tuple[str, ...]]:
     moving: list[Moving] = []
     notes: list[str] = []
     for each in hair:
-        part, said = moving_hair(each, depsgraph, frames, request, use_bake=use_bake)
+        part, said = moving_hair(each, depsgraph, frames, request, known, use_bake=use_bake)
         moving.append(part)
         notes += said
     return [part.out for part in moving], tuple(moving), tuple(notes)

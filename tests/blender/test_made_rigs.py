@@ -1,0 +1,259 @@
+"""Strands that are made ready for a preview or a dialog are not made again for a file, and never
+taken where anything has changed since."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+import pytest
+
+from hairloom.addon.blender.base import latest_job
+from hairloom.addon.blender.colliders import rigs
+from hairloom.addon.blender.preview import previews
+from hairloom.addon.blender.scene.partings import partings_of
+from hairloom.addon.blender.strands.export_check import ExportCheck
+from hairloom.addon.blender.strands.strand_export import StrandExport
+from hairloom.addon.exchange.strand_export_settings import StrandExportSettings
+from hairloom.addon.exchange.strand_formats import ALEMBIC, TRESSFX
+from hairloom.addon.ui import operators_export_check
+
+
+@pytest.fixture
+def made(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """The names of hair, each time it is made ready."""
+    names: list[str] = []
+    prepare = rigs.rig_flow.prepare
+
+    def counted(*arguments: Any, **named: Any) -> Any:
+        names.append(named["place"])
+        return prepare(*arguments, **named)
+
+    monkeypatch.setattr(rigs.rig_flow, "prepare", counted)
+    return names
+
+
+@pytest.fixture
+def hair(new_hair: Callable[..., Any], sphere: Any) -> Iterator[Any]:
+    """With children that are painted, a parting, and a head that frames move."""
+    group = sphere.vertex_groups.new(name="Thick")
+    group.add(list(range(len(sphere.data.vertices))), 1.0, "REPLACE")
+    sphere.location.x = 0.0
+    sphere.keyframe_insert("location", frame=1)
+    sphere.location.x = 0.2
+    sphere.keyframe_insert("location", frame=5)
+    bpy.context.scene.frame_set(1)
+    made = new_hair(sphere)
+    made.data.hairloom.children.method, made.data.hairloom.children.strand_count = "multi", 200
+    made.hairloom.children_density = "Thick"
+    assert bpy.ops.hairloom.add_parting() == {"FINISHED"}
+    chosen(made)
+    bpy.context.view_layer.update()
+    yield made
+    operators_export_check.end()
+
+
+def chosen(hair: Any) -> None:
+    for other in bpy.context.selected_objects:
+        other.select_set(False)
+    hair.select_set(True)
+    bpy.context.view_layer.objects.active = hair
+
+
+def written(path: Path) -> bytes:
+    assert bpy.ops.hairloom.export_tressfx(filepath=str(path)) == {"FINISHED"}
+    return path.read_bytes()
+
+
+def comb(hair: Any) -> None:
+    hair.data.position_data[7].vector.z += 0.01
+    hair.data.update_tag()
+
+
+def sculpt(hair: Any) -> None:
+    for vertex in hair.data.surface.data.vertices:
+        vertex.co *= 1.05
+    hair.data.surface.data.update_tag()
+
+
+def move_head(hair: Any) -> None:
+    hair.data.surface.animation_data_clear()
+    hair.data.surface.location.z = 0.3
+
+
+def unwrap(hair: Any) -> None:
+    for loop in hair.data.surface.data.uv_layers[0].uv:
+        loop.vector.x *= 0.5
+    hair.data.surface.data.update_tag()
+
+
+def paint(hair: Any) -> None:
+    head = hair.data.surface
+    head.vertex_groups["Thick"].add(list(range(0, 150)), 0.0, "REPLACE")
+    head.data.update_tag()
+
+
+def grow_more(hair: Any) -> None:
+    hair.data.hairloom.children.strand_count = 250
+
+
+def give_guides_more_points(hair: Any) -> None:
+    hair.data.hairloom.guides.cv_count = 24
+
+
+def widen(hair: Any) -> None:
+    hair.data.hairloom.widths.method = "auto"
+
+
+def forget_density(hair: Any) -> None:
+    hair.hairloom.children_density = ""
+
+
+def part_elsewhere(hair: Any) -> None:
+    (line,) = partings_of(hair)
+    line.location.x += 0.03
+
+
+def go_to_another_frame(_hair: Any) -> None:
+    bpy.context.scene.frame_set(4)
+
+
+def undo_a_stroke(hair: Any) -> None:
+    """As undo does, which puts other curves into the same object."""
+    points = np.empty(len(hair.data.points) * 3, np.float32)
+    hair.data.position_data.foreach_get("vector", points)
+    hair.data.position_data.foreach_set("vector", points * np.float32(1.01))
+    hair.data.update_tag()
+
+
+CHANGES = (
+    comb,
+    sculpt,
+    move_head,
+    unwrap,
+    paint,
+    grow_more,
+    give_guides_more_points,
+    widen,
+    forget_density,
+    part_elsewhere,
+    go_to_another_frame,
+    undo_a_stroke,
+)
+
+
+def test_a_file_of_previewed_hair_has_its_strands(
+    hair: Any, evaluated: Any, tmp_path: Path, made: list[str]
+) -> None:
+    own = written(tmp_path / "own.tfx")
+    assert made == ["Hair"]
+    previews.start(hair, evaluated())
+    made.clear()
+    assert written(tmp_path / "again.tfx") == own and not made, "the preview has them"
+    previews.stop(previews.sessions()[0])
+    assert written(tmp_path / "last.tfx") == own and made == ["Hair"], "nothing is kept"
+
+
+@pytest.mark.parametrize("change", CHANGES, ids=lambda change: change.__name__)
+def test_strands_of_a_preview_are_not_taken_for_other_hair(
+    hair: Any, evaluated: Any, tmp_path: Path, made: list[str], change: Any
+) -> None:
+    """Though the preview has not read it yet."""
+    before = written(tmp_path / "before.tfx")
+    previews.start(hair, evaluated())
+    change(hair)
+    bpy.context.view_layer.update()
+    made.clear()
+    found = written(tmp_path / "found.tfx")
+    assert made == ["Hair"], "it is other hair"
+    previews.stop_all()
+    assert found == written(tmp_path / "own.tfx") and found != before
+
+
+def test_strands_of_a_preview_are_taken_again_once_it_has_read_an_edit(
+    hair: Any, evaluated: Any, tmp_path: Path, made: list[str]
+) -> None:
+    session = previews.start(hair, evaluated())
+    comb(hair)
+    session.read_again(evaluated())
+    made.clear()
+    found = written(tmp_path / "found.tfx")
+    assert not made
+    previews.stop_all()
+    assert found == written(tmp_path / "own.tfx")
+
+
+def test_strands_of_a_bake_are_those_that_were_baked(
+    hair: Any, evaluated: Any, tmp_path: Path, made: list[str]
+) -> None:
+    """And a file has those of the curves, as they are made now."""
+    bpy.context.scene.frame_start, bpy.context.scene.frame_end = 1, 2
+    hair.hairloom.dynamics.collider_resolution = 16
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "file.blend"))
+    assert bpy.ops.hairloom.bake() == {"FINISHED"}
+    previews.stop_all()
+    session = previews.start(hair, evaluated())
+    assert session.rig.child_count and session.rig.grown is None, "it has those of the bake"
+    assert not previews.made_rigs()
+    made.clear()
+    written(tmp_path / "own.tfx")
+    assert made == ["Hair"]
+
+
+def test_hair_that_is_not_made_yet_is_made_for_the_file(
+    hair: Any, evaluated: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    own = written(tmp_path / "own.tfx")
+    monkeypatch.setattr(latest_job, "is_blocking", lambda: False)
+    session = previews.start(hair, evaluated())
+    assert not session.is_made and written(tmp_path / "found.tfx") == own
+
+
+def test_the_dialog_makes_strands_once_and_the_file_has_them(
+    hair: Any, tmp_path: Path, made: list[str]
+) -> None:
+    check, depsgraph = ExportCheck.of([hair]), bpy.context.evaluated_depsgraph_get()
+    check.refresh(depsgraph, TRESSFX, StrandExportSettings())
+    assert made == ["Hair"]
+    check.refresh(depsgraph, ALEMBIC, StrandExportSettings())
+    assert made == ["Hair"], "another format has the same strands"
+    operators_export_check.begin(check)
+    found = written(tmp_path / "found.tfx")
+    assert made == ["Hair"]
+    assert not operators_export_check.made(), "they are kept no longer than the dialog"
+    assert found == written(tmp_path / "own.tfx") and made == ["Hair", "Hair"]
+    operators_export_check.begin(check)
+    comb(hair)
+    bpy.context.view_layer.update()
+    edited = written(tmp_path / "edited.tfx")
+    assert edited == written(tmp_path / "as_it_is.tfx") != own_bytes(tmp_path)
+    assert len(made) == 4, "it was edited while the dialog was open"
+
+
+def own_bytes(folder: Path) -> bytes:
+    return (folder / "own.tfx").read_bytes()
+
+
+def test_the_dialog_takes_strands_of_the_preview(
+    hair: Any, evaluated: Any, made: list[str]
+) -> None:
+    previews.start(hair, evaluated())
+    made.clear()
+    check = ExportCheck.of([hair], previews.made_rigs())
+    list(check.reading(evaluated(), TRESSFX, StrandExportSettings()))
+    check.refresh(evaluated(), TRESSFX, StrandExportSettings())
+    assert check.lines and not made
+
+
+def test_frames_of_children_are_of_strands_that_were_made_once(
+    hair: Any, evaluated: Any, made: list[str]
+) -> None:
+    plan = StrandExport.of(
+        [hair], evaluated(), ALEMBIC, StrandExportSettings(use_bake=False), frames=range(1, 3)
+    )
+    assert made == ["Hair"]
+    one, two = plan.positions()
+    assert not np.array_equal(one, two)

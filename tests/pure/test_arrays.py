@@ -1,0 +1,60 @@
+"""When what holds arrays is the same to the last bit."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pytest
+
+from hairloom.addon.arrays import same_content
+from hairloom.addon.strands import Surface
+
+
+@dataclass(frozen=True, eq=False)
+class Held:
+    array: Any
+    name: str = ""
+
+
+CORNERS = np.eye(3, dtype=np.float32)
+
+
+@pytest.mark.parametrize(
+    ("one", "other"),
+    [
+        (np.array([0.0, np.nan]), np.array([0.0, np.nan])),
+        (np.zeros((0, 3)), np.zeros((0, 3))),
+        (np.arange(6)[::2], np.array([0, 2, 4])),
+        (Held(CORNERS, "a"), Held(CORNERS.copy(), "a")),
+        ((1, Held(None)), (1, Held(None))),
+        ({"a": CORNERS}, {"a": CORNERS.copy()}),
+    ],
+)
+def test_it_is_the_same(one: Any, other: Any) -> None:
+    assert same_content(one, other)
+
+
+@pytest.mark.parametrize(
+    ("one", "other"),
+    [
+        (np.array([0.0]), np.array([-0.0])),
+        (CORNERS, CORNERS.astype(np.float64)),
+        (CORNERS, CORNERS.ravel()),
+        (CORNERS, None),
+        (Held(CORNERS, "a"), Held(CORNERS, "b")),
+        (Held(CORNERS), Held(2.0 * CORNERS)),
+        ((1,), (1, 2)),
+        ({"a": 1}, {"b": 1}),
+        ({"a": 1, "b": 2}, {"b": 2, "a": 1}),
+    ],
+)
+def test_it_is_not_the_same(one: Any, other: Any) -> None:
+    assert not same_content(one, other)
+
+
+def test_what_was_found_of_it_does_not_count() -> None:
+    one, other = (Surface(CORNERS, np.array([[0, 1, 2]])) for _ in range(2))
+    one.vertex_normals()
+    assert same_content(one, other) and same_content(other, one)
