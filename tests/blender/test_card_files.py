@@ -395,6 +395,14 @@ def test_the_format_may_be_named_and_others_are_refused(
     assert "levels" in capfd.readouterr().err
 
 
+def test_a_name_that_is_too_long_for_what_lies_beside_is_refused_before_any_work(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(files, "build_steps", lambda *_, **__: pytest.fail("it has begun"))
+    assert cards(tmp_path / f"{'x' * 240}.glb", "--levels", "1") == 1
+    assert "Choose a shorter name" in capfd.readouterr().err
+
+
 def test_a_button_writes_under_the_hairs_name(sphere: Any, tmp_path: Path) -> None:
     grown(sphere, "Haar/Ä.001")
     out = tmp_path / "Haar_Ä.obj"

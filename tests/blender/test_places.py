@@ -39,6 +39,12 @@ REFUSED = [
     (["bake", "--scene", "wig.blend", "--output", "kept"], "other files too, such as notes.txt. "),
     ([*EXPORT, "--output", "hair.tfx"], "the job reads this"),
     ([*EXPORT, "--output", "link.tfx"], "the job reads this"),
+    ([*EXPORT, "--output", ""], "this names a folder, and no file in it"),
+    ([*EXPORT, "--output", "/"], "this names a folder, and no file in it"),
+    ([*EXPORT, "--output", f"{'x' * 252}.tfx"], "Choose a shorter name"),
+    ([*EXPORT, "--output", f"{'x' * 400}/a.tfx"], "Choose a shorter name"),
+    ([*EXPORT, "--output", f"{'x' * 244}.tfx", "--skip-existing"], "Choose a shorter name"),
+    (["simulate", "--groom", "hair.tfx", "--output", "x" * 256], "Choose a shorter name"),
     ([*EXPORT, "--output", "a.tfx", "--report", "look.json", "--preset", "look.json"], "reads"),
 ]
 

@@ -104,6 +104,8 @@ _RAMP_SIZE = 256
 _PIGMENT = {"pigment", "melanin", "redness", "absorption"}
 #: of strands alone: a material of cards has what they do in its textures
 _OF_STRANDS = {"model", "color_source", "color_map", "brow_source", "brow_color"}
+#: what the longest name of a file beside adds to the mesh's, or more
+_LONGEST = "_motion_position.exr"
 _OF_KIND = {"color": "scene-linear Rec. 709", "choice": "name", "toggle": "true or false"}
 
 #: What is being done, and which fraction of it is done; None where that is unknown.
@@ -186,6 +188,7 @@ def check_output(path: Path, output: CardOutput, motion: GuideMotion | None) -> 
     """
     path, file_format = format_of(path, output.format)
     check_place(path)
+    check_place(path.with_name(path.stem + _LONGEST))
     _check_neighbours(path)
     check_exporter(file_format, str(path))
     check_page(output.settings, file_format, str(path))

@@ -22,7 +22,7 @@ from typing import Any
 import bpy
 
 from ...errors import HairloomError
-from ...exchange.files.atomic import write_text_atomic
+from ...exchange.files.atomic import check_place, write_text_atomic
 from ...exchange.named_files import named_files
 from ...params.preset import preset_as_dict
 from ..base.digests import digest
@@ -40,7 +40,8 @@ class Stamp:
     """The stamp of one job, beside its output.
 
     Raises:
-        HairloomError: the job names no output, or saves over its own input.
+        HairloomError: the job names no output, or saves over its own input; or nothing can be
+            written beside its output.
     """
 
     def __init__(self, options: argparse.Namespace) -> None:
@@ -57,8 +58,10 @@ class Stamp:
                 place="--skip-existing",
                 remedy="Save another file: --save-as, or --output",
             )
+        output = Path(os.path.abspath(output))  # "." has a name then
         self.path = output.with_name(output.name + SUFFIX)
-        self._folder = Path(os.path.abspath(self.path.parent))
+        check_place(self.path)
+        self._folder = self.path.parent
         self._asked = _asked(options, self._folder)
         self._begun = time.time_ns()
         self._inputs = {path: file_digest(Path(path)) for path in _files_read(options)}

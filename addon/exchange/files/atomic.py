@@ -28,6 +28,7 @@ _REMEDIES = {
     DISK_FULL: _SPACE,
     os.strerror(errno.EDQUOT): _SPACE,
     os.strerror(errno.EFBIG): "Choose a folder on a disk that takes files of this size",
+    os.strerror(errno.ENAMETOOLONG): "Choose a shorter name",
     os.strerror(errno.EROFS): _RIGHTS,
     # on Windows the same is said of a file that is open
     _NO_RIGHTS: _RIGHTS if os.name == "posix" else f"{_RIGHTS}, and close what uses the file",
@@ -135,7 +136,16 @@ def check_place(path: Path) -> None:
         HairloomError: what has this name cannot be replaced, or no file can be made in its folder.
     """
     check_name(path)
-    why = why_not_replaced(path) or _why_no_file(path)
+    if not path.name:
+        raise HairloomError(
+            "this names a folder, and no file in it",
+            place=str(path),
+            remedy="Give the name of a file; if it comes from a variable, that may be empty",
+        )
+    try:
+        why = why_not_replaced(path) or _why_no_file(path)
+    except OSError as error:  # a name that is too long
+        why = error.strerror or str(error)
     if why:
         raise unwritable(path, why)
 
@@ -147,11 +157,14 @@ def check_folder_place(folder: Path) -> None:
         HairloomError: a file has this name, or no file can be made there.
     """
     check_name(folder)
-    if folder.exists() and not folder.is_dir():
+    try:
+        is_file, why = folder.exists() and not folder.is_dir(), _why_no_file(folder / "file")
+    except OSError as error:  # a name that is too long
+        is_file, why = False, error.strerror or str(error)
+    if is_file:
         raise HairloomError(
             "a file has this name", place=str(folder), remedy="Choose a folder, or a new name"
         )
-    why = _why_no_file(folder / "file")
     if why:
         raise folder_unwritable(folder, why)
 
