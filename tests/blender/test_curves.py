@@ -7,6 +7,7 @@ import bpy
 import numpy as np
 import pytest
 from mathutils import Euler, Matrix
+from node_modifiers import with_modifier
 
 from hairloom.addon.blender.base.attributes import set_attribute
 from hairloom.addon.blender.scene.curves import (
@@ -82,22 +83,6 @@ def test_more_points_than_are_moved_at_once(evaluated):
     obj.matrix_world = Matrix.Translation((10.0, 0.0, 0.0))
     read = read_curves(obj, evaluated()).strands
     assert read.points == pytest.approx(strands.points + np.array([10.0, 0.0, 0.0]), abs=2e-6)
-
-
-def with_modifier(obj, *nodes):
-    """A geometry nodes modifier that sends the curves through these nodes."""
-    tree = bpy.data.node_groups.new("Nodes", "GeometryNodeTree")
-    for in_out in ("INPUT", "OUTPUT"):
-        tree.interface.new_socket("Geometry", in_out=in_out, socket_type="NodeSocketGeometry")
-    source = tree.nodes.new("NodeGroupInput").outputs[0]
-    for kind, inputs in nodes:
-        node = tree.nodes.new(kind)
-        for name, value in inputs.items():
-            node.inputs[name].default_value = value
-        tree.links.new(source, node.inputs[0])
-        source = node.outputs[0]
-    tree.links.new(source, tree.nodes.new("NodeGroupOutput").inputs[0])
-    obj.modifiers.new("Nodes", "NODES").node_group = tree
 
 
 def test_modifiers_are_applied(evaluated):

@@ -54,6 +54,7 @@ from ...shading.texture_settings import TextureSettings
 from ...shading.textures import TEXTURES, HairTextures, hair_textures
 from ...shading.volume.card_opacity import UPRIGHT_SHOWN, StrandArea, card_shadow_area
 from ..base.gpu_context import ensure_gpu
+from ..base.objects import head_of
 from ..base.outcome import notes_of
 from ..base.thread_work import ThreadWork
 from ..colliders.rigs import rig_from
@@ -109,9 +110,17 @@ def read_inputs(
     notes: tuple[str, ...] = ()
     dropped: dict[str, int] = {}
     if rig is None:
-        source = read_source(hair, depsgraph)
+        read = read_source(hair, depsgraph)
+        source = read.at_rest
         rig, colors = rig_from(source, settings, place=hair.name), source.colors
         notes, dropped = source.warnings, source.dropped
+        if read.rest is not None:
+            frame, head = depsgraph.scene.frame_current, head_of(hair)
+            assert head is not None
+            notes += (
+                f"{hair.name}: {head.name} is posed in frame {frame}. The cards are those of the"
+                " rest pose, in which engines bind skeletons.",
+            )
     else:
         triangle_count = None if rig.head is None else len(rig.head.triangles)
         colors, notes = read_colors(hair, depsgraph, triangle_count)

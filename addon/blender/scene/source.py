@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import bpy
 
@@ -11,6 +11,8 @@ from ...errors import HairloomError
 from ...groom.children_settings import ChildrenSettings
 from ...groom.masks import Mask, Masks
 from ...groom.painted_color import PaintedColor
+from ...groom.rest_hair import DEFORMED, RestHair
+from ...groom.root_fit import LOOSE_DISTANCE
 from ...groom.ties import NO_HOLDERS, Holders
 from ...strands import StrandSet, Surface
 from ...strands.clean import Cleaned
@@ -21,7 +23,7 @@ from .curves import read_curves
 from .masks import Canvas
 from .painted_colors import read_colors
 from .partings import read_partings
-from .surfaces import read_surface
+from .surfaces import read_rest_surface, read_surface
 
 #: node group of the modifier that Blender 5.2 gives to new hair
 _OWN_DYNAMICS = "Hair Dynamics"
@@ -41,6 +43,7 @@ class Source:
     holders: what holds it beside its roots, at rest.
     partings: the straight pieces of its partings, (n, 2, 3) [m] world space; None: there are none.
     parting_warnings: about objects that cannot be partings.
+    rest: the hair as it is stored, where it had to be put onto the posed head; else None.
     """
 
     strands: StrandSet
@@ -57,6 +60,14 @@ class Source:
     holders: Holders = NO_HOLDERS
     partings: Floats | None = None
     parting_warnings: tuple[str, ...] = ()
+    rest: RestHair | None = None
+
+    @property
+    def at_rest(self) -> Source:
+        """The hair as it is stored, on the undeformed head."""
+        if self.rest is None:
+            return self
+        return replace(self, strands=self.rest.strands, head=self.rest.surface, rest=None)
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -85,16 +96,15 @@ def read_source(
     """
     read = usable_curves(hair, depsgraph)
     head, head_warning = _read_head(hair, depsgraph)
-    canvas = Canvas(
-        hair, head_of(hair), head, read.strands, read.kept, {} if good is None else good
-    )
+    strands, rest = _on_head(hair, read.strands, head, depsgraph)
+    canvas = Canvas(hair, head_of(hair), head, strands, read.kept, {} if good is None else good)
     density, density_warning = read_density(hair, canvas, depsgraph)
     settings = settings_of(hair.data.hairloom.children, ChildrenSettings)
     masks, mask_warnings = canvas.masks(settings, depsgraph)
-    colors, color_warnings = read_source_colors(hair, read.strands, head, depsgraph)
+    colors, color_warnings = read_source_colors(hair, strands, head, depsgraph)
     partings, parting_warnings = read_partings(hair, depsgraph)
     return Source(
-        read.strands,
+        strands,
         read.dropped,
         read.kept,
         head,
@@ -107,7 +117,33 @@ def read_source(
         color_warnings,
         partings=partings if len(partings) else None,
         parting_warnings=parting_warnings,
+        rest=rest,
     )
+
+
+def shown_curves(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Cleaned:
+    """Like `usable_curves`, on the head as it is posed."""
+    read, (head, _) = usable_curves(hair, depsgraph), _read_head(hair, depsgraph)
+    return replace(read, strands=_on_head(hair, read.strands, head, depsgraph)[0])
+
+
+def _on_head(
+    hair: bpy.types.Object,
+    strands: StrandSet,
+    head: Surface | None,
+    depsgraph: bpy.types.Depsgraph,
+) -> tuple[StrandSet, RestHair | None]:
+    """Strands on the head as it is posed, and as they are stored, if they had to be put there. An
+    animated style is where its curves are."""
+    if head is None or hair.hairloom.dynamics.animated_style:
+        return strands, None
+    rest, is_deformed_only = read_rest_surface(head_of(hair), depsgraph, head)
+    if rest is None:
+        return strands, None
+    # Subdivision moves a surface too, which is no pose
+    least = DEFORMED if is_deformed_only else LOOSE_DISTANCE
+    found = RestHair.found(strands, rest, head, least)
+    return (strands, None) if found is None else (found.on(head), found)
 
 
 def read_source_colors(

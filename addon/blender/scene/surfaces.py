@@ -9,7 +9,7 @@ from __future__ import annotations
 import weakref
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import bpy
 import numpy as np
@@ -17,6 +17,7 @@ import numpy as np
 from ...arrays import Floats, Ints
 from ...errors import HairloomError
 from ...strands import Surface
+from ...strands.affine import moved
 from ..base.attributes import read_attribute
 from ..base.mesh_arrays import of_triangles, triangle_corners
 from ..base.objects import as_mesh
@@ -77,6 +78,27 @@ def read_surface(
             )
         surface = Surface(_positions(mesh), triangles, corner_uv)
     return _read.kept(surface.transformed(np.array(obj.evaluated_get(depsgraph).matrix_world)))
+
+
+def read_rest_surface(
+    obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, posed: Surface
+) -> tuple[Surface | None, bool]:
+    """The same mesh before its shape keys and modifiers, with the triangles of the posed one, and
+    whether these only deform it; None where that is not known.
+
+    Args:
+        posed: as `read_surface` gives it now.
+    """
+    with evaluated_mesh(obj, depsgraph, obj.name) as mesh:
+        rest = read_attribute(mesh, "rest_position", "POINT", 3)
+    original = obj.original.data
+    is_deformed_only = len(original.vertices) == len(posed.positions)
+    if rest is None and is_deformed_only:
+        rest = _positions(original)
+    if rest is None or rest.shape != posed.positions.shape or not np.isfinite(rest).all():
+        return None, is_deformed_only
+    matrix = np.array(obj.evaluated_get(depsgraph).matrix_world)
+    return replace(posed, positions=moved(rest, matrix)), is_deformed_only
 
 
 def _is_same(one: Surface, other: Surface) -> bool:

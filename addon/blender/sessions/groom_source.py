@@ -15,6 +15,7 @@ from ...dynamics.painted import PaintedGuides
 from ...dynamics.settings import DynamicsSettings
 from ...groom.children_settings import ChildrenSettings
 from ...groom.masks import NO_MASKS, Mask, Masks, mask_names
+from ...groom.rest_hair import RestHair
 from ...paint_flow import painted_guides
 from ...rig_flow import Pose, Rig
 from ...shading.ambient_settings import AmbientSettings
@@ -149,17 +150,33 @@ class GroomSource:
     def _rig_of(self, baked: BakedRig) -> Rig:
         """The rig of a bake; rest is where hair and head were then."""
         back = baked.rests.hair @ np.linalg.pinv(self.hair.rest)
-        strands = self.source.strands.transformed(back)
         lines = self.source.partings
         if lines is not None:
             lines = moved(lines.reshape(-1, 3), back).reshape(-1, 2, 3)
         rig = _with_uv(baked.rig, self.source.head)
-        head = rig.head
-        self.source = replace(self.source, strands=strands, head=head, partings=lines)
+        strands, rest = self._in_pose_of(baked, back)
+        self.source = replace(
+            self.source, strands=strands, head=rig.head, partings=lines, rest=rest
+        )
         self.hair.rest = baked.rests.hair
         if self.head is not None and baked.rests.head is not None:
             self.head.rest = baked.rests.head
         return rig
+
+    def _in_pose_of(self, baked: BakedRig, back: Floats) -> tuple[StrandSet, RestHair | None]:
+        """The strands where body and head were at the rest of a bake, and as they are stored if
+        they had to be put there.
+
+        Args:
+            back: (4, 4), from where the hair's object is to where it was.
+        """
+        read, start = self.source.at_rest, self.source.at_rest.head
+        strands, head = read.strands.transformed(back), baked.rig.head
+        if start is None or head is None or self.head is None or baked.rests.head is None:
+            return strands, None
+        start = start.transformed(baked.rests.head @ np.linalg.pinv(self.head.rest))
+        rest = RestHair.found(strands, start, head)
+        return (strands, None) if rest is None else (rest.on(head), rest)
 
     def has_another_head(self) -> bool:
         """Whether the artist has set another surface since."""
@@ -178,12 +195,14 @@ class GroomSource:
         hair, known = self.hair.found(), self.request
         before = known.source
         settings = GroomSettings.of(hair)
-        read, strands, back = self._read_curves(hair, depsgraph)
+        read, stored, back = self._read_curves(hair, depsgraph)
+        rest = None if before.rest is None else replace(before.rest, strands=stored)
+        strands = self._on_head(stored)
         is_animated = settings[DynamicsSettings].animated_style
         if is_animated and np.array_equal(strands.offsets, before.strands.offsets):
             strands = strands.with_points(before.strands.points)  # each frame has its own
         if _same(strands, before.strands, back):
-            strands = before.strands
+            strands, rest = before.strands, before.rest
         canvas = self._canvas(replace(before, strands=strands, kept=read.kept))
         self._read_motion_masks(canvas, settings, depsgraph)
         density, warning = read_density(hair, canvas, depsgraph)
@@ -200,6 +219,7 @@ class GroomSource:
             before,
             holders=holding.holders,
             strands=strands,
+            rest=rest,
             dropped=read.dropped,
             kept=read.kept,
             density=density,
@@ -233,11 +253,18 @@ class GroomSource:
     def _read_curves(
         self, hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph
     ) -> tuple[Cleaned, StrandSet, Floats]:
-        """The curves, these as strands at rest, and the way back there (4, 4)."""
+        """The curves, these as strands where the object was at rest, and the way back (4, 4)."""
         read = usable_curves(hair, depsgraph)
         back = self.hair.rest @ np.linalg.pinv(matrix_of(hair, depsgraph))
         is_there = np.allclose(back, np.eye(4))
         return read, read.strands if is_there else read.strands.transformed(back), back
+
+    def _on_head(self, stored: StrandSet) -> StrandSet:
+        """Strands as they are stored, on the head in the pose in which the reading began."""
+        rest, head = self.request.source.rest, self.request.source.head
+        if rest is None or head is None:
+            return stored
+        return replace(rest, strands=stored).on(head)
 
     def moved_curves(self, depsgraph: bpy.types.Depsgraph) -> tuple[StrandSet, Ints] | None:
         """The curves that have moved since this was last asked for, or since other hair was
@@ -247,7 +274,8 @@ class GroomSource:
             HairloomError: the hair is gone, or none that can be used is left.
         """
         before = self._combed
-        _, strands, back = self._read_curves(self.hair.found(), depsgraph)
+        _, stored, back = self._read_curves(self.hair.found(), depsgraph)
+        strands = self._on_head(stored)
         if not np.array_equal(strands.offsets, before.offsets):
             return None
         farthest = max(np.abs(strands.points).max(initial=0.0), np.abs(back[:3, 3]).max())

@@ -23,7 +23,7 @@ from ..bakes.stale_bakes import stale_notes
 from ..base.objects import Body, Handle, head_of
 from ..base.suspension import suspended
 from ..colliders.rigs import MadeRig
-from ..scene.source import usable_curves
+from ..scene.source import shown_curves
 from ..scene.surfaces import read_positions
 from .read_hair import ExportRequest, ExportStrands, baked_hair, still_hair
 
@@ -74,7 +74,7 @@ class ShownMotion:
     needs_scene: bool = True
 
     def at(self, frame: int, depsgraph: bpy.types.Depsgraph) -> Floats:
-        read = usable_curves(self.hair.found("Export again"), depsgraph).strands
+        read = shown_curves(self.hair.found("Export again"), depsgraph).strands
         if not np.array_equal(read.offsets, self.out.seen.offsets):
             raise _other_curves(self.hair, frame)
         return read.points
@@ -99,7 +99,7 @@ class ChildrenMotion:
     needs_scene: bool = True
 
     def at(self, frame: int, depsgraph: bpy.types.Depsgraph) -> Floats:
-        read = usable_curves(self.hair.found("Export again"), depsgraph).strands
+        read = shown_curves(self.hair.found("Export again"), depsgraph).strands
         if read.strand_count != self.count:
             raise _other_curves(self.hair, frame)
         now = center_lines(read.take(self.guides), self.rig.guide_grid.shape[1]).grid

@@ -13,6 +13,7 @@ from ...cards.drawing_settings import CardDrawingSettings
 from ...dynamics.settings import DynamicsSettings
 from ...groom.children_settings import ChildrenSettings
 from ...groom.masks import Masks, StrandMask, mask_names
+from ...groom.rest_hair import carried
 from ...groom.width_settings import WidthSettings
 from ...paint_flow import painted_strands, with_colors
 from ...parameters import ALL_SETTINGS, sections_of
@@ -93,8 +94,17 @@ def _drawn(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Parts[_Dra
         "Making strands",
         lambda: rig_from(source, settings.sections, place=name),
     )
-    strands = yield Part("Colouring strands", lambda: _coloured(rig, source, settings))
+    strands = yield Part(
+        "Colouring strands", lambda: _stored(_coloured(rig, source, settings), source)
+    )
     return _Drawn(source, settings, rig, strands, masks)
+
+
+def _stored(strands: StrandSet, source: Source) -> StrandSet:
+    """As the hair that they are made from is stored, in the rest pose of its head."""
+    if source.rest is None or source.head is None:
+        return strands
+    return carried(strands, source.head, source.rest.surface)
 
 
 def _coloured(rig: Rig, source: Source, settings: GroomSettings) -> StrandSet:

@@ -1,0 +1,19 @@
+"""Modifiers of geometry nodes, as an artist adds them."""
+
+import bpy
+
+
+def with_modifier(obj, *nodes):
+    """A geometry nodes modifier that sends the curves through these nodes."""
+    tree = bpy.data.node_groups.new("Nodes", "GeometryNodeTree")
+    for in_out in ("INPUT", "OUTPUT"):
+        tree.interface.new_socket("Geometry", in_out=in_out, socket_type="NodeSocketGeometry")
+    source = tree.nodes.new("NodeGroupInput").outputs[0]
+    for kind, inputs in nodes:
+        node = tree.nodes.new(kind)
+        for name, value in inputs.items():
+            node.inputs[name].default_value = value
+        tree.links.new(source, node.inputs[0])
+        source = node.outputs[0]
+    tree.links.new(source, tree.nodes.new("NodeGroupOutput").inputs[0])
+    obj.modifiers.new("Nodes", "NODES").node_group = tree

@@ -1,0 +1,219 @@
+"""Hair that no modifier attaches, on a posed head: it does not matter in which frame it is read."""
+
+import bpy
+import numpy as np
+import pytest
+from hedgehogs import hedgehog
+from node_modifiers import with_modifier
+
+from hairloom.addon.blender.base.parts import at_once
+from hairloom.addon.blender.cards.build import read_inputs
+from hairloom.addon.blender.preview import previews
+from hairloom.addon.blender.preview.bake import Bake
+from hairloom.addon.blender.scene.curves import curve_points, read_curves
+from hairloom.addon.blender.scene.source import read_source, shown_curves
+from hairloom.addon.blender.sessions.groom_source import GroomSource
+from hairloom.addon.blender.strands.groom_motion import moving_hair
+from hairloom.addon.blender.strands.make_real import make_real
+from hairloom.addon.blender.strands.read_hair import ExportRequest
+from hairloom.addon.groom.roots import bind_roots
+
+REST, POSED = 1, 4
+#: [m]; strands turn by frames in float32.
+SAME = 1e-5
+
+
+@pytest.fixture
+def hair(new_hair, sphere):
+    """On a ball that a bone turns by 40 degrees and moves by 0.3 m, through four frames."""
+    made = new_hair(sphere, hedgehog(80, seed=3))
+    made.hairloom.dynamics.collider_resolution = 8
+    attach_roots(made)
+    bpy.ops.object.armature_add(location=(0.0, 0.0, -0.3))
+    armature = bpy.context.object
+    group = sphere.vertex_groups.new(name=armature.data.bones[0].name)
+    group.add(range(len(sphere.data.vertices)), 1.0, "REPLACE")
+    sphere.modifiers.new("Armature", "ARMATURE").object = armature
+    bone = armature.pose.bones[0]
+    bone.rotation_mode = "XYZ"
+    for frame, angle, place in ((REST, 0.0, 0.0), (POSED, 0.7, 0.3)):
+        bone.rotation_euler.y, bone.location.x = angle, place
+        bone.keyframe_insert("rotation_euler", frame=frame)
+        bone.keyframe_insert("location", frame=frame)
+    scene = bpy.context.scene
+    scene.frame_start, scene.frame_end = REST, POSED
+    scene.frame_set(REST)
+    select(made)
+    return made
+
+
+def attach_roots(hair):
+    """Gives its curves their root UVs, as all hair has that Hairloom or Blender put onto a mesh."""
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    source = read_source(hair, depsgraph)
+    bound = bind_roots(source.strands, source.head, place="").strands
+    uv = hair.data.attributes.new("surface_uv_coordinate", "FLOAT2", "CURVE")
+    uv.data.foreach_set("vector", bound.root_uv.astype(np.float32).ravel())
+
+
+def select(hair):
+    for other in bpy.context.selected_objects:
+        other.select_set(False)
+    hair.select_set(True)
+    bpy.context.view_layer.objects.active = hair
+
+
+def go_to(frame):
+    bpy.context.scene.frame_set(frame)
+    return bpy.context.evaluated_depsgraph_get()
+
+
+def expected(hair):
+    """Its strands as the bone carries them in the posed frame."""
+    depsgraph = go_to(REST)
+    rest = read_curves(hair, depsgraph).strands.points
+    bone = bpy.data.objects["Armature"].pose.bones[0]
+    place = bpy.data.objects["Armature"].matrix_world
+    before = place @ bone.matrix
+    go_to(POSED)
+    moved = np.array(place @ bone.matrix @ before.inverted())
+    return rest @ moved[:3, :3].T + moved[:3, 3]
+
+
+def started(hair, frame):
+    previews.stop_all()
+    previews.start(hair, go_to(frame))
+    return previews.session_of(hair)
+
+
+def test_a_preview_that_starts_in_a_pose_shows_the_hair_there(hair):
+    there = expected(hair)
+    session = started(hair, REST)
+    go_to(POSED)
+    followed = np.array(session.strands)
+    session = started(hair, POSED)
+    assert session.source.strands.points == pytest.approx(there, abs=SAME)
+    assert not any("root" in each for each in session.warnings)
+    previews.rest(bpy.context.evaluated_depsgraph_get(), keep_playing=False)
+    away = np.linalg.norm(session.strands - session.rig.strands.points, axis=1)
+    assert away.max() < SAME and followed.shape == session.strands.shape
+
+
+def test_what_blender_has_put_there_stays(hair):
+    """By its own node, in a modifier as an artist adds it."""
+    hair.data.surface.add_rest_position_attribute = True
+    hair.data.surface_uv_map = hair.data.surface.data.uv_layers.active.name
+    with_modifier(hair, ("GeometryNodeDeformCurvesOnSurface", {}))
+    depsgraph = go_to(POSED)
+    source = read_source(hair, depsgraph)
+    assert source.rest is None
+    assert np.array_equal(source.strands.points, read_curves(hair, depsgraph).strands.points)
+    assert source.strands.points == pytest.approx(expected(hair), abs=0.02), "it is posed"
+
+
+def test_a_head_that_is_subdivided_but_not_posed_moves_no_hair(hair, sphere):
+    sphere.modifiers.new("Subdivision", "SUBSURF").levels = 1
+    depsgraph = go_to(REST)
+    source = read_source(hair, depsgraph)
+    assert source.rest is None
+    assert np.array_equal(source.strands.points, read_curves(hair, depsgraph).strands.points)
+    # and hair that is as far off the smooth skin as at rest, in a pose
+    assert read_source(hair, go_to(POSED)).strands.points == pytest.approx(expected(hair), abs=1e-2)
+
+
+def test_a_shape_key_is_a_pose_too(new_hair, sphere):
+    hair = new_hair(sphere, hedgehog(80, seed=3))
+    attach_roots(hair)
+    rest = shown_curves(hair, go_to(REST)).strands.points
+    sphere.shape_key_add(name="Basis")
+    wide = sphere.shape_key_add(name="Wide")
+    for point in wide.data:
+        point.co.y += 0.3
+    wide.value = 1.0
+    bpy.context.view_layer.update()
+    shown = shown_curves(hair, bpy.context.evaluated_depsgraph_get()).strands.points
+    assert shown == pytest.approx(rest + [0.0, 0.3, 0.0], abs=SAME)
+
+
+def test_the_bakes_of_both_frames_are_one(hair, tmp_path):
+    baked = []
+    for frame in (REST, POSED):
+        hair.hairloom.bake.folder = str(tmp_path / str(frame))
+        started(hair, frame)
+        list(Bake.of([hair], bpy.context.scene).steps())
+        session = previews.session_of(hair)
+        go_to(3)
+        baked.append(np.array(session.strands).reshape(-1, 3))
+    assert np.abs(baked[0] - baked[1]).max() < 2e-3
+
+
+def test_combing_in_a_pose_moves_what_is_shown(hair):
+    there = expected(hair)
+    source = GroomSource(hair, go_to(POSED))
+    assert source.moved_curves(bpy.context.evaluated_depsgraph_get()) is None
+    assert source.read_again(bpy.context.evaluated_depsgraph_get()) is None
+    points = curve_points(hair.data).copy()
+    points[-1] += (0.0, 0.0, 0.02)
+    hair.data.position_data.foreach_set("vector", points.ravel())
+    hair.data.update_tag()
+    bpy.context.view_layer.update()
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    (combed, number) = source.moved_curves(depsgraph)
+    assert number.tolist() == [79]
+    assert np.linalg.norm(combed.points[-1] - there[-1]) == pytest.approx(0.02, rel=1e-3)
+    request = source.read_again(depsgraph)
+    assert request.source.strands.points[:-1] == pytest.approx(there[:-1], abs=SAME)
+    stored = read_curves(hair, depsgraph).strands.points
+    assert np.array_equal(request.source.at_rest.strands.points, stored)
+
+
+def test_hair_of_a_bake_is_in_the_pose_of_the_bake_wherever_it_is_read(hair, tmp_path):
+    hair.hairloom.bake.folder = str(tmp_path)
+    session = started(hair, POSED)
+    list(Bake.of([hair], bpy.context.scene).steps())
+    in_pose = session.source.strands.points
+    again = started(hair, REST)
+    assert again.source.strands.points == pytest.approx(in_pose, abs=SAME)
+    made = again.rig
+    again.read_again(go_to(REST))
+    assert again.rig is made, "nothing has been combed"
+
+
+def test_files_hold_the_hair_as_it_is_shown(hair):
+    there = expected(hair)
+    moving, _ = moving_hair(
+        hair, go_to(POSED), range(REST, POSED + 1), ExportRequest(), use_bake=False
+    )
+    assert moving.at(POSED, go_to(POSED)) == pytest.approx(there, abs=SAME)
+    stored = read_curves(hair, go_to(REST)).strands.points
+    assert np.array_equal(moving.at(REST, go_to(REST)), stored)
+
+
+def test_cards_are_those_of_the_rest_pose_and_say_so(hair):
+    inputs, notes, _ = read_inputs(hair, go_to(REST))
+    posed, said, _ = read_inputs(hair, go_to(POSED))
+    for name in ("strands", "head"):
+        one, other = (getattr(each.rig, name) for each in (inputs, posed))
+        points = ("points" if name == "strands" else "positions",)
+        assert getattr(one, *points) == pytest.approx(getattr(other, *points), abs=1e-6)
+    assert not any("posed" in note for note in notes)
+    assert any("Head is posed in frame 4" in note for note in said)
+
+
+def test_made_real_it_is_stored_as_it_was(hair):
+    found = []
+    for frame in (REST, POSED):
+        (made,) = at_once(make_real([hair], go_to(frame)))
+        found.append(curve_points(made.hair.data))
+        bpy.data.objects.remove(made.hair)
+        hair.hide_set(False)
+    assert found[1] == pytest.approx(found[0], abs=SAME)
+
+
+def test_a_preview_far_from_the_rest_pose_starts(hair):
+    """Where all roots are farther from the head than it is large."""
+    bone = bpy.data.objects["Armature"].pose.bones[0]
+    bone.location.x = 5.0
+    bone.keyframe_insert("location", frame=POSED)
+    there = expected(hair)
+    assert started(hair, POSED).source.strands.points == pytest.approx(there, abs=1e-4)

@@ -1,0 +1,108 @@
+"""Hair that is stored on its undeformed surface, and is put onto the posed one."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hairloom.addon.groom.rest_hair import RestHair, carried
+from hairloom.addon.groom.roots import bind_roots
+from hairloom.addon.strands import StrandSet, Surface
+
+
+def turned(points, angle=0.7, shift=(0.0, 0.0, 0.0)):
+    """By an angle around y."""
+    c, s = np.cos(angle), np.sin(angle)
+    return (points @ np.array([[c, 0.0, -s], [0.0, 1.0, 0.0], [s, 0.0, c]]) + shift).astype(
+        np.float32
+    )
+
+
+@pytest.fixture
+def ball():
+    """A unit ball of squares, with UVs by place."""
+    v, u = (each.ravel() for each in np.meshgrid(np.linspace(0.1, 3.0, 20), np.arange(30) * 0.2))
+    points = np.column_stack([np.sin(v) * np.cos(u), np.sin(v) * np.sin(u), np.cos(v)])
+    column, row = (each.ravel() for each in np.meshgrid(np.arange(29), np.arange(19)))
+    a = column * 20 + row
+    triangles = np.concatenate(
+        [np.column_stack([a, a + 1, a + 20]), np.column_stack([a + 1, a + 21, a + 20])]
+    )
+    uv = np.column_stack([u, v]).astype(np.float32) / 6.0
+    return Surface(points, triangles, uv[triangles])
+
+
+@pytest.fixture
+def hair(ball):
+    """Curved strands on some of its faces, with their root UVs."""
+    faces = np.arange(0, len(ball.triangles), 7)
+    roots = ball.corners[faces].mean(axis=1)
+    along = np.linspace(0.0, 0.4, 5)[None, :, None]
+    points = roots[:, None] * (1.0 + along) + (0.0, 0.2, 0.0) * along**2
+    offsets = np.arange(len(faces) + 1) * 5
+    strands = StrandSet(
+        points.reshape(-1, 3), offsets, np.full(len(faces) * 5, 1e-3), np.zeros(len(faces))
+    )
+    return replace(strands, root_uv=ball.corner_uv[faces].mean(axis=1))
+
+
+def test_a_turn_in_place_turns_the_hair(ball, hair):
+    """All roots lie on the turned ball as well: the UVs alone tell."""
+    posed = replace(ball, positions=turned(ball.positions))
+    found = RestHair.found(hair, ball, posed)
+    assert found is not None and found.surface is ball and found.strands is hair
+    assert found.on(posed).points == pytest.approx(turned(hair.points), abs=1e-5)
+
+
+def test_far_away_it_is_told_without_uvs(ball, hair):
+    shift = (5.0, 0.0, 1.0)
+    posed = replace(ball, positions=turned(ball.positions, 0.7, shift))
+    found = RestHair.found(replace(hair, root_uv=None), ball, posed)
+    assert found is not None
+    assert found.on(posed).points == pytest.approx(turned(hair.points, 0.7, shift), abs=1e-5)
+
+
+def test_hair_that_stands_on_the_posed_surface_stays(ball, hair):
+    """Which a modifier of Blender has put there, or which has grown there."""
+    posed = replace(ball, positions=turned(ball.positions))
+    there = hair.with_points(turned(hair.points))
+    assert RestHair.found(there, ball, posed) is None
+    assert RestHair.found(replace(there, root_uv=None), ball, posed) is None
+
+
+def test_what_is_not_posed_is_left_alone(ball, hair):
+    assert RestHair.found(hair, ball, ball) is None
+    bit = replace(ball, positions=ball.positions * np.float32(1.00001))
+    assert RestHair.found(hair, ball, bit) is None
+    large = replace(ball, positions=ball.positions * np.float32(1.01))
+    assert RestHair.found(hair, ball, large) is not None
+    assert RestHair.found(hair, ball, large, least=0.1) is None
+
+
+def test_a_surface_that_swells_lifts_its_hair(ball, hair):
+    """UVs of the nearest points are the same then; the distance tells."""
+    posed = replace(ball, positions=ball.positions * np.float32(1.1))
+    found = RestHair.found(hair, ball, posed)
+    assert found is not None
+    assert bind_roots(found.on(posed), posed, place="").distance.max() < 1e-5
+
+
+def test_a_part_that_is_posed_elsewhere_moves_no_hair(ball, hair):
+    below = ball.positions[:, 2] < -0.5
+    posed = replace(ball, positions=ball.positions - np.float32(0.5) * below[:, None])
+    on_top = hair.take(np.flatnonzero(hair.roots[:, 2] > 0.0))
+    assert RestHair.found(on_top, ball, posed) is None
+
+
+def test_other_triangles_and_no_strands_are_none(ball, hair):
+    posed = replace(ball, positions=turned(ball.positions))
+    fewer = replace(posed, triangles=posed.triangles[1:], corner_uv=posed.corner_uv[1:])
+    assert RestHair.found(hair, ball, fewer) is None
+    assert RestHair.found(hair.take(np.zeros(0, int)), ball, posed) is None
+
+
+def test_there_and_back_is_the_same(ball, hair):
+    """Bound strands go by what they are bound to."""
+    posed = replace(ball, positions=turned(ball.positions, 1.9, (0.3, 0.0, 0.0)))
+    bound = bind_roots(carried(hair, ball, posed), posed, place="").strands
+    assert carried(bound, posed, ball).points == pytest.approx(hair.points, abs=1e-5)
