@@ -72,6 +72,20 @@ def test_frames_output_and_settings_are_chosen(file, tmp_path):
     assert list(dynamics.style_along) == pytest.approx([1, 0.5, 0.25, 0.1, 0])
 
 
+def test_an_object_that_is_named_twice_is_taken_once(file, tmp_path):
+    """As in lists that a script has joined."""
+    report, twice = tmp_path / "report.json", ["--object", "Hair", "--object", "Hair"]
+    bake = ["bake", "--scene", str(file), "--frames", "1", "2", *twice]
+    bake += ["--output", str(tmp_path / "out"), "--report", str(report)]
+    assert command_line.run(bake) == 0
+    (baked,) = json.loads(report.read_text())["baked"]
+    assert Path(baked["folder"]) == tmp_path / "out"
+    export = ["export", "--scene", str(file), *twice, "--output", str(tmp_path / "a.tfx")]
+    assert command_line.run([*export, "--report", str(report)]) == 0
+    count = len(bpy.data.objects["Hair"].data.curves)
+    assert json.loads(report.read_text())["preflight"]["strands"] == count
+
+
 @pytest.mark.alike
 @pytest.mark.parametrize("verb", [["bake"], ["simulate", "--animated"], ["simulate"]])
 def test_only_selected_curves_move_by_themselves(file, tmp_path, verb):

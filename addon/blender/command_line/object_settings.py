@@ -21,7 +21,8 @@ from .overrides import overrides
 def named_objects(
     names: list[str], is_wanted: Callable[[bpy.types.Object], bool], what: str
 ) -> list[bpy.types.Object]:
-    """Objects of the view layer by their names.
+    """Objects of the view layer by their names, each once: where it was named last, since the last
+    one is active in `run`.
 
     Args:
         what: such as "a mesh", for the message.
@@ -30,7 +31,7 @@ def named_objects(
         HairloomError: there is no such object, or it is something else.
     """
     found = []
-    for name in names:
+    for name in reversed(dict.fromkeys(reversed(names))):
         obj = bpy.context.view_layer.objects.get(name)
         if obj is None or not is_wanted(obj):
             raise HairloomError(
