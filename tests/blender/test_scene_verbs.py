@@ -181,6 +181,15 @@ def test_operators_are_listed_with_their_properties(
     assert any(line.startswith("    sphere_count: ") for line in lines)
 
 
+def test_a_scene_is_wanted_and_nothing_said_that_is_to_be_done(
+    scene: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for wanted in (["--output", str(scene.with_name("out.blend"))], ["--save"]):
+        assert command_line.run(["run", "--scene", str(scene), "--object", "Hair", *wanted]) == 1
+        told = capsys.readouterr()
+        assert "there is nothing to do" in told.err and "sphere_count" not in told.out
+
+
 def test_a_mesh_becomes_a_fin_and_a_mesh_again(scene: Path) -> None:
     facts = run(scene, "run", "fin_add", "--object", "Head", "--set", "fin.damping=5")
     head = bpy.data.objects["Head"]
@@ -394,6 +403,10 @@ def test_settings_that_no_object_has_are_refused(
         said = capsys.readouterr().err
         assert f"Head: it has no settings of '{setting.partition('.')[0]}'" in said
         assert "Name the hair curves with --object" in said
+    for name, preset in (("Head", "looks/blond"), ("Hair", "stage/daylight")):
+        whole = ["run", "--scene", str(scene), "--object", name, "--preset", preset]
+        assert command_line.run([*whole, "--output", str(scene.with_name("out.blend"))]) == 1
+        assert f"{name}: it has no settings of '" in capsys.readouterr().err
     assert not scene.with_name("out.blend").exists()
 
 

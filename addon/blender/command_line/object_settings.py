@@ -149,22 +149,34 @@ def _check_growth(obj: bpy.types.Object) -> None:
         )
 
 
-def check_sections(objects: list[bpy.types.Object], assignments: list[str]) -> None:
-    """Refuse settings that would act on none of these objects.
+def check_sections(
+    objects: list[bpy.types.Object], presets: list[str], assignments: list[str]
+) -> None:
+    """Refuse settings that would act on none of these objects, and presets of such alone.
 
     Raises:
         HairloomError: naming the first of them.
     """
-    for section in ALL_SETTINGS:
-        has_it = any(_group(obj, section) is not None for obj in objects if _is_simulated(obj))
-        if overrides(assignments, section) and not has_it:
-            names = ", ".join(obj.name for obj in objects)
-            raise HairloomError(
-                f"it has no settings of '{section}', which are those of hair"
-                + (" or cloth" if ALL_SETTINGS[section].owner == "character" else ""),
-                place=names,
-                remedy="Name the hair curves with --object",
-            )
+    hair = [obj for obj in objects if _is_simulated(obj)]
+    kept = {name for name in ALL_SETTINGS if any(_group(obj, name) is not None for obj in hair)}
+    wanted = [[section] for section in ALL_SETTINGS if overrides(assignments, section)]
+    wanted += [[each.section for each in named_preset(name).all] for name in presets]
+    for sections in wanted:
+        if kept.isdisjoint(sections):
+            raise _no_settings(objects, sections[0])
+
+
+def _no_settings(objects: list[bpy.types.Object], section: str) -> HairloomError:
+    owner, names = ALL_SETTINGS[section].owner, ", ".join(obj.name for obj in objects)
+    whose = {
+        "groom": ", which are those of hair",
+        "character": ", which are those of hair or cloth",
+    }
+    return HairloomError(
+        f"it has no settings of '{section}'{whose.get(owner, '')}",
+        place=names,
+        remedy="Name the hair curves with --object" if owner in whose else "Leave them out",
+    )
 
 
 def _is_simulated(obj: bpy.types.Object) -> bool:

@@ -76,6 +76,7 @@ def run_operator(job: Job) -> None:
     """
     options = job.options
     if not (options.operator or options.set or options.preset):
+        _check_nothing_asked(options)
         _list_operators()
         return
     is_of_scene = options.operator not in _OF_PRESETS
@@ -101,6 +102,18 @@ def run_operator(job: Job) -> None:
             saved = save_scene(options.output)
         job.report.add_output(saved)
         print(f"Wrote {saved}")
+
+
+def _check_nothing_asked(options: argparse.Namespace) -> None:
+    """Raises:
+    HairloomError: a changed scene is wanted, so that something was forgotten.
+    """
+    if options.output or options.save or options.object:
+        raise HairloomError(
+            "there is nothing to do",
+            place="run",
+            remedy="Name an operator, which `run` alone lists, or give --preset or --set",
+        )
 
 
 @dataclass(frozen=True)
@@ -239,7 +252,7 @@ def _change_settings(job: Job, assignments: list[str]) -> None:
             remedy="Name hair curves or a mesh of the scene",
         )
     if job.options.operator != "fin_add":  # which makes a mesh cloth, with these settings
-        check_sections(chosen, assignments)
+        check_sections(chosen, job.options.preset, assignments)
     for obj in chosen:
         check_editable(obj)
         grows_again = job.options.operator == "grow_again"
