@@ -7,13 +7,15 @@ here, so that it does not depend on the frame in which it is read.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 
 from ..arrays import Floats
 from ..strands import StrandSet, Surface
-from ..strands.closest_point import ClosestPoints, search_of
+from ..strands.closest_point import search_of
 from .roots import follow, root_frames, root_motions
 
 #: A surface is deformed where a vertex has moved by more than this part of its diagonal.
@@ -34,37 +36,43 @@ class RestHair:
 
     @classmethod
     def found(
-        cls, strands: StrandSet, rest: Surface, posed: Surface, least: float = DEFORMED
+        cls, strands: StrandSet, rests: Sequence[Surface], posed: Surface, least: float = DEFORMED
     ) -> RestHair | None:
-        """None where the strands are to stay: they stand on the posed surface, or it is not posed.
+        """On that of the undeformed surfaces on which the strands stand; None where they are to
+        stay: they stand on the posed surface, or it is not posed.
 
-        The root UVs say which of the two surfaces roots stand on; where these do not tell, the
-        nearer surface is the one.
+        The root UVs say on which surface roots stand; where these do not tell, the nearest surface
+        is the one.
 
         Args:
-            rest, posed: one mesh, before and after all that deforms it.
+            rests: the same mesh without all, or some, of what deforms it.
             least: by how much it has to be deformed at the roots, as a part of its diagonal.
         """
-        if not strands.strand_count or not np.array_equal(rest.triangles, posed.triangles):
+        if not strands.strand_count:
             return None
-        low, high = rest.bounds()
+        low, high = posed.bounds()
         far = least * float(np.linalg.norm(high - low))
-        if np.abs(posed.positions - rest.positions).max(initial=0.0) <= far:
+        rests = [
+            each
+            for each in rests
+            if np.array_equal(each.triangles, posed.triangles)
+            and np.abs(each.positions - posed.positions).max(initial=0.0) > far
+        ]
+        if not rests:
             return None
         step = -(-strands.strand_count // _SAMPLED_ROOTS)
         roots = strands.roots[::step]
-        on_rest, on_posed = (search_of(each).closest(roots) for each in (rest, posed))
-        there = np.einsum("nk,nkj->nj", on_rest.barycentric, posed.corners[on_rest.triangle])
-        if np.median(np.linalg.norm(there - on_rest.point, axis=1)) <= far:
-            return None
         uv = None if strands.root_uv is None else strands.root_uv[::step]
-        off_rest = _uv_error(on_rest, rest, uv)
-        off_posed = _uv_error(on_posed, posed, uv)
-        if max(off_rest, off_posed) <= _SAME_UV:
-            off_rest, off_posed = (float(np.median(each.distance)) for each in (on_rest, on_posed))
-            if off_posed <= far:
-                return None
-        return cls(strands, rest) if _CLEARLY * off_rest < off_posed else None
+        there = _Standing.of(roots, uv, posed, posed)
+        before = [_Standing.of(roots, uv, each, posed) for each in rests]
+        if max(each.uv_error for each in (*before, there)) > _SAME_UV:
+            number = int(np.argmin([each.uv_error for each in before]))
+            is_before = _CLEARLY * before[number].uv_error < there.uv_error
+        else:
+            number = int(np.argmin([each.distance for each in before]))
+            is_before = _CLEARLY * before[number].distance < there.distance > far
+        is_posed = before[number].moved > far
+        return cls(strands, rests[number]) if is_before and is_posed else None
 
     def on(self, posed: Surface) -> StrandSet:
         """The strands on the posed surface."""
@@ -87,10 +95,31 @@ def carried(strands: StrandSet, start: Surface, end: Surface) -> StrandSet:
     return strands.with_points(follow(strands.points, strands.offsets, root_motions(was, now)))
 
 
-def _uv_error(closest: ClosestPoints, surface: Surface, root_uv: Floats | None) -> float:
-    """How far the UVs of these points lie from those of the roots, the median; 0 where either has
-    none."""
-    if root_uv is None or surface.corner_uv is None:
-        return 0.0
-    uv = np.einsum("nk,nkj->nj", closest.barycentric, surface.corner_uv[closest.triangle])
-    return float(np.median(np.linalg.norm(uv - root_uv, axis=1)))
+@dataclass(frozen=True)
+class _Standing:
+    """How well roots stand on a surface, medians.
+
+    distance: [m]. uv_error: between their UVs and those of the nearest points; 0 where either has
+        none. moved: how far these points are from where the pose carries them [m].
+    """
+
+    distance: float
+    uv_error: float
+    moved: float
+
+    @classmethod
+    def of(cls, roots: Floats, root_uv: Floats | None, surface: Surface, posed: Surface) -> Self:
+        held = search_of(surface).closest(roots)
+
+        def at(values: Floats) -> Floats:
+            result: Floats = np.einsum("nk,nkj->nj", held.barycentric, values[held.triangle])
+            return result
+
+        uv_error, moved = 0.0, at(posed.corners - surface.corners)
+        if root_uv is not None and surface.corner_uv is not None:
+            uv_error = _median_length(at(surface.corner_uv) - root_uv)
+        return cls(float(np.median(held.distance)), uv_error, _median_length(moved))
+
+
+def _median_length(vectors: Floats) -> float:
+    return float(np.median(np.linalg.norm(vectors, axis=1)))

@@ -135,6 +135,23 @@ def test_a_shape_key_is_a_pose_too(new_hair, sphere):
     assert shown == pytest.approx(rest + [0.0, 0.3, 0.0], abs=SAME)
 
 
+def test_hair_of_a_head_that_shape_keys_have_formed_is_told_from_its_basis(hair, sphere):
+    """As MPFB forms faces: the hair has grown on the formed face, before an armature poses it."""
+    sphere.shape_key_add(name="Basis")
+    for name, factor in (("Wide", 1.3), ("Muted", 5.0)):
+        key = sphere.shape_key_add(name=name)
+        for point in key.data:
+            point.co.x *= factor
+        key.value, key.mute = 1.0, name == "Muted"
+    points = curve_points(hair.data)
+    hair.data.position_data.foreach_set("vector", (points * np.float32([1.3, 1, 1])).ravel())
+    hair.data.update_tag()
+    bpy.context.view_layer.update()
+    assert read_source(hair, go_to(REST)).rest is None
+    there = expected(hair)
+    assert shown_curves(hair, go_to(POSED)).strands.points == pytest.approx(there, abs=SAME)
+
+
 def test_the_bakes_of_both_frames_are_one(hair, tmp_path):
     baked = []
     for frame in (REST, POSED):

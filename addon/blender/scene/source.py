@@ -23,7 +23,7 @@ from .curves import read_curves
 from .masks import Canvas
 from .painted_colors import read_colors
 from .partings import read_partings
-from .surfaces import read_rest_surface, read_surface
+from .surfaces import read_rest_surfaces, read_surface
 
 #: node group of the modifier that Blender 5.2 gives to new hair
 _OWN_DYNAMICS = "Hair Dynamics"
@@ -137,12 +137,10 @@ def _on_head(
     animated style is where its curves are."""
     if head is None or hair.hairloom.dynamics.animated_style:
         return strands, None
-    rest, is_deformed_only = read_rest_surface(head_of(hair), depsgraph, head)
-    if rest is None:
-        return strands, None
+    rests, is_deformed_only = read_rest_surfaces(head_of(hair), depsgraph, head)
     # Subdivision moves a surface too, which is no pose
     least = DEFORMED if is_deformed_only else LOOSE_DISTANCE
-    found = RestHair.found(strands, rest, head, least)
+    found = RestHair.found(strands, rests, head, least)
     return (strands, None) if found is None else (found.on(head), found)
 
 

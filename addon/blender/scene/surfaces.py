@@ -80,11 +80,11 @@ def read_surface(
     return _read.kept(surface.transformed(np.array(obj.evaluated_get(depsgraph).matrix_world)))
 
 
-def read_rest_surface(
+def read_rest_surfaces(
     obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, posed: Surface
-) -> tuple[Surface | None, bool]:
-    """The same mesh before its shape keys and modifiers, with the triangles of the posed one, and
-    whether these only deform it; None where that is not known.
+) -> tuple[list[Surface], bool]:
+    """The same mesh before its shape keys and modifiers, and with its shape keys alone, each where
+    it is known, with the triangles of the posed one; and whether modifiers only deform it.
 
     Args:
         posed: as `read_surface` gives it now.
@@ -93,12 +93,33 @@ def read_rest_surface(
         rest = read_attribute(mesh, "rest_position", "POINT", 3)
     original = obj.original.data
     is_deformed_only = len(original.vertices) == len(posed.positions)
-    if rest is None and is_deformed_only:
-        rest = _positions(original)
-    if rest is None or rest.shape != posed.positions.shape or not np.isfinite(rest).all():
-        return None, is_deformed_only
+    found = [rest]
+    if is_deformed_only:
+        found = [_positions(original) if rest is None else rest, _keyed(original, depsgraph)]
     matrix = np.array(obj.evaluated_get(depsgraph).matrix_world)
-    return replace(posed, positions=moved(rest, matrix)), is_deformed_only
+    surfaces = [
+        replace(posed, positions=moved(each, matrix))
+        for each in found
+        if each is not None and each.shape == posed.positions.shape and np.isfinite(each).all()
+    ]
+    return surfaces, is_deformed_only
+
+
+def _keyed(mesh: bpy.types.Mesh, depsgraph: bpy.types.Depsgraph) -> Floats | None:
+    """Its vertices by its relative shape keys alone, as they are now; None where it has none."""
+    if mesh.shape_keys is None or not mesh.shape_keys.use_relative:
+        return None
+    keys = mesh.shape_keys.evaluated_get(depsgraph).key_blocks
+    places = {key.name: np.empty((len(mesh.vertices), 3), np.float32) for key in keys}
+    for key in keys:
+        key.points.foreach_get("co", places[key.name].ravel())
+    result: Floats = places[keys[0].name].copy()
+    for key in keys[1:]:
+        # a vertex group would limit it, which is rare: then another surface fits better
+        if not key.mute and key.value:
+            change = places[key.name] - places[key.relative_key.name]
+            result += np.float32(key.value) * change
+    return result
 
 
 def _is_same(one: Surface, other: Surface) -> bool:

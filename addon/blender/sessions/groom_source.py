@@ -175,7 +175,7 @@ class GroomSource:
         if start is None or head is None or self.head is None or baked.rests.head is None:
             return strands, None
         start = start.transformed(baked.rests.head @ np.linalg.pinv(self.head.rest))
-        rest = RestHair.found(strands, start, head)
+        rest = RestHair.found(strands, [start], head)
         return (strands, None) if rest is None else (rest.on(head), rest)
 
     def has_another_head(self) -> bool:
