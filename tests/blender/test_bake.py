@@ -263,6 +263,19 @@ def test_a_head_that_is_posed_by_hand_takes_its_hair_along(swinging, evaluated):
     np.testing.assert_array_equal(drawn(hair), baked)
 
 
+def test_the_bake_of_another_scene_is_not_replaced_without_a_word(swinging):
+    hair, head = swinging
+    bake(hair)
+    assert not Bake.of([hair], bpy.context.scene).notes
+    other = bpy.data.scenes.new("Other")
+    for obj in (hair, head):
+        other.collection.objects.link(obj)
+    other.frame_start, other.frame_end = LAST + 10, LAST + 12
+    assert not Bake.of([hair], bpy.context.scene).notes, "the same frames"
+    (note,) = Bake.of([hair], other).notes
+    assert f"bake of frames 1 to {LAST} was replaced, as 2 scenes share" in note
+
+
 def test_a_bake_can_be_left_out_and_is_simulated_again(swinging, evaluated):
     hair, _ = swinging
     previews.start(hair, evaluated())

@@ -265,13 +265,20 @@ def _layout_of(arrays: Arrays) -> dict[str, tuple[str, tuple[int, ...]]]:
     }
 
 
-def owner_and_file(folder: Path) -> tuple[str, str]:
-    """The object and the file whose bake is in a folder; empty where that is not known."""
+def facts_in(folder: Path) -> Facts | None:
+    """What is known of the bake in a folder; None where there is none, or a damaged one, which
+    anybody may replace."""
     try:
         cache = Cache.found(folder)
-    except HairloomError:  # a damaged one may be replaced by anybody
-        return "", ""
-    return (cache.facts.owner, cache.facts.file) if cache is not None else ("", "")
+    except HairloomError:
+        return None
+    return None if cache is None else cache.facts
+
+
+def owner_and_file(folder: Path) -> tuple[str, str]:
+    """The object and the file whose bake is in a folder; empty where that is not known."""
+    facts = facts_in(folder)
+    return ("", "") if facts is None else (facts.owner, facts.file)
 
 
 def delete(folder: Path) -> None:

@@ -26,7 +26,7 @@ from ..bakes.bake_settings import (
     frames_of,
     is_own,
 )
-from ..bakes.cache import CacheWriter, Facts, check_bake_folder, delete
+from ..bakes.cache import CacheWriter, Facts, check_bake_folder, delete, facts_in
 from ..bakes.groom_hashes import frame_rate
 from ..bakes.simulated import Simulated
 from ..base.objects import Handle
@@ -46,12 +46,14 @@ class _Part:
     """One groom or fin of a bake.
 
     folder: where it goes. named: the same as its object names it once it is there.
+    replaced: what is said of the bake that was there.
     """
 
     handle: Handle
     frames: range
     folder: Path
     named: str
+    replaced: str = ""
     session: Simulated | None = None
     writer: CacheWriter | None = None
     rig_hash: str = ""
@@ -120,6 +122,17 @@ class _Part:
         return self.handle.found("Bake again")
 
 
+def _replaced(obj: bpy.types.Object, folder: Path, frames: range) -> str:
+    """What is said where scenes share hair, and with it the bake of another's frames."""
+    before, scenes = facts_in(folder), len(obj.users_scene)
+    if before is None or scenes < 2 or (before.first in frames and before.last in frames):
+        return ""
+    return (
+        f"{obj.name}: its bake of frames {before.first} to {before.last} was replaced, as"
+        f" {scenes} scenes share this hair and its bake. Duplicate it to give each scene its own."
+    )
+
+
 @dataclass
 class Bake:
     """A bake of some grooms and fins of the open scene, each over its own frames."""
@@ -165,7 +178,8 @@ class Bake:
                     chosen = folder / name if len(objects) > 1 else folder
                     named = str(chosen)
                 check_bake_folder(chosen)
-                parts.append(_Part(Handle.of(obj), own, chosen, named))
+                replaced = _replaced(obj, chosen, own)
+                parts.append(_Part(Handle.of(obj), own, chosen, named, replaced=replaced))
         return cls(parts)
 
     @property
@@ -183,8 +197,8 @@ class Bake:
     @property
     def notes(self) -> list[str]:
         """What the artist should know about what was baked so far."""
-        own = dict.fromkeys(note for part in self.parts for note in part.notes)
-        return [*own, *self.unfelt]
+        found = (note for part in self.parts for note in (part.replaced, *part.notes))
+        return [*dict.fromkeys(filter(None, found)), *self.unfelt]
 
     @property
     def unfelt(self) -> list[str]:
