@@ -63,6 +63,19 @@ def test_a_task_that_is_done_is_not_done_again(
     assert task("--progress", "openjd")["status"] == "skipped", "progress is no part of the result"
 
 
+def test_the_report_of_a_task_that_is_skipped_still_names_outputs_and_notes(
+    task: Callable[..., dict[str, Any]], scene: Path
+) -> None:
+    """A farm that runs a job again, for one task that has failed, loses no notes of the others."""
+    bpy.ops.wm.open_mainfile(filepath=str(scene))
+    bpy.data.objects["Hair"].data.surface = bpy.data.objects["Hair"].parent = None
+    bpy.ops.wm.save_mainfile()
+    done, skipped = task(), task()
+    assert (done["status"], skipped["status"]) == ("done", "skipped")
+    assert skipped["outputs"] == done["outputs"] == ["bake"]
+    assert skipped["notes"] == done["notes"] and "it has no surface" in done["notes"][0]
+
+
 def largest(folder: Path) -> Path:
     files = (file for file in folder.rglob("*") if file.is_file())
     return max(files, key=lambda file: file.stat().st_size)

@@ -140,6 +140,7 @@ def _run(verb: Verb, options: argparse.Namespace, report: Report) -> None:
     if stamp is not None:
         reason = stamp.why_not_done()
         if not reason:
+            report.facts |= stamp.reported
             report.end("skipped")
             print(f"Nothing to do: {options.output} is there, of the same inputs and options")
             return

@@ -34,10 +34,14 @@ from .places import named_inputs
 SUFFIX = ".done.json"
 #: options that say nothing about the result
 _NOT_ASKED = frozenset(("report", "progress", "skip_existing"))
+#: facts of a report that are of the result, and so of each later report about it
+_REPORTED = ("outputs", "dropped", "notes")
 
 
 class Stamp:
     """The stamp of one job, beside its output.
+
+    reported: what the report said when the job was done; empty before `why_not_done` is asked.
 
     Raises:
         HairloomError: the job names no output, or saves over its own input; or nothing can be
@@ -61,6 +65,7 @@ class Stamp:
         output = Path(os.path.abspath(output))  # "." has a name then
         self.path = output.with_name(output.name + SUFFIX)
         check_place(self.path)
+        self.reported: dict[str, Any] = {}
         self._folder = self.path.parent
         self._asked = _asked(options, self._folder)
         self._begun = time.time_ns()
@@ -71,6 +76,7 @@ class Stamp:
         try:
             known = json.loads(self.path.read_text(encoding="utf-8"))
             asked, inputs, outputs = known["asked"], known["inputs"], known["outputs"]
+            self.reported = dict(known["reported"])
             pairs = _pairs(inputs, outputs)
             changed = [path for path, was in pairs if file_digest(self._folder / path) != was]
         except FileNotFoundError:
@@ -96,6 +102,7 @@ class Stamp:
         inputs = {path: self._digest_as_read(Path(path)) for path in found} | self._inputs
         content = {
             "asked": self._asked,
+            "reported": {name: report.facts[name] for name in _REPORTED if name in report.facts},
             "inputs": {
                 _seen_from(self._folder, path): was
                 for path, was in inputs.items()
