@@ -111,18 +111,19 @@ class Parameter:
                 raise TypeError("it must be a name")
             return value
         if self.kind == "color":
-            red, green, blue = (self._in_range(_finite(channel)) for channel in value)
-            return (red, green, blue)
+            return self._several(value, 3, "red, green and blue")
         if self.kind == "curve":
-            values = tuple(self._in_range(_finite(place)) for place in value)
-            if len(values) != len(PLACES):
-                raise ValueError(f"it must be {len(PLACES)} values from root to tip")
-            return values
+            return self._several(value, len(PLACES), "from root to tip")
         if self.kind == "integer":
-            if isinstance(value, bool) or int(value) != value:
+            if isinstance(value, bool) or int(_finite(value)) != value:
                 raise TypeError("it must be a whole number")
             return int(self._in_range(_finite(value)))
         return self._in_range(_finite(value))
+
+    def _several(self, value: Any, count: int, which: str) -> tuple[float, ...]:
+        if isinstance(value, str) or not hasattr(value, "__len__") or len(value) != count:
+            raise TypeError(f"it must be {count} numbers, {which}, with commas between them")
+        return tuple(self._in_range(_finite(each)) for each in value)
 
     def _in_range(self, value: float) -> float:
         low, high = self.hard_range or (-math.inf, math.inf)
@@ -144,12 +145,13 @@ class Parameter:
             if self.unit == "angle":
                 ends = f"{math.degrees(low):g} to {math.degrees(high):g} degrees"
                 return f"Use {ends}, which is {low:g} to {high:g} here"
-            return f"Use a value from {low:g} to {high:g} (default {self.default})"
+            some = "values" if self.kind in ("color", "curve") else "a value"
+            return f"Use {some} from {low:g} to {high:g} (default {self.default})"
         return f"Use a {self.kind} (default {self.default})"
 
 
 def _finite(value: Any) -> float:
-    if isinstance(value, (bool, str)):
+    if isinstance(value, bool) or not isinstance(value, (int, float, np.number)):
         raise TypeError("it must be a number")
     if not math.isfinite(value):
         raise ValueError("it must be finite")

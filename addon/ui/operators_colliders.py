@@ -63,7 +63,7 @@ class HAIRLOOM_OT_fit_spheres(LongWork, bpy.types.Operator):
         report(
             self,
             "INFO",
-            f"{count} spheres in {fitted.collection.name}. "
+            f"{'1 sphere' if count == 1 else f'{count} spheres'} in {fitted.collection.name}. "
             f"The mesh sticks out of them by {error.gap_mean * _MILLIMETRES:.1f} mm on average "
             f"(at most {error.gap_max * _MILLIMETRES:.1f} mm), they out of the mesh by "
             f"{error.outside_mean * _MILLIMETRES:.1f} mm "
@@ -92,7 +92,7 @@ class HAIRLOOM_OT_remove_spheres(bpy.types.Operator):
         mesh = _mesh(context)
         assert mesh is not None
         count = spheres.remove_spheres(mesh)
-        text = f"{count} spheres removed"
+        text = "1 sphere removed" if count == 1 else f"{count} spheres removed"
         if mesh.hairloom.collider_shape != "none":
             text += f"; {mesh.name} collides by itself again"
         report(self, "INFO", text)

@@ -4,8 +4,14 @@ import math
 
 import pytest
 
+from hairloom.addon.blender.command_line.command_line import parser
+from hairloom.addon.blender.command_line.job_options import chosen_settings
 from hairloom.addon.blender.command_line.overrides import overrides
+from hairloom.addon.blender.properties import presets
+from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.errors import HairloomError
+from hairloom.addon.groom.settings import GuideSettings
+from hairloom.addon.shading.settings import ShadingSettings
 from hairloom.addon.shading.stage_settings import StageSettings
 
 
@@ -36,3 +42,46 @@ def test_a_number_is_read_as_people_write_it(text, value):
 def test_what_no_angle_may_be_is_said_in_degrees_too():
     with pytest.raises(HairloomError, match="-180 to 180 degrees"):
         StageSettings.from_dict(overrides(["stage.rim_side=-148"], "stage"), "--set")
+
+
+@pytest.mark.parametrize(
+    ("kind", "setting", "why"),
+    [
+        (ShadingSettings, "shading.tip_color=0.5", "it must be 3 numbers, red, green and blue"),
+        (ShadingSettings, "shading.tip_color=#ff8800", "it must be 3 numbers, red, green and blue"),
+        (DynamicsSettings, "dynamics.style_along=1,2", "it must be 5 numbers, from root to tip"),
+        (DynamicsSettings, "dynamics.damping=", "it must be a number"),
+        (DynamicsSettings, "dynamics.damping=1,2", "it must be a number"),
+        (GuideSettings, "guides.guide_count=many", "it must be a number"),
+    ],
+)
+def test_what_a_value_must_be_is_said_in_our_own_words(kind, setting, why):
+    with pytest.raises(HairloomError, match=why):
+        kind.from_dict(overrides([setting], kind.section), "--set")
+
+
+@pytest.mark.parametrize(
+    ("name", "meant"),
+    [
+        ("blond", "Did you mean looks/blond? "),
+        ("looks/blond.json", "Did you mean looks/blond? "),
+        ("mine", "Did you mean own/mine? "),
+        ("", "Use a file"),
+        ("what is not there", "Use a file"),
+    ],
+)
+def test_a_preset_that_is_not_there_is_answered_with_near_ones(name, meant, tmp_path, monkeypatch):
+    monkeypatch.setattr(presets, "own_folder", lambda: tmp_path)
+    presets.save_own("Mine", ShadingSettings())
+    with pytest.raises(HairloomError) as caught:
+        presets.named_preset(name)
+    assert caught.value.remedy.startswith(meant) and "own/mine" in caught.value.remedy
+    assert caught.value.problem.startswith("there is no such" if name else "no preset is named")
+
+
+def test_a_stage_that_is_not_there_is_answered_with_stages():
+    whole = ["render", "--stage", "daylite", "--output", "a.png"]
+    with pytest.raises(HairloomError) as caught:
+        chosen_settings(parser().parse_args(whole))
+    assert caught.value.remedy.startswith("Did you mean stage/daylight? ")
+    assert "looks/" not in caught.value.remedy

@@ -12,6 +12,7 @@ from ...errors import HairloomError
 from ...exchange.strand_formats import SUFFIXES
 from ...parameters import ALL_SETTINGS
 from ...params import Settings, SettingsMap
+from ...params.preset import Preset
 from ..bakes.bake_settings import frame_range
 from ..base.report import STYLES
 from ..properties.presets import named_preset, shipped
@@ -327,12 +328,16 @@ _LIMITS = (
 )
 
 
-def _stage_preset(options: argparse.Namespace) -> list[str]:
-    """The preset that --stage names, if it is given."""
-    name = getattr(options, "stage", None)
-    if name is None:
-        return []
-    return [f"stage/{name}" if name in _stages() else name]
+def _presets(options: argparse.Namespace) -> list[Preset[Any]]:
+    """Those of --preset, and over them that of --stage."""
+    presets, stage = (
+        [named_preset(name) for name in options.preset],
+        getattr(options, "stage", None),
+    )
+    if stage is not None:
+        name = f"stage/{stage}" if stage in _stages() else stage
+        presets.append(named_preset(name, ["stage"]))
+    return presets
 
 
 def chosen_settings(options: argparse.Namespace) -> SettingsMap:
@@ -343,8 +348,8 @@ def chosen_settings(options: argparse.Namespace) -> SettingsMap:
     groom = hair_named(name)
     if groom is not None:
         chosen |= own_settings(groom)
-    for preset in (*options.preset, *_stage_preset(options)):
-        chosen |= {settings.section: settings for settings in named_preset(preset).all}
+    for preset in _presets(options):
+        chosen |= {settings.section: settings for settings in preset.all}
     if hasattr(options, "groom") and getattr(options, "look_from_material", False):
         chosen["shading"], notes = look_from_named(name, chosen["shading"])
         for note in notes:

@@ -37,6 +37,8 @@ def plain_value(text: str) -> Any:
     """A JSON value, a number, several with commas (a colour or a curve), or the text itself (a
     choice). An angle is in radians, or in degrees where `deg` follows it.
     """
+    if not text.strip():
+        return text
     for content in (text, f"[{text}]"):
         try:
             return json.loads(content)

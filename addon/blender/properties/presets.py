@@ -10,8 +10,9 @@ import json
 import re
 from collections.abc import Container, Iterable
 from dataclasses import dataclass
+from difflib import get_close_matches
 from functools import cache, lru_cache
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import Any
 
 import bpy
@@ -201,8 +202,11 @@ def delete_own(name: str) -> None:
         ) from error
 
 
-def named_preset(name: str) -> Preset[Any]:
+def named_preset(name: str, sections: Iterable[str] = tuple(ALL_SETTINGS)) -> Preset[Any]:
     """A preset by its name, such as looks/blond or own/mine, or by the path of a file.
+
+    Args:
+        sections: those whose presets are proposed in place of one that is not there.
 
     Raises:
         HairloomError: there is no such preset, or it is damaged.
@@ -211,9 +215,23 @@ def named_preset(name: str) -> Preset[Any]:
     is_shipped = below.is_file() and below.resolve().is_relative_to(PRESET_FOLDER)
     path = (below if is_shipped else None) or _own_path(name) or Path(name)
     if not path.is_file():
-        known = ", ".join(one.name for section in ALL_SETTINGS for one in shipped(section))
-        raise HairloomError("there is no such preset", place=name, remedy=f"Use a file or {known}")
+        raise _no_preset(
+            name, [one.name for each in sections for one in shipped(each) + own(each)[0]]
+        )
     return read_any_preset(path, ALL_SETTINGS)
+
+
+def _no_preset(name: str, known: list[str]) -> HairloomError:
+    """With the names that may have been meant, and all that there are."""
+    said = PurePath(name).stem
+    stems = {each: PurePath(each).name for each in known}
+    meant = [said] if said in stems.values() else get_close_matches(said, stems.values())
+    near = " or ".join(each for each, stem in stems.items() if stem in meant)
+    return HairloomError(
+        "there is no such preset" if name else "no preset is named",
+        place=name or "preset",
+        remedy=(f"Did you mean {near}? " if near else "") + f"Use a file or {', '.join(known)}",
+    )
 
 
 def apply(settings: Settings, hair: bpy.types.Object) -> None:
