@@ -5,8 +5,14 @@
 //
 // A list is sorted nearest first: runs of LAYERS first, then by merging two at a time.
 //
+// NODES_A_ROUND: how many nodes a round of a loop takes: one, but for software drivers, which end a shader
+// after 65,535 rounds of all its loops.
+//
 // Twin of layer_fractions in addon/shading/volume/transparency.py.
 #include "lib_layer_packing.glsl"
+
+// As `while`, through a list whose next node the body puts in place of this one.
+#define EACH_FROM(node) while (node != 0u) for (int i = 0; i < NODES_A_ROUND; i++) if (node != 0u)
 
 const uvec4 NO_LAYER = uvec4(0u, 0xFFFFFFFFu, 0xFFFFFFFFu, 0xFFFFFFFFu);
 
@@ -24,7 +30,7 @@ uint merged_layers(uint one, uint other)
   uvec4 other_node = imageLoad(layer_nodes, layer_texel(other));
   uint first = 0u, last = 0u;
   uvec4 last_node = uvec4(0u);
-  while (one != 0u) {
+  EACH_FROM (one) {
     if (is_before(other_node, node)) {
       uint number = one;
       uvec4 kept = node;
@@ -135,7 +141,7 @@ vec2 hidden_by(uint sorted)
 {
   float through = 1.0, front = 2.0;
   uint number = sorted;
-  while (number != 0u) {
+  EACH_FROM (number) {
     uvec4 node = imageLoad(layer_nodes, layer_texel(number));
     through *= 1.0 - layer_alpha(node.w);
     front = front > 1.0 && through <= 0.5 ? uintBitsToFloat(node.y) : front;
@@ -155,7 +161,7 @@ float fraction_of_one(uint sorted, float covered)
     large = 0;
     float left = covered, through = 1.0;
     uint number = sorted;
-    while (number != 0u) {
+    EACH_FROM (number) {
       uvec4 node = imageLoad(layer_nodes, layer_texel(number));
       float weight = through * layer_alpha(node.w);
       through *= 1.0 - layer_alpha(node.w);
@@ -177,7 +183,7 @@ void keep_some(uint sorted, float covered)
   float threshold = fraction_of_one(sorted, covered);
   float through = 1.0, passed = 0.5;
   uint number = sorted;
-  while (number != 0u) {
+  EACH_FROM (number) {
     uvec4 node = imageLoad(layer_nodes, layer_texel(number));
     float weight = through * layer_alpha(node.w);
     through *= 1.0 - layer_alpha(node.w);

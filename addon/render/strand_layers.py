@@ -54,8 +54,10 @@ _TOO_LARGE = 1.25
 _SPARE = 1.25
 #: pixels of which the fragments of what moves are shaded by one invocation, one after the other
 _SHADED_IN_TURN = 16
-#: fragments of a pixel that a software driver can order: each takes some 20 rounds of loops
-LONGEST_IN_SOFTWARE = 3072
+#: nodes that a round of a loop takes in software, so that all rounds do for more of them
+_NODES_A_ROUND = 8
+#: fragments of a pixel that a software driver can order: each takes some five rounds of loops
+LONGEST_IN_SOFTWARE = 12288
 
 _ORDER_RECIPE = ShaderRecipe(
     name="strand_layers_order",
@@ -69,11 +71,13 @@ _ORDER_RECIPE = ShaderRecipe(
         ("RG32F", "layer_fronts"),
     ),
     group_size=(64, 1),
-    defines=(("LAYERS", LAYERS),),
+    defines=(("LAYERS", LAYERS), ("NODES_A_ROUND", 1)),
 )
 #: shades fewer layers
 _TURNING_ORDER_RECIPE = replace(
-    _ORDER_RECIPE, name="strand_layers_order_turning", defines=(("LAYERS", TURNING_LAYERS),)
+    _ORDER_RECIPE,
+    name="strand_layers_order_turning",
+    defines=(("LAYERS", TURNING_LAYERS), ("NODES_A_ROUND", 1)),
 )
 
 
@@ -229,6 +233,9 @@ class StrandLayers:
 
     def _order(self, count: int, recipe: ShaderRecipe = _ORDER_RECIPE) -> None:
         """Order all lists that there are, by as many invocations."""
+        if is_software():
+            defines = dict(recipe.defines) | {"NODES_A_ROUND": _NODES_A_ROUND}
+            recipe = replace(recipe, defines=tuple(defines.items()))
         order = program(recipe)
         order.bind(images={name: self._images[name] for _, name, *_ in recipe.images})
         _dispatch(order, count)

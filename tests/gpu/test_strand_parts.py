@@ -13,6 +13,7 @@ from hairloom.addon.refine.settings import DetailSettings
 from hairloom.addon.render.strand_layout import StrandLayout
 from hairloom.addon.shading.settings import ShadingSettings, StrandSettings
 from hairloom.addon.shading.volume.settings import VolumeSettings
+from hairloom.addon.shading.volume.transparency import layer_fractions
 from hairloom.addon.strands import Surface
 
 pytestmark = pytest.mark.usefixtures("gpu_context")
@@ -205,14 +206,15 @@ def test_what_cannot_be_drawn_is_told(frame: Any, front: Any, with_rows: Any) ->
     """More than there is memory for, all at one depth of one pixel; or than a driver can order."""
     from hairloom.addon.render.strand_layers import LONGEST_IN_SOFTWARE, is_software
 
-    own, opacity = with_rows(1), 4.0 / 4095.0
-    shown = sheets(frame, np.zeros(5000), opacity)
-    picture = frame.render_image(shown, front, 1, 1, 1, passes=(frame.MeshPass(), own))
-    assert picture[0, 0, 3] == pytest.approx(1.0 - (1.0 - opacity) ** 4096, abs=1e-3)
-    missing = 5000 - (LONGEST_IN_SOFTWARE if is_software() else 4096)
-    assert own.statistics.layers.missing == missing
-    (note,) = own.statistics.notes
-    assert f"{missing:,}" in note
+    opacity = 4.0 / 4095.0
+    for rows, room in ((1, 4096), (MANY, LONGEST_IN_SOFTWARE)):
+        own, shown = with_rows(rows), sheets(frame, np.zeros(room + 904), opacity)
+        picture = frame.render_image(shown, front, 1, 1, 1, passes=(frame.MeshPass(), own))
+        assert picture[0, 0, 3] == pytest.approx(1.0 - (1.0 - opacity) ** room, abs=1e-3)
+        if rows == 1 or is_software():
+            assert own.statistics.layers.missing == 904
+            (note,) = own.statistics.notes
+            assert "904" in note
 
 
 def test_little_memory_makes_more_parts_and_not_a_crash(
@@ -236,6 +238,25 @@ def test_little_memory_makes_more_parts_and_not_a_crash(
     picture = frame.render_image(shown, front, SIZE, SIZE, 1, passes=(frame.MeshPass(), own))
     assert own.statistics.layers.parts > 3
     assert is_same(picture, expected)
+
+
+@pytest.mark.parametrize("opacity", [0.003, 0.02])
+def test_thousands_of_layers_in_a_pixel_are_drawn_at_once(
+    frame: Any, front: Any, with_rows: Any, opacity: float
+) -> None:
+    """As theory has them, by a software driver too, which ends a shader after so many rounds."""
+    count = 12_000
+    depths = np.linspace(-40.0, 40.0, count)
+    alpha = round(opacity * 4095.0) / 4095.0  # as lists hold it
+    fractions = layer_fractions(depths[None], np.full((1, count), alpha))[0]
+    own = with_rows(MANY)
+    shown = sheets(frame, np.random.default_rng(9).permutation(depths), opacity)
+    picture = frame.render_image(shown, front, 2, 1, 1, passes=(frame.MeshPass(), own))
+    assert own.statistics.layers.parts == 1
+    assert picture[..., 3] == pytest.approx(np.ones((1, 2)), abs=1e-3)
+    assert picture[..., 0] == pytest.approx(
+        np.full((1, 2), fractions @ brightness_of(depths)), abs=1e-3
+    )
 
 
 def test_long_lists_leave_nothing_unshaded(frame: Any, front: Any, with_rows: Any) -> None:
