@@ -12,6 +12,7 @@ from bpy_extras.io_utils import ImportHelper, poll_file_object_drop
 
 from ..blender.base.outcome import report
 from ..blender.properties.presets import (
+    OWN,
     apply,
     delete_own,
     free_title,
@@ -128,7 +129,7 @@ class HAIRLOOM_OT_save_preset(bpy.types.Operator):
     @reporting
     def execute(self, context: bpy.types.Context) -> set[str]:
         path = save_own(self.title, *kept_settings(chosen_hair(context)[0], self.section))
-        report(self, "INFO", f"Saved to {path}")
+        report(self, "INFO", f"Saved as {OWN}{path.stem}, in {path}")
         return {"FINISHED"}
 
     def draw(self, _context: bpy.types.Context) -> None:

@@ -192,6 +192,16 @@ def test_a_look_is_saved_listed_applied_and_deleted(
     assert list(own_folder.iterdir()) == [] and titles() == []
 
 
+def test_files_are_named_by_titles_of_all_scripts_and_take_no_others_place(
+    hair: bpy.types.Object, own_folder: Path
+) -> None:
+    for title in ("前髪", "後髪", "Straße!", "Strasse", "con", "?!", "!?"):
+        assert bpy.ops.hairloom.save_preset(title=title) == {"FINISHED"}
+    names = {"前髪", "後髪", "straße", "strasse_2", "_con", "preset", "preset_2"}
+    assert {path.stem for path in own_folder.iterdir()} == names
+    assert bpy.ops.hairloom.apply_preset(name="own/前髪") == {"FINISHED"}
+
+
 def test_the_name_that_is_offered_for_hair_of_a_long_name_is_free(
     hair: bpy.types.Object, own_folder: Path
 ) -> None:

@@ -19,7 +19,7 @@ import bpy
 
 from ...errors import HairloomError
 from ...exchange.files.atomic import write_text_atomic
-from ...exchange.files.names import as_compared
+from ...exchange.files.names import as_compared, folder_name
 from ...parameters import ALL_SETTINGS
 from ...params import Settings
 from ...params.preset import Preset, preset_as_dict, read_any_preset
@@ -155,10 +155,10 @@ def save_own(title: str, settings: Settings, *also: Settings) -> Path:
         HairloomError: the title is empty, or the file cannot be written.
     """
     title = _as_title(title)
-    stem = re.sub(r"[^a-z0-9]+", "_", title.lower()).strip("_")
+    stem = re.sub(r"[\W_]+", "_", title.lower()).strip("_")
     if not title:
         raise HairloomError("a preset needs a name", place="Save Preset", remedy="Type one")
-    path = _file_for(stem or "preset", title, settings.section)
+    path = _file_for(stem, title, settings.section)
     data = preset_as_dict(Preset(title, "saved by the artist", settings, also))
     write_text_atomic(path, json.dumps(data, indent=2) + "\n")
     return path
@@ -288,8 +288,7 @@ def _file_for(stem: str, title: str, section: str) -> Path:
     if known is not None:
         return known.path
     taken = {as_compared(path.stem) for path in _own_files()}
-    names = [stem, *(f"{stem}_{number}" for number in range(2, len(taken) + 3))]
-    return own_folder() / f"{next(name for name in names if name not in taken)}.json"
+    return own_folder() / f"{folder_name(stem, taken, 'preset')}.json"
 
 
 def _of_title(title: str, section: str) -> Entry | None:
