@@ -210,6 +210,23 @@ def test_a_scene_that_would_not_play_the_bake_of_linked_hair_is_not_saved(shot, 
     assert Cache(folder).facts.frame_count == 2 and Cache(shot[1]).facts.frame_count == 3
 
 
+@pytest.mark.parametrize("is_alone", [True, False])
+def test_hair_of_an_instance_is_said_to_be_left_out(library, new_hair, tmp_path, capfd, is_alone):
+    """The usual layout of characters in a shot, whose hair the render engine draws."""
+    if not is_alone:
+        new_hair()
+    empty = bpy.data.objects.new("Anna", None)
+    empty.instance_type, empty.instance_collection = "COLLECTION", brought(library, link=True)
+    bpy.context.scene.collection.objects.link(empty)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
+    scene = ["--scene", str(tmp_path / "shot.blend")]
+    for verb in (["export", "--output", str(tmp_path / "a.tfx")], ["bake", "--frames", "1", "1"]):
+        assert command_line.run([*verb, *scene]) == (1 if is_alone else 0)
+        told = capfd.readouterr()
+        (line,) = [one for one in (told.err + told.out).splitlines() if "an instance" in one]
+        assert line.startswith("hairloom: Anna: its hair") and "library override" in line
+
+
 def test_saving_leaves_the_file_of_the_library_as_it_is(override, library, tmp_path):
     before = Path(library).read_bytes()
     saved_and_loaded(tmp_path)

@@ -87,10 +87,21 @@ def _delete(objects: list[bpy.types.Object], report: Report) -> None:
 
 def _objects(names: list[str]) -> tuple[list[bpy.types.Object], tuple[str, ...]]:
     """Those that were named, else all hair and cloth of the view layer to be simulated; and
-    what is said of those left out."""
+    what is said of those left out.
+
+    Raises:
+        HairloomError: there is none, or no such.
+    """
     if names:
         return named_objects(names, bakeable, "hair curves or cloth"), ()
-    return all_of_scene(lambda obj: bakeable(obj) and _is_wanted(obj))
+    found, notes = all_of_scene(lambda obj: bakeable(obj) and _is_wanted(obj))
+    if not found:
+        raise HairloomError(
+            "there is nothing to bake",
+            place=bpy.context.scene.name,
+            remedy="Name a scene that has hair or cloth with --scene",
+        )
+    return found, notes
 
 
 def _is_wanted(obj: bpy.types.Object) -> bool:

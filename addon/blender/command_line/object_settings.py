@@ -10,6 +10,7 @@ import bpy
 from ...errors import HairloomError
 from ...parameters import ALL_SETTINGS
 from ...params import Settings, SettingsMap
+from ..bakes.bake_settings import OVERRIDE
 from ..base.objects import objects_in, without_hidden
 from ..properties.presets import named_preset
 from ..properties.properties import settings_of
@@ -73,16 +74,17 @@ def named_grooms(names: list[str]) -> tuple[list[bpy.types.Object], tuple[str, .
 def all_of_scene(
     is_wanted: Callable[[bpy.types.Object], bool], option: str = "--object"
 ) -> tuple[list[bpy.types.Object], tuple[str, ...]]:
-    """Such objects of the view layer, but for those that are hidden and for hair without curves;
-    and what is said of these.
+    """Such objects of the view layer, but for those that are hidden or only instanced, and for
+    hair without curves; and what is said of these.
 
     Args:
         option: which names an object.
 
     Raises:
-        HairloomError: all that there are would be left out.
+        HairloomError: all that there are would be left out, or are instances.
     """
-    found = [obj for obj in objects_in(bpy.context.view_layer) if is_wanted(obj)]
+    own = objects_in(bpy.context.view_layer)
+    found = [obj for obj in own if is_wanted(obj)]
     taken, left_out = without_hidden(found, bpy.context.evaluated_depsgraph_get())
     if left_out and not taken:
         raise HairloomError(
@@ -90,9 +92,34 @@ def all_of_scene(
             place="--scene",
             remedy=f"Show it in Blender, or name it with {option}",
         )
+    there = set(own)
+    instances = [
+        each for each in own if _instances_any(each, lambda of: of not in there and is_wanted(of))
+    ]
+    if instances and not taken:
+        raise _only_instanced(instances)
     remark = f"and is left out. Name it with {option} to have it."
-    notes = tuple(f"{each}, {remark}" for each in left_out)
-    return taken, notes
+    notes = [f"{each}, {remark}" for each in left_out]
+    if instances:
+        notes.append(f"{_only_instanced(instances)}")
+    return taken, tuple(notes)
+
+
+def _instances_any(obj: bpy.types.Object, is_wanted: Callable[[bpy.types.Object], bool]) -> bool:
+    """Whether an Empty shows such objects by an instance of their collection."""
+    if obj.instance_type != "COLLECTION" or obj.instance_collection is None:
+        return False
+    objects = obj.instance_collection.all_objects
+    return any(is_wanted(each) or _instances_any(each, is_wanted) for each in objects)
+
+
+def _only_instanced(instances: list[bpy.types.Object]) -> HairloomError:
+    is_linked = any(obj.instance_collection.library is not None for obj in instances)
+    return HairloomError(
+        "its hair or cloth is an instance, and only objects of the scene are taken",
+        place=", ".join(obj.name for obj in instances),
+        remedy=OVERRIDE if is_linked else "Link its collection into the scene in its place",
+    )
 
 
 def own_settings(obj: bpy.types.Object) -> dict[str, Settings]:
