@@ -192,7 +192,10 @@ def test_hair_whose_bake_is_not_there_is_exported_in_no_other_motion(
     for more in ([], ["--use-bake"]):
         assert export(*more) == 1
         assert "its bake is not in" in capfd.readouterr().err
-    assert not list(tmp_path.glob("a.abc*"))
+    cards = ["cards", "--scene", str(scene), "--groom", "Hair", "--motion", "joints"]
+    assert command_line.run([*cards, "--output", str(tmp_path / "a.glb")]) == 1
+    assert "its bake is not in" in capfd.readouterr().err
+    assert not list(tmp_path.glob("a.*"))
     assert export("--no-use-bake") == 0
     away.rename(tmp_path / "bake")
     assert export() == 0

@@ -54,7 +54,7 @@ class BakedGuides:
         Raises:
             HairloomError: no bake, a damaged one, or frames that it does not hold.
         """
-        cache = playback.cache_of(hair)
+        cache = playback.cache_if_baked(hair)
         if cache is None:
             raise HairloomError(
                 "it has no bake, so it does not move",

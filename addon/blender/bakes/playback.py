@@ -82,7 +82,7 @@ def cache_of(obj: bpy.types.Object) -> Cache | None:
 
 
 def cache_if_baked(obj: bpy.types.Object) -> Cache | None:
-    """The same for what goes into files: None where the object was never baked. One whose bake is
+    """The same for files and pictures: None where the object was never baked. One whose bake is
     gone, or lies where this machine does not see it, would be written in another motion.
 
     Raises:
@@ -93,7 +93,7 @@ def cache_if_baked(obj: bpy.types.Object) -> Cache | None:
         raise HairloomError(
             f"it was baked, and its bake is not in {folder}",
             place=obj.name,
-            remedy="Bring that folder here or bake again; or export without Use Bake "
+            remedy="Bring that folder here, bake again, or export strands without Use Bake "
             "(--no-use-bake)",
         )
     return cache
