@@ -45,7 +45,7 @@ class RestHair:
         is the one.
 
         Args:
-            rests: the same mesh without all, or some, of what deforms it.
+            rests: the same mesh without all, or some, of what deforms it, or in any other pose.
             least: by how much it has to be deformed at the roots, as a part of its diagonal.
         """
         if not strands.strand_count:

@@ -170,7 +170,8 @@ class HAIRLOOM_OT_pause(bpy.types.Operator):
 
 
 class HAIRLOOM_OT_mute_hair_dynamics(bpy.types.Operator):
-    """Turn off Blender's own Hair Dynamics on the selected hair, so that only Hairloom moves it"""
+    """Let Blender's own Hair Dynamics only put the selected hair onto its surface, so that Hairloom
+    alone moves it"""
 
     bl_idname = "hairloom.mute_hair_dynamics"
     bl_label = "Mute Hair Dynamics"
@@ -182,13 +183,13 @@ class HAIRLOOM_OT_mute_hair_dynamics(bpy.types.Operator):
             return False
         if any(own_dynamics(hair) for hair in chosen_hair(context)):
             return True
-        cls.poll_message_set("The selected hair has no Hair Dynamics modifier that is on")
+        cls.poll_message_set("No modifier with Hair Dynamics simulates the selected hair")
         return False
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         count = sum(mute_own_dynamics(hair) for hair in chosen_hair(context))
         modifiers = "1 modifier" if count == 1 else f"{count} modifiers"
-        report(self, "INFO", f"Turned off {modifiers} of Hair Dynamics")
+        report(self, "INFO", f"Muted {modifiers} of Hair Dynamics")
         return {"FINISHED"}
 
 

@@ -123,7 +123,7 @@ class HAIRLOOM_OT_sample_scene(LongWork, bpy.types.Operator):
 
 
 class HAIRLOOM_OT_use_groom(LongWork, bpy.types.Operator):
-    """Preview the selected hair with Hairloom. Turns off Blender's Hair Dynamics, grows hair if
+    """Preview the selected hair with Hairloom. Mutes Blender's Hair Dynamics, grows hair if
     there are no curves, and adds a look if there is none. Esc cancels"""
 
     bl_idname = "hairloom.use_groom"

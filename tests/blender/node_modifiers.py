@@ -17,3 +17,10 @@ def with_modifier(obj, *nodes):
         source = node.outputs[0]
     tree.links.new(source, tree.nodes.new("NodeGroupOutput").inputs[0])
     obj.modifiers.new("Nodes", "NODES").node_group = tree
+
+
+def mode_of(modifier):
+    """The input of Blender's Hair Dynamics that has their mode."""
+    sockets = modifier.node_group.interface.items_tree
+    (mode,) = (each for each in sockets if each.item_type == "SOCKET" and each.name == "Mode")
+    return getattr(modifier.properties.inputs, mode.identifier)

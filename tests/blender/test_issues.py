@@ -3,6 +3,7 @@
 import bpy
 import numpy as np
 import pytest
+from node_modifiers import mode_of
 
 from hairloom.addon.blender.preview import diagnostics, previews
 from hairloom.addon.blender.scene.curves import read_curves
@@ -161,6 +162,9 @@ def test_what_blender_does_to_selected_hair_waits_for_hidden_hair_to_be_shown(
 def test_blenders_dynamics_are_muted(sphere, extension):
     bpy.ops.object.curves_empty_hair_add()
     hair = bpy.context.object
+    assert told(hair) == [], "as it is added it only puts hair onto its surface"
+    mode_of(hair.modifiers[0]).value = "Physics (Experimental)"
+    hair.update_tag()
     assert told(hair) == ["hairloom.mute_hair_dynamics"]
     fix(hair)
     assert told(hair) == []

@@ -4,14 +4,14 @@ import bpy
 import numpy as np
 import pytest
 from hedgehogs import hedgehog
-from node_modifiers import with_modifier
+from node_modifiers import mode_of, with_modifier
 
 from hairloom.addon.blender.base.parts import at_once
 from hairloom.addon.blender.cards.build import read_inputs
 from hairloom.addon.blender.preview import previews
 from hairloom.addon.blender.preview.bake import Bake
-from hairloom.addon.blender.scene.curves import curve_points, read_curves
-from hairloom.addon.blender.scene.source import read_source, shown_curves
+from hairloom.addon.blender.scene.curves import curve_points, fill_curves, read_curves
+from hairloom.addon.blender.scene.source import own_dynamics, read_source, shown_curves
 from hairloom.addon.blender.sessions.groom_source import GroomSource
 from hairloom.addon.blender.strands.groom_motion import moving_hair
 from hairloom.addon.blender.strands.make_real import make_real
@@ -100,15 +100,63 @@ def test_a_preview_that_starts_in_a_pose_shows_the_hair_there(hair):
 
 
 def test_what_blender_has_put_there_stays(hair):
-    """By its own node, in a modifier as an artist adds it."""
-    hair.data.surface.add_rest_position_attribute = True
-    hair.data.surface_uv_map = hair.data.surface.data.uv_layers.active.name
-    with_modifier(hair, ("GeometryNodeDeformCurvesOnSurface", {}))
+    attached(hair)
     depsgraph = go_to(POSED)
     source = read_source(hair, depsgraph)
     assert source.rest is None
     assert np.array_equal(source.strands.points, read_curves(hair, depsgraph).strands.points)
     assert source.strands.points == pytest.approx(expected(hair), abs=0.02), "it is posed"
+
+
+def attached(hair):
+    """By Blender's own node, in a modifier as an artist adds it."""
+    hair.data.surface.add_rest_position_attribute = True
+    hair.data.surface_uv_map = hair.data.surface.data.uv_layers.active.name
+    with_modifier(hair, ("GeometryNodeDeformCurvesOnSurface", {}))
+    bpy.context.view_layer.update()
+
+
+def test_attached_hair_that_is_read_again_in_a_pose_is_the_same(hair):
+    attached(hair)
+    source = GroomSource(hair, go_to(REST))
+    depsgraph = go_to(POSED)
+    assert (
+        np.abs(read_curves(hair, depsgraph).strands.points - source.source.strands.points).max()
+        > 0.1
+    )
+    assert source.read_again(depsgraph) is None and source.moved_curves(depsgraph) is None
+    points = curve_points(hair.data).copy()
+    points[-1] += (0.0, 0.0, 0.02)
+    hair.data.position_data.foreach_set("vector", points.ravel())
+    hair.data.update_tag()
+    bpy.context.view_layer.update()
+    combed = source.read_again(bpy.context.evaluated_depsgraph_get()).source.strands.points
+    away = np.linalg.norm(combed - source.source.strands.points, axis=1)
+    assert away[-1] == pytest.approx(0.02, rel=0.01) and away[:-24].max() < SAME
+
+
+def test_muted_hair_dynamics_leave_hair_on_its_skin(hair, sphere):
+    """Those of Blender's own Empty Hair, which put it there."""
+    select(sphere)
+    bpy.ops.object.curves_empty_hair_add()
+    empty = bpy.context.object
+    stored = read_curves(hair, go_to(REST)).strands
+    fill_curves(
+        empty.data, bind_roots(stored, read_source(hair, go_to(REST)).head, place="").strands
+    )
+    empty.data.surface_uv_map = sphere.data.uv_layers.active.name
+    (modifier,) = empty.modifiers
+    mode = mode_of(modifier)
+    assert not own_dynamics(empty), "as it is added it simulates nothing"
+    mode.value = "Physics (Experimental)"
+    empty.update_tag()
+    assert own_dynamics(empty) == [modifier]
+    select(empty)
+    assert bpy.ops.hairloom.mute_hair_dynamics() == {"FINISHED"}
+    assert not own_dynamics(empty) and modifier.show_viewport and mode.value == "Animation"
+    there, depsgraph = expected(hair), go_to(POSED)
+    assert read_curves(empty, depsgraph).strands.points == pytest.approx(there, abs=1e-4)
+    assert started(empty, POSED).source.strands.points == pytest.approx(there, abs=1e-4)
 
 
 def test_a_head_that_is_subdivided_but_not_posed_moves_no_hair(hair, sphere):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import bpy
 
@@ -27,6 +28,8 @@ from .surfaces import read_rest_surfaces, read_surface
 
 #: node group of the modifier that Blender 5.2 gives to new hair
 _OWN_DYNAMICS = "Hair Dynamics"
+#: Its mode, and the one in which it only puts hair onto its deformed surface.
+_MODE, _ATTACHES = "Mode", "Animation"
 
 
 @dataclass(frozen=True)
@@ -198,20 +201,28 @@ def _no_density(name: str, head: bpy.types.Object | None) -> HairloomError:
 
 
 def own_dynamics(hair: bpy.types.Object) -> list[bpy.types.Modifier]:
-    """The object's enabled modifiers with Blender's own hair dynamics, in viewport or render.
+    """The object's enabled modifiers in which Blender's own dynamics simulate hair, in viewport or
+    render.
 
-    They would move the hair a second time.
+    They would move the hair a second time. Those in mode *Animation*, as new hair has them, only
+    put it onto its surface.
     """
-    groups = [
-        (modifier, modifier.node_group) for modifier in hair.modifiers if modifier.type == "NODES"
-    ]
     return [
         modifier
-        for modifier, nodes in groups
-        if nodes is not None
-        and nodes.name.startswith(_OWN_DYNAMICS)
+        for modifier in hair.modifiers
+        if modifier.type == "NODES"
+        and modifier.node_group is not None
+        and modifier.node_group.name.startswith(_OWN_DYNAMICS)
         and (modifier.show_viewport or modifier.show_render)
+        and ((mode := _mode(modifier)) is None or mode.value != _ATTACHES)
     ]
+
+
+def _mode(modifier: bpy.types.Modifier) -> Any:
+    """The input in which Hair Dynamics has its mode; None in a group without one."""
+    sockets = modifier.node_group.interface.items_tree
+    found = [each for each in sockets if each.item_type == "SOCKET" and each.name == _MODE]
+    return getattr(modifier.properties.inputs, found[0].identifier, None) if found else None
 
 
 def refuse_own_dynamics(hair: bpy.types.Object) -> None:
@@ -225,7 +236,7 @@ def refuse_own_dynamics(hair: bpy.types.Object) -> None:
             raise HairloomError(
                 f"its modifier {modifier.name} simulates it already",
                 place=hair.name,
-                remedy="Press Mute Hair Dynamics, which turns that modifier off",
+                remedy="Press Mute Hair Dynamics, which leaves the hair on its surface",
             )
 
 
@@ -240,10 +251,17 @@ def dynamics_warnings(hair: bpy.types.Object) -> tuple[str, ...]:
 
 
 def mute_own_dynamics(hair: bpy.types.Object) -> int:
-    """Turn Blender's own hair dynamics off, in viewport and render; returns how many."""
+    """Let Blender's own hair dynamics only put hair onto its surface, or turn them off where they
+    cannot; returns how many."""
     modifiers = own_dynamics(hair)
     for modifier in modifiers:
-        modifier.show_viewport = modifier.show_render = False
+        mode = _mode(modifier)
+        if mode is None:
+            modifier.show_viewport = modifier.show_render = False
+        else:
+            mode.value = _ATTACHES
+    if modifiers:
+        hair.update_tag()
     return len(modifiers)
 
 

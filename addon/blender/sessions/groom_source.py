@@ -41,6 +41,7 @@ from ..scene.source import (
     read_source_colors,
     usable_curves,
 )
+from ..scene.surfaces import read_positions
 from .prepared_groom import BuildRequest, requested_rig
 
 #: Points that lie nearer than this to where they were have not moved, as a part of how far they are
@@ -197,7 +198,7 @@ class GroomSource:
         settings = GroomSettings.of(hair)
         read, stored, back = self._read_curves(hair, depsgraph)
         rest = None if before.rest is None else replace(before.rest, strands=stored)
-        strands = self._on_head(stored)
+        strands = self._on_head(stored, depsgraph)
         is_animated = settings[DynamicsSettings].animated_style
         if is_animated and np.array_equal(strands.offsets, before.strands.offsets):
             strands = strands.with_points(before.strands.points)  # each frame has its own
@@ -259,12 +260,32 @@ class GroomSource:
         is_there = np.allclose(back, np.eye(4))
         return read, read.strands if is_there else read.strands.transformed(back), back
 
-    def _on_head(self, stored: StrandSet) -> StrandSet:
-        """Strands as they are stored, on the head in the pose in which the reading began."""
-        rest, head = self.request.source.rest, self.request.source.head
-        if rest is None or head is None:
-            return stored
-        return replace(rest, strands=stored).on(head)
+    def _on_head(self, read: StrandSet, depsgraph: bpy.types.Depsgraph) -> StrandSet:
+        """Curves that were read, on the head in the pose in which the reading began: hair that no
+        modifier attaches is stored on the undeformed head, other hair stands on it as it is now."""
+        source, hair = self.request.source, self.hair.found()
+        if source.head is None or hair.hairloom.dynamics.animated_style:
+            return read
+        if source.rest is not None:
+            return replace(source.rest, strands=read).on(source.head)
+        now = self._head_now(source.head, depsgraph)
+        found = None if now is None else RestHair.found(read, [now], source.head)
+        return read if found is None else found.on(source.head)
+
+    def _head_now(self, rest: Surface, depsgraph: bpy.types.Depsgraph) -> Surface | None:
+        """The head as it is deformed now, where its object was at rest; None where nothing deforms
+        it."""
+        head = None if self.head is None else self.head.handle.find()
+        if self.head is None or head is None:
+            return None
+        if not len(head.modifiers) and head.data.shape_keys is None:
+            return None
+        positions = read_positions(head, depsgraph, place=head.name)
+        back = self.head.rest @ np.linalg.pinv(matrix_of(head, depsgraph))
+        positions = moved(positions, back)
+        if positions.shape != rest.positions.shape or not np.isfinite(positions).all():
+            return None
+        return replace(rest, positions=positions)
 
     def moved_curves(self, depsgraph: bpy.types.Depsgraph) -> tuple[StrandSet, Ints] | None:
         """The curves that have moved since this was last asked for, or since other hair was
@@ -275,7 +296,7 @@ class GroomSource:
         """
         before = self._combed
         _, stored, back = self._read_curves(self.hair.found(), depsgraph)
-        strands = self._on_head(stored)
+        strands = self._on_head(stored, depsgraph)
         if not np.array_equal(strands.offsets, before.offsets):
             return None
         farthest = max(np.abs(strands.points).max(initial=0.0), np.abs(back[:3, 3]).max())

@@ -144,7 +144,7 @@ def take_over(
     else:
         yield Part("Reading the hair", lambda: None)  # before which nothing changes
         if mute_own_dynamics(hair):
-            done.append("turned off Blender's Hair Dynamics")
+            done.append("muted Blender's Hair Dynamics")
     if is_untouched(hair):
         dress(hair, presets)
         fit_motion(hair, factor)
