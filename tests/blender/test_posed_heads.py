@@ -282,3 +282,16 @@ def test_a_preview_far_from_the_rest_pose_starts(hair):
     bone.keyframe_insert("location", frame=POSED)
     there = expected(hair)
     assert started(hair, POSED).source.strands.points == pytest.approx(there, abs=1e-4)
+
+
+def test_settled_in_a_pose_it_is_stored_at_rest(hair):
+    there, stored = expected(hair), read_curves(hair, go_to(REST)).strands
+    go_to(POSED)
+    select(hair)
+    assert bpy.ops.hairloom.settle() == {"FINISHED"}
+    settled = read_curves(hair, go_to(REST)).strands
+    assert settled.roots == pytest.approx(stored.roots, abs=SAME)
+    posed = shown_curves(hair, go_to(POSED)).strands
+    fallen = (posed.points - there)[stored.offsets[1:] - 1]
+    assert np.median(fallen[:, 2]) < -0.01, "straight down, in the pose"
+    assert np.abs(np.median(fallen[:, :2], axis=0)).max() < 0.3 * -np.median(fallen[:, 2])

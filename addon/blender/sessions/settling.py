@@ -17,6 +17,7 @@ from ...dynamics.colliders import PosedCollider
 from ...dynamics.settings import DynamicsSettings
 from ...dynamics.settle_settings import SettleSettings
 from ...errors import HairloomError
+from ...groom.rest_hair import carried
 from ...groom.settings import GuideSettings
 from ...paint_flow import painted_guides
 from ...rig_flow import Rig
@@ -52,10 +53,13 @@ def settle_hair(
     check_curves_editable(hair, depsgraph)
     source = GroomSource(hair, depsgraph)
     own = read_own_curves(hair, depsgraph, COMBED.before(hair))
-    guides = settle_flow.guides_that_fall(own.strands, source.settings[GuideSettings])
     read = source.source
+    strands = own.strands
+    if read.rest is not None and read.head is not None:
+        strands = carried(strands, read.rest.surface, read.head)
+    guides = settle_flow.guides_that_fall(strands, source.settings[GuideSettings])
     rig = rig_flow.prepare(
-        own.strands,
+        strands,
         read.head,
         guides,
         place=hair.name,
@@ -65,14 +69,16 @@ def settle_hair(
     _check_roots(hair, rig)
     dynamics, pose = source.settings[DynamicsSettings], source.pose(rig, depsgraph)
     posed, warnings = _colliders(hair, source, rig, dynamics, depsgraph)
-    canvas = Canvas(hair, head_of(hair), read.head, own.strands, own.kept, is_own=True)
+    canvas = Canvas(hair, head_of(hair), read.head, strands, own.kept, is_own=True)
     masks, notes = canvas.masks(dynamics, depsgraph)
     warnings += tuple(note for note in notes if note not in warnings)
     gravity = gravity_of(depsgraph.scene)
     painted = painted_guides(rig, masks) if masks else None
     fallen = yield from settle_flow.settle(rig, pose, posed, dynamics, settings, gravity, painted)
     head = solid_of(rig.head)
-    settled, is_out = settle_flow.as_curves(own.strands, rig, fallen, head)
+    settled, is_out = settle_flow.as_curves(strands, rig, fallen, head)
+    if read.rest is not None and read.head is not None:
+        settled = carried(settled, read.head, read.rest.surface)
     return lambda: _stored(hair, own, settled, is_out, warnings, depsgraph)
 
 
