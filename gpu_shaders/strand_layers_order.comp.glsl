@@ -5,6 +5,8 @@
 //
 // A list is sorted nearest first: runs of LAYERS first, then by merging two at a time.
 //
+// Lists of more than `longest` are counted, and left as they are.
+//
 // NODES_A_ROUND: how many nodes a round of a loop takes: one, but for software drivers, which end a shader
 // after 65,535 rounds of all its loops.
 //
@@ -222,6 +224,9 @@ void main()
     number = node.x;
   }
   imageAtomicMax(layer_count, ivec2(3, 0), uint(count));
+  if (count > longest) {
+    return;
+  }
 
   float fractions[LAYERS];
   float through = 1.0, front = 2.0;

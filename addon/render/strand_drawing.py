@@ -142,6 +142,7 @@ class StrandDrawing:
     ribbon: the vertices of a strand that has room for this many pieces.
     points: where strands and eye are. shading: what all programs that shade have.
     shown: what those that write colours have beside that.
+    expected_depths: see PixelPart; found only where they are asked for.
     """
 
     order: DetailOrder
@@ -152,6 +153,7 @@ class StrandDrawing:
     shown: Sequence[ShaderFeature]
     output_encoding: int
     samples_across: int
+    expected_depths: Callable[[], range]
 
     def draw(self) -> None:
         """All strands, opaque, each pixel shaded as it is drawn."""

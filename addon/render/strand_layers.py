@@ -58,6 +58,8 @@ _SHADED_IN_TURN = 16
 _NODES_A_ROUND = 8
 #: fragments of a pixel that a software driver can order: each takes some five rounds of loops
 LONGEST_IN_SOFTWARE = 12288
+#: more than any list has
+_ANY_LENGTH = (1 << 31) - 1
 
 _ORDER_RECIPE = ShaderRecipe(
     name="strand_layers_order",
@@ -70,6 +72,7 @@ _ORDER_RECIPE = ShaderRecipe(
         ("R32UI", "layer_seen"),
         ("RG32F", "layer_fronts"),
     ),
+    integers=("longest",),
     group_size=(64, 1),
     defines=(("LAYERS", LAYERS), ("NODES_A_ROUND", 1)),
 )
@@ -159,7 +162,8 @@ class StrandLayers:
         counts, drawn, missing = self._counted(drawing), 0, 0
         fragments = int(counts.sum(dtype=np.int64))
         self._make_room(fragments)
-        waiting = pixel_parts(counts, self._capacity)[::-1]
+        expected = drawing.expected_depths()
+        waiting = pixel_parts(counts, self._capacity, _longest(), expected)[::-1]
         while waiting:
             part = waiting.pop()
             rows = part.rows(self._heads.width) if is_own_target else None
@@ -222,22 +226,26 @@ class StrandLayers:
         pixel_count = self._pixel_count
         if not pixel_count:
             return True
-        self._order(pixel_count)
+        self._order(pixel_count, longest=None if even_if_too_long else _longest())
         _, _, seen_count, longest = self._counts()
-        if is_software() and longest > LONGEST_IN_SOFTWARE:
-            if not even_if_too_long:
-                return False
-            self._too_long = longest - LONGEST_IN_SOFTWARE
+        self._too_long = max(longest - (_longest() or longest), 0)
+        if self._too_long and not even_if_too_long:
+            return False
         self._shade(drawing, seen_count)
         return True
 
-    def _order(self, count: int, recipe: ShaderRecipe = _ORDER_RECIPE) -> None:
-        """Order all lists that there are, by as many invocations."""
+    def _order(
+        self, count: int, recipe: ShaderRecipe = _ORDER_RECIPE, *, longest: int | None = None
+    ) -> None:
+        """Order all lists that there are, but those that are too long, by as many invocations."""
         if is_software():
             defines = dict(recipe.defines) | {"NODES_A_ROUND": _NODES_A_ROUND}
             recipe = replace(recipe, defines=tuple(defines.items()))
         order = program(recipe)
-        order.bind(images={name: self._images[name] for _, name, *_ in recipe.images})
+        order.bind(
+            images={name: self._images[name] for _, name, *_ in recipe.images},
+            integers={"longest": _ANY_LENGTH if longest is None else longest},
+        )
         _dispatch(order, count)
 
     def _shade(self, drawing: StrandDrawing, count: int) -> None:
@@ -336,6 +344,11 @@ class StrandLayers:
 def is_software() -> bool:
     """Whether a processor draws in place of a GPU."""
     return str(gpu.platform.device_type_get()) == "SOFTWARE"
+
+
+def _longest() -> int | None:
+    """How many fragments of a pixel can be ordered; None: all."""
+    return LONGEST_IN_SOFTWARE if is_software() else None
 
 
 def _dispatch(shader: ShaderProgram, count: int) -> None:

@@ -45,6 +45,7 @@ from .kept_picture import KeptPicture
 from .marschner_textures import marschner_feature, scattering_feature
 from .opacity_maps import OpacityMaps
 from .opacity_pass import OpacityPass
+from .pixel_parts import expected_depths
 from .ribbons import Ribbons
 from .shader_feature import ShaderFeature
 from .shader_program import released_with_shaders
@@ -244,6 +245,7 @@ class StrandPass:
             ),
             output_encoding=output_encoding,
             samples_across=samples,
+            expected_depths=lambda: expected_depths(self._ball.of(snapshot), camera),
         )
         layers = LayersDrawn()
         if is_layered:

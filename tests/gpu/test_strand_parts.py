@@ -287,3 +287,31 @@ def test_more_layers_in_a_pixel_than_a_software_driver_can_count(
     # a layer of the eight that stand for all may stand for an eighth of the light
     assert picture[:3] == pytest.approx(float(share @ brightness_of(depths)), abs=0.125 * 0.8)
     assert passes[1].statistics.layers.missing == 0
+
+
+def test_strands_that_no_driver_orders_at_once_are_drawn_a_few_times(
+    frame: Any, with_rows: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Not once for each half of all depths, of which hair has hardly any, until it is met."""
+    from hairloom.addon.render.strand_drawing import StrandDrawing
+    from hairloom.addon.render.strand_layers import is_software
+
+    gather, draws = StrandDrawing.gather, []
+
+    def counted(*given: Any) -> None:
+        draws.append(given)
+        gather(*given)
+
+    monkeypatch.setattr(StrandDrawing, "gather", counted)
+    middle = SIZE / 2
+    view = frame.look_at((middle, -2.0e4, middle), (middle, 0.0, middle))
+    far_away = frame.Camera(view, frame.perspective(0.5 / 2.0e4, 1.0, 10.0, 1.0e5))
+    passes = frame.MeshPass(), with_rows(MANY)
+    shown = sheets(frame, np.linspace(-40.0, 40.0, 20_000), 0.003)
+    for at_most in (3, 2):
+        draws.clear()
+        picture = frame.render_image(shown, far_away, 1, 1, 1, passes=passes)
+        assert len(draws) <= at_most, "of a view that is known, nothing is tried in vain"
+        assert passes[1].statistics.layers.parts == (2 if is_software() else 1)
+    assert picture[0, 0, 3] == pytest.approx(1.0, abs=1e-3)
+    assert passes[1].statistics.layers.missing == 0

@@ -8,7 +8,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from hairloom.addon.render.pixel_parts import DEPTH_END, PixelPart, pixel_parts
+from hairloom.addon.render.camera import Camera, look_at, orthographic, perspective
+from hairloom.addon.render.pixel_parts import DEPTH_END, PixelPart, expected_depths, pixel_parts
+from hairloom.addon.shading.volume.light_frame import Ball
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -51,6 +53,59 @@ def test_a_part_is_cut_until_it_is_one_depth_of_one_pixel() -> None:
         part, steps = (one, other)[steps % 2], steps + 1
     assert part.end - part.first == 1 and part.far - part.near == 1
     assert steps < 3 + 32
+
+
+@pytest.mark.parametrize("expected", [range(500, 508), range(DEPTH_END - 8, DEPTH_END), range(9)])
+def test_depths_are_cut_where_hair_is_and_all_are_in_one_slab(expected: range) -> None:
+    cuts: set[int] = set()
+
+    def cut(part: PixelPart, rounds: int) -> list[PixelPart]:
+        if not rounds or not part.slabs:
+            return [part]
+        cuts.add(part.slabs[0].near)
+        return [end for slab in part.slabs for end in cut(slab, rounds - 1)]
+
+    ends = cut(PixelPart(4, 5, expected=expected), 2)
+    assert cuts <= set(expected), "no draw for what holds no hair"
+    assert ends[0].far == DEPTH_END and ends[-1].near == 0
+    assert all(far.near == near.far for far, near in pairwise(ends))
+
+
+def test_a_part_with_a_pixel_that_is_too_long_is_two_at_once() -> None:
+    counts = np.array([5, 1, 9, 2], np.uint32)
+    parts = pixel_parts(counts, 8, longest=8, expected=range(100, 104))
+    ends = [(part.first, part.end, part.near, part.far) for part in parts]
+    assert ends == [
+        (0, 2, 0, DEPTH_END),
+        (2, 3, 102, DEPTH_END),
+        (2, 3, 0, 102),
+        (3, 4, 0, DEPTH_END),
+    ]
+    assert len(pixel_parts(counts, 8, longest=9)) == 3
+
+
+@pytest.mark.parametrize(
+    "projection",
+    [perspective(0.5, 1.5, 0.1, 30.0), orthographic(3.0, 1.5, 0.1, 30.0)],
+    ids=["perspective", "orthographic"],
+)
+def test_depths_of_hair_are_expected_where_it_is_seen(projection: np.ndarray) -> None:
+    ball = Ball(np.array([0.3, 0.2, 1.0]), 0.2)
+    camera = Camera(look_at((1.0, -4.0, 2.0), (0.3, 0.0, 1.0)), projection)
+    away = np.random.default_rng(1).normal(size=(10_000, 3))
+    points = ball.center + ball.radius * away / np.linalg.norm(away, axis=1, keepdims=True)
+    clip = np.column_stack([points, np.ones(len(points))]) @ (projection @ camera.view).T
+    depths = (0.5 + 0.5 * clip[:, 2] / clip[:, 3]).astype(np.float32).view(np.int32)
+    expected = expected_depths(ball, camera)
+    assert expected.start <= depths.min() and depths.max() < expected.stop
+    assert len(expected) < 1.01 * (depths.max() - depths.min())
+
+
+def test_an_eye_within_hair_expects_some_before_it() -> None:
+    camera = Camera(look_at((0.0, 0.1, 0.0), (0.0, 1.0, 0.0)), perspective(0.5, 1.0, 0.01, 30.0))
+    expected = expected_depths(Ball(np.zeros(3), 1.0), camera)
+    assert np.int32(expected.start).view(np.float32) > 0.1
+    assert len(expected) > 0 and expected.stop <= DEPTH_END
 
 
 def test_depths_up_to_the_farthest_have_bits_in_order() -> None:
