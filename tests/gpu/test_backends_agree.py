@@ -22,7 +22,7 @@ from hairloom.addon.strands import Surface
 
 pytestmark = pytest.mark.portable
 
-SIZE = 160
+SIZE = 96
 VOLUMES = {
     "none": VolumeSettings(extinction=0.0, shadows="slices", scattering=False),
     "slices": VolumeSettings(shadows="slices", scattering=False),
@@ -43,7 +43,7 @@ def picture(volume: VolumeSettings) -> np.ndarray:
         render_image,
     )
 
-    strands = combed_strands(2500)
+    strands = combed_strands(1000)
     snapshot = Snapshot(
         strands,
         np.full(strands.shape[:2], 0.004, np.float32),

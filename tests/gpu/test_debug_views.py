@@ -12,8 +12,13 @@ import pytest
 from hair_ball import ball_mesh
 from tiers import few_in_commits
 
-from hairloom.addon.dynamics.colliders import CapsuleCollider, PosedCollider, SphereCollider
-from hairloom.addon.dynamics.colliders.distance_field import DistanceField
+from hairloom.addon.dynamics.colliders import (
+    CapsuleCollider,
+    Collider,
+    DistanceField,
+    PosedCollider,
+    SphereCollider,
+)
 from hairloom.addon.dynamics.settings import DynamicsSettings
 from hairloom.addon.refine.detail import PictureView, detail_factors
 from hairloom.addon.refine.settings import DetailSettings
@@ -197,11 +202,10 @@ def test_depth_is_the_distance_from_colliders(
     posed[:3, 3] = center
     ball = SphereCollider((0.0, 0.0, 0.0), radius)
     far = CapsuleCollider((0.0, 5.0, 0.0), (0.0, 5.0, 1.0), 0.1)
-    solids = {
-        "ball": (ball,),
-        "capsule and ball": (far, ball),
-        "field": (DistanceField.from_surface(Surface(*ball_mesh(64, radius)), DynamicsSettings()),),
-    }[kind]
+    solids: tuple[Collider, ...] = (far, ball) if kind == "capsule and ball" else (ball,)
+    if kind == "field":
+        mesh = Surface(*ball_mesh(64, radius))
+        solids = (DistanceField.from_surface(mesh, DynamicsSettings()),)
     snapshot = snapshot_of(
         frame,
         strands,

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from gpu_calls import gpu_calls
+from tiers import few_in_commits
 
 from hairloom.addon.render.camera import Camera, look_at, orthographic
 from hairloom.addon.render.scene_snapshot import DrawnGroom, SceneSnapshot
@@ -83,9 +84,8 @@ def test_a_mesh_has_the_shadow_of_all_grooms(gpu_context: Any) -> None:
     assert lit == pytest.approx(expected, rel=0.04)
 
 
-@pytest.mark.alike
-@pytest.mark.parametrize("transparency", ["none", "hashed", "layers"])
-@pytest.mark.parametrize("model", ["kajiya_kay", "marschner"])
+@pytest.mark.parametrize("transparency", few_in_commits(["layers", "hashed", "none"]))
+@pytest.mark.parametrize("model", few_in_commits(["marschner", "kajiya_kay"]))
 def test_hair_has_the_shadow_of_other_grooms(
     gpu_context: Any, transparency: str, model: str
 ) -> None:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from gpu_rounding import tolerance
+from tiers import few_in_commits
 
 from hairloom.addon.refine.settings import DetailSettings
 from hairloom.addon.shading.environment import (
@@ -134,7 +135,7 @@ PLAIN = replace(
 )
 
 
-@pytest.mark.parametrize("transparency", ["none", "layers"])
+@pytest.mark.parametrize("transparency", few_in_commits(["layers", "none"]))
 def test_strands_gain_the_light_of_the_reference(frame: Any, transparency: str) -> None:
     """Broad straight ribbons under a sun and a lamp, with and without far skin."""
     strands = ribbons()

@@ -100,6 +100,7 @@ def layers_of(maps: Any) -> np.ndarray:
     return np.concatenate([texture_to_array(slot) for slot in maps.slots], axis=-1)
 
 
+@pytest.mark.alike
 @pytest.mark.parametrize("light", LIGHTS.values(), ids=LIGHTS)
 @pytest.mark.parametrize("shadows", ["slices", "deep"])
 def test_sums_are_those_of_the_strands(gpu_context: Any, light: Light, shadows: str) -> None:
@@ -125,6 +126,7 @@ def test_sums_are_those_of_the_strands(gpu_context: Any, light: Light, shadows: 
     assert found == pytest.approx(expected, rel=2e-2 if is_wide else 4e-3)
 
 
+@pytest.mark.alike
 @pytest.mark.parametrize("light", LIGHTS.values(), ids=LIGHTS)
 @pytest.mark.parametrize("shadows", ["slices", "deep"])
 def test_look_up_agrees_with_its_twin(
@@ -277,6 +279,7 @@ def path_at(compute: Callable[..., np.ndarray], maps: Any, points: np.ndarray) -
     )[0, :, :3]
 
 
+@pytest.mark.alike
 @pytest.mark.parametrize("light", LIGHTS.values(), ids=LIGHTS)
 def test_a_strand_finds_itself_in_the_map_as_often_as_is_taken_off(
     gpu_context: Any, compute: Callable[..., np.ndarray], light: Light

@@ -62,6 +62,7 @@ def halves(left: Any, right: Any) -> np.ndarray:
     return np.where(is_left, left, right)
 
 
+@pytest.mark.alike
 @pytest.mark.parametrize("transparency", ["none", "hashed", "layers"])
 @pytest.mark.parametrize("model", ["kajiya_kay", "marschner"])
 def test_hair_of_two_colours_is_drawn_as_two_looks(

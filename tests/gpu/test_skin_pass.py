@@ -98,6 +98,7 @@ def noise(layout: SkinLayout) -> np.ndarray:
     return np.random.default_rng(7).random((*layout.island.shape, 4)).astype(np.float32)
 
 
+@pytest.mark.alike
 @pytest.mark.parametrize("softness", [0.0005, 0.004, 0.03])
 def test_the_blur_is_its_twins(softness: float) -> None:
     from hairloom.addon.render.skin_pass import layout_textures, spread

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tiers import few_in_commits
 
 from hairloom.addon.refine.detail import PictureView, detail_factors
 from hairloom.addon.refine.settings import DetailSettings
@@ -99,9 +100,8 @@ def test_both_at_once_are_both_alone(frame: Any, transparency: str, mode: str) -
     assert apart(both, alone[0] + alone[1]).max() < 1.0 / 255.0
 
 
-@pytest.mark.alike
-@pytest.mark.parametrize("shadows", ["slices", "deep"])
-@pytest.mark.parametrize("model", ["kajiya_kay", "marschner"])
+@pytest.mark.parametrize("shadows", few_in_commits(["deep", "slices"]))
+@pytest.mark.parametrize("model", few_in_commits(["marschner", "kajiya_kay"]))
 def test_few_points_are_the_same_curves_as_many(frame: Any, model: str, shadows: str) -> None:
     """Also in their own shadow and in that of others, and with all that goes by the way along."""
     curves = [straight(40, FEW), coils(12, turns=6.0)]
@@ -139,7 +139,7 @@ def _uncolored(*grids: np.ndarray) -> dict[str, Any]:
     return of_grids(*grids) | {"color": None}
 
 
-@pytest.mark.parametrize("transparency", ["none", "layers"])
+@pytest.mark.parametrize("transparency", few_in_commits(["layers", "none"]))
 def test_tint_and_taper_go_by_length_however_points_are_spaced(
     frame: Any, transparency: str
 ) -> None:
