@@ -10,11 +10,18 @@ bpy = pytest.importorskip("bpy", reason="these tests need Blender or the bpy mod
 
 from engine_stage import SIZE, set_world  # noqa: E402
 from hedgehogs import hedgehog  # noqa: E402
+from made_once import once  # noqa: E402
 
 import hairloom  # noqa: E402  it is loaded by tests/conftest.py
-from hairloom.addon import registration  # noqa: E402
+from hairloom.addon import light_flow, registration  # noqa: E402
+from hairloom.addon.blender.cards import motion  # noqa: E402
+from hairloom.addon.blender.colliders import spheres  # noqa: E402
+from hairloom.addon.blender.command_line import inputs  # noqa: E402
 from hairloom.addon.blender.sessions import solvers  # noqa: E402
+from hairloom.addon.cards import build as card_build  # noqa: E402
 from hairloom.addon.dynamics.colliders import DistanceField  # noqa: E402
+from hairloom.addon.groom import child_roots  # noqa: E402
+from hairloom.addon.render import skin_layouts  # noqa: E402
 from hairloom.addon.shading import density_grid, skin_seen  # noqa: E402
 from hairloom.addon.strands import StrandSet  # noqa: E402
 
@@ -39,6 +46,28 @@ def same_fields() -> Iterator[Any]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(DistanceField, "from_surface", found)
         yield make
+
+
+@pytest.fixture(autouse=True, scope="session")
+def made_before() -> Iterator[None]:
+    """What takes long and depends on its arguments alone is made once of the same ones: most tests
+    have the same hair on the same head, and those in tests/pure show what it is."""
+
+    def cells() -> tuple[int, int]:
+        return density_grid._MAX_CELLS, skin_seen._CELLS
+
+    with pytest.MonkeyPatch.context() as patch:
+        for name in ("sky_field", "openness_field", "skin_field"):
+            once(patch, light_flow, name, also=cells)
+        for name in ("above_skin", "wrong_fraction"):
+            once(patch, card_build, name)
+        for name in ("grow", "grow_with_face"):
+            once(patch, inputs, name)
+        once(patch, child_roots, "_roots_among")
+        once(patch, skin_layouts, "skin_layout")
+        once(patch, spheres, "fit_spheres")
+        once(patch, motion, "fit_spheres")
+        yield
 
 
 @pytest.fixture(autouse=True)
