@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -21,6 +22,7 @@ def marks_of(function: ast.FunctionDef) -> dict[str, ast.expr]:
     return found
 
 
+@cache
 def marked_in(file: Path) -> dict[str, dict[str, ast.expr]]:
     """The tests of a file with their marks."""
     tree = ast.parse(file.read_text(encoding="utf-8"))

@@ -109,9 +109,9 @@ def test_equals_the_reference(kit, values):
         return tumbling(kit, time)
 
     ends = [
-        played(kit, settings, motion, form, 0.25, gravity=kit.EARTH)[0]
+        played(kit, settings, motion, form, 0.15, gravity=kit.EARTH)[0]
         for form in (advance, advance_slowly)
     ]
-    plain, _ = played(kit, DynamicsSettings(**SOFT), motion, seconds=0.25, gravity=kit.EARTH)
+    plain, _ = played(kit, DynamicsSettings(**SOFT), motion, seconds=0.15, gravity=kit.EARTH)
     assert np.abs(plain.position - ends[0].position).max() > 0.01
     np.testing.assert_allclose(ends[0].position, ends[1].position, atol=3e-4)

@@ -50,7 +50,7 @@ def test_hair_moves_the_same_at_any_size(kit, shake, collider, solver):
             gravity=kit.EARTH * factor,
             bowed=True,
         )
-        return np.array([state.grid for state in scene.play(0.5)]) / factor
+        return np.array([state.grid for state in scene.play(0.25)]) / factor
 
     one = ends(1.0)
     assert np.abs(one[-1] - one[0]).max() > 0.05

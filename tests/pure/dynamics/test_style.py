@@ -95,6 +95,7 @@ def zigzag(guide_count: int, angle: float) -> np.ndarray:
     return (0.015 * start_at_zero).astype(np.float32)
 
 
+@pytest.mark.alike
 @pytest.mark.parametrize("degrees", [10, 30, 60, 80])
 def test_shaken_hair_comes_to_rest_however_kinked(degrees: float) -> None:
     """Kinks that turned with the strand fed on their own motion and never stopped."""

@@ -35,7 +35,7 @@ APART = tuple(
     for kind, package in (("abc", "alembic3d"), ("usdc", "pxr"), ("usda", "pxr"))
 )
 WRITTEN = (*FORMATS, "tfxbone", "glb", *APART[:2])
-FILES, FILES_APART, KILLS = 300, 12, 12
+FILES, FILES_APART, KILLS = 150, 6, 6
 
 
 def report(tool: str, *arguments: str) -> dict[str, Any]:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tiers import few_in_commits
 
 from hairloom.addon.arrays import Floats
 from hairloom.addon.exchange.tressfx import read_tfx
@@ -135,8 +136,7 @@ def test_a_flat_groom_is_as_large_as_it_is_wide_however_the_camera_is_rolled() -
     assert rolled.widening == pytest.approx(far.widening)
 
 
-@pytest.mark.alike
-@pytest.mark.parametrize("height", [150, 75, 38])
+@pytest.mark.parametrize("height", few_in_commits([75, 150, 38]))
 def test_the_groom_covers_as_much_when_it_is_thinned(shared_data: Path, height: int) -> None:
     path = shared_data / "sintel" / "SintelHairOriginal-sintel_hair.16points.tfx"
     grid = read_tfx(path).strands.grid
