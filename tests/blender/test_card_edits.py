@@ -8,6 +8,7 @@ import bpy
 import numpy as np
 import pytest
 from glb_files import Glb
+from tiers import few_in_commits
 
 from hairloom.addon.blender.cards.build import BuiltCards, build_steps, read_inputs
 from hairloom.addon.blender.cards.edits import MADE_ATTRIBUTE, RECORD, groom_edits
@@ -167,6 +168,7 @@ def test_another_tile_is_kept(hair):
     assert set(tile[numbers(obj) == 4]) == {int(chosen[:, 0].mean() * 4)}
 
 
+@pytest.mark.alike
 @pytest.mark.parametrize("count", [6, 12, 24])
 def test_with_other_cards_nothing_vanishes(hair, count):
     """Fewer, as many by another seed, and more."""
@@ -182,7 +184,7 @@ def test_with_other_cards_nothing_vanishes(hair, count):
     assert obj.hairloom.card_object.card_count == len(found) <= count + 1
 
 
-@pytest.mark.parametrize("seed", [1, 3])
+@pytest.mark.parametrize("seed", few_in_commits([1, 3]))
 def test_cards_that_were_joined_to_save_triangles_are_not_deleted(hair, seed):
     cards = hair.data.hairloom.cards
     cards.segment_count, cards.max_triangles, cards.seed = 1, 12, seed
@@ -340,7 +342,7 @@ def test_edited_cards_go_with_their_skin(hair, sphere):
     np.testing.assert_allclose(corners(make(hair), 3), before + [0.0, 0.0, 0.5], atol=1e-4)
 
 
-@pytest.mark.parametrize("scale", [(2.0, 2.0, 2.0), (-1.0, 1.0, 1.0)])
+@pytest.mark.parametrize("scale", few_in_commits([(-1.0, 1.0, 1.0), (2.0, 2.0, 2.0)]))
 def test_edited_cards_go_with_the_object(hair, sphere, scale):
     """Its mesh lies in the hair's space, whether that is moved, scaled or mirrored."""
     sphere.location, sphere.scale = (1.0, 2.0, 3.0), scale
@@ -535,7 +537,7 @@ def test_a_card_whose_uvs_are_folded_has_the_indices_of_its_file(hair, evaluated
     assert sorted(first.tolist()) == sorted(back.tolist())
 
 
-@pytest.mark.parametrize("is_chosen", [False, True])
+@pytest.mark.parametrize("is_chosen", few_in_commits([False, True]))
 def test_in_another_atlas_a_card_lies_within_one_tile(hair, is_chosen):
     """The atlas gets eight columns in place of four. A card that was only moved has the tile of the
     card that it replaces."""

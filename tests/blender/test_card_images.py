@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tiers import few_in_commits
 
 bpy = pytest.importorskip("bpy", reason="Blender's images need Blender or the bpy module")
 
@@ -97,7 +98,7 @@ def test_an_artists_picture_is_written_in_place_of_the_generated_one(
         assert same[0] == same[1]
 
 
-@pytest.mark.parametrize("kind", ["missing", "broken"])
+@pytest.mark.parametrize("kind", few_in_commits(["broken", "missing"]))
 def test_a_picture_that_is_gone_is_told_and_replaced(
     kind: str, write: Any, hair: Any, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:

@@ -134,6 +134,7 @@ def curve(points, kind="POLY"):
     return line
 
 
+@pytest.mark.alike
 @pytest.mark.parametrize("kind", ["POLY", "BEZIER"])
 @pytest.mark.parametrize("turned", [False, True])
 def test_a_card_along_a_curve_stands_on_the_skin_and_stays(hair, kind, turned):

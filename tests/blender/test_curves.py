@@ -281,7 +281,8 @@ def test_curves_of_every_type_are_where_blender_draws_them(kind, attributes, eva
     for number, strand in enumerate(read.strands.strands()):
         drawn = smoothed(strand)
         own = vertex[vertex[:, 0] > 0.7] if number else vertex[vertex[:, 0] <= 0.7]
-        line = np.concatenate([np.linspace(a, b, 60) for a, b in pairwise(own)])
+        count = max(1600 // len(own), 8)
+        line = np.concatenate([np.linspace(a, b, count) for a, b in pairwise(own)])
         away = np.linalg.norm(drawn[:, None] - line[None], axis=2)
         assert away.min(axis=1).max() < 1e-3, "nothing is drawn beside the curve"
         assert away.min(axis=0).max() < 2e-3, "and all of it is drawn"
@@ -293,8 +294,9 @@ def test_curves_of_every_type_are_where_blender_draws_them(kind, attributes, eva
 
 def smoothed(strand):
     """Points along the curve that is drawn of a strand (count, 3)."""
-    u = np.tile(np.linspace(0.0, 1.0, 80), len(strand) - 1)
-    segment = np.repeat(np.arange(len(strand) - 1), 80)
+    count = max(1600 // (len(strand) - 1), 8)
+    u = np.tile(np.linspace(0.0, 1.0, count), len(strand) - 1)
+    segment = np.repeat(np.arange(len(strand) - 1), count)
     return points_at(strand[None], np.zeros(len(u), int), segment, u)
 
 

@@ -18,7 +18,7 @@ from engine_stage import SIZE, add_ball, coded, passes_in, picture, rendered  # 
 from hairloom.addon.blender.engine import engine_view  # noqa: E402
 from hairloom.addon.render import gpu_objects  # noqa: E402
 
-pytestmark = [pytest.mark.draws, pytest.mark.usefixtures("gpu_context", "extension")]
+pytestmark = [pytest.mark.draws(light=False), pytest.mark.usefixtures("gpu_context", "extension")]
 
 
 def test_radiance_arrives_as_it_is(stage: Any, tmp_path: Path) -> None:

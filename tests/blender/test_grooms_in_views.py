@@ -112,6 +112,7 @@ FORMS = {
 }
 
 
+@pytest.mark.alike
 @pytest.mark.parametrize("form", FORMS)
 def test_hair_has_the_colours_of_a_render(view: SmallView, form: str) -> None:
     """Three grooms above each other, opaque, so that each pixel is of one strand."""

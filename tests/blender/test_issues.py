@@ -73,6 +73,8 @@ def test_a_selected_mesh_is_taken_before_a_closer_one(new_hair, sphere):
 
 def test_cards_of_the_hair_are_no_surface(new_hair, sphere):
     hair = new_hair(sphere)
+    hair.data.hairloom.cards.source, hair.data.hairloom.atlas.source = "guides", "made"
+    hair.data.hairloom.cards.order_by = "distance"
     bpy.ops.hairloom.make_cards()
     bpy.context.view_layer.objects.active = hair
     hair.parent = hair.data.surface = None

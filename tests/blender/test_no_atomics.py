@@ -30,7 +30,7 @@ from hairloom.addon.shading.lights import three_point_lights  # noqa: E402
 from hairloom.addon.shading.settings import StrandSettings  # noqa: E402
 from hairloom.addon.ui import preferences  # noqa: E402
 
-pytestmark = [pytest.mark.draws, pytest.mark.usefixtures("gpu_context", "extension")]
+pytestmark = [pytest.mark.draws(light=False), pytest.mark.usefixtures("gpu_context", "extension")]
 
 
 @pytest.fixture(autouse=True)

@@ -225,7 +225,7 @@ def test_removing_and_deleting(new_hair, sphere):
     Obstacles.of(hair, None, None, DynamicsSettings(), depsgraph, None).move(depsgraph, 0.1)
 
 
-@pytest.mark.parametrize("shape", ["automatic", "capsule", "none"])
+@pytest.mark.parametrize("shape", few_in_commits(["automatic", "capsule", "none"]))
 def test_a_mesh_collides_again_as_it_did_before_its_spheres(monkey, shape):
     monkey.hairloom.collider_shape = shape
     fit(4)

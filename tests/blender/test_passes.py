@@ -21,7 +21,7 @@ from hairloom.addon.render.cryptomatte import matte_id  # noqa: E402
 from hairloom.addon.render.scene_pass import ScenePass  # noqa: E402
 from hairloom.addon.strands import StrandSet  # noqa: E402
 
-pytestmark = [pytest.mark.draws, pytest.mark.usefixtures("gpu_context", "extension")]
+pytestmark = [pytest.mark.draws(light=False), pytest.mark.usefixtures("gpu_context", "extension")]
 
 COUNT, POINTS, RADIUS = 40, 6, 0.008
 OWN = ("use_alpha", "use_tangent", "use_shadow", "use_strand_index")

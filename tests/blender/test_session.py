@@ -313,6 +313,7 @@ def test_the_preview_button_reports_bad_input_without_a_traceback(new_hair, capf
     assert previews.session_of(hair) is None
 
 
+@pytest.mark.alike
 @pytest.mark.parametrize("scale", [(2.0, 2.0, 2.0), (1.0, 3.0, 0.5), (-1.0, 1.0, 1.0)])
 @pytest.mark.parametrize("is_headless", [False, True])
 def test_scaled_or_mirrored_hair_is_as_the_engine_renders_it(

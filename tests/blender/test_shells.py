@@ -86,7 +86,7 @@ def fur_and_shells() -> tuple[Snapshot, Snapshot]:
 
 
 @pytest.mark.slow(
-    instead="tests/pure/cards/test_shells.py::test_from_above_layers_cover_what_strands_cover"
+    instead="tests/pure/cards/test_shells.py::test_sparse_hair_covers_as_much_however_few_strands_a_pattern_has"
 )
 @pytest.mark.draws(light=False)
 @pytest.mark.parametrize("eighth", range(8))

@@ -4,6 +4,7 @@ import bpy
 import numpy as np
 import pytest
 from mathutils import Matrix
+from tiers import few_in_commits
 
 from hairloom.addon import motion_flow
 from hairloom.addon.blender.bakes import playback
@@ -17,7 +18,7 @@ pytestmark = pytest.mark.draws(light=False)
 SOFT = {"style_root": 1.0, "style_tip": 0.2, "sag_compensation": 0.0}
 
 
-@pytest.fixture(params=["numpy", "compute"])
+@pytest.fixture(params=few_in_commits(["numpy", "compute"]))
 def playing(request, gpu_context, new_hair, sphere, evaluated):
     """Soft hair on a head, which plays: its settings, the head, the session."""
     hair = new_hair(sphere)
@@ -53,6 +54,7 @@ def cut(head):
     head.matrix_world = Matrix.Translation((4.0, -3.0, 1.0)) @ Matrix.Rotation(2.5, 4, "Y")
 
 
+@pytest.mark.parametrize("playing", ["numpy", "compute"], indirect=True)
 def test_hair_goes_along_at_a_cut_and_has_no_speed_after_it(playing, evaluated):
     _, head, session = playing
     advance(evaluated, 6, lambda frame: setattr(head.location, "x", 0.02 * frame))

@@ -21,7 +21,7 @@ from hairloom.addon.blender.sessions.session import Session
 from hairloom.addon.errors import HairloomError
 from hairloom.addon.shading.volume.settings import VolumeSettings
 
-pytestmark = [pytest.mark.draws, pytest.mark.usefixtures("gpu_context")]
+pytestmark = [pytest.mark.draws(light=False), pytest.mark.usefixtures("gpu_context")]
 
 SMALL = [
     "--set",

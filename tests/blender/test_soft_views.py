@@ -103,6 +103,7 @@ def mean_of_hard(view: SmallView, grooms: dict[str, Snapshot]) -> np.ndarray:
     return total / SAMPLES
 
 
+@pytest.mark.alike
 @pytest.mark.parametrize("names", [("low",), ("low", "high")])
 def test_a_view_at_rest_becomes_soft(view: SmallView, names: tuple[str, ...]) -> None:
     """Hair and its shadow on the floor are, nearly, the mean of hard pictures."""

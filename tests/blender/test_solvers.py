@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from extension_loader import REPOSITORY
 from shaken import GRAVITY, shaken_poses
+from tiers import few_in_commits
 
 from hairloom.addon import motion_flow, rig_flow
 from hairloom.addon.blender.scene.built_in_head import built_in_head
@@ -82,11 +83,14 @@ def test_numpy_is_the_pipeline(rig: Rig, poses: list[Pose]) -> None:
 @pytest.mark.usefixtures("gpu_context")
 @pytest.mark.parametrize(
     ("settings", "share"),
-    [
-        (SETTINGS, 1.0),
-        (replace(SETTINGS, length_solver="relaxation"), 1.0),
-        (DynamicsSettings(), 0.9),
-    ],
+    few_in_commits(
+        [
+            pytest.param(SETTINGS, 1.0),
+            pytest.param(DynamicsSettings(), 0.9),
+            pytest.param(replace(SETTINGS, length_solver="relaxation"), 1.0),
+        ],
+        2,
+    ),
 )
 def test_both_agree_on_a_shaken_head(
     rig: Rig, poses: list[Pose], settings: DynamicsSettings, share: float

@@ -103,6 +103,7 @@ def played(hair, first=1, last=LAST):
     return np.array(shown)
 
 
+@pytest.mark.alike
 @pytest.mark.parametrize("kind", ["circle", "ball", "curve", "torus"])
 def test_a_ring_of_any_kind_holds_what_passes_through_it(swinging, evaluated, kind):
     """Those whose direction meets the disc at z = 0.12 within the ring, however it is made."""
@@ -161,6 +162,7 @@ def test_a_tie_that_is_deleted_in_mid_play_lets_go(swinging, evaluated):
     assert any("this tie is gone" in text for text in session.warnings)
 
 
+@pytest.mark.alike
 @pytest.mark.parametrize("how", ["disabled", "scaled to zero", "taken out", "head at zero"])
 def test_what_cannot_hold_is_said_and_holds_nothing(swinging, evaluated, how):
     hair, head = swinging

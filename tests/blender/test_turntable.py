@@ -32,7 +32,7 @@ from hairloom.addon.errors import HairloomError
 from hairloom.addon.exchange.files import moving, stale_temp_files
 from hairloom.addon.render.camera import frame_points
 
-pytestmark = [pytest.mark.draws, pytest.mark.usefixtures("gpu_context")]
+pytestmark = [pytest.mark.draws(light=False), pytest.mark.usefixtures("gpu_context")]
 
 SMALL = TurntableSettings(frames=4, width=64, height=48, samples=1, video=False)
 

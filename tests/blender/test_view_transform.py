@@ -14,6 +14,7 @@ import bpy
 import numpy as np
 import pytest
 from full_disk import full_disk
+from tiers import few_in_commits
 
 from hairloom.addon.blender.pictures.film import write_picture
 from hairloom.addon.blender.viewport import view_transform
@@ -193,7 +194,7 @@ def test_a_transform_that_cannot_be_read_is_told_and_not_tried_again(
     assert view_transform.problem() == ""
 
 
-@pytest.mark.parametrize("most_bytes", [0, 3000])
+@pytest.mark.parametrize("most_bytes", few_in_commits([0, 3000]))
 def test_a_full_disk_is_no_other_colours_and_nothing_that_python_must_not_see(
     most_bytes: int, tmp_path: Path
 ) -> None:
