@@ -319,12 +319,12 @@ def tips_after_two_seconds(kit, fps, values, bowed):
 @pytest.mark.parametrize(
     "values", few_by_name({"still": {}, "wind": {"wind_speed": 4.0, "damping": 2.0}}, "still")
 )
-def test_the_frame_rate_does_not_matter(kit, values):
+@pytest.mark.parametrize("rates", few_in_commits([(24.0, 120.0), (24.0, 30.0, 60.0, 120.0)]))
+def test_the_frame_rate_does_not_matter(kit, values, rates):
     """Under 2 % of the hair's length (0.2 m) at the tips, any two rates.
 
     It is 0.1 %, and twice as much on straight ways.
     """
-    rates = (24.0, 120.0)
 
     def spread(bowed):
         tips = np.stack([tips_after_two_seconds(kit, fps, values, bowed) for fps in rates])
