@@ -16,7 +16,7 @@ from hairloom.addon.blender.bakes.guide_motion import BakedGuides
 from hairloom.addon.blender.base.images import read_texture
 from hairloom.addon.blender.command_line import command_line
 from hairloom.addon.blender.pictures import studio
-from hairloom.addon.render.frame import render_image
+from hairloom.addon.render.frame import render_still
 
 LAST = 5
 
@@ -269,9 +269,9 @@ def test_the_whole_of_a_deformed_head_is_drawn(new_hair, sphere, evaluated, tmp_
 
     def watched(snapshot, *arguments, **options):
         drawn.append(snapshot.meshes[0].surface.positions)
-        return render_image(snapshot, *arguments, **options)
+        return render_still(snapshot, *arguments, **options)
 
-    monkeypatch.setattr(studio, "render_image", watched)
+    monkeypatch.setattr(studio, "render_still", watched)
     arguments = ["render", "--groom", "Hair", "--bake", "--frame", str(LAST), "--width", "32"]
     arguments += ["--height", "32", "--samples", "1", "--output", str(tmp_path / "hair.png")]
     assert command_line.run(arguments) == 0
