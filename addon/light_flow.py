@@ -42,6 +42,8 @@ type Axes = tuple[Floats, Floats, Floats]
 SHADING_STRANDS = 6000
 #: Of coarse fields: cells along the longest side, cells in all, those of the skin's, and strands.
 _COARSE_CELLS, _COARSE_MOST, _COARSE_SKIN, _COARSE_STRANDS = 24, 8_000, 20, 2000
+#: Settings on which how open the sky is to hair does not depend.
+_NOT_OF_SKY = ("strength", "ao_bias", "scalp_extinction")
 #: Quick light is looked up at one of this many points of a strand, and at its last one.
 _STRIDE = 4
 
@@ -112,6 +114,28 @@ def _sky_fields(
     openness = openness_field(cells, rig.widths.extinction)
     report()
     return sky, openness
+
+
+def relit(
+    rig: Rig, light: HairLight, before: AmbientSettings, settings: AmbientSettings
+) -> HairLight | None:
+    """The light of a rig by other settings, to the same bits as `rest_light`: only what they decide
+    about is found again, and that is nothing of the light off the skin and by direction. None where
+    there is more to find.
+
+    Args:
+        light: its own, by the settings before.
+    """
+    fields = light.fields
+    if light.is_quick or fields is None or before.cell_count != settings.cell_count:
+        return None
+    sky = fields.sky
+    looks = {name: getattr(settings, name) for name in _NOT_OF_SKY}
+    if replace(before, **looks) != settings:
+        cells = HairCells.of(rig.strands, rig.head, settings.cell_count)
+        sky = sky_field(cells, ambient_of(rig, settings))
+    occlusion = occlusion_by(sky.at(rig.strands.points)[0], ambient_of(rig, settings))
+    return replace(light, occlusion=occlusion, fields=replace(fields, sky=sky))
 
 
 def quick_light(

@@ -9,7 +9,8 @@ import pytest
 from grids import grid_of
 from waiting import take_steps_until, until, until_it_plays
 
-from hairloom.addon import motion_flow, rig_flow
+from hairloom.addon import light_flow, motion_flow, rig_flow
+from hairloom.addon.arrays import same_content
 from hairloom.addon.blender.bakes import playback
 from hairloom.addon.blender.base import latest_job
 from hairloom.addon.blender.colliders import fields
@@ -464,6 +465,23 @@ def test_ambient_light_needs_no_other_strands(playing, hair, evaluated, monkeypa
     arrive(playing)
     assert playing.rig is rig and np.array_equal(grid_of(playing), motion)
     assert playing.snapshot.occlusion.mean() > before.mean()
+
+
+@pytest.mark.parametrize("is_combed", [False, True])
+def test_how_strong_ambient_light_is_finds_no_light_again(hair, evaluated, monkeypatch, is_combed):
+    """But that of hair which was combed as well."""
+    session = previews.start(hair, evaluated())
+    found, make = [], light_flow.sky_field
+    monkeypatch.setattr(light_flow, "sky_field", lambda *given: found.append("sky") or make(*given))
+    hair.data.hairloom.ambient.strength, hair.data.hairloom.ambient.ao_bias = 0.2, 0.8
+    if is_combed:
+        hair.data.position_data[7].vector.z += 0.02
+        hair.data.update_tag()
+    session.read_again(evaluated())
+    assert bool(found) == is_combed
+    own = build(GroomSource(hair, evaluated()).request, is_drawn=True)
+    assert same_content(session.groom.light, own.light)
+    np.testing.assert_array_equal(session.groom.head_occlusion, own.head_occlusion)
 
 
 @pytest.mark.parametrize("end", ["stop", "delete", "load"])

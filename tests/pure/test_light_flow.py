@@ -3,22 +3,25 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 from spheres import ball
 
 from hairloom.addon import light_flow, rig_flow
-from hairloom.addon.arrays import Floats
+from hairloom.addon.arrays import Floats, same_content
 from hairloom.addon.groom.settings import GuideSettings
-from hairloom.addon.light_flow import quick_light, rest_light
+from hairloom.addon.light_flow import quick_light, relit, rest_light
 from hairloom.addon.rig_flow import Rig
+from hairloom.addon.shading import skin_seen
 from hairloom.addon.shading.ambient import occlusion_by
 from hairloom.addon.shading.ambient_settings import AmbientSettings
 from hairloom.addon.strands import StrandSet
 
 RADIUS, POINTS, COUNT = 0.09, 14, 1500
 SETTINGS = AmbientSettings(cell_count=64)
+COARSE = AmbientSettings(cell_count=16)
 
 
 @pytest.fixture(scope="module")
@@ -117,3 +120,46 @@ def test_finding_light_asks_whether_it_is_still_wanted(rig: Rig) -> None:
 
     with pytest.raises(GivenUp):
         rest_light(rig, SETTINGS, given_up)
+
+
+@pytest.mark.parametrize(
+    ("change", "found"),
+    [
+        ({"strength": 0.3}, []),
+        ({"ao_bias": 0.9}, []),
+        ({"scalp_extinction": 5.0}, []),
+        ({"extinction": 1.2}, ["sky_field"]),
+        ({"upper_fraction": 0.9}, ["sky_field"]),
+        ({"upper_fraction": 0.9, "strength": 0.3}, ["sky_field"]),
+    ],
+)
+def test_other_settings_find_again_what_depends_on_them_and_no_more(
+    rig: Rig, monkeypatch: pytest.MonkeyPatch, change: dict[str, float], found: list[str]
+) -> None:
+    monkeypatch.setattr(skin_seen, "_CELLS", 12)
+    light, settings = rest_light(rig, COARSE), replace(COARSE, **change)
+    own, again = rest_light(rig, settings), []
+    for name in ("sky_field", "openness_field", "skin_field"):
+        make = getattr(light_flow, name)
+
+        def counted(*arguments: Any, name: str = name, make: Any = make) -> Any:
+            again.append(name)
+            return make(*arguments)
+
+        monkeypatch.setattr(light_flow, name, counted)
+    other = relit(rig, light, COARSE, settings)
+    assert other is not None and again == found
+    assert same_content(other, own)
+
+
+def test_light_that_has_other_cells_or_is_quick_is_found_as_a_whole(
+    rig: Rig, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(skin_seen, "_CELLS", 12)
+    light = rest_light(rig, COARSE)
+    assert relit(rig, light, COARSE, replace(COARSE, cell_count=20)) is None
+    quick = quick_light(rig, COARSE, None)
+    assert relit(rig, quick, COARSE, replace(COARSE, strength=0.3)) is None
+    none = replace(rig, strands=rig.strands.take(np.arange(0)))
+    nothing = rest_light(none, COARSE)
+    assert relit(none, nothing, COARSE, replace(COARSE, strength=0.3)) is None
