@@ -141,7 +141,8 @@ def card_steps(
         return (yield from _shell_steps(groom, settings, atlas, occlusion, alpha_of, others))
     yield "Cards from strands"
     settings, atlas, shape_notes = fitted_to_length(settings, atlas, groom.strands)
-    cards, plan = uncut_cards(groom, settings, atlas)
+    card = card_of_strand(groom, settings)
+    cards, plan = uncut_cards(groom, settings, atlas, card)
     usual = float(np.median(cards.strips.width[:, 0])) if len(cards) else 0.0
     kept = kept_cards(edits, cards, settings, groom.head, plan is not None) if edits else None
     made = MadeCards.of(cards.strips, cards.tile, cards.atlas, groom.head)
@@ -164,7 +165,7 @@ def card_steps(
         build = replace(build, edits=kept.counts, edit_notes=kept.notes)
     yield "Atlas"
     alpha = alpha_of(build)
-    shading = _light_steps(groom, settings, build, alpha, others, occlusion, kept)
+    shading = _light_steps(groom, card, build, alpha, others, occlusion, kept)
     build = yield from _reported("Ambient occlusion", shading)
     finest = build.finest
     shaded = (finest, *(with_occlusion_of(finest, level) for level in build.levels[1:]))
@@ -249,7 +250,7 @@ def _order_notes(wrong: float, settings: CardSettings) -> tuple[str, ...]:
 
 def _light_steps(
     groom: CardGroom,
-    settings: CardSettings,
+    card: Ints,
     build: CardBuild,
     alpha: Floats | None,
     others: Sequence[CardOccluder],
@@ -257,7 +258,11 @@ def _light_steps(
     kept: KeptCards | None,
 ) -> Generator[float, None, CardBuild]:
     """The build with the light that its finest level takes over of the strands, and their occlusion
-    times what rays find of other grooms."""
+    times what rays find of other grooms.
+
+    Args:
+        card: see `card_of_strand`.
+    """
     mesh = build.finest
     if not len(mesh.triangles):  # all cards were deleted
         return build
@@ -268,7 +273,6 @@ def _light_steps(
         return _with_finest(build, mesh.with_occlusion(found))
     # cards of the artist's own stand beside the strands of the nearest one
     on_strands = mesh if kept is None else replace(mesh, card=kept.model[mesh.card])
-    card = card_of_strand(groom, settings)
     taken = taken_over(on_strands, groom.strands.grid, groom.occlusion, groom.light, card)
     shown: Floats = (1.0 - occlusion.strength * (1.0 - taken.occlusion)).astype(np.float32)
     if others:
@@ -313,12 +317,15 @@ def _reported[Result](
 
 
 def uncut_cards(
-    groom: CardGroom, settings: CardSettings, atlas: AtlasSettings
+    groom: CardGroom, settings: CardSettings, atlas: AtlasSettings, cluster: Ints
 ) -> tuple[UncutCards, AtlasPlan | None]:
-    """The strips of all cards, with their groups, layers and tiles; and what the tiles show."""
+    """The strips of all cards, with their groups, layers and tiles; and what the tiles show.
+
+    Args:
+        cluster: see `card_of_strand`.
+    """
     strands, guides, is_baked = groom.strands, groom.guides, atlas.source == "baked"
     grid, radius = strands.grid, strands.radius.reshape(strands.grid.shape[:2])
-    cluster = card_of_strand(groom, settings)
     _, found, count = np.unique(cluster, return_index=True, return_counts=True)
     first: Ints = found
     if settings.source == "guides":

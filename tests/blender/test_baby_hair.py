@@ -14,7 +14,7 @@ from hairloom.addon.blender.bakes.baked_rig import RestMatrices, baked_rig_of, r
 from hairloom.addon.blender.cards.build import baked_atlas  # noqa: E402
 from hairloom.addon.card_flow import card_groom  # noqa: E402
 from hairloom.addon.cards.atlas_settings import AtlasSettings  # noqa: E402
-from hairloom.addon.cards.build import uncut_cards  # noqa: E402
+from hairloom.addon.cards.build import card_of_strand, uncut_cards  # noqa: E402
 from hairloom.addon.cards.settings import CardSettings  # noqa: E402
 from hairloom.addon.shading.settings import ShadingSettings, StrandSettings  # noqa: E402
 
@@ -30,7 +30,9 @@ def test_the_atlas_shows_the_strands_that_its_plan_names() -> None:
     """It is that of a groom in which no baby hair ever was."""
     rig, look, drawn = wig(), ShadingSettings(color_variation=0.0), StrandSettings()
     settings = CardSettings(source="clusters", card_count=12)
-    _, plan = uncut_cards(card_groom(rig), settings, AtlasSettings(size="256"))
+    groom = card_groom(rig)
+    card = card_of_strand(groom, settings)
+    _, plan = uncut_cards(groom, settings, AtlasSettings(size="256"), card)
     assert plan is not None
     without = replace(
         rig, strands=rig.strands.take(np.flatnonzero(~short_strands(rig))), grown=None

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 from tiers import few_in_commits
 
 from hairloom.addon import card_flow, rig_flow
+from hairloom.addon.cards import build as build_module
 from hairloom.addon.cards.atlas_settings import AtlasSettings
 from hairloom.addon.cards.build import (
     CardBuild,
@@ -34,6 +36,22 @@ MADE, BAKED = AtlasSettings(source="made"), AtlasSettings(columns=8, rows=2)
 FEW_RAYS = CardOcclusionSettings(rays=16)
 #: as if the few strands here stood for many
 DENSE = AmbientSettings(extinction=100.0)
+
+
+def uncut(groom: CardGroom, settings: CardSettings, atlas: AtlasSettings) -> Any:
+    return uncut_cards(groom, settings, atlas, card_of_strand(groom, settings))
+
+
+@pytest.mark.parametrize("way", ["clusters", "guides"])
+def test_the_card_of_each_strand_is_found_once(way: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    found: list[str] = []
+    monkeypatch.setattr(
+        build_module,
+        "card_of_strand",
+        lambda *given: found.append(way) or card_of_strand(*given),
+    )
+    built(falling(300), source=way)
+    assert found == [way]
 
 
 def falling(count: int, *, groups: int = 2, cv_count: int = 12, seed: int = 0) -> StrandSet:
@@ -134,8 +152,8 @@ def test_guides_show_the_strands_that_lie_along_them() -> None:
     groom, settings = _groom(falling(1500)), CardSettings(source="guides")
     grid, guides = groom.strands.grid, groom.guides
     assert len(guides) < len(grid)
-    baked, plan = uncut_cards(groom, settings, BAKED)
-    made, none = uncut_cards(groom, settings, MADE)
+    baked, plan = uncut(groom, settings, BAKED)
+    made, none = uncut(groom, settings, MADE)
     assert plan is not None and none is None
     ends = np.stack([baked.strips.frames.center[:, [0, -1]], grid[guides][:, [0, -1]]])
     np.testing.assert_allclose(*ends, atol=1e-6)
@@ -150,7 +168,7 @@ def test_guides_show_the_strands_that_lie_along_them() -> None:
         assert set(card[own].tolist()) == {shown}
     alone = replace(groom, strands=groom.strands.take(guides), guides=np.arange(len(guides)))
     parts = {name: getattr(groom, name)[guides] for name in ("radius", "root_normal")}
-    cards, plan = uncut_cards(replace(alone, **parts), settings, BAKED)
+    cards, plan = uncut(replace(alone, **parts), settings, BAKED)
     assert plan is None
     np.testing.assert_array_equal(cards.strips.width, made.strips.width)
     np.testing.assert_array_equal(cards.layer, made.layer)
@@ -158,10 +176,8 @@ def test_guides_show_the_strands_that_lie_along_them() -> None:
 
 def test_the_lowest_layer_is_wider_by_choice_and_the_outermost_is_not() -> None:
     groom = _groom(falling(1500))
-    plain, _ = uncut_cards(groom, CardSettings(source="clusters", card_count=60), MADE)
-    wide, _ = uncut_cards(
-        groom, CardSettings(source="clusters", card_count=60, base_width=1.6), MADE
-    )
+    plain, _ = uncut(groom, CardSettings(source="clusters", card_count=60), MADE)
+    wide, _ = uncut(groom, CardSettings(source="clusters", card_count=60, base_width=1.6), MADE)
     factor = (wide.strips.width / plain.strips.width).mean(axis=1)
     for layer, expected in enumerate((1.6, 1.3, 1.0)):
         np.testing.assert_allclose(factor[plain.layer == layer], expected, rtol=1e-5)
@@ -169,7 +185,7 @@ def test_the_lowest_layer_is_wider_by_choice_and_the_outermost_is_not() -> None:
 
 def test_single_strands_are_the_outermost_layer() -> None:
     settings = CardSettings(source="clusters", card_count=60, fly_aways=0.2)
-    cards, _ = uncut_cards(_groom(falling(1500)), settings, MADE)
+    cards, _ = uncut(_groom(falling(1500)), settings, MADE)
     loose = cards.strand_count == 1
     assert loose.sum() >= 12
     np.testing.assert_array_equal(cards.layer[loose], 2)
@@ -179,7 +195,7 @@ def test_single_strands_are_the_outermost_layer() -> None:
 def test_brows_are_the_outermost_layer_and_not_widened() -> None:
     strands = falling(1500)
     strands = replace(strands, group=np.where(np.arange(1500) < 300, BROWS, 0).astype(np.int32))
-    cards, _ = uncut_cards(_groom(strands), CardSettings(source="clusters", card_count=60), MADE)
+    cards, _ = uncut(_groom(strands), CardSettings(source="clusters", card_count=60), MADE)
     np.testing.assert_array_equal(cards.layer[cards.group == BROWS], 2)
     assert set(cards.layer[cards.group == 0].tolist()) == {0, 1, 2}
 
@@ -301,7 +317,7 @@ def test_notes_go_by_how_wide_strands_are_drawn() -> None:
 
     def notes(scale: float) -> str:
         groom = card_flow.card_groom(rig, StrandSettings(fullness=scale, tip_width=1.0))
-        plan = uncut_cards(groom, settings, atlas)[1]
+        plan = uncut(groom, settings, atlas)[1]
         assert plan is not None
         return " ".join(plan.notes)
 
@@ -315,7 +331,7 @@ def test_half_a_million_strands_become_cards() -> None:
     normal = np.tile(np.float32([0.0, 0.0, 1.0]), (500_000, 1))
     radius = strands.radius.reshape(500_000, -1)
     groom = CardGroom(strands, np.arange(500_000), np.arange(0, 500_000, 500), radius, normal, None)
-    cards, _ = uncut_cards(groom, CardSettings(source="clusters"), replace(MADE))
+    cards, _ = uncut(groom, CardSettings(source="clusters"), replace(MADE))
     assert len(cards) >= 800
 
 
