@@ -12,6 +12,7 @@ from ..blender.cards.build import counts_line, order_line
 from ..blender.cards.edits import groom_edits
 from ..blender.cards.made_objects import card_objects
 from ..blender.cards.object import CardObjectJob
+from ..blender.preview.previews import made_rigs, previews
 from ..cards.settings import CardSettings
 from ..errors import HairloomError
 from .drawing import draw_button
@@ -93,7 +94,10 @@ def _built(
 ) -> Steps[None]:
     """Make the cards of the active hair, and report it."""
     hair = chosen_hair(context)[0]
-    job = CardObjectJob(hair, context.evaluated_depsgraph_get(), keep_edits=keep_edits)
+    depsgraph, known = context.evaluated_depsgraph_get(), tuple(made_rigs().values())
+    job = CardObjectJob(
+        hair, depsgraph, keep_edits=keep_edits, known=known, kept=previews.built_cards
+    )
     yield Progress("Reading the hair")
     job.write((yield from threaded(job.building())))
     finest, levels = job.objects[0], len(job.objects)

@@ -57,7 +57,7 @@ from ..base.gpu_context import ensure_gpu
 from ..base.objects import head_of
 from ..base.outcome import notes_of
 from ..base.thread_work import ThreadWork
-from ..colliders.rigs import rig_from
+from ..colliders.rigs import MadeRig
 from ..properties.groom_settings import GroomSettings
 from ..scene.painted_colors import read_colors
 from ..scene.source import read_source
@@ -96,12 +96,14 @@ def read_inputs(
     depsgraph: bpy.types.Depsgraph,
     rig: Rig | None = None,
     keep_edits: bool = True,
+    known: tuple[MadeRig, ...] = (),
 ) -> tuple[CardInputs, tuple[str, ...], dict[str, int]]:
     """A groom by its own settings; what the artist should know; what was dropped and why.
 
     Args:
         rig: of the groom's bake; None is that of its curves.
         keep_edits: of cards in the scene.
+        known: see `MadeRig.of`.
 
     Raises:
         HairloomError: no hair that can be used, or edited cards that cannot be read.
@@ -112,7 +114,7 @@ def read_inputs(
     if rig is None:
         read = read_source(hair, depsgraph)
         source = read.at_rest
-        rig, colors = rig_from(source, settings, place=hair.name), source.colors
+        rig, colors = MadeRig.of(hair, source, known).rig, source.colors
         notes, dropped = source.warnings, source.dropped
         if read.rest is not None:
             frame, head = depsgraph.scene.frame_current, head_of(hair)

@@ -47,9 +47,11 @@ from ...shading.marschner.settings import MarschnerSettings
 from ...shading.settings import ShadingSettings, SharedSettings
 from ...strands import Surface
 from ..bakes.guide_motion import BakedGuides, GuideMotion
+from ..base.objects import Handle
 from ..base.outcome import Outcome
 from ..base.report import hairloom_version
 from ..base.thread_work import ThreadWork
+from ..colliders.rigs import MadeRig
 from ..scene.bone_weights import head_bone_of
 from ..scene.built_in_head import HeadLook
 from ..scene.head_look import look_below
@@ -59,12 +61,12 @@ from .build import (
     MappedCards,
     Stage,
     build_steps,
-    built_in_thread,
     order_line,
     read_inputs,
     untimed,
 )
 from .exporters import CardLook, check_cards, check_exporter, level_names, write_card_mesh
+from .kept_cards import KeptCards
 from .motion import (
     JointMotion,
     SpringMotion,
@@ -487,6 +489,8 @@ def material_of(shading: ShadingSettings, tables: Mapping[str, str]) -> dict[str
 class CardExport:
     """What is written of one hair, and where. notes: what the artist should know."""
 
+    hair: Handle
+    kept: KeptCards
     path: Path
     output: CardOutput
     inputs: CardInputs
@@ -504,12 +508,16 @@ class CardExport:
         *,
         levels: int | None = None,
         frames: range | None = None,
+        known: tuple[MadeRig, ...] = (),
+        kept: KeptCards | None = None,
     ) -> CardExport:
         """Read the hair; where it is to move, from its bake.
 
         Args:
             levels: of detail; None is what the groom's own settings say.
             frames: of the bake; None is all of them.
+            known: see `MadeRig.of`.
+            kept: cards that were built before; these are kept there.
 
         Raises:
             HairloomError: no hair that can be used, no bake, or a format that cannot be written.
@@ -518,21 +526,24 @@ class CardExport:
         check_output(path, output, motion)
         check_no_input(path, picture_files(hair.data.hairloom.card_images))
         rig, stale = (None, ()) if motion is None else (motion.rig, motion.notes)
-        inputs, notes, dropped = read_inputs(hair, depsgraph, rig)
+        inputs, notes, dropped = read_inputs(hair, depsgraph, rig, known=known)
         bone = head_bone_of(hair, depsgraph, inputs.rig.strands)
         output = replace(output, head_bone=bone, head_look=look_below(hair, inputs.rig.head))
         if levels is not None:
             cards = replace(inputs.settings[CardSettings], levels=levels)
             inputs = replace(inputs, settings=inputs.settings.with_settings(cards))
-        return cls(path, output, inputs, motion, dropped, (*notes, *stale))
+        notes += stale
+        kept = KeptCards() if kept is None else kept
+        return cls(Handle.of(hair), kept, path, output, inputs, motion, dropped, notes)
 
     def building(self) -> ThreadWork[MappedCards]:
         """Build the cards in a thread."""
-        return ThreadWork(lambda work: built_in_thread(work, self.inputs), "hairloom card files")
+        return self.kept.building(self.inputs, "hairloom card files")
 
     def writing(self, made: MappedCards) -> FileSteps[Outcome]:
         """Write the cards that were made; closing it leaves old files as they were."""
         inputs = self.inputs
+        self.kept.keep(self.hair, inputs, made)
         steps = file_steps(
             self.path,
             made,

@@ -20,9 +20,11 @@ from ...shading.settings import ShadingSettings
 from ..base.attributes import set_attribute
 from ..base.objects import Handle, check_shape_editable, head_of, link_into, matrix_of
 from ..base.thread_work import ThreadWork
+from ..colliders.rigs import MadeRig
 from ..scene.surfaces import OCCLUSION_LAYER
-from .build import MappedCards, built_in_thread, order_line, read_inputs
+from .build import MappedCards, order_line, read_inputs
 from .edits import MADE_ATTRIBUTE, TILE_LAYER, forget_record, read_pieces, write_record
+from .kept_cards import KeptCards
 from .made_objects import card_objects
 from .material import fill_image, new_material
 from .mesh import OCCLUSION_IS_OURS, fill_mesh
@@ -36,17 +38,28 @@ class CardObjectJob:
 
     Args:
         keep_edits: what the artist has changed of the cards that are there.
+        known: see `MadeRig.of`.
+        kept: cards that were built before; these are kept there.
 
     Raises:
         HairloomError: no hair that can be used, or its cards that are there cannot be changed.
     """
 
     def __init__(
-        self, hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph, *, keep_edits: bool = True
+        self,
+        hair: bpy.types.Object,
+        depsgraph: bpy.types.Depsgraph,
+        *,
+        keep_edits: bool = True,
+        known: tuple[MadeRig, ...] = (),
+        kept: KeptCards | None = None,
     ) -> None:
         for obj in card_objects(hair):
             _check_replaceable(obj)
-        self._inputs, self.notes, self.dropped = read_inputs(hair, depsgraph, keep_edits=keep_edits)
+        self._inputs, self.notes, self.dropped = read_inputs(
+            hair, depsgraph, keep_edits=keep_edits, known=known
+        )
+        self._kept = KeptCards() if kept is None else kept
         self._hair, self._matrix = Handle.of(hair), matrix_of(hair, depsgraph)
         self.objects: list[bpy.types.Object] = []
         self.order = ""
@@ -54,8 +67,7 @@ class CardObjectJob:
 
     def building(self) -> ThreadWork[MappedCards]:
         """Build the cards in a thread, which touches nothing of Blender's."""
-        inputs = self._inputs
-        return ThreadWork(lambda work: built_in_thread(work, inputs), "hairloom card objects")
+        return self._kept.building(self._inputs, "hairloom card objects")
 
     def write(self, made: MappedCards) -> None:
         """Put them into the scene.
@@ -64,6 +76,7 @@ class CardObjectJob:
             HairloomError: the hair is gone, or its cards cannot be changed any more.
         """
         hair, build = self._hair.found("Choose other hair"), made.build
+        self._kept.keep(self._hair, self._inputs, made)
         for obj in card_objects(hair):
             _check_replaceable(obj)
         self.notes += tuple(f"{hair.name}: {note}." for note in made.notes)

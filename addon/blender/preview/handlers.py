@@ -62,6 +62,7 @@ def on_undo_post(*_: Any) -> None:
 @persistent
 def on_depsgraph_update(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     views.scene_changed()
+    previews.built_cards.forget_gone()
     _react(scene_events.updated, depsgraph)
 
 

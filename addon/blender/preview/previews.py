@@ -27,6 +27,7 @@ from ..base.originals import (
     shown_depsgraphs,
 )
 from ..base.redraw import redraw_panels, redraw_views, refresh_panels
+from ..cards.kept_cards import KeptCards
 from ..colliders import fields
 from ..colliders.rigs import MadeRig
 from ..scene.fin_modifier import clear, is_shown
@@ -48,12 +49,14 @@ class Previews(dict[int, Preview]):
     is_paused: whether all that plays freely is held where it is.
     last_edit: when one was edited [s], by the clock that never goes back.
     is_reacting: whether an event of Blender's is being followed.
+    built_cards: as objects or files were made of them last, previewed or not.
     """
 
     def __init__(self) -> None:
         super().__init__()
         self.notice, self.is_paused = "", False
         self.last_edit, self.is_reacting = 0.0, False
+        self.built_cards = KeptCards()
 
 
 previews = Previews()
@@ -113,6 +116,7 @@ def end() -> None:
     """Leave nothing behind: no preview, no bake in memory, no notice."""
     stop_all()
     playback.forget()
+    previews.built_cards.forget()
     fields.forget()
     previews.notice = ""
 
@@ -123,6 +127,7 @@ def forget_all() -> None:
         _forget(uid)
     previews.notice, previews.is_paused = "", False
     playback.forget()
+    previews.built_cards.forget()
 
 
 def stop(session: Simulated) -> None:
@@ -159,6 +164,7 @@ def stop_all() -> None:
 def _forget(uid: int) -> None:
     """As `stop` when its object is about to go: touches nothing of it."""
     preview = previews.pop(uid, None)
+    previews.built_cards.forget()
     unwatch((uid, "lines"))
     if preview is not None:
         preview.session.forget()

@@ -1,0 +1,305 @@
+"""Cards that were built last are not built again, and never taken where anything has changed."""
+
+from __future__ import annotations
+
+import gc
+import weakref
+from collections.abc import Callable
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import bpy
+import numpy as np
+import pytest
+
+from hairloom.addon.blender.cards import build, kept_cards
+from hairloom.addon.blender.cards.kept_cards import KeptCards
+from hairloom.addon.blender.cards.made_objects import card_objects
+from hairloom.addon.blender.colliders import rigs
+from hairloom.addon.blender.preview import previews
+from hairloom.addon.blender.scene.curves import write_curves
+
+
+def counted(monkeypatch: pytest.MonkeyPatch, owner: Any, name: str) -> list[str]:
+    """One entry for each call."""
+    calls: list[str] = []
+    make = getattr(owner, name)
+
+    def counting(*arguments: Any, **named: Any) -> Any:
+        calls.append(name)
+        return make(*arguments, **named)
+
+    monkeypatch.setattr(owner, name, counting)
+    return calls
+
+
+@pytest.fixture
+def builds(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    return counted(monkeypatch, build, "card_build_steps")
+
+
+@pytest.fixture
+def hair(new_hair: Callable[..., Any], sphere: Any, tmp_path: Path) -> Any:
+    """A hedgehog of 60 strands on a sphere that frames move, to be few cards of a small picture,
+    with a texture of the artist's own."""
+    sphere.location.x = 0.0
+    sphere.keyframe_insert("location", frame=1)
+    sphere.location.x = 0.2
+    sphere.keyframe_insert("location", frame=5)
+    bpy.context.scene.frame_set(1)
+    made = new_hair(sphere)
+    cards, texture = made.data.hairloom.cards, made.data.hairloom.card_texture
+    cards.source, cards.card_count, cards.levels, cards.fly_aways = "clusters", 12, 2, 0.0
+    cards.segment_count, cards.error, cards.order_by = 4, 0.0, "distance"
+    made.data.hairloom.atlas.source = "made"
+    made.data.hairloom.card_occlusion.rays, made.data.hairloom.card_occlusion.others = 32, True
+    texture.height = texture.variant_width = 32
+    made.data.hairloom.card_images.base = picture(tmp_path / "base.png", 0.5)
+    bpy.context.view_layer.update()
+    return made
+
+
+def picture(path: Path, value: float) -> Any:
+    image = bpy.data.images.get("Base") or bpy.data.images.new("Base", 32, 32)
+    image.pixels.foreach_set(np.full(32 * 32 * 4, value, np.float32))
+    image.file_format, image.filepath_raw = "PNG", str(path)
+    image.save()
+    image.source = "FILE"
+    image.reload()
+    return image
+
+
+def make() -> None:
+    assert bpy.ops.hairloom.make_cards() == {"FINISHED"}
+    bpy.context.view_layer.update()
+
+
+def written(folder: Path) -> dict[str, bytes]:
+    """All files of an export of the hair."""
+    folder.mkdir()
+    assert bpy.ops.hairloom.export_cards(filepath=str(folder / "cards.glb")) == {"FINISHED"}
+    return {path.name: path.read_bytes() for path in sorted(folder.iterdir())}
+
+
+def afresh(folder: Path) -> dict[str, bytes]:
+    previews.previews.built_cards.forget()
+    return written(folder)
+
+
+def test_what_was_made_is_written_without_building_it_again(
+    hair: Any, tmp_path: Path, builds: list[str]
+) -> None:
+    own = afresh(tmp_path / "own")
+    assert len(own) > 3 and len(builds) == 1
+    assert written(tmp_path / "again") == own, "writing changes nothing of what is kept"
+    previews.previews.built_cards.forget()
+    make()
+    assert len(builds) == 2
+    assert written(tmp_path / "kept") == own and len(builds) == 2
+    make()
+    assert len(builds) == 2 and len(card_objects(hair)) == 2
+
+
+def comb(hair: Any, _folder: Path) -> None:
+    hair.data.position_data[7].vector.z += 0.01
+    hair.data.update_tag()
+
+
+def sculpt(hair: Any, _folder: Path) -> None:
+    for vertex in hair.data.surface.data.vertices:
+        vertex.co *= 1.05
+    hair.data.surface.data.update_tag()
+
+
+def ask_for_more(hair: Any, _folder: Path) -> None:
+    hair.data.hairloom.cards.card_count = 14
+
+
+def grow_children(hair: Any, _folder: Path) -> None:
+    hair.data.hairloom.children.method = "multi"
+    hair.data.hairloom.children.strand_count = 100
+
+
+def dye(hair: Any, _folder: Path) -> None:
+    hair.data.hairloom.shading.melanin = 0.1
+
+
+def shade_less(hair: Any, _folder: Path) -> None:
+    hair.data.hairloom.ambient.strength = 0.3
+
+
+def paint_over_the_picture_on_disk(_hair: Any, folder: Path) -> None:
+    """As another program does, and Blender reads it again."""
+    image = bpy.data.images["Base"]
+    other = bpy.data.images.new("Other", 32, 32)
+    other.pixels.foreach_set(np.full(32 * 32 * 4, 0.2, np.float32))
+    other.file_format, other.filepath_raw = "PNG", str(folder / "base.png")
+    other.save()
+    image.reload()
+
+
+def drop_the_picture(hair: Any, _folder: Path) -> None:
+    hair.data.hairloom.card_images.base = None
+
+
+def edit_a_card(hair: Any, _folder: Path) -> None:
+    finest = card_objects(hair)[0]
+    card = np.zeros(len(finest.data.polygons), np.int32)
+    finest.data.attributes["made_card"].data.foreach_get("value", card)
+    corners = {
+        vertex
+        for face in np.flatnonzero(card == 1)
+        for vertex in finest.data.polygons[int(face)].vertices
+    }
+    for vertex in corners:
+        finest.data.vertices[vertex].co.z += 0.05
+    finest.data.update()
+
+
+def go_to_another_frame(_hair: Any, _folder: Path) -> None:
+    bpy.context.scene.frame_set(4)
+
+
+def add_other_hair(hair: Any, _folder: Path) -> None:
+    """Which shades this one."""
+    from hedgehogs import hedgehog
+
+    other = write_curves("Other", hedgehog(), hair.data.surface, bpy.context.collection)
+    other.data.hairloom.children.method = "none"
+    other.data.hairloom.widths.method = "own"
+
+
+CHANGES = (
+    comb,
+    sculpt,
+    ask_for_more,
+    grow_children,
+    dye,
+    shade_less,
+    paint_over_the_picture_on_disk,
+    drop_the_picture,
+    edit_a_card,
+    go_to_another_frame,
+    add_other_hair,
+)
+
+
+@pytest.mark.parametrize("change", CHANGES, ids=lambda change: change.__name__)
+def test_cards_are_not_taken_for_others(
+    hair: Any, tmp_path: Path, builds: list[str], change: Any
+) -> None:
+    make()
+    before = written(tmp_path / "before")
+    assert len(builds) == 1
+    change(hair, tmp_path)
+    bpy.context.view_layer.update()
+    found = written(tmp_path / "found")
+    assert len(builds) == 2, "they are others"
+    assert found == afresh(tmp_path / "own") and found != before
+
+
+def test_what_was_changed_and_changed_back_is_the_same(
+    hair: Any, tmp_path: Path, builds: list[str]
+) -> None:
+    """As by undo."""
+    make()
+    hair.data.hairloom.cards.card_count = 14
+    hair.data.hairloom.cards.card_count = 12
+    found = written(tmp_path / "found")
+    assert len(builds) == 1 and found == afresh(tmp_path / "own")
+
+
+def test_other_levels_are_built(hair: Any, tmp_path: Path, builds: list[str]) -> None:
+    make()
+    bpy.ops.hairloom.export_cards(filepath=str(tmp_path / "cards.glb"), own_levels=True, levels=1)
+    assert len(builds) == 2
+
+
+def test_an_atlas_is_drawn_again_where_a_gpu_has_come_or_gone(
+    hair: Any, tmp_path: Path, builds: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    hair.data.hairloom.atlas.source = "baked"
+    hair.data.hairloom.atlas.size, hair.data.hairloom.card_images.base = "256", None
+    for module in (build, kept_cards):
+        monkeypatch.setattr(module, "has_gpu", lambda: False)
+    make()
+    written(tmp_path / "kept")
+    assert len(builds) == 1
+    monkeypatch.setattr(kept_cards, "has_gpu", lambda: True)
+    written(tmp_path / "drawn")
+    assert len(builds) == 2
+
+
+@pytest.fixture
+def last(monkeypatch: pytest.MonkeyPatch) -> list[weakref.ref[build.MappedCards]]:
+    """All cards that were kept, as long as they are."""
+    found: list[weakref.ref[build.MappedCards]] = []
+    keep = KeptCards.keep
+
+    def seen(self: Any, hair: Any, inputs: Any, made: Any) -> None:
+        found.append(weakref.ref(made))
+        keep(self, hair, inputs, made)
+
+    monkeypatch.setattr(KeptCards, "keep", seen)
+    return found
+
+
+def other_file(_hair: Any) -> None:
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+
+
+def gone(hair: Any) -> None:
+    bpy.data.objects.remove(hair)
+    bpy.context.view_layer.update()
+
+
+def ended(_hair: Any) -> None:
+    previews.end()
+
+
+def no_longer_previewed(hair: Any) -> None:
+    previews.stop(previews.start(hair, bpy.context.evaluated_depsgraph_get()))
+
+
+@pytest.mark.parametrize(
+    "end", [other_file, gone, ended, no_longer_previewed], ids=lambda end: end.__name__
+)
+def test_nothing_is_kept_for_ever(hair: Any, end: Any, last: list[Any]) -> None:
+    make()
+    gc.collect()
+    assert last[0]() is not None
+    end(hair)
+    gc.collect()
+    assert last[0]() is None
+
+
+def test_what_is_built_next_takes_the_place_of_the_last_before_it_is_built(
+    hair: Any, last: list[Any]
+) -> None:
+    """So that both are never in memory at once."""
+    make()
+    hair.data.hairloom.cards.card_count = 14
+    steps = bpy.types.HAIRLOOM_OT_make_cards.steps(SimpleNamespace(), bpy.context)
+    next(steps)
+    next(steps)
+    gc.collect()
+    assert last[0]() is None
+    steps.close()
+
+
+def test_cards_of_previewed_hair_are_of_its_strands(
+    hair: Any, tmp_path: Path, evaluated: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    hair.data.hairloom.children.method = "multi"
+    hair.data.hairloom.children.strand_count = 100
+    own = afresh(tmp_path / "own")
+    session = previews.start(hair, evaluated())
+    made = counted(monkeypatch, rigs.rig_flow, "prepare")
+    assert afresh(tmp_path / "previewed") == own and not made
+    comb(hair, tmp_path)
+    bpy.context.view_layer.update()
+    found = written(tmp_path / "combed")
+    assert made == ["prepare"], "the preview has not read it yet"
+    previews.stop(session)
+    assert found == afresh(tmp_path / "combed afresh") != own
