@@ -18,11 +18,12 @@ Limitation: no light goes from skin to skin.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import Bools, Floats
+from ..arrays import Bools, Floats, Ints
 from ..strands import StrandSet, Surface
 from ..strands.triangles import area_vectors
 from .ambient import Step, add_shifted, depth_towards, sky_directions, unit_steps, with_mean
@@ -81,12 +82,11 @@ def skin_field(
     """
     grid = _grid_beyond(strands, cell_count or _CELLS)
     hair = np.float32(extinction) * hair_depth(strands, grid)
-    normal, is_skin = _skin_cells(skin, grid)
-    is_inside = _inside(normal, is_skin)
-    sent = _sent(hair, normal, is_skin, is_inside)
-    cells = np.concatenate(_spread(hair, sent, normal, is_skin))
+    cells_of_skin = skin.latest(_SkinCells.of, grid.low, grid.cell, grid.shape)
+    sent = _sent(hair, cells_of_skin)
+    cells = np.concatenate(_spread(hair, sent, cells_of_skin.normal, cells_of_skin.is_skin))
     # those within the body know of nothing, and those beside fill them
-    known = ~is_inside
+    known = ~cells_of_skin.is_inside
     return Field(grid, np.concatenate([cells * known, known[None]], dtype=np.float32))
 
 
@@ -134,7 +134,50 @@ def _grid_beyond(strands: StrandSet, cell_count: int) -> Grid:
     return Grid.of_cells(first, last + 1 - first, cell)
 
 
-def _skin_cells(skin: Surface, grid: Grid) -> tuple[Floats, Bools]:
+@dataclass(frozen=True, eq=False)
+class _SkinCells:
+    """The skin in the cells of a grid, and the light that it sends back where there is no hair.
+
+    normal: (3, *shape), the mean of the skin in each cell. is_skin: which have any.
+    is_inside: which lie right below it.
+    facing: (26, skin_count), of each cell with skin, how much light of each direction it sends.
+    clear: (skin_count,), what of that gets away, in all.
+    """
+
+    normal: Floats
+    is_skin: Bools
+    is_inside: Bools
+    facing: Floats
+    clear: Floats
+
+    @classmethod
+    def of(cls, skin: Surface, low: Floats, cell: float, shape: tuple[int, int, int]) -> _SkinCells:
+        """Of the numbers of a grid, which hair that is combed keeps."""
+        normal, is_skin = _skin_in(skin, Grid(low, cell, shape))
+        is_inside = _inside(normal, is_skin)
+        steps, weights = zip(*sky_directions(0.0), strict=True)
+        directions = unit_steps(steps).astype(np.float32)
+        chosen = np.flatnonzero(is_skin)
+        facing = np.maximum(directions.T @ normal.reshape(3, -1)[:, chosen], 0.0)
+        facing *= np.array(weights, np.float32)[:, None]
+        through = _through(_body(is_inside), steps, chosen)
+        return cls(normal, is_skin, is_inside, facing, (facing * through).sum(axis=0))
+
+
+def _body(is_inside: Bools) -> Floats:
+    """Optical depth of the body, (1, *shape)."""
+    depth: Floats = np.float32(_OPAQUE) * is_inside[None]
+    return depth
+
+
+def _through(depth: Floats, steps: Sequence[Step], chosen: Ints) -> Floats:
+    """What gets from some cells out of the grid along each step, (step_count, k)."""
+    towards = depth_towards(depth, steps, own=0.0)
+    through: Floats = np.exp(-towards.reshape(len(steps), -1)[:, chosen])
+    return through
+
+
+def _skin_in(skin: Surface, grid: Grid) -> tuple[Floats, Bools]:
     """The mean normal of the skin in each cell, (3, *shape), and which have any."""
     high = grid.low + grid.cell * np.array(grid.shape)
     corners = skin.positions[skin.triangles].astype(np.float64)
@@ -160,24 +203,18 @@ def _inside(normal: Floats, is_skin: Bools) -> Bools:
     return result
 
 
-def _sent(hair: Floats, normal: Floats, is_skin: Bools, is_inside: Bools) -> Floats:
+def _sent(hair: Floats, skin: _SkinCells) -> Floats:
     """What skin sends back of light from all around: as `SkinSeen.received`, and its mean without
     any hair in the way, (5, *shape)."""
-    steps, weights = zip(*sky_directions(0.0), strict=True)
+    steps, _ = zip(*sky_directions(0.0), strict=True)
     directions = unit_steps(steps).astype(np.float32)
-    skin = np.flatnonzero(is_skin)
-    facing = np.maximum(directions.T @ normal.reshape(3, -1)[:, skin], 0.0)
-    facing *= np.array(weights, np.float32)[:, None]
-    body = np.float32(_OPAQUE) * is_inside[None]
-    both = np.stack([body[0] + _gappy(hair, step) for step in steps])
+    chosen = np.flatnonzero(skin.is_skin)
+    (body,) = _body(skin.is_inside)
+    both = np.stack([body + _gappy(hair, step) for step in steps])
     sent = np.zeros((5, *hair.shape), np.float32)
     flat = sent.reshape(5, -1)
-    clear, some = (
-        facing * np.exp(-depth_towards(each, steps, own=0.0).reshape(len(steps), -1)[:, skin])
-        for each in (body, both)
-    )
-    flat[:4, skin] = with_mean(directions) @ some
-    flat[4, skin] = clear.sum(axis=0)
+    flat[:4, chosen] = with_mean(directions) @ (skin.facing * _through(both, steps, chosen))
+    flat[4, chosen] = skin.clear
     return sent
 
 

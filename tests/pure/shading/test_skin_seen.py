@@ -9,6 +9,7 @@ import pytest
 
 from hairloom.addon import light_flow, rig_flow
 from hairloom.addon.groom.settings import GuideSettings
+from hairloom.addon.shading import skin_seen as skin_seen_module
 from hairloom.addon.shading.ambient_settings import AmbientSettings
 from hairloom.addon.shading.skin_seen import (
     GAPS,
@@ -16,6 +17,7 @@ from hairloom.addon.shading.skin_seen import (
     SkinSeen,
     far_light,
     plane_beneath,
+    skin_field,
     skin_seen,
     through_hair,
 )
@@ -255,3 +257,32 @@ def test_a_plane_alone_is_as_before() -> None:
     seen: SkinSeen = plane_beneath(normal)
     assert not far_light(seen.received, normal).any()
     np.testing.assert_array_equal(seen.beneath, normal)
+
+
+def test_skin_in_cells_is_found_once_for_hair_that_keeps_its_grid(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """As under a comb; and for other cells or another head again. The field is the same to the
+    bit."""
+    found: list[int] = []
+    cut = skin_seen_module.small_triangles
+    monkeypatch.setattr(
+        skin_seen_module,
+        "small_triangles",
+        lambda corners, *box: found.append(len(corners)) or cut(corners, *box),
+    )
+    head = ball()
+    around = ball(1.3 * RADIUS, 8).positions[::3]
+    points = np.stack([around, 1.4 * around], axis=1)
+    combed = points.copy()
+    combed[len(points) // 2, 1] *= 0.95
+
+    def field(points: np.ndarray, head: Surface) -> np.ndarray:
+        return skin_field(hair(points, 1e-3), head, 1.0, 20).values
+
+    field(points, head)
+    np.testing.assert_array_equal(field(combed, head), field(combed, ball()))
+    assert len(found) == 2, "once for each head"
+    np.testing.assert_array_equal(field(2.0 * points, head), field(2.0 * points, ball()))
+    np.testing.assert_array_equal(field(points, head), field(points, ball()))
+    assert len(found) == 6, "one grid is kept for a head"
