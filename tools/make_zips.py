@@ -1,6 +1,7 @@
 """Builds the zips of the extension, one for each build of Blender with the wheels that fit it.
 
-python tools/make_zips.py dist
+python tools/make_zips.py dist            as artists get them
+python tools/make_zips.py dist --quick    with wheels as they were fetched, much sooner
 
 Blender's own packager makes one zip of everything, and takes wheels apart by platform alone. Its
 official builds have one Python, those of Linux distributions may have a newer one: so there is one
@@ -97,7 +98,9 @@ def packed_tighter(wheel: bytes) -> bytes:
     return kept.read_bytes()
 
 
-def write_zip(whole: Path, folder: Path, system: str, python: tuple[int, int]) -> Path:
+def write_zip(
+    whole: Path, folder: Path, system: str, python: tuple[int, int], is_quick: bool = False
+) -> Path:
     """The part of the whole zip that one build of Blender takes."""
     other = "" if python == OFFICIAL else f"_python{python[0]}{python[1]}"
     path = folder / f"{whole.stem}-{system.replace('-', '_')}{other}.zip"
@@ -110,6 +113,9 @@ def write_zip(whole: Path, folder: Path, system: str, python: tuple[int, int]) -
             if is_wheel and entry.filename.rpartition("/")[2] not in kept:
                 continue
             content = old.read(entry)
+            if is_quick and is_wheel:
+                new.writestr(entry, content, zipfile.ZIP_STORED)
+                continue
             if is_wheel and system == LZMA_SYSTEM and len(content) > LZMA_BYTES:
                 content = packed_tighter(content)
             if entry.filename == MANIFEST:
@@ -120,7 +126,7 @@ def write_zip(whole: Path, folder: Path, system: str, python: tuple[int, int]) -
     return path
 
 
-def main(folder: Path) -> int:
+def main(folder: Path, is_quick: bool = False) -> int:
     folder.mkdir(parents=True, exist_ok=True)
     fresh_help()  # which is packed
     with tempfile.TemporaryDirectory() as temporary:
@@ -130,10 +136,12 @@ def main(folder: Path) -> int:
             return done.returncode
         (whole,) = Path(temporary).glob("*.zip")
         with ThreadPoolExecutor() as pool:
-            for path in pool.map(lambda build: write_zip(whole, folder, *build), BUILDS):
+            for path in pool.map(
+                lambda build: write_zip(whole, folder, *build, is_quick=is_quick), BUILDS
+            ):
                 print(f"{path.name}  {path.stat().st_size / 1e6:.1f} MB")
     return 0
 
 
 if __name__ == "__main__":
-    sys.exit(main(Path(sys.argv[1])))
+    sys.exit(main(Path(sys.argv[1]), "--quick" in sys.argv[2:]))
