@@ -117,6 +117,16 @@ def test_a_picture_that_is_gone_is_told_and_replaced(
     assert (tmp_path / "cards_base.png").stat().st_size > 0
 
 
+@pytest.mark.usefixtures("gpu_context")
+def test_a_picture_may_have_another_size_than_a_baked_atlas(write: Any, hair: Any) -> None:
+    hair.data.hairloom.atlas.source = "baked"
+    hair.data.hairloom.atlas.size = "256"
+    hair.data.hairloom.card_images.base = bpy.data.images.load(
+        str(write("mine.png", np.full((*SHAPE, 3), 0.5, np.float32), is_color=True))
+    )
+    assert bpy.ops.hairloom.make_cards() == {"FINISHED"}
+
+
 def test_the_command_line_takes_pictures(write: Any, tmp_path: Path, gpu_context: Any) -> None:
     shift, tangent = values(1), values(3)
     arguments = [

@@ -179,7 +179,8 @@ class CardMaps:
         look = shading if self.base_color is None else in_color(self.base_color, shading)
         base = self.textures.base
         if "along" in self.by_name:
-            along = of_one_size({"base": base, "along": self.by_name["along"]})["along"]
+            sized = of_one_size({"base": base, "along": self.by_name["along"]})
+            base, along = sized["base"], sized["along"]
         else:  # one row of tiles, from the root to the tip
             along = np.linspace(0.0, 1.0, len(base))[:, None]
         color = plain_albedo(np.clip(base * card_color(along, look), 0.0, 1.0))
