@@ -93,6 +93,16 @@ def test_constants_of_other_nodes_are_read_and_what_varies_is_told(hair: Any) ->
     assert note.startswith("Roughness comes from other nodes")
 
 
+def test_of_several_materials_the_active_one_counts_and_that_is_said(hair: Any) -> None:
+    material(hair, Color=(1.0, 0.0, 0.0, 1.0))
+    assert look(hair)[1] == ()
+    material(hair, Color=(0.0, 1.0, 0.0, 1.0))
+    hair.active_material_index = 0
+    settings, (note,) = look(hair)
+    assert settings.base_color[0] > settings.base_color[1]
+    assert note == "of several materials it has the look of the active one, Hair"
+
+
 @pytest.mark.parametrize("way", ["mixed", "in a group"])
 def test_it_is_found_behind_other_nodes(hair: Any, way: str) -> None:
     node = material(hair, IOR=1.3)

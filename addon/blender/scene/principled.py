@@ -61,6 +61,8 @@ def look_from_material(
         )
     values, notes = _values(node)
     settings, more = settings_from(PrincipledHair(**values), before)
+    if len({slot.material for slot in hair.material_slots} - {None}) > 1:
+        more += (f"of several materials it has the look of the active one, {material.name}",)
     return settings, (*notes, *more)
 
 
