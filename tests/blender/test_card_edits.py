@@ -8,6 +8,7 @@ import bpy
 import numpy as np
 import pytest
 from glb_files import Glb
+from selecting import select
 from tiers import few_in_commits
 
 from hairloom.addon.blender.cards.build import BuiltCards, build_steps, read_inputs
@@ -42,13 +43,6 @@ def make(hair):
     assert bpy.ops.hairloom.make_cards() == {"FINISHED"}
     bpy.context.view_layer.update()
     return card_objects(hair)[0]
-
-
-def select(obj):
-    for other in bpy.context.selected_objects:
-        other.select_set(False)
-    obj.select_set(True)
-    bpy.context.view_layer.objects.active = obj
 
 
 def numbers(obj):

@@ -10,6 +10,7 @@ from typing import Any
 import bpy
 import numpy as np
 import pytest
+from selecting import select
 
 from hairloom.addon.blender.base import latest_job
 from hairloom.addon.blender.colliders import rigs
@@ -40,7 +41,9 @@ def made(monkeypatch: pytest.MonkeyPatch) -> list[str]:
 def hair(new_hair: Callable[..., Any], sphere: Any) -> Iterator[Any]:
     """With children that are painted, a parting, and a head that frames move."""
     group = sphere.vertex_groups.new(name="Thick")
-    group.add(list(range(len(sphere.data.vertices))), 1.0, "REPLACE")
+    count = len(sphere.data.vertices)
+    group.add(list(range(count)), 1.0, "REPLACE")
+    group.add(list(range(count // 2)), 0.2, "REPLACE")
     sphere.location.x = 0.0
     sphere.keyframe_insert("location", frame=1)
     sphere.location.x = 0.2
@@ -50,17 +53,10 @@ def hair(new_hair: Callable[..., Any], sphere: Any) -> Iterator[Any]:
     made.data.hairloom.children.method, made.data.hairloom.children.strand_count = "multi", 200
     made.hairloom.children_density = "Thick"
     assert bpy.ops.hairloom.add_parting() == {"FINISHED"}
-    chosen(made)
+    select(made)
     bpy.context.view_layer.update()
     yield made
     operators_export_check.end()
-
-
-def chosen(hair: Any) -> None:
-    for other in bpy.context.selected_objects:
-        other.select_set(False)
-    hair.select_set(True)
-    bpy.context.view_layer.objects.active = hair
 
 
 def written(path: Path) -> bytes:

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from hedgehogs import hedgehog
 from node_modifiers import mode_of, with_modifier
+from selecting import select
 
 from hairloom.addon.blender.base.parts import at_once
 from hairloom.addon.blender.cards.build import read_inputs
@@ -54,13 +55,6 @@ def attach_roots(hair):
     bound = bind_roots(source.strands, source.head, place="").strands
     uv = hair.data.attributes.new("surface_uv_coordinate", "FLOAT2", "CURVE")
     uv.data.foreach_set("vector", bound.root_uv.astype(np.float32).ravel())
-
-
-def select(hair):
-    for other in bpy.context.selected_objects:
-        other.select_set(False)
-    hair.select_set(True)
-    bpy.context.view_layer.objects.active = hair
 
 
 def go_to(frame):

@@ -1,0 +1,13 @@
+"""Objects chosen as by a click."""
+
+from __future__ import annotations
+
+import bpy
+
+
+def select(obj: bpy.types.Object) -> None:
+    """This object alone, and active."""
+    for other in bpy.context.selected_objects:
+        other.select_set(False)
+    obj.select_set(True)
+    bpy.context.view_layer.objects.active = obj
