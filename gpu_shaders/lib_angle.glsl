@@ -2,8 +2,7 @@
 // are off by 2e-5, which a narrow highlight shows.
 //
 // Holds no resources.
-
-const float ANGLE_PI = 3.14159265358979;
+#include "lib_pi.glsl"
 
 // From 0 to pi. The angle over its sine as a polynomial of the cosine, within 1e-7.
 float angle_of(float sine, float cosine)
@@ -17,5 +16,5 @@ float angle_of(float sine, float cosine)
   sum = 0.7848962545394897 + x * sum;
   sum = -0.9999822378158569 + x * sum;
   sum = (1.570796251296997 + x * sum) * sine;
-  return cosine < 0.0 ? ANGLE_PI - sum : sum;
+  return cosine < 0.0 ? PI - sum : sum;
 }

@@ -30,7 +30,7 @@ vec2 all_and_left(vec3 point, vec3 normal, vec3 facet)
     vec3 to_light, irradiance;
     light_at(lights, index, point, to_light, irradiance);
     vec3 path = shadow_path_to_mesh(index, point, normal);
-    vec3 arriving = irradiance * max(0.0, dot(normal, to_light)) / LIGHT_PI;
+    vec3 arriving = irradiance * max(0.0, dot(normal, to_light)) / PI;
     all_light += arriving * path.z;
     left += arriving * light_left(path, hair_forward);
   }

@@ -55,14 +55,14 @@ vec3 returned_shape(vec4 forward, vec4 backward, Fibre fibre)
                     a_b * a_b * a_b * sqrt(wider + 3.0 * wide_b * wide_b);
   float width = (1.0 + 0.7 * a_f * a_f) * numerator /
                 max(a_b + a_b * a_b * a_b * (2.0 * wide_f + 3.0 * wide_b), DUAL_SMALLEST);
-  return vec3(width, clamp(shift, -0.25 * ANGLE_PI, 0.25 * ANGLE_PI), wide_f);
+  return vec3(width, clamp(shift, -0.25 * PI, 0.25 * PI), wide_f);
 }
 
 // N of the lobes for light that comes from half a circle around its direction.
 vec4 spread_around(vec4 forward, vec4 backward, float phi)
 {
   float cosine = cos(phi);
-  return (forward * (1.0 - cosine) + backward * (1.0 + cosine)) / (2.0 * ANGLE_PI);
+  return (forward * (1.0 - cosine) + backward * (1.0 + cosine)) / (2.0 * PI);
 }
 
 // Half of the unit Gaussian of theta_h about -shift: Marschner's M_p.
@@ -70,7 +70,7 @@ float half_gaussian(float theta_h, float shift, float variance)
 {
   variance = max(variance, DUAL_SMALLEST);
   float off = theta_h + shift;
-  return exp(-0.5 * off * off / variance) / (2.0 * sqrt(2.0 * ANGLE_PI * variance));
+  return exp(-0.5 * off * off / variance) / (2.0 * sqrt(2.0 * PI * variance));
 }
 
 // S of a strand among others; `single` is that of the strand alone, tau how many strands lie
@@ -95,7 +95,7 @@ vec3 dual_scattering(vec3 single,
   float added = max(tau, 1.0) * shape.z * shape.z;
   // what the strand itself sends back is in `single`
   vec3 stack = returned(a_f, a_b, 1.0 + beyond) - returned(a_f, a_b, 1.0);
-  vec3 back = max(stack, 0.0) / (ANGLE_PI * squared);
+  vec3 back = max(stack, 0.0) / (PI * squared);
   vec3 back_straight = back * half_gaussian(theta_h, shape.y, shape.x * shape.x);
   vec3 back_scattered = back * half_gaussian(theta_h, shape.y, shape.x * shape.x + added);
   vec4 along = vec4(half_gaussian(theta_h, fibre.shifts.x, fibre.widths.x * fibre.widths.x + added),
@@ -123,7 +123,7 @@ vec3 off_the_skin(float phi,
   vec3 a_f = sum_of_lobes(forward), a_b = sum_of_lobes(backward);
   float strands = tau + beyond * (1.0 + DUAL_DIFFUSIVITY * facing);
   vec3 kept = max(1.0 - skin * returned(a_f, a_b, beyond), 1.0 - DUAL_MAX);
-  vec3 lit = skin * facing / (ANGLE_PI * kept);
+  vec3 lit = skin * facing / (PI * kept);
   float cosine = cos(phi);
   vec3 onward = 0.5 * (a_f * (1.0 + cosine) + a_b * (1.0 - cosine));
   return lit * exp(-strands * (1.0 - a_f)) * onward;
@@ -137,7 +137,7 @@ vec3 off_far_skin(
   vec3 a_f = sum_of_lobes(forward), a_b = sum_of_lobes(backward);
   vec3 taken = sqrt(max((1.0 - a_f) * (1.0 - a_f) - a_b * a_b, 0.0));
   vec3 onward = 0.5 * (a_f * (1.0 + outward) + a_b * (1.0 - outward));
-  vec3 lit = 2.0 / ANGLE_PI * skin * far_light(seen.received, to_light);
+  vec3 lit = 2.0 / PI * skin * far_light(seen.received, to_light);
   return lit * through_hair(seen.depth, taken) * onward;
 }
 

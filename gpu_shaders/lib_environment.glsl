@@ -1,11 +1,12 @@
 // Light from all around. Twin of addon/shading/environment.py: same names; what the terms mean is
 // written there. Needs struct_lights.glsl. Holds no resources.
+#include "lib_pi.glsl"
 
 // MATT of addon/shading/environment.py
 const vec2 MATT = vec2(2.0 / 3.0, 1.0 / 4.0);
 // EIGHTH, CLOSED and CORNER_BLUR of addon/shading/environment.py
 const vec2 EIGHTH = vec2(0.8660254037844386, 0.6366197723675814);
-const float CLOSED = 1.0e-3, CORNER_BLUR = 0.39269908169872, ENVIRONMENT_PI = 3.14159265358979;
+const float CLOSED = 1.0e-3, CORNER_BLUR = 0.39269908169872;
 
 // Radiance from a direction, of which orders 1 and 2 are damped.
 vec3 light_from(Lights lights, vec3 towards, vec2 kept)
@@ -37,7 +38,7 @@ vec3 corner_direction(int corner)
 // Its irradiance on what faces it.
 vec3 corner_light(Lights lights, int corner)
 {
-  return 0.5 * ENVIRONMENT_PI * light_from(lights, corner_direction(corner), EIGHTH);
+  return 0.5 * PI * light_from(lights, corner_direction(corner), EIGHTH);
 }
 
 // Openness where only occlusion is known: to where hair looks away.

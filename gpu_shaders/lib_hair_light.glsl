@@ -63,7 +63,7 @@ vec3 hair_light(vec3 tangent,
                          level,
                          path.x);
 #else
-  return (path.x < 0.0 ? 1.0 : exp(-path.x)) * hair / LIGHT_PI *
+  return (path.x < 0.0 ? 1.0 : exp(-path.x)) * hair / PI *
          kajiya_kay(tangent, normal, to_light, to_eye, shift_noise, sparkle_noise, shading);
 #endif
 }

@@ -4,12 +4,12 @@
 // LIGHT_KINDS, where a recipe says it: 0 there are suns alone, 1 points and spots as well, 2 area lights
 // too. A software driver computes all branches, and panels cost as much as all other shading.
 #include "lib_angle.glsl"
+#include "lib_pi.glsl"
 
 #ifndef LIGHT_KINDS
 #  define LIGHT_KINDS 2
 #endif
 
-const float LIGHT_PI = 3.14159265358979;
 const float POINT_LIGHT = 1.0, SPOT_LIGHT = 2.0, RECTANGLE_LIGHT = 3.0, DISK_LIGHT = 4.0;
 const float ROUND_GRID_LIGHT = 6.0;
 // FAR and MIN_HEIGHT of addon/shading/area_lights.py
@@ -44,7 +44,7 @@ vec3 panel_rectangle(vec2 half_sides, vec3 offset)
   vec3 total = vec3(offset.z * (at_left - at_right),
                     offset.z * (at_bottom - at_top),
                     left * at_left - right * at_right + bottom * at_bottom - top * at_top);
-  return total / (8.0 * LIGHT_PI * half_sides.x * half_sides.y);
+  return total / (8.0 * PI * half_sides.x * half_sides.y);
 }
 
 vec3 panel_disk(float radius, vec3 offset)
@@ -56,7 +56,7 @@ vec3 panel_disk(float radius, vec3 offset)
   float rest = radius * radius + height * height - p * p;
   float facing = rest > 0.0 ? product + rest :
                               4.0 * (p * height) * (p * height) / (product - rest);
-  return -vec3(2.0 * height * offset.xy, facing) / (LIGHT_PI * total * product);
+  return -vec3(2.0 * height * offset.xy, facing) / (PI * total * product);
 }
 
 // The part of one row of a panel, from low to high, by the sine of the angle at the point.
@@ -100,7 +100,7 @@ vec3 panel_grid(Lights lights, int index, bool is_round, vec3 offset)
     total += PANEL_WEIGHTS[node / 2] * half_width *
              panel_row(lights, index, height, v, low, high);
   }
-  return total / (LIGHT_PI * 4.0 * a * b * (is_round ? 0.25 * LIGHT_PI : 1.0));
+  return total / (PI * 4.0 * a * b * (is_round ? 0.25 * PI : 1.0));
 }
 
 // Four points instead of a panel far away, which lie as wide along each axis as it does.
@@ -113,7 +113,7 @@ vec3 panel_four_points(Lights lights, int index, bool is_round, vec2 half_sides,
     vec3 direction = vec3(aside, 0.0) - offset;
     float squared = dot(direction, direction);
     float shade = panel_shade(lights, index, length(direction.xy) / offset.z);
-    total += direction * (offset.z * shade / (4.0 * LIGHT_PI * squared * squared));
+    total += direction * (offset.z * shade / (4.0 * PI * squared * squared));
   }
   return total;
 }
@@ -187,6 +187,6 @@ void light_at(Lights lights, int index, vec3 point, out vec3 to_light, out vec3 
   if (light.w == SPOT_LIGHT) {
     let_through = cone_fraction(lights, index, away, min((added + least) / squared, 1.0));
   }
-  irradiance *= let_through / (4.0 * LIGHT_PI * squared);
+  irradiance *= let_through / (4.0 * PI * squared);
 #endif
 }

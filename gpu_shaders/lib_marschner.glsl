@@ -24,8 +24,8 @@ vec3 directions_to_angles(vec3 tangent, vec3 to_light, vec3 to_eye)
   vec2 turn = vec2(length(cross(across_light, across_eye)), dot(across_light, across_eye));
   float size = length(turn);
   turn = size > 0.0 ? turn / size : vec2(0.0, 1.0);
-  return vec3(0.5 * ANGLE_PI - angle_of(cos_i, sin_i),
-              0.5 * ANGLE_PI - angle_of(cos_r, sin_r),
+  return vec3(0.5 * PI - angle_of(cos_i, sin_i),
+              0.5 * PI - angle_of(cos_r, sin_r),
               angle_of(turn.x, turn.y));
 }
 
@@ -38,7 +38,7 @@ vec2 table_place(vec2 x, vec2 size)
 // The level at which the longitudinal table is blurred over an angle of theta_h.
 float table_level(float angle, sampler3D longitudinal)
 {
-  float step = ANGLE_PI / float(textureSize(longitudinal, 0).x - 1);
+  float step = PI / float(textureSize(longitudinal, 0).x - 1);
   return log2(max(angle / step, 1.0));
 }
 
@@ -64,9 +64,9 @@ vec3 look_up(sampler3D longitudinal,
              float level)
 {
   vec3 size = vec3(textureSize(longitudinal, 0));
-  vec2 place = table_place(angles.xy / ANGLE_PI + 0.5, size.xy);
+  vec2 place = table_place(angles.xy / PI + 0.5, size.xy);
   vec4 along = textureLod(longitudinal, vec3(place, (level + 0.5) / size.z), 0.0);
-  place = table_place(vec2(along.w, angles.z / ANGLE_PI), vec2(textureSize(azimuthal, 0)));
+  place = table_place(vec2(along.w, angles.z / PI), vec2(textureSize(azimuthal, 0)));
   vec4 clear = textureLod(azimuthal, place, 0.0);
   mat4x3 kept = kept_light(textureLod(paths, place, 0.0), absorption);
   vec4 factors = strengths * along.xyzz * clear;
@@ -176,5 +176,5 @@ vec3 marschner_light(sampler3D longitudinal,
       longitudinal, azimuthal, paths, angles, sparkle_noise, absorption, fibre, shading, level);
   float bias = diffuse_bias(normal, to_light) * (tau < 0.0 ? 1.0 : exp(-tau));
   return scattered * cos(angles.x) * straight_light(normal, to_light, tau, shading) +
-         strand_color(fibre, absorption) * (shading.fake_scattering * bias / ANGLE_PI);
+         strand_color(fibre, absorption) * (shading.fake_scattering * bias / PI);
 }

@@ -1,6 +1,5 @@
 // Twin of addon/shading/microfacet.py: what a surface reflects at its boundary. Holds no resources.
-
-const float MICROFACET_PI = 3.14159265358979;
+#include "lib_pi.glsl"
 
 float dielectric_fresnel(float cosine, float specular)
 {
@@ -31,7 +30,7 @@ float ggx_reflection(vec3 normal, vec3 to_light, vec3 to_eye, float specular, fl
   vec3 aside = cross(normal, middle);
   float across = dot(normal, middle);
   float spread = dot(aside, aside) + alpha_squared * across * across;
-  float facets = alpha_squared / (MICROFACET_PI * spread * spread);
+  float facets = alpha_squared / (PI * spread * spread);
   float visible = 0.5 / (lit * smith_height(seen, alpha_squared) + seen * smith_height(lit, alpha_squared));
   return facets * visible * dielectric_fresnel(clamp(dot(middle, to_eye), 0.0, 1.0), specular);
 }

@@ -112,7 +112,7 @@ void main()
     reaching *= exp((index < {{other_tau_lights}} ? -between[index] : 0.0) * (1.0 - hair_forward));
 #endif
     float shine = ggx_reflection(normal, to_light, to_eye, mesh_specular, mesh_roughness);
-    radiance += irradiance * reaching * facing * (matt / LIGHT_PI + shine);
+    radiance += irradiance * reaching * facing * (matt / PI + shine);
   }
 #ifdef EMISSION
   radiance += mesh_emission;

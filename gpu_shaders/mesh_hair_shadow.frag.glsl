@@ -71,7 +71,7 @@ void main()
 #ifdef OTHER_TAU
     by_hair *= exp((index < {{other_tau_lights}} ? -between[index] : 0.0) * (1.0 - hair_forward));
 #endif
-    vec3 arriving = past_meshes * facing / LIGHT_PI * irradiance;
+    vec3 arriving = past_meshes * facing / PI * irradiance;
     all_light += arriving;
     left += arriving * by_hair;
   }

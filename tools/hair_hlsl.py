@@ -39,7 +39,7 @@ IN_NODES = (
     "hair_unit",
     "hair_tangent",
     "hair_view_compensated_alpha",
-    "hair_tip_share",
+    "hair_tip_fraction",
     "hair_absorption",
     "hair_color",
 )

@@ -19,14 +19,13 @@ from __future__ import annotations
 from functools import lru_cache
 from typing import Any
 
-import gpu
 import numpy as np
 
 from ..arrays import Floats
 from ..dynamics.among import BEGIN, MOTION, Among, HairGrid, Others
 from . import gpu_objects
 from .ribbons import Ribbons
-from .shader_program import ShaderRecipe, program
+from .shader_program import ShaderProgram, ShaderRecipe, program
 from .strand_layout import strand_rows
 from .textures import UniformBlock, drawing_into, drawing_state, texture_from
 
@@ -130,20 +129,15 @@ class AmongPass:
         ):
             self._target.clear(color=(0.0, 0.0, 0.0, 0.0))
             shader = _bound(deposit_recipe(cv_count), block, textures)
-            self._points.points(guide_count * cv_count).draw(shader)
+            self._points.points(guide_count * cv_count).draw(shader.shader)
             if among.others is not None:
                 shader = _bound(OTHERS_RECIPE, block, textures)
-                self._points.points(_room_for(len(among.others.mass))).draw(shader)
+                self._points.points(_room_for(len(among.others.mass))).draw(shader.shader)
         for recipe, size in (
             (FIELDS_RECIPE, (x * z, y)),
             (feel_recipe(cv_count, pairs), (cv_count, guide_count)),
         ):
-            shader = _bound(recipe, block, textures)
-            groups = [
-                -(-side // group) for side, group in zip(size, recipe.group_size, strict=True)
-            ]
-            gpu.compute.dispatch(shader, *groups, 1)
-        gpu.shader.unbind()
+            _bound(recipe, block, textures).dispatch(*size)
 
     def _make(self, grid: HairGrid, volume: Floats | None) -> None:
         mass = np.broadcast_to(grid.mass, grid.density.shape)
@@ -174,14 +168,14 @@ def _textures_of(others: Others) -> dict[str, Any]:
     return {name: texture_from(strand_rows(rows), "RGBA32F") for name, rows in found.items()}
 
 
-def _bound(recipe: ShaderRecipe, block: Any, textures: dict[str, Any]) -> Any:
+def _bound(recipe: ShaderRecipe, block: Any, textures: dict[str, Any]) -> ShaderProgram:
     shader = program(recipe)
     shader.bind(
         blocks={"among": block},
         textures={name: textures[name] for _, name in recipe.textures},
         images={name: textures[name] for _, name, *_ in recipe.images},
     )
-    return shader.shader
+    return shader
 
 
 def _block_of(among: Among, speed_ratio: float) -> Floats:

@@ -144,8 +144,7 @@ class _Strands:
         for drawn in self.casting.classes:
             shader.shader.uniform_int("drawn_count", drawn.count)
             shader.shader.uniform_int("first_instance", drawn.first)
-            cvs = drawn.capacity + 1
-            gpu.compute.dispatch(shader.shader, -(-cvs // 8), -(-drawn.count // 8), 1)
+            shader.run(drawn.capacity + 1, drawn.count)
         gpu.shader.unbind()
 
     def draw_layers(self, features: Sequence[ShaderFeature]) -> None:

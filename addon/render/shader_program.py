@@ -121,11 +121,14 @@ class ShaderProgram:
         for name, number in (numbers or {}).items():
             self.shader.uniform_float(name, number)
 
-    def dispatch(self, width: int, height: int = 1) -> None:
-        """Run what is bound, a compute shader, for this many invocations, up to whole groups, and
-        bind nothing."""
+    def run(self, width: int, height: int = 1) -> None:
+        """Run what is bound, a compute shader, for this many invocations, up to whole groups."""
         across, down = (*self.recipe.group_size, 1)[:2]
         gpu.compute.dispatch(self.shader, -(-width // across), -(-height // down), 1)
+
+    def dispatch(self, width: int, height: int = 1) -> None:
+        """As `run`, and bind nothing after it."""
+        self.run(width, height)
         gpu.shader.unbind()
 
     def _require(self, kind: str, declared: Any, given: Mapping[str, Any] | None) -> None:

@@ -353,8 +353,7 @@ def _longest() -> int | None:
 
 def _dispatch(shader: ShaderProgram, count: int) -> None:
     """This many invocations, in rows."""
-    columns = -(-min(count, LAYER_ROW) // shader.recipe.group_size[0])
-    gpu.compute.dispatch(shader.shader, columns, -(-count // LAYER_ROW), 1)
+    shader.dispatch(min(count, LAYER_ROW), -(-count // LAYER_ROW))
 
 
 def _viewport_end() -> tuple[int, int]:

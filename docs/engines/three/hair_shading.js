@@ -92,7 +92,7 @@ vec3 hair_normal(vec3 texel, vec3 tangent, vec3 normal)
   return hair_unit(way.x * cross(tangent, normal) + way.y * tangent + way.z * normal, normal);
 }
 
-float hair_tip_share(HairMaterial hair, float along)
+float hair_tip_fraction(HairMaterial hair, float along)
 {
   float span = max(hair.tint_end - hair.tint_start, 1.0e-4);
   float rise = clamp((along - hair.tint_start) / span, 0.0, 1.0);
@@ -148,7 +148,7 @@ float hair_view_compensated_alpha(float alpha, vec3 across, vec3 tangent, vec3 t
 // difference from the mean of the card.
 vec3 hair_absorption(HairMaterial hair, float along, vec3 base)
 {
-  vec3 mixed = mix(hair.fibre_root.xyz, hair.fibre_tip.xyz, hair_tip_share(hair, along));
+  vec3 mixed = mix(hair.fibre_root.xyz, hair.fibre_tip.xyz, hair_tip_fraction(hair, along));
   vec3 grey = vec3(hair.fibre_tip.w * (mixed.x + mixed.y + mixed.z) / 3.0);
   vec3 root = sqrt(max(mix(mixed, grey, hair.grey_fraction), vec3(0.0)));
   root -= log(max(base, vec3(HAIR_DARKEST))) / hair.fibre_root.w;
@@ -162,7 +162,7 @@ vec3 hair_color(HairMaterial hair, float along, vec3 base)
   if (hair.model == 1) {
     return exp(-sqrt(hair_absorption(hair, along, base)) * hair.fibre_root.w);
   }
-  vec3 colored = mix(hair.base_color, hair.tip_color, hair_tip_share(hair, along));
+  vec3 colored = mix(hair.base_color, hair.tip_color, hair_tip_fraction(hair, along));
   return base * mix(colored, HAIR_GREY, hair.grey_fraction);
 }
 

@@ -103,7 +103,7 @@ float3 hair_normal(float3 texel, float3 tangent, float3 normal)
   return hair_unit(way.x * cross(tangent, normal) + way.y * tangent + way.z * normal, normal);
 }
 
-float hair_tip_share(HairMaterial hair, float along)
+float hair_tip_fraction(HairMaterial hair, float along)
 {
   float span = max(hair.tint_end - hair.tint_start, 1.0e-4);
   float rise = clamp((along - hair.tint_start) / span, 0.0, 1.0);
@@ -159,7 +159,7 @@ float hair_view_compensated_alpha(float alpha, float3 across, float3 tangent, fl
 // difference from the mean of the card.
 float3 hair_absorption(HairMaterial hair, float along, float3 base)
 {
-  float3 mixed = lerp(hair.fibre_root.xyz, hair.fibre_tip.xyz, hair_tip_share(hair, along));
+  float3 mixed = lerp(hair.fibre_root.xyz, hair.fibre_tip.xyz, hair_tip_fraction(hair, along));
   float3 grey = ((float3)(hair.fibre_tip.w * (mixed.x + mixed.y + mixed.z) / 3.0));
   float3 root = sqrt(max(lerp(mixed, grey, hair.grey_fraction), ((float3)(0.0))));
   root -= log(max(base, ((float3)(HAIR_DARKEST)))) / hair.fibre_root.w;
@@ -173,7 +173,7 @@ float3 hair_color(HairMaterial hair, float along, float3 base)
   if (hair.model == 1) {
     return exp(-sqrt(hair_absorption(hair, along, base)) * hair.fibre_root.w);
   }
-  float3 colored = lerp(hair.base_color, hair.tip_color, hair_tip_share(hair, along));
+  float3 colored = lerp(hair.base_color, hair.tip_color, hair_tip_fraction(hair, along));
   return base * lerp(colored, HAIR_GREY, hair.grey_fraction);
 }
 
