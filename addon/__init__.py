@@ -1,6 +1,6 @@
-"""Hairloom's rooms; see docs/dev/architecture.md for the way of the data through them.
+"""Hairloom's rooms; docs/dev/architecture.md describes the flow of data through them.
 
-Importing this package touches neither bpy nor gpu, so that every room above `render` works in
+Importing this package imports neither bpy nor gpu, so that every room before `render` works in
 plain Python.
 """
 

@@ -1,7 +1,7 @@
-"""Array types for annotations; arrays and what holds them that are the same; rows of pieces that
-follow each other; sums and means of rows by number.
+"""Array types for annotations, comparison of arrays and their containers, indices of pieces stored
+end to end, sums and means of rows grouped by number.
 
-Shapes, units, dtype and space are said where an array is born.
+Shape, unit, dtype and space of an array are documented where it is created.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ def are_same(one: Floats | Ints | None, other: Floats | Ints | None) -> bool:
 
 
 def same_content(one: Any, other: Any) -> bool:
-    """Whether the same comes of both, to the last bit: of arrays, and of data classes, tuples and
-    mappings that hold them. What a data class has found of itself does not count."""
+    """Whether two values are the same, bit for bit: arrays, or data classes, tuples and mappings
+    that hold them. Of data classes only fields are compared, no cached properties."""
     if one is other:
         return True
     if type(one) is not type(other):
@@ -50,26 +50,26 @@ def _bits(array: Any) -> Ints:
 
 
 def piece_starts(counts: Ints) -> Ints:
-    """Where each piece begins, (n,), of pieces of this many rows that follow each other."""
+    """The first row of each piece, (n,), for pieces of `counts` rows stored end to end."""
     return np.cumsum(counts) - counts
 
 
 def number_in_piece(counts: Ints) -> Ints:
-    """The number of each row in its piece, (row_count,), see `piece_starts`."""
+    """The index of each row within its piece, (row_count,), see `piece_starts`."""
     numbers: Ints = np.arange(counts.sum()) - np.repeat(piece_starts(counts), counts)
     return numbers
 
 
 def sums_by(number: Ints, rows: Floats, count: int = 0) -> Floats:
-    """The sum of the rows (n,) or (n, k) of each number, (count,) or (count, k) float64;
-    `count` is at least one more than the largest number."""
+    """The sums of rows, (n,) or (n, k), of equal number: (count,) or (count, k) float64; `count` is
+    at least the largest number plus one, which is the default."""
     if rows.ndim == 1:
         return np.bincount(number, rows, count)
     return np.stack([np.bincount(number, column, count) for column in rows.T], axis=1)
 
 
 def means_by(number: Ints, rows: Floats, count: int) -> Floats:
-    """The same of their means; 0 where no row has the number."""
+    """The means of rows of equal number, shaped as `sums_by`; 0 where no row has the number."""
     times = np.maximum(np.bincount(number, minlength=count), 1)
     means: Floats = sums_by(number, rows, count) / times.reshape(-1, *(1,) * (rows.ndim - 1))
     return means

@@ -1,4 +1,4 @@
-"""The flow of data from a groom that was made ready to its cards, which move with it."""
+"""The flow of data from a rig to its cards, at rest and in motion."""
 
 from __future__ import annotations
 
@@ -47,14 +47,14 @@ def card_build_steps(
     others: Sequence[CardOccluder] = (),
     edits: CardEdits | None = None,
 ) -> Generator[str, None, CardBuild]:
-    """Cards at rest in all levels of detail, with occlusion, from inside to outside.
+    """Cards at rest in all levels of detail, with occlusion, sorted from inside to outside.
 
     Args:
-        alpha_of: the alpha of the atlas, which is best baked here; see `cards.build`.
+        alpha_of: bakes the atlas and returns its alpha; see `cards.build`.
         others: cards of other grooms, which shade these, world space.
-        edits: what the artist has changed of cards that were made before, which is kept.
+        edits: the artist's changes to cards made before, which are kept.
 
-    Yields what comes next, and returns the cards.
+    Yields the name of the next stage; returns the cards.
 
     Raises:
         HairloomError: the atlas is too small for its tiles, or there is nothing to bake into it.
@@ -81,10 +81,10 @@ def card_build_steps(
 
 
 def card_groom(rig: Rig, drawn: StrandSettings = _AS_THEY_ARE) -> CardGroom:
-    """What cards are made from, without the occlusion of the strands.
+    """The strands that cards are made from, without their occlusion.
 
-    Baby hair is left out: it lies singly on the skin along hairlines and partings, and cards of it
-    would be dashes there.
+    Baby hair is left out: its single strands lie on the skin along hairlines and partings, where
+    cards would look like dashes.
     """
     number = np.delete(np.arange(rig.strands.strand_count), rig.baby_hair)
     strands = card_strands(rig.strands.take(number) if len(rig.baby_hair) else rig.strands)
@@ -94,16 +94,16 @@ def card_groom(rig: Rig, drawn: StrandSettings = _AS_THEY_ARE) -> CardGroom:
 
 
 def occluder_of(rig: Rig, drawn: StrandSettings = _AS_THEY_ARE) -> CardOccluder:
-    """What shades others instead of this groom's strands, world space."""
+    """Cards that represent this groom's strands where they shade other grooms, world space."""
     return strand_occluder(card_groom(rig, drawn))
 
 
 def bound_cards(rig: Rig, mesh: CardMesh) -> CardBinding:
-    """Cards at rest, tied to the guides that they ride on from then on."""
+    """Cards at rest, bound to the guides that they ride on."""
     used, lines = card_lines(mesh)
     guides, guide_group = rig.guide_grid, rig.strands.group[rig.guides]
     group = mesh.group[used]
-    if not np.isin(group, guide_group).all():  # cards that know of no groups
+    if not np.isin(group, guide_group).all():  # cards without groups
         group, guide_group = np.zeros_like(group), np.zeros_like(guide_group)
     weights = guide_weights(
         lines[:, 0], group, guides[:, 0], guide_group, strand_grid=lines, guide_grid=guides
@@ -119,7 +119,7 @@ def cards_at(rig: Rig, cards: CardBinding, pose: Pose, guides_now: Floats) -> Ca
 
 
 def _contacts(rig: Rig, cards: CardBinding, solids: Solids) -> CardContacts | None:
-    """How far cards stay from their colliders is found once for a motion."""
+    """The colliders of a pose with the clearances of cards, which are computed once per motion."""
     colliders = solids.colliders
     if not colliders or not solids.begun.colliders:
         return None
@@ -132,7 +132,7 @@ def _contacts(rig: Rig, cards: CardBinding, solids: Solids) -> CardContacts | No
 
 
 def card_clearance(rig: Rig, cards: CardBinding, begun: Begun) -> CardClearance:
-    """How far cards stay from colliders, by where their roots carry them as a motion begins."""
+    """How far cards stay from colliders, from where their roots carry them as a motion begins."""
     guides = carried_guides(rig, begun.pose)
     spines, vertices = carried_cards(cards, guides, root_turns(rig, begun.pose))
     standing = tuple(each.at_end() for each in begun.colliders)
@@ -140,7 +140,7 @@ def card_clearance(rig: Rig, cards: CardBinding, begun: Begun) -> CardClearance:
 
 
 class CardMeasure:
-    """What is found of cards frame after frame, as `dynamics.figures.Measure` of strands."""
+    """Gathers figures of cards frame by frame, as `dynamics.figures.Measure` does of strands."""
 
     def __init__(self, rig: Rig, cards: CardBinding) -> None:
         self._rig, self._cards = rig, cards
@@ -155,7 +155,7 @@ class CardMeasure:
         """Take another frame into account.
 
         Args:
-            solids: what cards are led out of in it; None: nothing.
+            solids: what cards are led out of in this frame; None: nothing.
         """
         if not len(self._cards.guide):
             return
@@ -176,5 +176,5 @@ class CardMeasure:
 
     @property
     def figures(self) -> CardFigures:
-        """Of all frames so far."""
+        """The figures of all frames so far."""
         return CardFigures.of_frames(self._change, self._depth)

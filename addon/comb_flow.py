@@ -1,10 +1,9 @@
-"""The flow of hair under a brush: what a stroke has touched follows at once.
+"""The flow of hair under a comb: the rig follows each stroke of a brush at once.
 
-Curves that moved, and the children that they have a part in, are shaped again; each keeps its root,
-its guides and their weights, its clump, its random numbers and its point count. So nothing else
-changes, and what was found for the whole groom, such as ambient occlusion, stays. What it leaves
-to `rig_flow.prepare`, which is to follow: points by need, children that are led out of the head or
-change guides, widths.
+Curves that moved, and children that are mixed from them, are shaped again. Each keeps its root,
+guides and weights, clump, random numbers and point count. So nothing else changes, and results for
+the whole groom, such as ambient occlusion, stay in use. Left to `rig_flow.prepare`, which has to
+follow: point counts by need, children led out of the head, guides of children, and widths.
 """
 
 from __future__ import annotations
@@ -22,11 +21,11 @@ from .strands.resample import resample
 
 
 def combed(rig: Rig, curves: StrandSet, number: Ints, *, is_animated: bool = False) -> Rig:
-    """The rig with some of the artist's curves elsewhere.
+    """The rig after some of the artist's curves have moved.
 
     Args:
-        curves: (n,) world space at rest, as they are now.
-        number: (n,) ascending, which of the rig's own strands these are.
+        curves: the n curves that moved, world space at rest, as they are now.
+        number: (n,) ascending, their indices among the rig's own strands.
         is_animated: whether strands have kept their own points, see `rig_flow.prepare`.
     """
     strands, cv_count = rig.strands, rig.guide_grid.shape[1]
@@ -48,10 +47,10 @@ def combed(rig: Rig, curves: StrandSet, number: Ints, *, is_animated: bool = Fal
 
 
 def _grown(grown: Grown, strands: StrandSet, points: Floats, number: Ints) -> tuple[Grown, Ints]:
-    """The children's parents as they are now, and which of the rig's children they shape again.
+    """Children with their parents as these are now, and which of the rig's children to shape again.
 
     Args:
-        strands: of the rig. points: theirs now; those of strands of these numbers have moved.
+        strands: of the rig. points: of these strands now. number: the strands that have moved.
     """
     is_moved = np.isin(grown.parents, number)
     parents = np.flatnonzero(is_moved)
@@ -66,7 +65,7 @@ def _grown(grown: Grown, strands: StrandSet, points: Floats, number: Ints) -> tu
 
 
 def _taken(strands: StrandSet, points: Floats, chosen: Ints) -> StrandSet:
-    """Some of the strands, with these points of all, without making a set of all."""
+    """Some of the strands with new points; `points` are those of all strands."""
     counts = strands.point_counts[chosen]
     offsets = np.concatenate([[0], np.cumsum(counts)])
     picked = np.arange(offsets[-1]) + np.repeat(strands.offsets[chosen] - offsets[:-1], counts)
@@ -74,11 +73,11 @@ def _taken(strands: StrandSet, points: Floats, chosen: Ints) -> StrandSet:
 
 
 def put_children(points: Floats, offsets: Ints, grown: Grown, chosen: Ints, own: int) -> None:
-    """Write some of a rig's children (n,) as they have grown, by as many points as they had.
+    """Write the shapes of some of a rig's children into `points`, with their old point counts.
 
     Args:
-        chosen: numbers among the children whose growth ascends.
-        own: how many strands come before them.
+        chosen: (n,) indices among the rig's children, in the order of `grown.kept`.
+        own: the number of strands before the children.
     """
     children = _strands(grown.growth.shapes(grown.shapes.grid, grown.kept[chosen]))
     counts = (offsets[1:] - offsets[:-1])[own + chosen]
@@ -87,13 +86,13 @@ def put_children(points: Floats, offsets: Ints, grown: Grown, chosen: Ints, own:
 
 
 def _strands(grid: Floats) -> StrandSet:
-    """Of the points alone, (n, count, 3)."""
+    """Strands of these points, (n, count, 3), with dummy radii and groups."""
     count, points = grid.shape[1], grid.reshape(-1, 3)
     offsets = np.arange(len(grid) + 1) * count
     return StrandSet(points, offsets, np.ones(len(points)), np.zeros(len(grid), np.int32))
 
 
 def _put(points: Floats, offsets: Ints, number: Ints, strands: StrandSet) -> None:
-    """Write strands in place of those of these numbers, which have as many points."""
+    """Overwrite the strands of these numbers, which have the same point counts, in `points`."""
     first = np.repeat(offsets[number] - strands.offsets[:-1], strands.point_counts)
     points[first + np.arange(len(strands.points))] = strands.points

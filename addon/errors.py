@@ -1,14 +1,14 @@
 """The one kind of error that reaches an artist as a message instead of a traceback.
 
-Lives beside the rooms, on the ground floor, because every room raises it and only `blender`
-and `ui` turn it into an operator report or a line on stderr with a non-zero exit.
+It is in none of the rooms because every room raises it; only `blender` and `ui` turn it into an
+operator report, or a line on stderr with a non-zero exit code.
 """
 
 from __future__ import annotations
 
 
 class HairloomError(Exception):
-    """Bad input: says what is wrong, where it was found, and what to do about it.
+    """Bad input: what is wrong, where it was found, and what to do about it.
 
     Args:
         problem: what is wrong, one sentence without a full stop.

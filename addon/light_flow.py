@@ -1,9 +1,9 @@
 """The flow of light to hair at rest: first the hair, then its light.
 
-Points have their light from fields, grids over the hair. To find those takes time, so that a window
-shows hair before, in quick light. Strands that were there before keep what they had, as they do
-under a brush; others take what the fields of the hair before have at their place. The first hair
-has coarse fields, of few of its strands. They are looked up at few points of each strand.
+Points look up their light in fields, which are grids over the hair. Computing fields takes time, so
+a window first shows hair in quick light: strands that were there before keep their light, as under
+a brush, and others look theirs up in the fields of the earlier hair. The first hair gets coarse
+fields, computed from few of its strands. Quick light is looked up at few points of each strand.
 """
 
 from __future__ import annotations
@@ -34,23 +34,24 @@ from .strands.frames import strand_tangents, tangents_at, volume_normal_rows
 from .strands.kept import same_rows
 from .strands.vectors import cross_rows, dot_rows
 
-#: Points whose directions are found at once: they stay in the cache.
+#: Points whose directions are computed at once, so that they stay in the cache.
 AT_ONCE = 1 << 14
 #: Three directions at each point, three times (point_count, 3), see `strand_axes`.
 type Axes = tuple[Floats, Floats, Floats]
-#: Strands, about, that stand in the way of light off far skin for all.
+#: Number of strands that represent all where light off far skin is blocked.
 SHADING_STRANDS = 6000
-#: Of coarse fields: cells along the longest side, cells in all, those of the skin's, and strands.
+#: Coarse fields: cells along the longest side, cells in all, cells along the longest side of the
+#: skin's field, and strands.
 _COARSE_CELLS, _COARSE_MOST, _COARSE_SKIN, _COARSE_STRANDS = 24, 8_000, 20, 2000
-#: Settings on which how open the sky is to hair does not depend.
+#: Settings that `ambient.sky_field` does not depend on.
 _NOT_OF_SKY = ("strength", "ao_bias", "scalp_extinction")
-#: Quick light is looked up at one of this many points of a strand, and at its last one.
+#: Quick light is looked up at every fourth point of a strand, and at its last one.
 _STRIDE = 4
 
 
 @dataclass(frozen=True, eq=False)
 class LightFields:
-    """Of hair at rest: see `ambient.sky_field`, `ambient.openness_field` and
+    """The fields of hair at rest: see `ambient.sky_field`, `ambient.openness_field` and
     `skin_seen.skin_field`; the last is None without a head."""
 
     sky: Field
@@ -60,14 +61,14 @@ class LightFields:
 
 @dataclass(frozen=True, eq=False)
 class HairLight:
-    """What light comes to each point at rest.
+    """The light at each point of hair at rest.
 
     occlusion: (point_count,), 1 where nothing shades.
-    openness: (point_count, 4), see `ambient.openness_field`: the mean, and a vector by the strand's
-        axes. It turns with the strand, so it holds while hair moves as far as occlusion does.
+    openness: (point_count, 4), see `ambient.openness_field`: the mean, and a vector in the strand's
+        axes. The vector turns with the strand, so in motion it is as good as occlusion.
     skin_seen: (point_count, 8), see `skin_seen_by`; None without a head.
-    fields: from which it is taken; None without strands.
-    is_quick: whether these are not the hair's own.
+    fields: the ones that light was looked up in; None without strands.
+    is_quick: whether these fields are coarse, or those of earlier hair.
     """
 
     occlusion: Floats
@@ -83,7 +84,7 @@ def rest_light(
     """The light of a rig.
 
     Args:
-        report: is called from time to time; may end it by an exception.
+        report: called from time to time; may raise an exception to cancel.
     """
     strands = rig.strands
     if not strands.strand_count:
@@ -119,12 +120,13 @@ def _sky_fields(
 def relit(
     rig: Rig, light: HairLight, before: AmbientSettings, settings: AmbientSettings
 ) -> HairLight | None:
-    """The light of a rig by other settings, to the same bits as `rest_light`: only what they decide
-    about is found again, and that is nothing of the light off the skin and by direction. None where
-    there is more to find.
+    """The light of a rig after a change of settings, bit for bit as `rest_light`.
+
+    Only occlusion is computed again, since openness and light off the skin depend on none of these
+    settings but the cell count. None where that has changed, or where the light is quick.
 
     Args:
-        light: its own, by the settings before.
+        light: of this rig, by the settings before.
     """
     fields = light.fields
     if light.is_quick or fields is None or before.cell_count != settings.cell_count:
@@ -141,10 +143,10 @@ def relit(
 def quick_light(
     rig: Rig, settings: AmbientSettings, known: tuple[Rig, HairLight] | None
 ) -> HairLight:
-    """About the light of a rig, in a fraction of the time.
+    """An approximation of `rest_light` in a fraction of the time.
 
     Args:
-        known: hair that was much like it, and its light; None: there is none.
+        known: earlier hair much like this, and its light; None: there is none.
     """
     strands = rig.strands
     if not strands.strand_count:
@@ -189,8 +191,8 @@ def _put(light: HairLight, strands: StrandSet, chosen: Ints, own: HairLight) -> 
 def _looked_up(
     rig: Rig, settings: AmbientSettings, fields: LightFields, strands: StrandSet
 ) -> HairLight:
-    """Quick light of some of a rig's strands: their own light at few points, and straight between
-    these."""
+    """Quick light of some of a rig's strands: looked up at few points, and interpolated linearly
+    between these."""
     chosen, before, part = _few_points(strands)
     few, axes = strands.points[chosen], _few_axes(strands, chosen, rig.strands)
 
@@ -220,7 +222,7 @@ def _light(
     skin_seen: Floats | None,
 ) -> HairLight:
     """Args:
-    look: gives the values of a field at all points, (k, point_count).
+    look: returns the values of a field at all points, (k, point_count).
     """
     occlusion = occlusion_by(look(fields.sky)[0], ambient_of(rig, settings))
     openness = np.ascontiguousarray(look(fields.openness).T)
@@ -241,8 +243,8 @@ def _coarse_fields(rig: Rig, settings: AmbientSettings) -> LightFields:
 
 
 def _few_points(strands: StrandSet) -> tuple[Ints, Ints, Floats]:
-    """Which points are looked at, (k,); and, of each point, which of these it is or comes after,
-    and how far it is from there to the next, from 0 to 1."""
+    """The points to look up, (k,); for each point of the strands the index of the last of these at
+    or before it, and how far it is from there to the next, 0 to 1."""
     offsets, number = strands.offsets, np.arange(strands.point_count)
     is_chosen = (number - np.repeat(offsets[:-1], strands.point_counts)) % _STRIDE == 0
     is_chosen[offsets[1:] - 1] = True
@@ -252,7 +254,7 @@ def _few_points(strands: StrandSet) -> tuple[Ints, Ints, Floats]:
 
 
 def _between(values: Floats, before: Ints, part: Floats) -> Floats:
-    """Of values at few points (few, k), those at all, (n, k)."""
+    """Values at all points, (n, k), interpolated from those at few points, (few, k)."""
     found = np.empty((len(before), values.shape[1]), np.float32)
     last = len(values) - 1
     for first in range(0, len(before), AT_ONCE):
@@ -266,7 +268,7 @@ def _between(values: Floats, before: Ints, part: Floats) -> Floats:
 
 
 def _few_axes(strands: StrandSet, chosen: Ints, among: StrandSet) -> Axes:
-    """`strand_axes` at some of the points alone, (k,)."""
+    """`strand_axes` at the chosen points, (k,); `among` is all hair, which has the volume."""
     tangent = tangents_at(strands.points, strands.offsets, chosen)
     away = np.ascontiguousarray(strands.points[chosen].T) - _middle(among)
     normal = volume_normal_rows(away, tangent)
@@ -274,7 +276,8 @@ def _few_axes(strands: StrandSet, chosen: Ints, among: StrandSet) -> Axes:
 
 
 def strand_axes(strands: StrandSet) -> Axes:
-    """Along the strand, along its normal of the hair's volume, and across both, at each point."""
+    """Three directions at each point: the strand's tangent, its normal in the volume of the hair,
+    and across both."""
     axes = np.empty((3, 3, strands.point_count), np.float32)
     count, center = max(strands.strand_count, 1), _middle(strands)
     step = max(AT_ONCE * count // max(strands.point_count, 1), 1)
@@ -291,21 +294,23 @@ def strand_axes(strands: StrandSet) -> Axes:
 
 
 def _middle(strands: StrandSet) -> Floats:
-    """Of the roots, (3, 1) float32 [m]."""
+    """The mean of the roots, (3, 1) float32 [m]."""
     total = strands.roots.sum(axis=0, dtype=np.float64)[:, None]
     middle: Floats = (total / max(strands.strand_count, 1)).astype(np.float32)
     return middle
 
 
 def directional_light(fields: LightFields, points: Floats) -> Floats:
-    """What comes to points (n, 3) by direction, and off the skin, world space, (n, k): the means of
-    these over places are those of their light, see `light_by_axes`."""
+    """Openness and skin seen at points (n, 3), as rows (n, k) in world axes.
+
+    Rows may be averaged over points before `light_by_axes` turns them into light.
+    """
     found = [field.at(points) for field in (fields.openness, fields.skin) if field is not None]
     return np.ascontiguousarray(np.concatenate(found).T)
 
 
 def light_by_axes(axes: Axes, light: Floats) -> tuple[Floats, Floats | None]:
-    """The openness (n, 4) and the skin seen (n, 8), as of `HairLight`, of `directional_light`."""
+    """The openness (n, 4) and skin seen (n, 8) of `HairLight`, from rows of `directional_light`."""
     openness, skin = np.ascontiguousarray(light[:, :4]), np.ascontiguousarray(light[:, 4:].T)
     openness[:, 1:] = by_axes(openness[:, 1:], axes)
     return openness, skin_seen_by(axes, skin) if len(skin) else None
@@ -314,10 +319,10 @@ def light_by_axes(axes: Axes, light: Floats) -> tuple[Floats, Floats | None]:
 def rest_skin_field(
     rig: Rig, cell_count: int | None = None, most: int = SHADING_STRANDS
 ) -> Field | None:
-    """What is seen of the head, see `skin_seen.skin_field`; None without a head."""
+    """The field of the skin seen, see `skin_seen.skin_field`; None without a head."""
     if rig.head is None or not rig.strands.strand_count:
         return None
-    # coarse cells do not tell each strand from the next
+    # a part of the strands is enough: cells are coarser than the gaps between strands
     some, step = few_strands(rig.strands, most)
     radius = drawn_radius(some.radius, StrandSettings(), even(some.offsets))
     some = replace(some, radius=radius.astype(np.float32))
@@ -325,14 +330,14 @@ def rest_skin_field(
 
 
 def few_strands(strands: StrandSet, most: int) -> tuple[StrandSet, int]:
-    """Strands, about `most` of them, and for how many each of these stands."""
+    """At most `most` of the strands, and how many strands each of these represents."""
     step = -(-strands.strand_count // most)
     return strands.take(np.arange(0, strands.strand_count, step)), step
 
 
 def skin_seen_by(axes: Axes, found: Floats) -> Floats:
-    """The received, beneath and depth of `skin_seen.SkinSeen`, (n, 8), vectors by the axes at each
-    point.
+    """`received`, `beneath` and `depth` of `skin_seen.SkinSeen`, (n, 8), with vectors in the axes
+    at each point.
 
     Args:
         found: values of `rest_skin_field` at points, (k, n).
@@ -344,7 +349,7 @@ def skin_seen_by(axes: Axes, found: Floats) -> Floats:
 
 
 def by_axes(vectors: Floats, axes: Axes) -> Floats:
-    """Vectors (n, 3) along each of the axes, (n, 3) float32."""
+    """The components of vectors (n, 3) along the axes, (n, 3) float32."""
     found = np.empty((len(vectors), 3), np.float32)
     for first in range(0, len(vectors), AT_ONCE):
         some = slice(first, first + AT_ONCE)
@@ -362,6 +367,6 @@ def head_occlusion(rig: Rig, settings: AmbientSettings) -> Floats | None:
 
 
 def ambient_of(rig: Rig, settings: AmbientSettings) -> AmbientSettings:
-    """As strong as the hairs that strands stand for are."""
+    """The settings with extinction scaled to the hairs that strands represent."""
     factor = rig.widths.extinction
     return settings.multiplied(extinction=factor, scalp_extinction=factor)

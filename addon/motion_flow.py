@@ -1,4 +1,4 @@
-"""The flow of a groom in motion: what roots carry, a frame of dynamics, all strands after it."""
+"""The flow of a groom in motion: rest shapes carried by roots, a frame of dynamics, all strands."""
 
 from __future__ import annotations
 
@@ -39,20 +39,20 @@ from .refine.ride import ride
 from .rig_flow import Pose, Rig
 from .strands.root_motions import RootMotions
 
-#: Guides, about, that tell whether their head has jumped.
+#: About this many guides are sampled where the motion of the whole head matters.
 JUMP_GUIDES = 64
 
 
 @dataclass(frozen=True)
 class FrameInput:
-    """What a groom meets in one frame.
+    """The input of one frame of motion.
 
     pose: at the frame's end.
-    colliders: with their way during the frame.
+    colliders: with their trajectories during the frame.
     gravity: (3,) [m/s^2], world space.
     duration: since the motion's pose [s].
     force_fields: of the scene.
-    painted: by what settings are multiplied at each guide; None: nothing is painted.
+    painted: factors of the settings at each guide; None: nothing is painted.
     time_scale: speed of the hair's time; 0: it is frozen.
     """
 
@@ -73,17 +73,17 @@ class FrameInput:
 
 @dataclass(frozen=True)
 class Motion:
-    """What one frame hands to the next.
+    """The state that one frame passes on to the next.
 
     guides: (guide_count, cv_count, 3) [m], simulated, with their roots in this pose.
     carried_guides: the same without dynamics: their rest shape carried by the roots.
-    carried_earlier: the same one frame earlier; None at the start.
-    duration: of the last frame [s]; 0 at the start. hair_time: the hair's own, in which it moved.
-    colliders: as they stand at its end.
-    clearance: how far strands stay from these; None before there are any.
-    guide_clearance: the same of guides.
-    leans: how strands were bent that were led out in the frame before.
-    begun: the pose in which it began, in which the dynamics knows the style.
+    carried_earlier: `carried_guides` one frame earlier; None at the start.
+    duration: of the last frame [s]; 0 at the start. hair_time: the same in the hair's own time.
+    colliders: as they stand at the last frame's end.
+    clearance: how far strands stay from colliders; None before there are any.
+    guide_clearance: the same for guides.
+    leans: how leading out bent strands in the frame before.
+    begun: the pose in which the motion began; the dynamics stores the style in that pose.
     """
 
     dynamics: DynamicsState
@@ -123,7 +123,7 @@ def carried(rig: Rig, pose: Pose) -> Floats:
 
 
 def carried_guides(rig: Rig, pose: Pose, precision: type = np.float32) -> Floats:
-    """The same of the guides, (guide_count, cv_count, 3)."""
+    """`carried` for the guides, (guide_count, cv_count, 3)."""
     return _carried_guides(rig, motions_of(rig, pose, rig.guides), precision)
 
 
@@ -163,7 +163,7 @@ def held_guides(rig: Rig, pose: Pose) -> Holds | None:
 
 
 def held_cvs(rig: Rig, pose: Pose) -> Held | None:
-    """The same by CVs, as the dynamics takes it, with brows and lashes, which go with the face."""
+    """The held CVs, for the dynamics, with all CVs of brows and lashes, which follow the face."""
     holds = held_guides(rig, pose)
     if holds is None:
         return rig.held_face
@@ -179,21 +179,20 @@ def begin(rig: Rig, pose: Pose) -> Motion:
 
 
 def with_style(rig: Rig, motion: Motion) -> Motion:
-    """A running motion whose guides return to the shapes and the lengths that this rig has.
+    """A running motion whose guides now return to the shapes and lengths of this rig.
 
     Args:
-        rig: the same groom as before with curves of other shapes, see `style_flow`.
+        rig: of the same groom with its curves in other shapes, see `style_flow`.
     """
     state, begun = motion.dynamics, motion.begun or motion.pose
     style = start(style_of_guides(rig, begun), rig.curl_room, rig.strands_of_guides)
-    # distances in the settings stay what they are
+    # so that distances, which settings give in fractions of it, stay as they are
     rest = replace(style.rest, size=state.rest.size)
     return replace(motion, dynamics=replace(state, rest=rest))
 
 
 def advance(rig: Rig, motion: Motion, frame: FrameInput, led: LedOut = NOT_LED) -> Motion:
-    """One frame of motion: the roots go with the head, the dynamics moves the rest; without other
-    grooms.
+    """One frame of motion without other grooms: roots follow the head, the dynamics moves the rest.
 
     Args:
         led: see `steps`.
@@ -202,11 +201,11 @@ def advance(rig: Rig, motion: Motion, frame: FrameInput, led: LedOut = NOT_LED) 
 
 
 def steps(rig: Rig, motion: Motion, frame: FrameInput, led: LedOut = NOT_LED) -> Steps[Motion]:
-    """The same with other grooms, see `dynamics.neighbours`.
+    """`advance` with other grooms, see `dynamics.neighbours`.
 
     Args:
-        led: the strands that were led out at this moment of the motion: from how they were bent
-            the next frame's are led.
+        led: the strands of `motion` that were led out of colliders; the next frame's leading out
+            starts from how these were bent.
     """
     settings, hair_time = frame.settings, frame.hair_time
     target = style_of_guides(rig, frame.pose)
@@ -233,10 +232,10 @@ def steps(rig: Rig, motion: Motion, frame: FrameInput, led: LedOut = NOT_LED) ->
 def has_jumped(
     rig: Rig, motion: Motion, pose: Pose, settings: DynamicsSettings, duration: float
 ) -> bool:
-    """Whether the head is elsewhere all of a sudden, as at a cut: since the motion's pose
-    it has gone much farther than in the frame before, or has turned far.
+    """Whether the head has jumped, as at a cut: since the motion's pose it has moved much farther
+    than in the frame before, or has turned far.
 
-    In the frame after a jump nobody can tell, as the speed is not known.
+    False in the frame after a jump, since the speed before is not known.
     """
     is_first = not motion.duration
     if (motion.carried_earlier is None and not is_first) or not len(rig.guides):
@@ -261,10 +260,10 @@ def has_jumped(
 
 
 def go_along(rig: Rig, motion: Motion, frame: FrameInput) -> Motion:
-    """A frame in which hair goes along with its roots as it is, each guide rigidly.
+    """A frame without dynamics: each guide moves rigidly with its root.
 
-    After a jump hair has no speed. Frozen hair goes on with the speed that it had. What is not
-    to be seen of the simulation goes with the style.
+    After a jump hair has no velocity; frozen hair keeps the one that it had. Where guides show less
+    than all of their simulation, the rest of them follows the style.
     """
     pose, is_frozen = frame.pose, not frame.time_scale
     target, state = style_of_guides(rig, pose), motion.dynamics
@@ -314,8 +313,7 @@ def style_seen(rig: Rig, pose: Pose, source: Rig) -> Style:
 
 
 def reach(rig: Rig, pose: Pose) -> tuple[Floats, float]:
-    """A ball in which all guides are in this pose, however they swing: its middle (3,) and its
-    radius [m]."""
+    """A sphere around all guides in this pose, however they swing: middle (3,) and radius [m]."""
     if not len(rig.guides):
         return np.zeros(3), 0.0
     chosen = np.arange(0, len(rig.guides), max(len(rig.guides) // JUMP_GUIDES, 1))
@@ -336,11 +334,12 @@ def with_clearance(
     settings: DynamicsSettings,
     painted: PaintedGuides | None = None,
 ) -> Motion:
-    """The motion that knows how far hair stays from colliders, from the first frame with any on.
+    """The motion with clearances from colliders, which are computed in the first frame with any.
 
-    Guides stay as far as their radius says, strands as far as guides do at their roots, but
-    neither farther than they were at that frame's begin, in their style and as their roots
-    carried them. Strands of which nothing is simulated go where their style goes.
+    Guides stay as far away as their radius says, and strands as far as guides do at their roots,
+    but neither farther than they were at that frame's begin: guides in their style, strands where
+    their roots carried them. Where nothing is simulated, strands get no clearance and follow their
+    style.
     """
     simulated, size = simulated_of(painted, settings, len(rig.guides)), motion.dynamics.rest.size
     kept, reach = settings.radius_root * size, farthest_kept(settings, size)
@@ -358,12 +357,12 @@ def with_clearance(
 def strand_clearance(
     rig: Rig, pose: Pose, colliders: tuple[PosedCollider, ...], kept: float
 ) -> Clearance:
-    """How far strands stay from colliders that stand still, by where their roots carry them now.
+    """How far strands stay from still colliders, measured where their roots carry them now.
 
     Args:
-        kept: [m], at most.
+        kept: the largest such distance [m].
     """
-    # of an unmoved rig what `carried` would give, bit for bit
+    # an unmoved rig's points are what `carried` would return, bit for bit
     points = rig.strands.points if _is_unmoved(rig, pose) else carried(rig, pose)
     return clearance_at(points, rig.strands.offsets, colliders, kept)
 
@@ -398,7 +397,7 @@ def strands_at(rig: Rig, pose: Pose, guides_now: Floats, led: LedOut = NOT_LED) 
 def _ridden(rig: Rig, pose: Pose, guides_now: Floats) -> tuple[Floats, RootMotions]:
     """All strands riding on guides, and how their roots have moved."""
     motions = motions_of(rig, pose)
-    # as precise as the guides are, so that those which their roots carry turn by exactly nothing
+    # in the guides' own precision, so that guides that only their roots move turn by exactly 0
     by_roots = _carried_guides(rig, motions.of(rig.guides), guides_now.dtype.type)
     return ride(rig.strands.points, rig.riders, by_roots, guides_now, motions), motions
 

@@ -1,12 +1,12 @@
-"""The flow of hair under a brush on its density and its masks: children come and go at once. And
-of the colours that are painted.
+"""The flow of painted hair: children come and go at once under a brush that paints their density or
+masks, and strands take painted colours.
 
-Children that the new density does not want make room for those that it wants now: these get their
-points, as many as they were, and shapes as all children grow, in the clumps of their neighbours.
-So nothing else changes, and what was found for the whole groom stays, as in `comb_flow`. What it
-leaves to `rig_flow.prepare`, which is to follow: how many children there are, occlusion where they
-have come, from where children scatter, guides in motion, and all that `comb_flow` leaves to it.
-Children that a mask shapes in another way are shaped again, as combed ones are.
+Children that the new density removes make room for those that it adds. The new ones take over the
+point counts of the old and get the shapes of all children, in the clumps of their neighbours. So
+nothing else changes, and results for the whole groom stay in use, as in `comb_flow`. Left to
+`rig_flow.prepare`, which has to follow: the number of children, occlusion where new ones are, where
+children scatter from, guides in motion, and all that `comb_flow` leaves to it. Children whose masks
+have changed are shaped again, as combed ones are.
 """
 
 from __future__ import annotations
@@ -31,12 +31,12 @@ from .strands import StrandSet, Surface
 from .strands.arc_length import along
 from .strands.kept import same_rows
 
-#: Less opaque paint counts as if it were so opaque where its colour is found.
+#: The lowest opacity that premultiplied paint is divided by.
 _FAINTEST = 1.0e-6
 
 
 def painted(rig: Rig, density: Floats | None, masks: Masks = NO_MASKS) -> Rig:
-    """The rig with its children where they grow by another density, and as other masks shape them.
+    """The rig with children by a new density and in the shapes of new masks.
 
     Args:
         rig: with children that have grown.
@@ -58,7 +58,7 @@ def painted(rig: Rig, density: Floats | None, masks: Masks = NO_MASKS) -> Rig:
     come = np.flatnonzero(is_wanted)
     if not len(gone):
         return rig
-    # fewer that come are drawn more than once until it is known how many there are
+    # if fewer come than go, some are drawn twice until `prepare` has found how many there are
     come = np.sort(np.resize(come if len(come) else number, len(gone)))
     kept = grown.kept.copy()
     kept[gone] = come
@@ -67,7 +67,7 @@ def painted(rig: Rig, density: Floats | None, masks: Masks = NO_MASKS) -> Rig:
 
 
 def colored(rig: Rig, painted: PaintedColor | None, look: ShadingSettings) -> Rig:
-    """The rig in the colours that are painted, see `with_colors`."""
+    """The rig with painted colours, see `with_colors`."""
     strands = with_colors(rig.strands, painted, look)
     return rig if strands is rig.strands else replace(rig, strands=strands)
 
@@ -75,12 +75,11 @@ def colored(rig: Rig, painted: PaintedColor | None, look: ShadingSettings) -> Ri
 def with_colors(
     strands: StrandSet, painted: PaintedColor | None, look: ShadingSettings
 ) -> StrandSet:
-    """Strands in the colours that are painted at their roots, all along; where these are
-    transparent in their own, or in the look's.
+    """Strands in the colour that is painted at their root, over their own colour or the look's.
 
     Args:
-        strands: bound to the surface, but for hair without one.
-        painted: None: nothing that can be used.
+        strands: bound to the surface, unless the hair has none.
+        painted: None: no usable paint.
     """
     own = strands.color if look.color_source == "own" else None
     if own is not None:
@@ -109,13 +108,13 @@ def with_colors(
 
 
 def _coated(painted: Floats, look: ShadingSettings) -> Floats:
-    """Of premultiplied colours (n, 4), the colours in the look's water and dust."""
+    """Premultiplied colours (n, 4) as the look's water and dust change them, (n, 3)."""
     opacity = painted[:, 3:]
     return opacity * coated_color(painted[:, :3] / np.maximum(opacity, _FAINTEST), look)
 
 
 def _grown(roots: ChildRoots, head: Surface, grown: Grown) -> tuple[Ints, Grown]:
-    """Which child of the growth each root belongs to, (n,), and the growth with all of them."""
+    """The index of each root's child in the growth, (n,), and the growth with these added to it."""
     growth = grown.growth
     number = same_rows(roots.point, growth.root)
     new = np.flatnonzero(number < 0)
@@ -127,8 +126,8 @@ def _grown(roots: ChildRoots, head: Surface, grown: Grown) -> tuple[Ints, Grown]
 
 
 def painted_guides(rig: Rig, masks: Masks) -> PaintedGuides | None:
-    """By what settings are multiplied at each guide; None where the masks are of other strands or
-    another head, which are on their way.
+    """The factors of settings at each guide; None where the masks belong to other strands or
+    another head, whose rig is still being built.
 
     Args:
         masks: of the settings of the motion.
@@ -142,8 +141,8 @@ def painted_guides(rig: Rig, masks: Masks) -> PaintedGuides | None:
 
 
 def painted_strands(rig: Rig, mask: StrandMask) -> Floats:
-    """What is painted on the artist's own strands at all strands of a rig, of children as they mix
-    it: (strand_count,), or (point_count,) where it is not alike along each."""
+    """A mask of the artist's own strands at all strands of a rig, where children mix the values of
+    their guides: (strand_count,), or (point_count,) if it varies along strands."""
     strands, count = rig.strands, mask.grid.shape[1]
     own = strands.strand_count if rig.own_count is None else rig.own_count
     values = mask.along(Places.of_strands(strands, np.arange(own)), count)
@@ -192,12 +191,12 @@ def _masked(rig: Rig, masks: Masks) -> Rig:
 def _moved(
     rig: Rig, roots: ChildRoots, grown: Grown, strand: Ints, number: Ints, come: Ints
 ) -> Rig:
-    """The rig with some of its strands as children that have grown.
+    """The rig with some of its strands replaced by other children of the growth.
 
     Args:
-        roots: of which each is that of the child `number` (n,) of the growth.
-        strand: which of the rig's strands are others now, (m,).
-        come: which children of the growth they are, (m,) ascending.
+        roots: of the children `number`, (n,), of the growth.
+        strand: (m,) the rig's strands that are replaced.
+        come: (m,) ascending, the children of the growth that replace them.
     """
     strands, own, head = rig.strands, rig.own_count, rig.head
     assert own is not None and head is not None and rig.rest_frames is not None
@@ -226,7 +225,7 @@ def _moved(
 
 
 def _with[Rows: np.ndarray](rows: Rows | None, chosen: Ints, others: Rows) -> Rows:
-    """Rows (n, ...) with some of them others."""
+    """A copy of rows (n, ...) with the chosen ones replaced."""
     assert rows is not None
     found: Any = rows.copy()
     found[chosen] = others

@@ -1,7 +1,7 @@
 """Every parameter set of Hairloom in one table: for properties, presets, command line and docs.
 
-A set is found by where it is declared: in a module of a pure room that is named settings or
-something_settings. To declare it there is all that a new section takes.
+A set is found by where it is declared: in a module of a pure room named `settings` or
+`*_settings`. A new section needs no other registration.
 """
 
 from __future__ import annotations

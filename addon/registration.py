@@ -1,6 +1,6 @@
-"""What Blender learns of Hairloom when it is enabled, and forgets when it is disabled.
+"""Registers all of Hairloom with Blender when it is enabled, and unregisters it when disabled.
 
-Nothing here touches the GPU: that begins with the first draw.
+Nothing here touches the GPU; the first draw is the first to do so.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ from .ui import (
     translations,
 )
 
-#: the package that Blender knows, above this one; it is called otherwise in every repository
+#: the extension's package, above this one; its name depends on the repository it is installed from
 ROOT_PACKAGE = __package__.rpartition(".")[0]
 COMMAND = "hairloom"
 
@@ -111,7 +111,7 @@ _command: Any = None
 
 
 def register() -> None:
-    """Take all steps, or none: what was done is undone when one fails, and the error raised."""
+    """Run all steps or none: if one fails, those before it are undone and its error is raised."""
     done: list[Step] = []
     try:
         for step in _steps():
@@ -124,10 +124,11 @@ def register() -> None:
 
 
 def unregister() -> None:
-    """The exact mirror image, after the previews have ended.
+    """End all that runs, then undo the steps in reverse order.
 
     Raises:
-        ExceptionGroup: of what failed; all the rest is done, so that it can be registered again.
+        ExceptionGroup: the errors of steps that failed; all others are undone nevertheless, so that
+            Hairloom can be registered again.
     """
     errors = []
     for undo in (end_all, *(undo for _, undo in reversed(_steps()))):
@@ -140,14 +141,14 @@ def unregister() -> None:
 
 
 def end_all() -> None:
-    """End what goes on: previews, long work, and all that is deferred."""
+    """End previews and long work, and drop all that is deferred."""
     operators_preview.stop_ticking()
     long_work.stop()
     scene_events.clear()
 
 
 def _steps() -> tuple[Step, ...]:
-    """What is done and how it is undone, in order."""
+    """Each step of registration with its undo, in order."""
     return (
         *(_class_step(each) for each in CLASSES),
         (preferences.register, preferences.unregister),

@@ -1,5 +1,5 @@
-"""The flow of a groom that is made ready to move: roots, children, guides, weights, and what each
-strand needs to be drawn."""
+"""The flow from a groom to its rig: roots, children, guides, weights, and all that each strand
+needs to be drawn."""
 
 from __future__ import annotations
 
@@ -48,13 +48,13 @@ from .strands.needed_points import LOST, MAX_POINTS, with_needed_points, with_ow
 from .strands.resample import resample
 from .strands.vectors import unit_or
 
-#: Of children that cannot be led out of the head, the part from which on a note says so.
+#: A note is given if more than this fraction of children cannot be led out of the head.
 MANY_INSIDE = 0.01
 
 
 @dataclass(frozen=True, eq=False)
 class Begun:
-    """Where a motion began: from then on hair knows how far it stays from its colliders.
+    """The begin of a motion, from which clearances between hair and colliders are computed.
 
     pose: of the body. colliders: as they stood. kept: how far hair stays from them at most [m].
     """
@@ -64,7 +64,7 @@ class Begun:
     kept: float
 
     def is_as(self, other: Begun) -> bool:
-        """Whether hair knows the same from then on."""
+        """Whether both give the same clearances."""
         return (
             self.kept == other.kept
             and self.pose.is_as(other.pose)
@@ -74,7 +74,7 @@ class Begun:
 
 
 class Solids(Protocol):
-    """What hair stays out of at one moment of a motion."""
+    """The colliders that hair stays out of at one moment of a motion."""
 
     @property
     def begun(self) -> Begun: ...
@@ -86,7 +86,7 @@ class Solids(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class SimulatedSolids:
-    """Those of a motion that is simulated; fulfils `Solids`."""
+    """The solids of a simulated motion; implements `Solids`."""
 
     begun: Begun
     colliders: tuple[PosedCollider, ...]
@@ -98,8 +98,8 @@ class Pose:
 
     head_positions: (vertex_count, 3) [m], world space, or None for hair without a head.
     matrix: (4, 4), moves rest world space to now; carries hair without a head, and colliders.
-    anchors: what holds hair beside its roots, see `groom.holds.anchors_of`; None: nothing does.
-    solids: what cards are led out of; None: nothing, or nobody knows.
+    anchors: of hair that is held, see `groom.holds.anchors_of`; None: none is.
+    solids: what cards are led out of; None: nothing, or not known.
     """
 
     head_positions: Floats | None
@@ -120,8 +120,9 @@ class Pose:
 class Grown:
     """How the children of a rig have grown, so that those of combed curves can be shaped again.
 
-    parents: which of the artist's own strands they grew between. shapes: these, of one point count.
-    kept: which of the children that grew the rig has.
+    parents: which of the artist's own strands they grew between. shapes: of these strands,
+        resampled to one point count.
+    kept: which of the grown children are in the rig.
     """
 
     growth: Growth
@@ -134,18 +135,19 @@ class Grown:
 class Rig:
     """A groom made ready to move: all strands, their guides and weights.
 
-    strands: as many points as each needs, world space at rest; bound when there is a head.
+    strands: each with the points it needs, world space at rest; bound when there is a head.
     guides: (guide_count,) indices of the strands that are simulated.
-    guide_grid: (guide_count, cv_count, 3) [m], their centre lines, evenly, which are simulated.
+    guide_grid: (guide_count, cv_count, 3) [m], evenly spaced CVs of the guides' centre lines, which
+        are simulated.
     rest_frames: of all strands, or None without a head.
     notes: what the artist should know, each with its remedy.
     own_count: how many strands, the first ones, are the artist's own; children follow in the order
         in which they are grown. None: all.
     widths: how wide the strands are, and why.
-    children_line: what automatic children there are, and why; empty where there are none.
+    children_line: for the artist, whether automatic children were added, and why; may be empty.
     holds: where strands are held by ties or by a surface; None: nowhere.
-    grown: how its children have grown; None without any, and where it comes from a bake.
-    baked_baby_hair: which strands are baby hair where it comes from a bake.
+    grown: how its children have grown; None without any, and in a rig that comes from a bake.
+    baked_baby_hair: the strands that are baby hair, in a rig that comes from a bake.
     """
 
     strands: StrandSet
@@ -164,7 +166,7 @@ class Rig:
 
     @property
     def baby_hair(self) -> Ints:
-        """Which strands are short and fine hair of the hairline and of partings."""
+        """The strands that are short, fine hair of the hairline and of partings."""
         if self.grown is None or self.own_count is None:
             return self.baked_baby_hair
         return self.own_count + np.flatnonzero(self.grown.growth.is_baby[self.grown.kept])
@@ -184,7 +186,7 @@ class Rig:
 
     @cached_property
     def guide_holds(self) -> Holds | None:
-        """The same of the guides alone, numbered as these, along their centre lines."""
+        """`holds` of the guides alone, by guide index, along their centre lines."""
         if self.holds is None:
             return None
         own, cv_count = self.holds.of(self.guides), self.guide_grid.shape[1]
@@ -192,7 +194,8 @@ class Rig:
 
     @cached_property
     def held_face(self) -> Held | None:
-        """All of the brows and lashes among other hair: so short, they are too stiff to swing."""
+        """All CVs of brows and lashes, which are too short to swing; None if there is no other hair
+        or none of these."""
         is_face = is_face_hair(self.strands.group)
         chosen = is_face[self.guides] & ~is_face.all()
         if not chosen.any():
@@ -201,12 +204,12 @@ class Rig:
 
     @cached_property
     def curl_room(self) -> Floats | None:
-        """How much the curls of guides have to give, see `center_lines.curl_room`."""
+        """How far curls of guides can be stretched, see `center_lines.curl_room`."""
         return curl_room(self.strands.take(self.guides).lengths(), self.guide_grid)
 
     @cached_property
     def strands_of_guides(self) -> Floats:
-        """How many strands each guide stands for, (guide_count,): their parts that ride on it."""
+        """How many strands each guide represents, (guide_count,): the sum of its weights."""
         guide, weight = self.weights.guide.ravel(), self.weights.weight.ravel()
         return np.bincount(guide, weight, len(self.guides))
 
@@ -217,7 +220,7 @@ class Rig:
 
     @cached_property
     def reach(self) -> tuple[Floats, float]:
-        """The middle (3,) of the guides' roots at rest, and how far any guide gets from it [m]."""
+        """The middle (3,) of the guides' roots at rest, and how far guides reach from it [m]."""
         middle = self.guide_grid[:, 0].mean(axis=0, dtype=np.float64)
         away = np.linalg.norm(self.guide_grid[:, 0] - middle, axis=1)
         lengths = np.linalg.norm(np.diff(self.guide_grid, axis=1), axis=2).sum(axis=1)
@@ -230,7 +233,7 @@ class Rig:
 
     @cached_property
     def root_holds(self) -> RootHolds | None:
-        """Which of the head's vertices hold roots; None without a head."""
+        """The vertices of the head that hold roots; None without a head."""
         return None if self.head is None else RootHolds.of(self.strands, self.head)
 
     @property
@@ -260,12 +263,12 @@ class Rig:
 
 @dataclass(frozen=True, eq=False)
 class ChildGround:
-    """What decides, beside their settings, where children grow; at rest.
+    """What decides, apart from their settings, where children grow; at rest.
 
     density: (vertex_count,) how densely they grow on the head; None: wherever guides are near.
-    masks: by what their settings are multiplied on the head.
+    masks: painted factors of their settings.
     partings: (n, 2, 3) [m] the straight pieces of lines on the head; None: no line.
-    head_field: is called if there are children: what they are led out of; None: of nothing.
+    head_field: called if there are children; the field that they are led out of, or None.
     """
 
     density: Floats | None = None
@@ -297,13 +300,13 @@ def prepare(
         strands: world space at rest.
         head: world space at rest, or None for hair that only follows its object.
         place: names the groom in error messages.
-        children: None is none.
+        children: None: there are none.
         ground: its partings part the artist's own strands, too.
         widths: one of `groom.widths.METHODS`.
         holders: ties and a surface of tips, at rest.
-        kept: of the groom that was made last, which may be the same but for what an artist combs
-            or paints; it changes nothing but the time.
-        is_animated: whether the strands will have other shapes, so that all keep their own points.
+        kept: intermediate results of the last rig, reused where strands have not changed, as when
+            an artist combs or paints; it changes no result, only the time.
+        is_animated: whether the strands will change shape, so that all keep their own points.
 
     Raises:
         HairloomError: no strands, or a groom of another scale than the head.
@@ -352,7 +355,7 @@ def prepare(
 
 
 def _loose(away: float) -> tuple[str, ...]:
-    """A note on roots that lie so far [m] from the surface; none where that is 0."""
+    """A note on roots that lie `away` [m] from the surface; none where that is 0."""
     if not away:
         return ()
     return (
@@ -363,7 +366,7 @@ def _loose(away: float) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class _Growing:
-    """What matters to children beside the artist's strands, see `prepare`."""
+    """What children depend on beside the artist's strands, see `prepare`."""
 
     ground: ChildGround
     partings: Partings | None
@@ -372,21 +375,21 @@ class _Growing:
 
 
 def _numbers(rig: Rig) -> Ints | None:
-    """Which strands a rig has of those that it would have if no child were left out; None: all."""
+    """The rig's strands, numbered as if no child were left out; None: none is."""
     if rig.grown is None or rig.own_count is None:
         return None
     return np.concatenate([np.arange(rig.own_count), rig.own_count + rig.grown.kept])
 
 
 def _fineness(rig: Rig) -> Floats | None:
-    """How wide each strand is in terms of the hair around it, (strand_count,); None: as that."""
+    """The width of each strand over that of the hair around it, (strand_count,); None: all 1."""
     if rig.grown is None or rig.own_count is None:
         return None
     return np.append(np.ones(rig.own_count), rig.grown.growth.fineness[rig.grown.kept])
 
 
 def _lost_length(strands: StrandSet, own: StrandSet) -> tuple[str, ...]:
-    """What is said where strands have not as many points as they need."""
+    """A note on strands that need more points than they may have."""
     kept = own.lengths() / np.maximum(strands.lengths(), np.float32(1.0e-30))
     lost = 1.0 - kept[kept < 1.0 - LOST]
     if not len(lost):
@@ -409,8 +412,9 @@ def _automatic(
     widths: str,
     place: str,
 ) -> Rig:
-    """With as many children as cover the body, each as wide as the strands around it: those stand
-    for so much less.
+    """The rig with as many children as it takes to cover the body.
+
+    Each is as wide as the strands around it, all of which then represent fewer hairs.
     """
     hair = rig.strands.take(_parents(rig.strands))
     settings, parts = automatic(hair, settings)
@@ -441,7 +445,7 @@ def _weights(
     guide_kind: Ints | None = None,
     partings: Partings | None = None,
 ) -> GuideWeights:
-    """Strands that are held follow guides that are held by the same."""
+    """Guide weights; held strands follow guides that are held by the same kind of holder."""
     group, guide_group = strands.group, guides.group
     if kind is not None and guide_kind is not None:
         both = grouped(np.append(group, guide_group), np.append(kind, guide_kind))
@@ -491,7 +495,7 @@ def _with_children(
         children = with_needed_points(made.strands, cv_count, kept=kept)
     strands = joined(own, children)
     if len(rig.guides) < own.strand_count:
-        # shaped by their neighbours among all strands, they move as guides do
+        # their shapes come from neighbours among all strands, their motion from guides alone
         lines = center_lines(own.take(rig.guides), cv_count)
         weights = _weights(_lines(made.strands, cv_count, kept), lines, partings=growing.partings)
     else:
@@ -513,7 +517,7 @@ def _with_children(
 
 
 def _lines(children: StrandSet, cv_count: int, kept: Kept) -> StrandSet:
-    """The centre lines of children, which are of one point count; their widths do not matter."""
+    """The centre lines of children, which have one point count; widths are dummies."""
 
     def of(some: Ints) -> tuple[Floats]:
         return (center_lines(children.take(some), cv_count).grid,)
@@ -530,8 +534,7 @@ def _lines(children: StrandSet, cv_count: int, kept: Kept) -> StrandSet:
 def _outside(
     made: Children, head: DistanceField | None, length: float, kept: Kept
 ) -> tuple[Children, Ints]:
-    """Children that are led out of the head, without those that nothing leads out, and which of
-    all these are.
+    """Children led out of the head, without those that cannot be, and their indices among all.
 
     Args:
         length: the hair's [m].
@@ -557,8 +560,9 @@ def _outside(
 
 
 def _parent_shapes(parents: StrandSet, child_count: int) -> tuple[StrandSet, tuple[str, ...]]:
-    """What children are mixed from, which takes equally many points: as many as the parent has
-    that has most, as long as all children have room for them.
+    """Parents resampled to one point count, from which children can be mixed, and notes.
+
+    The count is the largest of any parent, unless children of that many points exceed memory.
     """
     needed = int(parents.point_counts.max(initial=2))
     count = min(needed, max(CHILD_POINTS // max(child_count, 1), FEWEST_CHILD_POINTS))
@@ -574,7 +578,7 @@ def _parent_shapes(parents: StrandSet, child_count: int) -> tuple[StrandSet, tup
 
 
 def _parents(own: StrandSet) -> Ints:
-    """Which strands children grow between: of a head of hair, not its brows and lashes."""
+    """The strands that children grow between: all but brows and lashes, unless these are all."""
     is_face = is_face_hair(own.group)
     return np.flatnonzero(~is_face | is_face.all()).astype(np.int32)
 
@@ -589,11 +593,12 @@ def _frames(strands: StrandSet, head: Surface | None) -> RootFrames | None:
 
 
 def strand_ranks(rig: Rig) -> Floats:
-    """Where each strand stands in an even order, (strand_count,) in 0 to 1: the strands of low
-    rank alone are the same hair, only sparser.
+    """The rank of each strand in an even order, (strand_count,), 0 to 1: the strands below any rank
+    are the same hair, only sparser.
 
-    The artist's own strands and children each keep their fraction. Children come in the order in
-    which they were grown, which is such an order: one more of them changes no other's rank by much.
+    The artist's own strands and the children are ranked apart, so that each keep their fraction.
+    Children grow in such an order, which gives their ranks: one child more hardly changes those of
+    the others.
     """
     count = rig.strands.strand_count
     own = count - rig.child_count
@@ -604,10 +609,10 @@ def strand_ranks(rig: Rig) -> Floats:
 
 
 def strand_seeds(rig: Rig) -> Ints:
-    """What the noise of each strand depends on, (strand_count,) whole numbers below 2^24.
+    """The noise seed of each strand, (strand_count,), whole numbers below 2^24.
 
-    A child's is named by the place of its root, so that it keeps its own colour when another one
-    comes or goes; an artist's strand has the seed that it was made with, or its number.
+    A child's seed is a hash of the place of its root, so that it keeps its colour when others come
+    or go. A strand of the artist has the seed that it was made with, or else its number.
     """
     strands = rig.strands
     seeds = np.arange(strands.strand_count)

@@ -24,18 +24,18 @@ from .strands import StrandSet
 from .strands.arc_length import along, steps
 from .strands.vectors import unit
 
-#: Curves that are simulated, at most; of more, the others ride on these.
+#: At most this many curves are simulated; the others ride on them.
 _MAX_GUIDES = 4096
-#: A frame [s], and how many there are at least before hair counts as at rest.
+#: Duration of a frame [s], and how many there are at least before hair counts as at rest.
 _FRAME, _FEWEST = 1.0 / 24.0, 12
-#: Hair is at rest where no CV moves farther in a frame than this part of the hair's length.
+#: Hair is at rest where no CV moves farther in a frame than this fraction of the hair's length.
 _STILL = 1.0e-4
-#: Points of guides: as many as most curves have, within what a guide may have.
+#: Limits of the CVs that guides have.
 _MIN_CVS, _MAX_CVS = 8, 64
 
 
 def guides_that_fall(strands: StrandSet, own: GuideSettings) -> GuideSettings:
-    """All curves are simulated, with as many points as most of them have."""
+    """Settings by which all curves are simulated, with the median of their point counts."""
     typical = int(np.median(strands.point_counts)) if strands.strand_count else own.cv_count
     cv_count = min(max(typical, own.cv_count, _MIN_CVS), _MAX_CVS)
     guide_count = min(max(strands.strand_count, 1), _MAX_GUIDES)
@@ -51,13 +51,13 @@ def settle(
     gravity: Floats,
     painted: PaintedGuides | None = None,
 ) -> Generator[float, None, Floats]:
-    """All strands after they have fallen, (point_count, 3) [m]; yields the fraction of the time.
+    """All strands after they have fallen, (point_count, 3) [m]; yields progress, 0 to 1.
 
     Args:
         pose, colliders: at rest, where they stay.
         own: the hair's dynamics.
         gravity: (3,) [m/s^2], world space.
-        painted: by what its dynamics are multiplied at each guide; all of the motion is seen.
+        painted: factors of its dynamics at each guide; those that hide motion are ignored.
     """
     falling = settings.falling(own)
     still = _STILL * float(np.median(rig.rest_lengths))
@@ -77,8 +77,8 @@ def settle(
 def as_curves(
     curves: StrandSet, rig: Rig, fallen: Floats, head: DistanceField | None
 ) -> tuple[StrandSet, Bools]:
-    """The artist's curves in the shape that they have fallen into, each segment as long as it was;
-    and which (strand_count,) are outside of the head.
+    """The artist's curves in their fallen shapes, each segment as long as it was, and which of them
+    are outside of the head, (strand_count,).
 
     Args:
         curves: as combed, bound to the head if there is one.
@@ -87,7 +87,7 @@ def as_curves(
     length = steps(curves.points, curves.offsets)
     place = along(curves.points, curves.offsets)
     known = along(rig.strands.points, rig.strands.offsets)
-    # a number for each place of all strands, rising, so that one look-up serves them all
+    # strand n takes 2 n to 2 n + 1, so that one interpolation serves all strands
     wanted = place + 2.0 * np.repeat(np.arange(curves.strand_count), curves.point_counts)
     there = known + 2.0 * np.repeat(np.arange(curves.strand_count), rig.strands.point_counts)
     points = np.stack([np.interp(wanted, there, fallen[:, axis]) for axis in range(3)], axis=1)

@@ -1,11 +1,11 @@
 """The flow of an animated style: curves that shape keys, modifiers, nodes or a cache move are the
 style of each frame.
 
-A rig is at rest, so what a frame shows is brought back there: children, guides and weights, roots
-on the head and occlusion stay those of the rig, and everything that moves it goes on as it is. The
-curves may have been moved by the object alone, so that their roots are where they were at rest, or
-go with their surface already, as Blender's own hair nodes have them do: what brings their roots
-nearer to those of the rig is what has happened.
+A rig is at rest, so the curves of a frame are brought back to rest. Children, guides and weights,
+roots on the head and occlusion stay those of the rig, and all that moves a rig works as usual. The
+curves may have been moved by their object alone, or may already follow their surface, as Blender's
+own hair nodes make them. Both motions are undone in turn; the one that brings roots nearer to those
+of the rig counts.
 """
 
 from __future__ import annotations
@@ -50,8 +50,8 @@ def styled(rig: Rig, curves: StrandSet) -> Rig:
 
 
 def _with_children_riding(rig: Rig, now: Rig) -> Rig:
-    """The rig of this moment with children of which nobody knows how they have grown, as in a bake:
-    they ride on their guides."""
+    """The rig of this moment with its children riding on guides, since a bake does not store how
+    they have grown."""
     if not rig.child_count:
         return now
     first = rig.strands.offsets[rig.own_count]
@@ -62,7 +62,7 @@ def _with_children_riding(rig: Rig, now: Rig) -> Rig:
 
 
 def carried_back(strands: StrandSet, motions: RootMotions) -> StrandSet:
-    """Strands that go with their roots, where they were at rest; undoes `groom.roots.follow`."""
+    """Strands that follow their roots, brought back to rest; inverse of `groom.roots.follow`."""
     strand = np.repeat(np.arange(strands.strand_count), strands.point_counts)
     turn = motions.turn.transpose(2, 0, 1).astype(np.float64) + np.eye(3)
     shift, origin = (each.T.astype(np.float64) for each in (motions.shift, motions.origin))

@@ -1,11 +1,11 @@
-"""What water and dust in the hair change of all its settings: looks, children and motion.
+"""How water and dust in the hair change its settings: look, children and motion.
 
-The settings that an artist makes stay as they are; what is drawn, grown and simulated are these.
+The artist's own settings stay as they are; the changed ones are drawn, grown and simulated.
 
-Water is weight: soaked hair holds about its own in water (Robbins 2012, "Chemical and Physical
+Water is weight: soaked hair holds about its own mass of water (Robbins 2012, "Chemical and Physical
 Behavior of Human Hair", chapter 9, has a third within the fibre; the rest is the film). A stiffness
-that is given in swings a second falls with the root of the mass; damping, the wind and what the
-style carries of the weight fall with the mass itself. And it draws strands together in clumps.
+given as a frequency is divided by the square root of the mass; damping, wind and the compensation
+of sag are divided by the mass itself. Water also draws strands together in clumps.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ from .shading.settings import ShadingSettings
 
 #: Water that soaked hair holds, over its own mass.
 WATER = 1.0
-#: How far water draws the children of a clump together that were apart.
+#: How far soaking closes the gap between the artist's clumping and full clumping.
 CLUMPED = 0.75
-#: What water leaves of strays.
+#: The factors of frizz and fly-aways in soaked hair.
 _FRIZZ_LEFT, _FLY_AWAYS_LEFT = 0.25, 0.0
 
 
 def acting(settings: SettingsMap) -> SettingsMap:
-    """The settings as they act; of settings that have been through it, never again."""
+    """The settings with the effects of water and dust; not to be applied twice."""
     look = settings[ShadingSettings]
     if not is_coated(look):
         return settings
@@ -39,7 +39,7 @@ def acting(settings: SettingsMap) -> SettingsMap:
 
 
 def wet_children(settings: ChildrenSettings, wetness: float) -> ChildrenSettings:
-    """Children of wet hair, 0 to 1."""
+    """Settings of children in hair of this wetness, 0 to 1."""
     if not wetness:
         return settings
     return replace(
@@ -51,7 +51,7 @@ def wet_children(settings: ChildrenSettings, wetness: float) -> ChildrenSettings
 
 
 def heavier(settings: DynamicsSettings, wetness: float) -> DynamicsSettings:
-    """The motion of wet hair, 0 to 1."""
+    """Settings of the motion of hair of this wetness, 0 to 1."""
     if not wetness:
         return settings
     mass = 1.0 + WATER * wetness
