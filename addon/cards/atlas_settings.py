@@ -32,11 +32,11 @@ class AtlasSettings(Settings):
             (
                 "baked",
                 "Baked",
-                "The strands themselves, laid flat; procedural if there are only guides",
+                "The groom's own strands, laid flat; procedural if there are only guides",
             ),
         ),
         label="Source",
-        description="What the texture of the cards is made from",
+        description="Source of the cards' texture",
     )
     size: str = choice(
         "auto",
@@ -44,8 +44,8 @@ class AtlasSettings(Settings):
             (
                 "auto",
                 "Automatic",
-                "As few pixels as show strands one and a half pixels wide, up to "
-                f"{_AUTOMATIC_MAX} x {_AUTOMATIC_MAX}, with no more tiles than there are cards",
+                "Use the fewest pixels that show strands one and a half pixels wide, up to "
+                f"{_AUTOMATIC_MAX} x {_AUTOMATIC_MAX}, with no more tiles than cards",
             ),
             *((str(size), str(size), f"{size} x {size} pixels") for size in SIZES),
         ),
@@ -56,8 +56,8 @@ class AtlasSettings(Settings):
     columns: int = integer(
         16,
         label="Columns",
-        description="Tiles side by side; a power of two keeps tiles apart in all mip maps. If the "
-        "size is automatic, columns times rows is the maximum number of tiles",
+        description="Number of tiles side by side; a power of two keeps tiles apart in all mip "
+        "maps. With an automatic size, columns times rows is the maximum number of tiles",
         soft=(1, 32),
         hard=(1, 64),
         shown_when=when("atlas.source", "baked"),
@@ -65,7 +65,7 @@ class AtlasSettings(Settings):
     rows: int = integer(
         4,
         label="Rows",
-        description="Rows of tiles; a power of two keeps tiles apart in all mip maps",
+        description="Number of rows of tiles; a power of two keeps tiles apart in all mip maps",
         soft=(1, 16),
         hard=(1, 64),
         shown_when=when("atlas.source", "baked"),
@@ -83,7 +83,7 @@ class AtlasSettings(Settings):
         1.57,  # pi / 2: the mean of |cos| over all turns of a card is 2 / pi
         label="Strand Width",
         description="Factor on the strand width in the atlas, because cards are mostly seen at a "
-        "slant, which makes strands on them narrower",
+        "slant, where their strands look narrower",
         soft=(1.0, 2.0),
         hard=(0.01, 100.0),
         shown_when=when("atlas.source", "baked"),

@@ -47,11 +47,11 @@ class CardDrawingSettings(Settings):
     order: str = choice(
         "static",
         (
-            ("static", "Static", "From inside to outside, sorted once"),
+            ("static", "Static", "Sort once, from the inside to the outside"),
             (
                 "view",
                 "For Each View",
-                "From the farthest card to the nearest, for hair that swings",
+                "Sort in each view, from the farthest card to the nearest; for hair that swings",
             ),
         ),
         label="Order",
@@ -63,8 +63,8 @@ class CardDrawingSettings(Settings):
     skip_clear: bool = toggle(
         True,
         label="Skip Clear Pixels",
-        description="Test alpha in the last pass, so that transparent pixels hide nothing; "
-        "without it, the pass is as in the paper and faster on some GPUs",
+        description="Test alpha in the last pass, so that transparent pixels hide nothing. If "
+        "off, the pass is as in the paper, and faster on some GPUs",
         panel="Drawing",
         active_when=_ARE_DRAWN,
         shown_when=when("card_drawing.passes", "four"),

@@ -28,7 +28,7 @@ class CardExportSettings(Settings):
     packing: str = choice(
         "hairloom",
         (
-            ("hairloom", "One Each", "A file for each map, as Hairloom's own shaders read them"),
+            ("hairloom", "One Each", "One file for each map, as Hairloom's own shaders read them"),
             ("gltf", "glTF", "Base colour with alpha, occlusion, normal, anisotropy"),
             ("unreal", "Unreal", "The default layout of Unreal's card textures"),
             ("unreal_compact", "Unreal Compact", "The compact layout of Unreal's card textures"),
@@ -36,12 +36,12 @@ class CardExportSettings(Settings):
             ("godot", "Godot", "As Godot's standard material reads them"),
         ),
         label="Packing",
-        description="What the channels of the textures hold",
+        description="Contents of the textures' channels",
     )
     textures: str = choice(
         "png",
         (
-            ("png", "PNG", "8 bits, and 16 where steps would be seen"),
+            ("png", "PNG", "8 bits, or 16 where steps would show"),
             ("exr", "OpenEXR", "Half floats"),
             ("dds", "DDS", "Compressed for GPUs (BC4, BC5, BC7), with all mip maps"),
             ("dds_plain", "DDS, Plain", "Not compressed, with all mip maps"),
@@ -52,8 +52,8 @@ class CardExportSettings(Settings):
     attributes: bool = toggle(
         False,
         label="Custom Attributes",
-        description="Write ambient occlusion as the attribute _AO beside the second UV map, which "
-        "some engines refuse",
+        description="Also write ambient occlusion as the attribute _AO, beside the second UV map; "
+        "some engines reject such attributes",
     )
     index_buffer: bool = toggle(
         False,
@@ -64,44 +64,46 @@ class CardExportSettings(Settings):
     page: bool = toggle(
         False,
         label="Web Page",
-        description="GLB: also write NAME.html, one file that shows the hair in any browser, "
-        "without a network",
+        description="Also write NAME.html, a single file that shows the hair in any browser, "
+        "without a network; GLB only",
     )
     page_texture: str = choice(
         "1024",
         tuple((size, size, f"Up to {size} texels a side") for size in ("512", "1024", "2048")),
         label="Page Textures",
-        description="Size of the textures in the web page, which are scaled down",
+        description="Size to which the textures in the web page are scaled down",
     )
     page_head: bool = toggle(
         True,
         label="Page Head",
-        description="Put the mesh that hair grows on into the web page, too, in its materials",
+        description="Also show the mesh that hair grows on in the web page, with its materials",
     )
     motion: str = choice(
         "none",
         (
-            ("none", "None", "The cards at rest"),
+            ("none", "None", "Write the cards at rest"),
             (
                 "joints",
                 "Joints",
-                "GLB: chains of joints that cards are skinned to, with keys; every engine plays "
-                "them",
+                "GLB: skin cards to chains of joints with keyframes, which every engine plays",
             ),
             (
                 "springs",
                 "Springs",
-                "GLB: chains of joints that the engine's own physics moves (VRMC_springBone), "
-                "fitted to the bake",
+                "GLB: skin cards to chains of joints moved by the engine's own physics "
+                "(VRMC_springBone), fitted to the bake",
             ),
             (
                 "texture",
                 "Vertex Textures",
-                "GLB, FBX, USD: where each vertex is in each frame, for a vertex shader; exact",
+                (
+                    "GLB, FBX, USD: store the position of each vertex in each frame, for a vertex "
+                    "shader; exact"
+                ),
             ),
         ),
         label="Motion",
-        description="How the motion of the hair's bake is written",
+        description="How the hair's baked motion is written",
     )
     motion_space: str = choice(
         "head",
@@ -109,21 +111,21 @@ class CardExportSettings(Settings):
             (
                 "head",
                 "With the Head",
-                "Without the head's own motion: attach the hair to the head",
+                "Leave out the head's own motion; attach the hair to the head in the engine",
             ),
-            ("world", "World", "With the head's own motion"),
+            ("world", "World", "Include the head's own motion"),
         ),
         label="Space",
-        description="What the motion is measured against",
+        description="Space in which the motion is written",
     )
     motion_depth: str = choice(
         "half",
         (
-            ("half", "Half", "16 bits: within a two thousandth of how far a vertex moves"),
+            ("half", "Half", "16 bits: exact to a two-thousandth of a vertex's movement"),
             ("float", "Float", "32 bits"),
         ),
         label="Depth",
-        description="Numbers in the textures of motion",
+        description="Precision of the motion textures",
     )
     # 127 chains of two joints each, and the root, are as many as a byte can number
     chains: int = integer(
@@ -136,15 +138,15 @@ class CardExportSettings(Settings):
     joints: int = integer(
         16,
         label="Joints",
-        description="Maximum number of joints in a chain; as few as stay under the error",
+        description="Maximum number of joints per chain; as few as the error allows are used",
         soft=(2, 16),
         hard=(2, 16),
     )
     joint_error: float = number(
         1.0,
         label="Error",
-        description="Root mean square distance of cards from the simulation, as a fraction of the "
-        "median length of the guides",
+        description="Maximum root mean square distance of cards from the simulation, as a "
+        "fraction of the median length of the guides",
         soft=(0.01, 10.0),
         hard=(0.01, 100.0),
         unit="percent",
@@ -152,7 +154,8 @@ class CardExportSettings(Settings):
     spring_joints: int = integer(
         120,
         label="Spring Joints",
-        description="Maximum number of joints that springs move; as few as do nearly as well",
+        description="Maximum number of joints moved by springs; fewer are used if they do nearly "
+        "as well",
         soft=(10, 250),
         hard=(5, 1024),
     )

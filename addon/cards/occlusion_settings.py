@@ -19,7 +19,7 @@ class CardOcclusionSettings(Settings):
     strength: float = number(
         1.0,
         label="Strength",
-        description="Amount of ambient occlusion that is stored",
+        description="Amount of ambient occlusion to store",
         unit="factor",
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),
@@ -27,15 +27,16 @@ class CardOcclusionSettings(Settings):
     extinction: float = number(
         2.0,
         label="Extinction",
-        description="Extinction of light in cards of other grooms and in cards that you sort, as "
-        "a power of their transparency. Cards of a groom have the occlusion of its strands",
+        description="Extinction of light in cards of other grooms and in your own sorted cards, "
+        "as a power of their transparency. Cards made from a groom use the occlusion of its "
+        "strands",
         soft=(0.0, 10.0),
         hard=(0.0, 1_000.0),
     )
     rays: int = integer(
         256,
         label="Rays",
-        description="Number of directions per vertex; time grows in proportion",
+        description="Number of rays per vertex; time grows in proportion",
         soft=(64, 1024),
         hard=(1, 65_536),
     )
@@ -50,8 +51,8 @@ class CardOcclusionSettings(Settings):
     self_occlusion_distance: float = number(
         0.03,
         label="Self Distance",
-        description="Distance from which a card occludes itself, relative to the extent of the "
-        "cards; a little more than its width, so that only curls do",
+        description="Distance beyond which a card occludes itself, relative to the extent of all "
+        "cards; slightly more than a card's width, so that only curls do",
         soft=(0.0, 0.2),
         hard=(0.0, 1_000.0),
     )

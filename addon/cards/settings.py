@@ -20,16 +20,16 @@ class CardSettings(Settings):
         "cards",
         (
             ("cards", "Cards", "Strips of triangles along the hair"),
-            ("shells", "Shells", "Layers of the skin, each of which shows where hair crosses it"),
+            ("shells", "Shells", "Layers above the skin, each showing where hair crosses it"),
             (
                 "auto",
                 "Automatic",
-                "Shells for hair that is short beside the skin that it grows on, as fur and "
-                "stubble are, if nobody has edited its cards; else cards",
+                "Shells if hair is short compared with its area of skin, such as fur and stubble, "
+                "and its cards are not edited; else cards",
             ),
         ),
         label="Kind",
-        description="Cards or shells",
+        description="Type of geometry to make",
     )
     max_triangles: int = integer(
         0,
@@ -50,8 +50,8 @@ class CardSettings(Settings):
     source: str = choice(
         "clusters",
         (
-            ("clusters", "Clusters", "A card for each cluster of strands that lie together"),
-            ("guides", "Guides", "A card along each guide"),
+            ("clusters", "Clusters", "One card for each cluster of strands that lie together"),
+            ("guides", "Guides", "One card along each guide"),
         ),
         label="Source",
         description="What each card is built from",
@@ -68,7 +68,7 @@ class CardSettings(Settings):
         0.008,
         label="Error",
         description="Maximum distance of a card's edges from the path of its strands, as a "
-        "fraction of the hair's length; less gives more segments",
+        "fraction of the hair's length; lower values give more segments",
         soft=(0.002, 0.1),
         hard=(0.0, 10.0),
         shown_when=when("cards.source", "clusters"),
@@ -84,8 +84,8 @@ class CardSettings(Settings):
     crossed: bool = toggle(
         False,
         label="Crossed Pairs",
-        description="Add a second card through each at a right angle, so that hair has volume "
-        "from all sides",
+        description="Add a second card through each one at a right angle, for volume from all "
+        "sides",
         shown_when=when("cards.source", "clusters"),
     )
     fly_aways: float = number(
@@ -107,8 +107,8 @@ class CardSettings(Settings):
     base_width: float = number(
         1.0,
         label="Base Width",
-        description="Widening of the lowest layer, so that the head does not show through; the "
-        "outermost layer is never widened",
+        description="Factor on the width of the lowest layer, to keep the head from showing "
+        "through; it fades to 1 at the outermost layer",
         soft=(1.0, 2.0),
         hard=(1.0, 10.0),
     )
@@ -123,21 +123,21 @@ class CardSettings(Settings):
     segment_count: int = integer(
         12,
         label="Segments",
-        description="Segments of a card from root to tip; for clusters, the maximum",
+        description="Number of segments of a card from root to tip; for clusters, the maximum",
         soft=(4, 32),
         hard=(1, 128),
     )
     column_count: int = integer(
         2,
         label="Columns",
-        description="Segments across a card; two or more can bend",
+        description="Number of segments across a card; two or more let it bend",
         soft=(1, 4),
         hard=(1, 16),
     )
     width_factor: float = number(
         3.5,
         label="Width",
-        description="Width at the root, as a factor of the mean distance between neighbouring "
+        description="Width at the root, in multiples of the mean distance between neighbouring "
         "guides",
         soft=(1.0, 6.0),
         hard=(0.01, 100.0),
@@ -183,16 +183,16 @@ class CardSettings(Settings):
                 "Sort pieces of crossing cards separately: fewest errors",
             ),
             ("cards", "Whole Cards", "Keep all faces of a card together"),
-            ("distance", "Distance", "Sort whole cards only by their distance from the head"),
+            ("distance", "Distance", "Sort whole cards by their distance from the head alone"),
         ),
         label="Order By",
-        description="What is sorted from inside to outside",
+        description="What to sort from the inside to the outside",
         source="Scheuermann 2004",
     )
     seed: int = integer(
         0,
         label="Seed",
-        description="Random seed for the strips that cards use",
+        description="Random seed for the choice of strips",
         soft=(0, 100),
         hard=(0, 2**31 - 1),
     )

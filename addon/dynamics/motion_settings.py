@@ -17,8 +17,7 @@ def air_damping(*, is_painted: bool) -> Any:
     return number(
         0.5,
         label="Air Damping",
-        description="Rate at which still air or water slows motion down, and at which wind "
-        "carries it along",
+        description="Rate at which hair takes on the speed of the air or water around it",
         soft=(0.0, 10.0),
         hard=(0.0, 1000.0),
         unit="rate",
@@ -35,7 +34,8 @@ class MotionSettings(Settings):
     buoyancy: float = number(
         0.0,
         label="Buoyancy",
-        description="Fraction of the weight that the medium carries: 0 in air; at 1 it floats",
+        description="Fraction of the weight that the surrounding medium carries: 0 in air, 1 "
+        "floats",
         soft=(0.0, 1.0),
         hard=(0.0, 2.0),
         source="Archimedes",
@@ -45,7 +45,8 @@ class MotionSettings(Settings):
     drag: float = number(
         0.0,
         label="Drag",
-        description="Quadratic drag through air or water, per metre travelled; a few in water",
+        description="Quadratic drag through air or water, per metre travelled; a few units in "
+        "water",
         soft=(0.0, 10.0),
         hard=(0.0, 1000.0),
         source="Rayleigh's drag equation",
@@ -54,7 +55,7 @@ class MotionSettings(Settings):
     wind_speed: float = number(
         0.0,
         label="Wind Speed",
-        description="Speed of the air, or of the current under water; the same everywhere",
+        description="Speed of the wind, or of the current under water; the same everywhere",
         soft=(0.0, 20.0),
         hard=(0.0, 200.0),
         unit="speed",
@@ -63,7 +64,7 @@ class MotionSettings(Settings):
     wind_direction: float = number(
         0.0,
         label="Wind Direction",
-        description="Direction that the wind blows towards: 0 is world +X, 90 degrees is +Y",
+        description="Direction in which the wind blows: 0 is world +X, 90 degrees is +Y",
         soft=(-math.pi, math.pi),
         hard=(-_MAX_TURNED, _MAX_TURNED),
         unit="angle",
@@ -107,8 +108,8 @@ class MotionSettings(Settings):
     force_fields: float = number(
         1.0,
         label="Force Fields",
-        description="How strongly the scene's force fields act, each where it stands; 0 is not at "
-        "all",
+        description="Factor on the scene's force fields, each acting where it is placed; 0 "
+        "ignores them",
         soft=(0.0, 1.0),
         hard=(0.0, 10.0),
         panel="Medium & Wind",
@@ -125,8 +126,8 @@ class MotionSettings(Settings):
     depenetration_speed: float = number(
         2.0,
         label="Exit Speed",
-        description="Speed at which points that start inside a collider are moved out of it, in "
-        "lengths of the hair per second; for cloth, in quarters of its extent",
+        description="Speed at which points that start inside a collider are pushed out, in "
+        "lengths of the hair per second; for cloth, in quarters of its extent per second",
         soft=(0.2, 20.0),
         hard=(0.001, 1000.0),
         unit="rate",

@@ -28,8 +28,8 @@ class DynamicsSettings(MotionSettings):
     device: str = choice(
         "automatic",
         (
-            ("automatic", "Automatic", "The GPU if Blender can compute on it, otherwise the CPU"),
-            ("numpy", "CPU (numpy)", "Needs no GPU; the same result to the last bit in every run"),
+            ("automatic", "Automatic", "Use the GPU if Blender can compute on it, else the CPU"),
+            ("numpy", "CPU (numpy)", "Needs no GPU; gives bit-identical results in every run"),
             ("compute", "GPU (compute)", "Fastest; guides stay on the GPU between frames"),
         ),
         label="Device",
@@ -47,7 +47,7 @@ class DynamicsSettings(MotionSettings):
     longest_frame: float = number(
         0.25,
         label="Longest Frame",
-        description="Maximum time that is simulated between two frames",
+        description="Maximum time to simulate between two frames",
         soft=(0.05, 1.0),
         hard=(0.01, 10.0),
         unit="time",
@@ -55,7 +55,7 @@ class DynamicsSettings(MotionSettings):
     gravity: float = number(
         1.0,
         label="Gravity",
-        description="Fraction of the scene's gravity that pulls at the hair",
+        description="Factor on the scene's gravity",
         soft=(0.0, 2.0),
         hard=(-10.0, 10.0),
         is_painted=True,
@@ -63,8 +63,8 @@ class DynamicsSettings(MotionSettings):
     sag_compensation: float = number(
         1.0,
         label="Sag Correction",
-        description="Fraction of the weight that the style compensates; at 1 a groom does not sag "
-        "when it comes to rest",
+        description="Fraction of the weight that the style compensates; at 1 the groom at rest "
+        "does not sag",
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),
         unit="factor",
@@ -72,7 +72,7 @@ class DynamicsSettings(MotionSettings):
     style_root: float = number(
         4.0,
         label="Root Stiffness",
-        description="Stiffness that holds the first points to the style, in swings per second",
+        description="Stiffness that holds the roots to the style, in swings per second",
         soft=(0.0, 10.0),
         hard=(0.0, 1000.0),
         unit="rate",
@@ -83,7 +83,7 @@ class DynamicsSettings(MotionSettings):
     style_tip: float = number(
         1.2,
         label="Tip Stiffness",
-        description="Stiffness that holds the tip to the style, in swings per second",
+        description="Stiffness that holds the tips to the style, in swings per second",
         soft=(0.0, 10.0),
         hard=(0.0, 1000.0),
         unit="rate",
@@ -94,14 +94,15 @@ class DynamicsSettings(MotionSettings):
     style_along: tuple[float, ...] = curve(
         (1.0, 0.75, 0.5, 0.25, 0.0),
         label="Stiffness Along",
-        description="Style stiffness along the strand: 1 is that of the root, 0 that of the tip",
+        description="Blend of the two stiffnesses along the strand: 1 is Root Stiffness, 0 is Tip "
+        "Stiffness",
         hard=(0.0, 1.0),
         panel="Style",
     )
     style_damping: float = number(
         5.0,
         label="Style Damping",
-        description="Rate at which swinging about the style dies away, relative to the moving head",
+        description="Rate at which swinging about the style decays, relative to the moving head",
         soft=(0.0, 20.0),
         hard=(0.0, 1000.0),
         unit="rate",
@@ -123,16 +124,15 @@ class DynamicsSettings(MotionSettings):
     bend_along: tuple[float, ...] = curve(
         (1.0, 1.0, 1.0, 1.0, 1.0),
         label="Bend Along",
-        description="Fraction of the bend stiffness along the strand, from root to tip",
+        description="Factor on Bend Stiffness along the strand, from root to tip",
         hard=(0.0, 1.0),
         panel="Style",
     )
     curl_stretch: float = number(
         0.25,
         label="Curl Stretch",
-        description="How far curls and coils may be drawn out or pushed together when the hair "
-        "swings, as a fraction of what there is until they are straight; 0 keeps them stiff, "
-        "straight hair never stretches",
+        description="How far swinging curls may stretch or compress, as a fraction of the stretch "
+        "that would straighten them; 0 keeps curls stiff. Straight hair never stretches",
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),
         unit="factor",
@@ -141,8 +141,8 @@ class DynamicsSettings(MotionSettings):
     curl_bounce: float = number(
         2.0,
         label="Curl Bounce",
-        description="Stiffness of curls along themselves, in swings per second of a strand that "
-        "bobs from its root; more is stiffer",
+        description="Stiffness of curls along the strand, in swings per second of a strand "
+        "bobbing from its root; higher is stiffer",
         soft=(1.0, 8.0),
         hard=(0.1, 50.0),
         unit="rate",
@@ -152,9 +152,9 @@ class DynamicsSettings(MotionSettings):
     volume: float = number(
         0.0,
         label="Volume",
-        description="How much hair feels other hair, of its own groom and of others: it keeps its "
-        "volume and its locks, and neighbours move together. At rest it changes nothing; 0 is hair "
-        "that passes through hair",
+        description="Interaction with other hair, of the same and of other grooms: it preserves "
+        "volume and locks, and lets neighbours move together. It does not change hair at rest; at "
+        "0 hair passes through hair",
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),
         unit="factor",
@@ -165,16 +165,16 @@ class DynamicsSettings(MotionSettings):
     animated_style: bool = toggle(
         False,
         label="Animated Style",
-        description="Read the curves again in each frame, so that hair returns to them as shape "
-        "keys, modifiers, nodes or a cache move them; off, they are read once",
+        description="Read the curves in every frame, so that the style follows shape keys, "
+        "modifiers, nodes or a cache. If off, they are read once",
         panel="Style",
         is_animatable=False,
     )
     simulated: float = number(
         1.0,
         label="Simulated",
-        description="Fraction of the motion that is simulated: at 0 hair goes exactly as its style "
-        "does, at 1 as the simulation says",
+        description="Blend between style and simulation: 0 follows the style exactly, 1 is fully "
+        "simulated",
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),
         unit="factor",
@@ -184,22 +184,22 @@ class DynamicsSettings(MotionSettings):
     length_solver: str = choice(
         "direct",
         (
-            ("direct", "Direct", "Solve all segments of a guide at once: no visible stretch"),
+            ("direct", "Direct", "Solve all segments of a guide at once, without visible stretch"),
             (
                 "relaxation",
                 "Relaxation",
-                "Solve one segment after the other, repeatedly: stretches under jerks",
+                "Solve one segment after another, repeatedly; stretches under sudden motion",
             ),
         ),
         label="Length Solver",
-        description="Method that keeps segments at their length",
+        description="Method that keeps the length of segments",
         source="Direct: Goldenthal et al. 2007. Relaxation: Jakobsen 2001",
         panel="Lengths",
     )
     relaxations: int = integer(
         8,
         label="Relaxations",
-        description="Sweeps along the guide in each substep",
+        description="Number of sweeps along each guide per substep",
         soft=(1, 32),
         hard=(1, 256),
         source="Jakobsen 2001",
@@ -208,15 +208,15 @@ class DynamicsSettings(MotionSettings):
     long_range: bool = toggle(
         True,
         label="Long Range",
-        description="With relaxation, let no point get farther from its root, along the strand "
-        "or straight, than it is at rest",
+        description="Limit each point's distance from its root, both along the strand and "
+        "straight, to that at rest; for relaxation",
         source="Kim, Chentanez and Mueller 2012",
         panel="Lengths",
     )
     length_tolerance: float = number(
         0.002,
         label="Length Tolerance",
-        description="Guides are solved until no segment is off by more than this fraction",
+        description="Maximum error of a segment's length, as a fraction, at which the solver stops",
         soft=(0.0005, 0.01),
         hard=(0.0001, 0.02),
         panel="Lengths",
@@ -224,8 +224,7 @@ class DynamicsSettings(MotionSettings):
     length_iterations: int = integer(
         8,
         label="Length Iterations",
-        description="Maximum number of Newton steps in each substep's last solve for segment "
-        "lengths",
+        description="Maximum number of Newton steps in the last length solve of each substep",
         soft=(1, 16),
         hard=(1, 64),
         source="Fast projection, Goldenthal et al. 2007",
@@ -234,7 +233,7 @@ class DynamicsSettings(MotionSettings):
     contact_passes: int = integer(
         2,
         label="Contact Passes",
-        description="Number of times that contacts and lengths are solved in turn in each substep",
+        description="Number of times per substep that contacts and lengths are solved in turn",
         soft=(1, 4),
         hard=(1, 16),
         panel="Collisions",
@@ -242,8 +241,7 @@ class DynamicsSettings(MotionSettings):
     radius_root: float = number(
         0.004,
         label="Root Radius",
-        description="Distance of the first points from colliders, as a fraction of the hair's "
-        "length",
+        description="Distance that roots keep from colliders, as a fraction of the hair's length",
         soft=(0.0, 0.05),
         hard=(0.0, 1.0),
         source='"Pearl" configuration, Nguyen and Donnelly 2005',
@@ -252,8 +250,8 @@ class DynamicsSettings(MotionSettings):
     radius_tip: float = number(
         0.016,
         label="Tip Radius",
-        description="Distance of the tip from colliders, as a fraction of the hair's length, so "
-        "that no collider slips between points",
+        description="Distance that tips keep from colliders, as a fraction of the hair's length; "
+        "large enough that no collider slips between points",
         soft=(0.0, 0.1),
         hard=(0.0, 1.0),
         source='"Pearl" configuration, Nguyen and Donnelly 2005',
@@ -262,15 +260,15 @@ class DynamicsSettings(MotionSettings):
     only_selected: bool = toggle(
         False,
         label="Only Selected",
-        description="Simulate the curves that are selected in Sculpt or Edit Mode; guides that are "
-        "not selected stay in their style",
+        description="Simulate only curves selected in Sculpt or Edit Mode; other guides keep "
+        "their style",
         panel="Shot",
     )
     inherit_location: float = number(
         0.0,
         label="Inherit Location",
-        description="Fraction of the roots' movement that hair takes over at once, without lagging "
-        "behind; at 1 it moves as if its head stayed in place",
+        description="Fraction of the roots' movement that hair follows rigidly, without lag; at 1 "
+        "it moves as if the head stayed in place",
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),
         unit="factor",
@@ -280,8 +278,8 @@ class DynamicsSettings(MotionSettings):
     inherit_rotation: float = number(
         0.0,
         label="Inherit Rotation",
-        description="Fraction of the roots' rotation that hair takes over at once, without lagging "
-        "behind; at 1 it moves as if its head did not turn, but for its weight",
+        description="Fraction of the roots' rotation that hair follows rigidly, without lag; at 1 "
+        "it moves as if the head did not turn, apart from gravity",
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),
         unit="factor",
@@ -291,8 +289,8 @@ class DynamicsSettings(MotionSettings):
     jump_distance: float = number(
         3.0,
         label="Jump Distance",
-        description="Treat a frame as a cut if the roots move farther than in the frame before "
-        "by this many extents of the hair. The hair goes along without gaining speed. 0 turns this "
+        description="Treat a frame as a cut if the roots move farther than in the previous frame "
+        "by this many extents of the hair. Hair follows a cut without gaining speed. 0 turns this "
         "off",
         soft=(0.0, 10.0),
         hard=(0.0, 1.0e6),
@@ -301,8 +299,8 @@ class DynamicsSettings(MotionSettings):
     jump_turn: float = number(
         math.radians(120.0),
         label="Jump Turn",
-        description="Treat a frame as a cut if the roots turn by more than this. The hair goes "
-        "along without gaining speed. 0 turns this off",
+        description="Treat a frame as a cut if the roots turn by more than this angle. Hair "
+        "follows a cut without gaining speed. 0 turns this off",
         soft=(0.0, math.pi),
         hard=(0.0, math.pi),
         unit="angle",
@@ -311,8 +309,8 @@ class DynamicsSettings(MotionSettings):
     pre_roll: int = integer(
         0,
         label="Pre-Roll",
-        description="Frames that are simulated before the first one, with the head where it is "
-        "then, so that hair hangs and blows from the start",
+        description="Number of frames to simulate before the first one, with the head in its "
+        "first pose, so that gravity and wind have already taken effect",
         soft=(0, 100),
         hard=(0, 1000),
         panel="Shot",
@@ -320,7 +318,8 @@ class DynamicsSettings(MotionSettings):
     time_scale: float = number(
         1.0,
         label="Time Scale",
-        description="Speed of the hair's time; at 0 hair is frozen and goes along with its roots",
+        description="Speed of time for the hair; at 0 it is frozen and moves rigidly with its "
+        "roots",
         soft=(0.0, 1.0),
         hard=(0.0, 4.0),
         panel="Shot",

@@ -22,7 +22,7 @@ class SettleSettings(Settings):
     seconds: float = number(
         2.0,
         label="Time",
-        description="Time that the hair falls; it ends earlier where nothing moves any more",
+        description="Maximum time that the hair falls; it stops earlier once nothing moves",
         unit="time",
         soft=(0.1, 5.0),
         hard=(0.0, 60.0),
@@ -30,8 +30,8 @@ class SettleSettings(Settings):
     stiffness: float = number(
         0.4,
         label="Stiffness",
-        description="Fraction of the hair's own stiffness, as set under Dynamics, that holds the "
-        "combed shape while it falls: 0 lets it hang from its roots",
+        description="Fraction of the stiffness set under Dynamics that holds the combed shape "
+        "while hair falls; at 0 it hangs limp from its roots",
         unit="factor",
         soft=(0.0, 1.0),
         hard=(0.0, 10.0),

@@ -39,38 +39,41 @@ class StrandExportSettings(Settings):
 
     engine: str = choice(
         USUAL,
-        ((USUAL, "As Usual", "Unreal in Alembic, Blender in USD"), *_engines()),
+        (
+            (USUAL, "Default", "The format's usual program: Unreal for Alembic, Blender for USD"),
+            *_engines(),
+        ),
         label="For",
-        description="Which program the file is for; it sets unit, axes and parts",
+        description="Program that the file is for; sets unit, axes and contents",
         panel="Engine",
     )
     basis: str = choice(
         USUAL,
         (
-            (USUAL, "As Usual", "Straight in Alembic, curved in USD"),
+            (USUAL, "Default", "Straight for Alembic, curved for USD"),
             ("linear", "Straight", "Straight lines between points"),
             ("cubic", "Curved", "Catmull-Rom curves through the points"),
         ),
         label="Curves",
-        description="What the hair is between its points, in Alembic and USD",
+        description="Shape of the hair between its points, in Alembic and USD",
         panel="Engine",
     )
     up: str = choice(
         USUAL,
         (
-            (USUAL, "As Usual", "As the program has it; Y in TressFX, Z in .hair"),
+            (USUAL, "Default", "The program's up axis; Y for TressFX, Z for .hair"),
             ("Y", "Y Up", "The file's Y axis points up, as in most engines"),
             ("Z", "Z Up", "The file's Z axis points up, as in Blender"),
         ),
         label="Up",
-        description="Which axis points up in the file; not for Alembic",
+        description="Axis that points up in the file; not for Alembic",
         panel="Engine",
     )
     scale: float = number(
         0.0,
         label="Scale",
-        description="Metres in one unit of the file: 0.01 writes centimetres. 0: as the program "
-        "has it; not for Alembic",
+        description="Metres per unit of the file: 0.01 writes centimetres, 0 uses the program's "
+        "unit; not for Alembic",
         soft=(0.0, 100.0),
         hard=(0.0, 1.0e6),
         panel="Engine",
@@ -78,50 +81,55 @@ class StrandExportSettings(Settings):
     parts: str = choice(
         USUAL,
         (
-            (USUAL, "As the Engine Wants", "Unreal gets strands and guides, others the strands"),
-            ("strands", "Strands", "The strands that are seen"),
-            ("guides", "Guides", "The guides alone"),
-            ("both", "Strands and Guides", "The strands, and copies of the guides marked as such"),
+            (USUAL, "Default", "Strands and guides for Unreal, strands for other programs"),
+            ("strands", "Strands", "The visible strands"),
+            ("guides", "Guides", "Only the guides"),
+            (
+                "both",
+                "Strands and Guides",
+                "The strands, and copies of the guides that are marked as guides",
+            ),
         ),
         label="What",
-        description="What is written; TressFX calls all of it guides",
+        description="What to write; TressFX calls all of it guides",
         panel="Include",
     )
     by_group: bool = toggle(
         False,
         label="Split by Group",
-        description="An object or prim for each group, which Unity always gets; a file for each "
-        "where the format has no groups: TressFX and .hair",
+        description="Write an object or prim for each group, as is always done for Unity, or a "
+        "file for each group in formats without groups: TressFX and .hair",
         panel="Include",
     )
     bones: bool = toggle(
         True,
         label="Bones",
-        description="Where an armature and vertex groups move the head, write which bones carry "
-        "each strand to a .tfxbone file beside the .tfx file",
+        description="If an armature moves the head by vertex groups, write a .tfxbone file beside "
+        "the .tfx file, with the bones that carry each strand",
         panel="Include",
     )
     point_uv: bool = toggle(
         False,
         label="UVs of Points",
-        description="Write UVs of points too. TressFX: u across the strands, v along them. "
-        ".hair: root UVs as LuxCore does; other programs may refuse such a file",
+        description="Also write UVs of points. TressFX: u across the strands, v along them. "
+        ".hair: root UVs as LuxCore does; other programs may reject such a file",
         panel="Include",
     )
     vertex_count: str = choice(
         "fit",
         (
-            ("fit", "As Needed", "The smallest number that holds the longest strand"),
+            ("fit", "Automatic", "Use the smallest count that fits all strands"),
             *((str(n), str(n), f"{n} vertices on each strand") for n in VERTEX_COUNTS),
         ),
         label="Vertices",
-        description="On each strand; strands with other counts are resampled",
+        description="Number of vertices per strand; strands with other counts are resampled",
         panel="TressFX",
     )
     held_count: int = integer(
         1,
         label="Held Vertices",
-        description="Vertices at the root that TressFX does not move; AMD's exporter holds two",
+        description="Number of vertices at the root that TressFX does not move; AMD's exporter "
+        "uses two",
         soft=(0, 8),
         hard=(0, 8),
         panel="TressFX",
@@ -129,15 +137,15 @@ class StrandExportSettings(Settings):
     fills_groups: bool = toggle(
         False,
         label="Fill up to 64",
-        description="Repeat the last strand until there is a multiple of 64, as TressFX simulates "
-        "64 at a time; its own loader does so by itself, others may not",
+        description="Repeat the last strand up to a multiple of 64, as TressFX simulates 64 at a "
+        "time; its own loader does this by itself, others may not",
         panel="TressFX",
     )
     use_bake: bool = toggle(
         True,
         label="Use Bake",
-        description="Write the motion that Hairloom has baked, of hair that has a bake; off: as "
-        "Blender's own animation and modifiers move the hair",
+        description="Write the motion baked by Hairloom if hair has a bake. If off, write the "
+        "motion of Blender's own animation and modifiers",
         panel="Animation",
     )
 

@@ -28,13 +28,13 @@ class ChildrenSettings(Settings):
     method: str = choice(
         "auto",
         (
-            ("none", "None", "The curves are all the hair there is"),
+            ("none", "None", "Add no children: the curves are all of the hair"),
             ("multi", "Between Guides", "Blend the three guides around each child"),
             ("single", "Around a Guide", "Place each child beside one guide"),
             (
                 "auto",
                 "Automatic",
-                "Add as many children as cover the body; none where the curves already do",
+                ("Add as many children as full hair needs; none if the curves already suffice"),
             ),
         ),
         label="Method",
@@ -44,7 +44,7 @@ class ChildrenSettings(Settings):
     strand_count: int = integer(
         4095,
         label="Strands",
-        description="Number of children; a higher number adds children without moving the others",
+        description="Number of children; raising it adds children without moving the others",
         soft=(100, 20_000),
         hard=(0, 500_000),
         source=_NALU,
@@ -53,7 +53,8 @@ class ChildrenSettings(Settings):
     parting: float = number(
         math.radians(60.0),
         label="Parting",
-        description="Do not blend guides that diverge by more than this angle",
+        description="Maximum angle between guides that are blended; guides that diverge more form "
+        "a parting",
         unit="angle",
         soft=(math.radians(10.0), math.radians(90.0)),
         hard=(0.0, math.pi),
@@ -63,8 +64,8 @@ class ChildrenSettings(Settings):
     scatter: float = number(
         0.0,
         label="Scatter",
-        description="How far away, in distances between guides, each child may take its shape "
-        "from, at random. Fur needs this: its hairs differ from their neighbours",
+        description="Radius within which each child picks the guides for its shape at random, in "
+        "multiples of the distance between guides. Use it for fur, where neighbouring hairs differ",
         soft=(0.0, 2.0),
         hard=(0.0, 100.0),
         shown_when=when("children.method", "multi"),
@@ -83,7 +84,7 @@ class ChildrenSettings(Settings):
     length_variation: float = number(
         0.2,
         label="Length Variation",
-        description="Maximum amount by which a child is shorter than its guides",
+        description="Maximum fraction by which a child is shorter than its guides",
         unit="factor",
         soft=(0.0, 0.9),
         hard=(0.0, 0.99),
@@ -92,7 +93,7 @@ class ChildrenSettings(Settings):
     clump: float = number(
         0.5,
         label="Clump",
-        description="Amount by which the children of a clump are drawn together",
+        description="Amount by which the children of a clump are pulled together",
         unit="factor",
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),
@@ -102,7 +103,7 @@ class ChildrenSettings(Settings):
     clump_along: tuple[float, float, float, float, float] = curve(
         (0.0, 0.25, 0.5, 0.75, 1.0),
         label="Clump Along",
-        description="Fraction of Clump along the strand, from root to tip",
+        description="Factor on Clump along the strand, from root to tip",
         hard=(0.0, 1.0),
         shown_when=when("children.method", "multi", "single"),
         active_when=_HAS_CLUMPS,
@@ -119,8 +120,8 @@ class ChildrenSettings(Settings):
     frizz: float = number(
         0.004,
         label="Frizz",
-        description="Distance that single children stray from their path, as a fraction of the "
-        "hair's length",
+        description="Distance by which single children stray from their path, as a fraction of "
+        "the hair's length",
         soft=(0.0, 0.05),
         hard=(0.0, 1.0),
         shown_when=when("children.method", "multi", "single"),
@@ -129,7 +130,7 @@ class ChildrenSettings(Settings):
     frizz_along: tuple[float, float, float, float, float] = curve(
         (0.0, 0.4, 0.7, 0.9, 1.0),
         label="Frizz Along",
-        description="Fraction of Frizz along the strand, from root to tip",
+        description="Factor on Frizz along the strand, from root to tip",
         hard=(0.0, 1.0),
         shown_when=when("children.method", "multi", "single"),
         active_when=_HAS_FRIZZ,
@@ -137,7 +138,8 @@ class ChildrenSettings(Settings):
     frizz_length: float = number(
         0.12,
         label="Frizz Length",
-        description="Length of hair from one stray to the next, as a fraction of the hair's length",
+        description="Distance along the hair from one bend of the frizz to the next, as a "
+        "fraction of the hair's length",
         soft=(0.02, 1.0),
         hard=(0.001, 100.0),
         shown_when=when("children.method", "multi", "single"),
@@ -146,8 +148,8 @@ class ChildrenSettings(Settings):
     fly_aways: float = number(
         0.0,
         label="Fly-Aways",
-        description="Fraction of the children that wander off their clump, the farther the nearer "
-        "to their tips",
+        description="Fraction of the children that leave their clump, increasingly towards their "
+        "tips",
         unit="factor",
         soft=(0.0, 0.2),
         hard=(0.0, 1.0),
@@ -157,8 +159,8 @@ class ChildrenSettings(Settings):
     baby_hair: float = number(
         0.8,
         label="Baby Hair",
-        description="Fraction of the children that are short and fine at the very border of the "
-        "hair; further inside there are ever fewer",
+        description="Fraction of the children at the hairline that are short and fine; it "
+        "decreases away from the hairline",
         unit="factor",
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),
@@ -177,8 +179,8 @@ class ChildrenSettings(Settings):
     curl_length: float = number(
         0.12,
         label="Curl Length",
-        description="Length of the path from one turn of a curl to the next, as a fraction of the "
-        "hair's length",
+        description="Distance along the path from one turn of a curl to the next, as a fraction "
+        "of the hair's length",
         soft=(0.02, 1.0),
         hard=(0.001, 100.0),
         shown_when=when("children.method", "multi", "single"),
@@ -187,7 +189,7 @@ class ChildrenSettings(Settings):
     curl_along: tuple[float, float, float, float, float] = curve(
         (0.0, 0.5, 0.9, 1.0, 1.0),
         label="Curl Along",
-        description="Fraction of Curl along the strand, from root to tip",
+        description="Factor on Curl along the strand, from root to tip",
         hard=(0.0, 1.0),
         shown_when=when("children.method", "multi", "single"),
         active_when=_HAS_CURL,

@@ -18,7 +18,7 @@ class FlowSettings(Settings):
     amount: float = number(
         1.0,
         label="Amount",
-        description="How far hair at a stroke turns to its direction",
+        description="Amount by which hair at a stroke turns to the stroke's direction",
         unit="factor",
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),
@@ -26,15 +26,16 @@ class FlowSettings(Settings):
     reach: float = number(
         0.25,
         label="Reach",
-        description="Distance from a stroke up to which hair follows it, as a fraction of the "
-        "hair's length",
+        description="Maximum distance from a stroke at which hair follows it, as a fraction of "
+        "the hair's length",
         soft=(0.02, 1.0),
         hard=(0.001, 100.0),
     )
     falloff: float = number(
         0.7,
         label="Falloff",
-        description="Part of Reach in which the stroke's effect fades: 0 ends at Reach at once",
+        description="Fraction of Reach over which the effect fades out; 0 ends it abruptly at "
+        "Reach",
         unit="factor",
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),
@@ -42,8 +43,8 @@ class FlowSettings(Settings):
     lift: float = number(
         0.1,
         label="Lift",
-        description="How much hair rises from the surface, beside what the stroke itself rises: 0 "
-        "lies as flat as the stroke",
+        description="Amount by which hair rises from the surface, in addition to the stroke's own "
+        "rise; at 0 it lies as flat as the stroke",
         unit="factor",
         soft=(0.0, 1.0),
         hard=(0.0, 4.0),
@@ -51,8 +52,8 @@ class FlowSettings(Settings):
     length: float = number(
         0.0,
         label="Length",
-        description="How far hair becomes as long as the stroke beside its root: 0 keeps its "
-        "length",
+        description="Amount by which hair takes on the length of the stroke beside its root; 0 "
+        "keeps its own length",
         unit="factor",
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),

@@ -18,19 +18,19 @@ class MirrorSettings(Settings):
     side: str = choice(
         "positive",
         (
-            ("positive", "Positive", "Such as a character's left, if it faces -Y"),
-            ("negative", "Negative", "Such as a character's right, if it faces -Y"),
+            ("positive", "Positive", "On X, the left of a character that faces -Y"),
+            ("negative", "Negative", "On X, the right of a character that faces -Y"),
         ),
         label="From",
-        description="Side of the axis whose hair is mirrored to the other side",
+        description="Side of the axis to copy to the other side",
     )
     axis: str = choice(
         "x",
         (
-            ("x", "X", "From left to right of an upright head"),
-            ("y", "Y", "From front to back of an upright head"),
-            ("z", "Z", "From top to bottom of an upright head"),
+            ("x", "X", "Between left and right of an upright head"),
+            ("y", "Y", "Between front and back of an upright head"),
+            ("z", "Z", "Between top and bottom of an upright head"),
         ),
         label="Axis",
-        description="Axis of the surface's object across which hair is mirrored, at its origin",
+        description="Local axis of the surface object to mirror along, about its origin",
     )

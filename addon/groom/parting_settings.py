@@ -18,7 +18,7 @@ class PartingSettings(Settings):
     amount: float = number(
         0.8,
         label="Amount",
-        description="How far roots beside a parting turn away from it",
+        description="Amount by which roots beside a parting turn away from it",
         unit="factor",
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),
@@ -26,15 +26,15 @@ class PartingSettings(Settings):
     width: float = number(
         0.2,
         label="Width",
-        description="Distance from a parting up to which roots turn, as a fraction of the hair's "
-        "length",
+        description="Maximum distance from a parting at which roots turn, as a fraction of the "
+        "hair's length",
         soft=(0.01, 0.5),
         hard=(0.0, 10.0),
     )
     along: float = number(
         0.6,
         label="Along",
-        description="Fraction of a curve, from its root on, that turns",
+        description="Fraction of each curve that turns, from its root",
         unit="factor",
         soft=(0.05, 1.0),
         hard=(0.01, 1.0),
@@ -42,7 +42,7 @@ class PartingSettings(Settings):
     lift: float = number(
         0.4,
         label="Lift",
-        description="How much hair rises from the surface where it turns away: 0 lies flat",
+        description="Amount by which hair rises from the surface where it turns away; 0 lies flat",
         unit="factor",
         soft=(0.0, 1.0),
         hard=(0.0, 4.0),

@@ -25,8 +25,12 @@ class GrowSettings(Settings):
     method: str = choice(
         "combed",
         (
-            ("combed", "Combed", "A groom on an upright head, combed and falling around it"),
-            ("normals", "Along Normals", "Out of any mesh, as fur, or as guides to be styled"),
+            ("combed", "Combed", "Hair on an upright head, combed and falling around it"),
+            (
+                "normals",
+                "Along Normals",
+                "Straight out of any mesh: fur, or guides to style by hand",
+            ),
         ),
         label="Method",
         description="Direction in which hair grows from the mesh",
@@ -76,7 +80,7 @@ class GrowSettings(Settings):
     length_variation: float = number(
         0.25,
         label="Length Variation",
-        description="Maximum amount by which a strand is shorter than the longest",
+        description="Maximum fraction by which a strand is shorter than the longest",
         unit="factor",
         soft=(0.0, 0.9),
         hard=(0.0, 0.99),
@@ -92,8 +96,8 @@ class GrowSettings(Settings):
     lift: float = number(
         0.15,
         label="Lift",
-        description="Angle at which hair leaves the surface: 0 lies flat, 1 stands up, and along "
-        "normals it is straight then",
+        description="Angle at which hair leaves the surface: 0 lies flat, 1 stands up; hair along "
+        "normals is straight at 1",
         unit="factor",
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),
@@ -102,7 +106,7 @@ class GrowSettings(Settings):
     whorl: float = number(
         1.0,
         label="Whorl",
-        description="How much hair that is too short to be combed turns away from a whorl at the "
+        description="Amount by which hair that is too short to comb turns around a whorl at the "
         "crown",
         unit="factor",
         soft=(0.0, 1.0),
@@ -112,8 +116,8 @@ class GrowSettings(Settings):
     comb_back: float = number(
         0.65,
         label="Comb Back",
-        description="Comb hair to the back of the head (world +Y) rather than to its sides; below "
-        "0 forward, over the face",
+        description="Amount of combing to the back of the head (world +Y) instead of to the "
+        "sides; negative values comb forward, over the face",
         unit="factor",
         soft=(-1.0, 1.0),
         hard=(-1.0, 1.0),
@@ -122,8 +126,8 @@ class GrowSettings(Settings):
     comb_aside: float = number(
         1.0,
         label="Comb Aside",
-        description="Comb hair away from the middle, as far as it is not combed back or forward; "
-        "below 0 over the middle to the other side",
+        description="Amount of combing away from the middle of the head, for hair not combed back "
+        "or forward; negative values comb across the middle to the other side",
         unit="factor",
         soft=(-1.0, 1.0),
         hard=(-1.0, 1.0),
@@ -132,13 +136,13 @@ class GrowSettings(Settings):
     each_side: bool = toggle(
         False,
         label="Each Side",
-        description="Comb the right side of the head (world -X) by values of its own",
+        description="Use separate values for the right side of the head (world -X)",
         shown_when=when("grow.method", "combed"),
     )
     right_back: float = number(
         0.65,
         label="Right Back",
-        description="Comb Back of the right side",
+        description="Comb Back for the right side",
         unit="factor",
         soft=(-1.0, 1.0),
         hard=(-1.0, 1.0),
@@ -147,7 +151,7 @@ class GrowSettings(Settings):
     right_aside: float = number(
         1.0,
         label="Right Aside",
-        description="Comb Aside of the right side; -1 is to the left, as where hair is swept over",
+        description="Comb Aside for the right side; at -1 hair is swept across to the left",
         unit="factor",
         soft=(-1.0, 1.0),
         hard=(-1.0, 1.0),
@@ -156,7 +160,7 @@ class GrowSettings(Settings):
     comb_fraction: float = number(
         0.45,
         label="Comb Fraction",
-        description="Fraction of the strand that follows the comb before the hair falls",
+        description="Fraction of the strand, from the root, that follows the comb before it falls",
         unit="factor",
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),
@@ -165,8 +169,7 @@ class GrowSettings(Settings):
     droop: float = number(
         0.45,
         label="Droop",
-        description="Amount by which each 2 cm of hair turn towards the direction in which it "
-        "falls",
+        description="Fraction by which hair turns towards its falling direction over each 2 cm",
         unit="factor",
         soft=(0.0, 0.9),
         hard=(0.0, 1.0),
@@ -175,7 +178,7 @@ class GrowSettings(Settings):
     clump: float = number(
         0.3,
         label="Clump",
-        description="Amount by which the tips of a clump are drawn together",
+        description="Amount by which the tips of a clump are pulled together",
         unit="factor",
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),
@@ -192,7 +195,7 @@ class GrowSettings(Settings):
     wave: float = number(
         0.006,
         label="Wave",
-        description="Amplitude of the waves of clumps",
+        description="Amplitude of the waves in each clump",
         unit="length",
         soft=(0.0, 0.02),
         hard=(0.0, 1.0),
@@ -201,7 +204,7 @@ class GrowSettings(Settings):
     wave_length: float = number(
         0.1,
         label="Wave Length",
-        description="Length of hair from one crest to the next",
+        description="Distance along the hair from one wave crest to the next",
         unit="length",
         soft=(0.01, 0.3),
         hard=(0.001, 100.0),
@@ -210,7 +213,7 @@ class GrowSettings(Settings):
     frizz: float = number(
         0.0015,
         label="Frizz",
-        description="Distance that single strands stray from their clump",
+        description="Distance by which single strands stray from their clump",
         unit="length",
         soft=(0.0, 0.01),
         hard=(0.0, 1.0),
@@ -228,7 +231,7 @@ class GrowSettings(Settings):
     volume: float = number(
         0.03,
         label="Volume",
-        description="Thickness of the layer in which hair lies on the head",
+        description="Thickness of the layer of hair on the head",
         unit="length",
         soft=(0.0, 0.05),
         hard=(0.0, 10.0),
@@ -258,8 +261,7 @@ class GuideSettings(Settings):
     guide_count: int = integer(
         762,
         label="Guides",
-        description="Number of strands that are simulated; every group of strands gets at least "
-        "one",
+        description="Number of strands to simulate; every group of strands gets at least one",
         soft=(50, 4000),
         hard=(1, 100_000),
         source=_NALU,
@@ -267,7 +269,8 @@ class GuideSettings(Settings):
     cv_count: int = integer(
         16,
         label="Points",
-        description="Points that a guide is simulated with; strands have as many as they need",
+        description="Number of simulated points per guide; strands keep as many points as they "
+        "need",
         soft=(8, 32),
         hard=(4, 64),
         source=_NALU,
@@ -275,15 +278,15 @@ class GuideSettings(Settings):
     seed: int = integer(
         1,
         label="Seed",
-        description="Random seed for choosing the guides",
+        description="Random seed for the choice of guides",
         soft=(0, 100),
         hard=(0, 2**31 - 1),
     )
     tip_distance: float = number(
         0.02,
         label="Tip Distance",
-        description="Tips nearer than this to the object that holds tips are held by it, as a "
-        "fraction of the hair's length",
+        description="Maximum distance at which the Held Tips mesh holds a tip, as a fraction of "
+        "the hair's length",
         soft=(0.0, 0.1),
         hard=(0.0, 1.0),
         source="Hairloom",

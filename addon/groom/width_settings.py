@@ -22,6 +22,6 @@ class WidthSettings(Settings):
         "auto",
         METHODS,
         label="Widths",
-        description="Where the widths of strands come from",
+        description="Source of the strands' widths",
         source="Robbins 2012, Chemical and Physical Behavior of Human Hair, chapter 9",
     )

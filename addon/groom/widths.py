@@ -59,9 +59,13 @@ _FINER = 0.4
 _LEAST, _MOST = 0.5, 2.0
 
 METHODS = (
-    ("auto", "Automatic", "The groom's own widths where they can be hair, else found widths"),
-    ("found", "Found", "Widths found from the spacing, length and number of the strands"),
-    ("own", "Own", "The groom's own widths, whatever they are; 0.08 mm where it has none"),
+    (
+        "auto",
+        "Automatic",
+        "Use the groom's own widths if they are plausible for hair, else found widths",
+    ),
+    ("found", "Found", "Find widths from the spacing, length and number of the strands"),
+    ("own", "Own", "Use the groom's own widths unchecked; 0.08 mm where it has none"),
 )
 
 

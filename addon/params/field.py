@@ -421,9 +421,9 @@ def mask_of(name: str) -> str:
 
 def _mask(of: str, parameter: Parameter) -> Any:
     description = (
-        f"Multiplies {parameter.label} by what is painted: a vertex group or an attribute of the "
-        "surface, an attribute of the curves, or an image on the surface's UVs; empty: the same "
-        "everywhere"
+        f"Mask that {parameter.label} is multiplied by: a vertex group or attribute of the "
+        "surface, an attribute of the curves, or an image on the surface's UVs. If empty, the "
+        "value is the same everywhere"
     )
     label = f"{parameter.label} Mask"
     return _declare(Parameter("", "mask", "", label, description, "Hairloom", of=of))

@@ -26,10 +26,10 @@ class DetailSettings(Settings):
             (
                 "adaptive",
                 "Adaptive",
-                "The fewest pieces that keep the curve within an error in pixels",
+                "Use the fewest pieces that keep strands within an error in pixels",
             ),
-            ("heuristic", "By Size and Angle", "More pieces for long and for curved segments"),
-            ("fixed", "Fixed", "The same number of pieces everywhere"),
+            ("heuristic", "By Size and Angle", "Use more pieces for long and for curved segments"),
+            ("fixed", "Fixed", "Use the same number of pieces everywhere"),
         ),
         label="Detail",
         description="How segments of a strand are subdivided",
@@ -58,7 +58,7 @@ class DetailSettings(Settings):
     subdivisions: int = integer(
         2,
         label="Subdivisions",
-        description="Pieces per segment",
+        description="Number of pieces per segment",
         soft=(1, 8),
         hard=(1, 64),
         shown_when=when("detail.mode", "fixed"),
@@ -80,14 +80,14 @@ class DetailSettings(Settings):
             ("away", "Facing Away", "Skip strands whose root faces away from the camera"),
         ),
         label="Culling",
-        description="Which strands are not drawn because the head hides them",
+        description="Strands to skip because the head hides them",
         source=_SSALOD,
     )
     lod_size: float = number(
         300.0,
         label="LOD Size",
-        description="Size of the groom in the picture, the larger of width and height, below which "
-        "fewer but wider strands are drawn; 0 always draws all",
+        description="Size of the groom in the picture (the larger of width and height) below "
+        "which fewer, wider strands are drawn; 0 always draws all",
         soft=(0.0, 1000.0),
         hard=(0.0, 100_000.0),
         unit="pixels",
@@ -95,7 +95,7 @@ class DetailSettings(Settings):
     min_density: float = number(
         0.125,
         label="Min Density",
-        description="Minimum fraction of the strands that is drawn at any distance",
+        description="Minimum fraction of the strands to draw at any distance",
         unit="factor",
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),

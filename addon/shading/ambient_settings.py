@@ -28,8 +28,8 @@ class AmbientSettings(Settings):
     extinction: float = number(
         0.4,
         label="Extinction",
-        description="Factor on the light that strands block on its way from all sides; they send "
-        "about half of it on",
+        description="Factor on the surrounding light that strands block; they pass about half of "
+        "it on",
         soft=(0.0, 10.0),
         hard=(0.0, 10_000.0),
         source="Kajiya and Kay 1989, section 2; Kim and Neumann 2001, opacity shadow maps",
@@ -37,7 +37,8 @@ class AmbientSettings(Settings):
     upper_fraction: float = number(
         0.4,
         label="Light from Above",
-        description="0: light comes evenly from all sides, 1: only from straight above",
+        description="Direction of the surrounding light: 0 is even from all sides, 1 only from "
+        "straight above",
         unit="factor",
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),
@@ -45,8 +46,8 @@ class AmbientSettings(Settings):
     ao_bias: float = number(
         0.5,
         label="AO Bias",
-        description="Fraction of the sky that counts as unoccluded; the surface of a solid body "
-        "sees half of it",
+        description="Fraction of visible sky that counts as unoccluded; the surface of a solid "
+        "body sees one half",
         unit="factor",
         soft=(0.25, 1.0),
         hard=(0.05, 1.0),
@@ -54,16 +55,16 @@ class AmbientSettings(Settings):
     scalp_extinction: float = number(
         2.0,
         label="Scalp Extinction",
-        description="Extinction of light on its way to the skin; higher than Extinction, so that "
-        "the scalp does not shine through",
+        description="Extinction of light on its way to the skin; set higher than Extinction to "
+        "keep the scalp from shining through",
         soft=(0.0, 30.0),
         hard=(0.0, 10_000.0),
     )
     cell_count: int = integer(
         56,
         label="Resolution",
-        description="Cells of the grid along the longest side of the hair; short hair gets "
-        "smaller ones",
+        description="Number of grid cells along the longest side of the hair; short hair gets "
+        "smaller cells",
         soft=(16, 96),
         hard=(4, 256),
     )

@@ -19,13 +19,13 @@ class MeshShadowSettings(Settings):
     mesh_shadows: bool = toggle(
         True,
         label="Mesh Shadows",
-        description="Meshes cast shadows on meshes everywhere; if off, only around hair",
+        description="Let meshes cast shadows on meshes everywhere; if off, only around hair",
     )
     mesh_resolution: int = integer(
         2048,
         label="Resolution",
-        description="Texels along each side of a light's shadow map; a lamp among the meshes has "
-        "up to six maps",
+        description="Texels along each side of a light's shadow map; a light among the meshes "
+        "uses up to six maps",
         soft=(512, 4096),
         hard=(16, 8192),
     )

@@ -26,17 +26,17 @@ class PictureSettings(Settings):
     viewport_samples: int = integer(
         32,
         label="View Samples",
-        description="Samples that the viewport adds up while nothing moves. In the preview over "
-        "other engines they soften the shadows of lights that have a size: each draws the hair and "
-        "its shadow maps once. With 1, or without a GPU, shadows stay hard there",
+        description="Samples that the viewport accumulates while nothing moves. In previews over "
+        "other engines they soften the shadows of lights with a size; each sample draws the hair "
+        "and its shadow maps once. With 1 sample, or without a GPU, shadows stay hard there",
         soft=(1, 64),
         hard=(1, 65536),
     )
     motion_steps: int = integer(
         16,
         label="Motion Steps",
-        description="Number of times that the scene is evaluated while the shutter is open; the "
-        "samples of a render are divided among them",
+        description="Number of times the scene is evaluated while the shutter is open; render "
+        "samples are divided among them",
         soft=(2, 64),
         hard=(1, 1024),
     )

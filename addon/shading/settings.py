@@ -20,25 +20,25 @@ MODELS = (
 )
 
 PIGMENTS = (
-    ("color", "Colour", "Absorption that gives a mass of hair this colour"),
-    ("melanin", "Melanin", "The pigments of natural hair"),
+    ("color", "Colour", "Set the colour that a mass of hair shall have"),
+    ("melanin", "Melanin", "Set the pigments of natural hair"),
     ("absorption", "Absorption", "Set absorption directly"),
 )
 
 COLOR_SOURCES = (
-    ("own", "Curves", "The curves' own colours, where they have an attribute named color"),
-    ("look", "Look", "The look's colour alone"),
+    ("own", "Curves", "Use the curves' own colours if they have an attribute named color"),
+    ("look", "Look", "Use only the look's colour"),
 )
 
 BROW_SOURCES = (
-    ("look", "Look", "The look's colour, as all hair"),
-    ("natural", "Natural", "A colour of their own, which dye on the head leaves as it is"),
+    ("look", "Look", "Use the look's colour, as for all hair"),
+    ("natural", "Natural", "Use Brow Colour, which stays natural when the hair is dyed"),
 )
 
 TRANSPARENCIES = (
     ("layers", "Layers", "Blend strands by their coverage of each pixel, sorted by depth"),
     ("hashed", "Hashed", "Stochastic coverage: needs little memory, but is noisy"),
-    ("none", "None", "Opaque strands with hard edges, no thinner than the minimum width"),
+    ("none", "None", "Opaque strands with hard edges, never thinner than Minimum Width"),
 )
 _HAS_TIPS = when("shading.tip_tint", lack="needs Tip Tint")
 _HAS_DUST = when("shading.dust", lack="needs Dust")
@@ -62,20 +62,19 @@ class SharedSettings(Settings):
         "own",
         COLOR_SOURCES,
         label="Colour Source",
-        description="Where the colour comes from; strands that have none of their own have the "
-        "look's",
+        description="Source of the colour; strands without a colour of their own use the look's",
     )
     color_map: str = color_map(
         label="Colour Map",
-        description="Colours that are painted on the surface: a colour attribute, or an image on "
-        "its UVs. Each strand has the colour at its root; where it is transparent, that of Colour "
-        "Source. Empty: nothing is painted",
+        description="Colours painted on the surface: a colour attribute, or an image on its UVs. "
+        "Each strand takes the colour at its root, or that of Colour Source where the map is "
+        "transparent. If empty, no map is used",
     )
     pigment: str = choice(
         "color",
         PIGMENTS,
         label="Pigment",
-        description="How absorption inside the hair is set",
+        description="How the absorption inside the hair is set",
         source=_PIGMENT,
         shown_when=when("shading.model", "marschner"),
     )
@@ -108,7 +107,7 @@ class SharedSettings(Settings):
     absorption: tuple[float, float, float] = color(
         (0.25, 0.42, 0.83),
         label="Absorption",
-        description="Absorption of red, green and blue inside the hair, per length of its radius",
+        description="Absorption of red, green and blue inside the hair, per hair radius",
         maximum=100.0,
         source=_PIGMENT,
         shown_when=_HAS_ABSORPTION,
@@ -142,7 +141,7 @@ class SharedSettings(Settings):
     tint_end: float = number(
         0.9,
         label="Tint End",
-        description="Position between root and tip from which the colour is that of the tips",
+        description="Position between root and tip from which on the colour is Tip Colour",
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),
         unit="factor",
@@ -153,21 +152,21 @@ class SharedSettings(Settings):
         "look",
         BROW_SOURCES,
         label="Brow Source",
-        description="Colour of brows and lashes, which are strands of the groups 9001 and 9002",
+        description="Source of the colour of brows and lashes (strands in groups 9001 and 9002)",
         panel="Tips & Brows",
     )
     brow_color: tuple[float, float, float] = color(
         (0.03, 0.017, 0.011),
         label="Brow Colour",
-        description="Colour of natural brows and lashes that have none of their own",
+        description="Colour of natural brows and lashes without a colour of their own",
         panel="Tips & Brows",
         active_when=when("shading.brow_source", "natural", lack="as the hair"),
     )
     wetness: float = number(
         0.0,
         label="Wetness",
-        description="Amount of water in the hair; 1 is soaked. Wet hair is darker, with a sharp "
-        "highlight, its children clump, and it is heavier when it moves",
+        description="Amount of water in the hair; 1 is soaked. Wet hair is darker and heavier, "
+        "has a sharp highlight, and its children clump",
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),
         unit="factor",
@@ -177,7 +176,7 @@ class SharedSettings(Settings):
     dust: float = number(
         0.0,
         label="Dust",
-        description="Fraction of the hair that dust covers, which dulls its highlights",
+        description="Fraction of the hair covered by dust, which dulls its highlights",
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),
         unit="factor",
@@ -186,7 +185,7 @@ class SharedSettings(Settings):
     dust_color: tuple[float, float, float] = color(
         (0.22, 0.17, 0.115),
         label="Dust Colour",
-        description="Colour of the dust while it is dry",
+        description="Colour of the dry dust",
         panel="Wet & Dusty",
         active_when=_HAS_DUST,
     )
@@ -277,7 +276,7 @@ class StrandSettings(Settings):
     fullness: float = number(
         1.0,
         label="Fullness",
-        description="Factor on the widths of strands, and so on the light that they block",
+        description="Factor on the widths of strands, and thus on the light that they block",
         soft=(0.1, 10.0),
         hard=(0.0, 1000.0),
     )
@@ -293,14 +292,14 @@ class StrandSettings(Settings):
         "layers",
         TRANSPARENCIES,
         label="Transparency",
-        description="How strands thinner than a pixel, and the edges of all strands, are drawn",
+        description="How strand edges and strands thinner than a pixel are drawn",
         source="Yang et al. 2010, lists of each pixel; Wyman and McGuire 2017, hashed alpha",
     )
     opacity: float = number(
         1.0,
         label="Opacity",
-        description="Opacity of a strand over its full width, for what lies behind it and for "
-        "light; needs transparency",
+        description="Opacity of a strand across its full width, to light and to anything behind "
+        "it; needs Transparency",
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),
         unit="factor",
@@ -308,7 +307,7 @@ class StrandSettings(Settings):
     minimum_width: float = number(
         1.0,
         label="Minimum Width",
-        description="Minimum width at the root if transparency is off",
+        description="Minimum width at the root if Transparency is None",
         soft=(0.0, 4.0),
         hard=(0.0, 100.0),
         unit="pixels",

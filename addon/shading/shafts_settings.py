@@ -14,12 +14,12 @@ _FROM_BRIGHT = both(_IS_ON, when("shafts.source", "bright", "both", lack="lights
 
 #: what throws shafts
 SOURCES = (
-    ("lights", "Lights", "Lamps and suns, from where they are in the picture"),
+    ("lights", "Lights", "Lamps and suns, from their places in the picture"),
     (
         "bright",
         "Bright Things",
-        "What is bright in the picture: windows, emission, sky and glints, cut by what stands "
-        "before them",
+        "Bright parts of the picture: windows, emission, sky and glints, cut by objects in front "
+        "of them",
     ),
     ("both", "Both", "Lights and bright things"),
 )
@@ -40,15 +40,15 @@ class ShaftSettings(Settings):
     use_shafts: bool = toggle(
         False,
         label="Light Shafts",
-        description="In renders: light scattered in air or water around lights and bright "
-        "things, with shafts behind the hair",
+        description="Render light scattered in air or water around lights and bright things, with "
+        "shafts behind the hair",
         source=_NGUYEN,
     )
     source: str = choice(
         "lights",
         SOURCES,
         label="Source",
-        description="What throws shafts",
+        description="What casts the shafts",
         source=_NGUYEN,
         active_when=_IS_ON,
     )
@@ -73,7 +73,7 @@ class ShaftSettings(Settings):
     bright_threshold: float = number(
         1.0,
         label="Bright Threshold",
-        description="Luminance above which a thing throws shafts; white paper in full light has 1",
+        description="Luminance above which a thing casts shafts; white paper in full light has 1",
         soft=(0.0, 10.0),
         hard=(0.0, 10000.0),
         source=_NGUYEN,
@@ -82,8 +82,8 @@ class ShaftSettings(Settings):
     length: float = number(
         math.radians(10.0),
         label="Length",
-        description="Length of a shaft behind its occluder, as an angle of view; the haze reaches "
-        "twice as far from a light, and as far as this from a bright thing",
+        description="Length of a shaft behind its occluder, as an angle of view; haze reaches "
+        "twice this far from a light, and this far from a bright thing",
         soft=(0.0, math.radians(45.0)),
         hard=(0.0, math.radians(86.0)),
         unit="angle",
@@ -93,8 +93,8 @@ class ShaftSettings(Settings):
     samples: int = integer(
         256,
         label="Samples",
-        description="Number of steps outwards from a light or bright thing; more resolve finer "
-        "strands",
+        description="Number of steps outwards from a light or bright thing; more steps resolve "
+        "finer strands",
         soft=(32, 512),
         hard=(2, 4096),
         source=_NGUYEN,

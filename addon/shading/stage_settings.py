@@ -11,9 +11,9 @@ from ..params import Settings, choice, color, number
 
 VIEWS = (
     ("agx", "AgX", "Blender's default: bright colours fade to white as on film"),
-    ("agx_contrast", "AgX, High Contrast", "The same with deeper shadows"),
-    ("filmic", "Filmic", "What Blender had before AgX"),
-    ("standard", "Standard", "No tone mapping: what is brighter than white is cut off"),
+    ("agx_contrast", "AgX, High Contrast", "AgX with deeper shadows"),
+    ("filmic", "Filmic", "Blender's default before AgX"),
+    ("standard", "Standard", "No tone mapping: values brighter than white are clipped"),
 )
 
 
@@ -21,7 +21,7 @@ def _strength(default: float, label: str, description: str) -> Any:
     return number(
         default,
         label=label,
-        description=f"{description}, in W/m² where the hair is",
+        description=f"{description}, in W/m² at the hair",
         soft=(0.0, 20.0),
         hard=(0.0, 10_000.0),
     )
@@ -44,7 +44,8 @@ def _side(default: float, label: str, light: str) -> Any:
     return _angle(
         default,
         label,
-        f"Angle of the {light} beside the camera, to the side of the hair that it sees",
+        f"Horizontal angle from the camera to the {light}, towards the side of the hair that the "
+        "camera sees",
         180.0,
     )
 
@@ -65,7 +66,7 @@ class StageSettings(Settings):
     key: float = _strength(3.8, "Key", "Main light")
     key_side: float = _side(62.0, "Key Side", "main light")
     key_height: float = _height(40.0, "Key Height", "main light")
-    fill: float = _strength(1.3, "Fill", "Light into the shadows of the main light")
+    fill: float = _strength(1.3, "Fill", "Light that fills the shadows of the main light")
     fill_side: float = _side(-30.0, "Fill Side", "fill light")
     fill_height: float = _height(5.0, "Fill Height", "fill light")
     rim: float = _strength(1.4, "Rim", "Light from behind, which shines through the hair")
@@ -74,15 +75,15 @@ class StageSettings(Settings):
     distance: float = number(
         5.0,
         label="Distance",
-        description="Distance of the lights, in radii of what is shown; the nearer, the more the "
-        "light falls off",
+        description="Distance of the lights, in radii of the subject; nearer lights fall off more",
         soft=(2.0, 20.0),
         hard=(1.5, 1000.0),
     )
     warmth: float = number(
         0.4,
         label="Warmth",
-        description="Warm main light and cool other lights; below 0 the other way round",
+        description="Warmth of the main light and coolness of the other lights; negative values "
+        "swap them",
         soft=(-1.0, 1.0),
         hard=(-1.0, 1.0),
     )
@@ -115,5 +116,5 @@ class StageSettings(Settings):
         "agx_contrast",
         VIEWS,
         label="View",
-        description="Blender's view transform by which pictures are shown",
+        description="View transform of the pictures",
     )

@@ -33,14 +33,14 @@ class TextureSettings(Settings):
     strand_count: int = integer(
         32,
         label="Strands",
-        description="Strands side by side in one strip",
+        description="Number of strands side by side in one strip",
         soft=(8, 64),
         hard=(2, 1024),
     )
     contrast: float = number(
         0.45,
         label="Contrast",
-        description="Amount by which the darkest strand is darker than the brightest",
+        description="Difference in brightness between the darkest and the brightest strand",
         unit="factor",
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),
@@ -95,7 +95,7 @@ class TextureSettings(Settings):
     shift_cells: int = integer(
         3,
         label="Shift Cells",
-        description="Cells of the shift texture along a strand, from one shift to the next",
+        description="Number of cells of the shift texture along a strand",
         soft=(1, 16),
         hard=(1, 256),
         source="Scheuermann 2004, specular shift texture",
@@ -103,7 +103,8 @@ class TextureSettings(Settings):
     sparkle_cells: int = integer(
         24,
         label="Sparkle Cells",
-        description="Cells of the noise texture along a strand: sparkles of the second highlight",
+        description="Number of cells of the noise texture along a strand, which make the second "
+        "highlight sparkle",
         soft=(1, 64),
         hard=(1, 1024),
         source="Scheuermann 2004, specular noise texture",
@@ -111,11 +112,15 @@ class TextureSettings(Settings):
     highlights: str = choice(
         "shift",
         (
-            ("shift", "Shift Texture", "Each strand shifts the highlights along the hair"),
-            ("tangent", "Tangent Map", "The map holds the direction of each strand"),
+            (
+                "shift",
+                "Shift Texture",
+                "Shift the highlights along the hair, by a different amount for each strand",
+            ),
+            ("tangent", "Tangent Map", "Store the direction of each strand in a tangent map"),
         ),
         label="Highlights By",
-        description="What breaks up the highlights",
+        description="Texture that breaks up the highlights",
         source="Scheuermann 2004, hair shading",
         shown_when=when("atlas.source", "made"),
     )

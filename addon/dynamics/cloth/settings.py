@@ -36,8 +36,8 @@ class FinSettings(MotionSettings):
     small_steps: int = integer(
         10,
         label="Small Steps",
-        description="Steps of motion and edges in each substep; twice as many stretch a quarter "
-        "as much",
+        description="Number of motion and edge steps per substep; doubling them quarters the "
+        "stretch",
         soft=(1, 24),
         hard=(1, 256),
         source="Macklin et al. 2019",
@@ -46,7 +46,7 @@ class FinSettings(MotionSettings):
     longest_frame: float = number(
         0.25,
         label="Longest Frame",
-        description="Maximum time that is simulated between two frames",
+        description="Maximum time to simulate between two frames",
         soft=(0.05, 1.0),
         hard=(0.01, 10.0),
         unit="time",
@@ -55,7 +55,7 @@ class FinSettings(MotionSettings):
     gravity: float = number(
         1.0,
         label="Gravity",
-        description="Fraction of the scene's gravity that pulls at the cloth",
+        description="Factor on the scene's gravity",
         soft=(0.0, 2.0),
         hard=(-10.0, 10.0),
         panel="Cloth",
@@ -63,8 +63,8 @@ class FinSettings(MotionSettings):
     damping: float = number(
         3.0,
         label="Air Damping",
-        description="Rate at which still air or water slows down a face that moves broadside, and "
-        "at which wind carries it along",
+        description="Rate at which a face that moves broadside takes on the speed of the air or "
+        "water around it",
         soft=(0.0, 10.0),
         hard=(0.0, 1000.0),
         unit="rate",
@@ -74,7 +74,7 @@ class FinSettings(MotionSettings):
     drag: float = number(
         0.0,
         label="Drag",
-        description="Quadratic drag on broadside motion, per metre travelled; about 3 for thin "
+        description="Quadratic drag on broadside motion, per metre travelled: about 3 for thin "
         "cloth in air, hundreds in water",
         soft=(0.0, 10.0),
         hard=(0.0, 1000.0),
@@ -84,7 +84,7 @@ class FinSettings(MotionSettings):
     edgewise: float = number(
         0.1,
         label="Edgewise Drag",
-        description="Fraction of damping and drag that acts on motion along the face",
+        description="Fraction of Air Damping and Drag that acts on motion along the face",
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),
         unit="factor",
@@ -93,8 +93,7 @@ class FinSettings(MotionSettings):
     stretch: float = number(
         0.0,
         label="Stretch",
-        description="Stretch at the upper edge of a hanging sheet of one metre under its own "
-        "weight",
+        description="Stretch at the upper edge of a one-metre sheet hanging under its own weight",
         soft=(0.0, 0.1),
         hard=(0.0, 10.0),
         unit="factor",
@@ -105,7 +104,7 @@ class FinSettings(MotionSettings):
         1.0,
         label="Bend Stiffness",
         description="Stiffness of the fold between two faces, in swings per second of their outer "
-        "vertices against each other",
+        "vertices",
         soft=(0.0, 20.0),
         hard=(0.0, 1000.0),
         unit="rate",
@@ -136,15 +135,15 @@ class FinSettings(MotionSettings):
     long_range: bool = toggle(
         True,
         label="Long Range",
-        description="Limit the distance of each vertex from its nearest pinned vertex to its "
-        "distance along the edges",
+        description="Limit each vertex's distance from its nearest pinned vertex to the distance "
+        "along edges",
         source="Kim, Chentanez and Mueller 2012",
         panel="Cloth",
     )
     radius: float = number(
         0.012,
         label="Collision Radius",
-        description="Distance of vertices from colliders, in quarters of the cloth's extent",
+        description="Distance that vertices keep from colliders, in quarters of the cloth's extent",
         soft=(0.0, 0.1),
         hard=(0.0, 1.0),
         panel="Collisions",

@@ -25,8 +25,8 @@ class SphereFitSettings(Settings):
     overshoot: float = number(
         0.01,
         label="Overshoot",
-        description="Distance by which spheres may stick out, as a fraction of the mesh's longest "
-        "side; more leaves smaller gaps",
+        description="Distance by which spheres may stick out of the mesh, as a fraction of its "
+        "longest side; higher values leave smaller gaps",
         soft=(0.0, 0.05),
         hard=(0.0, 0.5),
         unit="factor",

@@ -86,7 +86,7 @@ class MarschnerSettings(Settings):
     strength_tt: float = number(
         1.0,
         label="Rim Strength",
-        description="Factor on transmitted light, seen against the light",
+        description="Factor on transmitted light, visible in backlit hair",
         soft=(0.0, 2.0),
         hard=(0.0, 100.0),
         source=_MARSCHNER,
@@ -192,8 +192,8 @@ class MarschnerSettings(Settings):
     fake_scattering: float = number(
         0.6,
         label="Fake Scattering",
-        description="Approximates light scattered between strands if Shadows with Scattering are "
-        "off",
+        description="Amount of approximate scattering between strands, used while Shadows or "
+        "Scattering are off",
         soft=(0.0, 2.0),
         hard=(0.0, 100.0),
         shown_when=when("shading.model", "marschner"),
@@ -203,7 +203,7 @@ class MarschnerSettings(Settings):
     volume_shadow: float = number(
         1.0,
         label="Volume Shadow",
-        description="Darkens the side of the groom that faces away from lights without shadows",
+        description="Darkening of the groom's side facing away from lights that cast no shadows",
         soft=(0.0, 1.0),
         hard=(0.0, 1.0),
         unit="factor",

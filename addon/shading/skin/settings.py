@@ -27,15 +27,15 @@ class SkinSettings(Settings):
     soft_shadow: bool = toggle(
         True,
         label="Soft Shadow on Skin",
-        description="Diffuse light under the skin of a head with UVs, so that the hair's shadow "
-        "has soft edges; needs shadows",
+        description="Diffuse light under the skin of a head with UVs, to soften the edges of the "
+        "hair's shadow; needs Shadows",
         source=_GREEN,
     )
     softness: float = number(
         0.008,
         label="Softness",
-        description="Distance that light spreads along the skin, as a fraction of the head's size, "
-        "which is the square root of its area",
+        description="Distance that light spreads along the skin, as a fraction of the head's size "
+        "(the square root of its area)",
         soft=(0.0, 0.04),
         hard=(0.0, 1.0),
         unit="factor",

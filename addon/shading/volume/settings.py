@@ -13,7 +13,7 @@ _ZINKE = "Zinke et al. 2008, dual scattering"
 SHADOWS = (
     ("deep", "Deep Opacity", "Layers that follow the lit side of the hair"),
     ("slices", "Opacity Slices", "Evenly spaced slices through the hair"),
-    ("none", "None", "Ambient occlusion replaces shadows"),
+    ("none", "None", "No shadows; ambient occlusion replaces them"),
 )
 _CAN_SCATTER = when("shading.model", "marschner", lack="needs Marschner")
 _SCATTERS = both(_CAN_SCATTER, when("volume.scattering", lack="needs Scattering"))
@@ -55,7 +55,7 @@ class VolumeSettings(Settings):
     slices: int = integer(
         16,
         label="Slices",
-        description="Number of slices through the hair, away from the light",
+        description="Number of slices through the hair, in the direction of the light",
         soft=(4, 64),
         hard=(4, 64),
         source=_KIM,
@@ -114,15 +114,16 @@ class VolumeSettings(Settings):
     on_body: bool = toggle(
         True,
         label="Shadow on Surface",
-        description="In 3D views with scene lights, hair as it is shown shades the head that "
-        "Blender draws. Off: Blender's own strands do, as they are at rest, and all other meshes",
+        description="In 3D views with scene lights, let the hair as shown cast its shadow on the "
+        "head drawn by Blender. If off, Blender's own strands at rest cast shadows instead, on "
+        "all meshes",
         shown_when=when("volume.shadows", "deep", "slices"),
     )
     scattering: bool = toggle(
         True,
         label="Scattering",
-        description="Multiple scattering between strands, without which light hair looks brown; "
-        "needs shadows and the model Marschner",
+        description="Compute multiple scattering between strands, without which light hair looks "
+        "brown; needs Shadows and the Marschner model",
         source=_ZINKE,
         shown_when=when("volume.shadows", "deep", "slices"),
         active_when=_CAN_SCATTER,
@@ -130,7 +131,8 @@ class VolumeSettings(Settings):
     density: float = number(
         0.88,
         label="Scatter Density",
-        description="Density of the surrounding hair: 0 is a single strand, 1 is full of hair",
+        description="Density of the surrounding hair: 0 is a single strand, 1 is completely "
+        "filled with hair",
         soft=(0.5, 1.0),
         hard=(0.0, 1.0),
         unit="factor",
