@@ -1,4 +1,4 @@
-// Adds one picture to the sum of all before it, pixel by pixel.
+// Adds one picture to the sum of the earlier ones, pixel by pixel.
 
 void main()
 {
@@ -7,7 +7,7 @@ void main()
     return;
   }
   vec4 found = texelFetch(one_sample, pixel, 0);
-  // one broken sample would break the pixel for good
+  // one NaN or infinity would spoil the pixel for good
   if (any(isnan(found)) || any(isinf(found))) {
     found = vec4(0.0, 0.0, 0.0, found.w == found.w ? clamp(found.w, 0.0, 1.0) : 0.0);
   }

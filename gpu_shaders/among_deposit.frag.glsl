@@ -1,4 +1,4 @@
-// Hair among hair, fragment stage of what CVs leave in the cells.
+// Hair among hair: deposit of CVs into the cells, fragment stage.
 void main()
 {
   cell_sums = lanes;

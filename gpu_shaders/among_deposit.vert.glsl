@@ -1,5 +1,5 @@
-// Hair among hair, vertex stage of what CVs leave in the cells: a point a CV, in the middle of the
-// texel of its cell. Blending adds whole numbers, so the sums depend on no order.
+// Hair among hair: deposit of CVs into the cells, vertex stage. One point per CV, in the middle of the
+// texel of its cell. Blending adds whole numbers, so the sums do not depend on the order.
 //
 // Twin of _sums in addon/dynamics/among.py.
 #include "lib_strand_texel.glsl"

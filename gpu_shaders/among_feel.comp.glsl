@@ -1,11 +1,11 @@
-// Hair among hair: friction changes the motion of each CV, pressure and cohesion are written down for
-// the substeps. One invocation a CV.
+// Hair among hair: applies friction to the motion of each CV, and stores pressure and cohesion for the
+// substeps. One invocation per CV.
 //
 // Twin of feel in addon/dynamics/among.py.
 #include "lib_strand_texel.glsl"
 #include "lib_among.glsl"
 
-// Twin of own_part: the part in density, and its gradient.
+// Twin of own_part: the CV's own part of the density (x), and its gradient (yzw).
 vec4 own_part(vec3 part)
 {
   vec3 far = min(part, 1.0 - part);

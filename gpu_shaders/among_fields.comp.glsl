@@ -1,4 +1,4 @@
-// Hair among hair: the sums of cells smoothed, and their slope. One invocation a cell.
+// Hair among hair: smoothed sums of the cells, and the gradient of density. One invocation per cell.
 //
 // Twin of _fields in addon/dynamics/among.py.
 #include "lib_among.glsl"

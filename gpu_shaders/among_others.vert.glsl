@@ -1,4 +1,4 @@
-// Hair among hair, vertex stage of what CVs of other hair leave in the cells around the groom.
+// Hair among hair: deposit of other hair's CVs into the cells around the groom, vertex stage.
 //
 // Twin of others_in in addon/dynamics/among.py.
 #include "lib_strand_texel.glsl"

@@ -1,4 +1,4 @@
-// Strands laid flat into the atlas, fragment stage: one sample of the outermost strand.
+// Flattened strands in the atlas, fragment stage: one sample of the outermost strand.
 //
 // SPARSE 1: some strands are thinner than a sample.
 #include "lib_atlas.glsl"

@@ -1,5 +1,5 @@
-// Strands laid flat into the atlas, vertex stage: ribbons straight from CV to CV, see
-// addon/cards/bake_strands.py. The target holds the samples of a block of the atlas.
+// Flattened strands in the atlas, vertex stage: ribbons, straight from CV to CV, see
+// addon/cards/bake_strands.py. The target holds the samples of one block of the atlas.
 #include "lib_strand_texel.glsl"
 #include "lib_atlas.glsl"
 

@@ -1,4 +1,4 @@
-// Texels of the atlas of their samples: means over those that show hair.
+// Texels of the atlas from their samples: means over the samples that show hair.
 //
 // Twin of _filtered in addon/cards/bake.py.
 #include "lib_atlas.glsl"
@@ -15,7 +15,7 @@ void main()
   float outermost = -1.0, strand_id = 0.0;
   for (int y = 0; y < {{atlas_samples}}; y++) {
     for (int x = 0; x < {{atlas_samples}}; x++) {
-      ivec2 from = texel * {{atlas_samples}} + ivec2(x + texel.y, y);  // samples lean, see Block
+      ivec2 from = texel * {{atlas_samples}} + ivec2(x + texel.y, y);  // slanted grid, see Block
       vec4 base = texelFetch(sample_base, from, 0);
       vec4 place = texelFetch(sample_place, from, 0) * base.w;
       vec4 tangent = texelFetch(sample_tangent, from, 0);

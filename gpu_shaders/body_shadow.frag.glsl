@@ -1,6 +1,5 @@
-// Hair's shadow on meshes that Blender has drawn: how much of the light hair leaves, as black that
-// lies over the finished picture. Blender lays what is drawn over its picture by the powers 2.2 of code
-// values, see lib_output.glsl.
+// Hair's shadow on meshes that Blender has drawn, as black whose alpha is the fraction of the brightness that
+// hair takes. Blender blends it over its picture in code values to the power of 2.2, see lib_output.glsl.
 #include "lib_body_shadow.glsl"
 
 void main()

@@ -1,5 +1,5 @@
-// Hair's shadow on meshes that Blender has drawn, vertex stage: the same mesh, a little nearer to the
-// eye, since Blender transforms it otherwise.
+// Hair's shadow on meshes that Blender has drawn, vertex stage: the same mesh, moved a little towards the
+// eye, since Blender's own transform rounds differently.
 const float NEARER = 5.0e-4;
 
 void main()

@@ -1,6 +1,6 @@
-// One sample of hair's shadow on meshes that Blender has drawn: an image gets x what hair takes of the
-// light on the screen and y all of it. Where other hair has stored its part before, hair takes a part of
-// what that left.
+// One sample of hair's shadow on meshes that Blender has drawn. Writes an image: y brightness on the screen
+// without hair, x the part of it that hair takes. Where other hair has already written, this hair takes a
+// fraction of what that left.
 #include "lib_body_shadow.glsl"
 
 layout(early_fragment_tests) in;
@@ -12,7 +12,7 @@ void main()
   ivec2 pixel = ivec2(gl_FragCoord.xy);
   vec2 before = imageLoad(taken_and_all, pixel).xy;
   float fraction = (before.y > 0.0 ? 1.0 - before.x / before.y : 1.0) * on_screen.y / on_screen.x;
-  // maps of other hair may know of more meshes in the way of light
+  // the maps of other hair may hold other meshes that block light
   float most = max(before.y, on_screen.x);
   imageStore(taken_and_all, pixel, vec4(most * (1.0 - fraction), most, 0.0, 0.0));
   color = vec4(0.0);

@@ -1,5 +1,5 @@
-// A picture made smaller by a whole factor: each pixel is the mean of its samples.
-// The colours are premultiplied by alpha, so that the mean is the right one at edges as well.
+// Downsampling by a whole factor: each pixel is the mean of its samples.
+// Colours are premultiplied by alpha, so that the mean is right at edges as well.
 
 void main()
 {

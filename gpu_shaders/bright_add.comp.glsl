@@ -1,4 +1,4 @@
-// Back from polar coordinates into the picture.
+// Adds blurred bright parts from polar coordinates to the picture.
 // Twin of from_polar and bright_shafts in addon/shading/.
 #include "lib_shafts.glsl"
 

@@ -1,4 +1,4 @@
-// One region of what is bright, to polar coordinates and blurred along the radius; a thread a ray.
+// Transforms one bright region to polar coordinates and blurs it along the radius; one invocation per ray.
 // Twin of to_polar, weights_on and radial_blur in addon/shading/.
 #include "lib_shafts.glsl"
 

@@ -1,4 +1,4 @@
-// Sums over cells: luminance, that times x and y, and how surely it is bright.
+// Sums over cells: luminance, luminance times x and times y, and the certainty that pixels are bright.
 // Twin of bright_cells in addon/shading/bright_shafts.py.
 #include "lib_bright.glsl"
 

@@ -1,7 +1,7 @@
-// What is bright in a picture over what lies behind it, and how surely it is.
+// The bright part of a picture composited over its background, and the certainty that it is bright (w).
 // Twin of bright_part in addon/shading/bright_shafts.py.
 //
-// What lies behind has the size of the picture, or one texel that stands for all.
+// The background has the size of the picture, or is one texel for all of it.
 #include "lib_bright.glsl"
 
 void main()
@@ -13,7 +13,7 @@ void main()
   vec4 over = texelFetch(seen, pixel, 0);
   vec4 under = texelFetch(behind, min(pixel, textureSize(behind, 0) - 1), 0);
   vec3 color = over.rgb + (1.0 - over.a) * under.rgb;
-  // comparisons with what is no number are false
+  // comparisons with NaN are false
   color = vec3(color.r >= 0.0 ? min(color.r, largest) : 0.0,
                color.g >= 0.0 ? min(color.g, largest) : 0.0,
                color.b >= 0.0 ? min(color.b, largest) : 0.0);

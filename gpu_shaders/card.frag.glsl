@@ -1,9 +1,10 @@
 // Cards, fragment stage: strands in textures, see addon/shading/textures.py.
 //
-// PRIME 1: depth alone, of opaque pixels. CLIPPED 1: pixels of alpha_range alone; without it nothing
-// is left out here, so that the depth test may come first. TANGENT_MAP 1: a map says which way strands
-// run, in place of the shift texture. LAYERED 1: shells, see addon/cards/shells.py. NORMAL_MAP 1: a map bends the normal. SHADOWS of hair on hair, and SCATTERING from strand to strand, as strands have
-// them; where a light has no map, the occlusion stands in.
+// PRIME 1: only the depth of opaque pixels. CLIPPED 1: only pixels in alpha_range; without it there is no
+// discard, so that the early depth test works. TANGENT_MAP 1: a map of strand directions replaces the shift
+// texture. LAYERED 1: shells, see addon/cards/shells.py. NORMAL_MAP 1: a map bends the normal. SHADOWS of
+// hair on hair, and SCATTERING from strand to strand, as for strands; for a light without a map, the
+// occlusion is used.
 #include "lib_card_texture.glsl"
 #if PRIME
 void main()
@@ -109,7 +110,7 @@ void main()
   float covered = is_opaque == 1 ? 1.0 : alpha;
 #  if CLIPPED
   if (alpha < alpha_range.x || alpha >= alpha_range.y) {
-    discard;  // at the end, because derivatives want all pixels until then
+    discard;  // at the end, because derivatives need all pixels until then
   }
 #  endif
   color = vec4(output_encoded(radiance, output_encoding) * covered, covered);

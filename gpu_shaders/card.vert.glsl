@@ -1,5 +1,5 @@
-// Cards, vertex stage. Both the pass that primes the depth and those that shade run this, and a
-// later one meets depths that are EQUAL only where the same place comes out to the bit: `precise`.
+// Cards, vertex stage. The pass that primes the depth and those that shade both run it. The depth test
+// EQUAL passes only for bit-identical positions, hence `precise`.
 #include "lib_skin_seen.glsl"
 
 void main()

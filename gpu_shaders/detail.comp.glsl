@@ -1,10 +1,10 @@
-// The detail factors of each strand's segments in one view, and its pieces in all, 0 where the head
-// hides it, and how far it is on average; one invocation a strand. MODE and CULLING are the
-// choices of DetailSettings.
+// For each strand in one view: the detail factors of its segments, the sum of its pieces, 0 where the head
+// hides it, and its mean depth. One invocation per strand. MODE and CULLING are the choices of
+// DetailSettings.
 //
-// COUNTED: also what the strand asks for, see addon/render/detail_slots.py: x half its mean width in pixels,
-// y fragments that it may have at most, z of these those that a strand without a width has, w as many as one
-// would have that is no thinner than THIN_STRAND.
+// COUNTED: also the demand of each strand, see addon/render/detail_slots.py: x half its mean width [pixels],
+// y an upper bound of its fragments, z that bound at zero width, w that bound at a half width of THIN_STRAND
+// at least.
 #include "lib_strand_texel.glsl"
 #include "lib_culling.glsl"
 #include "lib_detail.glsl"
@@ -25,8 +25,7 @@ float length_in_picture(Control control)
   return min(size, most);
 }
 
-// Pixels that a ribbon covers a fraction of: it reaches their centres from coverage_reach() beyond its edges,
-// at most.
+// Width in which a ribbon of zero width partly covers pixels: coverage_reach() on both sides, at most.
 const float EDGES = 2.0 * 0.7072;
 
 float pixels_covered(float pixels_long, float half_width)
@@ -46,7 +45,7 @@ void main()
   vec3 root = texelFetch(cv_points, span.first, 0).xyz;
   vec3 from = root;
   vec3 to = texelFetch(cv_points, span_texel(span, 1), 0).xyz;
-  vec3 before = 2.0 * from - to;  // beyond its ends the strand goes on straight
+  vec3 before = 2.0 * from - to;  // the strand is extended straight beyond its ends
   vec4 clip_before = seen.view_projection * vec4(before, 1.0);
   vec4 clip_from = seen.view_projection * vec4(from, 1.0);
   vec4 clip_to = seen.view_projection * vec4(to, 1.0);
@@ -128,7 +127,7 @@ void main()
   imageStore(asked, counted_texel(strand), wanted_by);
 #endif
 #if MODE == {{mode_fixed}}
-  depth = 0.0;  // where no strand is left out there is one draw, in which strands keep their order
+  depth = 0.0;  // so strands keep their order, as in the one draw where none are culled
 #endif
   imageStore(totals, counted_texel(strand), vec4(float(total), depth / float(span.count), 0.0, 0.0));
 }

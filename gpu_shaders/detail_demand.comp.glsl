@@ -1,4 +1,4 @@
-// Adds up what strands ask for, one invocation a strand; see addon/render/detail_slots.py.
+// Sums the demand of all strands, one invocation per strand; see addon/render/detail_slots.py.
 #include "lib_strand_texel.glsl"
 #include "lib_detail_slots.glsl"
 
@@ -13,7 +13,7 @@ void main()
   if (pieces == 0 || texelFetch(strand_widths, texel, 0).x <= 0.0) {
     return;
   }
-  float most = 4.0e9 / float(strand_count);  // sums are not to begin again at 0
+  float most = 4.0e9 / float(strand_count);  // so that sums do not overflow
   vec3 fragments = min(texelFetch(asked, texel, 0).yzw, vec3(most));
   imageAtomicAdd(demand, ivec2(DEMAND_SLOTS, 0), uint(slots_wanted(pieces, slot_pieces)));
   imageAtomicAdd(demand, ivec2(DEMAND_STRANDS, 0), 1u);

@@ -1,12 +1,12 @@
-// Puts strands that move into slots, one invocation a strand; see addon/render/detail_slots.py.
+// Assigns slots to moving strands, one invocation per strand; see addon/render/detail_slots.py.
 //
-// If all slots that are wanted are more than there are, each strand has one, and a fair part of what is
-// left. If there are more fragments than have room, a part of all strands is drawn, and wider: as much
-// wider as makes up for the rest, or, where wide strands then have no room, no wider than THIN_STRAND.
+// If strands want more slots than there are, each gets one and a proportional part of the rest. If there are
+// more fragments than fit, only a fraction of the strands is drawn, and wider: wide enough to make up for
+// the others, or, where wide strands would not fit either, no wider than THIN_STRAND.
 #include "lib_strand_texel.glsl"
 #include "lib_detail_slots.glsl"
 
-// a little less than all, so that rounding takes no slot too many
+// a little less than 1, so that rounding never takes too many slots
 const float NEARLY = 0.9999;
 
 float demanded(int number)

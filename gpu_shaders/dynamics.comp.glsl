@@ -1,11 +1,13 @@
-// One frame of dynamics: one invocation a guide, which goes through all substeps.
+// Substeps of a frame of dynamics: one invocation per guide, which loops over all of them.
 //
-// Twin of advance in addon/dynamics/step.py. Defines: CV_COUNT; RELAXATION;
-// IS_PAINTED, where guides have numbers of their own; HAS_HELD; HAS_SPRINGS; HAS_PUSHES, where hair feels other hair; HAS_AIR; HAS_FORCE_FIELDS; CONTACT_SLOTS, 0 where there are no colliders; HAS_ROUNDS and HAS_FIELDS, the
-// kinds of colliders; INHERITS, where hair takes over some of its head's motion; HAS_SHARP, HAS_FOLLOWED and HAS_CLEARANCE, see lib_contacts.glsl.
+// Twin of advance in addon/dynamics/step.py. Defines: CV_COUNT; RELAXATION; IS_PAINTED, where guides have
+// numbers of their own; HAS_HELD; HAS_SPRINGS; HAS_PUSHES, where hair feels other hair; HAS_AIR;
+// HAS_FORCE_FIELDS; CONTACT_SLOTS, 0 where there are no colliders; HAS_ROUNDS and HAS_FIELDS, the kinds of
+// colliders; INHERITS, where hair inherits some of its head's motion; HAS_SHARP, HAS_FOLLOWED and
+// HAS_CLEARANCE, see lib_contacts.glsl.
 //
-// Loops of an unknown number of turns ask at their end: drivers on CPUs go once more through the
-// body of one that asks at its begin, with nothing to do.
+// Loops without a constant count test their condition at the end: drivers on CPUs run the body of a loop
+// that tests at the begin once more, masked out.
 #include "lib_strand_texel.glsl"
 #include "lib_guide.glsl"
 #include "lib_forces.glsl"
@@ -24,7 +26,7 @@
 #include "lib_contacts.glsl"
 #endif
 
-#define NO_RADIUS -1.0e30  // of CVs that colliders do not move
+#define NO_RADIUS -1.0e30  // for CVs that colliders do not move
 
 vec3 style_before[CV_COUNT];
 vec3 style_displacement[CV_COUNT];
@@ -35,19 +37,19 @@ vec3 twist_curvature;
 #ifdef HAS_SPRINGS
 bool is_curled = false;
 #endif
-float own_kept;           // as in the block, or as this guide is painted
+float own_kept;           // of the block, or painted for this guide; so the next three
 float own_air;
-float own_carried = 1.0;  // by which what the moving style gives is multiplied
+float own_carried = 1.0;  // factor on the motion that the moving style gives
 float own_gravity = 1.0;
-vec3 fall[FREE_SIZE];  // [m] that gravity and other hair add to each free CV in a substep
+vec3 fall[FREE_SIZE];  // [m] displacement of each free CV by gravity and other hair in a substep
 
-// Where something is carried, see Carry in addon/dynamics/rigid_path.py, and what else its texels say.
+// A rigid motion, see Carry in addon/dynamics/rigid_path.py.
 struct Carry {
-  vec4 row[3];  // xyz of the rotation, w a coordinate of where the origin goes
-  vec4 origin;
+  vec4 row[3];  // xyz of the rotation, w a coordinate of the moved origin
+  vec4 origin;  // xyz; w another number, see dynamics_pass
 };
 
-// In `carriers`, see dynamics_pass. What is the same for all substeps lies in the last row.
+// A motion in `carriers`, see dynamics_pass. The last row has those that are the same for all substeps.
 Carry carry_at(int number, int texel)
 {
   Carry carry;
@@ -65,8 +67,8 @@ vec3 carried(Carry carry, vec3 point)
          vec3(carry.row[0].w, carry.row[1].w, carry.row[2].w);
 }
 
-// [m] that the motion of the style gives each free CV in the substep, beyond what it inherits, where it
-// goes on an arc; else zero
+// [m] motion of the style at each free CV in the substep, beyond the inherited motion, where the style moves
+// along an arc; else zero
 vec3 style_moved[FREE_SIZE];
 float arc_carried;  // fraction of its motion that the style gives, 0 where there is no arc
 #ifdef INHERITS
@@ -74,7 +76,8 @@ Carry inherited;         // in this substep
 Carry inherited_before;  // in the one before
 #endif
 
-// Where a CV is and was as it takes over its head's motion, before anything else acts on it.
+// Position and previous position of a CV after it has inherited its head's motion, before anything else acts
+// on it.
 vec3 inheriting(vec3 here)
 {
 #ifdef INHERITS
@@ -91,7 +94,7 @@ vec3 inheriting_before(vec3 before)
   return before;
 }
 
-// How the path of a point is bent, times r (r + 1); twin of curvature in addon/dynamics/trajectory.py.
+// Curvature of a point's path, times r (r + 1); twin of curvature in addon/dynamics/trajectory.py.
 vec3 curvature_of(vec3 earlier, vec3 before, vec3 displacement)
 {
   return earlier - before + displacement * frame.fall.w;
@@ -169,7 +172,7 @@ void load_guide(int guide)
   }
 }
 
-// Halfway through the frame.
+// Position of the style halfway through the frame.
 vec3 middle_of_style(int cv)
 {
   vec3 middle = style_before[cv] + 0.5 * style_displacement[cv];
@@ -197,14 +200,14 @@ void find_fall(int guide)
   }
 }
 
-// Where a CV was, so that its speed is what drag leaves of it.
+// Previous position of a CV that gives it the speed after drag.
 vec3 slowed(vec3 here, vec3 before, vec3 air_displacement)
 {
   return frame.drag > 0.0 ? braked(here, before, frame.drag, air_displacement) : before;
 }
 
 #ifdef HAS_FORCE_FIELDS
-vec3 blown[FREE_SIZE];  // [m] by which force fields move each free CV in a substep
+vec3 blown[FREE_SIZE];  // [m] displacement of each free CV by force fields in a substep
 
 void feel_fields(vec3 air_displacement)
 {
@@ -240,8 +243,8 @@ void predict(vec4 moment, vec3 air_displacement)
   }
 }
 
-// A held CV goes no farther from the one held before it than its length along the strand reaches. Two
-// that are neighbours keep their distance.
+// Pin held CVs, each no farther from the previous held one than the length of the strand between them.
+// Neighbouring held CVs keep exactly that distance.
 void pin_held()
 {
 #ifdef HAS_HELD
@@ -280,11 +283,11 @@ void keep_lengths(bool has_normals)
 #endif
 }
 
-// Contacts and lengths in turn, then lengths alone until they fit.
+// Alternate contacts and lengths, then solve lengths alone until they are within the tolerance.
 void keep_outside()
 {
 #if CONTACT_SLOTS > 0
-  int passes = frame.contact_passes;  // one at least
+  int passes = frame.contact_passes;  // at least one
 #ifdef HAS_SHARP
   passes *= part_fraction < 1.0 ? {{part_passes}} : 1;
 #endif
@@ -304,7 +307,7 @@ void keep_outside()
 #if CONTACT_SLOTS > 0
   int round_number = 0;
   bool is_again = true;
-  do {  // once more in turn where lengths have drawn the guide into a collider
+  do {  // another round where the length solve has pulled the guide into a collider
 #endif
   int number = 0;
   if (is_off) {
@@ -339,9 +342,9 @@ void keep_outside()
 }
 
 #ifdef HAS_SHARP
-vec3 went[CV_COUNT];  // [m] that each CV has gone in parts, less what contacts took of its speed
+vec3 went[CV_COUNT];  // [m] sum of each CV's displacements in parts, without what contacts absorbed
 
-// To the begin of the substep. From here on `previous` says how far each CV goes in the next part.
+// Go back to the begin of the substep. From here on position - previous is a CV's path in the next part.
 void begin_parts()
 {
   for (int cv = 0; cv < CV_COUNT; cv++) {
@@ -359,7 +362,7 @@ void begin_part(bool is_last)
     previous[cv] = position[cv];
     position[cv] += path;
   }
-  if (is_last) {  // what is carried, without rounding
+  if (is_last) {  // carried CVs, without accumulated rounding
     position[0] = style[0];
     position[1] = style[1];
     pin_held();
@@ -375,7 +378,7 @@ void end_part(bool is_last)
 }
 #endif
 
-// Lengths and contacts of a substep; in parts, from its begin, where the guide meets something fast.
+// Lengths and contacts of a substep; repeated in parts, from its begin, if the guide meets a fast collider.
 void go_outside(int number)
 {
 #ifdef HAS_SHARP

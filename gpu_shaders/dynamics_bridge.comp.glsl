@@ -1,6 +1,7 @@
-// Guides at a frame's very end: moved as a whole to where their roots are, and what is held to where
-// it is held, which bridges the time that is left over; turned about their roots as these turn, where they inherit it; between there and their style where not all
-// of them is simulated. One invocation a CV. Defines: HAS_HELD, IS_TURNED, IS_BLENDED.
+// Guides at the exact end of a frame. To bridge the time since the last substep, each guide is moved as a
+// whole to its root, and held CVs to where they are held; IS_TURNED: turned about its root by the inherited
+// rotation. IS_BLENDED: blended with its style where guides are only partly simulated. One invocation per
+// CV. Defines: HAS_HELD, IS_TURNED, IS_BLENDED.
 //
 // Twin of grid_at_frame_end in addon/dynamics/step.py, and of blended in addon/dynamics/blend.py.
 #include "lib_strand_texel.glsl"

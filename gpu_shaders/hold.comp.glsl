@@ -1,5 +1,5 @@
-// Strands that ride on guides, brought to where ties and surfaces hold them; one invocation a strand
-// that is held. Twin of hold in addon/refine/hold.py.
+// Moves strands that ride on guides to where ties and surfaces hold them; one invocation per held
+// strand. Twin of hold in addon/refine/hold.py.
 #include "lib_strand_texel.glsl"
 
 #define SWEEPS {{hold_sweeps}}
@@ -17,7 +17,7 @@ void put(StrandSpan span, int cv, vec3 point)
   imageStore(cv_points, texel, vec4(point, imageLoad(cv_points, texel).w));
 }
 
-// Of the segment from a CV to the next one, at rest.
+// Length at rest of the segment from a CV to the next one.
 float length_from(StrandSpan span, int cv)
 {
   vec3 here = texelFetch(rest_points, span_texel(span, cv), 0).xyz;
@@ -32,7 +32,7 @@ void put_beside(StrandSpan span, int cv, int other, float away)
   put(span, cv, place + offset * (away / max(length(offset), TINY)));
 }
 
-// Where a point of a strand at rest is carried by an anchor.
+// Position to which an anchor carries a point of a strand at rest.
 vec3 carried(StrandSpan span, int cv, int anchor)
 {
   vec4 rest = vec4(texelFetch(rest_points, span_texel(span, cv), 0).xyz, 1.0);
@@ -43,7 +43,7 @@ vec3 carried(StrandSpan span, int cv, int anchor)
   return place;
 }
 
-// Bring a strand to one hold; `before` is the last CV that is held so far. Returns the next such.
+// Bring a strand to one hold. before: the last CV that is held so far; returns the next such CV.
 int bring(StrandSpan span, int number, int before, float whole_length)
 {
   vec2 hold = texelFetch(holds, counted_texel(number), 0).xy;  // place, anchor

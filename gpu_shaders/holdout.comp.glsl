@@ -1,4 +1,4 @@
-// What was drawn beside a picture, cut out of it; premultiplied by alpha.
+// Cuts holes out of a picture, premultiplied by alpha, by the alpha of another one.
 
 void main()
 {

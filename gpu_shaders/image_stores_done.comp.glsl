@@ -1,3 +1,3 @@
-// Does nothing: but what draws before it have stored, can be read after it.
+// Does nothing, but after it, image stores of earlier draws can be read.
 
 void main() {}

@@ -1,6 +1,6 @@
-// How much hair of another groom lies between the first lights and each of the places in a texture: added
-// to what is in the way already, a channel a light. Places have a number in w: those with the groom's own
-// have it in their way anyway, and negative ones are none.
+// Adds the optical depth of one groom's hair between the first lights and each place in a texture to that of
+// other grooms; a channel per light. Places have a number in w: those with the groom's own number already get
+// its shadow from its maps, and negative numbers mark texels without a place.
 #include "lib_opacity_look_up.glsl"
 
 void main()

@@ -1,5 +1,5 @@
-// A picture of strands that was kept, into the target once more: their colour, or the depth of those that
-// hide more than half of what lies behind them.
+// Shows a kept picture of strands again: their colour, or the depth of hair that hides more than half of
+// what lies behind it.
 
 void main()
 {

@@ -1,26 +1,27 @@
-// Strands that ride on guides, led out of colliders.
+// Leads strands that ride on guides out of colliders.
 // Twin of lead_out in addon/refine/lead_out.py, in steps over points first_point to point_end - 1 of
-// each strand: software drivers end a shader after 65,535 rounds of all its loops.
+// each strand: software drivers end a shader after 65,535 iterations of all its loops.
 //
-//   IS_HELD     _hold: writes `states`, and cv_points of strands that go with their roots at first
-//   IS_NEAR     which strands are too near: writes `states`
-//   IS_COUNTED  how many of these each block of strands has: writes `near_counts`
-//   IS_LISTED   which: writes `near_strands`, one after the other, and behind all how many there are,
-//               so that the next steps lose no lanes to the others
-//   IS_BENT     bends those that were bent in the frame before: changes cv_points, and in `leans` is then
-//               by how much each segment of these is bent
-//   IS_LED      leads them: writes `led_points`
-//   IS_PUT      copies these into cv_points, adds to `leans` how that has bent them
+//   IS_HELD     _hold: moves the first points of strands rigidly with their roots; writes `states`,
+//               cv_points
+//   IS_NEAR     finds strands that are too near to colliders; writes `states`
+//   IS_COUNTED  counts these in each block of strands; writes `near_counts`
+//   IS_LISTED   lists them; writes `near_strands`, one after the other and their number behind the
+//               last, so that the next steps have no idle lanes
+//   IS_BENT     bends those that were bent in the frame before; changes cv_points, and sets `leans` to
+//               the bend of each segment
+//   IS_LED      leads them out; writes `led_points`
+//   IS_PUT      copies `led_points` into cv_points, and adds the bend by that to `leans`
 //
-// Where drivers bear it, the first two are done as strands ride, see ride.comp.glsl, and the last three
-// are one program.
-// One invocation a strand, a block of strands in IS_COUNTED and IS_LISTED; in IS_BENT, IS_LED and IS_PUT
-// every lane_count-th of the strands that are too near.
+// Where drivers allow it, the first two steps are done as strands ride, see ride.comp.glsl, and the last
+// three are one program.
+// One invocation per strand, per block of strands in IS_COUNTED and IS_LISTED; in IS_BENT, IS_LED and IS_PUT
+// one for every lane_count-th of the strands that are too near.
 //
-// states: x 1 where the strand is moved, 2 where it was bent in the frame before, y its first point that
-// is too near, 0 for none, z by how much [m] any point is nearer than it must be, after IS_PUT by how much
-// any segment is bent, w 1 when it is out. The fourth number of strand_spans is the last point that goes
-// with the root. clearances: how far [m] a point stays from colliders.
+// states: x 1 where the strand is moved, 2 where it was bent in the frame before; y its first point that is
+// too near, 0 for none; z the largest amount [m] by which a point is too near, after IS_PUT the largest bend
+// of a segment; w 1 once the strand is out. The fourth number of strand_spans is the last point that moves
+// rigidly with the root. clearances: distance [m] that a point keeps from colliders.
 #include "lib_strand_texel.glsl"
 #if defined(IS_NEAR) || defined(IS_LED)
 #include "lib_signed_distance.glsl"
@@ -54,7 +55,7 @@ vec3 riding_at(StrandSpan span, int point)
 #include "lib_root_frame.glsl"
 
 #if defined(IS_HELD) || defined(IS_NEAR) || defined(IS_LED) || defined(IS_PUT)
-// Where the root of a strand carries it.
+// Motion of a strand's root.
 RootMotion motion_of(int strand)
 {
   return root_motion_at(root_motions, min(strand, mover_count - 1));
@@ -67,7 +68,7 @@ vec3 carried_at(StrandSpan span, int point, RootMotion motion)
 #endif
 
 #if defined(IS_NEAR) || defined(IS_LED)
-// How far [m] a point stays from colliders that rides so far from where its root carries it.
+// Distance [m] that a point keeps from colliders. away: its distance from where its root carries it [m].
 float wanted_at(StrandSpan span, int point, float away)
 {
   return min(texelFetch(clearances, span_texel(span, point), 0).x + away, kept);
@@ -92,7 +93,7 @@ void take(int strand, StrandSpan span, int end)
     vec3 place = point > last ? riding.xyz + shift : carried_at(span, point, motion);
     imageStore(cv_points, texel, vec4(place, riding.w));
   }
-  // a strand that was bent in the frame before is led on from its root
+  // a strand that was bent in the frame before is led out from its root on
   bool was_bent = imageLoad(states, counted_texel(strand)).z > turned_back;
   float is_moved = was_bent ? 2.0 : last > 0 ? 1.0 : 0.0;
   vec4 state = vec4(is_moved, was_bent ? 1.0 : 0.0, 0.0, 0.0);
@@ -131,7 +132,7 @@ void bend(int strand, StrandSpan span)
     vec3 lean = imageLoad(leans, texel).xyz;
     lean *= max(1.0 - turned_back / max(length(lean), TINY), 0.0);
     vec3 bent = at_length(vec3(0.0), along + lean, length(segment));
-    bool is_lean = lean != vec3(0.0);  // what is not bent stays bit for bit
+    bool is_lean = lean != vec3(0.0);  // segments without a bend stay bit-identical
     shift += is_lean ? bent - segment : vec3(0.0);
     imageStore(leans, texel, vec4(is_lean ? direction_of(bent) - along : vec3(0.0), 0.0));
     imageStore(cv_points, texel, vec4(riding.xyz + shift, riding.w));
@@ -141,7 +142,7 @@ void bend(int strand, StrandSpan span)
 #endif
 
 #ifdef IS_LED
-// Evenly over the sphere, on a spiral by the golden angle.
+// Directions spread evenly over the sphere, on a spiral by the golden angle.
 vec3 direction(int number)
 {
   float height = 1.0 - (2.0 * float(number) + 1.0) / float(TRIES);
@@ -150,9 +151,9 @@ vec3 direction(int number)
   return vec3(radius * cos(angle), radius * sin(angle), height);
 }
 
-// xyz: the end of a segment that is turned until it is out; w: by how much [m] it is nearer than `goal`
-// all the same. `toward`: where its root carries it, of length 1: tried as well, since that does not
-// jump from frame to frame.
+// xyz: the end of a segment, turned until it is out; w: by how much [m] it is still nearer than `goal`.
+// toward: unit direction in which its root carries it; tried first, since it does not jump from frame to
+// frame.
 vec4 turned_out(Solid solid, vec3 start, vec3 arm, float size, vec3 toward, float goal)
 {
   arm /= max(size, TINY);
@@ -162,7 +163,7 @@ vec4 turned_out(Solid solid, vec3 start, vec3 arm, float size, vec3 toward, floa
   for (int number = -1; number < TRIES; number++) {
     vec3 tried = number < 0 ? toward : direction(number);
     float lack = goal - signed_distance(solid, start + size * tried, goal).w;
-    // the nearest that leads out; if none does, the one that lacks least
+    // the nearest direction that leads out; if none does, the one that lacks least
     float worth = lack > 0.0 ? -2.0 - lack : dot(tried, arm);
     out_of = worth > best ? tried : out_of;
     left = worth > best ? max(lack, 0.0) : left;
@@ -183,16 +184,16 @@ vec4 turned_out(Solid solid, vec3 start, vec3 arm, float size, vec3 toward, floa
   return vec4(at_length(start, arm + high * (out_of - arm), size), high < 1.0 ? 0.0 : left);
 }
 
-// How far [m] the end of a segment goes straight out, so that it is out by `lack` [m] when it is back
-// at its length.
+// How far [m] to move the end of a segment along the normal, so that it is farther out by `lack` [m] once
+// the segment is back at its length.
 float going_out(vec3 arm, vec3 outward, float size, float lack)
 {
   float along = dot(arm, outward) / max(size, TINY);
   return lack / max(1.0 - along * along, {{lead_steepest}});
 }
 
-// One attempt on some points of a strand from the first that is too near on, each farther out than it
-// must be.
+// One attempt to lead some points of a strand out, from the first that is too near on. farther: additional
+// distance [m] from colliders.
 void lead(StrandSpan span, int begin, int end, RootMotion motion, float farther, inout vec4 state)
 {
   if (begin >= end) {
@@ -207,7 +208,7 @@ void lead(StrandSpan span, int begin, int end, RootMotion motion, float farther,
   }
   Solid solid = solid_at(0);
   int point = begin;
-  // point after point straight out, until one must turn: so strands side by side turn at once
+  // move points straight out until one must turn: so that neighbouring invocations turn at the same time
   do {
     vec3 arm = vec3(0.0);
     vec3 carried = vec3(0.0);
@@ -225,7 +226,7 @@ void lead(StrandSpan span, int begin, int end, RootMotion motion, float farther,
       vec4 found = signed_distance(solid, here, kept + farther);
       float lack = goal - found.w;
       bool is_out = lack <= {{lead_slack}} * kept;
-      // from deep inside of a collider the way out changes its side
+      // deep inside a collider the normal may point to its other side
       is_stuck = !is_out && (sweep == SWEEPS || lack > {{lead_deepest}} * size);
       arm = here - start;
       arm += is_stuck ? vec3(0.0) : found.xyz * going_out(arm, found.xyz, size, lack);
@@ -275,7 +276,7 @@ void put(int strand, StrandSpan span)
 {
   vec4 state = imageLoad(states, counted_texel(strand));
   RootMotion motion = motion_of(strand);
-  bool is_stuck = state.z > kept;  // then it is as its root carries it
+  bool is_stuck = state.z > kept;  // then the strand stays where its root carries it
   bool was_bent = state.x > 1.5;
   vec3 riding_start = riding_at(span, 0);
   vec3 start = riding_start;

@@ -1,21 +1,21 @@
-// The grid around hair that feels other hair: where a CV is in it, and where a cell is in its texture.
+// The grid in which hair feels other hair: the cell of a CV, and the texel of a cell.
 //
 // Twin of addon/dynamics/among.py. Holds no resources.
 
 // A CV in the grid.
 struct AmongCv {
   vec3 motion;  // world [m] in a substep
-  ivec3 low;    // lowest of the eight cells whose middles are around it
-  vec3 part;    // how far it is from that middle to the next
+  ivec3 low;    // lowest of the eight cells whose centres surround it
+  vec3 part;    // position between that cell's centre (0) and the next one's (1)
 };
 
-// Sums over products in the order of numpy.
+// Dot product with the same order of additions as in numpy.
 float along_row(vec4 row, vec3 beside)
 {
   return row.x * beside.x + row.y * beside.y + row.z * beside.z;
 }
 
-// From the world to cells.
+// A point of the world in cells.
 vec3 among_cells(Among among, vec3 point)
 {
   vec3 beside = point - among.middle.xyz;
@@ -31,7 +31,7 @@ AmongCv among_cv(Among among, vec3 here, vec3 before)
   return AmongCv(motion, ivec3(corner), cells - corner);
 }
 
-// Mass, and motion in whole parts of a cell times mass.
+// x mass; yzw mass times motion, rounded to whole parts of a cell.
 vec4 among_lanes(Among among, vec3 motion, float mass)
 {
   vec3 whole = clamp(motion * among.whole, vec3(-{{among_limit}}), vec3({{among_limit}}));
@@ -44,7 +44,7 @@ ivec3 among_wrapped(ivec3 cell, ivec3 counts)
   return cell - counts * ivec3(floor((vec3(cell) + 0.5) / vec3(counts)));
 }
 
-// Where a point is drawn that adds to a cell.
+// Clip position of a point that adds to a cell.
 vec4 among_place(Among among, ivec3 cell)
 {
   ivec3 counts = among.counts.xyz;

@@ -1,10 +1,10 @@
-// Angles whose sine and cosine are known; GLSL promises little of its own asin and atan, and Mesa's
-// are off by 2e-5, which a narrow highlight shows.
+// Angles from their sine and cosine. GLSL guarantees little precision for asin and atan, and Mesa's
+// are off by 2e-5, which is visible in a narrow highlight.
 //
 // Holds no resources.
 #include "lib_pi.glsl"
 
-// From 0 to pi. The angle over its sine as a polynomial of the cosine, within 1e-7.
+// An angle from 0 to pi: its sine times a polynomial of its cosine, within 1e-7.
 float angle_of(float sine, float cosine)
 {
   float x = abs(cosine);

@@ -1,4 +1,4 @@
-// Strands in an atlas: what a sample sees of a round strand, and which samples of thin ones count.
+// Strands in an atlas: the normal of a round strand at a sample, and which samples of thin ones count.
 //
 // Twin of addon/cards/bake.py: same names. Holds no resources.
 
@@ -11,15 +11,15 @@ vec3 fibre_normal(vec3 tangent, float side)
   return right * side + cross(right, tangent) * sqrt(max(1.0 - side * side, 0.0));
 }
 
-// Whether a sample of a ribbon that was widened counts: this fraction of them does, evenly spread by the R2
-// sequence of Roberts 2018.
+// Whether a sample of a widened ribbon counts. This fraction of the samples does, evenly spread by the R2
+// sequence (Roberts 2018).
 bool is_counted(uint column, uint row, uint strand, float fraction)
 {
   uint place = column * {{sparse_step_x}}u + row * {{sparse_step_y}}u + strand * {{sparse_step_z}}u;
   return float(place & {{sparse_mask}}u) < fraction * float({{sparse_mask}}u + 1u);
 }
 
-// Where a place of the atlas, in 0..1, is among the samples of a block of it: Block.leaning.
+// A place of the atlas, in 0..1, in the slanted sample grid of one of its blocks; twin of Block.leaning.
 vec2 leaning(vec2 place, float size, vec2 start)
 {
   vec2 upright = (place * size - start) * float({{atlas_samples}});

@@ -1,9 +1,9 @@
-// A segment of a guide between its style and its simulation.
+// Blend of a guide's segment between its style and its simulation.
 //
 // Twin of addon/dynamics/blend.py.
 
-// fraction: 0 is the style, 1 the simulation. Where both point against each other, the simulation's
-// direction.
+// fraction: 0 is the style, 1 the simulation. Where the two point in opposite directions, the simulation's
+// is used.
 vec3 blended_segment(vec3 simulated, vec3 style, float fraction)
 {
   float simulated_length = length(simulated);

@@ -1,7 +1,8 @@
-// How much of the light on a matt body hair takes, as it is seen on the screen.
+// Brightness on the screen of a matt body with and without the shadow of hair.
 //
-// What a colour of the picture becomes depends on its view transform; skin stands for all. Reads what both
-// recipes of body_shadow.py have: view, lights, maps, body_color, hair_forward.
+// The view transform is not linear, so the ratio of the two depends on the body's colour; that of skin is
+// taken for all bodies. Reads what both recipes of body_shadow.py declare: view, lights, maps, body_color,
+// hair_forward.
 #include "lib_bright.glsl"
 #include "lib_lights.glsl"
 #include "lib_environment.glsl"
@@ -18,8 +19,8 @@ float shown(vec3 radiance)
   return luminance_of(written);
 }
 
-// Brightness on the screen at a place of a mesh: x with all light, y with what hair leaves of it. Where
-// there is no light at all hair takes none.
+// Brightness on the screen at a place of a mesh: x without hair, y in the shadow of hair. NO_LIGHT is added
+// to both, so that their ratio is 1 where there is no light.
 //   facet: see facing_normal.
 vec2 all_and_left(vec3 point, vec3 normal, vec3 facet)
 {

@@ -1,15 +1,15 @@
-// How much hair a card stands for in opacity maps.
+// Optical depth of hair cards in opacity maps.
 //
-// Twin of addon/shading/volume/card_opacity.py: what it means is written there. Holds no resources.
+// Twin of addon/shading/volume/card_opacity.py, which explains the model. Holds no resources.
 
-// tau that light meets in a card of thickness 1.
+// tau of a card of thickness 1.
 float card_optical_depth(float alpha)
 {
   return -log(1.0 - min(alpha, {{max_alpha}}));
 }
 
-// |cos| of the turn about its strands by which a card faces a direction. `across`: normal of its plane, of
-// any length.
+// |cos| of the angle, measured about the card's strands, between the card's normal and a direction.
+// `across`: normal of its plane, of any length.
 float turned_facing(vec3 across, vec3 tangent, vec3 direction)
 {
   vec3 turned = direction - dot(direction, tangent) * tangent;
@@ -17,8 +17,8 @@ float turned_facing(vec3 across, vec3 tangent, vec3 direction)
   return size > 0.0 ? abs(dot(across, turned)) / size : 1.0;
 }
 
-// The same of a layer that strands cross: how much denser it is as it was baked than from this direction.
-// `tangent` may stand out of its plane.
+// The same for a layer of shells, which strands cross: its density as baked over that seen from this
+// direction. `tangent` may stick out of its plane.
 float layer_facing(vec3 across, vec3 tangent, vec3 direction)
 {
   vec3 front = across / max(length(across), 1.0e-30);
@@ -27,7 +27,7 @@ float layer_facing(vec3 across, vec3 tangent, vec3 direction)
   return abs(dot(front, direction)) * baked / sqrt(max(1.0 - along * along, 1.0e-4));
 }
 
-// LAYERED: shells, else cards.
+// LAYERED: 1 for shells, else cards.
 float hair_facing(vec3 across, vec3 tangent, vec3 direction)
 {
 #if defined(LAYERED) && LAYERED
@@ -37,20 +37,23 @@ float hair_facing(vec3 across, vec3 tangent, vec3 direction)
 #endif
 }
 
-// Factor of the tau that light from this direction meets in a card of view-compensated alpha.
+// Factor on tau of a card with view-compensated alpha, for light from this direction.
 float view_compensated_depth(vec3 across, vec3 tangent, vec3 direction)
 {
   return {{mean_turn}} / max(hair_facing(across, tangent, direction), {{min_facing}});
 }
 
-// How far behind the front of a card's strands lies the one that is seen, as a fraction of their depth.
+// Mean depth of the visible strand behind the front of a card's strands, as a fraction of their depth.
+// seen: tau of the card along the eye's ray.
 float seen_depth(float seen)
 {
   float few = clamp(seen, {{min_seen}}, {{max_seen}});
   return 1.0 / few - 1.0 / (exp(few) - 1.0);
 }
 
-// tau of the other strands of a card before the one that is seen, and beyond it.
+// tau of a card's other strands: x between the light and the visible strand, y beyond it. seen, own: tau of
+// the card along the eye's and the light's ray. near: distance from the visible strand within which they do
+// not count, as a fraction of their depth. front: 1 for light from the eye's side of the card, 0 from behind.
 vec2 own_strands(float seen, float own, float near, float front)
 {
   float a = clamp(seen, {{min_seen}}, {{max_seen}}), b = clamp(own, 0.0, {{max_seen}});
@@ -64,8 +67,7 @@ vec2 own_strands(float seen, float own, float near, float front)
   return vec2(met, max(own - met, 0.0));
 }
 
-// The same of short hair, of which one sees a tip beside others. tau: of the card, of which light meets
-// `own`.
+// The same for short hair, where one sees a tip beside others. tau: of the card; own: what light meets of it.
 vec2 own_tips(float own, float tau, float front)
 {
   float few = max(tau, {{min_seen}});

@@ -1,12 +1,12 @@
-// What is in the way of a light to a card: all but the card itself, which is in the maps as well.
+// Shadows on a card from everything but the card itself, which is in the opacity maps as well.
 //
-// Reads what lib_shadows.glsl reads.
+// Reads the same resources as lib_shadows.glsl.
 #include "lib_shadows.glsl"
 #include "lib_card_opacity.glsl"
 
-// As shadow_path, for a place of a card whose texture covers alpha. `across`: normal of its plane, of any
-// length. VIEW_COMPENSATED: to the strand that is seen, of those that fill this depth [m] about the plane;
-// 0: of short hair.
+// As shadow_path, for a place of a card with this alpha. `across`: normal of its plane, of any length.
+// VIEW_COMPENSATED: the path ends at the visible one of the strands, which fill a depth [m] about the plane;
+// depth 0 means short hair.
 vec3 shadow_path_to_card(int index,
                          vec3 point,
                          float alpha,

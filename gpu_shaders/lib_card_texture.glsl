@@ -30,7 +30,7 @@ vec2 within_tile(vec2 place, ivec2 texels, vec2 tiles)
   return clamp(place, tile / tiles + margin, (tile + 1.0) / tiles - margin);
 }
 
-// tiles: columns and rows; 0 is a picture that repeats.
+// tiles: columns and rows; 0 for a texture that repeats.
 vec4 texel_in_level(sampler2D packed_levels, ivec2 whole, vec2 place, int level, vec2 tiles)
 {
   ivec2 size = picture_size(whole);
@@ -53,7 +53,7 @@ vec4 card_texel_at(sampler2D packed_levels, vec2 place, float level, vec2 tiles)
              level - float(lower));
 }
 
-// steps: from pixel to pixel in the texture, xy to the right, zw to the top.
+// steps: change of place from one pixel to the next, xy to the right, zw upwards.
 vec4 card_texel(sampler2D packed_levels, vec2 place, vec4 steps, vec2 tiles)
 {
   ivec2 size = picture_size(textureSize(packed_levels, 0));

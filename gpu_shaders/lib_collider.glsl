@@ -25,7 +25,7 @@ Round round_at(int index)
   return Round(start.xyz, start.w, axis.xyz, axis.w);
 }
 
-// The way from the closest point of the axis.
+// Vector from the closest point of the axis to a point.
 vec3 outward_of(Round solid, vec3 point)
 {
   vec3 outward = point - solid.start;
@@ -37,7 +37,7 @@ Found distance_from(vec3 outward, float radius)
 {
   float reach = length(outward);
   vec3 gradient = outward / max(reach, 1.0e-9);
-  gradient.z = reach < 1.0e-9 ? 1.0 : gradient.z;  // on the very axis any way out is as good
+  gradient.z = reach < 1.0e-9 ? 1.0 : gradient.z;  // on the axis itself any direction leads out
   return Found(reach - radius, gradient);
 }
 #endif
@@ -69,7 +69,7 @@ Found distance_in(Field field, vec3 point)
   int index = (node.z * field.nodes.y + node.y) * field.nodes.x + node.x;
   vec4 near = nodes_at(field, index);
   vec4 far = nodes_at(field, index + 1);
-  // along z, then y, then x; what is left over at each turn is a derivative
+  // trilinear along z, then y, then x; the difference in each step gives a derivative
   vec4 dz = vec4(near.yw - near.xz, far.yw - far.xz);
   vec4 z = vec4(near.xz, far.xz) + f.z * dz;
   vec2 dy = z.yw - z.xz;
@@ -80,10 +80,10 @@ Found distance_in(Field field, vec3 point)
 }
 #endif
 
-// From a point of the collider's own space to it.
+// Distance and gradient at a point of the collider's object space.
 //
-// Of a field: own its nodes along x, y, z and its row, low_cell where it begins and its cell. Of round
-// solids: own the first of them, how many, 0, -1.
+// For a field, own: nodes along x, y and z, then its row; low_cell: xyz place of its first node, w its cell
+// size. For round solids, own: the first one, their count, 0, -1.
 Found distance_to(vec4 own, vec4 low_cell, vec3 local)
 {
   Found found = Found(1.0e30, vec3(0.0));

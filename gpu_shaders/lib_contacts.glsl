@@ -2,8 +2,9 @@
 //
 // Twin of addon/dynamics/contacts.py, over the globals of lib_guide.glsl; see there. Defines:
 // CONTACT_SLOTS, how many contacts a CV may have at once; HAS_SHARP, where segments collide too;
-// HAS_FOLLOWED, there and where colliders are fast; HAS_CLEARANCE, where guides stay as far as they
-// were at most. Needs the block `frame`, and `moments`.
+// HAS_FOLLOWED, where paths are followed, that is with HAS_SHARP and where colliders are fast;
+// HAS_CLEARANCE, where guides keep no more distance than when the motion began. Needs the block
+// `frame`, and `moments`.
 #include "lib_lengths.glsl"
 #include "lib_collider.glsl"
 
@@ -14,19 +15,19 @@
 
 // xyz normal outwards, w offset [m]: keep normal . x >= offset
 vec4 plane[CONTACT_SLOTS][FREE_SIZE];
-// xyz where the CV would be had it stayed with the collider [m]; w how far from the plane it still
-// counts as touching [m], NO_PLANE for never
+// xyz where the CV would be had it moved with the collider [m]; w distance from the plane within which
+// it counts as touching [m], NO_PLANE for never
 vec4 origin[CONTACT_SLOTS][FREE_SIZE];
 float pushed[CONTACT_SLOTS][FREE_SIZE];  // [m] in this substep
 #ifdef HAS_SHARP
-// the same of a point of each segment, the one that ends at the free CV
+// the same for a point of each segment; segment i ends at free CV i
 vec4 between_plane[CONTACT_SLOTS][FREE_SIZE];
 vec4 between_origin[CONTACT_SLOTS][FREE_SIZE];
 float between_pushed[CONTACT_SLOTS][FREE_SIZE];
 float between_along[CONTACT_SLOTS][FREE_SIZE];  // its fraction of the segment
-vec3 between_normal[FREE_SIZE];  // at each free CV whose segments touch, else zero
-// Where a part of the substep begins and ends, as fractions of it, and how much of it that is; and
-// whether the contacts that were found last ask for parts.
+vec3 between_normal[FREE_SIZE];  // at each free CV with a touching segment, else zero
+// Begin, end and length of a part of the substep, as fractions of the substep; and whether the contacts
+// found last require the substep to be done in parts.
 float part_begin;
 float part_end;
 float part_fraction;
@@ -35,11 +36,11 @@ bool is_hurried;
 
 struct Posed {
   vec4 inverse[3];  // rows of world to object at the substep's end
-  vec4 change[3];   // rows of what the substep changes in object to world
+  vec4 change[3];   // rows of the change of the object-to-world matrix in the substep
   vec4 low_cell;    // of a field
   vec4 own;         // of a field xyz nodes, w row; of round solids x the first, y how many, w -1
   vec4 inverse_before[3];  // rows of world to object at the substep's begin
-  vec4 sweep;  // x [m^2] ways up to this squared length need not be followed; y above 0: segments
+  vec4 sweep;  // x [m^2] squared length up to which paths need not be followed; y above 0: segments
               // collide; z the smallest scale; w [m] its swelling
 };
 
@@ -81,7 +82,7 @@ Posed posed_at(int substep, int collider)
   return posed;
 }
 
-// How far [m] a point that is inside may be led out.
+// How far [m] a point inside a collider may be moved out.
 float led_out(Posed posed)
 {
 #ifdef HAS_SHARP
@@ -91,7 +92,8 @@ float led_out(Posed posed)
 #endif
 }
 
-// From which distance on [m] a point that keeps another counts as touching.
+// Distance [m] that a contact must be able to bring a point to, for it to count as touching; kept: the
+// distance that the point keeps [m].
 float touching_from(float kept)
 {
 #ifdef HAS_SHARP
@@ -102,14 +104,14 @@ float touching_from(float kept)
 }
 
 #ifdef HAS_SHARP
-// Whether a path in the substep, as seen from a collider, is long.
+// Whether a path in the substep, relative to a collider, is long.
 bool is_far(vec3 path)
 {
   float far = frame.reach * {{fast_of_reach}} / float(CV_COUNT - 1);
   return dot(path, path) > far * far;
 }
 
-// Twin of hurried_guides, of one collider.
+// Twin of hurried_guides, for one collider.
 bool is_root_far(Posed posed)
 {
   vec4 local = vec4(moved(posed.inverse, vec4(position[1], 1.0)), 1.0);
@@ -117,9 +119,8 @@ bool is_root_far(Posed posed)
 }
 #endif
 
-// xyz the normal in the world of a gradient in object space; w what distances are multiplied by. The
-// gradient transforms by the inverse transposed, and its length says how much the distance is scaled
-// along it.
+// xyz the world-space normal of an object-space gradient; w the factor from object-space to world-space
+// distances. Gradients transform by the inverse transpose; the length of the result gives the factor.
 vec4 world_normal(Posed posed, vec3 gradient)
 {
   vec3 normal = posed.inverse[0].xyz * gradient.x + posed.inverse[1].xyz * gradient.y +
@@ -130,12 +131,13 @@ vec4 world_normal(Posed posed, vec3 gradient)
 
 #ifdef HAS_FOLLOWED
 struct Met {
-  vec3 normal;    // of the surface where the way meets it, or where the way ends
+  vec3 normal;    // of the surface where the path meets it, or where the path ends
   float surface;  // [m] normal . x of the surface there
-  float was;      // [m] from the surface where the way begins
+  float was;      // [m] from the surface where the path begins
 };
 
-// The way of a point in the substep, as seen from the collider, until it meets `reach` [m].
+// Sphere tracing of a point's path in the substep, relative to the collider, until the distance is
+// `reach` [m].
 Met followed(Posed posed, vec3 here, vec3 before, float reach)
 {
   vec3 begin = moved(posed.inverse_before, vec4(before, 1.0));
@@ -146,7 +148,7 @@ Met followed(Posed posed, vec3 here, vec3 before, float reach)
   float span = length(path) * posed.sweep.z;
   float target = min(reach, was);
   float least = span * (1.0 / float(TRACE_STEPS));
-  float place = was > 0.0 ? 1.0 : 0.0;  // along the way; what starts inside met it there
+  float place = was > 0.0 ? 1.0 : 0.0;  // along the path; a path that starts inside ends at its start
   if (was > 0.0 && span > TINY) {
     float gone = 0.0;
     float away = was;
@@ -177,11 +179,11 @@ Met followed(Posed posed, vec3 here, vec3 before, float reach)
 }
 #endif
 
-// The next collider, from this one on, that is near the guide's bounding sphere; else their number.
+// The next collider, from this one on, near the guide's bounding sphere; frame.collider_count if none.
 int next_near(int collider, int substep, float guide_radius)
 {
   for (; collider < frame.collider_count; collider++) {
-    vec4 sphere = moment_texel(substep, collider, 8);  // around the collider, with all reach
+    vec4 sphere = moment_texel(substep, collider, 8);  // around the collider and its reach
     if (distance(sphere.xyz, position[1]) < sphere.w + guide_radius) {
       break;
     }
@@ -189,23 +191,23 @@ int next_near(int collider, int substep, float guide_radius)
   return collider;
 }
 
-// How far a point that keeps a distance, both [m], may be from its plane when the substep ends.
+// How far below its plane a point may be when the substep ends [m]; kept: the distance that it keeps [m].
 float slack_of(float kept)
 {
   return max(kept * {{may_miss}}, 2.0 * SKIN);
 }
 
-// Where a contact goes: x into the first slot; y into the second one, z which moves to the first. The
-// less pressing of two makes room, in the order of the colliders; `first`, `second` and `gap` are how
-// far [m] the point is below the planes of the two and of the new one. Without branches: compilers
-// keep each once for every CV.
+// Where a new contact goes: x into the first slot; y into the second slot, z and the second slot's old
+// contact moves to the first. The shallower of the two old contacts is dropped; slots keep the order of
+// the colliders. `first`, `second` and `gap` are how far [m] the point is below the planes of the two
+// slots and of the new contact. No branches: compilers would repeat each one for every CV.
 bvec3 slots_of(bool is_met, bool is_empty, float first, float second, float gap)
 {
   bool is_pressing = is_met && !is_empty && gap > min(first, second);
   return bvec3(is_met && is_empty, is_pressing, is_pressing && first < second);
 }
 
-// Put a contact of free CV i where there is room.
+// Put a contact of free CV i into its slot.
 void add_contact(int i, bool is_met, vec4 new_plane, vec4 new_origin)
 {
 #if CONTACT_SLOTS == 1
@@ -270,7 +272,7 @@ void find_contacts_with(Posed posed)
     local[i] = vec4(moved(posed.inverse, vec4(position[i + 2], 1.0)), 1.0);
   }
   distances_to(posed, local, found);
-  vec4 surface[FREE_SIZE];  // see Met: xyz the normal, w where the surface is
+  vec4 surface[FREE_SIZE];  // xyz normal and w surface of Met
   float was[FREE_SIZE];
   bool is_near[FREE_SIZE];
   bool is_fast[FREE_SIZE];
@@ -326,7 +328,7 @@ bool held_at(int i)
 #endif
 }
 
-// How far [m] points of segment i stay from colliders.
+// Distance [m] that each sampled point of segment i keeps from colliders.
 vec3 between_kept(int i)
 {
   vec3 kept = vec3(frame.own[i + 2].y * BETWEEN_RADIUS);
@@ -342,7 +344,7 @@ vec3 between(vec3 lower, vec3 upper, float along)
   return lower + (upper - lower) * along;
 }
 
-// x, y: what the lower and the upper CV of segment i go, of the way of a point of it.
+// Displacements of the lower (x) and upper (y) CV of segment i for a unit displacement of a point on it.
 vec2 weights_of(int i, float along)
 {
   float lower = i > 0 && !held_at(max(i - 1, 0)) ? 1.0 - along : 0.0;
@@ -383,7 +385,7 @@ struct Deepest {
   float along;  // 0: none is near
 };
 
-// Of some points of a segment the one that is deepest below its plane.
+// The one of a few sampled points of a segment that is deepest below its plane.
 Deepest deepest_between(Posed posed, int i)
 {
   vec3 lower = picked(position, i + 1);
@@ -492,7 +494,7 @@ void find_contacts(int substep)
   }
   float guide_radius = sqrt(squared);
   int collider = next_near(0, substep, guide_radius);
-  // drivers on CPUs run a loop once even if nothing is left to do, so it is asked at the end
+  // drivers on CPUs run a loop once even if its condition is false, so the condition is tested at the end
   if (collider < frame.collider_count) {
     do {
       find_with(posed_at(substep, collider));
@@ -503,8 +505,8 @@ void find_contacts(int substep)
 }
 
 #ifdef HAS_SHARP
-// Bring points of segments back to their planes, all of one collider at once; CVs whose segments
-// touch, but that do not touch themselves, get the normal.
+// Bring points of segments back to their planes, all contacts of one slot at once. A CV that does not
+// touch itself gets the normal of its touching segment.
 void push_between(float friction)
 {
   for (int i = 0; i < FREE; i++) {
@@ -540,7 +542,7 @@ void push_between(float friction)
 }
 #endif
 
-// Bring CVs back to their planes, and say which ones touch.
+// Bring CVs back to their planes, and set `touched_normal` of those that touch.
 void push_out(float friction)
 {
   for (int i = 0; i < FREE; i++) {
@@ -584,7 +586,7 @@ bool is_deep()
   return found;
 }
 
-// Take away the speed that pushing out has made: contacts do not bounce.
+// Remove the speed that pushing out has added, so that contacts do not bounce.
 void absorb()
 {
   for (int slot = 0; slot < CONTACT_SLOTS; slot++) {

@@ -1,4 +1,4 @@
-// How much of a pixel a thin strip covers: the pixel is a unit square, the strip goes on beyond it.
+// Coverage of a pixel by a thin strip: the pixel is a unit square, the strip is infinitely long.
 //
 // Twin of addon/shading/volume/transparency.py. Holds no resources.
 
@@ -21,15 +21,15 @@ float strip_coverage(float distance, float half_width, vec2 normal)
   return fraction_below(distance + half_width, normal) - fraction_below(distance - half_width, normal);
 }
 
-// How far beyond its edge a strip reaches pixels' centres that it covers a fraction of [pixels].
+// Greatest distance from a strip's edge to the centre of a pixel that it partly covers [pixels].
 float coverage_reach(vec2 normal)
 {
   return 0.5 * (abs(normal.x) + abs(normal.y));
 }
 
-// The fraction that a ribbon covers. x distance from its middle line, y half its width, zw its normal: all
-// of them linear in the picture. Vertices give them times their w, fragments take them times
-// gl_FragCoord.w, because some drivers clip what is declared noperspective wrongly.
+// The fraction of a pixel that a ribbon covers. ribbon_of: x distance from its middle line, y half its
+// width, zw its normal, all linear in screen space. The vertex stage multiplies them by clip w and the
+// fragment stage by gl_FragCoord.w, because some drivers clip noperspective varyings wrongly.
 float ribbon_coverage(vec4 ribbon_of)
 {
   return strip_coverage(ribbon_of.x, ribbon_of.y, abs(ribbon_of.zw));

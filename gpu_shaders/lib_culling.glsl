@@ -1,6 +1,6 @@
-// Strands that the head hides.
+// Culling of strands that the head hides.
 //
-// Twin of addon/refine/culling.py, which has the figure. Needs the struct DetailView. Holds no
+// Twin of addon/refine/culling.py, which has a figure. Needs the struct DetailView. Holds no
 // resources.
 
 // Whether a point lies in the region behind a ball: with s = (point - origin) . axis,
@@ -16,7 +16,7 @@ bool is_shaded(vec3 point, int index, DetailView seen)
   return along >= origin_nearest.w && dot(across, across) <= axis_width.w + slope * along * along;
 }
 
-// Those of the regions, bits of a number, that a point lies in.
+// The subset of `regions`, one bit each, that contain a point.
 uint shades_over(vec3 point, uint regions, DetailView seen)
 {
   for (int index = 0; index < int(seen.center.w) && regions != 0u; index++) {

@@ -1,16 +1,16 @@
-// Colours of the debug views: of whole numbers, of changes of length, and of depths.
+// Colours of the debug views: for integers, changes of length, and depths.
 //
 // Holds no resources.
 #include "lib_strand_noise.glsl"
 
-// Fully saturated, of a hue in 0..1.
+// Fully saturated colour of a hue in 0..1.
 vec3 hue_color(float hue)
 {
   vec3 away = abs(fract(hue + vec3(0.0, 2.0, 1.0) / 3.0) * 6.0 - 3.0);
   return clamp(away - 1.0, 0.0, 1.0);
 }
 
-// A detail factor of 1 to 64 by its logarithm: from dark blue over green and yellow to red.
+// Colour of a detail factor of 1 to 64 by its logarithm: from dark blue over green and yellow to red.
 vec3 detail_color(int pieces)
 {
   float fraction = clamp(log2(float(pieces)) / 6.0, 0.0, 1.0);
@@ -18,7 +18,7 @@ vec3 detail_color(int pieces)
   return color * mix(0.5, 1.0, sqrt(fraction));
 }
 
-// Of a guide or a group: neighbours in number are far apart in hue, a golden section each.
+// Colour of a guide or a group. Consecutive numbers are a golden section apart in hue.
 vec3 index_color(int index)
 {
   float hue = fract(float(index % 4096) * 0.61803398875);
@@ -26,16 +26,16 @@ vec3 index_color(int index)
   return mix(hue_color(hue), vec3(1.0), paler) * (1.0 - 0.5 * hash_unit(uint(index), 1u));
 }
 
-// A segment that is longer by a fraction of its length: grey where it is as in its style, red where it is
-// longer by {{shown_stretch}} or more, blue where it is shorter by as much.
+// Colour of a segment's relative change of length: grey at its length in the style, red where it is longer
+// by {{shown_stretch}} or more, blue where it is shorter by as much.
 vec3 stretch_color(float change)
 {
   vec3 full = change < 0.0 ? vec3(0.05, 0.25, 1.0) : vec3(1.0, 0.1, 0.05);
   return mix(vec3(0.5), full, min(abs(change) / {{shown_stretch}}, 1.0));
 }
 
-// At a signed distance from a collider, in terms of the depth that is shown in full: from blue, ten times as
-// far away, to green at its surface; inside from yellow to red.
+// Colour of a signed distance from a collider, as a multiple of the depth shown in red: blue at 10, green at
+// the surface; inside from yellow to red.
 vec3 depth_color(float away)
 {
   return away < 0.0 ? hue_color(mix(0.16, 0.0, min(-away, 1.0))) :

@@ -21,7 +21,7 @@ Control segment_control(vec4 p0, vec4 p1, vec4 p2, vec4 p3)
   return Control(p1, p1 + (p2 - p0) * sixth, p2 - (p3 - p1) * sixth, p2);
 }
 
-// The larger of what two bends do in pixels, squared, seen from one control point.
+// Squared size in pixels of the larger of two second differences, seen from one control point.
 float bend_size_from(vec4 b, vec4 bend_from, vec4 bend_to, vec2 half_size)
 {
   vec2 slope = b.xy / b.w;
@@ -30,7 +30,7 @@ float bend_size_from(vec4 b, vec4 bend_from, vec4 bend_to, vec2 half_size)
   return max(dot(shift_from, shift_from), dot(shift_to, shift_to));
 }
 
-// The largest of that, seen from all of them, in pixels.
+// The largest size in pixels of two second differences, seen from any control point.
 float bend_size(Control control, vec4 bend_from, vec4 bend_to, vec2 half_size)
 {
   return sqrt(max(max(bend_size_from(control.b0, bend_from, bend_to, half_size),
@@ -39,8 +39,8 @@ float bend_size(Control control, vec4 bend_from, vec4 bend_to, vec2 half_size)
                       bend_size_from(control.b3, bend_from, bend_to, half_size))));
 }
 
-// The least number of pieces that Wang's bound allows, not yet limited but where there is no bound.
-// `control` in clip space, half_size and error in pixels.
+// The smallest number of pieces by Wang's bound, not clamped; `most` for a segment that comes nearer to
+// the eye than NEAREST, where there is no bound. `control` in clip space, half_size and error in pixels.
 float wang_pieces(Control control, vec2 half_size, float error, float most)
 {
   float nearest = min(min(control.b0.w, control.b1.w), min(control.b2.w, control.b3.w));
@@ -56,7 +56,7 @@ float wang_pieces(Control control, vec2 half_size, float error, float most)
   return one <= 1.0 ? 1.0 : ceil(sqrt(many));
 }
 
-// Between two ways, in 0..pi; 0 where one has no length.
+// Angle between two directions, in 0..pi; 0 where one has no length.
 float angle_between(vec3 one, vec3 two)
 {
   float across = length(cross(one, two));
@@ -64,8 +64,8 @@ float angle_between(vec3 one, vec3 two)
   return across == 0.0 && along == 0.0 ? 0.0 : atan(across, along);
 }
 
-// By the segment's size in the picture and the larger angle beside it. from and to are its ends in
-// clip space, half_size and piece_length in pixels.
+// Number of pieces by the segment's size in the picture and the larger of the angles at its ends. from and
+// to are its ends in clip space, half_size and piece_length in pixels.
 float heuristic_pieces(vec4 from, vec4 to, float angle, vec2 half_size, float piece_length)
 {
   vec2 step = to.xy / max(to.w, NEAREST) - from.xy / max(from.w, NEAREST);

@@ -1,12 +1,12 @@
-// Detail factors of a strand as bytes, sixteen a texel.
+// Detail factors of a strand as bytes, sixteen to a texel.
 //
-// A factor is 1 to 64 and unused bytes are 1: read as floats such words are plain
-// numbers, neither denormal nor NaN, so any texture of floats keeps their bits.
+// A factor is 1 to 64 and unused bytes are 1. Read as floats, such words are normal
+// numbers, neither denormal nor NaN, so float textures keep their bits.
 // Holds no resources.
 
 const int FACTORS_IN_TEXEL = 16;
 
-// How many texels the factors of a strand take.
+// Number of texels for the factors of a strand.
 int factor_texels(int cv_count)
 {
   return (cv_count - 2) / FACTORS_IN_TEXEL + 1;
@@ -18,16 +18,16 @@ int unpacked_factor(uvec4 words, int index)
   return int((words[index >> 2] >> uint((index & 3) << 3)) & 255u);
 }
 
-// Which segment a station of a strand lies in, found texel by texel of its factors. Stations
-// beyond the tip fall onto it, and the tip ends the last piece.
+// Search for the segment in which a station of a strand lies, one texel of factors at a time.
+// Stations beyond the tip are clamped to it; the tip belongs to the last piece.
 struct StationSearch {
   int station;
   int tip;      // pieces of the strand
   int next;     // station where the next texel's first segment begins
   int segment;  // that segment
-  int first;    // station where the segment that was found begins
-  int found;    // that segment
-  int pieces;   // of it
+  int first;    // station where the found segment begins
+  int found;    // the found segment
+  int pieces;   // of the found segment
 };
 
 StationSearch start_search(int station, int tip)
@@ -35,7 +35,7 @@ StationSearch start_search(int station, int tip)
   return StationSearch(min(station, tip), tip, 0, 0, 0, 0, 1);
 }
 
-// Look at the next sixteen segments: first which word it is, then which byte.
+// Search the next sixteen segments: find the word first, then the byte.
 void search_factors(inout StationSearch search, vec4 texel)
 {
   uvec4 words = floatBitsToUint(texel);
@@ -62,7 +62,7 @@ void search_factors(inout StationSearch search, vec4 texel)
   search.segment += FACTORS_IN_TEXEL;
 }
 
-// Where in the segment that was found the station lies, 0 to 1.
+// Position of the station within the found segment, 0 to 1.
 float found_u(StationSearch search)
 {
   return float(search.station - search.first) / float(search.pieces);

@@ -1,12 +1,12 @@
-// A slot of a strand that moves: as many of its pieces as all slots have, or, where a strand has fewer slots
-// than it needs, as many steps along it. x the strand; y which of its slots this is, in 16 bits, and how
-// many it has; z pieces of the whole strand; w factor of its width, as a float's bits. All 0 is a slot
-// without a strand.
+// Slots of moving strands. Every slot is drawn with the same number of pieces, slot_pieces: consecutive
+// pieces of a strand, or, where a strand has fewer slots than it needs, longer steps along it. A texel: x
+// the strand; y number of the slot within the strand in the low 16 bits, the strand's slot count in the
+// high ones; z pieces of the strand; w factor on its width, as float bits. All 0 is an unused slot.
 //
 // Holds no resources.
 
-// What is counted of all strands: slots that they want, how many are drawn, fragments that they may have,
-// of these those that they had without a width, as many as they had if none were thin, and slots in use.
+// Sums over all strands: slots wanted, strands drawn, an upper bound of their fragments, the same at zero
+// width, the same with no strand thinner than THIN_STRAND, and slots in use.
 const int DEMAND_SLOTS = 0, DEMAND_STRANDS = 1, DEMAND_FRAGMENTS = 2, DEMAND_EDGES = 3, DEMAND_THICK = 4;
 const int DEMAND_USED = 5;
 
@@ -35,7 +35,7 @@ int slots_wanted(int pieces, int slot_pieces)
   return (pieces + slot_pieces - 1) / slot_pieces;
 }
 
-// The strand's station at one of a slot, where slots have as many pieces; the last slot ends at the tip or
+// Station of the strand at a station of a slot with slot_pieces pieces; the last slot ends at the tip or
 // beyond.
 int slot_station(DetailSlot slot, int station, int slot_pieces)
 {

@@ -1,10 +1,10 @@
-// Dual scattering: light that reaches a strand from others, on its way in and from behind.
+// Dual scattering: light that reaches a strand through the strands before it and back from those behind.
 //
-// Twin of addon/shading/volume/dual.py: same names, same order; what the terms mean is written
-// there. Reference: Zinke, Yuksel, Weber and Keyser 2008.
+// Twin of addon/shading/volume/dual.py, which explains the terms: same names, same order.
+// Reference: Zinke, Yuksel, Weber and Keyser 2008.
 // Needs struct_fibre.glsl and the struct ShadingSettings. Holds no resources.
 //
-// Colours are columns: a mat3x4 has for each of red, green and blue the four lobes.
+// Colours are columns: a mat3x4 has the four lobes for each of red, green and blue.
 #include "lib_marschner.glsl"
 #include "lib_skin_seen.glsl"
 
@@ -12,7 +12,7 @@ const float DUAL_SMALLEST = 1.0e-6;
 const float DUAL_MAX = 0.999, DUAL_MAX_KEPT = 0.9999;
 const float DUAL_MIN_LIGHT = 1.0e-3, DUAL_DIFFUSIVITY = 1.66;
 
-// What a fibre sends on, or back, at cos theta_d, by colour and lobe.
+// Fraction of light that a fibre scatters forward, or backward, at cos theta_d, by colour and lobe.
 mat3x4 fractions_at(sampler2D fractions, float cos_d, vec3 absorption)
 {
   vec2 size = vec2(textureSize(fractions, 0));
@@ -27,7 +27,7 @@ vec3 sum_of_lobes(mat3x4 lobes)
   return vec4(1.0) * lobes;
 }
 
-// What a number of strands, one behind the other, gives back of the light on the first.
+// Fraction of light that a stack of `count` strands returns.
 vec3 returned(vec3 a_forward, vec3 a_backward, float count)
 {
   a_forward = clamp(a_forward, vec3(0.0), max(DUAL_MAX_KEPT - a_backward, 0.0));
@@ -39,7 +39,7 @@ vec3 returned(vec3 a_forward, vec3 a_backward, float count)
   return deep * (1.0 - lost) / max(1.0 - deep * deep * lost, DUAL_SMALLEST);
 }
 
-// x width and y shift of theta_h in what returns, z the width that one passage on adds.
+// x width and y shift of theta_h in returned light, z width that each forward scattering adds.
 vec3 returned_shape(vec4 forward, vec4 backward, Fibre fibre)
 {
   float a_f = min(dot(forward, vec4(1.0)), DUAL_MAX), a_b = dot(backward, vec4(1.0));
@@ -58,7 +58,7 @@ vec3 returned_shape(vec4 forward, vec4 backward, Fibre fibre)
   return vec3(width, clamp(shift, -0.25 * PI, 0.25 * PI), wide_f);
 }
 
-// N of the lobes for light that comes from half a circle around its direction.
+// N of the lobes for light from the half circle around its direction.
 vec4 spread_around(vec4 forward, vec4 backward, float phi)
 {
   float cosine = cos(phi);
@@ -73,8 +73,8 @@ float half_gaussian(float theta_h, float shift, float variance)
   return exp(-0.5 * off * off / variance) / (2.0 * sqrt(2.0 * PI * variance));
 }
 
-// S of a strand among others; `single` is that of the strand alone, tau how many strands lie
-// between it and the light, beyond how many behind it.
+// S of a strand among others. single: S of the strand alone; tau: number of strands between it and the
+// light; beyond: number of strands behind it.
 vec3 dual_scattering(vec3 single,
                      vec3 angles,
                      mat3x4 forward,
@@ -93,7 +93,7 @@ vec3 dual_scattering(vec3 single,
   // widths are the same for all colours: those of green
   vec3 shape = returned_shape(forward[1], backward[1], fibre);
   float added = max(tau, 1.0) * shape.z * shape.z;
-  // what the strand itself sends back is in `single`
+  // `single` already has what the strand itself returns
   vec3 stack = returned(a_f, a_b, 1.0 + beyond) - returned(a_f, a_b, 1.0);
   vec3 back = max(stack, 0.0) / (PI * squared);
   vec3 back_straight = back * half_gaussian(theta_h, shape.y, shape.x * shape.x);
@@ -109,7 +109,7 @@ vec3 dual_scattering(vec3 single,
          scattered * density * (on + density * back_scattered);
 }
 
-// What comes off the skin behind the hair and from a strand to the eye. facing: cosine between the
+// Light that the skin beneath reflects and a strand scatters to the eye. facing: cosine between the
 // light and the skin's normal. skin: its albedo.
 vec3 off_the_skin(float phi,
                   mat3x4 forward,
@@ -129,8 +129,8 @@ vec3 off_the_skin(float phi,
   return lit * exp(-strands * (1.0 - a_f)) * onward;
 }
 
-// What comes off skin farther away and from a strand to the eye. outward: cosine between the eye and
-// the normal of the hair's volume.
+// Light that skin farther away reflects and a strand scatters to the eye. outward: cosine between the
+// direction to the eye and the normal of the hair's volume.
 vec3 off_far_skin(
     float outward, mat3x4 forward, mat3x4 backward, vec3 to_light, SkinSeen seen, vec3 skin)
 {
@@ -141,8 +141,8 @@ vec3 off_far_skin(
   return lit * through_hair(seen.depth, taken) * onward;
 }
 
-// What one light sends to the eye from a strand among others: as marschner_light, of which it has
-// all but the colour that replaces light from strand to strand.
+// Light that a strand among others scatters to the eye from one light. As marschner_light, but without its
+// diffuse term, which stands for light from strand to strand.
 vec3 scattering_light(sampler3D longitudinal,
                       sampler2D azimuthal,
                       sampler2D paths,

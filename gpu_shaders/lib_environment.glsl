@@ -1,5 +1,5 @@
-// Light from all around. Twin of addon/shading/environment.py: same names; what the terms mean is
-// written there. Needs struct_lights.glsl. Holds no resources.
+// Light from all around. Twin of addon/shading/environment.py, which explains the terms: same names.
+// Needs struct_lights.glsl. Holds no resources.
 #include "lib_pi.glsl"
 
 // MATT of addon/shading/environment.py
@@ -8,7 +8,7 @@ const vec2 MATT = vec2(2.0 / 3.0, 1.0 / 4.0);
 const vec2 EIGHTH = vec2(0.8660254037844386, 0.6366197723675814);
 const float CLOSED = 1.0e-3, CORNER_BLUR = 0.39269908169872;
 
-// Radiance from a direction, of which orders 1 and 2 are damped.
+// Radiance from a direction. kept: factors on the harmonics of orders 1 and 2.
 vec3 light_from(Lights lights, vec3 towards, vec2 kept)
 {
   vec3 radiance = lights.ambient_and_count.xyz;
@@ -22,32 +22,33 @@ vec3 light_from(Lights lights, vec3 towards, vec2 kept)
   return max(radiance, vec3(0.0));
 }
 
-// Irradiance over pi, on a surface that faces this way.
+// Irradiance over pi on a surface with this normal.
 vec3 matt_light(Lights lights, vec3 normal)
 {
   return light_from(lights, normal, MATT);
 }
 
-// What stands for the light from an eighth of all directions, around a corner of a cube.
+// Unit direction to a corner of a cube; its light represents an eighth of all directions.
 vec3 corner_direction(int corner)
 {
   vec3 side = vec3(corner & 1, (corner >> 1) & 1, corner >> 2);
   return (2.0 * side - 1.0) * 0.5773502691896258;
 }
 
-// Its irradiance on what faces it.
+// Irradiance of a corner's light on a surface that faces it.
 vec3 corner_light(Lights lights, int corner)
 {
   return 0.5 * PI * light_from(lights, corner_direction(corner), EIGHTH);
 }
 
-// Openness where only occlusion is known: to where hair looks away.
+// Openness from occlusion alone, largest towards `away`, the outward direction of the hair.
 vec4 openness_by_occlusion(float occlusion, vec3 away)
 {
   return 0.5 * occlusion * vec4(1.0, away);
 }
 
-// How many strands are between a place of hair and a direction, and beyond it, by its openness.
+// Number of strands between a place and the light from a direction (x), and beyond the place (y), from its
+// openness.
 vec2 open_path(vec4 openness, vec3 towards)
 {
   float bent = dot(openness.yzw, towards);

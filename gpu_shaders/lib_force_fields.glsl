@@ -1,9 +1,9 @@
 // The scene's force fields at one CV.
 //
 // Twin of addon/dynamics/force_fields.py. Needs the block `frame`, and the texture `force_fields`, see
-// ForceFields.table: a row of the noise's permutation, then a row of each field, its texels
-//     0  xyz the place that it acts from, w kind      1  xyz its normal there, w shape
-//     2  xyz its object's place, w strength           3  xyz its object's axis, w damping
+// ForceFields.table: a row with the noise's permutation, then a row for each field with the texels
+//     0  xyz the point that it acts from, w kind      1  xyz its normal there, w shape
+//     2  xyz its object's position, w strength        3  xyz its object's axis, w damping
 //     4  size, flow, fraction across strands, kind of falloff
 //     5  falloff by distance: power, near, far; w side
 //     6  falloff beside the axis: power, near, far; w 1 inverse square, 2 global
@@ -14,7 +14,7 @@
 
 vec3 field_push;         // [m/s^2]
 float field_slowing;     // [1/s]
-vec3 field_across_push;  // of these, what acts across strands only
+vec3 field_across_push;  // the parts of these two that act across strands only
 float field_across_slowing;
 vec3 field_spin;         // [1/s]
 
@@ -171,7 +171,7 @@ float speed_left(float slowing)
   return slowing > 0.0 ? 1.0 / (1.0 + slowing) : 1.0 - slowing;
 }
 
-// What a substep's fields add to the displacement of a CV [m]; `along` is the strand's direction there.
+// Displacement of a CV by all fields in a substep [m]; `along` is the strand's direction there.
 vec3 blown_by_fields(vec3 here, vec3 before, vec3 along)
 {
   vec3 velocity = (here - before) / frame.dt;

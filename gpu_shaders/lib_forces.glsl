@@ -1,10 +1,10 @@
-// What moves hair before its constraints act.
+// Forces that act on hair before its constraints.
 //
 // Twin of addon/dynamics/forces.py, over the globals of lib_guide.glsl. Holds no
 // resources.
 #include "lib_guide.glsl"
 
-// Drag by the square of the speed, implicitly; changes `previous`, which holds the speed.
+// Quadratic drag, implicit: the previous position that gives a CV the slowed speed.
 vec3 braked(vec3 here, vec3 before, float drag, vec3 air_displacement)
 {
   vec3 displacement = here - before - air_displacement;
@@ -12,12 +12,13 @@ vec3 braked(vec3 here, vec3 before, float drag, vec3 air_displacement)
   return here - (displacement + air_displacement);
 }
 
-// The part of gravity that the tension of the carried segments cannot hold, for each free CV.
-// Where curls give, `load` gets the tension. `carried` is where the free CVs are carried, `root` where the last pinned one is.
+// The part of gravity that the tension of the carried segments cannot balance, for each free CV.
+// Where curls give, `load` is set to the tension. carried: positions of the free CVs as carried;
+// root: position of the last pinned CV.
 void weight_on_style(vec3 gravity, vec3 root, vec3 carried[FREE_SIZE], out vec3 weight[FREE_SIZE])
 {
   vec3 segment[FREE_SIZE];
-  float ratio[FREE_SIZE];  // how much of the segment before goes into segment i
+  float ratio[FREE_SIZE];  // elimination factor of segment i - 1 in row i
   float tension[FREE_SIZE];
   vec3 before = root;
   vec3 segment_before = vec3(0.0);
@@ -36,7 +37,7 @@ void weight_on_style(vec3 gravity, vec3 root, vec3 carried[FREE_SIZE], out vec3 
     segment_before = segment[i];
   }
   vec3 above = vec3(0.0);
-  float taken = 0.0;  // of the tension, by the segment above
+  float taken = 0.0;  // part of the tension, by back substitution from the segment above
   for (int i = FREE - 1; i >= 0; i--) {
     float own = tension[i] - taken;
     taken = ratio[i] * own;

@@ -1,7 +1,7 @@
-// One guide in motion, as a compute shader holds it: each array has one entry a CV, a free CV or a
-// segment, all loops have constant bounds, so that compilers keep arrays in registers. Mesa unrolls a
-// loop of any length where its count is that of an array in it: one of FREE rounds needs an array of
-// FREE_SIZE, or with 32 CVs it takes minutes to compile.
+// The state of one guide in a compute shader invocation. Each array has one entry per CV, free CV or
+// segment, and all loops have constant bounds, so that compilers keep arrays in registers. Mesa unrolls a
+// loop of any length if its count is the length of an array in it: a loop of FREE rounds needs an array of
+// FREE_SIZE, or compiling for 32 CVs takes minutes.
 //
 // Twin of addon/dynamics/state.py. Defines: CV_COUNT, at least 2; HAS_HELD, where CVs are held by
 // ties; HAS_SPRINGS, where curls give. Holds no resources.
@@ -14,7 +14,7 @@
 vec3 position[CV_COUNT];       // world [m]
 vec3 previous[CV_COUNT];       // the same a substep earlier
 vec3 style[CV_COUNT];          // where the head carries each CV at the substep's end
-vec3 style_twist;              // the same of the CV that tells the twist about the root
+vec3 style_twist;              // the same for the CV that defines the twist about the root
 vec4 shape[FREE_SIZE];         // of CV i + 1: xyz curvature at rest [m], w its hold
 float segment_length[FREE_SIZE];  // [m] from CV i + 1 to CV i + 2
 // the same for all guides; copied here because some drivers are slow at arrays in uniform blocks
@@ -26,16 +26,16 @@ bool held[FREE_SIZE];  // of free CV i; twin of addon/dynamics/held.py
 #endif
 
 #ifdef HAS_SPRINGS
-float rest_length[FREE_SIZE];  // [m] as segment_length, which is that of this substep
-float most[FREE_SIZE];         // [m] by how much longer segment i may be, 0 where it does not give
-float load[FREE_SIZE];         // [m] by which the weight in the style would draw it out
+float rest_length[FREE_SIZE];  // [m] at rest; segment_length is that of this substep
+float most[FREE_SIZE];         // [m] largest extension of segment i, 0 where it does not give
+float load[FREE_SIZE];         // [m] by which the style's own weight would stretch it
 float compliance[FREE_SIZE];   // of segment i in the next Newton step
 #define LENGTH_AT_REST rest_length
 #else
 #define LENGTH_AT_REST segment_length
 #endif
 
-// Never zero; what is added is lost to rounding above 1e-8 m.
+// Length of a vector, never zero; the added term is lost to rounding above 1e-8 m.
 float length_of(vec3 vector)
 {
   return sqrt(dot(vector, vector) + TINY * TINY);
@@ -46,9 +46,9 @@ vec3 unit_of(vec3 vector)
   return vector / length_of(vector);
 }
 
-// What a list holds at an index that compilers do not know; an array asked like that would lie in
-// memory. With next_of it lets code that is long or branches be in a program once, not once for each
-// CV, which drivers take a minute to compile.
+// Element of an array at an index unknown at compile time, which as a plain access would force the array
+// into memory. With next_of, code that is long or branches is compiled once instead of once per CV, which
+// would take drivers a minute.
 vec3 picked(vec3 list[CV_COUNT], int index)
 {
   vec3 found = list[0];
@@ -67,7 +67,7 @@ float picked(float list[FREE_SIZE], int index)
   return found;
 }
 
-// The first free CV or segment behind another that is due, FREE for none.
+// The first free CV or segment after `index` that is due; FREE for none.
 int next_of(bool is_due[FREE_SIZE], int index)
 {
   int next = FREE;

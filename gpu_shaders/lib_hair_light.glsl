@@ -1,5 +1,5 @@
-// What hair, strands and cards alike, sends to the eye of one light that reaches it whole: by the
-// model that the program holds, and with SCATTERING from strand to strand.
+// Light from one light that hair, as strands or cards, scatters to the eye, for unit irradiance: by the
+// shading model that the program is compiled for, with SCATTERING also from strand to strand.
 //
 // Reads the blocks `shading` and `fibre`, and the textures that their features declare.
 #include "lib_environment.glsl"
@@ -13,7 +13,8 @@
 #  include "lib_dual.glsl"
 #endif
 
-// hair: its colour, for Kajiya-Kay; absorption and level: for Marschner; path: see shadow_path.
+// hair: its colour, for Kajiya-Kay. absorption, level: for Marschner, see lib_marschner.glsl. path: see
+// shadow_path.
 vec3 hair_light(vec3 tangent,
                 vec3 normal,
                 vec3 to_light,
@@ -69,8 +70,8 @@ vec3 hair_light(vec3 tangent,
 }
 
 #if WORLD
-// What hair sends to the eye of the world's light. Marschner's model takes it as eight lights;
-// Kajiya-Kay's as a matt surface, with ambient occlusion alone in the way.
+// Light from the world that hair scatters to the eye. Marschner's model takes it as eight lights;
+// Kajiya-Kay's shades a matt surface, shadowed by ambient occlusion alone.
 //
 // openness: see open_path.
 vec3 hair_ambient(float occlusion,

@@ -1,6 +1,6 @@
-// Holes finer than pixels. Holds no resources.
+// Hashed alpha: noise by which fragments are discarded. Holds no resources.
 
-// A number from 0 to 1 for each place of the target; interleaved gradient noise (Jimenez 2014).
+// A number from 0 to 1 for each pixel of the target; interleaved gradient noise (Jimenez 2014).
 float place_noise(vec2 place)
 {
   return fract(52.9829189 * fract(dot(place, vec2(0.06711056, 0.00583715))));
@@ -15,7 +15,7 @@ uint reversed_bits(uint value)
   return ((value & 0x55555555u) << 1u) | ((value & 0xaaaaaaaau) >> 1u);
 }
 
-// Flips each bit or not by those below it.
+// Flips each bit, or not, depending on the bits below it.
 uint mixed_upwards(uint value, uint seed)
 {
   value += seed;
@@ -25,8 +25,8 @@ uint mixed_upwards(uint value, uint seed)
   return value ^ (value * 0x8d22f6e6u);
 }
 
-// Of a sequence that fills 0..1 evenly, the number at this place of it. Each pair of seeds has an order
-// of its own. Twin of `scrambled` in addon/render/hashed_alpha.py.
+// Element `place` of a sequence that fills 0..1 evenly. Each pair of seeds has its own order. Twin of
+// `scrambled` in addon/render/hashed_alpha.py.
 float scrambled(uint place, uint seed, uint other_seed)
 {
   uint shuffled = reversed_bits(mixed_upwards(reversed_bits(place), seed));

@@ -1,26 +1,26 @@
 // Kajiya-Kay shading of hair with Scheuermann's two shifted highlights.
 //
-// Twin of addon/shading/kajiya_kay.py: same names, same order; a test holds the two together.
+// Twin of addon/shading/kajiya_kay.py: same names, same order; a test compares the two.
 // References: Kajiya and Kay 1989, "Rendering Fur with Three Dimensional Textures"; Scheuermann
-// 2004, "Practical Real-Time Hair Rendering and Shading"; for what the two highlights stand for,
+// 2004, "Practical Real-Time Hair Rendering and Shading"; for the origin of the two highlights,
 // Marschner et al. 2003.
 // Needs the struct ShadingSettings, which is made from addon/shading/settings.py.
 // Holds no resources.
 //
 //          N  T'          T  tangent from root to tip, N normal of the hair's volume.
 //          | /            T' = T + s N for s > 0. The highlight lies where T' is across the
-//          |/             half vector H, so that N, seen along the strand, must have leaned
-//   root --+----> T tip   on towards the tip: a positive shift moves the highlight to the tip.
+//          |/             half vector H. There N, which leans more and more to the tip along a strand,
+//   root --+----> T tip   has leaned past H: a positive shift moves the highlight towards the tip.
 //
-// Limits: no shadows but those in the occlusion; no energy conservation.
+// Limits: no shadows except those in the occlusion; no energy conservation.
 #include "lib_tint.glsl"
 #include "lib_unit.glsl"
 
 // GREY_COLOR of addon/shading/kajiya_kay.py
 const vec3 GREY_COLOR = vec3(0.42, 0.42, 0.43);
 
-// Normal of the hair's volume: away from its centre, made perpendicular to the strand. Where the
-// strand itself points away from the centre, any perpendicular will do.
+// Normal of the hair's volume: away from its centre, made perpendicular to the strand; any perpendicular
+// where the strand itself points away from the centre.
 vec3 strand_normal(vec3 point, vec3 tangent, vec3 center)
 {
   vec3 outward = unit_or(point - center, vec3(0.0, 0.0, 1.0));
@@ -39,7 +39,7 @@ vec3 shifted_tangent(vec3 tangent, vec3 normal, float shift)
   return unit_or(tangent + shift * normal, tangent);
 }
 
-// sin^p as (1 - cos^2)^(p / 2): the root would round near the peak, and p would magnify it.
+// sin^p as (1 - cos^2)^(p / 2): a square root would round near the peak, and p would amplify the error.
 float strand_specular(vec3 tangent, vec3 half_vector, float exponent)
 {
   float along = dot(tangent, half_vector);
@@ -70,8 +70,8 @@ vec3 kajiya_kay(vec3 tangent,
   return diffuse + diffuse * (primary + secondary);
 }
 
-// The hair's colour at a place of a strand: the base mixed to the tips', or grey, made darker or
-// brighter by the strand's noise in 0..1. Strands of the lowest grey noise are grey.
+// The hair's colour at a place of a strand: a mix of root and tip colour, or grey, made darker or
+// brighter by the strand's colour noise in 0..1. Strands whose grey noise is below grey_fraction are grey.
 vec3 strand_base(
     float along, float color_noise, float grey_noise, ShadingSettings shading, vec3 root)
 {

@@ -1,5 +1,6 @@
-// A strand's fragment as it waits in a pixel's list: x the next one's number, 0 at the end; y depth as
-// float bits; z the strand; w where along its points, in 20 bits, and alpha, in 12.
+// Nodes of the pixels' lists, one for each fragment of a strand: x number of the next node, 0 at the end; y
+// depth as float bits; z the strand; w position along its points, in the high 20 bits, and alpha, in the
+// low 12.
 //
 // Holds no resources.
 
@@ -21,7 +22,7 @@ float layer_alpha(uint word)
   return float(word & 4095u) / LAYER_ALPHA;
 }
 
-// Where node `number`, counted from 1, lies in the texture of nodes.
+// Texel of node `number`, counted from 1, in the texture of nodes.
 ivec2 layer_texel(uint number)
 {
   uint index = number - 1u;

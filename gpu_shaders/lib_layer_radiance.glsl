@@ -1,15 +1,15 @@
-// What a place of a strand looks like, from its points: for passes that record who is where, and shade
-// what is seen of it later.
+// Radiance at a place of a strand, computed from the strand's points, for passes that first record which
+// strand is where and shade the visible places later.
 //
 // Reads the textures of strands by name, see addon/render/strand_pass.py, and the block `strands`.
-// TANGENTS: the unit tangent, from root to tip in world space, in place of the colour.
+// TANGENTS: the unit tangent, from root to tip in world space, instead of the radiance.
 #define SHADED_LATER
 #include "lib_strand_geometry.glsl"
 #ifndef TANGENTS
 #  include "lib_strand_light.glsl"
 #endif
 
-// How much the tangent turns in a pixel, at a place of a segment.
+// Change of the tangent over one pixel, at a place of a segment.
 vec3 tangent_bend(vec3 before, vec3 from, vec3 to, vec3 after, float u, vec3 tangent)
 {
   vec4 clip = view.view_projection * vec4(catmull_rom_point(before, from, to, after, u), 1.0);
@@ -22,7 +22,7 @@ vec3 tangent_bend(vec3 before, vec3 from, vec3 to, vec3 after, float u, vec3 tan
   return turned * segments / ahead;
 }
 
-// `place` is 0 at the root's point and 1 at the tip's, and grows by as much from point to point.
+// `place` is 0 at the root and 1 at the tip, and grows by the same amount from each point to the next.
 vec3 layer_radiance(int strand, float place)
 {
   StrandSpan span = strand_span(strand_spans, strand);

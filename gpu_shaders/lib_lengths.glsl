@@ -1,4 +1,4 @@
-// Segments keep their length.
+// Length constraints of segments.
 //
 // Twin of addon/dynamics/constraints.py and of banded.solve_tridiagonal, over the globals of
 // lib_guide.glsl. References: Goldenthal et al. 2007; Jakobsen 2001; Kim, Chentanez and Mueller
@@ -11,11 +11,11 @@
 
 vec3 touched_normal[FREE_SIZE];  // at each free CV that touches a collider, else zero
 
-// One Newton step on all segments at once; segment i here goes from CV i + 1 to CV i + 2.
+// One Newton step on all segments at once. Segment i goes from CV i + 1 to CV i + 2.
 void newton_step(bool has_normals)
 {
   vec3 segment[FREE_SIZE];
-  float ratio[FREE_SIZE];  // how much of the segment before goes into segment i
+  float ratio[FREE_SIZE];  // elimination factor of segment i - 1 in row i
   float tension[FREE_SIZE];
   vec3 segment_before = vec3(0.0);
   vec3 normal_before = vec3(0.0);
@@ -50,7 +50,7 @@ void newton_step(bool has_normals)
     segment_before = segment[i];
   }
   vec3 above = vec3(0.0);  // the segment above times its tension
-  float taken = 0.0;       // of the tension, by the segment above
+  float taken = 0.0;       // part of the tension, by back substitution from the segment above
   for (int i = FREE - 1; i >= 0; i--) {
     float own = tension[i] - taken;
     taken = ratio[i] * own;
@@ -67,8 +67,8 @@ void newton_step(bool has_normals)
   }
 }
 
-// Whether a segment is off by more than this fraction of its length and what rounding hides,
-// `rounding` [m]; by squares, without a root.
+// Whether any segment's length is off by more than this fraction of it plus `rounding` [m]. Compares
+// squares, which needs no root.
 bool is_off_length(float tolerance, float rounding)
 {
   bool is_off = false;
@@ -83,14 +83,14 @@ bool is_off_length(float tolerance, float rounding)
   return is_off;
 }
 
-// Lay the guide out again from the root, with its segments' directions; one with held CVs from these
-// to the root first.
+// Set all segments to their lengths, from the root on, keeping their directions. With held CVs, first from
+// these towards the root.
 void lay_out()
 {
 #ifdef HAS_HELD
   vec3 after = position[CV_COUNT - 1];
   bool is_beyond = false;
-  for (int i = FREE - 1; i > 0; i--) {  // CV i + 1 by the one beyond it
+  for (int i = FREE - 1; i > 0; i--) {  // CV i + 1 from the one beyond it
     is_beyond = is_beyond || held[i];
     vec3 place = position[i + 1];
     vec3 moved_place = position[i + 2] - unit_of(after - place) * segment_length[i];
@@ -130,7 +130,7 @@ void relax_lengths(int sweeps)
   }
 }
 
-// The point, no farther from another than this.
+// A point, moved towards another one if it is farther from it than `farthest`.
 vec3 brought_near(vec3 point, vec3 other, float farthest)
 {
   vec3 offset = point - other;
@@ -144,9 +144,8 @@ void shorten_from_root()
   }
 }
 
-// No CV farther from the root than its length along the strand, neither in a straight line nor along
-// the strand; a guide with held CVs is shortened to and fro, from these to the
-// root first.
+// Limit each CV's distance from the root, in a straight line and along the strand, to its rest length
+// along the strand. With held CVs, in sweeps from these to the root and back.
 void hold_within_reach()
 {
   float reach = 0.0;

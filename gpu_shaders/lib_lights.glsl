@@ -1,8 +1,8 @@
-// Twin of addon/shading/lights.py and area_lights.py: the radiometric convention is written there.
-// Needs struct_lights.glsl. Holds no resources.
+// Irradiance of the scene's lights. Twin of addon/shading/lights.py and area_lights.py, which state the
+// radiometric convention. Needs struct_lights.glsl. Holds no resources.
 //
-// LIGHT_KINDS, where a recipe says it: 0 there are suns alone, 1 points and spots as well, 2 area lights
-// too. A software driver computes all branches, and panels cost as much as all other shading.
+// LIGHT_KINDS, where a recipe defines it: 0 only suns, 1 points and spots as well, 2 area lights too. A
+// software driver computes all branches, and area lights cost as much as all other shading.
 #include "lib_angle.glsl"
 #include "lib_pi.glsl"
 
@@ -18,13 +18,13 @@ const float FAR_PANEL = 2.5e-3, MIN_HEIGHT = 1.0e-9;
 const vec3 PANEL_NODES = vec3(0.23861918608319692, 0.6612093864662645, 0.932469514203152);
 const vec3 PANEL_WEIGHTS = vec3(0.46791393457269104, 0.3607615730481386, 0.17132449237917036);
 
-// What slats before a panel let through into a direction of this tangent to the panel's own.
+// Shade of an area light's spread, in a direction whose angle from its axis has this tangent.
 float panel_shade(Lights lights, int index, float tangent)
 {
   return max(lights.along[index].w - tangent, 0.0) * lights.power[index].w;
 }
 
-// The angle of an edge from start to end, over its line's distance.
+// The angle that an edge from start to end subtends, over the distance of its line.
 float panel_edge(float height, float across, float start, float end)
 {
   float squared = height * height + across * across;
@@ -59,7 +59,7 @@ vec3 panel_disk(float radius, vec3 offset)
   return -vec3(2.0 * height * offset.xy, facing) / (PI * total * product);
 }
 
-// The part of one row of a panel, from low to high, by the sine of the angle at the point.
+// The part of one row of a panel from low to high, integrated over the sine of the angle at the point.
 vec3 panel_row(Lights lights, int index, float height, float v, float low, float high)
 {
   float reach = length(vec2(height, v));
@@ -77,14 +77,14 @@ vec3 panel_row(Lights lights, int index, float height, float v, float low, float
   return total;
 }
 
-// Row by row over what of a panel lies in the cone into which it shines.
+// Integral, row by row, over the part of a panel in whose cone the point lies.
 vec3 panel_grid(Lights lights, int index, bool is_round, vec3 offset)
 {
   float a = lights.across[index].w, b = lights.upward[index].w, height = offset.z;
   float reach = height * lights.along[index].w;
   float first = max(-b - offset.y, -reach) / height, last = min(b - offset.y, reach) / height;
   float first_length = length(vec2(1.0, first)), last_length = length(vec2(1.0, last));
-  // angles from the panel's plane, which are those of numpy's arctan and a quarter turn
+  // angles from the panel's plane: those of numpy's arctan plus a quarter turn
   float low_angle = angle_of(1.0 / first_length, -first / first_length);
   float high_angle = angle_of(1.0 / last_length, -last / last_length);
   float middle = 0.5 * (low_angle + high_angle);
@@ -103,7 +103,7 @@ vec3 panel_grid(Lights lights, int index, bool is_round, vec3 offset)
   return total / (PI * 4.0 * a * b * (is_round ? 0.25 * PI : 1.0));
 }
 
-// Four points instead of a panel far away, which lie as wide along each axis as it does.
+// Four points instead of a distant panel, with its variance along each axis.
 vec3 panel_four_points(Lights lights, int index, bool is_round, vec2 half_sides, vec3 offset)
 {
   vec2 place = half_sides * (is_round ? 0.5 : 0.5773502691896257);
@@ -118,7 +118,7 @@ vec3 panel_four_points(Lights lights, int index, bool is_round, vec2 half_sides,
   return total;
 }
 
-// What arrives of one watt of an area light, towards it; nought behind it [1/m^2].
+// Vector irradiance of an area light of one watt, towards it, zero behind it [1/m^2].
 vec3 panel_vector_irradiance(Lights lights, int index, vec3 away)
 {
   mat3 axes = mat3(lights.across[index].xyz, lights.upward[index].xyz, lights.along[index].xyz);
@@ -142,7 +142,7 @@ vec3 panel_vector_irradiance(Lights lights, int index, vec3 away)
   return axes * panel_grid(lights, index, is_round, offset);
 }
 
-// What a spot's cone lets through; width is the squared sine of the angle that the light fills.
+// Fraction of light in a spot's cone. width: squared sine of the angle that the light subtends.
 float cone_fraction(Lights lights, int index, vec3 away, float width)
 {
   float x = -dot(lights.across[index].xyz, away), y = -dot(lights.upward[index].xyz, away);
@@ -159,8 +159,8 @@ float cone_fraction(Lights lights, int index, vec3 away, float width)
   return fraction * fraction * (3.0 - 2.0 * fraction);
 }
 
-// What comes from one light: the unit vector towards it (to a panel, whence most light comes), and
-// the irradiance on a surface that faces it [W/m^2].
+// The unit vector to a light (of an area light, to where most of its light comes from), and the irradiance
+// on a surface that faces it [W/m^2].
 void light_at(Lights lights, int index, vec3 point, out vec3 to_light, out vec3 irradiance)
 {
   vec4 light = lights.vector_and_kind[index];

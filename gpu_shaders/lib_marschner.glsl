@@ -1,7 +1,7 @@
-// Marschner's scattering from its look-up tables, and what a strand makes of it.
+// Marschner's scattering from its look-up tables, and the shading of strands by it.
 //
-// Twin of addon/shading/marschner/{fibre,tables,look}.py: same names, same order; what angles and
-// tables mean is written there. Needs struct_fibre.glsl and the struct ShadingSettings.
+// Twin of addon/shading/marschner/{fibre,tables,look}.py, which explain angles and tables: same names,
+// same order. Needs struct_fibre.glsl and the struct ShadingSettings.
 // References: Marschner et al. 2003; Nguyen and Donnelly 2005, GPU Gems 2, chapter 23.
 // Holds no resources.
 #include "lib_angle.glsl"
@@ -29,21 +29,21 @@ vec3 directions_to_angles(vec3 tangent, vec3 to_light, vec3 to_eye)
               angle_of(turn.x, turn.y));
 }
 
-// Where a texture has x in 0..1 between the centres of its end texels.
+// Texture coordinates that map x in 0..1 to the range between the centres of the end texels.
 vec2 table_place(vec2 x, vec2 size)
 {
   return ((size - 1.0) * clamp(x, 0.0, 1.0) + 0.5) / size;
 }
 
-// The level at which the longitudinal table is blurred over an angle of theta_h.
+// Level of the longitudinal table that is blurred over this angle of theta_h.
 float table_level(float angle, sampler3D longitudinal)
 {
   float step = PI / float(textureSize(longitudinal, 0).x - 1);
   return log2(max(angle / step, 1.0));
 }
 
-// What absorption leaves of R, TT, TRT and the rest, a column each. Where the fitted parabola would
-// rise again, it stays at its lowest.
+// Fraction of light that absorption leaves of R, TT, TRT and the rest, a column each. Beyond the minimum of
+// the fitted parabola, its minimum is used.
 mat4x3 kept_light(vec4 paths, vec3 absorption)
 {
   vec3 reached = min(absorption, vec3(paths.y / max(paths.z, MIN_VARIANCE)));
@@ -53,8 +53,8 @@ mat4x3 kept_light(vec4 paths, vec3 absorption)
                 exp(-absorption * paths.w));
 }
 
-// S of angles as directions_to_angles has them; strengths are of R, TT, TRT and the rest. For
-// the level see table_level.
+// S for angles of directions_to_angles; strengths are of R, TT, TRT and the rest. For the level see
+// table_level.
 vec3 look_up(sampler3D longitudinal,
              sampler2D azimuthal,
              sampler2D paths,
@@ -81,8 +81,8 @@ vec3 color_absorption(Fibre fibre, vec3 color)
   return root * root;
 }
 
-// Absorption at a place of a strand, per radius; both noises are the strand's own, in 0..1. `root` is
-// that without a tint.
+// Absorption at a place of a strand, per radius; both noises are the strand's, in 0..1. root: absorption
+// without a tint.
 vec3 strand_absorption(Fibre fibre,
                        float along,
                        float color_noise,
@@ -96,7 +96,7 @@ vec3 strand_absorption(Fibre fibre,
   return amount * (grey_noise < shading.grey_fraction ? grey : mixed);
 }
 
-// The colour of a mass of such hair, for light that comes from strand to strand.
+// The colour of a mass of hair with this absorption, for light from strand to strand.
 vec3 strand_color(Fibre fibre, vec3 absorption)
 {
   return exp(-sqrt(max(absorption, 0.0)) * fibre.root.w);
@@ -115,8 +115,8 @@ vec3 strand_angles(vec3 tangent,
 }
 
 #ifdef GPU_FRAGMENT_SHADER
-// The level at which a highlight does not flicker: blurred over what theta_h changes in a pixel.
-// Of a bend in the plane of a light from behind, theta_h hardly knows, and the light stays sharp.
+// Level at which a highlight does not flicker: blurred over the change of theta_h in a pixel. With light
+// from behind, a bend in the light's plane hardly changes theta_h, and the highlight stays sharp.
 float pixel_level(sampler3D longitudinal,
                   vec3 tangent,
                   vec3 normal,
@@ -131,14 +131,14 @@ float pixel_level(sampler3D longitudinal,
 }
 #endif
 
-// The fraction of light that no strand is in the way of: what passes tau strands, or, where tau is not
-// known, which is when it is negative, by how much the hair's volume faces the light.
+// The fraction of light that no strand blocks: exp(-tau), or, where tau is unknown, which is when it is
+// negative, by how much the hair's volume faces the light.
 float straight_light(vec3 normal, vec3 to_light, float tau, ShadingSettings shading)
 {
   return tau < 0.0 ? mix(1.0, diffuse_bias(normal, to_light), shading.volume_shadow) : exp(-tau);
 }
 
-// S of a strand on its own, for angles of strand_angles: sparkle breaks up TRT alone.
+// S of a single strand, for angles of strand_angles. Sparkle only varies TRT.
 vec3 single_scattering(sampler3D longitudinal,
                        sampler2D azimuthal,
                        sampler2D paths,
@@ -154,7 +154,7 @@ vec3 single_scattering(sampler3D longitudinal,
   return look_up(longitudinal, azimuthal, paths, angles, absorption, strengths, level);
 }
 
-// What one light sends to the eye: times irradiance, and occlusion where tau is not known, it is
+// Light from one light to the eye: times irradiance, and times occlusion where tau is unknown, it is
 // radiance. Both noises are in 0..1; for the level see look_up.
 vec3 marschner_light(sampler3D longitudinal,
                      sampler2D azimuthal,

@@ -1,9 +1,9 @@
-// How much of a light meshes let through to a place of a mesh, by the maps of their depths.
+// Shadows of meshes on meshes, from shadow maps of their depths.
 //
-// Twin of addon/shading/volume/mesh_light.py: same order; a test holds the two together. Reads the
+// Twin of addon/shading/volume/mesh_light.py: same order; a test compares the two. Reads the
 // block `mesh_shadows` and the texture array `mesh_depths`.
 
-// Place in a map before the division, and w: not positive behind the light.
+// Place in a map before the division by w, and w, which is not positive behind the light.
 vec3 mesh_map_place(int map, vec3 point)
 {
   vec4 at = vec4(point, 1.0);
@@ -12,7 +12,7 @@ vec3 mesh_map_place(int map, vec3 point)
               dot(mesh_shadows.map_w[map], at));
 }
 
-// The map of a light in which a point lies; -1 none.
+// The map of a light in which a point lies; -1 for none.
 int mesh_map_at(int light, vec3 point)
 {
   int first = int(mesh_shadows.light[light].x), count = int(mesh_shadows.light[light].y);
@@ -24,8 +24,7 @@ int mesh_map_at(int light, vec3 point)
   return found;
 }
 
-// xy how depth changes from texel to texel on the plane through a point, z the depth of one texel's
-// width.
+// xy change of depth per texel on the plane through a point, z depth that equals the width of a texel.
 vec3 mesh_slope(int map, vec3 place, vec3 normal)
 {
   float w = max(abs(place.z), 1.0e-6);
@@ -42,8 +41,7 @@ vec3 mesh_slope(int map, vec3 place, vec3 normal)
   return vec3(slope / max(length(slope) / ({{steepest}} * unit), 1.0), unit);
 }
 
-// The fraction of a light that reaches a point. normal: of its triangle; its sign and its length count for
-// nothing.
+// The fraction of a light that reaches a point. normal: of its triangle, of any sign and length.
 float mesh_light(int light, vec3 point, vec3 normal)
 {
   int map = mesh_map_at(light, point);

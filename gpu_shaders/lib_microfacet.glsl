@@ -1,4 +1,4 @@
-// Twin of addon/shading/microfacet.py: what a surface reflects at its boundary. Holds no resources.
+// Specular reflection of surfaces. Twin of addon/shading/microfacet.py. Holds no resources.
 #include "lib_pi.glsl"
 
 float dielectric_fresnel(float cosine, float specular)
@@ -26,7 +26,7 @@ float ggx_reflection(vec3 normal, vec3 to_light, vec3 to_eye, float specular, fl
   }
   vec3 middle = between * inversesqrt(length_squared);
   float alpha_squared = pow(max(roughness, {{min_roughness}}), 4.0);
-  // the sine of the angle by its cross product: one minus its cosine would lose a sharp highlight
+  // sine from the cross product: 1 - cosine^2 would be too imprecise for a sharp highlight
   vec3 aside = cross(normal, middle);
   float across = dot(normal, middle);
   float spread = dot(aside, aside) + alpha_squared * across * across;

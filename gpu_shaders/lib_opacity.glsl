@@ -1,31 +1,31 @@
-// Opacity maps: how much light the hair lets through to a place.
+// Opacity maps: how much light hair lets through to a place.
 //
-// Twin of addon/shading/volume/opacity.py: same names, same order; a test holds the two together.
+// Twin of addon/shading/volume/opacity.py: same names, same order; a test compares the two.
 // References: Kim and Neumann 2001, "Opacity Shadow Maps"; Yuksel and Keyser 2008, "Deep Opacity
 // Maps"; Nguyen and Donnelly 2005 for the look-up as a dot product.
 // Needs the struct Opacity. Holds no resources.
 //
 //   light   start      ends[0]   ends[1]         ends[2]    depth
 //   ------>   |-----------|---------|---------------|------->
-//             0          sum 0     sum 1           sum 2      what the map holds at each end; in
-//                                                             between tau is linear
-// Depth is counted from where a texel's layers start, in fractions of how thick they are together.
+//             0          sum 0     sum 1           sum 2      tau that the map holds at each end;
+//                                                             in between it is interpolated
+// Depth is measured from the start of a texel's layers, as a fraction of their total thickness.
 
-// The layers whose sums a strand at this depth behind their start is part of: four of them.
+// Which of four layers' sums a strand at this depth behind their start adds to, 1 or 0 each.
 vec4 adds_to(float depth, vec4 ends)
 {
   return vec4(lessThanEqual(vec4(depth), ends));
 }
 
-// The fraction of each layer that lies in front of this depth: four of them. `before` is the end of the
-// layer before these.
+// The fraction of each of four layers that lies in front of this depth. `before` is the end of the
+// preceding layer.
 vec4 layers_passed(float depth, vec4 ends, float before)
 {
   vec4 starts = vec4(before, ends.xyz);
   return clamp((depth - starts) / (ends - starts), 0.0, 1.0);
 }
 
-// Place in a light's map, xy in 0..1, and depth; outside of the map behind the light.
+// Place in a light's map: xy in 0..1, outside of the map behind the light; z depth.
 vec3 map_place(Opacity opacity, int light, vec3 point)
 {
   vec4 at = vec4(point, 1.0);
@@ -35,32 +35,32 @@ vec3 map_place(Opacity opacity, int light, vec3 point)
   return vec3(place, dot(opacity.map_depth[light], at));
 }
 
-// 1 in the middle of a map, 0 at its border: how much of the shadows of meshes counts on meshes, which
-// reach beyond it.
+// Weight of the map's mesh shadows on meshes, which may extend beyond the map: 1 in its middle, 0 at its
+// border.
 float within_map(vec2 place)
 {
   vec2 away = abs(place - 0.5);
   return clamp((0.5 - max(away.x, away.y)) / {{map_border}}, 0.0, 1.0);
 }
 
-// What of a place's depth is compared with that of meshes.
+// A depth with the bias subtracted, for comparison with the depths of meshes.
 float depth_before_meshes(Opacity opacity, float depth)
 {
   return depth - max(opacity.bias, {{min_mesh_bias}});
 }
 
-// How broad a strand of the width 1 m is in a light's map, in texels. `across` is the unit vector
-// across it there, xyw its place before the division.
+// Texels per metre across a strand in a light's map. `across` is the unit vector across the strand in the
+// map, xyw its place before the division by w.
 float strand_breadth(Opacity opacity, int light, vec3 xyw, vec2 across)
 {
-  // how places change with the point, times 2 w
+  // gradients of the place, times 2 w
   float w = max(abs(xyw.z), 1.0e-6);
   vec3 turn_x = opacity.map_x[light].xyz - xyw.x / w * opacity.map_w[light].xyz;
   vec3 turn_y = opacity.map_y[light].xyz - xyw.y / w * opacity.map_w[light].xyz;
   return length(across.x * turn_x + across.y * turn_y) * 0.5 * float(opacity.resolution) / w;
 }
 
-// tau of a strand itself at its middle line, of what a map holds there. half_width: in texels.
+// The strand's own part of the tau that a map holds at its middle line. half_width: in texels.
 float own_depth(float half_width)
 {
   float drawn = max(half_width, 0.5);
@@ -68,7 +68,7 @@ float own_depth(float half_width)
   return half_width / drawn * met * (2.0 - met);
 }
 
-// The same of a strand of this radius [m].
+// The same for a strand of this radius [m].
 float own_depth_at(Opacity opacity, int light, vec3 point, vec3 tangent, float radius)
 {
   vec4 at = vec4(point, 1.0);
@@ -83,14 +83,14 @@ float own_depth_at(Opacity opacity, int light, vec3 point, vec3 tangent, float r
   return own_depth(radius * strand_breadth(opacity, light, xyw, across));
 }
 
-// Depth of the first hair in what was kept; 1 where there is none.
+// Depth of the first hair from a texel of `starts`; 1 where there is none.
 float start_depth(uint kept)
 {
   return min(float(kept) / {{start_scale}}, 1.0);
 }
 
-// Where deep layers start, and how thick they are together: planes over a block of texels. x in its
-// middle, yz how much it changes from texel to texel.
+// Start and total thickness of deep layers, as planes over a block of texels: x the value in its middle,
+// yz the change per texel.
 struct LayerSpan {
   vec2 middle;
   vec3 start;
@@ -106,7 +106,7 @@ LayerSpan layer_span(sampler2D spans, ivec2 texel, int map, int resolution)
                    texelFetch(spans, at + ivec2(side, 0), 0).xyz);
 }
 
-// x where layers start at a place [texels], y one over how thick they are.
+// x start of the layers at a place [texels], y one over their total thickness.
 vec2 layers_at(LayerSpan span, vec2 place)
 {
   vec3 weights = vec3(1.0, place - span.middle);
@@ -114,7 +114,7 @@ vec2 layers_at(LayerSpan span, vec2 place)
               1.0 / max(dot(span.thickness, weights), {{min_thickness}}));
 }
 
-// At which fraction of the layers a depth at a place [texels] lies.
+// A depth at a place [texels], as a fraction of the layers.
 float layer_fraction(LayerSpan span, vec2 place, float depth)
 {
   vec2 layers = layers_at(span, place);

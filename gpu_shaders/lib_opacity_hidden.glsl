@@ -1,10 +1,10 @@
-// What a mesh hides from a light, opacity maps leave out: it gets no light and is in the way of none.
-// So the layers of hair before a head reach to the last hair before it, not to that behind it.
+// Hair that a mesh hides from a light, and that opacity maps therefore leave out: it gets no light and blocks
+// none. So the deep layers of the hair before a head end at the last hair before it, not at that behind it.
 //
 // Reads the block `opacity`, the integer `light_index` and the texture array `opacity_meshes`.
 #include "lib_opacity.glsl"
 
-// Whether the first mesh hides a place of the map, and what is this far around it, from the light.
+// Whether the first mesh hides a place of the map and its surroundings, up to `around`, from the light.
 bool is_hidden(vec3 place, float around)
 {
   int side = textureSize(opacity_meshes, 0).x, map = int(opacity.light[light_index].x);
@@ -19,7 +19,7 @@ bool is_hidden(vec3 place, float around)
   return true;
 }
 
-// The same, with the texels around it that a look-up blends.
+// The same, for a place and the texels around it that a look-up blends.
 bool is_hidden_from_texels(vec3 place)
 {
   return is_hidden(place, 1.5 / float(opacity.resolution));

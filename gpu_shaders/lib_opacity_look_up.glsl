@@ -1,12 +1,12 @@
-// What light meets on its way from a light to a place, and beyond, from the maps.
+// Look-up in opacity maps: the optical depth between a light and a place, and beyond the place.
 //
 // Twin of look_up in addon/shading/volume/opacity.py. Reads the block `opacity`, the texture arrays
-// `opacity_0` to `opacity_5`, as many as SLOTS says, `opacity_meshes`, and `opacity_spans` where
-// layers are DEEP. Where they are not, all four texels around a place are asked at once, for tau up to the
-// nearest mesh of theirs; the twin asks each up to its own.
+// `opacity_0` to `opacity_{SLOTS - 1}`, `opacity_meshes`, and `opacity_spans` where layers are DEEP. Where
+// they are not, one filtered look-up covers the four texels around a place, and tau is taken up to the
+// nearest of their meshes; the twin takes it up to each texel's own mesh.
 //
-// Texel t of a map lies in array t % SLOTS, since one framebuffer cannot hold several layers of one
-// array, and there in one of PASSES layers.
+// Texel t of a map lies in array t % SLOTS, since a framebuffer cannot hold several layers of one
+// array, in one of PASSES layers of it.
 #include "lib_opacity.glsl"
 
 #if DEEP
@@ -25,8 +25,8 @@
     sum_before = sums.w; \
   }
 
-// tau at two depths behind the start of the layers, of one texel, or of its bilinear neighbourhood
-// where all layers start alike.
+// tau at two depths behind the start of the layers: of one texel, or, where all layers start at the same
+// depth, of its bilinear neighbourhood.
 vec2 summed_layers(int map, vec2 place, ivec2 texel, vec2 depths)
 {
   vec2 tau = vec2(0.0);
@@ -53,8 +53,8 @@ vec2 summed_layers(int map, vec2 place, ivec2 texel, vec2 depths)
   return tau;
 }
 
-// x the fraction of the light that no mesh is in the way of, y the depth of the nearest mesh around a
-// place. Meshes have texels of their own: strands that stand for many hairs have larger ones.
+// x the fraction of the light that no mesh blocks, y the depth of the nearest mesh around a place. The mesh
+// maps have their own resolution, since maps of strands that represent many hairs are coarser.
 vec2 mesh_path(int map, vec2 place, float depth)
 {
   int side = textureSize(opacity_meshes, 0).x;
@@ -73,8 +73,8 @@ vec2 mesh_path(int map, vec2 place, float depth)
   return found;
 }
 
-// x tau between the light and a place, y tau from there on to the first mesh, z the fraction of the
-// light that no mesh is in the way of.
+// x tau between the light and a place, y tau from there to the first mesh, z the fraction of the light
+// that no mesh blocks.
 vec3 light_path(int light, vec3 point)
 {
   int map = int(opacity.light[light].x);
@@ -97,7 +97,7 @@ vec3 light_path(int light, vec3 point)
     float weight = weights.x * weights.y;
     ivec2 middle = (2 * texel + 1) * mesh_side / (2 * opacity.resolution);
     float mesh = texelFetch(opacity_meshes, ivec3(middle, map), 0).x;
-    // each texel's layers start elsewhere, so that its own tau is found before they are blended
+    // layers start at different depths in each texel, so tau is computed per texel and then blended
     LayerSpan span = layer_span(opacity_spans, texel, map, opacity.resolution);
     vec2 depths = vec2(layer_fraction(span, scaled + 0.5, depth),
                        layer_fraction(span, vec2(texel) + 0.5, mesh));

@@ -1,5 +1,5 @@
-// Points of strands at which opacity maps keep the depths of the first and the last hair: a few of each
-// segment, at least one in each texel of `starts` that it meets.
+// Sample points of strands for the depths of the first and the last hair in opacity maps: a few on each
+// segment, at least one in each texel of `starts` that it crosses.
 //
 // Reads the block `opacity`, the integer `light_index` and the texture array `opacity_meshes`.
 #include "lib_strand_texel.glsl"
@@ -16,11 +16,11 @@ bool is_ahead(vec3 point)
   return dot(opacity.map_w[light_index], vec4(point, 1.0)) > 0.0;
 }
 
-// Between the points before and after it, xyz the places of both in the map.
+// A segment between two points; xyz their places in the map.
 struct StartSegment {
   vec3 from;
   vec3 to;
-  int count;  // of its points; none where it reaches behind the light
+  int count;  // sample points; 0 where it reaches behind the light
 };
 
 StartSegment start_segment(vec3 root_side, vec3 tip_side)

@@ -1,7 +1,7 @@
-// How a finished colour is written to the target.
+// Encoding of finished colours for the target.
 
-// The sRGB transfer curve (IEC 61966-2-1), which is all that Blender's view transform "Standard"
-// does to colours inside the display's range.
+// The sRGB transfer curve (IEC 61966-2-1). Inside the display's range it is all that Blender's view
+// transform "Standard" applies.
 vec3 srgb_encoded(vec3 radiance)
 {
   vec3 curved = 1.055 * pow(max(radiance, vec3(0.0031308)), vec3(1.0 / 2.4)) - 0.055;
@@ -9,15 +9,15 @@ vec3 srgb_encoded(vec3 radiance)
 }
 
 #ifdef DISPLAY
-// Where radiances lie along the axes of the display table, in 0 to 1.
+// Places of radiances along the axes of the display table, in 0 to 1.
 // Twin of `shaped` in addon/render/display.py; the shaper is Display.shaper.
 vec3 display_shaped(vec3 radiance, vec4 shaper)
 {
   return clamp(log2(max(radiance, vec3(0.0)) * shaper.x + 1.0) * shaper.y, 0.0, 1.0);
 }
 
-// Code values by Blender's view transform, from the texture display_table of the recipe.
-// Twin of `Display.shown`, which does the gamma too.
+// Code values of Blender's view transform, from the recipe's texture display_table.
+// Twin of `Display.shown`, which applies the gamma too.
 vec3 display_code(vec3 radiance, vec4 shaper)
 {
   vec3 place = (display_shaped(radiance, shaper) * (shaper.z - 1.0) + 0.5) / shaper.z;
@@ -25,11 +25,11 @@ vec3 display_code(vec3 radiance, vec4 shaper)
 }
 #endif
 
-// What to write so that scene-linear `radiance` appears right in the target.
-// {{output_scene_linear}}: a picture of our own, scene-linear as it is.
-// {{output_viewport}}: Blender's viewport from a POST_VIEW handler, which applies no view transform
-// and shows a written L as the code value L^(1/2.2): so the wanted code value to the power of 2.2.
-// With DISPLAY the code value is that of the scene's view transform, else that of "Standard".
+// The value to write for a scene-linear `radiance`.
+// {{output_scene_linear}}: into a picture of our own: the radiance itself.
+// {{output_viewport}}: into Blender's viewport from a POST_VIEW handler, which applies no view transform
+// and shows a written L as the code value L^(1/2.2): the code value to the power of 2.2. With DISPLAY it is
+// the code value of the scene's view transform, else that of "Standard".
 vec3 output_encoded(vec3 radiance, int encoding)
 {
   if (encoding != {{output_viewport}}) {

@@ -1,24 +1,24 @@
-// A frame where each strand is held by the surface, and how it carries the strand.
+// The surface's frame at the root of each strand, and its motion, which carries the strand.
 //
 // Twin of addon/groom/roots.py (root_frames, follow). Holds no resources.
 #include "lib_strand_texel.glsl"
 //
-// Limits: with float32 a triangle whose first angle has a sine below 1e-6 counts as flat, where the
-// twin, with float64, still finds its normal.
+// Limits: in float32 a triangle whose first angle has a sine below 1e-6 counts as degenerate; the twin, in
+// float64, still finds its normal.
 
 struct RootFrame {
   vec3 origin;    // on the surface
   mat3 rotation;  // columns: along the triangle's first edge, bitangent, normal
 };
 
-// How a strand moves from rest to now: point + turn * (point - rest_origin) + shift.
+// Rigid motion of a strand from rest to now: point + turn * (point - rest_origin) + shift.
 struct RootMotion {
   vec3 rest_origin;
   mat3 turn;
   vec3 shift;
 };
 
-// A unit vector across a unit tangent, as near to an axis of the world as can be.
+// The unit vector across a unit tangent that is nearest to a world axis.
 vec3 across(vec3 tangent)
 {
   vec3 size = abs(tangent);
@@ -32,8 +32,8 @@ vec3 across(vec3 tangent)
   return normalize(axis - tangent * dot(axis, tangent));
 }
 
-// The frame in a triangle a, b, c. `weight` holds the barycentric coordinates of b and c. Without
-// area or first edge, axes of the world take the place of what is not known.
+// The frame in a triangle a, b, c. `weight` holds the barycentric coordinates of b and c. In a triangle
+// without area or first edge, world axes replace the undefined directions.
 RootFrame root_frame(vec3 a, vec3 b, vec3 c, vec2 weight)
 {
   vec3 edge = b - a;
@@ -49,7 +49,7 @@ RootFrame root_frame(vec3 a, vec3 b, vec3 c, vec2 weight)
   return frame;
 }
 
-// Only the change, so that a root that did not move leaves its strand bit for bit.
+// Stored as a change, so that a root that did not move leaves its strand bit for bit as it is.
 RootMotion root_motion(RootFrame rest, RootFrame now)
 {
   RootMotion motion;
@@ -59,8 +59,8 @@ RootMotion root_motion(RootFrame rest, RootFrame now)
   return motion;
 }
 
-// The motion that lies in four texels of a texture as ride_roots.comp.glsl writes them: xyz a column of
-// the turn and w a coordinate of the shift, three times, then xyz the rest origin.
+// The motion in four texels of a texture, as ride_roots.comp.glsl writes them: three with a column of the
+// turn in xyz and a coordinate of the shift in w, then xyz the rest origin.
 RootMotion root_motion_at(sampler2D motions, int mover)
 {
   vec4 x = texelFetch(motions, strand_texel(mover, 0, 4), 0);

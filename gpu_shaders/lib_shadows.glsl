@@ -1,5 +1,5 @@
-// What is in the way of a light. SHADOWS: whether there are opacity maps to ask. MESH_SHADOWS: whether
-// there are maps of the depths of all meshes.
+// Shadows of hair and meshes. SHADOWS: there are opacity maps. MESH_SHADOWS: there are shadow maps of all
+// meshes.
 #if SHADOWS
 #  include "lib_opacity_look_up.glsl"
 #endif
@@ -7,8 +7,8 @@
 #  include "lib_mesh_shadows.glsl"
 #endif
 
-// x how many strands a light passes on its way to a point, -1 where nothing is known of it, y how
-// many lie behind the point, z the fraction of the light that no mesh is in the way of.
+// x number of strands between a light and a point, -1 where the light has no map, y number of strands
+// behind the point, z the fraction of the light that no mesh blocks.
 vec3 shadow_path(int index, vec3 point)
 {
 #if SHADOWS
@@ -20,7 +20,7 @@ vec3 shadow_path(int index, vec3 point)
 }
 
 #if SHADOWS && defined(MESH_SHADOWS)
-// Whether the map of hair has smaller texels around a point than that of all meshes.
+// Whether the hair's map has smaller texels at a point than the map of all meshes.
 bool map_is_finer(int index, vec3 point)
 {
   int map = mesh_map_at(index, point);
@@ -34,9 +34,9 @@ bool map_is_finer(int index, vec3 point)
 }
 #endif
 
-// The fraction of a light that no mesh is in the way of, at a place of a mesh. path: of shadow_path.
-// normal: of its triangle. Meshes reach beyond the map of hair: towards its border, and where it is the
-// finer one, the map of all meshes takes over, or else their shadows fade, or they would end at a line.
+// The fraction of a light that no mesh blocks, at a place of a mesh. path: of shadow_path. normal: of its
+// triangle. Meshes may extend beyond the hair's map, where their shadows would end at a line. So towards the
+// map's border, and wherever the map of all meshes is finer, that map replaces it; without one, shadows fade.
 float light_past_meshes(int index, vec3 point, vec3 normal, vec3 path)
 {
   float within = 0.0;
@@ -45,7 +45,7 @@ float light_past_meshes(int index, vec3 point, vec3 normal, vec3 path)
     vec3 place = map_place(opacity, index, point);
     within = within_map(place.xy);
 #  ifdef MESH_SHADOWS
-    // depths before and behind all hair are not distinguished
+    // the hair's map clamps depths before and behind all hair
     within = min(within, within_map(vec2(0.5, depth_before_meshes(opacity, place.z))));
     within = map_is_finer(index, point) ? within : 0.0;
 #  endif
@@ -67,16 +67,16 @@ vec3 shadow_path_to_mesh(int index, vec3 point, vec3 normal)
   return vec3(path.xy, light_past_meshes(index, point, normal, path));
 }
 
-// The fraction of a light that hair and meshes in its way leave, by colour: of what strands take they
-// send `forward` on.
+// The fraction of a light that hair and meshes let through, by colour. forward: fraction of the light on a
+// strand that it scatters forward.
 vec3 light_left(vec3 path, vec3 forward)
 {
   return path.z * exp(-max(path.x, 0.0) * (1.0 - forward));
 }
 
 #if SHADOWS
-// How much of a strand or card at a point counts towards tau at another, since tau grows evenly through
-// the layer in which it lies. Twin of own_fraction in addon/shading/volume/opacity.py.
+// Fraction of a strand or card at a point that counts towards tau at another point, since tau grows linearly
+// through the layer in which it lies. Twin of own_fraction in addon/shading/volume/opacity.py.
 float own_fraction(int light, vec3 point, vec3 there)
 {
   vec3 place = map_place(opacity, light, point);
@@ -104,8 +104,8 @@ float own_fraction(int light, vec3 point, vec3 there)
 }
 #endif
 
-// As shadow_path, for a place of a strand of this radius [m] and opacity, which is in the maps as
-// well: it is not in its own way, nor behind itself.
+// As shadow_path, for a place of a strand of this radius [m] and opacity. The maps contain the strand
+// itself, whose part is subtracted on both sides of the place.
 vec3 shadow_path_to_strand(int index, vec3 point, vec3 tangent, float radius, float hides)
 {
   vec3 path = shadow_path(index, point);

@@ -2,7 +2,7 @@
 //
 // Needs struct_shafts.glsl.
 
-// From the light's place to a place on the screen, both in pixels, to ray and texel of the grid.
+// Texel (x) and ray (y) of the grid at an offset from the light on the screen [pixels].
 vec2 polar_place(Shafts grid, vec2 away)
 {
   float ahead = dot(away, grid.middle_cos_sin);
@@ -13,7 +13,7 @@ vec2 polar_place(Shafts grid, vec2 away)
   return vec2((length(away) - grid.nearest) / grid.radial_step - 0.5, row);
 }
 
-// The place on the screen of a texel of a ray, in pixels.
+// Place on the screen of a texel of a ray [pixels].
 vec2 screen_place(Shafts grid, int ray, int texel)
 {
   float angle = ((float(ray) + 0.5) / float(grid.angles) - 0.5) * grid.span;
@@ -24,8 +24,8 @@ vec2 screen_place(Shafts grid, int ray, int texel)
   return grid.center + (grid.nearest + (float(texel) + 0.5) * grid.radial_step) * along;
 }
 
-// A texture at a place counted in texels, exact where drivers filter in eight bits.
-// Beyond the sides as there, or with rows going round.
+// Bilinear look-up at a place in texels, in full precision where drivers filter in eight bits.
+// Clamped to the edges; with `wraps`, rows repeat.
 vec4 bilinear_texel(sampler2D texels, vec2 place, bool wraps)
 {
   ivec2 size = textureSize(texels, 0);

@@ -1,9 +1,9 @@
-// How far a point is from posed colliders, and which way leads out: for whoever is not the solver.
+// Signed distance of a point to posed colliders and the direction out, for all shaders but the solver's.
 //
-// Twin of addon/dynamics/colliders/signed_distance.py. Needs the textures `solids`,
-// `rounds` and `fields`, see render/collider_textures.py; HAS_ROUNDS and HAS_FIELDS say which of the
-// latter there are. With HAS_SEVERAL the integer `solid_count` says how many colliders there are, else
-// there is one: software drivers go once through a loop that is to be skipped.
+// Twin of addon/dynamics/colliders/signed_distance.py. Needs the textures `solids`, and `rounds` with
+// HAS_ROUNDS and `fields` with HAS_FIELDS, see render/collider_textures.py. With HAS_SEVERAL the integer
+// `solid_count` is the number of colliders, else there is one: software drivers execute a loop once even if
+// its condition is false.
 #include "lib_collider.glsl"
 
 vec4 solid_texel(int solid, int texel)
@@ -11,7 +11,7 @@ vec4 solid_texel(int solid, int texel)
   return texelFetch(solids, ivec2(solid * {{collider_texels}} + texel, 0), 0);
 }
 
-// A collider as it stands.
+// A collider in its current pose.
 struct Solid {
   vec4 to_own[3];  // rows of the matrix to its own space
   vec4 sphere;     // around it
@@ -31,7 +31,7 @@ Solid solid_at(int number)
   return solid;
 }
 
-// What signed_distance gives, once this collider is looked at too.
+// The result of signed_distance, updated with one more collider.
 vec4 nearer_of(vec4 result, Solid solid, vec3 point)
 {
   if (distance(solid.sphere.xyz, point) - solid.sphere.w >= result.w) {
@@ -44,16 +44,16 @@ vec4 nearer_of(vec4 result, Solid solid, vec3 point)
   vec3 normal = rows[0].xyz * found.gradient.x + rows[1].xyz * found.gradient.y +
                 rows[2].xyz * found.gradient.z;
   float size = max(length(normal), 1.0e-12);
-  // two sides of the collider may be as near; then a sampled gradient is short
+  // where two sides of the collider are equally near, a sampled gradient is short
   float stretch = max({{flattest}} / max(length(found.gradient), 1.0e-12), 1.0);
   float away = found.distance / (size * stretch);
   return away < result.w ? vec4(normal / size, away) : result;
 }
 
-// w: the signed distance [m] of a point of the world to the nearest collider, negative inside,
-// `reach` where nothing is nearer. xyz: unit direction outwards, zero where nothing is nearer.
+// w: the signed distance [m] of a world-space point to the nearest collider, negative inside, at most
+// `reach`. xyz: unit direction outwards, zero where no collider is nearer than `reach`.
 //
-// `first`: solid_at(0), which is fetched once for many points; there is at least one collider.
+// `first`: solid_at(0), fetched once for many points; there is at least one collider.
 vec4 signed_distance(Solid first, vec3 point, float reach)
 {
   vec4 result = nearer_of(vec4(0.0, 0.0, 0.0, reach), first, point);

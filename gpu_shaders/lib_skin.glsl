@@ -1,25 +1,28 @@
-// Soft shadows on skin: look-ups in a head's UV map that know its islands and seams.
+// Soft shadows on skin: look-ups in a head's UV map that respect its islands and close its seams.
 //
-// Twin of addon/shading/skin/diffusion.py: same names, same order. Textures as in
-// addon/render/skin_pass.py: a texel of `texels` has in x the triangle that it shows, in yz the weights
-// of its second and third corner, in w its island, -1 none; one of `stretches` in xy its width and
-// height [m], in z the nearest seam, -1 none. A seam is four texels: its start and its end, xy on its
-// own side and zw on the other; its two islands; the copies of its ends. Holds no resources.
+// Twin of addon/shading/skin/diffusion.py: same names, same order. Textures of
+// addon/render/skin_pass.py:
+//     texels     x the triangle that the texel shows, yz the weights of its second and third corner, w its
+//                island, -1 for none
+//     stretches  xy width and height of the texel [m], z the nearest seam, -1 for none
+//     seams      four texels each: start and end, xy on the seam's own side and zw on the other; its two
+//                islands; the copies of its ends
+// Holds no resources.
 
 // MIN_KNOWN and NARROW of diffusion.py
 const float SKIN_MIN_KNOWN = 1e-6, SKIN_NARROW = 1.0;
 
-// Of the colours' fractions of light that hair sends on the one with which the shadow is spread.
+// The fraction of forward-scattered light with which the shadow is blurred: the mean of the colours.
 float skin_forward(vec3 forward)
 {
   return dot(forward, vec3(1.0 / 3.0));
 }
 
-// The spread shadow in colours, from the strands that a light passes on its way to the place itself.
-// It cannot have lost more to hair than to all there is; what meshes take has no colour.
+// The blurred shadow in colours. soft: the blurred fraction of light; tau: strands between the light and the
+// place itself, limited so that hair accounts for no more than the whole loss; meshes do not tint shadows.
 vec3 skin_colored(float soft, float tau, vec3 forward)
 {
-  // what is added at seams may leave less than nothing
+  // the correction at seams may make it negative
   soft = max(soft, 0.0);
   float mean = skin_forward(forward);
   float lost = -log(clamp(soft, 1.0e-6, 1.0)) / (1.0 - mean);
@@ -37,7 +40,7 @@ ivec2 skin_texel_around(sampler2D texels, vec2 place, int corner)
   return clamp(texel, ivec2(0), textureSize(texels, 0) - 1);
 }
 
-// Values between texels of one island alone, and how much of them is known.
+// Bilinear look-up over the texels of one island. known: sum of their weights, 0 to 1.
 vec4 skin_looked_up(
     sampler2D values, sampler2D texels, vec2 place, float island, out float known)
 {
@@ -55,7 +58,7 @@ vec4 skin_looked_up(
   return total / max(known, SKIN_MIN_KNOWN);
 }
 
-// Where on an edge the place nearest to a point lies, 0 at its start and 1 at its end.
+// Position on an edge of the place nearest to a point, 0 at the edge's start and 1 at its end.
 float skin_along_border(vec2 point, vec2 start, vec2 end)
 {
   vec2 edge = end - start;
@@ -67,7 +70,7 @@ float skin_distance(vec2 place, vec2 start, vec2 end)
   return distance(mix(start, end, skin_along_border(place, start, end)), place);
 }
 
-// The nearest of the seams that the texels around a place know, -1 where they know none.
+// The nearest of the seams stored in the texels around a place, -1 where none is.
 int skin_seam_at(
     sampler2D texels, sampler2D stretches, sampler2D seams, vec2 place, float island)
 {
@@ -88,8 +91,8 @@ int skin_seam_at(
   return seam;
 }
 
-// Values that are the same on both sides of a seam, and how much of them is known: what the blur has
-// left of a difference is taken half and half to both sides.
+// Look-up that is continuous across seams: the difference that the blur leaves between the two sides is
+// split evenly between them. known: as of skin_looked_up.
 vec4 skin_soft_shadow(sampler2D values,
                       sampler2D texels,
                       sampler2D stretches,
@@ -107,7 +110,7 @@ vec4 skin_soft_shadow(sampler2D values,
   vec4 start = texelFetch(seams, skin_seam_texel(seam, 0, 4), 0);
   vec4 end = texelFetch(seams, skin_seam_texel(seam, 1, 4), 0);
   vec2 islands = texelFetch(seams, skin_seam_texel(seam, 2, 4), 0).xy;
-  // at the tip of a slit a texel may know only the other side of the same island
+  // at the tip of a slit a texel may store only the other side of the same island
   if (islands.x == islands.y &&
       skin_distance(place, start.zw, end.zw) < skin_distance(place, start.xy, end.xy))
   {
@@ -124,7 +127,7 @@ vec4 skin_soft_shadow(sampler2D values,
                    fraction);
   float nearness = clamp(1.0 - distance(place, on_seam.xy) / {{skin_closing}}, 0.0, 1.0);
   float fade = is_known > 0.0 ? nearness * nearness * (3.0 - 2.0 * nearness) : 0.0;
-  // where the two sides lie on the same texels both take what lies between them
+  // where both sides lie on the same texels, both use the value between them
   vec2 gap = on_seam.zw - on_seam.xy;
   if (islands.x == islands.y && length(gap) < SKIN_NARROW) {
     float is_between;

@@ -1,21 +1,21 @@
-// The skin that a place of hair sees. Twin of addon/shading/skin_seen.py: same names; what the terms
-// mean is written there. Holds no resources.
+// The skin that a place of hair sees. Twin of addon/shading/skin_seen.py, which explains the terms: same
+// names. Holds no resources.
 
-// received: light off far skin, its mean over directions of the light and a vector; beneath: the mean
-// normal of the skin right beneath; depth: of the hair that stands before far skin.
+// received: light reflected by far skin, as a mean over directions of the light and a vector. beneath: mean
+// normal of the skin right beneath. depth: optical depth of the hair between the place and far skin.
 struct SkinSeen {
   vec4 received;
   vec3 beneath;
   float depth;
 };
 
-// Skin right beneath alone, as of hair on a plane.
+// Only skin right beneath, as for hair on a plane.
 SkinSeen plane_beneath(vec3 normal)
 {
   return SkinSeen(vec4(0.0), normal, 0.0);
 }
 
-// Part of a light that comes off far skin through hair that takes a certain part of it.
+// The fraction of a light that arrives from far skin, through hair that absorbs the fraction {{part}}.
 float far_light(vec4 received, vec3 to_light)
 {
   float size = length(received.yzw);
@@ -24,15 +24,15 @@ float far_light(vec4 received, vec3 to_light)
   return received.x * (even + (1.0 - even) * 4.0 * facing);
 }
 
-// What hair with gaps lets through, by the part that strands take of the light that they meet, over what
-// it lets through in `received`. At the edge of a card the depth may be that beyond its vertices.
+// Transmittance of hair with gaps whose strands absorb the fraction `taken`, over that at {{part}}, for which
+// `received` holds. At the edge of a card the depth may be extrapolated beyond its vertices.
 vec3 through_hair(float depth, vec3 taken)
 {
   float gaps = {{gaps}} * max(depth, 0.0);
   return pow((1.0 + gaps * taken) / (1.0 + gaps * {{part}}), vec3(-1.0 / {{gaps}}));
 }
 
-// A vector by its parts along a strand or card, along its normal, and across both.
+// A vector from its components along a strand or card, along its normal, and across both.
 vec3 from_axes(vec3 parts, vec3 tangent, vec3 normal)
 {
   return tangent * parts.x + normal * parts.y + cross(tangent, normal) * parts.z;

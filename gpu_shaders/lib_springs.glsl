@@ -1,13 +1,13 @@
-// Curls give along themselves.
+// Springs along curled guides.
 //
-// Twin of addon/dynamics/springs.py, over the globals of lib_guide.glsl, behind lib_lengths.glsl.
+// Twin of addon/dynamics/springs.py, over the globals of lib_guide.glsl and lib_lengths.glsl.
 // Holds no resources.
 #include "lib_lengths.glsl"
 
 #define STEEPEST {{steepest_spring}}
 
-// One implicit step of the springs; the lengths that it leaves are those that segments keep from
-// then on. `softness` is 1 / (kappa dt^2).
+// One implicit step of the springs. The resulting lengths are the segments' lengths for the rest of the
+// substep. `softness` is 1 / (kappa dt^2).
 void give(float softness)
 {
   for (int i = 0; i < FREE; i++) {

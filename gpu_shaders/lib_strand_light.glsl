@@ -1,8 +1,8 @@
-// What a strand sends to the eye: all lights and the world's. SHADOWS of strands on strands come from
-// opacity maps; where a light has none, the occlusion and how much the volume faces it stand in.
-// With SCATTERING light goes from strand to strand. OTHERS: there is more hair in the way than the maps
-// hold; `between` is its optical depth, of the first lights. OWN_COLOR: strands have colours, `own`, in
-// place of the look's; w is 0 where one has none.
+// Radiance of a strand towards the eye, from all lights and the world. SHADOWS of strands on strands come
+// from opacity maps; for a light without one, from the occlusion and how much the hair's volume faces it.
+// With SCATTERING light goes from strand to strand. OTHER_TAU: `between` is the optical depth of hair that
+// is not in the maps, for the first lights. OWN_COLOR: strands have their own colours, `own`, instead of the
+// look's; w is 0 where a strand has none.
 //
 // Reads the blocks `view`, `lights`, `strands`, `shading`, `fibre`, and the textures of their features.
 #include "lib_lights.glsl"
@@ -11,16 +11,16 @@
 #include "lib_hair_light.glsl"
 
 #if MARSCHNER
-// The level at which a highlight does not flicker. Where a strand is shaded as it is drawn, pixels beside
-// say how much theta_h changes. Where it is SHADED_LATER these may show others; then `bend` does, by how
-// much the tangent turns in a pixel.
+// Level at which a highlight does not flicker. Where a strand is shaded as it is drawn, screen-space
+// derivatives give the change of theta_h. With SHADED_LATER neighbouring pixels may show other strands, so
+// the change is computed from `bend`, the change of the tangent in a pixel.
 float strand_level(
     vec3 tangent, vec3 bend, vec3 normal, vec3 to_light, vec3 to_eye, float shift_noise)
 {
 #  ifndef SHADED_LATER
   return pixel_level(longitudinal, tangent, normal, to_light, to_eye, shift_noise, shading);
 #  else
-  // the derivative of theta = asin(t . w), which has no end where a ray runs along the strand
+  // the derivative of theta = asin(t . w), which is unbounded where w runs along the strand
   vec2 sines = vec2(dot(tangent, to_light), dot(tangent, to_eye));
   vec2 turned = vec2(dot(bend, to_light), dot(bend, to_eye));
   vec2 angles = turned * inversesqrt(max(1.0 - sines * sines, vec2(1.0e-4)));
@@ -29,7 +29,7 @@ float strand_level(
 }
 #endif
 
-// openness, seen: with vectors by the strand's axes.
+// openness, seen: their vectors are in the strand's axes.
 vec3 strand_radiance(vec3 point,
                      vec3 tangent,
                      vec3 bend,
@@ -49,7 +49,7 @@ vec3 strand_radiance(vec3 point,
   float sparkle_noise = strand_noise(seed, 1u, cells);
   float color_noise = strand_noise(seed, 2u, 0.0);
   float grey_noise = strand_noise(seed, 3u, 0.0);
-  // a natural brow has no colour of the look, nor at its tip
+  // a brow in its natural colour (w = 2) has no tip colour either
   float tinted = along;
 #ifdef OWN_COLOR
   tinted = own.w > 1.5 ? 0.0 : along;

@@ -1,6 +1,6 @@
-// Noise that depends on a strand's seed alone, so that it stays with the strand as it moves.
+// Noise that depends on a strand's seed only, so that it stays with the strand as it moves.
 //
-// Twin of addon/shading/strand_noise.py: the hash agrees bit by bit.
+// Twin of addon/shading/strand_noise.py, whose hash gives the same bits.
 // Reference: the integer hash "lowbias32" of Wellons 2018, "Prospecting for Hash Functions".
 // Holds no resources.
 
@@ -20,8 +20,8 @@ float hash_unit(uint seed, uint cell)
   return float(hash_integer(hash_integer(seed) + cell) >> 8u) * (1.0 / 16777216.0);
 }
 
-// Value noise along a strand, in 0..1. `along` counts cells from the root; each channel (0 to 3)
-// of a seed (below 2^24) is a noise of its own.
+// Value noise along a strand, in 0..1. `along` counts cells from the root. The channels (0 to 3)
+// of a seed (below 2^24) are independent.
 float strand_noise(uint seed, uint channel, float along)
 {
   uint own = seed * 4u + channel;

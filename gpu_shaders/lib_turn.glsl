@@ -1,9 +1,9 @@
-// Rotations of guides as quaternions, xyz and w last.
+// Rotations of guides as quaternions, w last.
 //
 // Twin of minimal_rotation and turn_change in addon/refine/ride.py. Holds no resources.
 #include "lib_unit.glsl"
 
-// What a quaternion of any length adds to a vector by turning it.
+// The change of a vector when a quaternion of any length rotates it.
 vec3 turn_change(vec4 turn, vec3 vector)
 {
   vec3 across = cross(turn.xyz, vector);
@@ -17,15 +17,15 @@ vec4 turn_product(vec4 left, vec4 right)
               left.w * right.w - dot(left.xyz, right.xyz));
 }
 
-// A vector of length 1, or 0 where it has no length.
+// Unit vector along an edge, or 0 where it has no length.
 vec3 direction_of(vec3 edge)
 {
   float size = length(edge);
   return size < {{shortest_segment}} ? vec3(0.0) : edge / size;
 }
 
-// The least rotation from one unit vector to another; none where either has no length. By their
-// difference, so that there is exactly no rotation where there is none.
+// The smallest rotation from one unit vector to another; the identity where either is zero. Computed from
+// their difference, so that it is exactly the identity for equal vectors.
 vec4 minimal_rotation(vec3 one, vec3 other)
 {
   if (one == vec3(0.0) || other == vec3(0.0)) {

@@ -1,4 +1,4 @@
-// Unit vectors, and what is across a vector.
+// Unit vectors.
 //
 // Twin of unit_or in addon/strands/vectors.py. Holds no resources.
 
@@ -8,7 +8,7 @@ vec3 unit_or(vec3 vector, vec3 fallback)
   return size > 1.0e-6 ? vector / size : fallback;
 }
 
-// The axis of the world that a vector goes least along.
+// The world axis along which a vector has its smallest component.
 vec3 axis_across(vec3 vector)
 {
   vec3 size = abs(vector);

@@ -1,8 +1,8 @@
-// Meshes, fragment stage: Lambert under a boundary of microfacets, and the world's light. Hair
-// throws SHADOWS on them, and meshes do; where a light has no map of hair, the occlusion stands in.
-// OTHERS: there is more hair in the way than the maps hold. On SKIN the
-// shadow is looked up where it has been spread. PICTURES of the material take the place of its colour,
-// and bend its normals. HASHED and BLENDED: it does not cover all. EMISSION: it shines.
+// Meshes, fragment stage: a Lambertian base under a microfacet boundary, and the world's light. Hair and
+// meshes cast SHADOWS on them; for a light without a map of hair, the occlusion is used. OTHER_TAU: optical
+// depth of hair that is not in the maps. SKIN: the shadow of hair is looked up in the blurred shadow map of
+// the skin. PICTURES: textures replace the material's colour and bend its normals. HASHED, BLENDED: how a
+// partly transparent mesh is drawn. EMISSION: it emits light.
 #include "lib_lights.glsl"
 #include "lib_environment.glsl"
 #include "lib_facing.glsl"
@@ -17,9 +17,9 @@
 #endif
 
 #ifdef PICTURES
-// A normal of tangent space, whose axes are those along which the map's u and v grow (Schueler 2013,
-// "Followup: Normal Mapping Without Precomputed Tangents"). Blender's own are those of vertices, which
-// differ where a map is skewed.
+// Normal from a tangent-space normal map, with axes from the derivatives of u and v (Schueler 2013,
+// "Followup: Normal Mapping Without Precomputed Tangents"). Blender uses axes at vertices, which differ
+// where a UV map is skewed.
 vec3 bent_normal(vec3 normal, vec3 mapped, float bump)
 {
   vec3 point_x = dFdx(mesh_point), point_y = dFdy(mesh_point);
@@ -32,7 +32,7 @@ vec3 bent_normal(vec3 normal, vec3 mapped, float bump)
   if (min(across, upward) <= 0.0) {
     return normal;
   }
-  // both of one length, however the map is stretched, as Blender has them
+  // both of unit length, however the UV map is stretched, as in Blender
   vec3 bent = tangent * (mapped.x * inversesqrt(across)) + bitangent * (mapped.y * inversesqrt(upward));
   bent = normalize(bent + normal * mapped.z);
   return normalize(mix(normal, bent, bump));
@@ -92,7 +92,7 @@ void main()
     vec3 colored = vec3(0.0);
     float is_spread = 0.0;
 #ifdef SKIN
-    // what is not known of the skin is as it is without: where the head's UVs overlap
+    // where the blurred shadow is unknown, because the head's UVs overlap, the plain shadow is used
     int map = int(opacity.light[index].x);
     if (map >= 0 && map < {{skin_lights}}) {
       colored = skin_colored(soft[map], path.x, hair_forward);
@@ -117,7 +117,7 @@ void main()
 #ifdef EMISSION
   radiance += mesh_emission;
 #endif
-  // a holdout covers nothing itself and hides what is behind it
+  // a holdout writes no colour or alpha (mesh_cover is 0), but its depth
 #ifdef BLENDED
   color = mesh_cover * alpha * vec4(output_encoded(radiance, output_encoding), 1.0);
 #else

@@ -1,5 +1,5 @@
-// Depths of meshes as a light sees them, fragment stage. What is nearer than where the map begins
-// counts as if it lay there. ALPHA: it has as many holes as alpha asks for, a texel each.
+// Depths of meshes in a light's shadow map, fragment stage. Depths nearer than the begin of the map are
+// clamped to it. ALPHA: holes of one texel, as many as alpha requires.
 #ifdef ALPHA
 #  include "lib_hashed.glsl"
 #endif
@@ -11,7 +11,7 @@ void main()
 #  ifdef PICTURES
   alpha *= texture(mesh_color_map, mesh_uv).w;
 #  endif
-  // sheets behind one another have their holes at different texels
+  // front and back faces have their holes at different texels
   vec2 texel = floor(gl_FragCoord.xy) * vec2(1.0, mesh_chance.x);
   if (alpha <= fract(place_noise(gl_FrontFacing ? texel : texel.yx) + mesh_chance.y)) {
     discard;

@@ -1,5 +1,5 @@
-// Depths of meshes as a light sees them, vertex stage. They are even in space but not in the light's
-// picture, as a position's would be: they are written one by one.
+// Depths of meshes in a light's shadow map, vertex stage. Depth is linear in space, unlike the depth of a
+// projected position, so the fragment stage writes it.
 
 void main()
 {
@@ -8,6 +8,6 @@ void main()
 #ifdef PICTURES
   mesh_uv = picture_place;
 #endif
-  // in the middle of what is drawn, so that meshes before and behind the map's reach are drawn as well
+  // z in the middle of the clip range, so that meshes before and behind the map's range are drawn as well
   gl_Position = vec4(dot(map_x, at), dot(map_y, at), 0.0, dot(map_w, at));
 }

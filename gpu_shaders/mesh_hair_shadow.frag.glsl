@@ -1,6 +1,6 @@
-// What hair leaves of the light on meshes, fragment stage: the fraction of it, by colour, that a matt
-// surface still gets, 1 where hair takes nothing. What other meshes keep out counts neither way.
-// OTHER_TAU, SKIN, HASHED and BLENDED as in mesh.frag.glsl; of PICTURES only alpha counts.
+// Shadow of hair on meshes, fragment stage: the fraction of light, by colour, that a matt surface still
+// receives, 1 without a shadow. Light that other meshes block is left out of both sides of the fraction.
+// OTHER_TAU, SKIN, HASHED and BLENDED as in mesh.frag.glsl; of PICTURES only alpha is used.
 #include "lib_lights.glsl"
 #include "lib_environment.glsl"
 #include "lib_facing.glsl"
@@ -12,7 +12,7 @@
 #  include "lib_hashed.glsl"
 #endif
 
-// Less light than this is none [W/(m^2 sr)]; and a fainter shadow than this, which only rounding makes.
+// Radiance that counts as no light [W/(m^2 sr)]; and strength of a shadow that is only rounding.
 const float NO_LIGHT = 1.0e-9, NO_SHADOW = 1.0e-4;
 
 void main()
@@ -76,7 +76,7 @@ void main()
     left += arriving * by_hair;
   }
   vec3 fraction = left / max(all_light, vec3(NO_LIGHT));
-  // exactly 1 without a shadow, so that pictures stay as they are there
+  // exactly 1 without a shadow, so that pictures stay unchanged there
   bvec3 is_full = greaterThan(fraction, vec3(1.0 - NO_SHADOW));
   bvec3 is_dark = lessThan(all_light, vec3(NO_LIGHT));
   color = vec4(mix(fraction, vec3(1.0), max(vec3(is_full), vec3(is_dark))), 1.0);

@@ -1,5 +1,6 @@
-// Where meshes are, fragment stage: the place in the world, and a number of the mesh. ALPHA: what covers
-// less than a fraction of the pixel is left out; with a pattern where mesh_chance is not negative.
+// Places of meshes, fragment stage: the place in the world, and the mesh's number. ALPHA: pixels are
+// discarded by hashed alpha, or, where mesh_chance is negative, where the mesh covers no more than a fixed
+// fraction.
 #ifdef ALPHA
 #  include "lib_hashed.glsl"
 #endif

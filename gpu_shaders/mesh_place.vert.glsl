@@ -1,4 +1,4 @@
-// Where meshes are, vertex stage: world-space positions. CARRIED: other values of their vertices instead.
+// Places of meshes, vertex stage: world-space positions. CARRIED: other vertex attributes instead.
 
 void main()
 {

@@ -1,8 +1,8 @@
-// Opacity maps, fragment stage: a strand is part of the sums of all layers that end behind it.
+// Opacity maps, fragment stage: a strand adds to the sums of all layers that end behind it.
 //
-// TARGETS: textures of four layers each that are drawn into. DEEP: layers lie between the first
-// and the last hair that the light meets. CARDS: cards are drawn, not strands; they count as what their
-// alpha stands for. VIEW_COMPENSATED: from all directions of light.
+// TARGETS: number of textures, with four layers each, that are drawn into. DEEP: layers lie between the
+// first and the last hair that the light meets. CARDS: cards are drawn instead of strands, with the optical
+// depth of their alpha. VIEW_COMPENSATED: that depth depends on the direction of light.
 #include "lib_opacity.glsl"
 #ifdef CARDS
 #  include "lib_card_opacity.glsl"
@@ -19,7 +19,7 @@ void main()
   vec3 across = cross(dFdx(card_point), dFdy(card_point));
   strand_weight *= view_compensated_depth(across, normalize(card_tangent), normalize(light_direction));
 #  endif
-  // last, since what is discarded gives those beside it no derivatives
+  // last, since discarded pixels give their neighbours no derivatives
   if (is_hidden_from_texels(vec3(gl_FragCoord.xy / float(opacity.resolution), strand_depth))) {
     discard;
   }
@@ -28,7 +28,7 @@ void main()
 #if DEEP
   LayerSpan span = layer_span(
       opacity_spans, ivec2(gl_FragCoord.xy), map_index, opacity.resolution);
-  // what was not met by the points that fill `starts` counts to the last layer
+  // hair behind the last sample point in `starts` belongs to the last layer
   behind = min(layer_fraction(span, gl_FragCoord.xy, behind), 1.0);
 #endif
   layers_0 = strand_weight * adds_to(behind, opacity.ends[first_texel]);

@@ -1,7 +1,7 @@
-// Opacity maps, vertex stage: strands as ribbons across the light's rays, straight between CVs and
-// at least a texel wide; what they cover less than that is their weight. Stations beyond the tip fall
-// onto it. What a mesh hides from the light has no width: light does not come there anyway. UNEVEN:
-// points say how far along their strand they are; else they are evenly spaced.
+// Opacity maps, vertex stage: strands as ribbons across the light's rays, straight between CVs and at least
+// a texel wide; thinner strands get a smaller weight. Stations beyond the tip are clamped to it. Hair that a
+// mesh hides from the light gets no width, since no light reaches it anyway. UNEVEN: points store how far
+// along their strand they are; else they are evenly spaced.
 #include "lib_strand_texel.glsl"
 #include "lib_opacity_hidden.glsl"
 
@@ -45,7 +45,7 @@ void main()
   float half_width = cv.w * strands.fullness * taper *
                      strand_breadth(opacity, light_index, clip.xyw, across);
   float drawn = max(half_width, 0.5);
-  // a look-up blends over a texel to each side of what a strand covers
+  // a look-up also blends the texels next to those that a strand covers
   float around = (drawn + 1.0) / texels;
   bool hidden = is_hidden(place_of(clip), around) && is_hidden(place_of(from), around) &&
                 is_hidden(place_of(to), around);

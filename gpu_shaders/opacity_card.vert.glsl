@@ -1,4 +1,4 @@
-// Opacity maps, vertex stage of cards: their triangles as the light sees them.
+// Opacity maps, vertex stage of cards: their triangles in the light's view.
 #include "lib_opacity.glsl"
 
 void main()
@@ -9,7 +9,7 @@ void main()
   card_uv = uv;
   card_point = position;
   card_tangent = tangent;
-  // along it the place in the map stays the same
+  // the direction along which the place in the map is constant
   vec2 here = vec2(dot(opacity.map_x[light_index], at), dot(opacity.map_y[light_index], at)) / w;
   light_direction = cross(opacity.map_x[light_index].xyz - here.x * opacity.map_w[light_index].xyz,
                     opacity.map_y[light_index].xyz - here.y * opacity.map_w[light_index].xyz);

@@ -1,4 +1,4 @@
-// Opacity maps, fragment stage of cards: the depth of those that are not clear and that no mesh hides.
+// Opacity maps, depth of cards, fragment stage: discards clear pixels and those that a mesh hides.
 #include "lib_card_texture.glsl"
 #include "lib_opacity_hidden.glsl"
 

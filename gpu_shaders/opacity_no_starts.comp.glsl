@@ -1,5 +1,5 @@
-// Deep opacity maps before any hair is in them: in all texels of one light the first and the last hair
-// lie beyond all depths. The maps of others stay.
+// Deep opacity maps: clears the first and the last depth in all texels of one light's map to values beyond
+// all depths. The maps of other lights stay.
 
 void main()
 {

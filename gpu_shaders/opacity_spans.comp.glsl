@@ -1,11 +1,11 @@
-// Opacity maps: how the layers of blocks of texels go on from one to the next, one invocation a block. It
-// reads from `starts` the first and the last hair of its block and of the four beside it.
+// Deep opacity maps: planes through the start and the thickness of the layers in each block of texels, one
+// invocation per block, from the first and the last hair of the block and its four neighbours in `starts`.
 //
-// Twin of LayerSpans.between in addon/shading/volume/opacity.py. `spans` lies as `starts`: where layers
-// start on the left, how thick they are on the right.
+// Twin of LayerSpans.between in addon/shading/volume/opacity.py. `spans` has the layout of `starts`: the
+// start of the layers on the left, their total thickness on the right.
 #include "lib_opacity.glsl"
 
-// Depth of the first or the last hair of a block, if there is any.
+// Depth of the first or the last hair of a block, if it has any.
 struct Kept {
   float depth;
   bool is_there;
@@ -22,8 +22,8 @@ Kept kept_at(ivec2 block, bool is_last)
   return Kept(is_last ? 1.0 - depth : depth, kept <= uint({{start_scale}}));
 }
 
-// As depth changes on that side of a block where it does so less; 0 where it rises on the one and falls
-// on the other, or where one of them has no hair.
+// Slope of the depth across a block: the smaller of the slopes to both neighbours (minmod); 0 where their
+// signs differ or a neighbour has no hair.
 float slope(Kept before, Kept here, Kept after)
 {
   float down = here.depth - before.depth, up = after.depth - here.depth;

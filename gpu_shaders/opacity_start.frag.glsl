@@ -1,2 +1,2 @@
-// Opacity maps, fragment stage of the depths of the first and the last strand: nothing but these.
+// Opacity maps, depths of the first and the last strand, fragment stage: writes nothing but depth.
 void main() {}

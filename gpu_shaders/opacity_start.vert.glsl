@@ -1,6 +1,6 @@
-// Opacity maps, vertex stage of the depths of the first and the last strand: `points_across` of each
-// segment, for depth tests where opacity_starts.comp.glsl has atomics. They are the same points; of a
-// segment that has more of them as many, evenly.
+// Opacity maps, depths of the first and the last strand, vertex stage: sample points of segments for depth
+// tests, which replace the atomics of opacity_starts.comp.glsl. The points are the same, but a segment has
+// `points_across` at most, evenly spaced.
 #include "lib_opacity_starts.glsl"
 
 const vec4 NOWHERE = vec4(2.0, 2.0, 2.0, 1.0);
@@ -15,7 +15,7 @@ void main()
   int most = min(segment.count, points_across), i = 1 + gl_VertexID % points_across;
   vec3 place = mix(segment.from, segment.to, float(i) / float(max(most, 1)));
   bool is_there = point <= last && i <= most && !is_hidden_from_texels(place);
-  // in the middle of its texel: drivers move points by a little, which might be into the next one
+  // in the middle of its texel: drivers move points a little, which might be into the next texel
   float side = float(starts_side());
   vec3 middle = vec3((floor(place.xy * side) + 0.5) / side, clamp(place.z, 0.0, 1.0));
   gl_PointSize = 1.0;

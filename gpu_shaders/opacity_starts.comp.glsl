@@ -1,9 +1,9 @@
-// Opacity maps: the depths of the first and the last hair that a light meets, one invocation a CV.
+// Opacity maps: the depths of the first and the last hair that a light meets, one invocation per CV.
 //
-// `starts` is coarser than the map by {{start_texels}}: a few points of each segment fill it, one in
-// each of its texels, where drawing all strands a second time would cost as much as the map itself.
-// Maps stand above one another in it, what the last hair leaves to 1 on the right of where the first
-// one is. Depths are whole numbers, since only of these the least can be kept.
+// `starts` is coarser than the map by {{start_texels}}, so that a few sample points of each segment, one in
+// each texel, are enough; drawing all strands a second time would cost as much as the map itself. In
+// `starts` maps are stacked vertically, with the first depth on the left, and 1 minus the last depth on the
+// right. Depths are integers, since atomics have a minimum only for these.
 #include "lib_opacity_starts.glsl"
 
 void keep_first_and_last(vec3 place)

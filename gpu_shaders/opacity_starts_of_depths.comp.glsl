@@ -1,5 +1,5 @@
-// Opacity maps: where their layers start and end, one invocation a texel of `starts`. It has the first and
-// the last depth of as many texels of both depth buffers as fall onto it.
+// Opacity maps: fills `starts` from two depth buffers, one invocation per texel of `starts`, with the first
+// and the last depth of all texels that fall onto it.
 void main()
 {
   ivec2 at = ivec2(gl_GlobalInvocationID.xy);

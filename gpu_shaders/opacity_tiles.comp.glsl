@@ -1,7 +1,7 @@
-// The layers of a light's opacity map side by side: how much light is left behind each, white all of
-// it. Deep layers have where they start before them, white nearest to the light.
+// Shows the layers of a light's opacity map as tiles: the transmittance behind each layer, white for 1. For
+// deep layers, the first tile shows the depth at which they start, white nearest to the light.
 //
-// Rows of tiles go down from the top. {{tile_gap}} pixels lie between tiles.
+// Rows of tiles run from top to bottom, with {{tile_gap}} pixels between tiles.
 #include "lib_opacity.glsl"
 
 vec4 sums_of(int texel_of_map, ivec2 texel)

@@ -1,4 +1,4 @@
-// Whether a dispatch writes what it should: each texel its number.
+// Probe of compute shaders: writes its index into each texel.
 void main()
 {
   ivec2 at = ivec2(gl_GlobalInvocationID.xy);

@@ -1,4 +1,4 @@
-// Points of some strands, put in place of where these ride to; one invocation a point.
+// Overwrites points of some strands with stored ones; one invocation per point.
 // Twin of LedOut.put in addon/refine/lead_out.py.
 #include "lib_strand_texel.glsl"
 

@@ -1,10 +1,8 @@
-// Strands that ride on guides: carried by their own roots, they turn with their guides.
-// Twin of ride in addon/refine/ride.py, behind follow in addon/groom/roots.py. One
-// invocation a strand.
+// Strands that ride on guides: each is carried by its root, and its segments turn with those of its guides.
+// Twin of ride in addon/refine/ride.py after follow in addon/groom/roots.py. One invocation per strand.
 //
-// Defines: HAS_CURLS, where curls may be drawn out; HAS_CLEARANCE, where strands are to be led out of
-// colliders: then the steps IS_HELD and IS_NEAR of lead_out.comp.glsl are done here, where all that they
-// need is at hand.
+// Defines: HAS_CURLS, where curls may stretch; HAS_CLEARANCE, where strands are led out of colliders: then
+// the steps IS_HELD and IS_NEAR of lead_out.comp.glsl are done here, where their inputs are at hand.
 #include "lib_root_frame.glsl"
 #include "lib_strand_texel.glsl"
 #include "lib_turn.glsl"
@@ -15,14 +13,14 @@
 #include "lib_signed_distance.glsl"
 #endif
 
-// Where a segment of a strand rides: on the way from the middle of one segment of a guide to that of the
-// next. Behind the last one there is a texel, too, of which nothing is taken.
+// Where a segment of a strand rides: between the middles of two consecutive segments of a guide. The texel
+// behind the last segment may be read, with weight 0.
 struct Seat {
-  ivec2 before;  // texel of the former
+  ivec2 before;  // texel of the first of the two
   float fraction;
 };
 
-// At a place along a guide [segments].
+// The seat at a place along a guide [segments].
 Seat seat_at(int guide, float place)
 {
   float held = clamp(place - 0.5, 0.0, float(segment_count - 1));
@@ -53,7 +51,7 @@ void main()
     return;
   }
   RootMotion motion = root_motion_at(root_motions, min(strand, mover_count - 1));
-  // xyz of three texels: the guides, their weights, their segments a metre
+  // xyz of three texels: the guides, their weights, their segments per metre
   ivec3 guide = ivec3(texelFetch(guide_weights, strand_texel(strand, 0, 3), 0).xyz);
   vec3 weight = texelFetch(guide_weights, strand_texel(strand, 1, 3), 0).xyz;
   vec3 per_meter = texelFetch(guide_weights, strand_texel(strand, 2, 3), 0).xyz;
@@ -66,9 +64,9 @@ void main()
     displacement += weight[k] * imageLoad(guide_turns, shift).xyz;
   }
 #ifdef HAS_CLEARANCE
-  int held = span.factors;  // the last point that goes with the root
+  int held = span.factors;  // the last point that moves rigidly with the root
   displacement = held > 0 ? vec3(0.0) : displacement;
-  // a strand that was bent in the frame before is led on from its root
+  // a strand that was bent in the frame before is led out from its root on
   bool was_bent = imageLoad(states, counted_texel(strand)).z > turned_back;
   int first_near = was_bent ? 1 : 0;
   Solid solid = solid_at(0);
@@ -76,7 +74,7 @@ void main()
   imageStore(cv_points, span.first, vec4(follow(rest.xyz, motion) + displacement, rest.w));
   float reached = 0.0;
   int point = 0;
-  // a strand has a segment; software drivers go once through a loop that tests its condition first
+  // a strand has at least one segment; software drivers run loops once even if their condition is false
   do {
     point++;
     vec4 next = imageLoad(rest_points, span_texel(span, point));
@@ -86,7 +84,7 @@ void main()
     vec4 blend = weight.x * turn_at(seat_at(guide.x, place.x));
     for (int k = 1; k < 3; k++) {
       vec4 turn = turn_at(seat_at(guide[k], place[k]));
-      // of two quaternions of one rotation the nearer
+      // q and -q are the same rotation: take the nearer one
       blend += (dot(turn, blend) < 0.0 ? -weight[k] : weight[k]) * turn;
     }
     blend.w += dot(blend, blend) < {{reversed_turn}} ? 1.0 : 0.0;

@@ -1,8 +1,7 @@
-// How each segment of the guides has turned from the shape in which its root carries it, and behind
-// these how far the guide has left its root; one invocation a guide. Twin of guide_turns in
-// addon/refine/ride.py. Define: HAS_CURLS, where curls may be drawn out; then guide_axes gets where
-// each segment points at rest, and by which fraction it is longer, see guide_axes in
-// addon/refine/curls.py.
+// The rotation of each segment of a guide from its rest shape as carried by the root, and behind these the
+// guide's displacement from its root; one invocation per guide. Twin of guide_turns in addon/refine/ride.py.
+// Define: HAS_CURLS, where curls may stretch; then guide_axes gets each segment's direction at rest and its
+// extension as a fraction, see guide_axes in addon/refine/curls.py.
 #include "lib_root_frame.glsl"
 #include "lib_strand_texel.glsl"
 #include "lib_turn.glsl"
@@ -33,7 +32,7 @@ void main()
     turn = turn_product(minimal_rotation(here, direction_of(is_next - is)), turn);
     imageStore(guide_turns, strand_texel(guide, segment, segment_count + 1), turn);
 #ifdef HAS_CURLS
-    float size = length(was_next - was);  // w of a CV: whether the segment from it on gives
+    float size = length(was_next - was);  // w of a CV: whether the segment that begins there gives
     float extension = rest.w > 0.0 && size > 0.0 ? length(is_next - is) / size - 1.0 : 0.0;
     vec4 axis = vec4(before, seen_extension(extension));
     imageStore(guide_axes, strand_texel(guide, segment, segment_count + 1), axis);

@@ -1,6 +1,6 @@
-// Where each strand's root is on the surface as it is now, and how it has moved since rest; one
-// invocation a strand. The frames at rest come from this same program, so that a root at rest has
-// moved by exactly nothing.
+// The frame of each strand's root on the current surface, and its motion since rest; one invocation per
+// strand. The frames at rest are computed by this same program, so that the motion of a root at rest is
+// exactly zero.
 #include "lib_root_frame.glsl"
 #include "lib_strand_texel.glsl"
 

@@ -1,4 +1,4 @@
-// Back from polar coordinates, times the haze, into the picture.
+// Adds blurred shafts from polar coordinates, times the haze, to the picture.
 // Twin of from_polar and light_shafts in addon/shading/shafts.py.
 #include "lib_shafts.glsl"
 

@@ -1,4 +1,4 @@
-// To polar coordinates and blurred along the radius, from the light outwards; a thread a ray.
+// Transforms to polar coordinates and blurs along the radius, from the light outwards; one invocation per ray.
 // Twin of to_polar and radial_blur in addon/shading/shafts.py.
 #include "lib_shafts.glsl"
 

@@ -1,6 +1,6 @@
-// What stands before a light: the fraction of each pixel that is covered by what is nearer than it, or
-// by hair so thin that it has no depth.
-// Where meshes are holes, apart from the picture, all that has a depth covers its pixel.
+// Occluders of a light: the fraction of each pixel that is covered by surfaces nearer than the light, or by
+// hair too thin to have a depth.
+// is_apart: meshes are holes in the picture, so every pixel with a depth counts as covered.
 // Colour and depth may have several samples for each pixel of the picture.
 
 void main()

@@ -1,5 +1,5 @@
 // Soft shadows on skin, second and third step: a blur along rows (axis 0) or columns (axis 1) of a
-// head's UV map, as wide in metres everywhere, within each island and its gutter.
+// head's UV map, of the same width in metres everywhere, within each island and its gutter.
 //
 // Twin of blurred in addon/shading/skin/diffusion.py.
 

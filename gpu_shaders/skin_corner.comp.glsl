@@ -1,5 +1,5 @@
-// Soft shadows on skin, last step: what is to be added at each end of a seam for the mean of all
-// sides that meet there, where there are more than two.
+// Soft shadows on skin, last step: the correction at each end of a seam, where more than two sides meet,
+// that gives all of them their mean.
 //
 // Twin of corner_shifts in addon/shading/skin/diffusion.py.
 #include "lib_skin.glsl"

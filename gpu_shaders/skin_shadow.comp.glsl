@@ -1,6 +1,5 @@
-// Soft shadows on skin, first step: how much of each light reaches the skin that a texel of the
-// head's UV map shows. A channel a light, by the number of its opacity map. HAIR_ALONE: meshes keep
-// no light out.
+// Soft shadows on skin, first step: the fraction of each light that reaches the skin at each texel of the
+// head's UV map. A channel per light, by the index of its opacity map. HAIR_ALONE: meshes cast no shadows.
 #include "lib_shadows.glsl"
 #include "lib_skin.glsl"
 

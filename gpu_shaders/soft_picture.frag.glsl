@@ -1,5 +1,5 @@
-// What a view shows of samples that were added up: the mean light of hair, as the view shows colours, over
-// the black of its mean shadow on meshes; and the depth of hair.
+// Resolves accumulated samples for a view: the mean light of hair, encoded for the view, over the black of
+// its mean shadow on meshes; and the depth of hair.
 #include "lib_output.glsl"
 
 void main()

@@ -1,5 +1,5 @@
-// Strands, fragment stage, opaque: each pixel shaded as it is drawn. With a DEBUG view colours that show
-// numbers, just enough shaded that strands stay apart. TANGENTS: as in lib_layer_radiance.glsl.
+// Strands, fragment stage, opaque: each pixel shaded as it is drawn. DEBUG: colours of a debug view, shaded
+// just enough to tell strands apart. TANGENTS: as in lib_layer_radiance.glsl.
 #include "lib_kajiya_kay.glsl"
 #include "lib_strand_noise.glsl"
 #include "lib_output.glsl"

@@ -1,12 +1,11 @@
-// Strands, vertex stage: one instance a strand, no vertex attributes.
+// Strands, vertex stage: one instance per strand, no vertex attributes.
 //
-// ADAPTIVE 0: every segment has `subdivisions` pieces. ADAPTIVE 1: instances are strands in the
-// order of detail_pass.py, their stations as its factors say. IN_SLOTS: instances are parts of strands, see
-// detail_slots.py.
+// ADAPTIVE 0: every segment has `subdivisions` pieces. ADAPTIVE 1: instances are strands in the order of
+// detail_pass.py, with stations by its factors. IN_SLOTS: instances are slots, see detail_slots.py.
 //
-// COVERED: ribbons as wide as strands are, and as much wider as to reach all pixels that they cover a
-// fraction of. GATHERED: what it takes to find a fragment's looks later, in place of the looks.
-// UNEVEN: points say how far along their strand they are; else they are evenly spaced.
+// COVERED: ribbons of the strands' true width, extended to all pixels that they partly cover. GATHERED:
+// outputs what is needed to shade a fragment later, instead of what shading needs.
+// UNEVEN: points store how far along their strand they are; else they are evenly spaced.
 #include "lib_strand_geometry.glsl"
 #include "lib_detail_packing.glsl"
 #if COVERED
@@ -56,7 +55,7 @@ void main()
   vec4 to = texelFetch(cv_points, tip_side, 0);
   vec3 before = texelFetch(cv_points, span_texel(span, max(segment - 1, 0)), 0).xyz;
   vec3 after = texelFetch(cv_points, span_texel(span, min(segment + 2, last)), 0).xyz;
-  // beyond its ends the strand goes on straight
+  // the strand is extended straight beyond its ends
   before = segment == 0 ? 2.0 * from.xyz - to.xyz : before;
   after = segment == last - 1 ? 2.0 * to.xyz - from.xyz : after;
 

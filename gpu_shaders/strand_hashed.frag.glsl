@@ -1,6 +1,6 @@
-// Hashed strands, first step: of each pixel the nearest fragment that chance lets stay, as often as it covers
-// the pixel. x the strand, y the place along it, z its depth. What they look like is found later, for those
-// that are seen.
+// Hashed strands, first step: the nearest fragment of each pixel that is not discarded; a fragment stays with
+// the probability of its alpha. x the strand, y the place along it, z its depth. Visible fragments are shaded
+// later.
 #include "lib_coverage.glsl"
 #include "lib_hashed.glsl"
 #include "lib_strand_noise.glsl"
@@ -10,7 +10,7 @@ void main()
   float alpha = strands.opacity * ribbon_coverage(ribbon * gl_FragCoord.w);
   uvec2 pixel = uvec2(gl_FragCoord.xy);
   uint own = hash_integer(hash_integer(uint(strand_index)) + pixel.x + pixel.y * {{strand_rows}}u);
-  // another part in each sample of a picture
+  // each sample of a picture discards other fragments
   if (scrambled(2u * uint(view.viewport.z) + uint(turn), own, hash_integer(own)) >= alpha) {
     discard;
   }

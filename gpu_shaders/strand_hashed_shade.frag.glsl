@@ -1,7 +1,7 @@
-// Hashed strands, second step: the colours of what both turns have found, where they have, and its depth.
+// Hashed strands, second step: colour and depth of the fragments that both turns have found.
 //
-// SHADES_ALL: pixels without hair are shaded as well and left out afterwards, for a driver that fails in
-// a branch that no pixel takes.
+// SHADES_ALL: pixels without hair are shaded as well and then ignored, for a driver that fails in a branch
+// that no pixel takes.
 #include "lib_layer_radiance.glsl"
 #include "lib_output.glsl"
 

@@ -1,6 +1,5 @@
-// Hashed strands, third step: both turns into the target, each hidden by what lies before it there. First the
-// nearer one, half over what is there; then, where the farther one is not hidden either, both in place of
-// all.
+// Hashed strands, third step: draws both turns into the target, depth-tested. First the nearer one, blended
+// with alpha 0.5; then (are_both), where the farther one passes the test as well, the mean of both, opaque.
 void main()
 {
   ivec2 pixel = ivec2(gl_FragCoord.xy) - ivec2(left, bottom);

@@ -1,9 +1,8 @@
-// Strands as layers, first step: each fragment that no mesh hides joins the list of its pixel. The
-// first one puts the pixel into the list of those that have hair. What fragments look like is found
-// later, for those that are seen.
+// Strands as layers, first step: adds each fragment that no mesh hides to the list of its pixel. The first
+// fragment of a pixel also adds the pixel to the list of pixels with hair. Visible fragments are shaded later.
 //
-// COUNTED: instead, the heads of lists count what they would hold. PARTS: only fragments of a run of
-// pixels, row by row, and of a range of depths, see addon/render/pixel_parts.py.
+// COUNTED: instead, the heads of the lists count fragments. PARTS: only fragments of a run of pixels, row by
+// row, and in a range of depths, see addon/render/pixel_parts.py.
 #include "lib_coverage.glsl"
 #include "lib_layer_packing.glsl"
 
@@ -47,7 +46,7 @@ void main()
       imageStore(layer_nodes, layer_texel(number), uvec4(next, depth, uint(strand_index), word));
     }
     else if (number > MAX_COUNTED) {
-      // were it to begin again at 0, lists would run into each other
+      // if the counter wrapped around to 0, lists would overwrite each other
       imageAtomicMin(layer_count, ivec2(0), MAX_COUNTED);
     }
 #endif

@@ -1,31 +1,31 @@
-// Strands as layers, second step, one invocation a pixel that has hair. Its list becomes that of the
-// layers that are shaded, in order: the nearest, as far as enough light comes from behind them, or, where
-// these are more than LAYERS, a sample that represents all. In place of its depth a node has its fraction of
-// the pixel's light. `layer_seen` has the numbers of all that are left.
+// Strands as layers, second step, one invocation per pixel with hair: reduces the pixel's list to the layers
+// that are shaded, in order. These are the nearest ones, as long as enough light comes from behind them, or,
+// if they are more than LAYERS, a representative sample of all. In each remaining node the depth is replaced
+// by its fraction of the pixel's light, and its number is added to `layer_seen`.
 //
-// A list is sorted nearest first: runs of LAYERS first, then by merging two at a time.
+// Lists are sorted nearest first: runs of LAYERS nodes, which are then merged in pairs.
 //
-// Lists of more than `longest` are counted, and left as they are.
+// Lists longer than `longest` are counted and left unchanged.
 //
-// NODES_A_ROUND: how many nodes a round of a loop takes: one, but for software drivers, which end a shader
-// after 65,535 rounds of all its loops.
+// NODES_A_ROUND: nodes per loop iteration: 1, or more for software drivers, which end a shader after 65,535
+// iterations of all its loops.
 //
 // Twin of layer_fractions in addon/shading/volume/transparency.py.
 #include "lib_layer_packing.glsl"
 
-// As `while`, through a list whose next node the body puts in place of this one.
+// Loop over a list; the body sets `node` to the next one.
 #define EACH_FROM(node) while (node != 0u) for (int i = 0; i < NODES_A_ROUND; i++) if (node != 0u)
 
 const uvec4 NO_LAYER = uvec4(0u, 0xFFFFFFFFu, 0xFFFFFFFFu, 0xFFFFFFFFu);
 
-// Depths of equal layers are floats' bits, which order as the floats do above 0. Where two are equal,
-// what belongs to the strands decides, not when they were drawn.
+// Depths are float bits, which have the order of the floats above 0. Equal depths are ordered by the strands,
+// so that the order of drawing does not matter.
 bool is_before(uvec4 one, uvec4 other)
 {
   return one.y != other.y ? one.y < other.y : one.w != other.w ? one.w < other.w : one.z < other.z;
 }
 
-// The first node of two sorted lists made one.
+// Merge two sorted lists; returns the first node.
 uint merged_layers(uint one, uint other)
 {
   uvec4 node = imageLoad(layer_nodes, layer_texel(one));
@@ -58,8 +58,7 @@ uint merged_layers(uint one, uint other)
   return first;
 }
 
-// Puts a layer where it belongs among the nearest, and the farthest of these out. x of these is their own
-// number.
+// Insert a layer into the sorted nearest ones, dropping the farthest. Their x is their own number.
 void put_layer(inout uvec4 nearest[LAYERS], uvec4 found)
 {
   for (int i = 0; i < LAYERS; i++) {
@@ -70,7 +69,7 @@ void put_layer(inout uvec4 nearest[LAYERS], uvec4 found)
   }
 }
 
-// Takes the next LAYERS nodes from a list, and gives the first of them once they are sorted.
+// Take the next LAYERS nodes from a list and sort them; returns the first.
 uint sorted_run(inout uint number)
 {
   uvec4 nearest[LAYERS];
@@ -94,10 +93,10 @@ uint sorted_run(inout uint number)
   return next;
 }
 
-// The first node of a list once it is sorted.
+// Sort a list; returns its first node.
 uint sorted_layers(uint number)
 {
-  // at i either none or a sorted list of 2^i runs
+  // lists[i]: a sorted list of 2^i runs, or 0
   uint lists[{{list_digits}}];
   int used = 0;
   while (number != 0u) {
@@ -119,7 +118,7 @@ uint sorted_layers(uint number)
   return whole;
 }
 
-// The list as it is found: the last layer waits until the next one is known.
+// The reduced list; its last node is written once the next one is known.
 uint kept[LAYERS];
 int kept_count = 0;
 uvec4 last_node;
@@ -137,8 +136,7 @@ void keep_layer(uint number, uvec4 node, float fraction)
   kept_count++;
 }
 
-// x the fraction of light that comes from behind all, y the depth from which on half of it is hidden, 2
-// where it never is.
+// x transmittance of all layers, y depth at which the transmittance has fallen to a half, 2 where it does not.
 vec2 hidden_by(uint sorted)
 {
   float through = 1.0, front = 2.0;
@@ -152,8 +150,8 @@ vec2 hidden_by(uint sorted)
   return vec2(through, front);
 }
 
-// What one of LAYERS layers stands for: those that have more of the light count by what they have, and
-// the others share out what is left.
+// The light that each of LAYERS kept layers represents: layers with more light than that keep their own, and
+// the others share the rest evenly.
 float fraction_of_one(uint sorted, float covered)
 {
   float threshold = covered / float(LAYERS);
@@ -178,8 +176,8 @@ float fraction_of_one(uint sorted, float covered)
   return threshold;
 }
 
-// Of many layers those that stand for all: where their light, summed up from the nearest on, passes the
-// middle of one share after the other.
+// Keep a sample of many layers: systematic sampling by light, summed from the nearest layer on. Each time the
+// sum passes the middle of another threshold, the layer there is kept.
 void keep_some(uint sorted, float covered)
 {
   float threshold = fraction_of_one(sorted, covered);
@@ -247,7 +245,7 @@ void main()
     behind_all = kept_count > 0 ? hidden.x : behind_all;
     front = kept_count > 0 ? hidden.y : front;
   }
-  // also where a software driver has ended the loops above too early: it does 65535 rounds of all of them
+  // also if a software driver has ended the loops above early, after 65,535 iterations of all of them
   if (kept_count == 0) {
     for (int i = 0; i < LAYERS; i++) {
       if (i < seen) {
@@ -258,7 +256,7 @@ void main()
   imageStore(layer_nodes, layer_texel(kept[kept_count - 1]), last_node);
   imageStore(layer_fronts, pixel, vec4(front, 1.0 - behind_all, 0.0, 0.0));
   imageStore(layer_heads, pixel, uvec4(kept[0]));
-  // no walk along the list, which might end too early: what is in it but not seen is no colour
+  // from the array: a loop over the list might end early, and nodes missing here would never get a colour
   uint first_seen = imageAtomicAdd(layer_count, ivec2(2, 0), uint(kept_count)) + 1u;
   for (int i = 0; i < LAYERS; i++) {
     if (i < kept_count) {

@@ -1,9 +1,9 @@
-// Strands as layers, third step: the nodes that are seen, as many as the GPU has counted, whatever the
-// number of invocations. What tells a node's colour gives way to the colour itself: yzw, as floats' bits,
-// times its fraction of the pixel's light.
+// Strands as layers, third step: shades all visible nodes, as many as the GPU has counted, with any number of
+// invocations. In yzw of a node its colour times its fraction of the pixel's light, as float bits, replaces
+// the data it was shaded from.
 //
-// All invocations do equally many rounds, with nothing in some of them: a software driver fails, or takes
-// as long, where those that are idle leave a loop.
+// All invocations do the same number of iterations, some of them idle: a software driver fails, or is no
+// faster, if idle ones leave the loop.
 #include "lib_layer_radiance.glsl"
 #include "lib_layer_packing.glsl"
 

@@ -1,5 +1,5 @@
-// Strands as layers, fourth step: each pixel's colour into the target, or its depth, where hair hides
-// more than half of what lies behind it.
+// Strands as layers, fourth step: writes the colour of each pixel, or, where hair hides more than half of
+// what lies behind it, its depth.
 #include "lib_layer_packing.glsl"
 #include "lib_output.glsl"
 
@@ -16,7 +16,7 @@ void main()
     number = node.x;
   }
   color = alpha * vec4(output_encoded(light, output_encoding), 1.0);
-  // where there is no hair, nothing is known of front and alpha
+  // where there is no hair, front and alpha are undefined
   if (first == 0u || (writes_depth != 0 && front > 1.0)) {
     discard;
   }

@@ -1,4 +1,4 @@
-// Who is nearest, fragment stage: x the strand, y where along its points, as layer_radiance takes it.
+// The nearest strand, fragment stage: x the strand, y the place along its points, as for layer_radiance.
 
 void main()
 {

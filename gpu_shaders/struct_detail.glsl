@@ -1,9 +1,9 @@
-// What detail depends on besides its settings. Filled by addon/render/detail_pass.py.
+// The view for which detail factors are computed. Filled by addon/render/detail_pass.py.
 struct DetailView {
   mat4 view_projection;
   vec4 eye;      // as in View
-  vec4 picture;  // xy pixels from the middle of the final picture to its edges, w half a strand's width
-                 // in pixels of a radius and a depth of 1
-  vec4 center;   // xyz the middle of all roots, w number of shades
-  vec4 shades[3 * {{shade_capacity}}];  // three each, see lib_culling.glsl
+  vec4 picture;  // xy half the size of the final picture [pixels], w half the width of a strand with radius
+                 // 1 at depth 1 [pixels]
+  vec4 center;   // xyz the mean of all roots, w number of shades
+  vec4 shades[3 * {{shade_capacity}}];  // three vectors each, see lib_culling.glsl
 };

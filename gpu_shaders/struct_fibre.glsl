@@ -1,8 +1,8 @@
-// Marschner's fibre beyond its tables. Filled by pack_fibre() of addon/shading/marschner/look.py.
+// Marschner's fibre, except for its tables. Filled by pack_fibre() of addon/shading/marschner/look.py.
 struct Fibre {
-  vec4 root;       // xyz absorption per radius; w factor by which a root of absorption is a colour
-  vec4 tip;        // the same of the tip's own colour; w fraction of absorption that a grey strand has
+  vec4 root;       // xyz absorption per radius; w -log(colour) over the square root of absorption
+  vec4 tip;        // xyz the same of the tips' colour; w fraction of absorption that a grey strand has
   vec4 strengths;  // of R, TT, TRT and the rest
-  vec4 widths;     // of the same, of theta_h [rad]
-  vec4 shifts;     // of their highlights to the tip, in theta_h [rad]
+  vec4 widths;     // of the same lobes, in theta_h [rad]
+  vec4 shifts;     // of their highlights towards the tip, in theta_h [rad]
 };

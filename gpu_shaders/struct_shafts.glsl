@@ -8,8 +8,8 @@ struct Shafts {
   float nearest;        // where rays begin [pixels]
   float radial_step;    // between texels of a ray [pixels]
   float kept;           // fraction of a shaft that is left after a step
-  float before;         // what counts of the way from the light to where rays begin
-  float fall;           // of the haze [1 / pixels]
+  float before;         // weight of the path from the light to the begin of the rays
+  float fall;           // decay of the haze [1 / pixels]
   int angles;           // rays
-  int is_round;         // the last ray is beside the first
+  int is_round;         // whether the last ray is next to the first
 };

@@ -1,4 +1,4 @@
-// A background put under a picture that was drawn over nothing; both premultiplied by alpha.
+// Composites a picture over a background colour; both premultiplied by alpha.
 
 void main()
 {

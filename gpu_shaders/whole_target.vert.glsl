@@ -1,4 +1,4 @@
-// One triangle that covers the whole target, from no attributes.
+// One triangle that covers the whole target, without attributes.
 
 void main()
 {
