@@ -51,7 +51,7 @@ class HAIRLOOM_PT_engine_sampling(_RenderPanel):
 
 
 class HAIRLOOM_PT_engine_mesh_shadows(_RenderPanel):
-    """Shadows that meshes cast"""
+    """Shadows cast by meshes"""
 
     bl_label = "Mesh Shadows"
     helped = "mesh_shadows"
@@ -68,7 +68,7 @@ class HAIRLOOM_PT_engine_mesh_shadows(_RenderPanel):
 
 
 class HAIRLOOM_PT_engine_motion_blur(_RenderPanel):
-    """How long the shutter is open"""
+    """Motion blur and shutter time"""
 
     bl_label = "Motion Blur"
     bl_options = {"DEFAULT_CLOSED"}
@@ -87,7 +87,7 @@ class HAIRLOOM_PT_engine_motion_blur(_RenderPanel):
 
 
 class HAIRLOOM_PT_engine_film(_RenderPanel):
-    """Background, and pixel filter"""
+    """Background and pixel filter"""
 
     bl_label = "Film"
     bl_options = {"DEFAULT_CLOSED"}
@@ -154,7 +154,7 @@ class _PassesPanel(WithHelp):
 
 
 class HAIRLOOM_PT_engine_passes(_PassesPanel, bpy.types.Panel):
-    """Passes rendered besides the image"""
+    """Passes rendered in addition to the image"""
 
     bl_label = "Data"
 
@@ -175,7 +175,7 @@ class HAIRLOOM_PT_engine_passes(_PassesPanel, bpy.types.Panel):
 
 
 class HAIRLOOM_PT_hair_passes(_PassesPanel, bpy.types.Panel):
-    """Passes of hair that Blender has no setting for"""
+    """Hair passes that Blender has no settings for"""
 
     bl_label = "Hair"
 

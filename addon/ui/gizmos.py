@@ -46,7 +46,7 @@ class _OfActive:
 
 
 class HAIRLOOM_GGT_wind(_OfActive, bpy.types.GizmoGroup):
-    """Speed, direction and elevation of the wind of previewed hair, where its overlay is shown"""
+    """Speed, direction and elevation of the wind of previewed hair, while its overlay is shown"""
 
     bl_label = "Wind"
 
@@ -86,7 +86,7 @@ class HAIRLOOM_GGT_wind(_OfActive, bpy.types.GizmoGroup):
 
 
 class HAIRLOOM_GGT_empty_size(_OfActive, bpy.types.GizmoGroup):
-    """Size of an Empty that holds hair as a tie, or collides with it"""
+    """Size of an Empty that is a hair tie or a collider"""
 
     bl_label = "Size of Tie or Collider"
 

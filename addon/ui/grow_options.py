@@ -21,8 +21,8 @@ GROW_PROPERTIES: dict[str, Any] = {
     **operator_properties("grow"),
     "density_group": StringProperty(
         name="Density",
-        description="Vertex group, attribute of the surface, or image on its UVs that sets how "
-        "densely hair grows. If empty, combed hair grows on the scalp, other hair everywhere",
+        description="Vertex group, attribute of the surface, or image on its UVs with the density "
+        "of the hair. If empty, combed hair grows on the scalp, other hair everywhere",
         search=names_of_weights,
     ),
     "length_group": StringProperty(

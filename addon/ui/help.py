@@ -102,8 +102,8 @@ def manual_map() -> tuple[str, tuple[tuple[str, str], ...]]:
 
 
 class HAIRLOOM_OT_help(bpy.types.Operator):
-    """Show the page of the documentation about this panel, in the web browser. It needs no network.
-    F1 over a setting or a button shows its own"""
+    """Open the documentation of this panel in the web browser; no network is needed. Press F1 over
+    a setting or button for its own page"""
 
     bl_idname = "hairloom.help"
     bl_label = "Help"

@@ -31,7 +31,7 @@ _KEYMAP = "3D View"
 
 
 class HAIRLOOM_MT_import(bpy.types.Menu):
-    """Grooms from files"""
+    """Import grooms from files"""
 
     bl_idname = "HAIRLOOM_MT_import"
     bl_label = "Import Hair"
@@ -55,7 +55,7 @@ class HAIRLOOM_MT_looks(bpy.types.Menu):
 
 
 class HAIRLOOM_MT_object(bpy.types.Menu):
-    """What is done to the selected hair, or to the mesh that hair is to grow on"""
+    """Tools for the selected hair, or for the mesh that hair is to grow on"""
 
     bl_idname = "HAIRLOOM_MT_object"
     bl_label = "Hairloom"
@@ -81,7 +81,7 @@ class HAIRLOOM_MT_object(bpy.types.Menu):
 
 
 class HAIRLOOM_MT_pie(bpy.types.Menu):
-    """What one needs while one combs, around the mouse"""
+    """Tools needed while combing, around the mouse"""
 
     bl_idname = _PIE
     bl_label = "Hairloom"

@@ -32,7 +32,7 @@ KINDS = {
 
 
 class HAIRLOOM_UL_objects(bpy.types.UIList):
-    """Objects that act on hair, each with the button that takes it out"""
+    """Objects that act on hair, each with a button to remove it"""
 
     def draw_item(
         self,
@@ -54,7 +54,7 @@ class HAIRLOOM_PG_list_rows(bpy.types.PropertyGroup):
     """Which row of each list is the active one, which no file keeps."""
 
     __annotations__ = {
-        setting: IntProperty(name="Row", description="The row that was clicked last")
+        setting: IntProperty(name="Row", description="Row that was clicked last")
         for setting in KINDS
     }
 
@@ -79,7 +79,7 @@ CLASSES: tuple[type[Any], ...] = (HAIRLOOM_UL_objects, HAIRLOOM_PG_list_rows)
 def register() -> None:
     """After CLASSES are registered."""
     bpy.types.WindowManager.hairloom_list_rows = PointerProperty(
-        type=HAIRLOOM_PG_list_rows, name="Rows", description="Rows of lists that were clicked last"
+        type=HAIRLOOM_PG_list_rows, name="Rows", description="Active rows of the lists"
     )
 
 

@@ -23,7 +23,7 @@ from .long_work import LongWork, Steps, as_progress
 from .selection import active_mesh
 
 _DIRECTIONS = (
-    ("auto", "Automatic", "Detect by the end of the UVs that is nearer to the head"),
+    ("auto", "Automatic", "Detect the root end of the UVs by its distance from the head"),
     ("down", "Down", "Roots are at the top of the texture"),
     ("up", "Up", "Roots are at the bottom of the texture"),
     ("right", "Right", "Roots are at the left of the texture"),
@@ -32,7 +32,7 @@ _DIRECTIONS = (
 
 
 class HAIRLOOM_OT_sort_cards(LongWork, bpy.types.Operator):
-    """Sort the faces of the active mesh of hair cards from the inside to the outside, the order in
+    """Sort the faces of the active hair card mesh from the inside to the outside, the order in
     which engines must draw them, and store ambient occlusion. Esc cancels"""
 
     bl_idname = "hairloom.sort_cards"
@@ -42,13 +42,13 @@ class HAIRLOOM_OT_sort_cards(LongWork, bpy.types.Operator):
     __annotations__ = {
         "head": StringProperty(
             name="Head",
-            description="The mesh that the hair grows from; it also occludes the cards",
+            description="Mesh that the hair grows from; it also occludes the cards",
         ),
-        "by": EnumProperty(name="Order By", description="What is sorted", items=ORDERS),
+        "by": EnumProperty(name="Order By", description="What to sort", items=ORDERS),
         "dangling": StringProperty(
             name="Dangling",
-            description="Vertex group of cards that swing, such as a ponytail: drawn after all "
-            "others",
+            description="Vertex group of swinging cards, such as a ponytail; they are drawn after "
+            "all others",
         ),
         "direction": EnumProperty(
             name="Root to Tip",
@@ -57,12 +57,13 @@ class HAIRLOOM_OT_sort_cards(LongWork, bpy.types.Operator):
         ),
         "use_occlusion": BoolProperty(
             name="Ambient Occlusion",
-            description="Store how open each vertex is, as an attribute and as a UV map",
+            description="Store the ambient occlusion of each vertex, as an attribute and as a UV "
+            "map",
             default=True,
         ),
         "alpha": StringProperty(
             name="Alpha",
-            description="Image whose alpha makes cards transparent. If empty: the material's",
+            description="Image whose alpha makes cards transparent. If empty, the material's image",
         ),
         **operator_properties("card_occlusion"),
     }

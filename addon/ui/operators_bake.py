@@ -159,7 +159,7 @@ class _FinBake(WithHelp):
 
 
 class HAIRLOOM_PT_fin_bake(_FinBake, bpy.types.Panel):
-    """The bake of this fin"""
+    """Bake of this cloth"""
 
     bl_parent_id = "HAIRLOOM_PT_fin"
     bl_space_type = "PROPERTIES"

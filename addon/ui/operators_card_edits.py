@@ -42,8 +42,8 @@ def _done(operator: bpy.types.Operator, count: int, what: str) -> set[str]:
 
 
 class HAIRLOOM_OT_card_width(bpy.types.Operator):
-    """Make the selected cards wider or narrower, evenly from root to tip. A selected vertex is
-    enough"""
+    """Make the selected cards wider or narrower, evenly from root to tip. One selected vertex per
+    card is enough"""
 
     bl_idname = "hairloom.card_width"
     bl_label = "Card Width"
@@ -71,8 +71,8 @@ class HAIRLOOM_OT_card_width(bpy.types.Operator):
 
 
 class HAIRLOOM_OT_card_twist(bpy.types.Operator):
-    """Twist the selected cards about themselves: not at the root, ever more towards the tip. A
-    selected vertex is enough"""
+    """Twist the selected cards along their length, increasingly from root to tip. One selected
+    vertex per card is enough"""
 
     bl_idname = "hairloom.card_twist"
     bl_label = "Card Twist"
@@ -81,7 +81,7 @@ class HAIRLOOM_OT_card_twist(bpy.types.Operator):
     __annotations__ = {
         "angle": FloatProperty(
             name="Angle",
-            description="Turn of the tip",
+            description="Rotation of the tip",
             subtype="ANGLE",
             default=float(np.pi / 4.0),
             soft_min=float(-np.pi),
@@ -102,7 +102,8 @@ class HAIRLOOM_OT_card_twist(bpy.types.Operator):
 
 
 class HAIRLOOM_OT_card_tile(bpy.types.Operator):
-    """Show another tile of the atlas on the selected cards. A selected vertex is enough"""
+    """Show another tile of the atlas on the selected cards. One selected vertex per card is
+    enough"""
 
     bl_idname = "hairloom.card_tile"
     bl_label = "Card Tile"
@@ -111,20 +112,20 @@ class HAIRLOOM_OT_card_tile(bpy.types.Operator):
     __annotations__ = {
         "to": EnumProperty(
             name="Tile",
-            description="Which tile the cards show",
+            description="Tile that the cards show",
             items=(
                 (
                     "next",
                     "Next",
-                    "The tile after that of each card, and the first after the last",
+                    "Next tile after that of each card, from the last on to the first",
                 ),
-                ("previous", "Previous", "The tile before that of each card"),
-                ("number", "Number", "One tile for all"),
+                ("previous", "Previous", "Previous tile before that of each card"),
+                ("number", "Number", "The same tile for all cards"),
             ),
         ),
         "number": IntProperty(
             name="Number",
-            description="Number of the tile, counted from 1 at the lower left along rows",
+            description="Number of the tile, counted along rows from 1 at the lower left",
             default=1,
             min=1,
         ),
@@ -166,14 +167,14 @@ class HAIRLOOM_OT_add_card_along_curve(bpy.types.Operator):
     __annotations__ = {
         "width": FloatProperty(
             name="Width",
-            description="Width at the root; 0: as wide as the other cards usually are",
+            description="Width at the root; 0 uses the usual width of the other cards",
             subtype="DISTANCE",
             min=0.0,
             soft_max=0.1,
         ),
         "tile": IntProperty(
             name="Tile",
-            description="Number of the tile, from 1; 0: that of the nearest card",
+            description="Number of the tile, from 1; 0 uses the tile of the nearest card",
             min=0,
         ),
     }
@@ -205,7 +206,7 @@ def _curves(context: bpy.types.Context) -> list[bpy.types.Object]:
 
 
 class HAIRLOOM_MT_card_edits(bpy.types.Menu):
-    """What is done to selected hair cards"""
+    """Tools for selected hair cards"""
 
     bl_idname = _MENU
     bl_label = "Hair Cards"

@@ -47,35 +47,35 @@ class HAIRLOOM_OT_export_cards(LongWork, ExportHelper, bpy.types.Operator):
     )
     collection: StringProperty(
         name="Source Collection",
-        description="Write the hair of this collection in place of the active one",
+        description="Export the hair of this collection instead of the active hair",
         default="",
         options={"HIDDEN"},
     )
-    format: EnumProperty(name="Format", description="Format of the file", items=_FORMATS)
+    format: EnumProperty(name="Format", description="File format", items=_FORMATS)
     own_folder: BoolProperty(
         name="Own Folder",
-        description="Write all files into a folder that is named after the mesh. What names a path "
-        "itself, as a script or a collection's exporter does, gets that path unless this is on",
+        description="Write all files into a folder named after the mesh. Scripts and collection "
+        "exporters, which give their own path, use that path unless this is on",
         default=False,
     )
     own_levels: BoolProperty(
         name="Other Levels of Detail",
-        description="Write another number of levels than the groom's settings say",
+        description="Write a different number of levels than set in the groom",
         default=False,
     )
     levels: IntProperty(
         name="Levels",
-        description="How many meshes are written, each with about half the triangles of the one "
-        "before",
+        description="Number of meshes to write, each with about half the triangles of the "
+        "previous one",
         default=3,
         min=1,
         max=5,
     )
     own_frames: BoolProperty(
-        name="Other Frames", description="Write a part of the bake", default=False
+        name="Other Frames", description="Write only part of the bake", default=False
     )
-    first_frame: IntProperty(name="First", description="First frame that is written", default=1)
-    last_frame: IntProperty(name="Last", description="Last frame that is written", default=250)
+    first_frame: IntProperty(name="First", description="First frame to write", default=1)
+    last_frame: IntProperty(name="Last", description="Last frame to write", default=250)
     __annotations__ |= operator_properties("cards_export")
 
     @property

@@ -29,7 +29,7 @@ _MAX_LEVELS = next(
 
 
 class HAIRLOOM_OT_make_cards(LongWork, bpy.types.Operator):
-    """Make hair cards of the active hair as meshes in the scene, or update them. Esc cancels"""
+    """Make hair cards from the active hair as meshes in the scene, or update them. Esc cancels"""
 
     bl_idname = "hairloom.make_cards"
     bl_label = "Make Cards"
@@ -44,8 +44,8 @@ class HAIRLOOM_OT_make_cards(LongWork, bpy.types.Operator):
 
 
 class HAIRLOOM_OT_discard_card_edits(LongWork, bpy.types.Operator):
-    """Make the cards of the active hair as if nobody had edited them: edited cards are made again,
-    deleted ones come back, and your own ones go. Esc cancels"""
+    """Discard all edits to the cards of the active hair: edited cards are made again, deleted cards
+    are restored, and added cards are removed. Esc cancels"""
 
     bl_idname = "hairloom.discard_card_edits"
     bl_label = "Discard Edits"

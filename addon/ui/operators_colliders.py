@@ -20,8 +20,8 @@ _MILLIMETRES = 1000.0
 
 
 class HAIRLOOM_OT_fit_spheres(LongWork, bpy.types.Operator):
-    """Fit spheres to the active mesh, or to the mesh that the active hair grows on. They follow it
-    even if an armature deforms it, and are faster to collide with than a mesh. Esc cancels"""
+    """Fit collision spheres to the active mesh, or to the mesh that the active hair grows on. They
+    follow armature deformation and collide faster than a mesh. Esc cancels"""
 
     bl_idname = "hairloom.fit_spheres"
     bl_label = "Fit Spheres"
@@ -31,7 +31,8 @@ class HAIRLOOM_OT_fit_spheres(LongWork, bpy.types.Operator):
         **operator_properties("sphere_fit"),
         "replace_mesh": BoolProperty(
             name="Replace Mesh",
-            description="Stop colliding with the mesh itself, so that Play need not prepare it",
+            description="Stop collisions with the mesh itself, so that Play does not have to "
+            "prepare it",
             default=True,
         ),
     }
@@ -73,7 +74,7 @@ class HAIRLOOM_OT_fit_spheres(LongWork, bpy.types.Operator):
 
 class HAIRLOOM_OT_remove_spheres(bpy.types.Operator):
     """Remove the spheres fitted to the active mesh, or to the mesh that the active hair grows on.
-    The mesh itself collides again as it did before"""
+    The mesh itself collides again"""
 
     bl_idname = "hairloom.remove_spheres"
     bl_label = "Remove Spheres"
@@ -115,7 +116,7 @@ def draw_colliders(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
 
 
 class HAIRLOOM_PT_collider(WithHelp, bpy.types.Panel):
-    """How this object collides with hair that has it among its colliders"""
+    """How this object collides with hair that uses it as a collider"""
 
     bl_label = "Hairloom Collider"
     helped = "collisions"

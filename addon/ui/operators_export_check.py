@@ -109,7 +109,7 @@ def _engines() -> list[tuple[str, str, str]]:
 
 _ENGINE = {
     "name": "For",
-    "description": "Which engine, and by which file",
+    "description": "Engine and file format to check for",
     "items": _engines(),
     "default": _engines()[0][0],
 }
@@ -143,7 +143,7 @@ class HAIRLOOM_OT_check_export(LongWork, bpy.types.Operator):
 
 
 class HAIRLOOM_OT_show_export_check(bpy.types.Operator):
-    """Show what an engine will see of the hair that was read"""
+    """Show what an engine will receive of the checked hair"""
 
     bl_idname = "hairloom.show_export_check"
     bl_label = "Check for Export"

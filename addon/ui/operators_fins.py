@@ -50,7 +50,7 @@ class HAIRLOOM_OT_fin_add(bpy.types.Operator):
 
 
 class HAIRLOOM_OT_fin_remove(bpy.types.Operator):
-    """Make the active cloth a plain mesh again, in its original shape"""
+    """Turn the active cloth back into a plain mesh, in its original shape"""
 
     bl_idname = "hairloom.fin_remove"
     bl_label = "Remove Cloth"
@@ -71,7 +71,7 @@ class HAIRLOOM_OT_fin_remove(bpy.types.Operator):
 
 
 class HAIRLOOM_OT_fin_preview(bpy.types.Operator):
-    """Toggle whether Play and Blender's playback move the active cloth"""
+    """Toggle simulation of the active cloth with Play and during playback"""
 
     bl_idname = "hairloom.fin_preview"
     bl_label = "Preview Cloth"

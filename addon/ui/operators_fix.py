@@ -21,7 +21,7 @@ _ANGLE_LIMIT, _ISLAND_MARGIN = 1.15, 0.02
 
 
 class HAIRLOOM_OT_set_surface(bpy.types.Operator):
-    """Attach the active hair to the selected mesh; if none is selected, to the closest mesh"""
+    """Attach the active hair to the selected mesh, or to the closest mesh if none is selected"""
 
     bl_idname = "hairloom.set_surface"
     bl_label = "Set Surface"
@@ -68,7 +68,7 @@ class HAIRLOOM_OT_snap_roots(bpy.types.Operator):
 
 
 class HAIRLOOM_OT_unwrap_surface(bpy.types.Operator):
-    """Give the surface of the active hair UVs that do not overlap, by Smart UV Project"""
+    """Give the surface of the active hair non-overlapping UVs by Smart UV Project"""
 
     bl_idname = "hairloom.unwrap_surface"
     bl_label = "Unwrap Surface"
@@ -102,7 +102,7 @@ class HAIRLOOM_OT_unwrap_surface(bpy.types.Operator):
 
 
 class HAIRLOOM_OT_show_in_renders(bpy.types.Operator):
-    """Let renders show hair whose baked copy was deleted"""
+    """Show hair in renders again after its baked copy was deleted"""
 
     bl_idname = "hairloom.show_in_renders"
     bl_label = "Show in Renders"

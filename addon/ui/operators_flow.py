@@ -24,8 +24,8 @@ from .take_back import TakesBack
 
 
 class HAIRLOOM_OT_add_stroke(bpy.types.Operator):
-    """Let the hair be combed along the selected curves, which are drawn on its surface. If none is
-    selected, a stroke from the forehead to the crown is added, to be edited like any curve"""
+    """Use the selected curves, drawn on the surface, as strokes to comb the hair along. If none is
+    selected, add an editable curve from the forehead to the crown"""
 
     bl_idname = "hairloom.add_stroke"
     bl_label = "Add Stroke"
@@ -46,8 +46,8 @@ class HAIRLOOM_OT_add_stroke(bpy.types.Operator):
 
 
 class HAIRLOOM_OT_remove_stroke(bpy.types.Operator):
-    """Comb the hair along this stroke no longer. The object itself stays in the scene, and hair
-    that was combed stays as it is"""
+    """Stop combing the hair along this stroke. The object stays in the scene, and combed hair keeps
+    its shape"""
 
     bl_idname = "hairloom.remove_stroke"
     bl_label = "Remove Stroke"
@@ -70,8 +70,8 @@ class HAIRLOOM_OT_remove_stroke(bpy.types.Operator):
 
 
 class HAIRLOOM_OT_comb_flow(LongWork, bpy.types.Operator):
-    """Comb the selected hair along its strokes, from their first points to their last. Pressed
-    again, it begins from the shape before. Esc cancels"""
+    """Comb the selected hair along its strokes, from first to last point. When pressed again,
+    combing starts over from the previous shape. Esc cancels"""
 
     bl_idname = "hairloom.comb_flow"
     bl_label = "Comb Along Flow"
@@ -97,8 +97,8 @@ class HAIRLOOM_OT_comb_flow(LongWork, bpy.types.Operator):
 
 
 class HAIRLOOM_OT_take_flow_back(TakesBack, bpy.types.Operator):
-    """Give the selected hair the shape that it had before it was combed along strokes. What was
-    combed otherwise, settled or trimmed since is lost"""
+    """Restore the shape of the selected hair from before it was combed along strokes. Later
+    combing, settling and trimming is lost"""
 
     bl_idname = "hairloom.take_flow_back"
     bl_label = "Take Flow Back"

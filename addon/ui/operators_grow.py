@@ -50,8 +50,8 @@ class HAIRLOOM_OT_grow(LongWork, bpy.types.Operator):
 
 
 class HAIRLOOM_OT_grow_again(LongWork, bpy.types.Operator):
-    """Give the selected hair the curves that its settings make now. What was combed, cut, settled
-    or painted on its curves since it grew is lost. Esc cancels"""
+    """Grow the selected hair again with its current settings. Combing, cutting, settling and
+    painting on its curves since it grew is lost. Esc cancels"""
 
     bl_idname = "hairloom.grow_again"
     bl_label = "Grow Again"

@@ -36,9 +36,9 @@ _UNSEEN = frozenset(("CAMERA", "EMPTY", "LIGHT", "LIGHT_PROBE", "SPEAKER"))
 
 
 class HAIRLOOM_OT_add_hairstyle(LongWork, bpy.types.Operator):
-    """Add this hairstyle as hair curves to the selected head, or to the built-in one in the scene.
-    Fur grows on the selected mesh. Without one, a head is added too, with brows and lashes if the
-    hairstyle is neither. Esc cancels"""
+    """Add this hairstyle as hair curves to the selected head, or fur to the selected mesh. If no
+    head is selected, the built-in head is used, and added if the scene has none, with brows and
+    lashes unless the hairstyle is one of them. Esc cancels"""
 
     bl_idname = "hairloom.add_hairstyle"
     bl_label = "Hairloom Hairstyle"
@@ -57,12 +57,12 @@ class HAIRLOOM_OT_add_hairstyle(LongWork, bpy.types.Operator):
     )
     hairline: StringProperty(
         name="Hairline",
-        description="Vertex group or float attribute on points of the head that says where this "
-        "hair grows; empty: the one named as the hairstyle says, such as scalp",
+        description="Vertex group or point attribute (float) of the head that limits where this "
+        "hair grows. If empty, the one that the hairstyle names, such as scalp",
         search=names_of_weights,
     )
     plays: BoolProperty(
-        name="Play", description="Simulate the hair as soon as it is there", default=True
+        name="Play", description="Simulate the hair as soon as it is added", default=True
     )
 
     @classmethod
@@ -133,8 +133,8 @@ def _look_at(objects: list[bpy.types.Object], context: bpy.types.Context) -> Non
 
 
 class HAIRLOOM_OT_place_landmarks(LongWork, bpy.types.Operator):
-    """Guess where crown, ears, nose and other landmarks of the selected head are, and mark them by
-    objects that can be moved. Hairstyles that are added, or fitted again, go by them"""
+    """Guess the places of crown, ears, nose and other landmarks on the selected head, and mark them
+    with movable objects. Hairstyles are fitted to these when added or fitted again"""
 
     bl_idname = "hairloom.place_landmarks"
     bl_label = "Place Landmarks"
@@ -169,8 +169,8 @@ def _placed(count: int) -> str:
 
 
 class HAIRLOOM_OT_fit_again(LongWork, bpy.types.Operator):
-    """Give the selected hair the curves of its hairstyle again, by the landmarks and the shape that
-    its head has now. Modifiers and settings stay, combing is lost. Esc cancels"""
+    """Fit the hairstyle of the selected hair again to the current landmarks and shape of its head.
+    Modifiers and settings stay, combing is lost. Esc cancels"""
 
     bl_idname = "hairloom.fit_again"
     bl_label = "Fit Again"
@@ -193,7 +193,7 @@ class HAIRLOOM_OT_fit_again(LongWork, bpy.types.Operator):
 
 
 class HAIRLOOM_OT_choose_hairstyle(bpy.types.Operator):
-    """Choose a hairstyle and add it to the selected head or the built-in one, or fur and add it to
+    """Choose a hairstyle and add it to the selected or built-in head, or choose fur and add it to
     the selected mesh"""
 
     bl_idname = "hairloom.choose_hairstyle"
@@ -222,7 +222,7 @@ class HAIRLOOM_OT_choose_hairstyle(bpy.types.Operator):
 
 
 class HAIRLOOM_MT_hairstyles(bpy.types.Menu):
-    """Hair with shape, settings and look, ready to be changed"""
+    """Ready-made hair with shape, settings and look"""
 
     bl_idname = "HAIRLOOM_MT_hairstyles"
     bl_label = "Hairloom Hairstyle"

@@ -11,9 +11,9 @@ from .selection import chosen_hair, in_object_mode, make_active, needs_hair
 
 
 class HAIRLOOM_OT_make_real(LongWork, bpy.types.Operator):
-    """Make ordinary hair curves of all strands as they are combed, with children, curls, widths,
-    colours and a material like the look, for Cycles, EEVEE and other tools. The hair that they are
-    made from is kept, and hidden. Esc cancels"""
+    """Convert all strands as combed, with children, curls, widths, colours and a material that
+    matches the look, to ordinary hair curves for Cycles, EEVEE and other tools. The original hair
+    is kept and hidden. Esc cancels"""
 
     bl_idname = "hairloom.make_real"
     bl_label = "Make Real"

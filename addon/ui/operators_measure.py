@@ -19,8 +19,8 @@ _NAMES = 0.34
 
 
 class HAIRLOOM_OT_measure(bpy.types.Operator):
-    """Measure how far strands, and cards if they are shown, stretch and how deep they are in
-    colliders, as they are now. A bake measures all of its frames by itself"""
+    """Measure how far strands (and cards, if shown) currently stretch and how deep they are inside
+    colliders. Bakes measure all of their frames automatically"""
 
     bl_idname = "hairloom.measure"
     bl_label = "Measure"

@@ -16,9 +16,8 @@ from .selection import chosen_hair, in_object_mode, needs_hair, once_each
 
 
 class HAIRLOOM_OT_mirror_hair(LongWork, bpy.types.Operator):
-    """Mirror the curves of one side of the surface to the other, whose curves they replace. Roots
-    go to the surface; widths, colours and other attributes are those of the curves that are
-    mirrored. Esc cancels"""
+    """Mirror the curves of one side of the surface to the other, replacing the curves there. Roots
+    are placed on the surface; widths, colours and other attributes are copied. Esc cancels"""
 
     bl_idname = "hairloom.mirror_hair"
     bl_label = "Mirror Hair"

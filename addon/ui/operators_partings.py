@@ -21,8 +21,8 @@ from .selection import chosen_hair, in_object_mode, needs_hair, once_each
 
 
 class HAIRLOOM_OT_add_parting(bpy.types.Operator):
-    """Part the hair along the selected curves, which are drawn on its surface. If none is selected,
-    a line from the forehead to the crown is added, to be edited like any curve"""
+    """Part the hair along the selected curves, drawn on its surface. If none is selected, add an
+    editable curve from the forehead to the crown"""
 
     bl_idname = "hairloom.add_parting"
     bl_label = "Add Parting"
@@ -43,7 +43,7 @@ class HAIRLOOM_OT_add_parting(bpy.types.Operator):
 
 
 class HAIRLOOM_OT_remove_parting(bpy.types.Operator):
-    """Part the hair along this line no longer. The object itself stays in the scene"""
+    """Stop parting the hair along this line. The object stays in the scene"""
 
     bl_idname = "hairloom.remove_parting"
     bl_label = "Remove Parting"

@@ -41,7 +41,7 @@ class HAIRLOOM_OT_apply_preset(bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
 
     name: StringProperty(
-        name="Preset", description="A preset such as looks/blond, or the path of a preset file"
+        name="Preset", description="Preset such as looks/blond, or the path of a preset file"
     )
 
     @classmethod
@@ -64,7 +64,7 @@ def _apply(all_settings: Iterable[Any], context: bpy.types.Context) -> None:
 
 
 class HAIRLOOM_OT_add_preset(bpy.types.Operator, ImportHelper):
-    """Apply a preset file to the selected hair, and keep it as one of your own presets"""
+    """Apply a preset file to the selected hair, and add it to your own presets"""
 
     bl_idname = "hairloom.add_preset"
     bl_label = "Add Preset File"
@@ -114,7 +114,7 @@ class HAIRLOOM_OT_save_preset(bpy.types.Operator):
     section: KIND
     title: StringProperty(
         name="Name",
-        description="Name of the preset. Your own preset of this name is replaced",
+        description="Name of the preset. An own preset of this name is replaced",
         maxlen=40,
     )
 
@@ -139,7 +139,7 @@ class HAIRLOOM_OT_save_preset(bpy.types.Operator):
 
 
 class HAIRLOOM_OT_delete_preset(bpy.types.Operator):
-    """Delete this preset of yours permanently"""
+    """Delete this preset of your own permanently"""
 
     bl_idname = "hairloom.delete_preset"
     bl_label = "Delete Preset"
@@ -185,7 +185,7 @@ class HAIRLOOM_OT_look_from_material(bpy.types.Operator):
 
 
 class HAIRLOOM_OT_look_to_material(bpy.types.Operator):
-    """Give the hair a Principled Hair material that looks like it, for EEVEE, Cycles and other
+    """Give the hair a Principled Hair material that matches its look, for EEVEE, Cycles and other
     tools"""
 
     bl_idname = "hairloom.look_to_material"

@@ -58,8 +58,8 @@ class HAIRLOOM_OT_preview(bpy.types.Operator):
 
 
 class HAIRLOOM_OT_cancel_build(bpy.types.Operator):
-    """Stop what is being made of the selected hair: without cards its strands are shown, and hair
-    that is not there yet is no longer previewed"""
+    """Cancel what is being made for the selected hair: strands are shown instead of unfinished
+    cards, and unfinished hair is no longer previewed"""
 
     bl_idname = "hairloom.cancel_build"
     bl_label = "Cancel"
@@ -133,7 +133,7 @@ class HAIRLOOM_OT_play(bpy.types.Operator):
 
 
 class HAIRLOOM_OT_stop(bpy.types.Operator):
-    """Stop hair and cloth that play. They return to their style"""
+    """Stop the hair and cloth that are playing. They return to their style"""
 
     bl_idname = "hairloom.stop"
     bl_label = "Stop Hair"
@@ -152,7 +152,7 @@ class HAIRLOOM_OT_stop(bpy.types.Operator):
 
 
 class HAIRLOOM_OT_pause(bpy.types.Operator):
-    """Pause the simulation of hair that plays, or resume it"""
+    """Pause or resume the simulation of playing hair"""
 
     bl_idname = "hairloom.pause"
     bl_label = "Pause"
@@ -170,8 +170,8 @@ class HAIRLOOM_OT_pause(bpy.types.Operator):
 
 
 class HAIRLOOM_OT_mute_hair_dynamics(bpy.types.Operator):
-    """Let Blender's own Hair Dynamics only put the selected hair onto its surface, so that Hairloom
-    alone moves it"""
+    """Limit Blender's own Hair Dynamics to attaching the selected hair to its surface, so that only
+    Hairloom moves it"""
 
     bl_idname = "hairloom.mute_hair_dynamics"
     bl_label = "Mute Hair Dynamics"
@@ -194,7 +194,7 @@ class HAIRLOOM_OT_mute_hair_dynamics(bpy.types.Operator):
 
 
 class HAIRLOOM_OT_reset(bpy.types.Operator):
-    """Return previewed hair to its style, at the head's present position"""
+    """Return previewed hair to its style, at the current position of the head"""
 
     bl_idname = "hairloom.reset"
     bl_label = "Reset"

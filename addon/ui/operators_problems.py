@@ -15,7 +15,7 @@ _WIDTH = 360
 
 
 class HAIRLOOM_OT_show_problems(bpy.types.Operator):
-    """Show what is wrong with the selected hair, each problem with the button that fixes it"""
+    """Show the problems of the selected hair, each with a button to fix it"""
 
     bl_idname = "hairloom.show_problems"
     bl_label = "Problems"

@@ -22,7 +22,7 @@ def _has_reports(cls: type[Any]) -> bool:
 
 
 class HAIRLOOM_OT_show_reports(bpy.types.Operator):
-    """Show what Hairloom has reported last, such as the warnings of an export"""
+    """Show the latest reports by Hairloom, such as warnings of an export"""
 
     bl_idname = "hairloom.show_reports"
     bl_label = "Reports"
@@ -50,7 +50,7 @@ class HAIRLOOM_OT_show_reports(bpy.types.Operator):
 
 
 class HAIRLOOM_OT_copy_reports(bpy.types.Operator):
-    """Copy what Hairloom has reported last as text"""
+    """Copy the latest reports by Hairloom as text"""
 
     bl_idname = "hairloom.copy_reports"
     bl_label = "Copy Reports"

@@ -17,8 +17,8 @@ from .take_back import TakesBack
 
 
 class HAIRLOOM_OT_settle(LongWork, bpy.types.Operator):
-    """Let the selected hair fall under gravity onto head and shoulders, and keep that as its shape.
-    Ties and colliders hold it as they do in motion"""
+    """Let the selected hair fall under gravity onto head and shoulders, and keep the result as its
+    shape. Ties and colliders act as in motion"""
 
     bl_idname = "hairloom.settle"
     bl_label = "Settle"
@@ -41,8 +41,8 @@ class HAIRLOOM_OT_settle(LongWork, bpy.types.Operator):
 
 
 class HAIRLOOM_OT_back_to_combed(TakesBack, bpy.types.Operator):
-    """Give the selected hair the shape that it had before it settled. What was combed or trimmed
-    since is lost"""
+    """Restore the shape of the selected hair from before it settled. Later combing and trimming is
+    lost"""
 
     bl_idname = "hairloom.back_to_combed"
     bl_label = "Back to Combed"

@@ -19,7 +19,7 @@ from .reports import reporting, waiting
 from .selection import chosen_hair, needs_hair
 
 _SAMPLES = IntProperty(
-    name="Samples", description="Sub-pixels along each side of a pixel", default=3, min=1, max=4
+    name="Samples", description="Subpixels along each side of a pixel", default=3, min=1, max=4
 )
 
 
@@ -60,9 +60,13 @@ class HAIRLOOM_OT_turntable(LongWork, bpy.types.Operator):
         subtype="PIXEL",
     )
     samples: _SAMPLES
-    lights: EnumProperty(name="Lights", description="What the lights move with", items=LIGHTS)
+    lights: EnumProperty(
+        name="Lights",
+        description="Whether lights move with the camera or stay with the groom",
+        items=LIGHTS,
+    )
     transparent: BoolProperty(
-        name="Transparent", description="Pictures without a backdrop", default=False
+        name="Transparent", description="Render the pictures without a backdrop", default=False
     )
     video: BoolProperty(
         name="Video",
@@ -121,7 +125,7 @@ class HAIRLOOM_OT_contact_sheet(bpy.types.Operator, ExportHelper):
     filter_glob: StringProperty(default="*.png", options={"HIDDEN"})
     shows: EnumProperty(
         name="Shows",
-        description="What differs between the pictures of the sheet",
+        description="What varies between the pictures of the sheet",
         items=(
             ("sides", "All Sides", "Front, three-quarter, side, back, top, and a close-up"),
             ("looks", "All Looks", "One view in all looks that come with Hairloom"),

@@ -15,7 +15,7 @@ from .selection import chosen_hair, needs_hair
 
 
 class HAIRLOOM_OT_show_slices(bpy.types.Operator):
-    """Show what the hair lets through of each light, layer by layer, in an Image Editor"""
+    """Show how much of each light the hair lets through, layer by layer, in an Image Editor"""
 
     bl_idname = "hairloom.show_slices"
     bl_label = "Show Opacity Map"

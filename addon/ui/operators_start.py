@@ -83,8 +83,8 @@ class HAIRLOOM_OT_add_groom(LongWork, bpy.types.Operator):
 
 
 class HAIRLOOM_OT_sample_scene(LongWork, bpy.types.Operator):
-    """Add and play a scene with a turning head, long hair, lights and a camera. Your own scenes are
-    not changed. Esc cancels"""
+    """Add and play a new scene with a turning head, long hair, lights and a camera. Other scenes
+    are not changed. Esc cancels"""
 
     bl_idname = "hairloom.sample_scene"
     bl_label = "Hairloom Sample Scene"

@@ -56,7 +56,7 @@ def draw_strand_exports(layout: bpy.types.UILayout) -> None:
 
 
 class HAIRLOOM_MT_export_strands(bpy.types.Menu):
-    """Strands as a file for engines and other programs"""
+    """Export strands to a file for engines and other programs"""
 
     bl_label = "Export Strands"
 

@@ -36,14 +36,22 @@ from .selection import active_mesh, ground_mesh, in_object_mode, make_active
 
 SUFFIXES = tuple(suffix for _, suffixes in FILE_KINDS for suffix in suffixes)
 UP_AXES = (
-    ("FILE", "From File", "As the file says; where it does not: Z in .hair files, else Y"),
+    ("FILE", "From File", "Up axis given in the file; if there is none, Z for .hair files, else Y"),
     ("Y", "Y Up", "The file's Y axis points up, as in most engines"),
     ("Z", "Z Up", "The file's Z axis points up, as in Blender"),
 )
 GUIDES = (
-    ("LEAVE", "Ignore", "Only the strands that are seen; of a file with guides alone, those"),
-    ("APART", "Own Object", "Guides are hair curves of their own beside the strands"),
-    ("AMONG", "With Strands", "Guides are among the strands, marked by the attribute groom_guide"),
+    (
+        "LEAVE",
+        "Ignore",
+        "Import only visible strands, or the guides if the file holds nothing else",
+    ),
+    ("APART", "Own Object", "Import guides as a separate hair curves object"),
+    (
+        "AMONG",
+        "With Strands",
+        "Import guides with the strands, marked by the attribute groom_guide",
+    ),
 )
 
 
@@ -63,11 +71,11 @@ class HAIRLOOM_OT_import_strands(LongWork, ImportHelper, bpy.types.Operator):
         type=bpy.types.OperatorFileListElement, options={"HIDDEN", "SKIP_SAVE"}
     )
     directory: StringProperty(subtype="DIR_PATH", options={"HIDDEN", "SKIP_SAVE"})
-    up: EnumProperty(name="Up", description="What points up in the file", items=UP_AXES)
+    up: EnumProperty(name="Up", description="Axis that points up in the file", items=UP_AXES)
     scale: FloatProperty(
         name="Scale",
-        description="What lengths are multiplied by, beside what the file says of its unit: 0.01 "
-        "for a TressFX groom in centimetres",
+        description="Factor on all lengths, in addition to the unit given in the file: 0.01 for a "
+        "TressFX groom in centimetres",
         default=1.0,
         min=1.0e-6,
         max=1.0e6,
@@ -77,8 +85,8 @@ class HAIRLOOM_OT_import_strands(LongWork, ImportHelper, bpy.types.Operator):
     )
     head_scale: FloatProperty(
         name="Scale of Head",
-        description="What the size of the active mesh is multiplied by, about the scene's origin: "
-        "0.01 for a head in centimetres",
+        description="Factor on the size of the active mesh, about the scene's origin: 0.01 for a "
+        "head in centimetres",
         default=1.0,
         min=1.0e-6,
         max=1.0e6,
@@ -87,11 +95,11 @@ class HAIRLOOM_OT_import_strands(LongWork, ImportHelper, bpy.types.Operator):
         precision=4,
     )
     guides: EnumProperty(
-        name="Guides", description="What becomes of guides in Alembic and USD files", items=GUIDES
+        name="Guides", description="How guides in Alembic and USD files are imported", items=GUIDES
     )
     onto_mesh: BoolProperty(
         name="Onto Active Mesh",
-        description="Bind the roots to the mesh that is active, so that the hair moves with it",
+        description="Bind the roots to the active mesh, so that the hair moves with it",
         default=True,
     )
 

@@ -16,7 +16,7 @@ from .selection import chosen_hair, needs_hair
 
 class HAIRLOOM_OT_add_hair_tie(bpy.types.Operator):
     """Hold the hair that passes through the selected rings: Empties, curves or meshes. If none is
-    selected, a new ring is added at the 3D cursor, as a child of the surface"""
+    selected, add a ring at the 3D cursor as a child of the surface"""
 
     bl_idname = "hairloom.add_hair_tie"
     bl_label = "Add Hair Tie"
@@ -43,7 +43,7 @@ class HAIRLOOM_OT_add_hair_tie(bpy.types.Operator):
 
 
 class HAIRLOOM_OT_remove_hair_tie(bpy.types.Operator):
-    """Let go of the hair that this tie holds. The object itself stays in the scene"""
+    """Release the hair held by this tie. The object stays in the scene"""
 
     bl_idname = "hairloom.remove_hair_tie"
     bl_label = "Remove Hair Tie"

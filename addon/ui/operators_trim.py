@@ -19,9 +19,9 @@ from .take_back import TakesBack
 
 
 class HAIRLOOM_OT_trim_to_shape(LongWork, bpy.types.Operator):
-    """Cut the selected hair where it leaves a closed mesh, or passes a plane: an Empty (across its
-    Z axis) or a flat mesh. Meshes and Empties that are selected beside the hair become its shapes.
-    Pressed again, it begins from the lengths before. Esc cancels"""
+    """Cut the selected hair where it leaves a closed mesh, or passes a flat mesh or the XY plane of
+    an Empty. Meshes and Empties selected with the hair become its trim shapes. When pressed again,
+    trimming starts over from the previous lengths. Esc cancels"""
 
     bl_idname = "hairloom.trim_to_shape"
     bl_label = "Trim to Shape"
@@ -53,8 +53,8 @@ class HAIRLOOM_OT_trim_to_shape(LongWork, bpy.types.Operator):
 
 
 class HAIRLOOM_OT_remove_trim_shape(bpy.types.Operator):
-    """Trim the hair to this shape no longer. The object itself stays in the scene, and hair that
-    was trimmed stays as it is"""
+    """Stop trimming the hair to this shape. The object stays in the scene, and trimmed hair keeps
+    its length"""
 
     bl_idname = "hairloom.remove_trim_shape"
     bl_label = "Remove Trim Shape"
@@ -77,8 +77,8 @@ class HAIRLOOM_OT_remove_trim_shape(bpy.types.Operator):
 
 
 class HAIRLOOM_OT_take_trim_back(TakesBack, bpy.types.Operator):
-    """Give the selected hair the shape that it had before it was trimmed. What was combed or
-    settled since is lost"""
+    """Restore the shape of the selected hair from before it was trimmed. Later combing and settling
+    is lost"""
 
     bl_idname = "hairloom.take_trim_back"
     bl_label = "Take Trim Back"

@@ -109,7 +109,7 @@ def draw_more(layout: bpy.types.UILayout) -> None:
 
 
 class HAIRLOOM_PT_sidebar(bpy.types.Panel):
-    """Preview, Play and what is done to the selected hair"""
+    """Preview, Play and tools for the selected hair"""
 
     bl_label = "Hairloom"
     bl_space_type = "VIEW_3D"
@@ -126,7 +126,7 @@ class HAIRLOOM_PT_sidebar(bpy.types.Panel):
 
 
 class HAIRLOOM_PT_data(bpy.types.Panel):
-    """The settings of these hair curves"""
+    """Settings of these hair curves"""
 
     bl_label = "Hairloom"
     bl_space_type = "PROPERTIES"
@@ -200,7 +200,7 @@ def _sub_panel(
 
 
 class HAIRLOOM_PT_sidebar_mesh_cards(bpy.types.Panel):
-    """Hair cards that are meshes of your own"""
+    """Hair cards in your own meshes"""
 
     bl_label = "Mesh Cards"
     bl_parent_id = "HAIRLOOM_PT_sidebar"

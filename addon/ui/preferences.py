@@ -50,7 +50,7 @@ NEW_GROOM: dict[str, Any] = {
     ),
     "plays": BoolProperty(
         name="Play at Once",
-        description="Simulate new grooms as soon as they are created. If off, they are at rest",
+        description="Simulate new grooms as soon as they are created. If off, they stay at rest",
         default=True,
     ),
 }
@@ -66,15 +66,16 @@ def _choose_gpu(page: Any, _context: Any) -> None:
 _MACHINE: dict[str, Any] = {
     "image_atomics": EnumProperty(
         name="Image Atomics",
-        description="Whether the GPU sorts the strands of a pixel in lists. If it draws no hair or "
-        "broken hair, try Never, and tell us with Copy Report",
+        description="Whether the GPU sorts the strands of each pixel in lists. If hair is missing "
+        "or broken, choose Never and send us the text of Copy Report",
         items=gpu_choices.ATOMICS,
         update=_choose_gpu,
     ),
     "gpu_memory": IntProperty(
         name="GPU Memory (MB)",
-        description="How much of the GPU's memory hair may take. With less, strands are drawn in "
-        "more parts, and shadow maps have fewer texels. Blender does not tell how much there is",
+        description="Amount of GPU memory that hair may use. With less, strands are drawn in more "
+        "parts and shadow maps have fewer texels. Blender does not report how much memory the GPU "
+        "has",
         default=gpu_choices.DEFAULT_MEMORY,
         min=gpu_choices.MIN_MEMORY,
         max=1 << 17,

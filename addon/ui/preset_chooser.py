@@ -18,8 +18,8 @@ from .selection import chosen_hair
 KINDS: dict[str, tuple[str, str]] = {
     "shading": ("Looks", "Colour and shine of the strands"),
     "dynamics": ("Dynamics", "How the hair moves"),
-    "volume": ("Shadows", "Shadows from fast to fine"),
-    "cards": ("Cards", "How many cards, how fine, and their atlas"),
+    "volume": ("Shadows", "Shadow quality, from fast to fine"),
+    "cards": ("Cards", "Number and detail of cards, and their atlas"),
 }
 #: for the operators that are about presets of one kind
 KIND = EnumProperty(
@@ -31,7 +31,7 @@ KIND = EnumProperty(
 #: size of the picture in the panel, and of those to choose from
 _SCALE, _POPUP_SCALE = 3.0, 5.0
 #: of hair that has none of the presets, and its number; presets count from 1
-_CUSTOM = ("CUSTOM", "Custom", "Settings that are no preset's", "OPTIONS", 0)
+_CUSTOM = ("CUSTOM", "Custom", "Settings that match no preset", "OPTIONS", 0)
 
 
 def draw_preset_row(

@@ -31,11 +31,11 @@ from .reports import tell
 from .selection import chosen_hair, needs_hair
 
 _SEVERAL = (
-    ("one", "One File", "All hair in one file, each with groups of its own"),
-    ("each", "A File Each", "Each hair in a file of its own, named after it"),
+    ("one", "One File", "All hair in one file, with separate groups for each object"),
+    ("each", "A File Each", "One file for each hair object, named after it"),
 )
 _FRAMES = (
-    ("still", "This Frame", "The hair as it is now"),
+    ("still", "This Frame", "Only the current frame"),
     ("scene", "Scene Range", "All frames of the scene"),
     ("own", "Frames", "A range of frames"),
 )
@@ -74,12 +74,14 @@ class StrandExportOperator(LongWork, ExportHelper):
 
     collection: StringProperty(
         name="Source Collection",
-        description="Write the hair of this collection in place of what is selected",
+        description="Export the hair of this collection instead of the selected hair",
         default="",
         options={"HIDDEN"},
     )
     several: EnumProperty(
-        name="Multiple Objects", description="Where more than one hair is chosen", items=_SEVERAL
+        name="Multiple Objects",
+        description="How to write more than one hair object",
+        items=_SEVERAL,
     )
 
     @property
@@ -213,7 +215,7 @@ class StrandExportOperator(LongWork, ExportHelper):
 class MovingExport:
     """Formats that hold motion."""
 
-    frames: EnumProperty(name="Frames", description="Which frames are written", items=_FRAMES)
+    frames: EnumProperty(name="Frames", description="Frames to write", items=_FRAMES)
     first: IntProperty(name="First", description="First frame", default=1)
     last: IntProperty(name="Last", description="Last frame", default=250)
 

@@ -8,8 +8,12 @@ from ...render.capabilities import choose_image_atomics
 #: whether drawing may use atomics of images; those of render/capabilities.py: name, label,
 #: description
 ATOMICS = (
-    ("automatic", "Automatic", "Use image atomics where a small test finds that they work"),
-    ("never", "Never", "Draw as on GPUs without image atomics: strands are noisy in a moving view"),
+    ("automatic", "Automatic", "Use image atomics if a short test shows that they work"),
+    (
+        "never",
+        "Never",
+        "Draw as on GPUs without image atomics; strands are noisy while the view moves",
+    ),
 )
 #: [MB] that hair may take at least, and where nobody chooses
 MIN_MEMORY, DEFAULT_MEMORY = 128, gpu_memory.DEFAULT
@@ -41,8 +45,8 @@ def memory_problem() -> str:
     if memory_in_use() <= budget:
         return ""
     return (
-        f"Hair takes {memory_in_use():,.0f} MB of the GPU's memory, and may take {budget:,.0f} MB: "
-        "strands are drawn in more parts, and a view at rest is drawn again. Raise GPU Memory in "
+        f"Hair takes {memory_in_use():,.0f} MB of the GPU's memory, and may take {budget:,.0f} "
+        "MB: strands are drawn in more parts, and views at rest are redrawn. Raise GPU Memory in "
         "the preferences if the GPU has more, or lower Resolution in Shadows or the number of "
         "children"
     )

@@ -22,7 +22,7 @@ from .engine_view import EngineView
 
 
 class HAIRLOOM_RE_engine(bpy.types.RenderEngine):
-    """Draws meshes and hair on the GPU"""
+    """Render meshes and hair on the GPU"""
 
     bl_idname = ENGINE
     bl_label = "Hairloom"

@@ -31,9 +31,9 @@ LIGHTS = (
     (
         "camera",
         "Turn with Camera",
-        "As if the groom turned in front of a fixed camera and fixed lights",
+        "Look as if the groom turned in front of a fixed camera and fixed lights",
     ),
-    ("groom", "Stay on Groom", "As if the camera circled a fixed groom with fixed lights"),
+    ("groom", "Stay on Groom", "Look as if the camera circled a fixed groom with fixed lights"),
 )
 #: frame count and sides of pictures [pixels], min and max
 FRAMES, SIDES = (1, 10_000), (16, 4096)

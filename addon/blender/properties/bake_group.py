@@ -18,8 +18,8 @@ class HAIRLOOM_PG_bake(bpy.types.PropertyGroup):
 
     folder: StringProperty(
         name="Cache",
-        description="Folder of the bake; empty: hairloom_cache beside the file, in folders named "
-        "after the file and the object",
+        description="Folder of the bake. If empty, a folder named after the file and the object, "
+        "in hairloom_cache beside the file",
         subtype="DIR_PATH",
         options={"PATH_SUPPORTS_BLEND_RELATIVE"},
         update=_changed,
@@ -27,13 +27,13 @@ class HAIRLOOM_PG_bake(bpy.types.PropertyGroup):
     )
     use_own_range: BoolProperty(
         name="Own Frame Range",
-        description="Bake other frames than those of the scene",
+        description="Bake a different frame range than the scene's",
         default=False,
         override=OVERRIDABLE,
     )
     first: IntProperty(
         name="First",
-        description="First frame to bake; the hair begins at rest here, or Pre-Roll frames before",
+        description="First frame to bake; the hair starts at rest here, or Pre-Roll frames earlier",
         default=1,
         min=-99999,
         max=999999,
@@ -49,54 +49,54 @@ class HAIRLOOM_PG_bake(bpy.types.PropertyGroup):
     )
     is_shown: BoolProperty(
         name="Play the Bake",
-        description="Show the baked frames in place of simulating them; off: simulate again",
+        description="Show the baked frames instead of simulating them",
         default=True,
         update=_changed,
         override=OVERRIDABLE,
     )
     in_renders: BoolProperty(
         name="Show in Renders",
-        description="Add a copy of the hair that shows the bake in renders, where it takes the "
-        "place of these curves",
+        description="Add a copy of the hair that plays the bake and replaces these curves in "
+        "renders",
         default=True,
         override=OVERRIDABLE,
     )
     follows: BoolProperty(
         name="Simulate on Playback",
-        description="While Blender plays its animation, simulate this hair frame by frame, from "
-        "rest at the first frame",
+        description="Simulate this hair frame by frame while Blender plays its animation, "
+        "starting at rest in the first frame",
         default=True,
         override=OVERRIDABLE,
     )
     owner: StringProperty(
         name="Owner",
-        description="Name that the object had when it was baked",
+        description="Name of the object when it was baked",
         options={"HIDDEN"},
         override=OVERRIDABLE,
     )
     copy: PointerProperty(
         type=bpy.types.Object,
         name="Copy in Renders",
-        description="The hair curves that show the bake in renders",
+        description="Hair curves that show the bake in renders",
         options={"HIDDEN"},
         override=OVERRIDABLE,
     )
     stands_for: PointerProperty(
         type=bpy.types.Object,
         name="Stands For",
-        description="The hair whose bake this copy shows; renders have its animated settings by it",
+        description="Hair whose bake this copy shows, and whose animated settings renders use",
         options={"HIDDEN"},
         override=OVERRIDABLE,
     )
     hides: BoolProperty(
         name="Is Replaced in Renders",
-        description="Whether the copy takes the place of these curves in renders",
+        description="Whether the copy replaces these curves in renders",
         options={"HIDDEN"},
         override=OVERRIDABLE,
     )
     was_hidden: BoolProperty(
         name="Was Hidden in Renders",
-        description="Whether renders left these curves out before there was a bake",
+        description="Whether these curves were already hidden in renders before the bake",
         options={"HIDDEN"},
         override=OVERRIDABLE,
     )

@@ -21,73 +21,82 @@ class HAIRLOOM_PG_card_object(bpy.types.PropertyGroup):
         "groom": PointerProperty(
             type=bpy.types.Object,
             name="Cards Of",
-            description="Hair that these cards were made from; Make Cards builds them again",
+            description="Hair that these cards were made from; Make Cards makes them again",
             poll=_is_hair,
             override=OVERRIDABLE,
         ),
         "level": IntProperty(
             name="Level",
-            description="Level of detail, 0 is the finest",
+            description="Level of detail; 0 is the finest",
             options={"HIDDEN"},
             override=OVERRIDABLE,
         ),
         "made_name": StringProperty(
             name="Made As",
-            description="Name under which Make Cards knows this object; a copy has another one",
+            description="Name by which Make Cards recognizes this object and tells it from copies",
             options={"HIDDEN"},
             override=OVERRIDABLE,
         ),
         "made_uid": IntProperty(
             name="Made In",
-            description="Number of this object while the file is open; a copy has another one",
+            description="Number of this object while the file is open, which tells it from copies",
             options={"HIDDEN"},
             override=OVERRIDABLE,
         ),
         "card_count": IntProperty(
             name="Cards",
-            description="How many cards this mesh holds",
+            description="Number of cards in this mesh",
             options={"HIDDEN"},
             override=OVERRIDABLE,
         ),
         "shell_layers": IntProperty(
             name="Shell Layers",
-            description="How many layers of shells this mesh holds; 0: it holds cards",
+            description="Number of shell layers in this mesh; 0 if it holds cards",
             options={"HIDDEN"},
             override=OVERRIDABLE,
         ),
         "wrong_fraction": FloatProperty(
             name="Wrong Order",
-            description="Fraction of the pixels that the finest level draws in a wrong order, from "
-            "all sides",
+            description="Fraction of pixels, seen from all sides, that the finest level draws in "
+            "the wrong order",
             options={"HIDDEN"},
             override=OVERRIDABLE,
         ),
         "image": PointerProperty(
             type=bpy.types.Image,
             name="Image",
-            description="Picture of these cards, which is drawn again with them",
+            description="Picture of these cards, made together with them",
             override=OVERRIDABLE,
         ),
     }
 
 
 _PICTURES = {
-    "base": ("Base", "Brightness of the strands, or their colour: multiplied by the hair's"),
-    "alpha": ("Alpha", "Where there is hair: the alpha of this picture, or its red without one"),
-    "shift": ("Shift", "Where the highlights lie along each strand; middle grey leaves them"),
-    "noise": ("Noise", "What the second highlight is broken up by"),
-    "tangent": ("Tangent", "Direction of the strands in place of the shift, as in a normal map"),
+    "base": ("Base", "Brightness or colour of the strands, multiplied by the hair's colour"),
+    "alpha": (
+        "Alpha",
+        "Coverage by hair: the picture's alpha, or its red channel if it has no alpha",
+    ),
+    "shift": (
+        "Shift",
+        "Shift of the highlights along each strand; middle grey does not shift them",
+    ),
+    "noise": ("Noise", "Noise that breaks up the second highlight"),
+    "tangent": (
+        "Tangent",
+        "Direction of the strands, encoded as in a normal map; used instead of the shift",
+    ),
 }
 
 
 class HAIRLOOM_PG_card_images(bpy.types.PropertyGroup):
-    """Pictures for hair cards; what is empty is generated"""
+    """Pictures for hair cards; empty ones are generated"""
 
     __annotations__ = {
         name: PointerProperty(
             type=bpy.types.Image,
             name=label,
-            description=f"{about}; empty: generated",
+            description=f"{about}. If empty, a generated texture is used",
             override=OVERRIDABLE,
         )
         for name, (label, about) in _PICTURES.items()

@@ -24,25 +24,29 @@ from .properties import (
 
 #: Shapes that the artist can choose from; "automatic" is what an object looks like.
 COLLIDER_SHAPES = (
-    ("automatic", "Automatic", "Meshes collide as they are, empties shown as spheres as balls"),
+    (
+        "automatic",
+        "Automatic",
+        "Meshes collide with their actual shape, Empties displayed as spheres collide as balls",
+    ),
     (
         "mesh",
         "Mesh",
-        "As it is: the signed distance of a closed mesh, which takes a second to make",
+        "Actual shape of a closed mesh, as a signed distance field that takes a second to compute",
     ),
     (
         "sphere",
         "Sphere",
-        "A ball around the middle of the bounding box, as wide as its longest side; of an empty: "
-        "of its display size",
+        "Ball at the middle of the bounding box, as wide as its longest side; for an Empty, with "
+        "its display size as radius",
     ),
     (
         "capsule",
         "Capsule",
-        "A rod with round ends along the longest side of the bounding box; of an empty: along Z, "
-        "a display size to either side, half as thick",
+        "Rod with round ends along the longest side of the bounding box; for an Empty, along Z by "
+        "its display size to either side, and half as thick",
     ),
-    ("none", "None", "Hair does not collide with it"),
+    ("none", "None", "No collisions with this object"),
 )
 #: What acts on the hair and can be shown as lines in the viewport.
 OVERLAYS = (
@@ -50,49 +54,49 @@ OVERLAYS = (
     (
         "wind",
         "Wind",
-        "Where the mean wind blows to: as long as the hair is wide at 10 m/s. Force fields: where "
-        "they push points of the hair, the same at 10 m/s²",
+        "Direction and strength of the mean wind, and of force fields at points of the hair; a "
+        "line as long as the hair is wide is 10 m/s of wind, or 10 m/s² of force",
     ),
     ("lights", "Lights", "From the hair towards each light that shines on it"),
     (
         "stretch",
         "Stretch",
-        "Guides by how far they are from the lengths of their style: yellow from 1 %, red from 5 %",
+        "Guides coloured by their stretch relative to the style: yellow from 1 %, red from 5 %",
     ),
     (
         "contacts",
         "Contacts",
-        "Points of guides that touch a collider; red: how deep they are inside",
+        "Points of guides that touch a collider; red shows how deep they are inside",
     ),
     (
         "density",
         "Density",
-        "Two slices of the cells in which hair feels hair: green as dense as at rest, blue less, "
-        "yellow and red more",
+        "Two slices of the hair grid: green is as dense as at rest, blue less dense, yellow and "
+        "red denser",
     ),
     (
         "paint",
         "Painted",
-        "Guides by what is painted beside this button: blue is 0, green a half, red 1 and more",
+        "Guides coloured by the map chosen beside this button: blue is 0, green 0.5, red 1 or more",
     ),
 )
 _DEBUG_VIEWS = (
-    ("none", "Hair", "Hair as it is shaded"),
-    ("detail", "Detail", "Each segment by the number of pieces it is divided into"),
-    ("guide", "Guides", "Each strand by the guide that it follows most"),
-    ("group", "Groups", "Each strand by its group"),
-    ("occlusion", "Ambient Occlusion", "How much of the sky's light comes to each point, in grey"),
+    ("none", "Hair", "Shaded hair"),
+    ("detail", "Detail", "Each segment coloured by the number of pieces it is divided into"),
+    ("guide", "Guides", "Each strand coloured by the guide that it follows most"),
+    ("group", "Groups", "Each strand coloured by its group"),
+    ("occlusion", "Ambient Occlusion", "Amount of ambient light that reaches each point, in grey"),
     (
         "stretch",
         "Stretch",
-        "Each segment by its length beside that in the style: red is longer by 1 % or more, blue "
-        "is shorter, grey is as long",
+        "Each segment coloured by its length relative to the style: red is longer by 1 % or more, "
+        "blue is shorter, grey is equal",
     ),
     (
         "depth",
         "Depth",
-        "Each point by its distance from the head and other colliders: green touches them, blue is "
-        "far away, yellow and red are inside",
+        "Each point coloured by its distance from the head and other colliders: green touches "
+        "them, blue is far away, yellow and red are inside",
     ),
 )
 
@@ -139,8 +143,8 @@ SECTION_GROUPS = {
 SECTION_GROUPS["grow"].__annotations__ |= {
     "density_group": StringProperty(
         name="Density",
-        description="Vertex group, attribute of the surface, or image on its UVs that sets how "
-        "densely hair grows. If empty, combed hair grows on the scalp, other hair everywhere",
+        description="Vertex group, attribute of the surface, or image on its UVs with the density "
+        "of the hair. If empty, combed hair grows on the scalp, other hair everywhere",
         search=weights_of_surface,
         options=set(),
         update=_grow_changed,
@@ -153,21 +157,23 @@ SECTION_GROUPS["grow"].__annotations__ |= {
         options=set(),
         update=_grow_changed,
     ),
-    "shape": _hidden_text("Shape", "Digest of the curves as they grew; empty: they have not grown"),
-    "made_by": _hidden_text("Made By", "Digest of the settings by which the curves grew last"),
+    "shape": _hidden_text(
+        "Shape", "Digest of the curves as they were grown; empty if they were not grown"
+    ),
+    "made_by": _hidden_text("Made By", "Digest of the settings that last grew the curves"),
     "problem": _hidden_text("Problem", "Why the curves could not follow the settings"),
 }
 SECTION_GROUPS["fin"].__annotations__ |= {
     "enabled": BoolProperty(
         name="Simulate",
-        description="Simulate this cloth when Play is pressed, in playback and in bakes",
+        description="Simulate this cloth with Play, during playback and in bakes",
         default=True,
         override=OVERRIDABLE,
     ),
     "pin_group": StringProperty(
         name="Pin Group",
-        description="Vertex group that holds the mesh to its animation: at weight 1 firmly, below "
-        "softly. If empty, nothing is pinned and the mesh falls",
+        description="Vertex group that pins the mesh to its animation, firmly at weight 1 and "
+        "softly below. If empty, nothing is pinned and the mesh falls",
         override=OVERRIDABLE,
     ),
 }
@@ -200,10 +206,18 @@ _SWITCHES = {
         "children", "method", ("none", "auto"), "Children", "Grow more hair between the curves"
     ),
     "use_shadows": _switch(
-        "volume", "shadows", ("none", "deep"), "Shadows", "Let hair shade itself and what is near"
+        "volume",
+        "shadows",
+        ("none", "deep"),
+        "Shadows",
+        "Let hair cast shadows on itself and on nearby objects",
     ),
     "use_cards": _switch(
-        "card_drawing", "shown_as", ("strands", "cards"), "Draw Cards", "Draw cards, not strands"
+        "card_drawing",
+        "shown_as",
+        ("strands", "cards"),
+        "Draw Cards",
+        "Draw cards instead of strands",
     ),
 }
 
@@ -217,7 +231,7 @@ class HAIRLOOM_PG_groom(bpy.types.PropertyGroup):
         "card_images": PointerProperty(
             type=HAIRLOOM_PG_card_images,
             name="Card Pictures",
-            description="Pictures instead of generated textures of hair cards",
+            description="Pictures to use instead of the generated textures of hair cards",
             override=OVERRIDABLE,
         ),
         "baked_in": StringProperty(
@@ -228,8 +242,8 @@ class HAIRLOOM_PG_groom(bpy.types.PropertyGroup):
         ),
         "baked_rig": StringProperty(
             name="Baked Rig",
-            description="Hash of the strands that these curves were made from; another bake in the "
-            "folder is not shown",
+            description="Hash of the strands that these curves were made from; a bake of other "
+            "strands is not shown",
             options={"HIDDEN"},
             override=OVERRIDABLE,
         ),
@@ -244,19 +258,20 @@ class HAIRLOOM_PG_character(bpy.types.PropertyGroup):
         "bake": PointerProperty(
             type=HAIRLOOM_PG_bake,
             name="Bake",
-            description="How and where this object is baked",
+            description="Bake settings of this object",
             override=OVERRIDABLE,
         ),
         "card_object": PointerProperty(
             type=HAIRLOOM_PG_card_object,
             name="Cards",
-            description="Whose cards this mesh holds, if it does",
+            description="Hair cards in this mesh, if any",
             override=OVERRIDABLE,
         ),
         "children_density": StringProperty(
             name="Density",
-            description="How densely children grow: a vertex group or an attribute of the surface, "
-            "an attribute of the curves, or an image; empty: wherever guides are near",
+            description="Density of the children: a vertex group or attribute of the surface, an "
+            "attribute of the curves, or an image. If empty, children grow wherever guides are "
+            "near",
             search=masks_of_groom,
             options=set(),
             update=lambda self, _context: changed.settings(self.id_data),
@@ -264,25 +279,25 @@ class HAIRLOOM_PG_character(bpy.types.PropertyGroup):
         ),
         "hairstyle": StringProperty(
             name="Hairstyle",
-            description="The hairstyle that these curves were added as, by name or file",
+            description="Name or file of the hairstyle that these curves were added as",
             override=OVERRIDABLE,
         ),
         "landmark": StringProperty(
             name="Landmark",
-            description="Which place of its parent, a head, this object marks",
+            description="Place on the parent head that this object marks",
             override=OVERRIDABLE,
         ),
         "debug_view": EnumProperty(
             items=_DEBUG_VIEWS,
             name="Colour By",
-            description="What the strands of the preview are coloured by",
+            description="Colouring of the strands in the preview",
             update=lambda self, _context: changed.settings(self.id_data),
             override=OVERRIDABLE,
         ),
         "show_counts": BoolProperty(
             name="Counts",
-            description="Write into the viewport how many guides, strands, pieces and vertices are "
-            "drawn; with a colouring they are always there",
+            description="Show the numbers of drawn guides, strands, pieces and vertices in the "
+            "viewport; a colouring other than Hair always shows them",
             default=False,
             update=lambda self, _context: changed.settings(self.id_data),
             override=OVERRIDABLE,
@@ -291,16 +306,15 @@ class HAIRLOOM_PG_character(bpy.types.PropertyGroup):
             items=OVERLAYS,
             options={"ENUM_FLAG"},
             name="Overlays",
-            description="What acts on the hair, and what happens to it, drawn into the viewport as "
-            "lines",
+            description="Lines in the viewport that show what acts on the hair and how it responds",
             default=set(),
             update=lambda self, _context: changed.settings(self.id_data),
             override=OVERRIDABLE,
         ),
         "shown_map": StringProperty(
             name="Painted Map",
-            description="What is painted that Painted shows, by its name; empty: what a setting of "
-            "this hair is painted by",
+            description="Name of the map that the overlay Painted shows. If empty, a map used by "
+            "a setting of this hair",
             search=masks_of_groom,
             update=lambda self, _context: changed.settings(self.id_data),
             override=OVERRIDABLE,
@@ -308,23 +322,23 @@ class HAIRLOOM_PG_character(bpy.types.PropertyGroup):
         "collider": PointerProperty(
             type=bpy.types.Object,
             name="Collider",
-            description="Closed mesh that the hair stays out of; empty: the surface it grows from",
+            description="Closed mesh that the hair stays out of. If empty, the surface that it "
+            "grows from",
             poll=_is_mesh,
             override=OVERRIDABLE,
         ),
         "collider_collection": PointerProperty(
             type=bpy.types.Collection,
             name="Colliders",
-            description="Collection of the other objects that this hair or cloth stays out of; "
-            "each has its own. Empty: for hair its surface alone, for cloth nothing. Read as Play "
-            "begins",
+            description="Collection of other objects that this hair or cloth collides with, read "
+            "when Play starts. If empty, hair collides with its surface alone, cloth with nothing",
             override=OVERRIDABLE,
         ),
         "field_collection": PointerProperty(
             type=bpy.types.Collection,
             name="Fields",
-            description="Collection of the force fields that act on this hair or cloth; empty: all "
-            "of the scene",
+            description="Collection of force fields that act on this hair or cloth. If empty, all "
+            "force fields of the scene",
             override=OVERRIDABLE,
         ),
         "tie_collection": PointerProperty(
@@ -338,23 +352,23 @@ class HAIRLOOM_PG_character(bpy.types.PropertyGroup):
         "parting_collection": PointerProperty(
             type=bpy.types.Collection,
             name="Partings",
-            description="Collection of curves drawn on the surface, across which no strand follows "
-            "another: hair falls to both sides of them",
+            description="Collection of curves drawn on the surface, along which the hair is "
+            "parted to both sides",
             update=lambda self, _context: changed.settings(self.id_data),
             override=OVERRIDABLE,
         ),
         "stroke_collection": PointerProperty(
             type=bpy.types.Collection,
             name="Strokes",
-            description="Collection of curves drawn on the surface, which Comb Along Flow combs "
-            "hair along, from their first points to their last",
+            description="Collection of curves drawn on the surface, along which Comb Along Flow "
+            "combs hair, from first to last point",
             override=OVERRIDABLE,
         ),
         "trim_collection": PointerProperty(
             type=bpy.types.Collection,
             name="Trim Shapes",
-            description="Collection of closed meshes, flat meshes and Empties that Trim to Shape "
-            "cuts the hair by",
+            description="Collection of closed meshes, flat meshes and Empties to which Trim to "
+            "Shape cuts the hair",
             override=OVERRIDABLE,
         ),
         "tip_surface": PointerProperty(
@@ -367,9 +381,9 @@ class HAIRLOOM_PG_character(bpy.types.PropertyGroup):
         ),
         "tip_group": StringProperty(
             name="Tip Group",
-            description="Vertex group or float attribute of that mesh: it holds tips only where "
-            "this is one half or more, as on the cheeks of a head that holds sideburns. If empty, "
-            "it holds them everywhere",
+            description="Vertex group or float attribute of the mesh, which holds tips only where "
+            "this is 0.5 or more, such as the cheeks of a head that holds sideburns. If empty, it "
+            "holds tips everywhere",
             search=_tip_groups,
             search_options={"SUGGESTION"},
             update=lambda self, _context: changed.settings(self.id_data),
@@ -383,14 +397,14 @@ class HAIRLOOM_PG_character(bpy.types.PropertyGroup):
         ),
         "hidden_rays": IntProperty(
             name="Hidden Rays",
-            description="What these curves are hidden from while a render runs",
+            description="Rays from which these curves are hidden during a render",
             options={"HIDDEN"},
             override=OVERRIDABLE,
         ),
         "hide_original": BoolProperty(
             name="Hide Blender's Strands",
-            description="While previewing, show nothing of Blender's own drawing of these curves "
-            "but their outline when they are selected",
+            description="Hide Blender's own drawing of these curves during the preview, except "
+            "for their outline when selected",
             default=True,
             update=lambda self, _context: changed.display(self.id_data),
             override=OVERRIDABLE,
@@ -405,19 +419,19 @@ class HAIRLOOM_PG_scene(bpy.types.PropertyGroup):
         **_pointers("scene"),
         "use_hair_scene": BoolProperty(
             name="Hairloom Hair",
-            description="Draw hair curves by Hairloom over the pictures of this render engine, "
-            "with their shadow on meshes, by a scene and nodes of the compositor",
+            description="Draw hair curves and their shadows on meshes with Hairloom over the "
+            "pictures of this render engine, by means of a second scene and compositor nodes",
             update=lambda self, _context: changed.hair_scene(self.id_data),
         ),
         "hair_scene": PointerProperty(
             type=bpy.types.Scene,
             name="Hair Scene",
-            description="The scene that draws the hair of this one",
+            description="Scene that draws the hair of this one",
             options={"HIDDEN"},
         ),
         "is_hair_scene": BoolProperty(
             name="Is Hair Scene",
-            description="This scene draws the hair of its background set, and nothing else",
+            description="Whether this scene draws only the hair of its background set",
             options={"HIDDEN"},
         ),
     }
@@ -436,19 +450,19 @@ class HAIRLOOM_PG_view_layer(bpy.types.PropertyGroup):
 
     __annotations__ = {
         "use_alpha": _pass_of_hair(
-            "Alpha", "Deliver how much of each pixel is covered by hair that nothing hides"
+            "Alpha", "Render the fraction of each pixel covered by visible hair"
         ),
         "use_tangent": _pass_of_hair(
             "Tangent",
-            "Deliver the direction of hair from root to tip, in world space: the mean of all "
-            "strands that are seen in a pixel",
+            "Render the direction of hair from root to tip in world space, averaged over all "
+            "strands visible in a pixel",
         ),
         "use_shadow": _pass_of_hair(
-            "Shadow", "Deliver the fraction of their light that hair leaves to meshes, by colour"
+            "Shadow", "Render the fraction of light that hair lets reach meshes, by colour"
         ),
         "use_strand_index": _pass_of_hair(
             "Strand Index",
-            "Deliver the number of the nearest strand in its groom, counted from 1; 0 is no strand",
+            "Render the number of the nearest strand in its groom, counted from 1; 0 is no strand",
         ),
     }
 
@@ -483,7 +497,7 @@ def register() -> None:
         type=HAIRLOOM_PG_scene, name="Hairloom", description="Settings of this scene's pictures"
     )
     bpy.types.ViewLayer.hairloom = PointerProperty(
-        type=HAIRLOOM_PG_view_layer, name="Hairloom", description="Passes of hair in this layer"
+        type=HAIRLOOM_PG_view_layer, name="Hairloom", description="Hair passes of this view layer"
     )
 
 
