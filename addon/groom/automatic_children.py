@@ -1,9 +1,9 @@
-"""How many children a groom needs: as many as cover its body with strands as fine as hair, and none
-where its own curves do.
+"""The number of children that a groom needs: as many as cover the body with strands as fine as
+hair, and none where its own curves already do.
 
-A few strands stand for a whole head of hair; TressFX draws follow hairs beside each of them (Martin
-et al. 2014, TressFX: advanced real-time hair rendering, GPU Pro 5). Fewer still may be anything:
-guides, fly-aways, a lock that was modelled on its own. There the artist decides.
+A few strands can represent a whole head of hair; TressFX draws follow hairs beside each of them
+(Martin et al. 2014, TressFX: advanced real-time hair rendering, GPU Pro 5). Still fewer strands may
+be anything: guides, fly-aways, or a lock modelled on its own. There the artist decides.
 """
 
 from __future__ import annotations
@@ -15,23 +15,24 @@ from ..strands import StrandSet
 from .children_settings import ChildrenSettings
 from .widths import is_long, strands_for_cover
 
-#: Most strands in all: no more than a viewport draws fluently. Fewer own strands get no children.
+#: Maximum strands in all, which a viewport still draws fluently; fewer own strands than the second
+#: number get no children.
 _MAX_STRANDS, _MIN_STRANDS = 300_000, 1_000
-#: Parts of their length by which children are shorter at the most, and stray; length of a wave.
+#: Length variation, frizz and frizz length of automatic children.
 _SHORTER, _STRAY, _WAVE = 0.06, 0.01, 0.4
-#: From how far short hair takes its shape. Strands that are as their nearest curves would lie in
-#: patches, each of which answers light in its own way.
+#: Scatter of short hair. Without it strands would be shaped like their nearest curve, and lie in
+#: patches that each reflect light in their own way.
 _SCATTER = 1.0
 
 
 def are_few(own: StrandSet) -> bool:
-    """Whether the strands may be anything, and more of them would be seen."""
+    """Whether the strands are too few to tell what they are, and to cover the body."""
     return own.strand_count < _MIN_STRANDS and strands_for_cover(own) > 1.0
 
 
 def automatic(own: StrandSet, settings: ChildrenSettings) -> tuple[ChildrenSettings, float]:
-    """Settings with their number and shape found from the artist's own strands, and how many
-    strands are drawn for each of those: 1 where these are enough, or too few to tell.
+    """Settings with the number and shape of children found from the artist's own strands; and how
+    many strands are drawn for each of these: 1 where they are enough, or too few to tell.
     """
     count = own.strand_count
     if count < _MIN_STRANDS:

@@ -1,17 +1,17 @@
-"""Roots spread over a surface like blue noise, so that every beginning of them is spread as well.
+"""Roots spread over a surface as blue noise, in an order of which every prefix is spread as well.
 
 Darts are thrown at the surface in levels. A dart stays as a root if no root so far is nearer than
 the level's radius (dart throwing: Cook 1986, ACM Trans. Graph. 5, 51); the radius shrinks from
 level to level, so that the roots fill up evenly at any count (McCool and Fiume 1992, Hierarchical
 Poisson disk sampling distributions). Where hair is to grow half as densely the radius is longer by
-the root of two. Darts, levels and batches never depend on how many roots are asked for.
+the root of two. Darts, levels and batches do not depend on the number of roots that is requested.
 
-Each triangle gets darts of its own, by its own random numbers. So a triangle that is split, comes
-or goes changes the roots around it, and rounding, which differs where a scene has another size,
-changes hardly any: hair thrown again all over would be another groom.
+Each triangle gets its own darts, from its own random numbers. So a triangle that is split, added or
+removed changes only the roots around it, and rounding, which differs with the size of a scene,
+changes hardly any. Otherwise each of these would give another groom.
 
-Limitations: distances are straight ones, not along the surface, so two sheets nearer to each other
-than their roots share the room.
+Limitation: distances are straight, not along the surface, so two sheets that are nearer to each
+other than their roots share the space for roots.
 """
 
 from __future__ import annotations
@@ -28,21 +28,21 @@ from .counter_random import named, uniform
 from .dart_throwing import SampleCells, Samples, first_come
 from .triangle_subdivision import Pieces
 
-#: Roots of the first level; each level is to have more by the next factor.
+#: Roots of the first level, and the factor by which each level has more than the one before.
 _FIRST_COUNT, _GROWTH = 8.0, 2.0**0.5
-#: Disks of random darts fill a plane when area / radius^2 x this many lie on it: 0.547 of the area
-#: is covered by those of half the radius (Feder 1980), 0.547 x 4 / pi.
+#: Random darts fill a plane when there are this many x area / radius^2 of them: disks of half the
+#: radius then cover 0.547 of the area (Feder 1980), and 0.547 x 4 / pi is this.
 _PACKING = 0.697
-#: Darts of a level as a factor of the roots it is to have, and the batches they come in.
+#: Darts of a level for each root that it is to have, and the number of batches they come in.
 _SAMPLES, _BATCHES = 3.0, 3
-#: A level that gets less than this part of its roots shows that the surface is full, unless it is
-#: one of the first, where chance could show the same.
+#: The surface is full if a level gets less than this fraction of its roots, and is to have at least
+#: this many, so that it is not chance.
 _FULL, _FIRST_SURE = 0.02, 500.0
-#: Where hair grows more thinly than this part of the densest place, distances grow no more.
+#: Densities below this fraction of the highest one count as this, which limits distances.
 _THINNEST = 2.0**-12
-#: A thread has about this many darts at the least.
+#: A thread gets at least about this many darts.
 _OF_THREAD = 4096
-#: Plain roots drawn at once where the surface is full.
+#: Plain random roots drawn at once when the surface is full.
 _PLAIN = 65_536
 
 
@@ -52,7 +52,7 @@ def spread_roots(pieces: Pieces, count: int, seed: int, whole: Pieces | None = N
     The roots of a smaller count are exactly the first ones of a larger count, for the same seed.
 
     Args:
-        whole: the surface of which `pieces` are the part where roots are wanted; None: all of it.
+        whole: the surface that `pieces` are a part of; None: they are all of it.
 
     Raises:
         HairloomError: there is no area on which hair may grow.
@@ -72,7 +72,7 @@ def spread_roots(pieces: Pieces, count: int, seed: int, whole: Pieces | None = N
 
 
 def require_area(mass: Floats) -> None:
-    """Raise if there is no area x density in this mass of any parts."""
+    """Raise if this mass, the area x density of each part, is 0 everywhere."""
     if not mass.sum() > 0.0:
         raise HairloomError(
             "there is no area on which hair may grow",
@@ -84,10 +84,10 @@ def require_area(mass: Floats) -> None:
 @dataclass(frozen=True)
 class _Target:
     """corners: (piece_count, 3, 3) float64 [m], from the middle of the pieces.
-    density: (piece_count, 3) at the corners, 1 at the most on the whole surface.
+    density: (piece_count, 3) at the corners, scaled to a maximum of 1 on the whole surface.
     mass: (piece_count,) area x density [m^2].
-    part: how much of the whole surface's mass the pieces have.
-    key: (piece_count,) what their random numbers depend on.
+    part: the fraction of the whole surface's mass that the pieces have.
+    key: (piece_count,) keys of their random numbers.
     """
 
     corners: Floats
@@ -108,15 +108,16 @@ class _Target:
 
     @property
     def whole_mass(self) -> float:
-        """Of the whole surface [m^2]: hardly changed by which pieces are asked for."""
+        """The mass of the whole surface [m^2], hardly changed by the choice of pieces."""
         return float(self.mass.sum()) / self.part
 
     def samples(self, count: float, stream: Ints) -> Samples:
-        """Random points by area x density: `count` on the whole surface; see `_shuffled`.
+        """Random points by area x density, `count` on the whole surface, in the pieces' order.
 
-        A density linear between corners is the sum of three that fall from 1 at a corner to 0;
-        points of such a one are spacings of three random cuts, two of them joined
-        (Devroye 1986, chapter V.2: Dirichlet with 2, 1, 1).
+        A density that is linear between corners is a sum of three, each of which falls from a
+        corner to 0. The barycentric coordinates of a random point of one of these are the spacings
+        of three random cuts, two spacings joined (Devroye 1986, chapter V.2: Dirichlet with 2, 1,
+        1).
         """
         least = int(_OF_THREAD * len(self.mass) / max(count * self.part, 1.0)) + 1
         parts = even_parts(len(self.mass), least)
@@ -124,7 +125,7 @@ class _Target:
         return functools.reduce(Samples.and_also, found)
 
     def _samples(self, count: float, stream: Ints, some: slice) -> Samples:
-        """Those on some of the pieces."""
+        """`samples` on some of the pieces."""
         piece_key = named(self.key[some], stream)
         wanted = self.mass[some] * (count / self.whole_mass)
         counts = np.floor(wanted + uniform(piece_key, 0)).astype(np.int64)
@@ -148,14 +149,15 @@ class _Target:
 
 
 def _shuffled(samples: Samples) -> Samples:
-    """In random order, each at its own place among others."""
+    """Samples in random order, which depends on the key of each alone."""
     return samples.take(np.argsort(uniform(samples.key, 4)))
 
 
 def _filled(
     target: _Target, roots: Samples, level: int, seed: int, count: int
 ) -> tuple[Samples, bool]:
-    """The roots and those of one more level, until there are `count`; and whether it is full."""
+    """The roots with those of one more level, until there are `count`; and whether the surface is
+    full."""
     wanted = _FIRST_COUNT * _GROWTH**level
     radius = float(np.sqrt(_PACKING * target.whole_mass / wanted))
     before = len(roots)

@@ -1,10 +1,10 @@
-"""Clumps of children: those that grew later draw together around some that grew earlier.
+"""Clumps of children: later children are drawn towards some of the earlier ones.
 
-Children come in an order of which every beginning is spread evenly, so the first of them are the
-middles of clumps. The first 4,096 children have one middle for each `clump_size` of them; whenever
-the number of children doubles, so does that of the middles: the former ones and as many
-of the children since. So a clump of few strands becomes a clump of clumps as strands are added, its
-strands stay as many on average, and no child ever changes its clump.
+Every prefix of the children's order is spread evenly, so the first ones are the middles of clumps.
+The first 4,096 children have one middle for every `clump_size` of them. Whenever the number of
+children doubles, so does that of middles: the former ones, and as many of the children since. So as
+strands are added, a clump becomes a clump of clumps, the average size of clumps stays, and no child
+ever changes its clump.
 """
 
 from __future__ import annotations
@@ -23,18 +23,18 @@ from .weights import by_group, directions, likeness, nearest_before
 
 #: Children of the first level.
 _FIRST_LEVEL = 4096
-#: Middles that are looked at for each child; those that go elsewhere drop out.
+#: Nearest middles that are considered for each child; those of another direction drop out.
 _CANDIDATES = 6
-#: How far a middle may be, in distances from one middle to the next.
+#: How far away a middle may be, in distances from one middle to the next.
 _REACH = 3.0
 _CHUNK = 2048
 
 
 @dataclass(frozen=True, eq=False)
 class Clumps:
-    """Which child draws which, and how far, as it was decided when they grew.
+    """The child towards which each child is drawn, and how far, as decided when they grew.
 
-    middle: (child_count,), itself where nothing draws it. strength: (child_count,) 0 to 1.
+    middle: (child_count,), a child's own index if it is not drawn. strength: (child_count,) 0 to 1.
     """
 
     middle: Ints
@@ -70,11 +70,11 @@ class Clumps:
         near: Ints,
         partings: Partings | None,
     ) -> Clumps:
-        """And more children (n,), which follow in number: each in the clump of the nearest child
-        that is drawn by one, of its group and on its side of partings.
+        """The clumps with n more children, numbered after the others. Each joins the clump of the
+        nearest child that is drawn, of its group and on its side of partings.
 
         Args:
-            near: (m,) numbers of the children that may be their neighbours.
+            near: (m,) indices of the children that may be their neighbours.
         """
         count = len(self.middle)
         middle, strength = count + np.arange(len(root)), np.zeros(len(root))
@@ -106,9 +106,9 @@ def clump(
     Args:
         grid: (child_count, cv_count, 3) float32 [m], in the order in which they grew.
         group: (child_count,).
-        painted: (child_count,) by which the setting is multiplied.
+        painted: (child_count,) factor on the setting.
         partings: no clump has strands on both sides of these.
-        kept: of the children that were drawn last.
+        kept: results of the last call.
     """
     clumps = Clumps(np.arange(len(grid)), np.zeros(len(grid)))
     if not settings.clump or settings.clump_size == 1:
@@ -136,12 +136,12 @@ def clump(
 def clump_again(
     grid: Floats, number: Ints, clumps: Clumps, settings: ChildrenSettings, painted: Floats
 ) -> None:
-    """`clump` of some children, in place, by the middles that they had.
+    """`clump` for some of the children, in place, with the middles that they had.
 
     Args:
-        grid: (n, cv_count, 3) float32 [m]. number: (n,) ascending, which children these are; with
-            all their middles.
-        painted: (n,) by which the setting is multiplied.
+        grid: (n, cv_count, 3) float32 [m]. number: (n,) ascending, the indices of these children,
+            which include all their middles.
+        painted: (n,) factor on the setting.
     """
     fraction = _fraction(settings, grid.shape[1])
     for first, last in _levels(int(number.max(initial=-1)) + 1):
@@ -153,7 +153,7 @@ def clump_again(
 
 
 def _levels(count: int) -> Iterator[tuple[int, int]]:
-    """Children that grew at each level: the first of them, and the first of the next level."""
+    """The first child of each level, and the first of the next level."""
     first, last = 0, _FIRST_LEVEL
     while first < count:
         yield first, last

@@ -16,40 +16,40 @@ from .dart_throwing import Samples
 from .grown import checked_weights
 from .triangle_subdivision import Pieces
 
-#: How far from its nearest guide a root may be that guides surround, in their spacings there.
+#: Maximum distance of a root from its nearest guide where guides surround it, in guide spacings.
 _REACH = 1.75
-#: How far one may be that guides do not surround: the hair ends a little outside of its guides.
+#: The same where guides do not surround it: the hair ends a little outside of its guides.
 _MARGIN = 0.4
-#: How far one may be where the artist gave a density.
+#: The same where the artist has given a density.
 _REACH_WITH_DENSITY = 4.0
-#: Guides around a root, and how long the mean of the unit vectors to them is where they are all on
-#: one side: at a straight edge 2 / pi.
+#: Number of guides around a root that are examined, and the length of the mean unit vector to them
+#: above which they are all on one side; at a straight edge it is 2 / pi.
 _AROUND, _ONE_SIDED = 8, 0.6
-#: Least cosine between the surface's normals at a root and at its nearest guide: hair does not go
-#: on to the inside of a shell, or to an ear.
+#: Minimum cosine between the surface's normals at a root and at its nearest guide, so that hair
+#: does not spread to the inside of a shell, or to an ear.
 _SAME_SIDE = 0.5
-#: The spacing of guides is the distance to this neighbour, but not more than some times the usual.
+#: The spacing of guides is the distance to this neighbour, limited to a multiple of the median.
 _NEIGHBOUR, _WIDEST = 3, 4.0
-#: Spacing of guides that all start in one place, as a part of their length.
+#: Spacing of guides that all start in one place, as a fraction of their length.
 _TUFT = 0.25
-#: Triangles are split until they are smaller than this part of the reach, or so often.
+#: Triangles are split until smaller than this fraction of the reach, up to this many times.
 _FINE, _SPLITS = 0.5, 8
 #: Triangles that splitting may add.
 _MAX_PIECES = 100_000
-#: Roots tried for each one wanted, before what was found has to do.
+#: Maximum number of roots that are tried for each one wanted.
 _TRIES = 32
-#: Numbers of roots that are tried first, in each doubling.
+#: The number of roots tried first is rounded up to one of this many steps in each doubling.
 _STEPS = 4
-#: Cells of the lattice along all guides, by which the surface is looked at where hair grows.
+#: Cells along the extent of all guides, of the lattice in which triangles with hair are found.
 _CELLS = 8
-#: With less than this part of the painted area near guides, the artist gets a warning.
+#: With less than this fraction of the painted area near guides, the artist gets a warning.
 _BARE = 0.95
 
 
 @dataclass(frozen=True)
 class ChildRoots:
     """triangle: (n,). barycentric: (n, 3) float32. point: (n, 3) float32 [m], on the surface.
-    key: (n,) uint64, what is random about each child depends on.
+    key: (n,) uint64, of each child's random numbers.
     notes: what the artist should know.
     """
 
@@ -73,10 +73,10 @@ class ChildRoots:
 def child_roots(
     guides: StrandSet, surface: Surface, count: int, density: Floats | None, seed: int
 ) -> ChildRoots:
-    """Roots of children, at most `count`, those of a smaller count first.
+    """Roots of children, at most `count`; those of a smaller count come first.
 
-    Without a density they lie between guides, or beside the outermost by less than half of what
-    guides are apart there; with one they lie within 4 times of that.
+    Without a density they lie between guides, or outside of the outermost ones by up to 0.4 of the
+    spacing of guides there; with one they lie within 4 spacings of a guide.
 
     Raises:
         HairloomError: the surface has no area on which hair may grow, or a density that does not
@@ -97,17 +97,17 @@ def _roots_among(
     count: int,
     seed: int,
 ) -> ChildRoots:
-    """As `child_roots`, of guides that stand at these places; see `_Guided`."""
+    """`child_roots` for guides at these places; see `_Guided`."""
     guided = _Guided(place, normal, spacing, density is not None)
     mass = Pieces.of(surface, density).mass
     require_area(mass)
     is_wanted = _where_wanted(surface, density, place)
     pieces, is_near = surface.latest(_near_guides, *guided.arguments, is_wanted)
     mass_near = float(pieces.with_density(surface, density).mass[is_near].sum())
-    # as many as there would be at the peak everywhere
+    # evenly spread roots that it takes for each one that is kept
     even = _peak(density) * float(pieces.area.sum()) / max(mass_near, 1e-300)
     tried = 1.05 * count * min(_TRIES, even) + 64.0
-    # one dab of a brush mostly asks for no others
+    # rounded up, so that one dab of a brush mostly needs no other roots
     tried = 2.0 ** (np.ceil(np.log2(tried) * _STEPS) / _STEPS)
     roots = _spread(surface, guided, is_wanted, density, count, int(tried), seed)
     is_bare = density is not None and mass_near < _BARE * float(mass.sum())
@@ -120,8 +120,10 @@ def _peak(density: Floats | None) -> float:
 
 
 def _where_wanted(surface: Surface, density: Floats | None, place: Floats) -> Bools:
-    """Triangles (triangle_count,) in cells of a lattice in which hair grows anywhere: a brush at
-    the edge of the hair mostly paints no other cells."""
+    """Triangles (triangle_count,) in those cells of a lattice in which hair grows anywhere.
+
+    By cells, since a brush at the edge of the hair mostly stays within them.
+    """
     if density is None:
         return np.ones(len(surface.triangles), bool)
     grows = (density[surface.triangles] > 0.0).any(axis=1)
@@ -134,12 +136,12 @@ def _where_wanted(surface: Surface, density: Floats | None, place: Floats) -> Bo
 
 @dataclass(frozen=True)
 class _Guided:
-    """Where guides are: what is among them, and what is not.
+    """The places of guides, which decide what is among them.
 
     place: (place_count, 3) float64 [m], where guides are held, each place once.
     normal: (place_count, 3) of the surface there.
     spacing: (place_count,) how far others are from it [m], never 0.
-    is_painted: whether a density says where children grow, and guides only how far at the most.
+    is_painted: whether a density decides where children grow, and guides only how far away.
     """
 
     place: Floats
@@ -193,8 +195,8 @@ def _near_guides(
     is_painted: bool,
     is_wanted: Bools,
 ) -> tuple[Pieces, Bools]:
-    """What may be near guides of some triangles, large ones split so that little else comes with
-    it; and whether its middle is.
+    """The parts of some triangles that may be near guides, with large triangles split to leave out
+    the rest; and whether the middle of each part is near guides.
 
     Roots that are thrown away cost as much as others, and guides may stand on a small part of a
     large mesh, or of a large triangle.
@@ -230,14 +232,13 @@ def _spread(
 ) -> Samples:
     """Roots near guides, at most `count`, on triangles of the surface.
 
-    Of roots that are spread evenly, every beginning is. So where hair is to grow half as densely,
-    the first half of those elsewhere is enough: the numbers of roots divided by the density at them
-    are the order in which they come. What is painted changes no numbers, so that all those stay at
-    which nothing was painted.
+    Every prefix of evenly spread roots is spread evenly. So where hair is to grow half as densely,
+    the first half of the roots is enough: roots come in the order of their number divided by the
+    density at them. Painting changes no numbers, so roots stay wherever nothing was painted.
 
     Args:
-        is_wanted: triangles, all those on which hair grows among them.
-        tried: how many roots may be enough to find them; more are tried where not.
+        is_wanted: (triangle_count,), at least all triangles on which hair grows.
+        tried: how many roots to try first; this is doubled while they are not enough.
     """
     most = _TRIES * max(count, 1000)
     while True:
@@ -267,8 +268,8 @@ def _even_roots(
     tried: int,
     seed: int,
 ) -> tuple[Samples, Ints]:
-    """Of roots spread evenly over some triangles of a surface, `tried` of them, those near guides,
-    on triangles of the surface, and their numbers (n,).
+    """The roots near guides among `tried` roots spread evenly over some triangles of a surface, on
+    triangles of the whole surface; and their numbers among those tried, (n,).
     """
     guided = _Guided(place, normal, spacing, is_painted)
     pieces, _ = surface.latest(_near_guides, *guided.arguments, is_wanted)
@@ -284,7 +285,7 @@ def _even_roots(
 
 
 def _on_surface(surface: Surface, roots: Samples, notes: tuple[str, ...]) -> ChildRoots:
-    """The roots exactly where `roots.root_frames` will find them."""
+    """The roots, placed exactly where `roots.root_frames` will find them."""
     kept = roots.barycentric.astype(np.float32)
     a, b, c = np.moveaxis(surface.corners[roots.triangle].astype(np.float64), 1, 0)
     point = a + kept[:, 1:2] * (b - a) + kept[:, 2:3] * (c - a)

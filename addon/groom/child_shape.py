@@ -19,20 +19,20 @@ from .weights import GuideWeights
 _TURN = 2.0 * np.pi
 #: Children shaped at once, so that they stay in the processor's cache.
 _CHUNK = 2048
-#: Segments of a strand in one wave of frizz, at least: shorter ones it could not show.
+#: Minimum segments of a strand in one wave of frizz: it cannot show shorter waves.
 _SEGMENTS_PER_WAVE = 3.0
-#: Of its length a child keeps this much, whatever is painted: what has none has no direction.
+#: A child keeps at least this fraction of its length: without length it has no direction.
 _SHORTEST = 0.001
-#: Random numbers of a child's own, beside that of its place (`children`).
+#: Streams of a child's random numbers, beside that of its place (`children`).
 _LENGTH, _WAVES = 2, 3
-#: Those up to 4 have part in where children grow, too: fly-aways would be in patches by these.
+#: Streams up to 4 also decide where children grow; by these fly-aways would come in patches.
 _STRAYS, _STRAY_WAVES, _CURLS, _BABIES, _BABY_LENGTHS = 5, 6, 7, 8, 9
-#: Parts of the length of others that baby hair has.
+#: Length of the shortest and the longest baby hair over that of other children.
 _SHORTEST_BABY, _LONGEST_BABY = 0.04, 0.3
-#: How far fly-aways turn from their path at their tips, as a tangent: of the calmest and the
-#: wildest; and waves along one of them, which is as low as stray hair's are.
+#: How far the calmest and the wildest fly-aways turn from their path at their tips, as a tangent;
+#: and the number of waves along one, as few as in real stray hair.
 _CALM, _WILD, _STRAY_TURNS = 0.2, 0.55, 0.8
-#: Points of a turn of a curl, which keep its shape, and fewest of one, which show that it turns.
+#: Points in a turn of a curl that keep its shape, and the fewest that show that it turns.
 _POINTS_PER_TURN, _FEWEST_PER_TURN = 24, 6
 
 
@@ -58,10 +58,10 @@ def mixed(root: Floats, guide_grid: Floats, weights: GuideWeights) -> Floats:
 
 
 def babies(key: Ints, settings: ChildrenSettings, border: Floats) -> Bools:
-    """Which children are baby hair, (child_count,): more of them than before are those and others.
+    """Which children are baby hair, (child_count,); raising the setting only adds to them.
 
     Args:
-        key: (child_count,) what is random about each depends on.
+        key: (child_count,) of their random numbers.
         border: (child_count,) how near each is to where the hair ends, 0 to 1.
     """
     return np.asarray(uniform(key, _BABIES) < settings.baby_hair * border**2)
@@ -74,8 +74,8 @@ def shorten(
 
     Args:
         grid: (child_count, cv_count, 3) float32 [m].
-        key: (child_count,) what is random about each depends on.
-        painted: (child_count,) by which lengths are multiplied.
+        key: (child_count,) of their random numbers.
+        painted: (child_count,) factor on lengths.
         is_baby: (child_count,) see `babies`.
     """
     whole = settings.length * painted
@@ -90,7 +90,7 @@ def shorten(
 
 
 def _cut(grid: Floats, kept: Floats) -> Floats:
-    """Strands (n, cv_count, 3) cut to this part of their length, (n,)."""
+    """Strands (n, cv_count, 3) cut to this fraction of their length, (n,)."""
     reached = arc_length(grid)
     wanted = reached * kept[:, None]
     offsets = np.arange(len(grid) + 1) * grid.shape[1]
@@ -109,13 +109,13 @@ def frizz(
     """Let each strand stray from its path in waves, in place; roots stay.
 
     Two waves across each other, with each child's own direction, phase and pitch, and together no
-    further than `settings.frizz` says.
+    further than `settings.frizz`.
 
     Args:
         grid: (child_count, cv_count, 3) float32 [m].
-        key: (child_count,) what is random about each depends on.
-        size: the median length of the guides [m], in which frizz is given.
-        painted: (child_count,) by which frizz is multiplied.
+        key: (child_count,) of their random numbers.
+        size: the median length of the guides [m], of which frizz is a fraction.
+        painted: (child_count,) factor on frizz.
     """
     if not settings.frizz:
         return
@@ -140,16 +140,16 @@ def frizz(
 def stray(
     grid: Floats, key: Ints, settings: ChildrenSettings, painted: Floats, is_baby: Bools
 ) -> None:
-    """Let some strands wander off their path, in place, and all baby hair as the calmest of them;
+    """Let fly-aways wander off their path, in place, and all baby hair like the calmest of them;
     roots and lengths stay.
 
     Each segment turns from its direction towards a vector across it that wanders slowly along the
-    strand and grows to its tip. More fly-aways are those of fewer and others.
+    strand and grows towards its tip. Raising the setting only adds to the fly-aways.
 
     Args:
         grid: (child_count, cv_count, 3) float32 [m].
-        key: (child_count,) what is random about each depends on.
-        painted: (child_count,) by which their number is multiplied.
+        key: (child_count,) of their random numbers.
+        painted: (child_count,) factor on the fraction of fly-aways.
         is_baby: (child_count,) see `babies`.
     """
     if not settings.fly_aways and not is_baby.any():
@@ -189,17 +189,16 @@ def curled(
 ) -> Floats:
     """Strands that wind around their paths as helices, of `count` points each; roots stay.
 
-    The point at arc length s of the path goes aside by r (cos a e1 + sin a e2), a = 2 pi s / length
-    of a turn, where e1 and e2 are frames that do not twist along the path. Points lie outside of
-    the helix by as much as keeps its length: r is multiplied by (d / 2) / sin(d / 2), where d is
+    The point at arc length s of the path is displaced by r (cos a e1 + sin a e2) with a = 2 pi s /
+    length of a turn, where e1 and e2 span frames that do not twist along the path. To keep the
+    helix's length, points lie outside of it: r is multiplied by (d / 2) / sin(d / 2), where d is
     the angle from one point to the next.
 
     Args:
         grid: (child_count, cv_count, 3) float32 [m].
-        lock: (child_count,) what is random about the curls of each depends on: those of one number
-            wind alike.
-        size: the median length of the guides [m], in which curls are given.
-        painted: (child_count,) by which the radius is multiplied.
+        lock: (child_count,) keys of the random numbers of curls: children of one key wind alike.
+        size: the median length of the guides [m], of which curls' sizes are fractions.
+        painted: (child_count,) factor on the radius.
     """
     result = np.empty((len(grid), count, 3), np.float32)
     radius = settings.curl * size * along(settings.curl_along, np.linspace(0.0, 1.0, count))
@@ -228,7 +227,7 @@ def curled(
 
 
 def arc_length(grid: Floats) -> Floats:
-    """From the root to each CV, (n, cv_count) [m]."""
+    """Arc length from the root to each CV, (n, cv_count) [m]."""
     reached = np.zeros(grid.shape[:2])
     step = np.diff(grid, axis=1)
     squared = step[..., 0] ** 2 + step[..., 1] ** 2 + step[..., 2] ** 2

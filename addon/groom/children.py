@@ -3,9 +3,9 @@
 Tariq (2008, Real-time hair rendering on the GPU) has two patterns: multi strand, mixed from three
 guides (Nguyen and Donnelly 2005, GPU Gems 2, chapter 23), and single strand, around one guide.
 
-Children are progressive: those of a smaller number are exactly the first of a larger number. So
-roots come in their own order (`blue_noise`), what is random about a child depends on the name of
-its root, and nothing is measured over all children.
+Children are progressive: those of a smaller number are exactly the first of a larger number. For
+this, roots come in a fixed order (`blue_noise`), a child's random numbers depend on the key of its
+root alone, and nothing is measured over all children.
 """
 
 from __future__ import annotations
@@ -32,15 +32,16 @@ from .masks import NO_MASKS, Factors, Masks, Places
 from .partings import Partings
 from .weights import GUIDES_PER_STRAND, GuideWeights, child_weights, nearest_before
 
-#: Points that children have, all of them together, and each one at least.
+#: Maximum points of all children together, and minimum points of each.
 CHILD_POINTS, FEWEST_CHILD_POINTS = 12_000_000, 16
-#: Guides are as far apart as this neighbour is, in the middle.
+#: The spacing of guides is the median distance to this neighbour.
 _NEIGHBOUR = 3
-#: Random numbers of where a child takes its shape from; those of its shape are in `child_shape`.
+#: Stream of random numbers of the place that a child takes its shape from; `child_shape` has those
+#: of its shape.
 _PLACE = 0
-#: How wide baby hair is, in terms of the hair around it; and the finest that may be painted.
+#: Width of baby hair over that of the hair around it, and the lowest factor that may be painted.
 _BABY_WIDTH, _FINEST = 0.5, 0.001
-#: What is painted and gives children their shapes, after clumps.
+#: Painted parameters that shape children after clumping.
 _SHAPING = ("length", "fly_aways", "curl", "frizz")
 
 
@@ -60,13 +61,13 @@ class Children:
 
 @dataclass(frozen=True, eq=False)
 class Growth:
-    """What children keep when their guides are combed; their shapes follow from it and from these.
+    """What children keep when their guides are combed; with the guides it gives their shapes.
 
-    root: (child_count, 3) float32 [m]. key: (child_count,) what is random about each depends on.
+    root: (child_count, 3) float32 [m]. key: (child_count,) of their random numbers.
     clumps: as they were found. size: the median length of the guides [m].
-    partings: which they grew beside; None: none.
+    partings: across which no child is mixed; None: none.
     cv_count: of the children, more than their guides' where they curl.
-    masks, factors: what was painted, and what that is at each child.
+    masks, factors: what was painted, and its value at each child.
     guide_border, border: (guide_count,) and (child_count,), how near each is to where guides end.
     """
 
@@ -84,7 +85,7 @@ class Growth:
     border: Floats
 
     def varied(self, grid: Floats, chosen: Ints) -> Floats:
-        """With what is each child's own, (n, cv_count, 3) float32 [m].
+        """Children with their own lengths, strays, curls and frizz, (n, cv_count, 3) float32 [m].
 
         Args:
             grid: (n, guides' cv_count, 3) float32 [m], clumped, which is changed. chosen: (n,).
@@ -101,17 +102,17 @@ class Growth:
 
     @property
     def fineness(self) -> Floats:
-        """How wide each is in terms of the hair around it, (child_count,)."""
+        """The width of each child over that of the hair around it, (child_count,)."""
         painted = np.maximum(self.factors["width"], _FINEST).astype(np.float32)
         return np.where(self.is_baby, np.float32(_BABY_WIDTH), np.float32(1.0)) * painted
 
     @property
     def is_baby(self) -> Bools:
-        """Which are baby hair, (child_count,)."""
+        """Which children are baby hair, (child_count,)."""
         return babies(self.key, self.settings, self.border)
 
     def touched(self, guides: Bools) -> Bools:
-        """Children (child_count,) whose shapes these guides (guide_count,) have a part in."""
+        """Children (child_count,) whose shapes depend on these guides (guide_count,)."""
         weights = self.weights
         is_mixed = (guides[weights.guide] & (weights.weight > 0.0)).any(axis=1)
         return self.clumps.with_members(is_mixed)
@@ -132,12 +133,12 @@ class Growth:
     def with_more(
         self, roots: ChildRoots, surface: Surface, guides: StrandSet, beside: Ints
     ) -> Growth:
-        """And children at other roots, which follow in number: they mix guides as all do, and join
-        the clumps of their neighbours.
+        """The growth with children at more roots, numbered after the others. They mix guides as
+        all do, and join the clumps of their neighbours.
 
         Args:
-            guides: between which these have grown.
-            beside: which children are neighbours, if they are drawn by clumps.
+            guides: the ones that the children grow between.
+            beside: indices of the children that may be their neighbours in clumps.
         """
         weights = _weights(roots, guides, self.settings, self.partings, self.masks, NOTHING_KEPT)
         more = self.clumps.joined(
@@ -173,16 +174,17 @@ def make_children(
     place: str,
     kept: Kept = NOTHING_KEPT,
 ) -> Children:
-    """Strands between guides or around them, at rest; none of them crosses a group or a parting.
+    """Strands between guides or around them, at rest; none mixes guides of two groups, or across a
+    parting.
 
     Args:
         guides: of one CV count, bound, at rest in the surface's space.
         density: (vertex_count,), how densely children grow, not negative; None: wherever guides
             are near.
         partings: lines that the artist has drawn; None: there are none.
-        masks: what the artist has painted; of strands, by the guides.
+        masks: what the artist has painted; masks of strands are those of the guides.
         place: names the groom in error messages.
-        kept: of the children that were made last.
+        kept: results of the last call.
 
     Raises:
         HairloomError: there are no guides, the surface has no area on which hair may grow, or the
@@ -241,13 +243,13 @@ def make_children(
 
 
 def _room(settings: ChildrenSettings) -> int:
-    """Points that each child may have at the most."""
+    """The maximum number of points of each child."""
     room = max(CHILD_POINTS // max(settings.strand_count, 1), FEWEST_CHILD_POINTS)
     return min(room, MAX_POINTS)
 
 
 def _by_points(values: Floats, count: int) -> Floats:
-    """Values of CVs (n, cv_count, ...) at `count` points each, which lie evenly between these."""
+    """Values of CVs (n, cv_count, ...) at `count` points, spaced evenly from first to last CV."""
     if values.shape[1] == count:
         return values
     left, part = even_places(values.shape[1], count)
@@ -289,7 +291,7 @@ def _places(roots: ChildRoots, weights: GuideWeights) -> Places:
 def _scattered(
     roots: ChildRoots, guide_root: Floats, settings: ChildrenSettings, masks: Masks
 ) -> Floats:
-    """Where children take their shapes from, (child_count, 3) [m]: from near them, at random."""
+    """The places that children take their shapes from, (child_count, 3) [m]: random ones nearby."""
     if not settings.scatter or len(guide_root) < 2:
         return roots.point
     _, gap = nearest_points(guide_root, guide_root, min(_NEIGHBOUR + 1, len(guide_root)))
@@ -304,13 +306,13 @@ def _scattered(
 
 
 def _border(guide_border: Floats, weights: GuideWeights) -> Floats:
-    """How near children are to where their guides end, as these are, (child_count,) float32."""
+    """How near children are to the border, mixed from their guides, (child_count,) float32."""
     border: Floats = (guide_border[weights.guide] * weights.weight).sum(axis=1, dtype=np.float32)
     return border
 
 
 def _radius(guides: StrandSet, growth: Growth) -> Floats:
-    """Mixed as the points are, (child_count, guides' cv_count) [m]; baby hair is finer."""
+    """Radii, mixed as points are, (child_count, guides' cv_count) [m]; baby hair is finer."""
     settings, weights = growth.settings, growth.weights
     own = guides.radius.reshape(guides.strand_count, -1) * np.float32(settings.width)
     total = np.zeros((len(weights.guide), own.shape[1]), np.float32)
@@ -320,7 +322,7 @@ def _radius(guides: StrandSet, growth: Growth) -> Floats:
 
 
 def _color(guides: StrandSet, weights: GuideWeights, cv_count: int) -> Floats | None:
-    """Mixed as the points are, of the guides that have a colour, (child_count x cv_count, 3)."""
+    """Colours, mixed as points are from guides that have one, (child_count x cv_count, 3)."""
     if guides.color is None:
         return None
     own = guides.color.reshape(guides.strand_count, -1, 3)

@@ -1,4 +1,4 @@
-"""What the artist sets about children: the strands that are grown between guides."""
+"""Settings of children: strands that are grown between guides."""
 
 from __future__ import annotations
 

@@ -8,16 +8,16 @@ from ..arrays import Floats, Ints
 from .settings import GrowSettings
 
 _TURN = 2.0 * np.pi
-#: A clump draws no strand aside by more than this fraction of the way from its root.
+#: A clump draws no CV aside by more than this fraction of the arc length from its root.
 _MAX_PULL = 0.25
-#: Strands given to their clump at once, to bound the memory.
+#: Strands assigned to clumps at once, to bound the memory.
 _CHUNK = 1024
 
 
 def assign_clumps(
     root: Floats, settings: GrowSettings, random: np.random.Generator, side: Ints | None = None
 ) -> Ints:
-    """For each strand the strand in the middle of its clump, (strand_count,), itself included.
+    """The strand in the middle of each strand's clump, (strand_count,); for a middle, itself.
 
     Args:
         side: (strand_count,) of the parting, -1 or 1; a clump keeps to the side of its middle, or
@@ -64,7 +64,7 @@ def style_clumps(
 def _swing(turns: Floats, owner: Ints, random: np.random.Generator) -> Floats:
     """Displacements of about unit length that all strands of one owner share, (n, cv_count, 3).
 
-    Two waves across each other, each with a phase, direction and pitch of its owner's own.
+    Two waves across each other, each with the phase, direction and pitch of its owner.
     """
     total = np.zeros((*turns.shape, 3))
     for _ in range(2):
@@ -77,14 +77,14 @@ def _swing(turns: Floats, owner: Ints, random: np.random.Generator) -> Floats:
 
 
 def _limited(offset: Floats, longest: Floats) -> Floats:
-    """Offsets (n, cv_count, 3), those that are longer than that (n, cv_count) shortened to it."""
+    """Offsets (n, cv_count, 3), shortened to at most `longest`, (n, cv_count)."""
     length = np.linalg.norm(offset, axis=-1)
     factor = np.minimum(1.0, longest / np.maximum(length, 1e-30))
     return offset * factor[..., None]
 
 
 def _arc_length(grid: Floats) -> Floats:
-    """From the root to each CV, (strand_count, cv_count) [m]."""
+    """Arc length from the root to each CV, (strand_count, cv_count) [m]."""
     along = np.zeros(grid.shape[:2])
     along[:, 1:] = np.linalg.norm(np.diff(grid, axis=1), axis=2).cumsum(axis=1)
     return along

@@ -1,7 +1,7 @@
-"""Random numbers that depend on names alone, not on how many were drawn before.
+"""Random numbers that depend on keys alone, not on how many were drawn before.
 
-What is thrown at one triangle, and what is random about one child, stays the same whatever is added
-or goes elsewhere, and where rounding differs. Counter-based random numbers (Salmon et al. 2011,
+So the darts on one triangle and the variation of one child stay the same whatever is added or
+removed elsewhere, and however rounding differs. Counter-based random numbers (Salmon et al. 2011,
 Parallel random numbers: as easy as 1, 2, 3); the mixing is SplitMix64's (Steele, Lea and Flood
 2014, Fast splittable pseudorandom number generators).
 """
@@ -17,7 +17,7 @@ _FIRST, _SECOND = np.uint64(0xBF58476D1CE4E5B9), np.uint64(0x94D049BB133111EB)
 
 
 def named(*parts: Ints | int) -> Ints:
-    """A key (...) uint64 for what these whole numbers name together; they broadcast.
+    """A uint64 key (...) for these whole numbers together, which are broadcast.
 
     `named(named(a, b), c)` is `named(a, b, c)`.
     """
@@ -28,7 +28,7 @@ def named(*parts: Ints | int) -> Ints:
 
 
 def uniform(key: Ints, stream: int) -> Floats:
-    """A number in [0, 1) for each key (...), another for each stream."""
+    """A uniform number in [0, 1) for each key (...); streams give independent numbers."""
     found: Floats = (_mixed(_mixed(named(key, stream))) >> np.uint64(11)) * 2.0**-53
     return found
 

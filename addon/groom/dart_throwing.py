@@ -10,7 +10,7 @@ from ..arrays import Bools, Floats, Ints
 from ..strands.side_by_side import even_parts, side_by_side
 from ..strands.vectors import dot_rows
 
-#: A thread has at least this many darts.
+#: A thread gets at least this many darts.
 _OF_THREAD = 4096
 
 
@@ -18,7 +18,7 @@ _OF_THREAD = 4096
 class Samples:
     """triangle: (n,). barycentric: (n, 3). point: (n, 3) [m], from the middle of the surface.
     reach: (n,) the distance to keep, as a factor of the level's radius, 1 where hair is densest.
-    key: (n,) uint64, its name: what is random about whatever grows there depends on it.
+    key: (n,) uint64, of the random numbers of whatever grows there.
     """
 
     triangle: Ints
@@ -87,7 +87,7 @@ class SampleCells:
         np.cumsum(np.bincount(flat, minlength=buckets), out=self._start[1:])
 
     def covers(self, samples: Samples) -> Bools:
-        """Whether a point lies too near to each of the darts, (n,)."""
+        """Whether any of the points lies too near to each of these darts, (n,)."""
         parts = even_parts(len(samples), _OF_THREAD)
         if len(parts) == 1:
             return self._covers(samples)

@@ -1,7 +1,7 @@
-"""Brows and lashes on a face: short strands out of weights on the skin, each with a curve.
+"""Brows and lashes on a face: short, curved strands, placed by weights on the skin.
 
-Each hair is an arc of a circle: it leaves the skin at an angle and bends by another on its way. The
-face is upright (Z up) and looks to -Y.
+Each hair is an arc of a circle that leaves the skin at one angle and bends by another. The face is
+upright (Z up) and looks to -Y.
 """
 
 from __future__ import annotations
@@ -22,15 +22,15 @@ from .scalp import sample_roots
 from .settings import GrowSettings
 
 _UP = np.array([0.0, 0.0, 1.0])
-#: a lash's root is where the weight is highest: on the rim of the lid, not on the skin around it
+#: exponent of the lashes' weight: their roots are on the rim of the lid, not on the skin around it
 _RIM = 5.0
-#: where the weight of a brow is less than this, none grows
+#: brows do not grow where their weight is less than this
 _FAINT = 0.3
 
 
 @dataclass(frozen=True)
 class FaceHair:
-    """How many strands, and their lengths [m], which differ by up to a third."""
+    """Numbers of strands and their greatest lengths [m]; strands are up to a third shorter."""
 
     brow_count: int = 1000
     brow_length: float = 0.0075
@@ -47,7 +47,7 @@ def grow_with_face(
     weights: Mapping[str, Floats],
     length: Floats | None = None,
 ) -> StrandSet:
-    """Hair on the scalp, with brows and lashes; of sparse hair fewer of those as well.
+    """Hair on the scalp, with brows and lashes, which are fewer where the hair is sparse.
 
     Args:
         weights: (vertex_count,) each, by the names `scalp`, `brows` and `lashes`.
@@ -70,7 +70,7 @@ def grow_with_face(
 def grow_face_hair(
     surface: Surface, brows: Floats, lashes: Floats, hair: FaceHair | None = None
 ) -> StrandSet:
-    """Both, in groups of their own, so that guides on the scalp never move them.
+    """Brows and lashes, in groups of their own, so that guides on the scalp never move them.
 
     See `grow_brows` and `grow_lashes`.
     """
@@ -79,7 +79,8 @@ def grow_face_hair(
 
 
 def grow_brows(surface: Surface, density: Floats, hair: FaceHair) -> StrandSet:
-    """Brows: upwards at their inner end, then ever more outwards, and down to each other.
+    """Brows: upwards at their inner end, then ever more outwards, their upper and lower hairs
+    towards each other.
 
     Args:
         density: (vertex_count,), how densely they grow.
@@ -107,7 +108,7 @@ def grow_brows(surface: Surface, density: Floats, hair: FaceHair) -> StrandSet:
 
 
 def grow_lashes(surface: Surface, rim: Floats, hair: FaceHair) -> StrandSet:
-    """Lashes of both eyes: ahead and away from the middle of the eye, curled towards their tips.
+    """Lashes of both eyes: forwards and away from the middle of the eye, curled towards their tips.
 
     Args:
         rim: (vertex_count,), 1 on the rims of the lids, falling off around them.

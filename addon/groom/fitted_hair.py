@@ -1,4 +1,4 @@
-"""Hair of the built-in head on another one that it was fitted to."""
+"""Hair of the built-in head, moved to another head that this one was fitted to."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from ..strands.arc_length import steps
 from ..strands.closest_point import ClosestPoints, ClosestPointSearch
 from ..strands.vectors import unit
 
-#: how far from its root [m on the built-in head] a strand goes as the warp alone says
+#: distance from its root [m on the built-in head] beyond which a strand follows the warp alone
 _FADE = 0.03
-#: a triangle farther than this from the skin [m on the built-in head] is none of the head's
+#: a triangle farther than this from the skin [m on the built-in head] does not belong to the head
 _NEAR = 0.08
 
 
 @dataclass(frozen=True, eq=False)
 class FittedHair:
     """strands: bound to the other head, in its space.
-    away: (strand_count,) how far each root was from it before it was put there, in that space.
+    away: (strand_count,) how far each root was from that head before it was moved onto it.
     """
 
     strands: StrandSet
@@ -36,13 +36,13 @@ def fitted_hair(
     outside: OuterSearch,
     scale: float,
 ) -> FittedHair:
-    """Hair with its roots on the other head, which goes on as the smooth warp says.
+    """Hair with its roots on the other head, which follows the smooth warp beyond them.
 
-    So what belongs together stays together: a braid, a tail, a lock.
+    The smooth warp keeps together what belongs together: a braid, a tail, a lock.
 
     Args:
         strands: on the built-in head, in its space.
-        roots: (strand_count, 3) where they belong on the other head, in its space, about.
+        roots: (strand_count, 3) approximate places on the other head, in its space.
         scale: how much larger the other head is.
     """
     found = outside.closest(roots)
@@ -68,14 +68,14 @@ def fitted_hair(
 
 
 class OuterSearch:
-    """The closest point of the outer skin of a head, not of what lies within: sockets, the mouth,
+    """Finds closest points on the outer skin of a head, without inner parts: sockets, the mouth,
     the inner side of a shell."""
 
     def __init__(self, target: Surface, skin: Surface, scale: float) -> None:
         """
         Args:
-            skin: the built-in head's, as it is fitted to the target.
-            scale: how much larger than the built-in head they are.
+            skin: of the built-in head, fitted to the target.
+            scale: how much larger than the built-in head both are.
         """
         self.target = target
         self._triangles = np.flatnonzero(_is_outer(target, skin, _NEAR * scale))
@@ -91,7 +91,7 @@ class OuterSearch:
 
 
 def _is_outer(target: Surface, skin: Surface, near: float) -> Bools:
-    """(triangle_count,) which triangles face as the skin beside them does."""
+    """Which triangles (triangle_count,) face the same way as the skin beside them."""
     middle, facing = target.corners.mean(axis=1), target.triangle_normals()
     low, high = skin.bounds()
     is_outer = ((middle > low - near) & (middle < high + near)).all(axis=1)

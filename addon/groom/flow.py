@@ -1,8 +1,8 @@
 """Flow: hair follows strokes that are drawn on its surface.
 
-Strokes are a field of directions around them. A strand is traced through it from its root on, by
-the midpoint rule, and keeps its own directions where no stroke is near. What a stroke says is said
-relative to the surface: its direction along it, and how much it rises from it.
+Strokes give a field of directions around them. A strand is traced through this field from its root
+by the midpoint rule, and keeps its own directions where no stroke is near. A stroke's direction is
+relative to the surface: a direction along it, and how much the stroke rises from it.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ from ..strands.nearest import nearest_points
 from ..strands.vectors import dot, unit, unit_or
 from .flow_settings import FlowSettings
 
-#: Strokes are looked at in steps of at most this part of the reach.
+#: Strokes are sampled in steps of at most this fraction of the reach.
 _STEP = 1.0 / 24.0
-#: Steps of one stroke, at most: a reach of nothing would take forever.
+#: Maximum steps of one stroke, which bounds the time if the reach is tiny.
 _MAX_STEPS = 4096
-#: Surfaces that face away from each other by more than this cosine have no common direction.
+#: A stroke has no effect where the cosine between the normals of both places is below this.
 _FACING = -0.9
 
 
@@ -42,7 +42,7 @@ class _Stroke:
 
     @classmethod
     def of(cls, line: Floats, surface: Surface, step: float) -> _Stroke:
-        """A line (m, 3) from its first point to its last."""
+        """A stroke along a line (m, 3), from its first point to its last."""
         size = np.linalg.norm(np.diff(line, axis=0), axis=1)
         reached = np.concatenate([[0.0], np.cumsum(size)])
         count = int(np.clip(np.ceil(reached[-1] / step), 2, _MAX_STEPS)) + 1
@@ -67,8 +67,8 @@ class Flow:
     settings: FlowSettings
 
     def at(self, places: Floats) -> tuple[Floats, Floats, Floats]:
-        """At places (n, 3): where hair goes there, (n, 3) unit, zero where nothing says it; how far
-        it turns there, (n,) from 0 to 1; and the length of the strokes there, (n,) [m]."""
+        """At places (n, 3): the unit direction of hair, (n, 3), 0 where no stroke is near; how far
+        hair turns to it, (n,), 0 to 1; and the mean length of the strokes near, (n,) [m]."""
         aim, pull = np.zeros((len(places), 3)), np.zeros(len(places))
         length, total = np.zeros(len(places)), np.zeros(len(places))
         normal = _normals(places, self.surface)
@@ -90,7 +90,7 @@ class Flow:
         return unit(aim), self.settings.amount * pull, length
 
     def _fading(self, away: Floats) -> Floats:
-        """1 at a stroke, 0 from the reach on."""
+        """1 at a stroke, 0 beyond the reach."""
         width = max(self.settings.falloff, 1e-6)
         x = np.clip((away / self.reach - (1.0 - width)) / width, 0.0, 1.0)
         fading: Floats = 1.0 - x * x * (3.0 - 2.0 * x)
@@ -100,8 +100,8 @@ class Flow:
 def combed_along(
     strands: StrandSet, lines: tuple[Floats, ...], surface: Surface, settings: FlowSettings
 ) -> Floats:
-    """Points of strands that follow strokes, (point_count, 3) float32 [m]; what is out of reach
-    stays as it is.
+    """Points of strands that follow strokes, (point_count, 3) float32 [m]; strands out of reach
+    stay as they are.
 
     Args:
         lines: (m, 3) [m] each, from where hair comes to where it goes.
@@ -131,13 +131,17 @@ def combed_along(
 
 
 def _direction(flow: Flow, places: Floats, own: Floats) -> tuple[Floats, Bools]:
-    """Where hair goes that would go along its own directions (n, 3), and whether it is turned."""
+    """The unit direction of hair, and whether strokes turn it.
+
+    Args:
+        own: (n, 3), its direction without strokes.
+    """
     aim, pull, _ = flow.at(places)
     return unit_or((1.0 - pull)[:, None] * own + pull[:, None] * aim, own), pull > 0.0
 
 
 def _normals(points: Floats, surface: Surface) -> Floats:
-    """Of the surface at what is nearest to these points, (n, 3)."""
+    """Normals of the surface at its points closest to these, (n, 3)."""
     found = search_of(surface).closest(points)
     corners = surface.vertex_normals()[surface.triangles[found.triangle]]
     return unit(np.einsum("nk,nkj->nj", found.barycentric, corners))

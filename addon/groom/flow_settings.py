@@ -1,4 +1,4 @@
-"""What the artist sets about combing hair along strokes."""
+"""Settings of combing hair along strokes."""
 
 from __future__ import annotations
 

@@ -29,29 +29,29 @@ from .surface_points import GrowthSurface
 __all__ = ["grow", "scalp_density"]
 
 _DOWN = np.array([0.0, 0.0, -1.0])
-#: The step for which `GrowSettings.droop` says how much the hair turns [m].
+#: The length of hair that `GrowSettings.droop` refers to [m].
 _DROOP_STEP = 0.02
 #: How much the hair at the parting is combed aside, as a fraction of that at the sides; and where
 #: the parting ends, behind the cranium's middle, in units of half its depth.
 _PARTED, _CROWN = 0.5, 0.7
-#: Hair of this length grows as it will, and from that length on it is combed, in units of half the
-#: cranium's depth.
+#: Hair up to the first length is not combed, and from the second one on it is combed fully; in
+#: units of half the cranium's depth.
 _UNCOMBED, _COMBED = 0.45, 1.4
 #: The whorl in the same units, from the cranium's middle; how far its swirl reaches, and how much
 #: it turns the hair in its middle [rad], seen from above clockwise.
 _WHORL, _SWIRL_REACH, _SWIRL = (0.12, 0.55, 0.85), 0.45, np.radians(75.0)
-#: How much the direction and the lift of uncombed hair vary, of clumps and of single strands.
+#: Standard deviations in uncombed hair: of the direction, by clump and by strand, and of the lift.
 _CLUMPS_STRAY, _STRANDS_STRAY, _LIFT_VARIES = np.radians(9.0), np.radians(11.0), 0.14
-#: Hair is piled up no higher than this fraction of its length, and kept as far from the skin.
+#: Maximum height to which hair piles up, and maximum clearance, as fractions of its length.
 _MAX_PILE, _MAX_CLEARANCE = 0.12, 0.06
-#: It is as high as it will be at 1 / _RISEN of its length. Where it rose within some centimetres,
-#: hair beside the parting stood in loops before the light.
+#: Hair has its full height at 1 / _RISEN of its length. When it rose within some centimetres, hair
+#: beside the parting stood in loops against the light.
 _RISEN = 1.6
-#: Hair shorter than this turns within its own length, but is stiffer, as a shorter beam is; in
-#: units of half the cranium's depth. On the built-in head it is 5 cm.
+#: Hair shorter than this droops over shorter distances, but less than in proportion, as a shorter
+#: beam is stiffer; in units of half the cranium's depth. On the built-in head it is 5 cm.
 _STIFF = 0.48
 #: How often hair is drawn out of hollows, how far towards the middle of its neighbours each time,
-#: and how often the directions in which it goes are averaged over neighbours.
+#: and how often the normals along a strand are averaged with their neighbours.
 _PULLS, _PULL, _NORMALS_BLURRED = 40, 0.9, 6
 #: The side of the cells in which the skin is looked up, in units of half the cranium's depth.
 _CELL = 0.04
@@ -90,7 +90,7 @@ def grow(
 def _grow_combed(
     surface: Surface, settings: GrowSettings, density: Floats | None, length: Floats | None
 ) -> StrandSet:
-    """A groom on a head; the weights are checked."""
+    """`grow` on a head, with weights that have been checked."""
     random = np.random.default_rng(settings.seed)
     where = somewhere(density, length)
     triangle, barycentric = sample_roots(surface, settings.strand_count, where, random)
@@ -125,7 +125,7 @@ class _Plan:
 
     @property
     def length(self) -> Floats:
-        """Of each strand, (strand_count,) [m]."""
+        """The length of each strand, (strand_count,) [m]."""
         total: Floats = self.segment.sum(axis=1)
         return total
 
@@ -168,7 +168,7 @@ def _heights(
     """
     layer = 0.7 * random.random(len(clump))[clump] + 0.3 * random.random(len(clump))
     fraction = np.linspace(0.0, 1.0, settings.cv_count)[1:]
-    # it leaves the skin flat and rises on its way: at a parting it would stand up otherwise
+    # hair leaves the skin flat and rises farther out, or it would stand up at a parting
     rise = smooth_step(_RISEN * fraction)
     clearance = np.minimum(settings.clearance, _MAX_CLEARANCE * length)
     pile = layer * np.minimum(settings.volume, _MAX_PILE * length)
@@ -244,12 +244,13 @@ def _fallen(
 
 
 def _taut(grid: Floats, plan: _Plan) -> Floats:
-    """The strands stretched over hollows of the skin that they would follow: around an ear hair
-    bridges them. Points move away from the skin alone; lengths are left to `_laid`.
+    """The strands stretched over hollows of the skin, which hair bridges, as around an ear.
+
+    Points only move away from the skin; `_laid` restores the lengths.
     """
     grid = grid.copy()
     normal = plan.skin.nearest_normal(grid[:, 1:].reshape(-1, 3)).reshape(grid[:, 1:].shape)
-    # of a stretch of hair: the rim of an ear by itself faces along the hair that crosses it
+    # averaged along the hair: the rim of an ear by itself faces along the hair that crosses it
     for _ in range(_NORMALS_BLURRED):
         normal[:, 1:-1] = (normal[:, :-2] + normal[:, 1:-1] + normal[:, 2:]) / 3.0
     away = unit(normal[:, 1:-1])
@@ -278,7 +279,7 @@ def _laid(styled: Floats, plan: _Plan) -> Floats:
 
 
 def _turn_limited(before: Floats, direction: Floats) -> Floats:
-    """Unit directions (n, 3), those that turn too sharply from the ones before turned back."""
+    """Unit directions (n, 3), limited to a turn of _SHARPEST_TURN from the ones before."""
     cosine = np.einsum("ij,ij->i", before, direction)[:, None]
     beside = unit(direction - before * cosine)
     sharpest = before * np.cos(_SHARPEST_TURN) + beside * np.sin(_SHARPEST_TURN)

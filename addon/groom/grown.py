@@ -1,4 +1,4 @@
-"""What all ways of growing share: lengths along the strand, weights on the mesh, the strand set."""
+"""Shared by all methods of growing: segment lengths, weights on the mesh, the strand set."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def segment_fractions(cv_count: int, ratio: float) -> Floats:
 
 
 def checked_weights(weights: Floats | None, surface: Surface, name: str) -> Floats | None:
-    """Weights of the vertices, (vertex_count,) float64, those below zero raised to it.
+    """Weights of the vertices, (vertex_count,) float64, with negative ones raised to 0.
 
     Args:
         name: what they weigh, for messages.

@@ -9,19 +9,19 @@ from ..strands import StrandSet
 from ..strands.face import is_face_hair
 from .settings import GuideSettings
 
-#: Candidates a guide, at most: spreading gets no better with more, only slower.
+#: Maximum candidates per guide: with more, spreading gets no better, only slower.
 _CANDIDATES_PER_GUIDE = 100
-#: Brows and lashes hardly move: as many of them share a guide as if there were only one in this.
+#: This many brows or lashes count as one strand when guides are allotted, since they hardly move.
 _FACE_HAIR_PER_STRAND = 32
 
 
 def choose_guides(strands: StrandSet, settings: GuideSettings, kind: Ints | None = None) -> Ints:
     """Indices of the strands that become guides, (guide_count,) int64, ascending.
 
-    Each group, and each kind within it, gets guides in proportion to its size, at least one, brows
-    and lashes hardly more, and spreads them over its roots by farthest-point sampling (Gonzalez
+    Each group, and each kind within it, gets guides in proportion to its size, at least one; brows
+    and lashes hardly get more. They are spread over its roots by farthest-point sampling (Gonzalez
     1985): the next guide is the root farthest from all guides so far. The same seed gives the same
-    guides. No more guides than strands, none of none.
+    guides. There are never more guides than strands.
 
     Args:
         kind: (strand_count,) what the strands are held by, see `Holds.kinds`; None: all alike.
@@ -43,7 +43,7 @@ def choose_guides(strands: StrandSet, settings: GuideSettings, kind: Ints | None
 
 
 def grouped(group: Ints, kind: Ints | None) -> Ints:
-    """Groups that are of one kind each, (strand_count,): of these, strands share guides."""
+    """Groups split by kind, (strand_count,); only strands of one such group share guides."""
     if kind is None or not kind.any():
         return group
     _, both = np.unique(np.stack([group, kind], axis=1), axis=0, return_inverse=True)
@@ -53,14 +53,14 @@ def grouped(group: Ints, kind: Ints | None) -> Ints:
 def group_fractions(sizes: Ints, guide_count: int) -> Ints:
     """How many guides each group gets, (group_count,): one each, then by largest remainder.
 
-    Never more than the group's size; in total guide_count, or as many as there are strands, or
-    as many as there are groups.
+    Never more than the group's size; in total guide_count, but at most the number of strands and at
+    least the number of groups.
     """
     total, group_count = int(sizes.sum()), len(sizes)
     spare = min(guide_count, total) - group_count
     if spare <= 0 or total == group_count:
         return np.ones(group_count, np.int64)
-    # after the first guide of each group; then no share can pass its group's size
+    # quotas beyond the first guide of each group, so that none can exceed its group's size
     quota = spare * (sizes - 1) / (total - group_count)
     fraction = np.floor(quota).astype(np.int64)
     left_over = spare - int(fraction.sum())

@@ -1,4 +1,4 @@
-"""Where hair ends: at its border the roots around a root all lie to one side of it."""
+"""The border of the hair, where the roots around a root all lie to one side of it."""
 
 from __future__ import annotations
 
@@ -7,17 +7,17 @@ import numpy as np
 from ..arrays import Floats, Ints
 from ..strands.kept import NOTHING_KEPT, Kept
 
-#: Roots around one that are looked at. Of fewer, the mean strays as far by chance.
+#: Number of neighbours that are examined; the mean of fewer strays as far by chance.
 AROUND = 24
-#: How far the mean of what lies around a root is from it, in terms of how far that reaches: among
-#: evenly spread roots by chance, and on a straight border 4 / (3 pi), as the middle of a half disk.
+#: Distance from a root to the mean of its neighbours, over that to the farthest of them: by chance
+#: among evenly spread roots, and on a straight border, where it is the centroid of a half disk.
 _BY_CHANCE, _ON_BORDER = 0.2, 4.0 / (3.0 * np.pi)
 
 
 def nearness_to_border(
     places: Floats, among: Floats, kept: Kept = NOTHING_KEPT, name: str = ""
 ) -> Floats:
-    """How near places among roots are to where these end, (n,): 0 inside, and 1 on the border.
+    """How near places among roots are to the roots' border, (n,): 0 inside, and 1 on the border.
 
     Args:
         places: (n, 3) [m]. among: (root_count, 3) [m]. kept: see `Kept.nearest`, under this name.
@@ -28,7 +28,8 @@ def nearness_to_border(
 
 
 def nearness_by(places: Floats, among: Floats, index: Ints, distance: Floats) -> Floats:
-    """The same by the AROUND nearest roots or more of each place, see `nearest_points`."""
+    """`nearness_to_border` from the nearest roots of each place, at least AROUND of them, as given
+    by `nearest_points`; 0 with fewer."""
     if index.shape[1] < AROUND:
         return np.zeros(len(places))
     aside = np.linalg.norm(among[index[:, :AROUND]].mean(axis=1) - places, axis=1)

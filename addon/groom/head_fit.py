@@ -1,4 +1,4 @@
-"""The built-in head fitted to another one, so that what grows on it grows there.
+"""The built-in head fitted to another one, so that its hair can grow there.
 
 First a similarity, found by matching skulls and then closest points both ways; then smooth bends
 that bring landmarks together, and then the skin around them. Landmarks are guessed by the same
@@ -38,40 +38,40 @@ LANDMARKS: dict[str, tuple[str, tuple[float, float, float]]] = {
 _REMEDY = "Press Place Landmarks, drag them to their places and add the hairstyle again"
 
 # All lengths below are [m] on the built-in head.
-#: what is lower is neck and shoulders, which other heads may lack
+#: height below which neck and shoulders begin, which other heads may lack
 _CHIN = -0.115
-#: how far points that are matched are from each other, for the similarity and for bends
+#: spacing of the points that are matched, for the similarity and for bends
 _COARSE, _FINE = 0.022, 0.018
-#: how many rounds find a similarity, of each start and of the best one
+#: rounds of matching that find a similarity, from each start and from the best one
 _FIRST_ROUNDS, _ROUNDS = 6, 15
-#: the part of the matches that count: hats, hair and holes have none
+#: fraction of the matches that counts, the nearest ones: hats, hair and holes have no match
 _TRIMMED = 0.75
-#: how many sizes are tried around that of the skull, and how many directions the face may have
+#: sizes that are tried, relative to the skull's, and number of directions tried for the face
 _SIZES, _TURNS = (0.85, 1.0, 1.18), 4
-#: a match is of no use where surfaces face apart, or are this far from each other
+#: minimum cosine between the normals of a match, and its maximum distance
 _FACING, _FAR = 0.3, 0.035
-#: matches are as far apart as this part of the mesh's extent on a mesh; what is around a head
+#: spacing of a mesh's own points, as a fraction of its extent; half the side of a box around a head
 _CENTERS, _AROUND = 0.035, 0.2
-#: fewer matches say nothing; what one adds to the distance that has found nothing
+#: minimum number of matches; what the mean distance would be if no point had a match
 _FEW, _LOST = 30, 0.02
-#: how many times nearer another direction of the face must be; how far a head's skin is at most
+#: how many times nearer another direction of the face must be; maximum mean distance of a head
 _CLEARLY, _UNLIKE = 1.25, 0.0175
-#: a bend reaches this far: around landmarks, and around skin, in one round after the other
+#: reach of bends, around landmarks and around skin, the latter in successive rounds
 _LANDMARK_REACH, _SKIN_REACHES = 0.30, (0.16, 0.11, 0.07)
-#: how much a bend rather is smooth than exact, for landmarks and for skin
+#: how far a bend is smooth rather than exact, for landmarks and for skin
 _EXACT, _SMOOTH = 1e-6, 0.08
-#: landmarks nearer to each other are one on top of the other
+#: landmarks nearer to each other than this lie on top of each other
 _APART = 0.006
-#: landmarks that are farther than this from where they would be on any head are mistaken
+#: landmarks farther than this from where they would be on any head are mistaken
 _MISTAKEN = 0.06
-#: how far around a guess the tips of nose and ears are looked for, and in which direction
+#: radius around a guess in which the tips of nose and ears are searched, and their directions
 _FEATURE = 0.018
 _TIPS = {"nose": (0.0, -1.0, 0.0), "left_ear": (1.0, 0.0, 0.0), "right_ear": (-1.0, 0.0, 0.0)}
 
 
 @dataclass(frozen=True, eq=False)
 class Bends:
-    """Smooth displacements around centres: Wendland's function of C2, which is 0 from `reach` on.
+    """Smooth displacements around centres: Wendland's C2 function, which is 0 from `reach` on.
 
     centers, weights: (count, 3) [m].
     """
@@ -100,7 +100,7 @@ class Warp:
     bends: tuple[Bends, ...] = ()
 
     def bent(self, points: Floats) -> Floats:
-        """Points (n, 3), still as large and as turned as the built-in head."""
+        """Points (n, 3) after all bends, without the similarity."""
         points = np.asarray(points, np.float64)
         for bend in self.bends:
             points = points + bend.at(points)
@@ -114,8 +114,8 @@ class Warp:
         return mean_scale(self.matrix)
 
     def bending(self, source: Floats, target: Floats, reach: float, smooth: float) -> Warp:
-        """With one bend more, which brings points (n, 3) of the built-in head to others, both in
-        its own space and as they are bent so far."""
+        """The warp with one more bend, which moves points (n, 3) to others, both in the built-in
+        head's space after the bends so far."""
         table = _wendland(source, source, reach)
         table[np.diag_indices(len(source))] += smooth
         bend = Bends(source, np.linalg.solve(table, target - source), reach)
@@ -124,10 +124,10 @@ class Warp:
 
 @dataclass(frozen=True, eq=False)
 class FitModel:
-    """The built-in head as it is fitted to others.
+    """The parts of the built-in head that are fitted to others.
 
-    skin: without eyes and what closes the cut.
-    is_open: (vertex_count,) whether a vertex lies in no fold, mouth or socket.
+    skin: without the eyes and the faces that close the cut.
+    is_open: (vertex_count,) whether a vertex lies outside of folds, mouth and sockets.
     """
 
     skin: Surface
@@ -178,7 +178,7 @@ def fit_by_vertices(source: Floats, target: Floats, is_head: Bools) -> Warp:
     with its topology.
 
     Args:
-        is_head: (n,) which decide about place, turn and size; others may be posed.
+        is_head: (n,) which vertices decide position, rotation and scale; others may be posed.
     """
     matrix = _similarity(source[is_head], target[is_head])
     kept = thinned(source, _COARSE)
@@ -187,7 +187,7 @@ def fit_by_vertices(source: Floats, target: Floats, is_head: Bools) -> Warp:
 
 
 def guess_landmarks(model: FitModel, target: Surface) -> tuple[dict[str, Floats], bool]:
-    """Where landmarks may be on a mesh that stands upright, Z up; and whether it is like a head."""
+    """Guessed landmarks on a mesh that stands upright, Z up; and whether it is like a head."""
     matrix, away = _guessed_similarity(model, target)
     own = np.array(list(_own_landmarks(model).values()))
     if away < _UNLIKE:
@@ -204,7 +204,7 @@ def guess_landmarks(model: FitModel, target: Surface) -> tuple[dict[str, Floats]
 
 @dataclass(frozen=True, eq=False)
 class _Seen:
-    """A mesh as it lies in the built-in head's space, without what is far from a head.
+    """A mesh in the built-in head's space, without parts that are far from a head.
 
     facing: (triangle_count, 3) normals.
     """
@@ -223,7 +223,7 @@ class _Seen:
         return self.search.closest(points).point
 
     def matches(self, points: Floats, normals: Floats) -> tuple[Floats, Bools]:
-        """The closest points (n, 3), and which are of use."""
+        """The closest points (n, 3), and which of them are valid matches, (n,)."""
         found = self.search.closest(points)
         facing = np.einsum("nj,nj->n", normals, self.facing[found.triangle])
         return found.point, (facing > _FACING) & (found.distance < _FAR)
@@ -271,7 +271,7 @@ def _guessed_similarity(model: FitModel, target: Surface) -> tuple[Floats, float
             tops = [one.center + one.half_depth * up for one in (other, own)]
             matrix[:3, 3] = tops[0] - matrix[:3, :3] @ tops[1]
             found.append(matching.improved(matrix, _FIRST_ROUNDS))
-    # a head that faces -Y is what is expected: another turn must be clearly better
+    # a head is expected to face -Y: another direction must be clearly better
     away = np.array([one[1] for one in found])
     expected, best = int(away[: len(_SIZES)].argmin()), int(away.argmin())
     best = expected if away[expected] < _CLEARLY * away[best] else best
@@ -322,8 +322,8 @@ class _Matching:
         return matrix, away
 
     def _pairs(self, matrix: Floats) -> tuple[Floats, Floats, Floats, float]:
-        """Points of the built-in head, where they should be in its space, normals there, and the
-        part of those that were looked for which found something."""
+        """Points of the built-in head, where they should be in its space, normals at the points,
+        and the fraction of `points` that found a match."""
         back = np.linalg.inv(matrix)
         there = self.search.closest(_moved(self.points, matrix))
         point = _moved(there.point, back)
@@ -342,7 +342,7 @@ class _Matching:
 
 
 def _around(target: Surface, center: Floats, reach: float) -> Surface:
-    """The part of a mesh around a place, or all of it where that is nothing."""
+    """The part of a mesh around a place, or all of it where that part is empty."""
     near = (np.abs(target.positions - center) < reach).all(axis=1)[target.triangles].any(axis=1)
     triangles = target.triangles[near] if near.any() else target.triangles
     used, index = np.unique(triangles, return_inverse=True)
@@ -350,16 +350,16 @@ def _around(target: Surface, center: Floats, reach: float) -> Surface:
 
 
 def _own_landmarks(model: FitModel) -> dict[str, Floats]:
-    """On the skin of the built-in head."""
+    """The landmarks on the skin of the built-in head."""
     places = np.array([point for _, point in LANDMARKS.values()])
     return dict(zip(LANDMARKS, search_of(model.skin).closest(places).point, strict=True))
 
 
 def _landmark_similarity(names: list[str], source: Floats, wanted: Floats, place: str) -> Floats:
-    """(4, 4), from the built-in head to where landmarks are.
+    """The similarity (4, 4) from the built-in head to placed landmarks.
 
     Raises:
-        HairloomError: they are one on top of the other, or none of a head.
+        HairloomError: they are too few, lie on top of each other, or not as on a head.
     """
     matrix = None
     if len(names) >= 4 and np.isfinite(wanted).all():
@@ -392,7 +392,7 @@ def _landmark_similarity(names: list[str], source: Floats, wanted: Floats, place
 
 
 def _similarity(source: Floats, target: Floats) -> Floats:
-    """(4, 4), the turn, size and place that best bring points (n, 3) to others (Umeyama 1991)."""
+    """The similarity (4, 4) that best brings points (n, 3) to others (Umeyama 1991)."""
     middle, other = source.mean(axis=0), target.mean(axis=0)
     here, there = source - middle, target - other
     left, spread, right = np.linalg.svd(there.T @ here)
@@ -427,7 +427,7 @@ def _step(source: Floats, target: Floats, normals: Floats) -> Floats:
 
 
 def thinned(points: Floats, apart: float) -> Ints:
-    """One of the points in each cube of this size, the first; indices."""
+    """The index of the first point in each cube of this size."""
     cell = np.floor(points / apart).astype(np.int64)
     return np.sort(np.unique(cell, axis=0, return_index=True)[1])
 
@@ -439,7 +439,7 @@ def _far_from(points: Floats, others: Floats, least: float) -> Bools:
 
 
 def _wendland(points: Floats, centers: Floats, reach: float) -> Floats:
-    """(n, m), of the distances between points (n, 3) and centres (m, 3)."""
+    """Wendland's function of the distances between points (n, 3) and centres (m, 3), (n, m)."""
     squared = (points**2).sum(axis=1)[:, None] + (centers**2).sum(axis=1) - 2.0 * points @ centers.T
     ratio = np.sqrt(np.clip(squared / reach**2, 0.0, 1.0))
     left = 1.0 - ratio
@@ -452,13 +452,13 @@ def _wendland(points: Floats, centers: Floats, reach: float) -> Floats:
 
 
 def _turned(part: float) -> Floats:
-    """(3, 3), by a part of a whole turn around Z."""
+    """The rotation (3, 3) around Z by a fraction of a whole turn."""
     c, s = np.cos(2.0 * np.pi * part), np.sin(2.0 * np.pi * part)
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
 def _moved(points: Floats, matrix: Floats) -> Floats:
-    """In double precision, unlike `affine.moved`."""
+    """Points transformed in double precision, unlike `affine.moved`."""
     return np.asarray(points @ matrix[:3, :3].T + matrix[:3, 3])
 
 

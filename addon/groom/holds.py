@@ -1,7 +1,7 @@
 """Places along strands that something else than the root carries: a hair tie, or a surface.
 
-What carries them are *anchors*: each hair tie is one, and each tip that lies on a surface has one
-of its own. Where an anchor is in a pose is a matrix, from the world at rest to the world now.
+They are carried by *anchors*: each hair tie is one, and each tip that lies on a surface has one of
+its own. An anchor's pose is a matrix from the world at rest to the world now.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ class Holds:
         return self.tie_count + (0 if self.tip_triangle is None else len(self.tip_triangle))
 
     def of(self, chosen: Ints) -> Holds:
-        """Those of some strands, ascending, which are numbered among these alone."""
+        """The holds of some strands, ascending, renumbered among these strands."""
         place = np.searchsorted(chosen, self.strand)
         kept = np.flatnonzero(np.take(chosen, place, mode="clip") == self.strand)
         return self._some(kept, place[kept])
@@ -58,10 +58,10 @@ class Holds:
         return replace(self, place=place)
 
     def where(self, anchors: Floats | None) -> Holds:
-        """Those whose anchors are there: an object that is gone holds nothing.
+        """The holds whose anchors exist: an object that is gone holds nothing.
 
         Args:
-            anchors: see `anchors_of`; None: none is there.
+            anchors: see `anchors_of`; None: there are none.
         """
         if anchors is None:
             return self._some(np.zeros(0, np.int64), self.strand[:0])
@@ -75,8 +75,8 @@ class Holds:
         return replace(self, strand=strand, place=self.place[kept], anchor=self.anchor[kept])
 
     def kinds(self, strand_count: int) -> Ints:
-        """The strands' kind, (strand_count,): the same for strands that the same anchors hold, 0
-        for all that nothing holds. All held tips are alike."""
+        """The kind of each strand, (strand_count,): equal for strands that the same anchors hold, 0
+        for strands that are not held. The anchors of tips all count as one."""
         held_by = np.zeros((strand_count, self.tie_count + 1), bool)
         held_by[self.strand, np.minimum(self.anchor, self.tie_count)] = True
         packed = np.packbits(held_by, axis=1)
@@ -93,17 +93,17 @@ class Holds:
         return is_held
 
     def carried(self, rest: Floats, by_root: Floats, anchors: Floats) -> Floats:
-        """Rest shapes of strands, carried by their roots and by what holds them, in the shape of
-        `rest`, float32 world [m].
+        """Rest shapes of strands, carried by their roots and anchors, in the shape of `rest`,
+        float32 world [m].
 
-        At a hold a strand goes with its anchor alone, and so does all beyond the last one, as a tie
-        is a second root; between root and holds the influences change evenly. What is at rest stays
-        as it is to the last bit.
+        At a hold, and beyond the last one, a strand follows its anchor alone, since a tie is a
+        second root; between root and holds their influences change linearly. In the rest pose
+        nothing changes, bit for bit.
 
         Args:
             rest: (strand_count, cv_count, 3) world [m] at rest.
             by_root: the same, carried by the roots alone.
-            anchors: (anchor_count, 4, 4), all there.
+            anchors: (anchor_count, 4, 4), all finite.
         """
         result = np.array(by_root, np.float32)
         cv = np.arange(rest.shape[1])
@@ -148,7 +148,7 @@ def anchors_of(holds: Holds, ties: Floats, surface_now: Floats | None) -> Floats
         for positions in (holds.surface.positions, surface_now)
     )
     turn = now.rotation @ rest.rotation.transpose(0, 2, 1)
-    # a surface at rest carries by nothing at all
+    # a surface at rest must turn nothing, not even by rounding
     turn[np.abs(turn - np.eye(3)).max(axis=(1, 2)) < 1.0e-12] = np.eye(3)
     tips = anchors[holds.tie_count :]
     tips[:] = np.eye(4)

@@ -1,8 +1,8 @@
-"""Painted masks: by what settings are multiplied, wherever hair grows.
+"""Painted masks: factors of settings that vary over the hair.
 
-A parameter says that it may be painted (`is_painted`); its mask is what the parameter after it
-names. What was painted lies on the surface, in an image on its UVs, or on the artist's own strands.
-Any of them says how much it is at `Places`: at the roots of guides as of children.
+A parameter that may be painted is declared with `is_painted`; the parameter after it names its
+mask. A mask is painted on the surface, in an image on its UVs, or on the artist's own strands. Each
+kind has values at `Places`: at the roots of guides and children alike.
 """
 
 from __future__ import annotations
@@ -22,20 +22,20 @@ from ..strands.catmull_rom import even_places
 from ..strands.nearest import nearest_points
 from ..strands.resample import arc_length_positions
 
-#: Blender's name of what is selected of curves: a mask of the curves themselves, 1 everywhere where
-#: it is not there.
+#: Blender's attribute of the selection of curves, used as a mask of the curves themselves; 1
+#: everywhere where there is none.
 SELECTION = ".selection"
-#: Places along a strand at which it keeps what was painted on its points.
+#: Number of places along a strand at which a mask keeps what was painted on its points.
 _ALONG = 17
 
 
 def masks_of(settings: type[Settings]) -> dict[str, str]:
-    """Parameter that may be painted -> the one that names its mask."""
+    """Parameter that may be painted -> parameter that names its mask."""
     return {each.of: each.name for each in settings.parameters() if each.kind == "mask"}
 
 
 def mask_names(settings: Settings) -> dict[str, str]:
-    """Of each parameter that has a mask and acts, the name of that."""
+    """The name of the mask of each parameter that has one and takes effect."""
     sections = SimpleNamespace(**{settings.section: settings})
     named = {of: str(getattr(settings, name)) for of, name in masks_of(type(settings)).items()}
     acts = {p.name for p in settings.parameters() if not p.shown_when or p.shown_when(sections)}
@@ -50,7 +50,7 @@ class Places:
     """Where something grows, and between which of the artist's own strands.
 
     triangle: (n,), barycentric: (n, 3), of the surface; None: there is none.
-    strand, weight: (n, k) which strands it is mixed from, and how much of each.
+    strand, weight: (n, k) which strands it is mixed from, with which weights.
     """
 
     triangle: Ints | None
@@ -72,7 +72,7 @@ class Places:
 
 @dataclass(frozen=True, eq=False)
 class Mask:
-    """What was painted, not negative and finite."""
+    """A painted mask; values are finite and not negative."""
 
     def __eq__(self, other: object) -> bool:
         return type(self) is type(other) and all(
@@ -80,15 +80,16 @@ class Mask:
         )
 
     def at(self, places: Places) -> Floats:
-        """How much it is, (n,)."""
+        """The values at places, (n,)."""
         raise NotImplementedError
 
     def along(self, places: Places, cv_count: int) -> Floats:
-        """The same evenly spaced from root to tip, (cv_count, n); (1, n): alike at all of them."""
+        """The values at CVs evenly spaced from root to tip, (cv_count, n), or (1, n) where these
+        are all the same."""
         return self.at(places)[None]
 
     def at_vertices(self, surface: Surface, strands: StrandSet) -> Floats:
-        """How much it is at each vertex, (vertex_count,).
+        """The values at the surface's vertices, (vertex_count,).
 
         Args:
             strands: the artist's own, bound or not.
@@ -96,12 +97,12 @@ class Mask:
         raise NotImplementedError
 
     def fits(self, strand_count: int, triangle_count: int | None) -> bool:
-        """Whether it says something of this many of the artist's own strands, on a surface of this
-        many triangles; None: on none."""
+        """Whether it can have been painted with this many of the artist's own strands, on a surface
+        of this many triangles; None: without a surface."""
         raise NotImplementedError
 
     def of(self, strands: Ints) -> Mask:
-        """The same, known by some of the artist's strands alone."""
+        """The mask for some of the artist's strands, by their index among these."""
         return self
 
     @property
@@ -126,7 +127,7 @@ class SurfaceMask(Mask):
         triangle, barycentric = places.triangle, places.barycentric
         assert triangle is not None and barycentric is not None, "what is painted has a surface"
         a, b, c = self.corners[triangle].astype(np.float64).T
-        # so that it is exactly the same where it is painted evenly
+        # by differences, so that it is exactly even where it is painted evenly
         found: Floats = a + barycentric[:, 1] * (b - a) + barycentric[:, 2] * (c - a)
         return found
 
@@ -159,7 +160,7 @@ class ImageMask(Mask):
         return self.on(surface)
 
     def on(self, surface: Surface) -> Floats:
-        """How much it is at each vertex, (vertex_count,)."""
+        """The values at the surface's vertices, (vertex_count,)."""
         corners = self._at(self.corner_uv.reshape(-1, 2)).reshape(-1, 3)
         return _mean_at_vertices(surface, corners)
 
@@ -170,7 +171,7 @@ class ImageMask(Mask):
 
 @dataclass(frozen=True, eq=False)
 class StrandMask(Mask):
-    """grid: (strand_count, _ALONG) or, where it is alike along each, (strand_count, 1)."""
+    """grid: (strand_count, _ALONG), or (strand_count, 1) if it does not vary along strands."""
 
     grid: Floats
 
@@ -211,7 +212,7 @@ class StrandMask(Mask):
         return StrandMask(self.grid[strands])
 
     def at_points(self, strands: StrandSet) -> Floats:
-        """What it was painted with, (point_count,)."""
+        """The values at the points of the strands, (point_count,)."""
         if self.grid.shape[1] == 1:
             return np.repeat(self.grid[:, 0], strands.point_counts)
         along = reached(strands.points, strands.offsets)
@@ -227,12 +228,12 @@ class StrandMask(Mask):
 def between_pixels(
     pixels: Floats, uv: Floats, meant: Callable[[Floats], Floats] = lambda stored: stored
 ) -> Floats:
-    """Between the middles of the four nearest pixels, (n, ...); the image begins again at its
+    """Values between the middles of the four nearest pixels, (n, ...); the image repeats beyond its
     edges.
 
     Args:
         pixels: (height, width, ...). uv: (n, 2).
-        meant: gives what stored pixels mean, (n, ...).
+        meant: decodes stored pixels, to (n, ...).
     """
     height, width = pixels.shape[:2]
     place = uv.astype(np.float64) * (width, height) - 0.5
@@ -252,7 +253,7 @@ def _mean_at_vertices(surface: Surface, corners: Floats) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class Masks:
-    """masks: of each painted parameter by its name."""
+    """masks: by the names of the painted parameters."""
 
     masks: Mapping[str, Mask] = field(default_factory=dict)
 
@@ -263,7 +264,7 @@ class Masks:
         return bool(self.masks)
 
     def at(self, places: Places) -> Factors:
-        """Of what grows there."""
+        """The factors of what grows at these places."""
         return Factors(len(places.strand), {n: each.at(places) for n, each in self.masks.items()})
 
     def of(self, strands: Ints) -> Masks:
@@ -296,7 +297,7 @@ class Factors:
         return Factors(self.count + more.count, both)
 
     def with_others(self, chosen: Ints, others: Factors) -> Factors:
-        """With those of some (n,) others."""
+        """The factors with those of some (n,) replaced."""
         found = {}
         for name in self.painted.keys() | others.painted.keys():
             found[name] = self[name].copy()

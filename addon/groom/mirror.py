@@ -12,8 +12,8 @@ from ..strands.affine import moved
 from ..strands.closest_point import search_of
 from .mirror_settings import MirrorSettings
 
-#: Roots nearer to the plane than this part of the surface's size are in the middle, and roots that
-#: need to move by no more stay where the plane puts them.
+#: Fraction of the surface's size: roots nearer to the plane are in the middle, and roots that need
+#: to move by no more stay where the plane puts them.
 _NEAR = 1.0e-6
 
 
@@ -24,7 +24,7 @@ def reflection(matrix: Floats, axis: str) -> Floats:
         matrix: (4, 4), from object to world space. axis: of the object, across the plane.
     """
     number = "xyz".index(axis)
-    normal = np.linalg.inv(matrix)[number, :3]  # of a plane in a sheared object, too
+    normal = np.linalg.inv(matrix)[number, :3]  # correct in a sheared object, too
     normal = normal / np.linalg.norm(normal)
     result = np.eye(4)
     result[:3, :3] -= 2.0 * np.outer(normal, normal)
@@ -48,7 +48,7 @@ def sides(roots: Floats, surface: Surface, matrix: Floats, settings: MirrorSetti
 @dataclass(frozen=True, eq=False)
 class Mirrored:
     """strands: bound to the surface, with root UVs if it has any.
-    shift: (strand_count, 3) float32 [m], by which each was moved from where the plane puts it.
+    shift: (strand_count, 3) float32 [m], how far each was moved from where the plane puts it.
     """
 
     strands: StrandSet
@@ -62,8 +62,8 @@ class Mirrored:
 def mirrored(strands: StrandSet, surface: Surface, across: Floats) -> Mirrored:
     """Strands on the other side of a plane, as far from the surface as they are on their own.
 
-    What a root grows on is mirrored, and goes to the closest point of the surface; the strand goes
-    with it. On a surface that is its own mirror image nothing but the signs change.
+    The point that a root grows on is mirrored and moved to the closest point of the surface; the
+    strand moves with it. On a symmetric surface nothing but signs change.
 
     Args:
         strands: in the space of the surface. across: (4, 4), see `reflection`.

@@ -1,4 +1,4 @@
-"""What the artist sets about mirroring hair."""
+"""Settings of mirroring hair."""
 
 from __future__ import annotations
 

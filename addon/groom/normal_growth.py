@@ -4,7 +4,7 @@ From vertices, or lifted fully, they stand straight, the guides of the Nalu demo
 are grown from a dedicated mesh, one from each vertex, along the normal; the segments get longer
 towards the tip" (Nguyen and Donnelly 2005, GPU Gems 2, chapter 23). Here they may also grow from
 any number of points, spread over the mesh by area and density. Less lifted they lean back and down,
-the more the farther from the root, in tufts that each lean a little their own way.
+increasingly from root to tip, in tufts that each lean a little their own way.
 
 Limitations: fur leans by world space, for an upright animal that faces -Y, and does not keep out of
 folds of the mesh.
@@ -25,11 +25,11 @@ from .settings import GrowSettings
 
 #: A mean of normals shorter than this points nowhere, as on two faces back to back.
 _NO_DIRECTION = 1.0e-3
-#: The way in which fur leans on an animal: back and down.
+#: The direction in which fur leans on an animal: back and down.
 _LEANING = np.array([0.0, 0.55, -0.65])
-#: By which fraction a strand's angle from the skin gets less up to its tip, where it is least.
+#: Fraction by which an unlifted strand's angle from the skin shrinks from root to tip.
 _BEND = 0.7
-#: How much the directions of tufts and of single strands vary [rad], and the strands' lift.
+#: Standard deviations: directions of tufts and of single strands [rad], and the strands' lift.
 _TUFTS_STRAY, _STRANDS_STRAY, _LIFT_VARIES = 0.3, 0.2, 0.18
 
 
@@ -41,10 +41,9 @@ def grow_along_normals(
 ) -> StrandSet:
     """Strands along the normals, bound, all of one CV count, in the surface's space.
 
-    Straight from vertices, or with `settings.lift` 1.
-
-    From `settings.strand_count` points, or with `settings.per_vertex` from each vertex whose
-    density is above `settings.threshold`. The same input and seed give the same strands.
+    They grow from `settings.strand_count` points, or with `settings.per_vertex` from each vertex
+    whose density is above `settings.threshold`. From vertices, or with a `settings.lift` of 1, they
+    are straight. The same input and seed give the same strands.
 
     Args:
         surface: world space.
@@ -87,7 +86,7 @@ def _directions(
         return np.broadcast_to(normal[:, None], shape)
     tuft = assign_clumps(root, settings, random)
     across = _LEANING - normal * (normal @ _LEANING)[:, None]
-    # where it leans neither way, as on the breast, it stands
+    # it stands where the lean has no direction along the skin, as on the breast
     lean = np.linalg.norm(across, axis=1)
     aside = unit(across)
     turn = _TUFTS_STRAY * random.standard_normal(len(root))[tuft]
@@ -101,7 +100,7 @@ def _directions(
 
 
 def somewhere(density: Floats | None, length: Floats | None) -> Floats | None:
-    """The density, and none where hair would have no length."""
+    """The density, set to 0 where hair would have no length."""
     if length is None:
         return density
     grows = (length > 0.0).astype(np.float64)
@@ -124,7 +123,7 @@ def _vertex_roots(surface: Surface, grows: Bools) -> tuple[Ints, Floats]:
     """Roots on the vertices, in their order: triangle (n,) and barycentric (n, 3).
 
     Each is held by its largest triangle. A vertex of no triangle, or only of ones without area,
-    has no normal and grows none.
+    has no normal and grows no hair.
     """
     edge = np.diff(surface.corners.astype(np.float64), axis=1)
     area = np.linalg.norm(np.cross(edge[:, 0], edge[:, 1]), axis=1)

@@ -1,7 +1,7 @@
-"""Colours that are painted on the surface under hair, where its strands stand.
+"""Colours that are painted on the surface under hair, looked up where its strands stand.
 
-They are scene-linear and multiplied by their opacity, so that what is painted on nothing has no
-dark border; so they are mixed between corners of triangles and between pixels.
+They are scene-linear and premultiplied by their opacity when they are mixed between corners of
+triangles and between pixels, so that paint on an unpainted surface gets no dark border.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from .masks import between_pixels
 
 @dataclass(frozen=True, eq=False)
 class PaintedColor:
-    """What was painted, not negative and finite."""
+    """Painted colours; values are finite and not negative."""
 
     def at(self, triangle: Ints, barycentric: Floats) -> Floats:
         """Red, green, blue and opacity, (n, 4), where roots (n,), (n, 3) are."""
@@ -25,7 +25,7 @@ class PaintedColor:
 
     @property
     def triangle_count(self) -> int:
-        """Of the surface that it is painted on."""
+        """The number of triangles of the painted surface."""
         raise NotImplementedError
 
     def mirrored(self) -> PaintedColor:
@@ -56,9 +56,9 @@ class SurfaceColor(PaintedColor):
 @dataclass(frozen=True, eq=False)
 class ImageColor(PaintedColor):
     """pixels: (height, width, k) float32 as they are stored, the lowest row first.
-    meant: what such pixels (n, k) mean, (n, 4). corner_uv: (triangle_count, 3, 2).
+    meant: decodes such pixels (n, k) to colours (n, 4). corner_uv: (triangle_count, 3, 2).
 
-    Few of many pixels are asked for, so that a large image can be followed under a brush.
+    Only pixels under roots are decoded, so that hair can follow a brush on a large image.
     """
 
     pixels: Floats

@@ -1,4 +1,4 @@
-"""What the artist sets about combing hair away from partings."""
+"""Settings of combing hair away from partings."""
 
 from __future__ import annotations
 

@@ -1,11 +1,11 @@
 """Partings: lines on the scalp across which no strand follows a guide.
 
 A parting is a curtain that stands on the scalp along its line. Two roots are on different sides of
-it where the straight line between them goes through the curtain. So a parting may end in the middle
-of the hair: roots beside each other beyond its end see each other.
+it where the straight line between them crosses the curtain. So a parting may end in the middle of
+the hair: beyond its end, roots beside each other are not parted.
 
-Limitations: two roots are compared along a straight line, so that those far from each other, as on
-both sides of a head, are not parted by a line that runs around it.
+Limitation: roots are compared along a straight line, so roots that are far apart, as on both sides
+of a head, are not parted by a line that runs around it.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ from ..strands.nearest import nearest_points
 from ..strands.vectors import dot, unit, unit_or
 from .parting_settings import PartingSettings
 
-#: Pieces of a line reach over their ends by this part of their length, so that no gap is between
-#: them where they bend.
+#: Pieces of a line are extended by this fraction of their length, which leaves no gap between them
+#: where the line bends.
 _OVERLAP = 0.05
-#: How far above or below a parting two roots may pass it, as a part of their distance.
+#: Height of a parting's curtain above and below its line, as a fraction of the roots' distance.
 _HEIGHT = 0.5
-#: Of the straight line between two roots, what is nearer than this part of it to its ends does not
-#: count: a root on a parting is on both sides of it.
+#: Crossings nearer to a root than this fraction of the line between two roots do not count: a root
+#: on a parting is on both sides of it.
 _END = 1.0e-6
 _CHUNK = 512
 
@@ -46,7 +46,7 @@ class Partings:
 
     @classmethod
     def of(cls, pieces: Floats, surface: Surface) -> Partings:
-        """Lines that were drawn near the surface.
+        """Partings from lines that were drawn near the surface.
 
         Args:
             pieces: (piece_count, 2, 3) [m], the straight pieces of all lines.
@@ -76,7 +76,7 @@ class Partings:
         return is_crossed
 
     def _crossed(self, root: Floats, other: Floats) -> Bools:
-        """The same, each with each piece."""
+        """`crossed`, tested with every piece."""
         along = self.end - self.begin
         across = np.cross(self.normal, along)
         from_root = _apart(root, self.begin, across)[:, None]  # (n, 1, m)
@@ -128,8 +128,7 @@ def combed_away(
 ) -> Floats:
     """Points of strands whose roots lean away from partings, (point_count, 3) float32 [m].
 
-    Segments keep their lengths, and turn the less the farther they are from a parting and along
-    their strand.
+    Segments keep their lengths; they turn less with distance from a parting and along their strand.
 
     Args:
         strands: bound to the surface.
@@ -145,7 +144,7 @@ def combed_away(
     beside = unit(beside - normal * dot(beside, normal)[:, None])
     target = unit(beside + settings.lift * normal)
     pull = settings.amount * _fading(away / width)
-    # what is on the parting itself has no side
+    # a root on the parting itself has no side
     pull[~beside.any(axis=1)] = 0.0
     fade = _fading(along(strands.points, offsets) / settings.along)
     weight = (np.repeat(pull, counts) * fade)[:, None]

@@ -1,8 +1,8 @@
-"""Hair that is stored on its undeformed surface, and that surface posed.
+"""Hair that is stored on its undeformed surface, moved onto the posed one.
 
 Blender keeps curves on the surface as it is before shape keys and modifiers. *Deform Curves on
-Surface* and *Hair Dynamics* put them onto the posed one. Hair without these modifiers is put there
-here, so that it does not depend on the frame in which it is read.
+Surface* and *Hair Dynamics* move them onto the posed one. This module does so for hair without
+these modifiers, so that it does not depend on the frame in which it is read.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from ..strands import StrandSet, Surface
 from ..strands.closest_point import search_of
 from .roots import follow, root_frames, root_motions
 
-#: A surface is deformed where a vertex has moved by more than this part of its diagonal.
+#: A surface is deformed where a vertex has moved by more than this fraction of its diagonal.
 DEFORMED = 1.0e-4
 #: UVs that differ by less are the same.
 _SAME_UV = 1.0e-4
@@ -38,15 +38,15 @@ class RestHair:
     def found(
         cls, strands: StrandSet, rests: Sequence[Surface], posed: Surface, least: float = DEFORMED
     ) -> RestHair | None:
-        """On that of the undeformed surfaces on which the strands stand; None where they are to
-        stay: they stand on the posed surface, or it is not posed.
+        """The hair on the one of the undeformed surfaces that its strands stand on; None where the
+        strands are to stay, since they stand on the posed surface, or it is not deformed.
 
-        The root UVs say on which surface roots stand; where these do not tell, the nearest surface
-        is the one.
+        Root UVs tell on which surface strands stand; where they fit all surfaces, the nearest one
+        counts.
 
         Args:
-            rests: the same mesh without all, or some, of what deforms it, or in any other pose.
-            least: by how much it has to be deformed at the roots, as a part of its diagonal.
+            rests: the same mesh without some or all of its deformations, or in any other pose.
+            least: minimum deformation at the roots, as a fraction of the diagonal.
         """
         if not strands.strand_count:
             return None
@@ -80,10 +80,10 @@ class RestHair:
 
 
 def carried(strands: StrandSet, start: Surface, end: Surface) -> StrandSet:
-    """Strands on a surface, on the same one in another pose: each moves and turns with its root.
+    """Strands moved from one pose of a surface to another: each moves and turns with its root.
 
     Args:
-        strands: where they are bound, by that, else by the closest points of the start.
+        strands: held where they are bound, or else at the closest points of `start`.
     """
     triangle, barycentric = strands.root_triangle, strands.root_barycentric
     if triangle is None or barycentric is None:

@@ -10,10 +10,10 @@ import numpy as np
 from ..arrays import Floats
 from ..strands.closest_point import ClosestPointSearch
 
-#: Median distance of the roots, as a part of the surface's diagonal, beyond which the groom
+#: Median distance of the roots, as a fraction of the surface's diagonal, beyond which the groom
 #: cannot belong to it; grooms that fit lie within 1 %.
 IMPLAUSIBLE_DISTANCE = 0.15
-#: And beyond which an artist should look.
+#: The same beyond which the artist gets a note.
 LOOSE_DISTANCE = 0.01
 #: Factors between the units that grooms come in: powers of ten, inch and foot, to and from metres.
 _UNIT_FACTORS = (*(10.0**n for n in range(-4, 5)), 0.0254, 0.3048, 1 / 0.0254, 1 / 0.3048)
@@ -26,7 +26,7 @@ _CLEARLY = 4.0
 class RootFit:
     """A way to read roots: its name, and the factor that brings them onto the surface.
 
-    distance: median, as a part of the roots' own extent.
+    distance: median, as a fraction of the roots' own extent.
     """
 
     name: str
@@ -59,8 +59,8 @@ def better_fit(readings: Mapping[str, Floats], search: ClosestPointSearch) -> Ro
 def _best_fit(
     name: str, roots: Floats, search: ClosestPointSearch, factors: Iterable[float]
 ) -> RootFit:
-    """Distances are judged by the size of the scaled roots: roots that shrink to a point somewhere
-    inside of the head are near to it, but do not fit."""
+    """The factor that fits best. Distances are relative to the size of the scaled roots: roots that
+    shrink to a point inside the head are near to it, but do not fit."""
     size = float(np.linalg.norm(np.ptp(roots, axis=0))) or 1.0
     sample = roots[:: -(-len(roots) // _SAMPLED_ROOTS)].astype(np.float64)
     fits = [

@@ -17,8 +17,8 @@ from .root_fit import IMPLAUSIBLE_DISTANCE, LOOSE_DISTANCE, better_fit, fitting_
 
 #: Sine of a triangle's first angle below which rounding in float64 decides about its normal.
 _FLAT = 1.0e-9
-#: Fewer roots, and roots that span less than this part of the surface, say nothing of its scale
-#: where they are near to it.
+#: Fewer roots than this, or roots that span less than this fraction of the surface, reveal no wrong
+#: scale where they are near to it.
 _FEW, _PATCH = 16, 0.01
 
 
@@ -56,10 +56,10 @@ class RootFrames:
 class RootHolds:
     """Which vertices of a surface hold roots, and how.
 
-    vertices: (n,) ascending. corners: (strand_count, 3), those of each root's triangle, by their
-        place among these. barycentric: (strand_count, 3).
-    fraction: (n,) of all roots that each vertex holds. lift: (3,) [m], from the middle of where
-        they are held to that of the roots.
+    vertices: (n,) ascending. corners: (strand_count, 3), of each root's triangle, as indices into
+        `vertices`. barycentric: (strand_count, 3).
+    fraction: (n,), the fraction of all roots that each vertex holds. lift: (3,) [m], from the
+        middle of the points that hold roots to that of the roots.
     rest_positions: (vertex_count, 3) [m], of the whole surface.
     """
 
@@ -93,7 +93,7 @@ class RootHolds:
     def center(self, positions: Floats) -> Floats:
         """The middle of all roots (3,) [m] on vertices (vertex_count, 3).
 
-        How far they stand off the surface does not turn.
+        `lift` does not turn with the surface.
         """
         return np.asarray(self.fraction @ positions[self.vertices] + self.lift, np.float32)
 
@@ -155,14 +155,14 @@ def root_frames(
 
 
 def root_motions(rest: RootFrames, now: RootFrames) -> RootMotions:
-    """How the same roots have moved; by exactly nothing where they have not."""
+    """How the same roots have moved; exactly 0 where they have not."""
     was = rest.rotation.transpose(1, 2, 0)
     change, origin = now.rotation.transpose(1, 2, 0) - was, rest.origin.T
     turn = np.empty_like(change)
     for row in range(3):
         for column in range(3):
             turn[row, column] = dot_rows(change[row], was[column])
-    # the rounding of the origin to float32 must not show: it is turned here instead
+    # the origin is rounded to float32 below: turning what it loses must not be lost, too
     rounding = origin - origin.astype(np.float32)
     shift = now.origin.T - origin
     for column in range(3):

@@ -63,7 +63,7 @@ def scalp_density(surface: Surface) -> Floats:
     facing = 0.9 + normal[:, 1] + 0.6 * normal[:, 2] + np.maximum(z - 0.5, 0.0)
     edges = (above_hairline, _EARS - np.abs(x), facing)
     hair = np.prod([smooth_step(edge / _SOFTNESS) for edge in edges], axis=0)
-    # what grows at the front is combed away from there, and nothing falls over it
+    # hair at the front is combed away from there, and no other hair falls over it
     return (hair * (1.0 - _THINNER_BACK * smooth_step(0.5 + y))).astype(np.float32)
 
 
@@ -120,7 +120,7 @@ def _towards_density(barycentric: Floats, density: Floats, chance: Floats) -> Fl
 
 
 def smooth_step(value: Floats) -> Floats:
-    """Of what is below 0, 0; of what is above 1, 1; and between them without a corner."""
+    """0 below 0, 1 above 1, and a smooth rise between them."""
     x = np.clip(value, 0.0, 1.0)
     smooth: Floats = x * x * (3.0 - 2.0 * x)
     return smooth

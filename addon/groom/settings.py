@@ -1,4 +1,4 @@
-"""What the artist sets about growing a groom and choosing its guides."""
+"""Settings of growing a groom and of choosing its guides."""
 
 from __future__ import annotations
 

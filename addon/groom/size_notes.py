@@ -1,20 +1,21 @@
-"""Grooms and heads of files that are far too large to be in metres."""
+"""Notes on grooms and heads of files whose sizes cannot be in metres."""
 
 from __future__ import annotations
 
 from ..arrays import Floats
 
-#: Hair, a head or a body that is larger than this is in another unit [m]: a horse is 3 m, a man of
+#: Hair, a head or a body larger than this is in another unit [m]: a horse is 3 m, a man of
 #: MakeHuman's 17 dm.
 MAX_EXTENT = 12.0
-#: And hair that is smaller [m].
+#: Hair smaller than this is in another unit [m].
 MIN_EXTENT = 0.005
-#: Beside such a one, what is smaller than this [m], or this many times smaller, is in metres.
+#: Beside something too large, the other is in metres if it is smaller than this [m], or this many
+#: times smaller.
 _IN_METRES, _TIMES_SMALLER = 1.0, 50.0
 
 
 def size_note(hair: tuple[str, Floats] | None, head: tuple[str, Floats] | None) -> str:
-    """What to say of files whose numbers are no metres; "" where they may be.
+    """A note on files whose numbers cannot be metres; "" where they may be.
 
     Args:
         hair, head: name and points (n, 3) [m] as they were read; None is not from a file.

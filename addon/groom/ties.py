@@ -1,4 +1,4 @@
-"""Finding what of the hair is held: by ties that it passes through, and by tips on a surface."""
+"""Finding where hair is held: by ties that it passes through, and at tips on a surface."""
 
 from __future__ import annotations
 
@@ -96,7 +96,7 @@ def find_holds(strands: StrandSet, holders: Holders, tip_distance: float = 0.0) 
 
 
 def idle(holds: Holds, holders: Holders) -> tuple[str, ...]:
-    """What holds no hair, in sentences with a remedy."""
+    """Notes on ties and surfaces that hold no hair, each with a remedy."""
     busy = set(np.unique(np.minimum(holds.anchor, holds.tie_count)).tolist())
     notes = [
         f"No hair passes through the tie {tie.name}, so it holds none. Move it so that hair passes "
@@ -135,7 +135,7 @@ def _passing(strands: StrandSet, tie: Tie) -> tuple[Ints, Floats]:
     strand, segment = strand[order], segment[order]
     first = np.flatnonzero(np.diff(strand, prepend=-1))
     strand, segment = strand[first], segment[first]
-    # the whole of a segment is its own begin: the next point has a segment of its own
+    # below 1, since the next point belongs to the next segment
     within = np.minimum(part[segment], np.float32(1.0 - 2.0**-12))
     place = segment - strands.offsets[strand] + within
     return strand, np.maximum(place, np.float32(ROOT_POINTS))
@@ -165,7 +165,7 @@ def _tips_near(strands: StrandSet, tips: TipSurface, distance: float) -> tuple[I
 
 
 def _apart(strand: Ints, place: Floats) -> Ints:
-    """Which of the places, in order along each strand, are held without sharing a point."""
+    """Indices of places that share no point with an earlier one, in order along each strand."""
     first, kept, last = np.floor(place), [], (-1, -1.0)
     shared = np.flatnonzero((np.diff(strand) == 0) & (np.diff(first) < 2.0))
     if not len(shared):

@@ -1,4 +1,4 @@
-"""Triangles of a surface, whole or split, which know where in the surface they lie."""
+"""Triangles of a surface, whole or split, with their places in it."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from .counter_random import named
 
 @dataclass(frozen=True)
 class Pieces:
-    """Triangles of a surface, whole or split: what roots are spread over.
+    """Triangles of a surface, whole or split, over which roots are spread.
 
     parent: (n,) triangles of the surface.
     corner: (n, 3, 3) barycentric coordinates in it, of each corner.
     point: (n, 3, 3) [m], the corners.
     density: (n, 3) at the corners.
-    key: (n,) uint64, what is random about each depends on; the same whatever others there are.
+    key: (n,) uint64, of its random numbers; the same whatever other pieces there are.
     """
 
     parent: Ints
@@ -66,7 +66,7 @@ class Pieces:
         return unit(area_vectors(self.point))
 
     def with_density(self, surface: Surface, density: Floats | None) -> Pieces:
-        """As if they were made of all triangles with this density (vertex_count,), see `of`."""
+        """The pieces with another density of the surface, (vertex_count,), see `of`."""
         weights = np.ones(len(surface.positions)) if density is None else density
         whole = weights[surface.triangles[self.parent]]
         return replace(self, density=np.einsum("nck,nk->nc", self.corner, whole))
@@ -90,7 +90,7 @@ class Pieces:
         )
 
     def split(self) -> Pieces:
-        """Each in four."""
+        """Each piece split in four."""
         corner, point, density = map(quartered, (self.corner, self.point, self.density))
         key = named(self.key[:, None], 1 + np.arange(4)).ravel()
         return Pieces(np.repeat(self.parent, 4), corner, point, density, key)

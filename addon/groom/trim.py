@@ -1,8 +1,7 @@
 """Trim: strands end where they first leave a shape.
 
-A shape is a closed mesh, which strands leave, or a plane, which they pass: unbounded, or as far as
-a flat mesh reaches. Of a plane the side on which most roots are is the inside. What grows outside
-of a shape is not cut by it.
+A shape is a closed mesh or a plane, which is unbounded or as large as a flat mesh. A plane's inside
+is the side with most of the roots. A shape does not cut strands whose roots are outside of it.
 """
 
 from __future__ import annotations
@@ -19,20 +18,20 @@ from ..strands.arc_length import first_as_far
 from ..strands.catmull_rom import evenly_on_curve
 from ..strands.crossings import first_crossings
 
-#: Pieces of a segment in which strands are looked at.
+#: Number of pieces that each segment is divided into to find where it leaves a shape.
 _PIECES = 8
-#: Strands looked at together, so that their pieces stay in memory.
+#: Strands cut at once, to bound the memory of their pieces.
 _CHUNK = 4096
-#: A mesh is flat where it is no thicker than this part of its extent.
+#: A mesh is flat where it is no thicker than this fraction of its extent.
 _FLAT = 1.0e-4
 
 
 class Shape(Protocol):
-    """What cuts. All in the space of the strands."""
+    """A shape that cuts. All in the space of the strands."""
 
     def has_inside(self, roots: Floats) -> Bools:
-        """Which roots (n, 3) are inside, (n,); of all strands, since a plane asks where most
-        are."""
+        """Which roots (n, 3) are inside, (n,); needs the roots of all strands, since a plane's
+        inside is where most of them are."""
         ...
 
     def left_at(self, lines: Floats) -> Floats:
@@ -82,8 +81,8 @@ def flat(surface: Surface) -> Plane | None:
 
 @dataclass(frozen=True, eq=False)
 class Trimmed:
-    """points: (point_count, 3) float32 [m]. is_trimmed, is_outside: (strand_count,), shorter than
-    before; with its root outside of all shapes."""
+    """points: (point_count, 3) float32 [m]. is_trimmed: (strand_count,), is shorter than before.
+    is_outside: (strand_count,), has its root outside of all shapes."""
 
     points: Floats
     is_trimmed: Bools
@@ -91,8 +90,8 @@ class Trimmed:
 
 
 def trimmed(strands: StrandSet, shapes: Sequence[Shape]) -> Trimmed:
-    """Strands up to where they first leave a shape that their root is in; they keep their point
-    counts, and what stays of their curve with its points spaced as before."""
+    """Strands cut where they first leave a shape that their root is in; they keep their point
+    counts, in the same proportions along the rest of their curve."""
     points = strands.points.copy()
     inside = np.array([shape.has_inside(strands.roots) for shape in shapes])
     inside = inside.reshape(len(shapes), strands.strand_count)
@@ -114,8 +113,8 @@ def trimmed(strands: StrandSet, shapes: Sequence[Shape]) -> Trimmed:
 
 
 def _up_to(fine: Floats, left: Floats) -> Floats:
-    """Every _PIECES-th of the points (n, count, 3), moved along their lines so that the last one is
-    as far as the line goes, `left` segments, and the others are as far in proportion."""
+    """Every _PIECES-th of the points (n, count, 3), moved along their lines: the last one to `left`
+    segments from the start, the others by arc length in proportion."""
     step = np.linalg.norm(np.diff(fine.astype(np.float64), axis=1), axis=2)
     reached = np.concatenate([np.zeros((len(fine), 1)), np.cumsum(step, axis=1)], axis=1)
     own = reached[:, ::_PIECES]

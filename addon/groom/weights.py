@@ -1,14 +1,14 @@
 """Which three guides each strand rides on, and how much each of them counts.
 
-Strands and guides are compared by their root, and by where they go: a direction that differs
+Strands and guides are compared by their roots and by their directions: a difference in direction
 counts like a distance on the scalp, so that the two sides of a parting do not mix.
 The weights are those of Franke and Little (in Barnhill 1977; Franke 1982, Scattered data
 interpolation): w = (R - d) / (R d) = 1/d - 1/R with R the distance of the fourth nearest guide,
 so that a guide fades out before another one takes its place. Their exponent is 1 here, where
 scattered data take 2, because strands shall blend rather than flock around the nearest guide.
 
-A child has no way of its own yet: it is on the side of its nearest guide, and guides that go apart
-from that one, or from each other, are left out (`child_weights`).
+A child has no direction of its own yet: it is on the side of its nearest guide, and guides that
+diverge from that one, or from each other, are left out (`child_weights`).
 """
 
 from __future__ import annotations
@@ -29,11 +29,11 @@ GUIDES_PER_STRAND = 3
 _SPACINGS_PER_TURN = 4.0
 #: Cosine between strand and guide at which the guide is out, and from which it counts fully.
 _DIVERGENT, _ALIKE = 0.0, 0.5
-#: Part of the parting's angle up to which a guide counts fully for a child.
+#: Fraction of the parting's angle up to which a guide counts fully for a child.
 _SURELY_TOGETHER = 2.0 / 3.0
-#: The nearest guides of a child that are looked at; beyond a parting most of them drop out.
+#: Number of nearest guides considered for a child; beyond a parting most of them drop out.
 _CHILD_CANDIDATES = 8
-#: Those that are looked at where a parting is between a strand and all of these.
+#: The same where a parting is between a strand and any of its nearest guides.
 _MANY_CANDIDATES = 32
 #: Strands weighed at once, so that their table of distances stays in the cache.
 _CHUNK = 2048
@@ -69,7 +69,7 @@ def guide_weights(
         strand_grid: (strand_count, cv_count, 3) [m], to keep partings; or None, to look at
             the roots only.
         guide_grid: (guide_count, cv_count, 3) [m], with strand_grid.
-        partings: no strand follows a guide across these, but where its group has no other.
+        partings: no strand follows a guide across these, unless its group has no other.
 
     Limitations: groups are visited one by one, so tens of thousands of them take long.
     """
@@ -108,8 +108,8 @@ def _on_one_side(
     features: Floats,
     candidates: Ints,
 ) -> Ints:
-    """The candidates (n, k), where a parting is before one of them those of the nearest that none
-    is before, nearest first."""
+    """The candidates (n, k), nearest first; where a parting is before any of them, replaced by the
+    nearest guides on this side of it."""
     crossed = partings.crossed(root, guide_root[candidates]).any(axis=1)
     found = candidates.copy()
     behind = np.flatnonzero(crossed)
@@ -141,12 +141,12 @@ def child_weights(
         guide_root: (guide_count, 3) [m], at least one.
         guide_group: (guide_count,).
         guide_grid: (guide_count, cv_count, 3) [m].
-        parting: guides that go apart by more than this are not mixed [rad].
-        partings: no child takes a guide from behind these, but where its group has no other, and
-            none mixes guides with one between them.
+        parting: guides that diverge by more than this are not mixed [rad].
+        partings: no child takes a guide from behind these, unless its group has no other, and none
+            mixes guides with one between them.
         grown: (child_count, 3) [m], where they grow, if `root` is where they take shapes from; this
-            decides about partings.
-        kept: of the children that were asked about last.
+            is the place that partings are seen from.
+        kept: results of the last call.
     """
     grown = root if grown is None else grown
     guide = np.zeros((len(root), GUIDES_PER_STRAND), np.int32)
@@ -201,11 +201,11 @@ def nearest_before(
     kept: Kept = NOTHING_KEPT,
     name: str = "",
 ) -> tuple[Ints, Floats, Bools | None]:
-    """`nearest_points`, but where one is behind a parting, seen from `grown`, those nearest to that
-    place, with all behind partings as the last; and which these are.
+    """`nearest_points`, and which of them are behind a parting, seen from `grown`; None without
+    partings. If any is, they are the points nearest to `grown`, those behind partings last.
 
     Args:
-        kept: of the places that were asked for last by this name.
+        kept: results of the last call with this name.
     """
     near, gap = kept.nearest(name, root, among, count)
     if partings is None:
@@ -222,7 +222,7 @@ def nearest_before(
 
 
 def by_group(group: Ints, guide_group: Ints) -> Iterator[tuple[Ints, Ints]]:
-    """For each group of strands: the strands of it, and the guides of it, as ascending indices."""
+    """The strands and the guides of each group of strands, as ascending indices."""
     order = np.argsort(group, kind="stable")
     guide_order = np.argsort(guide_group, kind="stable")
     names, first = np.unique(group[order], return_index=True)
@@ -267,7 +267,7 @@ def _nearest(own: Floats, features: Floats, count: int) -> Ints:
 def likeness(
     own_direction: Floats, other_direction: Floats, parting: float | None = None
 ) -> Floats:
-    """1 for strands that go the same way, 0 for those that diverge, smooth between.
+    """1 for strands of the same direction, 0 for those that diverge, smooth between.
 
     Args:
         own_direction, other_direction: (n, k, 6) or (n, k, 0) `directions`, broadcast with each
@@ -289,9 +289,9 @@ def likeness(
 
 
 def _usable_first(near: Ints, gap: Floats, alike: Floats) -> tuple[Ints, Floats, Floats]:
-    """Of the candidates (n, k), nearest first, those that may be mixed, four columns at most.
+    """The candidates (n, k), those that may be mixed first, nearest first; four columns at most.
 
-    What is over is filled up with others, put so far away that those that may be mixed all count.
+    Others fill up the columns, at such a distance that all those that may be mixed count.
     """
     order = np.argsort(alike <= 0.0, axis=1, kind="stable")[:, : GUIDES_PER_STRAND + 1]
     near = np.take_along_axis(near, order, axis=1)
@@ -301,7 +301,7 @@ def _usable_first(near: Ints, gap: Floats, alike: Floats) -> tuple[Ints, Floats,
 
 
 def _agreeing(direction: Floats, alike: Floats, parting: float) -> Floats:
-    """Likeness (n, k), less for a guide that goes apart from a nearer one that is mixed."""
+    """Likeness (n, k), reduced for a guide that diverges from a nearer one that is mixed."""
     agreed = alike.copy()
     for later in range(2, alike.shape[1]):
         for earlier in range(1, later):
@@ -314,7 +314,7 @@ def _agreeing(direction: Floats, alike: Floats, parting: float) -> Floats:
 
 
 def _unparted(partings: Partings, root: Floats, alike: Floats) -> Floats:
-    """Likeness (n, k), none of a guide with a parting before a nearer one that is mixed.
+    """Likeness (n, k), 0 for a guide with a parting between it and a nearer one that is mixed.
 
     Args:
         root: (n, k, 3) of the guides.
@@ -337,7 +337,7 @@ def _weigh(distance: Floats, alike: Floats) -> tuple[Ints, Floats]:
     """
     farthest = distance.max(axis=1, keepdims=True)
     has_fourth = distance.shape[1] > GUIDES_PER_STRAND
-    # at a tie of all four a hair more than 0, so that there is something to share
+    # slightly beyond the farthest, so that four equally far guides get weights above 0
     reach = farthest * (1.0 + 1e-6) if has_fourth else 2.0 * farthest
     near = np.maximum(distance, np.maximum(1e-9 * reach, np.finfo(np.float64).tiny))
     weight = alike * np.maximum(reach - distance, 0.0) / near

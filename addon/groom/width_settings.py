@@ -1,4 +1,4 @@
-"""What the artist sets about where widths come from."""
+"""Settings of where widths come from."""
 
 from __future__ import annotations
 

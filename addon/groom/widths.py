@@ -1,12 +1,12 @@
 """How wide strands are: as their file says, or found from the groom where that cannot be hair.
 
-A groom has far fewer strands than a body has hairs, so each strand stands for many of them. Where
+A groom has far fewer strands than a body has hairs, so each strand represents many hairs. Where
 widths are missing, or would leave the body bald or bury it, they are found from the spacing of the
 strands, their lengths and their number alone. No unit of length is assumed: a groom that is a
 thousand times as large has strands a thousand times as wide.
 
 A head is the measure: about 120,000 hairs of 0.08 mm on 600 cm2 (Robbins 2012, Chemical and
-Physical Behavior of Human Hair, chapter 9). Any groom is given the cover that this is for its area.
+Physical Behavior of Human Hair, chapter 9). Any groom gets the same cover of its area.
 """
 
 from __future__ import annotations
@@ -24,38 +24,38 @@ from ..strands.kept import NOTHING_KEPT, Kept
 from ..strands.nearest import nearest_points
 from .hairline import AROUND, nearness_by
 
-#: of a head: how many hairs, and the width of one in terms of the root of the area they grow on.
+#: Number of hairs on a head, and the width of one over the square root of the area they grow on.
 _HAIRS, _HAIR = 120_000, 0.08 / 245.0
-#: Layers of hair that lie over every place, at least, wherever that is wide enough to do so.
+#: Minimum layers of hair over every place, as far as strands may be wide enough for it.
 _LAYERS = 6.0
-#: The widest strand: a quarter of the spacing, and in terms of its own length.
+#: Maximum width of a strand, over the spacing of strands and over its length.
 _OF_SPACING, _OF_LENGTH = 0.25, 1.0 / 15.0
-#: Brows and lashes are drawn hair by hair: 8 mm of a brow are 0.13 mm wide.
+#: The same over the length of brows and lashes, which are drawn hair by hair: a brow of 8 mm is
+#: 0.13 mm wide.
 _OF_FACE = 1.0 / 60.0
-#: Most that a strand blocks of the light, in terms of what its width does: a few guides alone are
-#: not all the hair.
+#: Maximum light that a strand blocks, over what its width blocks: a few guides alone do not stand
+#: for all the hair.
 _MAX_EXTINCTION = 6.0
-#: Hair covers its body by this many layers of strands that are as wide as they may be, and looks
-#: like hair where strands are this many times as long as wide: those of a buzz cut, 12 mm long, are
-#: 0.3 mm wide.
-#: Strands that lack less than this factor are enough.
+#: Layers of strands at maximum width that cover the body; length over width from which on strands
+#: look like hair (in a buzz cut of 12 mm they are 0.3 mm wide); and the factor by which strands may
+#: fall short of either and still be enough.
 _ENOUGH, _SLENDER, _LACKING = 4.0, 40.0, 1.1
-#: Hair this many spacings long hangs in locks. A strand of it that stands for more hairs than this
+#: Hair this many spacings long hangs in locks; a strand of it that represents more hairs than this
 #: looks like a noodle from near.
 _LONG, _MAX_HAIRS = 5.0, 3.5
-#: Fewer strands than this are not hair yet. In a row, neighbours are further apart than on an area:
-#: the eighth is 4 times, not twice, as far as the second.
+#: Minimum number of strands that count as hair; and the ratio of the distances to the eighth and
+#: the second neighbour above which roots are in a row: there it is 4, on an area 2.
 _FEWEST, _IN_ROW = 3, 3.0
-#: Without any spacing, a strand's width in terms of its length.
+#: Width of a strand over its length where there is no spacing.
 _ALONE = 1.0 / 500.0
-#: Own widths are believed from this part of what is found on, up to this multiple of it, or up to
-#: this part of the spacing of strands.
+#: A groom's own widths are kept from this fraction of the found widths on, up to this multiple of
+#: them, or up to this fraction of the spacing of strands.
 _TOO_THIN, _TOO_WIDE, _TOO_NEAR = 0.25, 2.0, 0.5
-#: Strands whose neighbours are looked at, and how many neighbours.
+#: Number of strands that are measured, and of neighbours of each.
 _SAMPLES, _NEIGHBOURS = 3000, 8
-#: Where hair ends it is finer by this part.
+#: Fraction by which hair is finer at its border.
 _FINER = 0.4
-#: Narrowest and widest of a groom's strands in terms of the median.
+#: Limits of the spacing at a strand over the median spacing.
 _LEAST, _MOST = 0.5, 2.0
 
 METHODS = (
@@ -71,16 +71,16 @@ METHODS = (
 
 @dataclass(frozen=True)
 class Widths:
-    """How wide the strands of a groom are, and what one of them stands for.
+    """How wide the strands of a groom are, and what one of them represents.
 
     is_found: whether the widths were found, rather than being the groom's own.
     median: the width of the median strand where it is widest [m].
-    hairs: how many hairs a strand stands for.
-    extinction: factor on the light that a strand blocks. It is above 1 where few strands stand for
-        more hairs than it could be wide without looking like a ribbon.
-    reason: why they were found; empty where they were not, or were asked for.
-    spacing: how far apart the strands are whose hairs fill the space between them [m]; 0 where
-        strands stand for themselves alone.
+    hairs: how many hairs a strand represents.
+    extinction: factor on the light that a strand blocks. It is above 1 where strands represent more
+        hairs than they are wide, since wider ones would look like ribbons.
+    reason: why they were found; empty where they were not, or where that was requested.
+    spacing: how far apart strands are, which the hairs that they represent fill [m]; 0 where each
+        represents only itself.
     """
 
     is_found: bool = False
@@ -96,7 +96,7 @@ class Widths:
 
     @classmethod
     def of(cls, numbers: Floats, reason: str) -> Self:
-        """Those that `numbers` were of; earlier versions had no spacing."""
+        """The inverse of `numbers`; earlier versions had no spacing."""
         is_found, median, hairs, extinction, *spacing = numbers.tolist()
         return cls(bool(is_found), median, hairs, extinction, reason, *spacing)
 
@@ -120,14 +120,14 @@ def with_widths(
     fineness: Floats | None = None,
     kept: Kept = NOTHING_KEPT,
 ) -> tuple[StrandSet, Widths]:
-    """The strands as wide as `METHODS` says, all in one space.
+    """The strands with widths by one of `METHODS`, in their own space.
 
     Args:
         parts: how many strands are drawn for each of these, itself included.
-        number: (strand_count,) ascending, which they are of all that there might be: which of them
-            are measured hardly changes where one is left out. None: all.
-        fineness: (strand_count,) by which widths that are found are multiplied; None: by 1.
-        kept: of the strands that were measured last.
+        number: (strand_count,) ascending, their numbers before any were left out, by which the
+            measured ones are chosen, so that leaving one out hardly changes these. None: all.
+        fineness: (strand_count,) factor on found widths; None: 1.
+        kept: results of the last call.
     """
     if not strands.strand_count:
         return strands, Widths()
@@ -161,7 +161,7 @@ def as_wide(strands: StrandSet, drawn: StrandSet) -> StrandSet:
 
 
 def is_long(strands: StrandSet) -> bool:
-    """Whether hair is many times as long as it is apart."""
+    """Whether hair is many times as long as the spacing of its strands."""
     return _Hair.of(strands).is_long
 
 
@@ -169,8 +169,8 @@ def strands_for_cover(strands: StrandSet) -> float:
     """How many strands must be drawn for each of these to cover the body and look like hair: 1
     where these do, and where they stand in a row, as lashes do.
 
-    Doubling the strands halves what each stands for, and their spacing falls by the root of two;
-    so at a quarter of their spacing they lie in layers that grow by the root of two.
+    Doubling the strands halves the hairs that each represents, and divides their spacing by the
+    root of two. So at a width of a quarter of their spacing, their layers grow by the root of two.
     """
     first = strands.offsets[:-1]
     if strands.strand_count < _FEWEST or _is_row(strands.points[first]):
@@ -198,7 +198,7 @@ class _Found:
 
 @dataclass(frozen=True)
 class _Hair:
-    """What decides about widths; all (strand_count,) [m].
+    """Measurements that decide the widths; all (strand_count,) [m].
 
     apart: how far strands are from their neighbours, at their roots or further out.
     border: how near they are to where the hair ends, 0 to 1.
@@ -223,7 +223,7 @@ class _Hair:
         name: str = "",
     ) -> Self:
         """Args:
-        number: see `with_widths`. kept: of the strands that were measured last by this name.
+        number: see `with_widths`. kept: results of the last call with this name.
         """
         chosen = _some(np.arange(strands.strand_count) if number is None else number)
 
@@ -242,7 +242,7 @@ class _Hair:
         typical = np.clip(length, *np.percentile(length, (25, 95)))
         # where most roots coincide, as in tufts, they do not tell how the hair is spread
         at_roots = _evened(at_roots if np.median(at_roots) else apart)
-        # neighbours are on one side alone, and half of the square that they suggest is bare
+        # at the border neighbours are on one side only: half of the square that they give is bare
         at_roots *= np.sqrt(1.0 - 0.5 * border)
         middle = float(np.median(apart))
         return cls(length, typical, _evened(apart), at_roots, border, middle)
@@ -254,7 +254,7 @@ class _Hair:
 
     @property
     def extent(self) -> float:
-        """The root of the area that the hair grows on [m]."""
+        """The square root of the area that the hair grows on [m]."""
         return float(np.median(self.at_roots)) * len(self.length) ** 0.5
 
     @property
@@ -320,15 +320,15 @@ def _found_of(hair: _Hair, parts: float = 1.0) -> _Found:
 
 
 def _evened(spacing: Floats) -> Floats:
-    """Without extremes, which borders and strays have."""
+    """The spacing without the extremes of borders and strays."""
     middle = np.median(spacing)
     evened: Floats = np.clip(spacing, _LEAST * middle, _MOST * middle)
     return evened
 
 
 def _some(number: Ints) -> Ints:
-    """Indices of the strands that are measured, of these numbers: all, or one in each of as many
-    equal steps, by chance, since hair may stand in rows.
+    """Indices of the strands that are measured, among strands of these numbers: all, or a random
+    one in each of equally many steps, since hair may stand in rows.
     """
     if len(number) <= _SAMPLES:
         return np.arange(len(number))
@@ -338,14 +338,14 @@ def _some(number: Ints) -> Ints:
 
 
 class _Measured:
-    """Places of strands (strand_count, 3) [m], some of which are measured among themselves.
+    """Places of strands (strand_count, 3) [m], a sample of which is measured among itself.
 
-    So a groom has the same widths by all of its strands as by a part of them. Among all strands
-    more would lie deeper, not only closer: the hundredth part of a ponytail is as wide apart as on
-    an area, and all of it as in a volume.
+    So a groom gets the same widths from all of its strands as from a part of them. Among all,
+    neighbours would also lie deeper, not only closer: a hundredth of a ponytail is spaced as on an
+    area, and all of it as in a volume.
 
     Args:
-        chosen: those that are; what they are the others get from the nearest of these.
+        chosen: indices of the sample; all others get the values of the nearest strand in it.
         kept, name: see `Kept.nearest`.
     """
 
@@ -354,14 +354,13 @@ class _Measured:
         self._measured = places[chosen]
 
     def border(self) -> Floats:
-        """How near those that are measured are to where the hair ends, see `nearness_to_border`."""
+        """How near the sample is to where the hair ends, see `nearness_to_border`."""
         return nearness_by(self._measured, self._measured, *self._around)
 
     def spacing(self) -> Floats:
         """How far strands are from their neighbours here, (strand_count,) [m].
 
-        It is the side of the square that a strand has for itself if its neighbours are spread
-        evenly.
+        It is the side of the square that each strand has to itself if neighbours are spread evenly.
         """
         neighbours = min(_NEIGHBOURS, len(self._measured) - 1)
         if neighbours < 1:
@@ -372,7 +371,7 @@ class _Measured:
         return self.spread(np.median(side[index[:, :_NEIGHBOURS]], axis=1))
 
     def spread(self, values: Floats) -> Floats:
-        """Values of the chosen strands, of all strands those of the nearest of these."""
+        """Values of the sample, given to all strands from the nearest in it."""
         if len(self._chosen) == len(self._places):
             return values
         spread: Floats = values[self._nearest]
@@ -380,13 +379,13 @@ class _Measured:
 
     @cached_property
     def _around(self) -> tuple[Ints, Floats]:
-        """The nearest of those that are measured of each of them, itself first."""
+        """The nearest neighbours of the sample within it, each itself first."""
         name, count = f"{self._name}, around", max(AROUND, _NEIGHBOURS + 1)
         return self._kept.nearest(name, self._measured, self._measured, count)
 
     @cached_property
     def _nearest(self) -> Ints:
-        """Of those that are measured, for each place."""
+        """The nearest of the sample for each place."""
         near, _ = self._kept.nearest(f"{self._name}, all", self._places, self._measured, 1)
         return near[:, 0]
 
