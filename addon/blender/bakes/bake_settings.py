@@ -1,4 +1,4 @@
-"""How and where a groom or a fin is baked, by the properties of its object (see bake_group)."""
+"""Frames and folder of a groom's or fin's bake, from the object's properties (see bake_group)."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from ...errors import HairloomError
 from ...exchange.files.names import as_compared, folder_name
 from .cache import owner_and_file
 
-#: Folder beside files, which has a folder for the bakes of each file.
+#: Folder beside Blender files; it holds one folder of bakes for each file.
 _BESIDE = "//hairloom_cache"
 
-#: what to do with an object that is linked
+#: remedy for a linked object
 OVERRIDE = "Make a library override of it (Object > Library Override > Make)"
 
 
@@ -47,7 +47,7 @@ def frame_range(first: int, last: int, place: str) -> range:
 
 
 def folder_of(obj: bpy.types.Object) -> Path | None:
-    """The folder that the object's bake is in; None where it names none."""
+    """The folder of the object's bake; None where none is set."""
     return _named(obj, lambda owner: owner.hairloom.bake.folder)
 
 
@@ -57,8 +57,9 @@ def shown_folder_of(curves: bpy.types.Curves) -> Path | None:
 
 
 def _named(owner: Any, read: Callable[[Any], str]) -> Path | None:
-    """What a data-block names: a path of Blender's, which may begin with // for the folder of the
-    file. What an override has not set itself is named in the file of the library."""
+    """The absolute path of a folder property of a data-block; None where it is empty, or relative
+    (//) in a file that has not been saved. An override that has not changed the property resolves
+    it against the library's file."""
     folder, library, override = read(owner), owner.library, owner.override_library
     if override is not None and override.reference and read(override.reference) == folder:
         return _named(override.reference, read)
@@ -68,10 +69,10 @@ def _named(owner: Any, read: Callable[[Any], str]) -> Path | None:
 
 
 def choose_folder(obj: bpy.types.Object) -> Path:
-    """The folder to bake into, written to the object where it named none of its own.
+    """The folder to bake into; an object without a folder of its own is assigned one.
 
-    A bake belongs to one object of one file. An object that was duplicated names the folder of its
-    original, and a file that was saved under another name those of the first; both get others.
+    A bake belongs to one object of one file. A duplicated object still has the folder of its
+    original, and a file saved under another name those of the first file; both get new folders.
 
     Raises:
         HairloomError: a folder beside a file that has not been saved, or a linked object.
@@ -95,10 +96,11 @@ def choose_folder(obj: bpy.types.Object) -> Path:
 
 
 def check_not_linked(obj: bpy.types.Object) -> None:
-    """Refuse an object whose bake is that of the library's own file, where all who link it look.
+    """Refuse a linked object: its bake belongs to the library's file, and is read by every file
+    that links it.
 
     Raises:
-        HairloomError: it is linked, and no override.
+        HairloomError: it is linked and not an override.
     """
     if obj.library is not None:
         raise HairloomError(
@@ -124,12 +126,12 @@ def check_owner(obj: bpy.types.Object, folder: Path) -> None:
 
 
 def is_own(obj: bpy.types.Object, folder: Path) -> bool:
-    """Whether the bake in the folder that an object names is of no other object or file."""
+    """Whether the bake in an object's folder belongs to no other object or file."""
     return not (_is_shared(obj) or _other_owner(obj, folder))
 
 
 def _other_owner(obj: bpy.types.Object, folder: Path) -> str:
-    """Another object or file whose bake is in a folder; empty where there is none."""
+    """Another object or file whose bake is in a folder, by name; empty where there is none."""
     owner, file = owner_and_file(folder)
     if file and file != file_name(obj):
         return f"{owner} in {file}"
@@ -138,13 +140,13 @@ def _other_owner(obj: bpy.types.Object, folder: Path) -> str:
 
 
 def file_name(obj: bpy.types.Object) -> str:
-    """Of the Blender file that the object is from; empty where that was not saved."""
+    """The name of the Blender file that the object is from; empty where it was not saved."""
     path = bpy.data.filepath if obj.library is None else obj.library.filepath
     return bpy.path.basename(path)
 
 
 def folder_names(objects: Sequence[bpy.types.Object]) -> list[str]:
-    """A folder for each of some objects, no two of them alike on any system."""
+    """A folder name for each object, distinct on every file system."""
     taken: set[str] = set()
     names = []
     for obj in objects:
@@ -165,13 +167,14 @@ def _own_folder(obj: bpy.types.Object, beside: str) -> str:
 
 
 def _is_shared(obj: bpy.types.Object) -> bool:
-    """Whether another object names the same folder, as a duplicate names that of its original."""
+    """Whether another object has the same folder, as a duplicate and its original do."""
     own = _place_of(obj)
     return bool(own) and own in map(_place_of, _others(obj))
 
 
 def _place_of(obj: bpy.types.Object) -> str:
-    """The same for paths that lead to one folder on any system; empty where it names none."""
+    """A key of the object's folder, equal for paths that are one folder on some file system; empty
+    where none is set."""
     folder = folder_of(obj)
     return "" if folder is None else as_compared(str(folder.resolve()))
 

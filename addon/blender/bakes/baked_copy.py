@@ -1,6 +1,6 @@
-"""The hair that renders show: curves that hold nothing but the bake's strands.
+"""The copy that renders show: curves that hold only the strands of a bake.
 
-Renders leave out the artist's own curves while there is such a copy, and the viewport the copy.
+While there is a copy, renders hide the artist's own curves, and the viewport hides the copy.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ _POLY = 1  # in Blender's attribute curve_type
 def show_in_renders(
     hair: bpy.types.Object, cache: Cache, depsgraph: bpy.types.Depsgraph
 ) -> bpy.types.Object:
-    """Make the copy, or make it again, and let renders show it in place of the hair.
+    """Make or update the copy, and let renders show it instead of the hair.
 
-    The render's thread writes strands into the copy, so the window is locked while it does.
+    The render thread writes strands into the copy, so Lock Interface is switched on.
 
     Raises:
         HairloomError: the bake is damaged.
@@ -36,7 +36,8 @@ def show_in_renders(
     rig = playback.rig_in(cache)
     bake = hair.hairloom.bake
     copy = bake.copy
-    if copy is None or copy.hairloom.bake.stands_for not in (None, hair):  # its original's
+    # a duplicate of hair still points to the copy of its original
+    if copy is None or copy.hairloom.bake.stands_for not in (None, hair):
         curves = bpy.data.hair_curves.new(f"{hair.name} Baked")
         copy = bpy.data.objects.new(curves.name, curves)
     link_into(copy, hair.users_collection, depsgraph.scene)
@@ -46,7 +47,7 @@ def show_in_renders(
         bake.hides, bake.was_hidden = True, hair.hide_render
     copy.data.hairloom.baked_in = bake.folder
     copy.data.hairloom.baked_rig = cache.facts.rig_hash
-    # what a copy names is evaluated in renders though it is hidden there: so are its settings
+    # renders hide the hair but evaluate it, and its settings, since the copy points to it
     copy.hairloom.bake.stands_for = hair
     copy.hide_viewport = copy.hide_select = True
     copy.hide_render = bake.was_hidden
@@ -58,7 +59,7 @@ def show_in_renders(
 
 
 def remove(hair: bpy.types.Object) -> None:
-    """Renders show the hair itself again."""
+    """Remove the copy, so that renders show the hair itself again."""
     bake = hair.hairloom.bake
     copy = bake.copy
     if bake.hides:
@@ -67,7 +68,7 @@ def remove(hair: bpy.types.Object) -> None:
         return
     bake.copy = None
     other = next((obj for obj in bpy.data.objects if obj.hairloom.bake.copy == copy), None)
-    if other is not None:  # a duplicate of the hair, which names the same copy
+    if other is not None:  # a duplicate of the hair, with the same copy
         if copy.hairloom.bake.stands_for == hair:
             copy.hairloom.bake.stands_for = other
         return
@@ -75,10 +76,10 @@ def remove(hair: bpy.types.Object) -> None:
 
 
 def heal() -> list[str]:
-    """Let renders show hair again whose copy is gone: deleted, or unlinked from all scenes.
+    """Let renders show hair again if its copy was deleted, or unlinked from all scenes.
 
     Returns:
-        the names of such hair.
+        the names of that hair.
     """
     healed = []
     for hair in bpy.data.objects:
@@ -89,7 +90,7 @@ def heal() -> list[str]:
 
 
 def is_copy_gone(hair: bpy.types.Object) -> bool:
-    """Whether renders leave hair out in favour of a copy that is in no scene."""
+    """Whether renders hide hair although its copy is in no scene."""
     bake = hair.hairloom.bake
     return bool(bake.hides and not (bake.copy and bake.copy.users_scene))
 
@@ -115,7 +116,7 @@ def _fill(
         curves.set_types(type="POLY")
     set_attribute(curves, "radius", "POINT", strands.radius)
     shown = hair.evaluated_get(depsgraph).data
-    if len(shown.curves) == strands.strand_count:  # else it is not known which strand is which
+    if len(shown.curves) == strands.strand_count:  # else curves and strands do not correspond
         _take_attributes(curves, shown)
     set_colors(curves, strands)
     curves.materials.clear()
@@ -131,9 +132,9 @@ def _are_poly(curves: bpy.types.Curves) -> bool:
 
 
 def _take_attributes(curves: bpy.types.Curves, shown: bpy.types.Curves) -> None:
-    """What a material may ask of a strand: UVs of the root, groups, colours."""
+    """Copy the attributes that materials may read from a strand: root UVs, groups, colours."""
     for attribute in shown.attributes:
-        # Blender's own are of INT8, such as the type of each curve, or have a dot before the name
+        # Blender's own are INT8, such as curve types, or have names that begin with a dot
         is_own = attribute.data_type == "INT8" or attribute.name.startswith(".")
         values = read_attribute(shown, attribute.name, "CURVE", width=None)
         if values is not None and not is_own:

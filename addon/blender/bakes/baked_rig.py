@@ -1,6 +1,6 @@
-"""A groom's rig as the arrays of a bake, and back: enough to place all strands without the scene.
+"""A groom's rig to and from the arrays of a bake: enough to place all strands without the scene.
 
-A frame keeps all vertices of the head, so that it is drawn whole wherever it bends.
+A frame holds all vertices of the head, so that all of it can be drawn however it deforms.
 """
 
 from __future__ import annotations
@@ -21,15 +21,15 @@ from ...rig_flow import Pose, Rig
 from ...strands import StrandSet, Surface
 from .simulated import Arrays
 
-#: Sizes that differ by less than this part are the same, as Blender's matrices are rounded.
+#: Relative tolerance at which sizes are equal, as Blender's matrices are rounded.
 _ROUNDING = 1.0e-4
 
 
 @dataclass(frozen=True)
 class RestMatrices:
-    """(4, 4) each, matrix_world of hair and head where the rig was made; head None without one.
+    """matrix_world of hair and head when the rig was made, (4, 4) each; head None without one.
 
-    ties: (tie_count, 4, 4), the same of its ties.
+    ties: (tie_count, 4, 4), the same for its ties.
     """
 
     hair: Floats
@@ -38,13 +38,13 @@ class RestMatrices:
 
     @property
     def has_size(self) -> bool:
-        """Whether neither hair nor head is flattened to nothing."""
+        """Whether neither hair nor head is scaled to 0 along an axis."""
         matrices = (self.hair,) if self.head is None else (self.hair, self.head)
         return all(np.linalg.matrix_rank(each[:3, :3]) == 3 for each in matrices)
 
     def has_size_of(self, other: RestMatrices) -> bool:
-        """Whether hair and head are as large as with the others, in each direction, and mirrored as
-        they are; wherever they stand and however they are turned."""
+        """Whether hair and head have the scale and handedness of the others, whatever their
+        positions and rotations."""
         if self.head is None or other.head is None:
             return self.head is other.head and _is_as_large(self.hair, other.hair)
         return _is_as_large(self.hair, other.hair) and _is_as_large(self.head, other.head)
@@ -52,18 +52,18 @@ class RestMatrices:
 
 @dataclass(frozen=True, eq=False)
 class BakedRig:
-    """What all frames share."""
+    """The part of a groom's bake that all frames share."""
 
     rig: Rig
     rests: RestMatrices
 
     def pose(self, frame: Arrays) -> Pose:
-        """Where the body was in a frame."""
+        """The pose of the head in a frame."""
         return Pose(frame.get("head"), frame["matrix"], frame.get("anchors"))
 
     def fits(self, frame: Arrays) -> bool:
-        """Whether a frame is of this rig: as many guides, vertices of the head, and anchors, and
-        strands that it has."""
+        """Whether a frame's arrays match this rig: guides, head vertices, anchors, style, and the
+        strands that were led out of colliders."""
         head = None if self.rig.head is None else self.rig.head.positions.shape
         found = frame["head"].shape if "head" in frame else None
         anchors = None if self.rig.holds is None else (self.rig.holds.anchor_count, 4, 4)
@@ -81,7 +81,7 @@ class BakedRig:
         return led_in(frame).fits(self.rig.strands.offsets)
 
     def styled(self, frame: Arrays) -> Rig:
-        """The rig in the style of a frame that fits."""
+        """The rig with the style of a frame that fits, or its own where the frame has none."""
         if "style" not in frame:
             return self.rig
         strands = self.rig.strands.with_points(frame["style"])
@@ -102,11 +102,12 @@ class BakedRig:
 
 
 def frame_arrays(pose: Pose, guides: Floats, led: LedOut, styled: Rig | None = None) -> Arrays:
-    """One frame: guides (guide_count, cv_count, 3) world [m], what carries them, and the strands
-    that were led out of colliders: what shows a frame has no colliders.
+    """The arrays of one frame: guides, pose, and the strands that were led out of colliders, which
+    playback could not compute, as it has no colliders.
 
     Args:
-        styled: the rig in the style of this frame; None: in its own.
+        guides: (guide_count, cv_count, 3) world [m].
+        styled: the rig with the style of this frame; None: the style is not animated.
     """
     arrays: Arrays = {
         "guides": guides,
@@ -129,7 +130,7 @@ def led_in(frame: Arrays) -> LedOut:
 
 
 def rig_arrays(rig: Rig, rests: RestMatrices) -> Arrays:
-    """All that `baked_rig_of` needs."""
+    """The arrays from which `baked_rig_of` makes the rig again."""
     strands = rig.strands
     arrays: Arrays = {
         "strands": strands.points,
@@ -270,7 +271,7 @@ def _baked_rig_of(arrays: Arrays) -> BakedRig:
 
 
 def _is_as_large(one: Floats, other: Floats) -> bool:
-    """Whether two (4, 4) matrices give all things the same lengths and the same handedness."""
+    """Whether two (4, 4) matrices give every vector the same length, and the same handedness."""
     one, other = one[:3, :3], other[:3, :3]
     lengths, known = one.T @ one, other.T @ other
     is_mirrored = np.linalg.det(one) * np.linalg.det(other) < 0.0

@@ -1,12 +1,13 @@
-"""What hair stayed out of in a bake, as arrays and back, so that its cards are led out of the same.
+"""The colliders of a baked groom to and from arrays, so that cards are led out of the same ones.
 
-    mesh_0_positions, mesh_0_triangles, ...  of meshes at rest, once; their fields are made again
-    solids          (k, 4) int32: of each collider its kind, which mesh, and which rows beside
+    mesh_0_positions, mesh_0_triangles, ...  meshes at rest, once; distance fields are rebuilt
+    solids          (k, 4) int32: kind, mesh, first row and row count of each collider; rows
+                    are those of solid_shapes for meshes, of solid_balls for others
     solid_matrices  (k, 4, 4) to world space
-    solid_balls     (n, 4) float32: center and radius of balls; a capsule has two
-    solid_shapes    (m, 3) float32: vertices of meshes that are bent, in the space of the mesh
+    solid_balls     (n, 4) float32: centre and radius of balls; a capsule has two
+    solid_shapes    (m, 3) float32: vertices of deformed meshes, in the space of the mesh
 
-The same arrays with `begun_` before their names are of where the motion began.
+The same arrays with the prefix `begun_` hold the colliders where the motion began.
 """
 
 from __future__ import annotations
@@ -37,15 +38,15 @@ from .simulated import Arrays
 
 _BALL, _CAPSULE, _BALLS, _MESH = range(4)
 _BEGUN = "begun_"
-#: arrays that may have another length in each frame
+#: arrays whose length may differ between frames
 LISTS = frozenset({"solids", "solid_matrices", "solid_balls", "solid_shapes"})
 
 
 def solid_constants(begun: Begun, meshes: Sequence[Surface], settings: DynamicsSettings) -> Arrays:
-    """What all frames share.
+    """The arrays that all frames share.
 
     Args:
-        meshes: of all colliders that are any, at rest.
+        meshes: those of all mesh colliders, at rest.
     """
     arrays: Arrays = {
         "kept": np.array(begun.kept),
@@ -63,7 +64,7 @@ def solid_constants(begun: Begun, meshes: Sequence[Surface], settings: DynamicsS
 
 
 def solid_arrays(colliders: Sequence[PosedCollider], meshes: Sequence[Surface]) -> Arrays:
-    """Colliders as they stand at their frame's end; meshes as of `solid_constants`."""
+    """The arrays of colliders at the end of their frame; meshes as for `solid_constants`."""
     solids: list[tuple[int, int, int, int]] = []
     balls: list[Floats] = [np.zeros((0, 4))]
     shapes: list[Floats] = [np.zeros((0, 3))]
@@ -98,8 +99,8 @@ def _rows(centers: Sequence[Floats] | Floats, radii: Sequence[float] | Floats) -
 
 
 def solids_between(frame: Arrays, there: Arrays, fraction: float) -> Arrays:
-    """The arrays of `solid_arrays` between two frames, straight; those of the first one where
-    something came or went."""
+    """The arrays of `solid_arrays`, linearly interpolated between two frames; those of the first
+    one where a collider was added or removed."""
     if "solids" not in frame or not np.array_equal(frame["solids"], there["solids"]):
         return frame
     moving = LISTS - {"solids"}
@@ -107,7 +108,7 @@ def solids_between(frame: Arrays, there: Arrays, fraction: float) -> Arrays:
 
 
 def _shape_of(field: DistanceField, meshes: Sequence[Surface]) -> tuple[int, Floats]:
-    """Which of some meshes a field is of, and its vertices, none where it is at rest."""
+    """The number of the mesh that a field was made from, and its vertices, none if at rest."""
     assert field.surface is not None, "fields of scenes know their meshes"
     shape = field.surface.positions
     alike = (
@@ -121,23 +122,23 @@ def _shape_of(field: DistanceField, meshes: Sequence[Surface]) -> tuple[int, Flo
 
 @dataclass(frozen=True, eq=False)
 class BakedSolids:
-    """The colliders of a bake; their fields are made when the first frame asks for them.
+    """The colliders of a bake; distance fields are made when a frame first needs them.
 
-    constants: of the bake.
+    constants: those of the bake.
     """
 
     constants: Arrays
 
     @classmethod
     def of(cls, constants: Arrays) -> Self | None:
-        """None of a bake without colliders, or of a version that did not keep them."""
+        """None for a bake without colliders, or of a version that did not keep them."""
         return cls(constants) if f"{_BEGUN}solids" in constants else None
 
     def at(self, frame: Arrays, *, blocking: bool) -> Solids | None:
-        """Those of a frame.
+        """The colliders of a frame; None where it has none.
 
         Args:
-            blocking: False: nothing is led out until all fields are made.
+            blocking: False: there are no colliders until all fields are made.
         """
         return _FrameSolids(self, frame, blocking) if "solids" in frame else None
 
@@ -159,11 +160,11 @@ class BakedSolids:
         return Begun(pose, self.colliders(own, blocking=True), kept)
 
     def colliders(self, frame: Arrays, *, blocking: bool) -> tuple[PosedCollider, ...]:
-        """As they stand in a frame.
+        """The colliders where they are in a frame.
 
         Raises:
             HairloomError: as `begun`.
-            NotMadeYetError: a field is being made, and nobody waits.
+            NotMadeYetError: a field is being made, and the call is not blocking.
         """
         try:
             solids, matrices = frame["solids"].tolist(), frame["solid_matrices"]
@@ -188,7 +189,7 @@ class BakedSolids:
         return SphereSetCollider(rows[:, :3], rows[:, 3])
 
     def _bent(self, number: int, blocking: bool) -> BentField:
-        """The field of a mesh, which may bend."""
+        """The field of a mesh that may deform."""
         if number not in self._fields:
             named = (self.constants[f"mesh_{number}_{name}"] for name in ("positions", "triangles"))
             surface = Surface(*named)
@@ -206,7 +207,7 @@ class BakedSolids:
 
 @dataclass(frozen=True, eq=False)
 class _FrameSolids:
-    """Fulfils `Solids`."""
+    """Implements `Solids`."""
 
     bake: BakedSolids
     frame: Arrays

@@ -1,15 +1,16 @@
-"""A bake on disk: one folder, which holds a whole bake or none.
+"""A bake on disk: one folder, which holds a complete bake or none.
 
-    cache.json              version, frames, rate, shapes, hashes (see `Facts`), and `frames`:
-    frames-hl-.../          the folder in it with
-        constants.npz       what all frames share
+    cache.json              version, frame range and rate, shapes, hashes (see `Facts`), and
+                            `frames`, the name of the folder below
+    frames-hl-.../
+        constants.npz       arrays that all frames share
         frame_000123.npz    one frame
-        cache.json          the same once more, so that this folder is a bake by itself
+        cache.json          a copy, so that this folder is a bake by itself
 
-Numpy's own format without pickles, so that a file from elsewhere can do no harm. Every writer has a
-folder for its frames that nobody else takes, and replaces cache.json at last, in one step. So two
-writers never mix their frames, no moment is without a whole bake, and none of this needs anything
-to be renamed that a reader holds open.
+Arrays are in NumPy's format without pickles, so that a file from elsewhere can do no harm. Every
+writer makes a frames folder with a unique name, and replaces cache.json last, in one step. So two
+writers never mix their frames, a complete bake is there at all times, and nothing that a reader
+holds open has to be renamed.
 """
 
 from __future__ import annotations
@@ -37,15 +38,15 @@ from ...exchange.files.stale_temp_files import MARK, is_stale, is_temporary, mar
 from .baked_solids import LISTS
 from .simulated import Arrays
 
-#: Of what a bake holds, other than what `layout` says. 2: strands may have points of their own.
+#: Version of the format, beyond what `layout` describes. 2: strands may have points of their own.
 #: 3: frames hold the strands that were led out of colliders.
 VERSION = 3
-#: Arrays that may have another length in each frame.
+#: Arrays whose length may differ between frames.
 _LISTS = frozenset({"led_strands", "led_points"}) | LISTS
 FACTS, CONSTANTS = "cache.json", "constants.npz"
 _OURS = re.compile(r"cache\.json|constants\.npz|frame_-?\d{5,7}\.npz")
 _FRAMES = re.compile(rf"frames-{MARK}")
-#: A frame has some hundred bytes there; JSON may take twenty times its size in memory.
+#: [bytes]: a frame takes some hundred, and JSON may take twenty times its size in memory.
 _LARGEST_FACTS = 1 << 25
 #: Frames kept in memory: the one that is shown, and its neighbours for motion blur.
 _KEPT = 3
@@ -53,13 +54,14 @@ _KEPT = 3
 
 @dataclass(frozen=True)
 class Facts:
-    """What is known of a bake without reading its frames.
+    """The description of a bake, in cache.json.
 
     owner, file: the object, and the name of its Blender file; empty where that was not saved.
     first, last: scene frames. frame_rate: [1/s].
-    form: what computed it. rig_hash, frame_hashes (one for each frame): see `simulated.hashes`.
+    form: the solver that computed it. rig_hash, frame_hashes (one per frame): see
+    `simulated.hashes`.
     hairloom: the version that wrote it.
-    figures: of the motion of hair; None of cloth, and where the version did not measure.
+    figures: measurements of the motion of hair; None for cloth, and from versions that took none.
     """
 
     owner: str
@@ -81,8 +83,8 @@ class Facts:
 class CacheWriter:
     """Writes a bake, frame after frame.
 
-    `finish` makes it whole, `publish` lets it replace the one before, and `abandon` removes what is
-    not whole.
+    `finish` completes it, `publish` lets it replace the bake before, and `abandon` removes an
+    incomplete one.
 
     Raises:
         HairloomError: the folder cannot be written, or holds files that are not of a bake.
@@ -108,8 +110,8 @@ class CacheWriter:
         self._save(CONSTANTS, arrays)
 
     def add(self, frame: int, arrays: Arrays, frame_hash: str) -> None:
-        """Frames come in order; all hold arrays of the same names, types and shapes, but for the
-        lengths of lists."""
+        """Frames come in order; all hold arrays of the same names, types and shapes, except for the
+        lengths of `_LISTS`."""
         layout = {name: [kind, list(shape)] for name, (kind, shape) in _layout_of(arrays).items()}
         assert not self._frame_hashes or layout == self._layout, "the frames of a bake are alike"
         self._layout = layout
@@ -117,7 +119,7 @@ class CacheWriter:
         self._save(_frame_name(frame), arrays)
 
     def finish(self, facts: Facts) -> None:
-        """All frames are written: they are a bake now, which nobody looks at yet.
+        """Complete the bake once all frames are written; it is not shown before `publish`.
 
         Raises:
             HairloomError: it cannot be written.
@@ -149,7 +151,7 @@ class CacheWriter:
         self._is_published = True
 
     def take_back(self) -> None:
-        """Show the earlier bake again, since another object's could not be published."""
+        """Undo `publish`, since the bake of another object could not be published."""
         if self._is_published and self._before is not None:
             write_bytes_atomic(self.folder / FACTS, self._before)
         elif self._is_published:
@@ -159,13 +161,13 @@ class CacheWriter:
     def clean(self) -> None:
         """Remove the frames of the bake before this one.
 
-        Those that another program holds open stay until a Blender that begins later bakes here.
+        Frames that another program holds open stay until a later Blender process bakes here.
         """
         if self._before is not None:
             _remove_frames(self.folder, _frames_named(self._before))
 
     def abandon(self) -> None:
-        """Leave the folder as it was; but what is whole may be hours of work, and stays."""
+        """Leave the folder as it was; but a complete bake may be hours of work, and stays."""
         if not self._is_whole:
             shutil.rmtree(self._frames, ignore_errors=True)
             _remove_if_empty(self.folder)
@@ -180,7 +182,7 @@ class CacheWriter:
 
 
 def check_bake_folder(folder: Path) -> None:
-    """Refuse a folder that no bake can be written into before hours of work; writes nothing.
+    """Refuse, before hours of work, a folder that no bake can be written into. Writes nothing.
 
     Raises:
         HairloomError: nothing can be written there, or it holds files that are not of a bake.
@@ -194,10 +196,10 @@ def check_bake_folder(folder: Path) -> None:
 
 
 class Cache:
-    """A bake that is read as its frames are asked for.
+    """A bake, whose frames are read on demand.
 
     Raises:
-        HairloomError: there is none, it is damaged, or of a newer version.
+        HairloomError: there is none, it is damaged, or of another version.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -258,7 +260,7 @@ class Cache:
 
 
 def _layout_of(arrays: Arrays) -> dict[str, tuple[str, tuple[int, ...]]]:
-    """Type and shape of each array; lists count as if they were empty."""
+    """Type and shape of each array; `_LISTS` count as if they were empty."""
     return {
         name: (str(a.dtype), (0, *a.shape[1:]) if name in _LISTS else tuple(a.shape))
         for name, a in arrays.items()
@@ -266,8 +268,8 @@ def _layout_of(arrays: Arrays) -> dict[str, tuple[str, tuple[int, ...]]]:
 
 
 def facts_in(folder: Path) -> Facts | None:
-    """What is known of the bake in a folder; None where there is none, or a damaged one, which
-    anybody may replace."""
+    """The facts of the bake in a folder; None where there is none, or a damaged one, which any
+    bake may replace."""
     try:
         cache = Cache.found(folder)
     except HairloomError:
@@ -282,14 +284,14 @@ def owner_and_file(folder: Path) -> tuple[str, str]:
 
 
 def delete(folder: Path) -> None:
-    """Delete a bake: its files only, and the folder if nothing else is in it.
+    """Delete the files of a bake, and the folder if nothing else is in it.
 
     Raises:
         HairloomError: a file cannot be deleted.
     """
     try:
         content = (folder / FACTS).read_bytes() if (folder / FACTS).is_file() else b""
-        # the facts go first: without them nobody takes what is left for a bake
+        # the facts go first: without them, the files that are left are no bake
         (folder / FACTS).unlink(missing_ok=True)
         _remove(folder / _frames_named(content))
         if folder.is_dir():
@@ -304,14 +306,18 @@ def _text(content: dict[str, Any], frames: str) -> bytes:
 
 
 def _checked_name(frames: object) -> str:
-    """A name of frames as we give them: no path, which could lead anywhere."""
+    """The name of a frames folder as we write them; refuses a path, which could lead anywhere.
+
+    Raises:
+        ValueError: it is none.
+    """
     if not isinstance(frames, str) or not (frames == "." or _FRAMES.fullmatch(frames)):
         raise ValueError("its frames are in no folder of its own")
     return frames
 
 
 def _frames_named(facts: bytes) -> str:
-    """The folder of frames that this content of cache.json names; "." where it names none."""
+    """The frames folder that this content of cache.json names; "." where it names none."""
     try:
         return _checked_name(json.loads(facts)["frames"])
     except (ValueError, TypeError, KeyError, RecursionError):
@@ -319,7 +325,7 @@ def _frames_named(facts: bytes) -> str:
 
 
 def _remove(folder: Path) -> None:
-    """Remove what is ours in a folder, and the folder if that was all.
+    """Remove the files of a bake from a folder, and the folder if it is empty then.
 
     Raises:
         OSError: a file cannot be removed.
@@ -336,7 +342,7 @@ def _remove_if_empty(folder: Path) -> None:
 
 
 def _remove_frames(folder: Path, name: str) -> None:
-    """Remove the frames of a bake that was replaced, but for those that a program holds open."""
+    """Remove the frames of a replaced bake, except for those that a program holds open."""
     if name != ".":
         shutil.rmtree(folder / name, ignore_errors=True)
         return
@@ -347,7 +353,7 @@ def _remove_frames(folder: Path, name: str) -> None:
 
 
 def _remove_stale(folder: Path) -> None:
-    """Remove frames that nobody looks at and whose writers are gone."""
+    """Remove frames that cache.json does not name and whose writers are gone."""
     facts = folder / FACTS
     current = _frames_named(facts.read_bytes()) if facts.is_file() else ""
     for path in folder.iterdir():
@@ -357,7 +363,7 @@ def _remove_stale(folder: Path) -> None:
 
 
 def _check_ours(folder: Path) -> None:
-    """Raise HairloomError if a folder holds what is not of a bake."""
+    """Raise HairloomError if a folder holds other files than those of a bake."""
     foreign = [
         path.name
         for path in folder.iterdir()
@@ -410,7 +416,7 @@ def _read_facts(path: Path) -> dict[str, Any]:
 
 
 def _check(facts: Facts) -> None:
-    """Raise ValueError or TypeError for what no bake says of itself."""
+    """Raise ValueError or TypeError for facts that no bake can have."""
     if not (isinstance(facts.first, int) and isinstance(facts.last, int)):
         raise TypeError("its frames are no whole numbers")
     texts = (

@@ -1,7 +1,7 @@
-"""The hashes of what a groom's bake depends on.
+"""The hashes of the inputs that a groom's bake depends on.
 
 A rig hash is the same in every frame of the scene: it is taken from the original data, in object
-space and before modifiers. What modifiers and animation change shows in the hash of each frame.
+space and before modifiers. Changes by modifiers and animation show in the frame hashes.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ def groom_rig_hash(
     settings: GroomSettings,
     scene: bpy.types.Scene,
 ) -> str:
-    """Named hashes, see `simulated.hashes`; messages say by these names what has changed."""
+    """Named hashes, see `simulated.hashes`; messages report changes by these names."""
     grown: dict[str, tuple[Hashed, ...]] = {}
     if settings[ChildrenSettings].method != "none":
         grown["children"] = (
@@ -94,10 +94,10 @@ def groom_frame_hash(
     pose: Pose,
     depsgraph: bpy.types.Depsgraph,
 ) -> str:
-    """Named hashes of what drives a groom in the scene's frame.
+    """Named hashes of the inputs that drive a groom in the scene's frame.
 
     Args:
-        head: that carries it. pose: where it is, see `poses.read_pose`.
+        head: the one that carries it. pose: see `poses.read_pose`.
     """
     ties = _places(holders_of(hair), depsgraph)
     style = _style(hair, depsgraph)
@@ -118,13 +118,13 @@ def groom_frame_hash(
 
 
 def _other_grooms(hair: bpy.types.Object, scene: bpy.types.Scene) -> list[bpy.types.Object]:
-    """Those that this one may feel, wherever they are."""
+    """The grooms that this one may feel, wherever they are."""
     grooms = (each for each in scene.objects if each.type == "CURVES" and each != hair)
     return [each for each in grooms if not (each.data.hairloom.baked_in or each.hide_render)]
 
 
 def _shape_of_groom(other: bpy.types.Object) -> str:
-    """What another groom is made from."""
+    """The hash of another groom's curves and of the settings that make its guides and children."""
     settings = GroomSettings.of(other)
     made = settings[GuideSettings], _children(other, settings), *_curves_parts(other)
     return hashes(groom=made)
@@ -133,7 +133,7 @@ def _shape_of_groom(other: bpy.types.Object) -> str:
 def _place_of_groom(
     other: bpy.types.Object, known: bpy.types.Object | None, depsgraph: bpy.types.Depsgraph
 ) -> str:
-    """What drives another groom in the scene's frame, but for its colliders and forces.
+    """The hash of what drives another groom in the scene's frame, without colliders and forces.
 
     Args:
         known: a head that is hashed already.
@@ -145,14 +145,15 @@ def _place_of_groom(
 
 
 def _children(hair: bpy.types.Object, settings: GroomSettings) -> ChildrenSettings:
-    """As they are grown, but for keyed water: no frame grows others."""
+    """The settings that children are grown with; without wetness where hair data is animated, since
+    keys of wetness grow no other children."""
     if hair.data.animation_data is None:
         return settings[ChildrenSettings]
     return settings_of(hair.data.hairloom.children, ChildrenSettings)
 
 
 def _style(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> tuple[Floats | Ints, ...]:
-    """The curves of the frame, where the style is animated."""
+    """The frame's curves where the style is animated, else nothing."""
     if not _dynamics(hair).animated_style:
         return ()
     strands = read_curves(hair, depsgraph).strands
@@ -160,12 +161,13 @@ def _style(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> tuple[Floa
 
 
 def settings_part(hair: bpy.types.Object) -> str:
-    """The part of a frame hash that stands for the settings."""
+    """The part of a frame hash that comes from the settings."""
     return hashes(settings=_dynamics(hair))
 
 
 def _dynamics(hair: bpy.types.Object) -> DynamicsSettings:
-    """Those alone, as each frame asks for them. All forms of the solver give the same motion."""
+    """The dynamics settings alone, which each frame needs. The device is left out, since the motion
+    is the same on all of them."""
     settings = settings_of(hair.hairloom.dynamics, DynamicsSettings)
     return replace(heavier(settings, hair.data.hairloom.shading.wetness), device="automatic")
 
@@ -173,15 +175,15 @@ def _dynamics(hair: bpy.types.Object) -> DynamicsSettings:
 def collider_places(
     owner: bpy.types.Object, head: bpy.types.Object | None, depsgraph: bpy.types.Depsgraph
 ) -> tuple[Floats | str, ...]:
-    """Where the colliders of a groom or fin are now, and which collide; but for the head: that is
-    its pose."""
+    """Where the colliders of a groom or fin are now, and which of them collide; without the head,
+    which is in the pose."""
     return _places([obj for obj in sources_of(owner, head) if obj != head], depsgraph)
 
 
 def _places(
     objects: Iterable[bpy.types.Object], depsgraph: bpy.types.Depsgraph
 ) -> tuple[Floats | str, ...]:
-    """Where they are now and in which shape, and which of them count."""
+    """Where objects are now, in which shape, and which are left out."""
     places: list[Floats | str] = []
     for obj in objects:
         places += [f"{is_left_out(obj, depsgraph)}", matrix_of(obj, depsgraph)]
@@ -193,7 +195,7 @@ def _places(
 def collider_shapes(
     owner: bpy.types.Object, head: bpy.types.Object | None
 ) -> tuple[Floats | Ints | str, ...]:
-    """What a groom or fin collides with, wherever that is."""
+    """The shapes of the colliders of a groom or fin, wherever they are."""
     parts: list[Floats | Ints | str] = []
     for obj in sources_of(owner, head):
         shape = shape_of(obj)
@@ -204,7 +206,7 @@ def collider_shapes(
 
 
 def _tie_shapes(hair: bpy.types.Object) -> tuple[Floats | Ints | str, ...]:
-    """What holds hair beside its roots, and where the artist has put it."""
+    """The hair ties and the tip surface of hair, and where the artist has put them."""
     parts: list[Floats | Ints | str] = []
     for obj in holders_of(hair):
         parts.append(f"{obj.name} {obj.type} {obj == hair.hairloom.tip_surface}")
@@ -220,7 +222,7 @@ def _tie_shapes(hair: bpy.types.Object) -> tuple[Floats | Ints | str, ...]:
 
 
 def _parting_shapes(hair: bpy.types.Object) -> tuple[Floats | str, ...]:
-    """As `parting_state`, but named, so that it is the same after the file was loaded again."""
+    """As `parting_state`, but by names, which stay the same when the file is loaded again."""
     names = {f"{obj.session_uid} {obj.type}": obj.name for obj in partings_of(hair)}
     return tuple(
         names[part] if isinstance(part, str) else part.astype(np.float64)
@@ -236,7 +238,7 @@ def frame_rate(scene: bpy.types.Scene) -> float:
 def _paint(
     hair: bpy.types.Object, head: bpy.types.Object | None, *names: str
 ) -> tuple[Floats | str, ...]:
-    """What is painted, see `masks.Canvas`; the name alone where modifiers make it."""
+    """The values of masks, see `masks.Canvas`; only the name of one that modifiers make."""
 
     def values(name: str) -> Floats | str:
         if head is not None and head.type == "MESH" and name in weight_names(head):

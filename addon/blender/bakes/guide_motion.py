@@ -1,4 +1,4 @@
-"""Guides over a range of frames, as a bake has them."""
+"""Guides over a range of frames, such as those of a bake."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from .stale_bakes import stale_notes
 class GuideMotion(Protocol):
     """Guides over a range of frames.
 
-    rig: what they belong to. frame_rate: [1/s]. notes: what the artist should know.
+    rig: of the guides. frame_rate: [1/s]. notes: for the artist.
     """
 
     @property
@@ -49,7 +49,7 @@ class BakedGuides:
 
     @classmethod
     def of(cls, hair: bpy.types.Object, frames: range | None = None) -> Self:
-        """Those of a groom's bake; None is all of its frames.
+        """The guides of a groom's bake; frames None: all that it has.
 
         Raises:
             HairloomError: no bake, a damaged one, or frames that it does not hold.
@@ -66,7 +66,7 @@ class BakedGuides:
 
     @classmethod
     def in_folder(cls, folder: Path, frames: range | None = None) -> Self:
-        """Those of the bake in a folder.
+        """The guides of the bake in a folder.
 
         Raises:
             HairloomError: as `of`.

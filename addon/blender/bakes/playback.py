@@ -1,6 +1,6 @@
-"""Bakes as they are shown again: frames for the live grooms, and curves of their own in renders.
+"""Playback of bakes: frames for the live grooms, and for the curves that renders show instead.
 
-In a render nothing is evaluated and nothing simulated: strands come from the bake alone.
+Renders evaluate and simulate nothing: strands come from the bake alone.
 """
 
 from __future__ import annotations
@@ -28,10 +28,10 @@ from .simulated import Arrays
 
 
 class _Known:
-    """What is kept of bakes, by folder.
+    """Bakes that are kept in memory, by folder.
 
-    caches: which file of facts it was, and the bake. rigs: of which bake, and its rig. solids: of
-    which bake, and its colliders.
+    caches: time and inode of cache.json, and the bake. rigs: the bake, and its rig. solids: the
+    bake, and its colliders.
     problems: why a bake cannot be shown in renders; reported once.
     unshown: session numbers of fins that are being baked.
     lock: renders read bakes in their own thread.
@@ -82,8 +82,8 @@ def cache_of(obj: bpy.types.Object) -> Cache | None:
 
 
 def cache_if_baked(obj: bpy.types.Object) -> Cache | None:
-    """The same for files and pictures: None where the object was never baked. One whose bake is
-    gone, or lies where this machine does not see it, would be written in another motion.
+    """As `cache_of`, for writing files and pictures: None only where the object was never baked.
+    If a bake is gone, or out of this machine's reach, other motion would be written without notice.
 
     Raises:
         HairloomError: it was baked and its bake is not there, or is damaged.
@@ -118,8 +118,8 @@ def rig_in(cache: Cache) -> BakedRig:
 def solids_in(
     cache: Cache, frame: int, subframe: float = 0.0, *, blocking: bool = True
 ) -> Solids | None:
-    """What the hair of a groom stayed out of, in time as `strands_in`; None where its bake does not
-    say.
+    """The colliders that the hair of a groom stayed out of, between frames as `strands_in`; None
+    where its bake holds none.
 
     Args:
         blocking: see `BakedSolids.at`.
@@ -143,8 +143,8 @@ def solids_in(
 def strands_in(cache: Cache, frame: int, subframe: float = 0.0) -> Floats:
     """All strands of a groom, (point_count, 3) world [m].
 
-    Before the first frame and after the last one they stay as they are in these. Between two
-    frames, where motion blur looks, they go straight.
+    Before the first frame and after the last one they stay as in that frame. Between two frames,
+    where motion blur samples, they are interpolated linearly.
 
     Raises:
         HairloomError: the bake is damaged.
@@ -153,7 +153,7 @@ def strands_in(cache: Cache, frame: int, subframe: float = 0.0) -> Floats:
 
 
 def guides_in(cache: Cache, frame: int, subframe: float = 0.0) -> Floats:
-    """The guides of a groom, (guide_count, cv_count, 3) world [m]; in time as `strands_in`.
+    """The guides of a groom, (guide_count, cv_count, 3) world [m]; between frames as `strands_in`.
 
     Raises:
         HairloomError: the bake is damaged.
@@ -173,14 +173,14 @@ def _between(
 
 
 def _frames_beside(cache: Cache, frame: int, subframe: float) -> tuple[int, int]:
-    """The baked frames between which a moment is; twice the same where it is in one."""
+    """The baked frames before and after a time; twice the same frame where it is exactly in one."""
     facts = cache.facts
     here = min(max(frame, facts.first), facts.last)
     return here, here + bool(subframe and facts.first <= frame < facts.last)
 
 
 def pose_in(cache: Cache, frame: int, subframe: float = 0.0) -> Pose:
-    """Where the body of a groom was, and what its hair stayed out of; in time as `strands_in`.
+    """The pose of a groom, with its colliders; between frames as `strands_in`.
 
     Raises:
         HairloomError: the bake is damaged.
@@ -202,9 +202,9 @@ def pose_in(cache: Cache, frame: int, subframe: float = 0.0) -> Pose:
 
 
 def show_fins(scene: bpy.types.Scene) -> None:
-    """Write the frame that the scene goes to into all meshes of baked fins, previewed or not.
+    """Write the scene's new frame into all meshes of baked fins, previewed or not.
 
-    Beyond the baked frames, a fin is where the animation carries it.
+    Beyond the baked frames, a fin only follows the animation.
     """
     for obj in bpy.data.objects if has_fins() else ():
         is_shown = is_baked_fin(obj) and obj.session_uid not in _known.unshown
@@ -215,7 +215,7 @@ def show_fins(scene: bpy.types.Scene) -> None:
 
 @contextmanager
 def without_fins(objects: Sequence[bpy.types.Object]) -> Iterator[None]:
-    """Inside the block the bakes of these fins are not shown: they are being made again."""
+    """Do not show the bakes of these fins inside the block, where they are baked again."""
     _known.unshown = {obj.session_uid for obj in objects}
     try:
         yield
@@ -224,7 +224,7 @@ def without_fins(objects: Sequence[bpy.types.Object]) -> Iterator[None]:
 
 
 def is_baked_fin(obj: bpy.types.Object) -> bool:
-    """Whether it is a fin whose bake is to be shown, if there is one."""
+    """Whether an object is a fin whose bake, if there is one, is to be shown."""
     return bool(
         obj.type == "MESH"
         and obj.hairloom.bake.folder
@@ -242,7 +242,7 @@ def _show_fin(obj: bpy.types.Object, folder: Path, frame: int) -> None:
 
 
 def show_in_copies(scene: bpy.types.Scene) -> None:
-    """Write the frame that the scene goes to into all curves that show a bake in renders."""
+    """Write the scene's new frame into all curves that show a bake in renders."""
     for curves in bpy.data.hair_curves:
         folder = shown_folder_of(curves)
         if folder is not None:
@@ -263,9 +263,10 @@ def _write(curves: bpy.types.Curves, folder: Path, scene: bpy.types.Scene) -> No
 
 
 def _attempt(folder: Path, show: Callable[[], object]) -> None:
-    """Show a bake, which may be anybody's and hold anything; what it raises is reported once.
+    """Show a bake, which may come from anywhere and be broken in any way; report an error once.
 
-    Blender would go on showing an error of a handler at every frame, and skip the bakes after it.
+    If it went up to Blender, Blender would print it at every frame, and the bakes after this one
+    would be skipped.
     """
     try:
         show()
@@ -288,7 +289,7 @@ def is_played() -> bool:
 
 
 def is_dragged() -> bool:
-    """Whether the artist drags the playhead."""
+    """Whether the playhead is being dragged."""
     screens = [window.screen for window in bpy.context.window_manager.windows]
     return any(screen.is_scrubbing for screen in screens)
 
@@ -299,13 +300,13 @@ def rendering(begins: bool) -> None:
 
 
 def needs_copies() -> bool:
-    """Copies are for renders, and for exporters that go through the frames; while an artist
-    plays or drags in the viewport, where they are hidden, they wait."""
+    """Whether to update the copies that renders and exporters read in each frame. The viewport
+    hides them, so they need no update while an animation plays or the playhead is dragged."""
     return _known.is_rendering or bpy.app.background or not (is_played() or is_dragged())
 
 
 def drop(folder: Path) -> None:
-    """The bake in this folder is gone, or another one."""
+    """Forget a folder whose bake is gone or was replaced."""
     with _known.lock:
         for known in (_known.caches, _known.rigs, _known.solids, _known.problems):
             known.pop(folder, None)

@@ -1,4 +1,4 @@
-"""What moves: a groom or a fin, as the window's Play, the timeline and a bake see it.
+"""The interface of grooms and fins for previews, the timeline and bakes.
 
 Rig and frame hashes consist of named hashes, such as "hair=3f2a settings=91bc", so that messages
 can say which of them has changed.
@@ -19,7 +19,7 @@ from ..base.objects import Body
 type Arrays = dict[str, NDArray[Any]]
 type Hashed = NDArray[Any] | Settings | str | float | None
 
-#: Raise it when the same input gives other motion than before, so that old bakes say so.
+#: Increase it when the same input gives other motion than before, so that old bakes become stale.
 SOLVER_VERSION = 6
 CLOTH_VERSION = 2
 
@@ -28,9 +28,9 @@ class Simulated(Protocol):
     """One groom or fin in motion.
 
     uid: session number of its object. is_playing: whether it is being simulated.
-    is_stale: whether what it was read from has been edited since.
-    All but `uid`, `name`, `bodies`, `stop` and `forget` raise HairloomError when what it is made
-    of is gone or broken.
+    is_stale: whether its inputs have been edited since they were read.
+    All but `uid`, `name`, `bodies`, `stop` and `forget` raise HairloomError when an input is gone
+    or broken.
     """
 
     is_playing: bool
@@ -44,18 +44,19 @@ class Simulated(Protocol):
 
     @property
     def bodies(self) -> tuple[Body, ...]:
-        """Its object, and what that grows on."""
+        """Its object, and the surface that carries it."""
 
     @property
     def is_made(self) -> bool:
-        """Whether nothing that it needs to be simulated is being made beside the window's work."""
+        """Whether everything that the simulation needs is built; else it is being built in the
+        background."""
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What the artist should know, each with its remedy."""
+        """For the artist, each with its remedy."""
 
     def rest(self, depsgraph: bpy.types.Depsgraph) -> None:
-        """In its style, where its body is now, at no speed."""
+        """Put it into its style, where its body is now, without velocity."""
 
     def play(
         self, depsgraph: bpy.types.Depsgraph, *, blocking: bool = True, is_frame: bool = False
@@ -63,41 +64,43 @@ class Simulated(Protocol):
         """Get ready to be simulated, from rest.
 
         Args:
-            blocking: False: do not wait for what is to be made first, such as fields of colliders.
-            is_frame: whether it begins in this very frame if it can: what takes less than a tenth
-                of a second is waited for all the same.
+            blocking: False: do not wait for what has to be built first, such as distance fields of
+                colliders.
+            is_frame: whether to begin in this very frame if possible: builds of less than a tenth
+                of a second are waited for even if not blocking.
 
         Raises:
-            NotMadeYetError: something is being made, and nobody waits; it is as at rest until then.
+            NotMadeYetError: something is being built, and the call does not wait; it stays at rest
+                until then.
         """
 
     def stop(self, depsgraph: bpy.types.Depsgraph) -> None:
-        """Simulate no longer; back to rest."""
+        """Stop simulating and go back to rest."""
 
     def forget(self) -> None:
-        """Nobody waits any more for what is on its way; touches no object."""
+        """Cancel what is being built in the background; touches no object."""
 
     def advance(self, depsgraph: bpy.types.Depsgraph, duration: float) -> None:
-        """Simulate the time [s] in which everything moved to where it is now."""
+        """Simulate the time [s] in which all bodies moved to where they are now."""
 
     def constants(self) -> Arrays:
-        """What a bake needs once: to show its frames without reading anything of the scene."""
+        """The arrays that a bake holds once, to show its frames without reading the scene."""
 
     def recorded(self) -> Arrays:
-        """This frame."""
+        """The arrays of this frame, for a bake."""
 
     def show_recorded(self, frame: Arrays, solids: Solids | None = None) -> None:
-        """Show a frame of a bake in place of what was simulated.
+        """Show a frame of a bake instead of the simulation.
 
         Args:
-            solids: what hair stayed out of in it, where that is known.
+            solids: the frame's colliders, where the bake holds them.
         """
 
     def rig_hash(self, depsgraph: bpy.types.Depsgraph) -> str:
-        """Hashes of what a bake depends on in all its frames."""
+        """Hashes of the inputs that all frames of a bake depend on."""
 
     def frame_hash(self, depsgraph: bpy.types.Depsgraph) -> str:
-        """Hashes of what drives this frame."""
+        """Hashes of the inputs that drive this frame."""
 
 
 def hashes(**parts: Hashed | tuple[Hashed, ...]) -> str:
@@ -114,7 +117,7 @@ def differences(known: str, now: str) -> tuple[str, ...]:
 
 
 def _parts(named: str) -> dict[str, str]:
-    """A plain hash counts as one part without a name of its own."""
+    """Hashes by name; a plain hash counts as one part."""
     pairs = (part.rpartition("=") for part in named.split())
     return {name or "what it was made from": value for name, _, value in pairs}
 

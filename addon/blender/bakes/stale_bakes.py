@@ -1,4 +1,4 @@
-"""What has changed since hair was baked: a file of the bake's motion is of the hair as it was."""
+"""Changes since hair was baked, for notes on files that are written with a stale bake's motion."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from .simulated import differences
 def changed_since(
     hair: bpy.types.Object, cache: Cache, depsgraph: bpy.types.Depsgraph
 ) -> tuple[str, ...]:
-    """What is not as it was baked, in words; nothing where the bake is up to date.
+    """The names of the inputs that have changed since the bake; empty where it is up to date.
 
-    What moves the hair is compared in the scene's frame, if that was baked.
+    The inputs of frames are compared in the scene's frame only, if that was baked.
 
     Raises:
         HairloomError: the bake is damaged.
@@ -38,7 +38,7 @@ def changed_since(
 def stale_notes(
     hair: bpy.types.Object, cache: Cache, depsgraph: bpy.types.Depsgraph
 ) -> tuple[str, ...]:
-    """A sentence for the artist; nothing where the bake is up to date.
+    """A sentence for the artist; empty where the bake is up to date.
 
     Raises:
         HairloomError: the bake is damaged.
@@ -58,7 +58,7 @@ def _moved_otherwise(
     cache: Cache,
     depsgraph: bpy.types.Depsgraph,
 ) -> tuple[str, ...]:
-    """What drives the hair otherwise in this frame than it did."""
+    """The names of this frame's inputs that have changed since the bake."""
     baked = playback.rig_in(cache)
     carrier, count = None, None
     if head is not None and baked.rests.head is not None and baked.rig.head is not None:
@@ -66,7 +66,7 @@ def _moved_otherwise(
         count = len(baked.rig.head.positions)
     try:
         pose = read_pose(Body(Handle.of(hair), baked.rests.hair), carrier, count, depsgraph)
-    except HairloomError:  # it has other vertices now, or is nowhere
+    except HairloomError:  # another vertex count now, or values that are not finite
         return ("pose",)
     now = groom_frame_hash(hair, head if carrier else None, pose, depsgraph)
     return differences(cache.frame_hash(depsgraph.scene.frame_current), now)
