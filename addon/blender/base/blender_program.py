@@ -6,7 +6,7 @@ import bpy
 
 
 def blender_command() -> tuple[str, ...] | None:
-    """Blender itself as a Python; None where it is a module."""
+    """Blender's own executable as a Python interpreter; None where Blender is a module."""
     if not bpy.app.binary_path:
         return None
     quietly = ("--background", "--factory-startup", "--python-exit-code", "1")

@@ -9,11 +9,10 @@ import numpy as np
 
 
 def digest(*parts: Any, size: int = 16) -> str:
-    """Of arrays with their dtypes and shapes, of bytes as they are, and of anything else by its
-    `repr`, one after the other.
+    """The digest of parts in order: arrays with dtype and shape, bytes, the `repr` of others.
 
     Args:
-        size: bytes, each of which is two characters.
+        size: [bytes], two characters each.
     """
     state = hashlib.blake2b(digest_size=size)
     for part in parts:

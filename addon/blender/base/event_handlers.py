@@ -1,11 +1,11 @@
-"""What Blender calls at its events, put into its lists and taken out again."""
+"""Adding handlers to Blender's lists in bpy.app.handlers, and removing them."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from typing import Any
 
-#: one of the lists in bpy.app.handlers, and what is in it
+#: one of the lists in bpy.app.handlers, and a handler for it
 type Listed = tuple[list[Any], Callable[..., None]]
 
 
@@ -15,7 +15,7 @@ def append(listed: Iterable[Listed]) -> None:
 
 
 def remove(listed: Iterable[Listed]) -> None:
-    """Those that are still there: any script may have emptied a list."""
+    """Remove handlers that are still there: any script may have emptied a list."""
     for handlers, handler in listed:
         if handler in handlers:
             handlers.remove(handler)

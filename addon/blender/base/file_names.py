@@ -1,4 +1,4 @@
-"""Files that are called after the hair in them."""
+"""Names of files after the hair in them."""
 
 from __future__ import annotations
 
@@ -9,20 +9,21 @@ from ...exchange.files.names import distinct_names, no_device, plain_name
 
 
 def file_stem(hair_name: str) -> str:
-    """What a file is called after the hair in it: no character that a file system refuses."""
+    """A file's name after the hair in it, without characters or names that file systems refuse."""
     return no_device(plain_name(hair_name))
 
 
 def in_own_folder(path: Path) -> Path:
-    """Where the files of an asset go if they are to have a folder of their own, named after it,
-    beside where `path` would be; one that is in such a folder stays."""
+    """The path with a folder of the asset's own, named after it, put in between; a path that is in
+    such a folder stays as it is."""
     return path if path.parent.name == path.stem else path.parent / path.stem / path.name
 
 
 def files_of(path: Path, hair_names: Sequence[str]) -> list[Path]:
-    """Where each hair goes; of several in a file each, it has its name behind the file's.
+    """The file of each hair; where there are several, with the hair's name appended.
 
-    Names that differ for Blender alone, such as "Hair.001" and "hair_001", get a number.
+    Names that differ for Blender but not as file names, such as "Hair.001" and "hair_001", get a
+    number.
     """
     if len(hair_names) == 1:
         return [path]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-#: The most frames that one tick makes up for. Further ones are dropped: making up for all of a slow
+#: Maximum number of frames per tick. Further ones are dropped: to catch up completely after a slow
 #: frame would make the next one slower still.
 MAX_AT_ONCE = 4
 
@@ -27,5 +27,5 @@ class FrameClock:
         return frames
 
     def skip(self, now: float) -> None:
-        """Time until now does not count: hair is held."""
+        """Leave out the time until now, as while hair is held."""
         self._done_until = now

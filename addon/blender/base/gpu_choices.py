@@ -1,12 +1,11 @@
-"""What an artist chooses about the GPU of this machine, and how much of its memory is taken."""
+"""The artist's settings for this machine's GPU, and how much of its memory is in use."""
 
 from __future__ import annotations
 
 from ...render import gpu_memory, gpu_objects
 from ...render.capabilities import choose_image_atomics
 
-#: whether drawing may use atomics of images; those of render/capabilities.py: name, label,
-#: description
+#: whether drawing may use image atomics, see render/capabilities.py: name, label, description
 ATOMICS = (
     ("automatic", "Automatic", "Use image atomics if a short test shows that they work"),
     (
@@ -15,12 +14,12 @@ ATOMICS = (
         "Draw as on GPUs without image atomics; strands are noisy while the view moves",
     ),
 )
-#: [MB] that hair may take at least, and where nobody chooses
+#: [MB] the lowest limit that can be set, and the default
 MIN_MEMORY, DEFAULT_MEMORY = 128, gpu_memory.DEFAULT
 
 
 def choose(*, image_atomics: str = "automatic", memory: int = DEFAULT_MEMORY) -> None:
-    """From the next draw on.
+    """Apply settings from the next draw on.
 
     Args:
         image_atomics: the name of one of ATOMICS. memory: [MB].
@@ -30,17 +29,17 @@ def choose(*, image_atomics: str = "automatic", memory: int = DEFAULT_MEMORY) ->
 
 
 def memory_in_use() -> float:
-    """Of the GPU, by all that Hairloom draws [MB]."""
+    """GPU memory that Hairloom uses now [MB]."""
     return gpu_objects.bytes_in_use() / gpu_memory.MEGABYTE
 
 
 def peak_memory() -> float:
-    """The most that was in use at once since Blender started [MB]."""
+    """Peak GPU memory that Hairloom has used since Blender started [MB]."""
     return gpu_objects.peak_bytes() / gpu_memory.MEGABYTE
 
 
 def memory_problem() -> str:
-    """What to do where more of the GPU's memory is taken than may be; else empty."""
+    """A message if Hairloom uses more of the GPU's memory than its limit; else empty."""
     budget = gpu_memory.budget() / gpu_memory.MEGABYTE
     if memory_in_use() <= budget:
         return ""

@@ -1,7 +1,7 @@
 """The GPU context of this process, created if there is none, and the GPU's name.
 
-In the background Blender makes a context only when asked. Where there is no driver that draws,
-asking crashes Blender; so another process tries first.
+In background mode Blender creates a context only on request. Where there is no driver that draws,
+the request crashes Blender; so another process tries first.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from ...errors import HairloomError
 from ...exchange.files.child_process import run_child
 from ...render import gpu_objects
 
-#: Exits with 0 where OpenGL or Vulkan finds a device without a window, as Blender's do.
+#: Exits with 0 if OpenGL or Vulkan finds a device without a window, in the way that Blender does.
 _TRIAL = """
 import ctypes, sys
 
@@ -59,7 +59,7 @@ sys.exit(0 if works(opengl) or works(vulkan) else 1)
 _REFUSAL = "gpu."
 #: Seconds for a driver to answer, on a busy machine too.
 _PATIENCE = 60.0
-#: Seconds until a window context is looked for again.
+#: Seconds between checks for a window context.
 _PAUSE = 0.05
 
 
@@ -67,7 +67,7 @@ def ensure_gpu() -> None:
     """A GPU context for this thread in background mode.
 
     Raises:
-        HairloomError: there is none to be had.
+        HairloomError: there is no driver for one.
     """
     if not bpy.app.background:
         return
@@ -82,23 +82,23 @@ def ensure_gpu() -> None:
 
 @cache
 def can_draw() -> bool:
-    """Whether there is a driver that draws; elsewhere than on Linux there always is."""
+    """Whether there is a driver that draws; always, except on Linux."""
     if not sys.platform.startswith("linux"):
         return True
     try:
         return run_child([sys.executable, "-I", "-c", _TRIAL], seconds=_PATIENCE).returncode == 0
     except TimeoutExpired:  # Blender would wait for the same driver
         return False
-    except OSError:  # this Blender has no Python of its own to ask with
+    except OSError:  # this Blender has no Python executable to try it with
         return True
 
 
 @contextmanager
 def gpu_refusals() -> Iterator[None]:
-    """What the GPU refuses inside, such as memory, becomes a message.
+    """Turn errors of the GPU inside the block, such as a lack of memory, into a HairloomError.
 
     Raises:
-        HairloomError: it has refused something.
+        HairloomError: the GPU has refused something.
     """
     try:
         yield
@@ -113,7 +113,7 @@ def gpu_refusals() -> Iterator[None]:
 
 
 def is_interrupted() -> bool:
-    """Whether there is no window context, as between a window's closing and the next redraw."""
+    """Whether there is no window context, as after a window was closed, until the next redraw."""
     if bpy.app.background:
         return False
     try:
@@ -124,7 +124,7 @@ def is_interrupted() -> bool:
 
 
 def free_soon() -> None:
-    """Once whatever goes just now is gone, free what nothing uses any more on the GPU."""
+    """Free unused GPU objects from a timer, once the caller's own references are gone too."""
     is_main = threading.current_thread() is threading.main_thread()
     if bpy.app.background or not is_main or bpy.app.timers.is_registered(_free_unused):
         return
@@ -146,5 +146,5 @@ def gpu_in_use() -> dict[str, str]:
             "renderer": gpu.platform.renderer_get(),
             "driver": gpu.platform.version_get(),
         }
-    except SystemError:  # what gpu raises if no context was ever created
+    except SystemError:  # raised by gpu if no context was ever created
         return {"backend": "", "renderer": "", "driver": ""}

@@ -1,6 +1,6 @@
-"""Pictures to and from files and Blender's images, and the contact sheet.
+"""Pictures to and from files and Blender's images, and contact sheets.
 
-Textures go through OpenImageIO where this Python has it, else through Blender's own images.
+Textures are read and written by OpenImageIO where this Python has it, else by Blender's images.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ def write_png(path: Path, linear: Floats) -> None:
 def write_texture(
     path: Path, pixels: Floats, *, is_color: bool, depth: str, is_packed: bool = False
 ) -> None:
-    """Write a texture, see `texture_files.write_texture`; without OpenImageIO as PNG in 8 bits.
+    """Write a texture, see `texture_files.write_texture`; without OpenImageIO only as 8-bit PNG.
 
     Args:
         pixels: (height, width) or (height, width, 1, 3 or 4), row 0 at the bottom.
@@ -84,8 +84,8 @@ def read_image(image: bpy.types.Image, *, is_color: bool, place: str) -> Floats:
     """The pixels of one of Blender's images, saved or not, in its own size.
 
     Args:
-        is_color: convert to scene-linear colour; else values as stored, whatever its colour space.
-        place: names it in error messages.
+        is_color: convert to scene-linear colour; else values as stored, whatever the colour space.
+        place: the picture's name in error messages.
 
     Returns:
         (height, width, 4) float32, row 0 at the bottom, straight alpha.
@@ -93,7 +93,7 @@ def read_image(image: bpy.types.Image, *, is_color: bool, place: str) -> Floats:
     Raises:
         HairloomError: its file is missing or broken, or it is too large.
     """
-    width, height = image.size  # loads it, if that has not happened
+    width, height = image.size  # loads the image, if that has not happened
     if not (width and height and image.has_data):
         raise HairloomError(
             "this picture has no pixels: its file is missing or broken",
@@ -105,11 +105,11 @@ def read_image(image: bpy.types.Image, *, is_color: bool, place: str) -> Floats:
     image.pixels.foreach_get(pixels)
     pixels = pixels.reshape(height, width, 4)
     is_coded = image.colorspace_settings.name == "sRGB"
-    if not image.is_float:  # stored as it is
+    if not image.is_float:  # pixels are the stored values
         if is_color and is_coded:
             pixels[..., :3] = srgb_decoded(pixels[..., :3])
         return pixels
-    # scene-linear already, and multiplied with alpha
+    # float images are scene-linear already, and premultiplied
     if image.alpha_mode != "CHANNEL_PACKED":
         alpha = pixels[..., 3:]
         np.divide(pixels[..., :3], alpha, out=pixels[..., :3], where=alpha > 0.0)
@@ -119,15 +119,14 @@ def read_image(image: bpy.types.Image, *, is_color: bool, place: str) -> Floats:
 
 
 def display_encoded(linear: Floats) -> Floats:
-    """Scene-linear premultiplied to sRGB-coded straight alpha, (..., 4) (IEC 61966-2-1)."""
+    """Scene-linear premultiplied to sRGB-encoded straight alpha, (..., 4) (IEC 61966-2-1)."""
     straight = straight_alpha(linear)
     coded = srgb_encoded(np.clip(straight[..., :3], 0.0, 1.0))
     return np.concatenate([coded, straight[..., 3:]], axis=-1).astype(np.float32)
 
 
 def straight_alpha(premultiplied: Floats) -> Floats:
-    """Colours (..., 4) that are not multiplied with alpha, black where there is none; alpha in
-    [0, 1]."""
+    """Colours (..., 4) with straight alpha in [0, 1]; black where alpha is 0."""
     color, alpha = premultiplied[..., :3], np.clip(premultiplied[..., 3:], 0.0, 1.0)
     straight = np.divide(color, alpha, out=np.zeros_like(color), where=alpha > 0.0)
     return np.concatenate([straight, alpha], axis=-1)
@@ -146,7 +145,7 @@ def contact_sheet(pictures: list[Floats], columns: int) -> Floats:
 
 
 def save_coded_png(path: Path, coded: Floats, *, has_alpha: bool = True) -> None:
-    """Write values that are coded already, (height, width, 4), in 8 bits.
+    """Write values that are sRGB-encoded already, (height, width, 4), in 8 bits.
 
     Raises:
         HairloomError: the folder or file cannot be written.
@@ -160,15 +159,16 @@ def save_coded_png(path: Path, coded: Floats, *, has_alpha: bool = True) -> None
 
 
 def webp_of(path: Path, coded: Floats, side: int, quality: int) -> bytes:
-    """Values that are coded already, (height, width, 4) with row 0 at the bottom, as a small file.
+    """The bytes of a small WebP file of a picture.
 
     Args:
-        path: it lies in the folder that this may use.
-        side: what is larger than this [pixels] is scaled down to it.
+        path: a temporary file is written beside it.
+        coded: (height, width, 4), sRGB-encoded already, row 0 at the bottom.
+        side: a larger picture is scaled down to this [pixels].
         quality: up to 100.
 
     Raises:
-        HairloomError: nothing can be written there.
+        HairloomError: the folder cannot be written.
     """
     height, width = coded.shape[:2]
     scale = min(side / max(height, width), 1.0)

@@ -1,4 +1,4 @@
-"""Ctrl-C, or a farm's signal to end a task, ends a job cleanly: nothing is left half-written."""
+"""Ending a job cleanly at Ctrl-C or at a farm's signal: nothing is left half-written."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
 
-#: SIGBREAK is Windows' own: what a farm sends there.
+#: SIGBREAK is what a farm sends on Windows.
 _NAMES = ("SIGINT", "SIGTERM", "SIGBREAK")
 
 _asked: list[int] = []
@@ -33,7 +33,7 @@ class Interrupted(KeyboardInterrupt):
 
 @contextmanager
 def interruptible() -> Iterator[None]:
-    """Signals raise Interrupted inside; by itself Blender would only note them, or exit at once.
+    """Let signals raise Interrupted inside; Blender's own handlers set a flag, or exit at once.
 
     Has no effect in a thread, where signals never arrive.
     """
@@ -46,7 +46,7 @@ def interruptible() -> Iterator[None]:
     try:
         yield
     except Exception:
-        stop_if_asked()  # Blender raises another error for what has interrupted an operator
+        stop_if_asked()  # Blender raises another error for an interrupted operator
         raise
     finally:
         for number, handler in before.items():

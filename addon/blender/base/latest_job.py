@@ -1,13 +1,13 @@
-"""Work beside the window: of one thing, the version that is wanted last, made in a thread.
+"""Background jobs: one thing is made in a thread, always in the version requested last.
 
-    wanted for the first time    it begins
-    another is wanted meanwhile  what runs is finished and taken; then the last one wanted begins
-    the same is wanted again     nothing is made twice
-    it fails                     that counts only if it is still wanted
-    it is cancelled              nobody waits; its thread ends by itself
+    first request                its work begins
+    another request meanwhile    the running work is finished and taken; then the last one begins
+    the same request again       nothing is made twice
+    failure                      raised only if the request is still the last one
+    cancelled                    the result is dropped; the thread ends by itself
     a file is opened             all are cancelled, as Blender drops the timer
 
-One timer of Blender's looks after all of it: `watch` has a step taken in the main thread.
+All jobs share one timer of Blender's: `watch` has a step taken in the main thread.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from ...errors import HairloomError
 from .redraw import redraw_panels
 from .thread_work import ThreadWork
 
-#: What is on its way is looked for this often [s], or where it waits for this thread.
+#: [s] between two looks at a running job, and between those at one that waits for the main thread.
 ARRIVAL_TIME, SERVING_PAUSE = 0.05, 0.01
 
 type Step = Callable[[], float | None]
@@ -33,15 +33,15 @@ _steps: dict[Hashable, Step] = {}
 
 
 def is_blocking() -> bool:
-    """Whether to wait for work: in the background there is no window that has to respond."""
+    """Whether to wait for work: in background mode there is no window that has to respond."""
     return bool(bpy.app.background)
 
 
 def watch(key: Hashable, step: Step) -> None:
-    """Have this step taken again and again, instead of the one known by this key.
+    """Have this step taken again and again, instead of the one that has this key.
 
     Args:
-        step: gives the seconds until it is to be taken again; None: it was the last one.
+        step: returns the seconds until it is to be taken again; None: it was the last time.
     """
     _steps[key] = step
     if not bpy.app.timers.is_registered(take_steps):
@@ -49,7 +49,7 @@ def watch(key: Hashable, step: Step) -> None:
 
 
 def is_watched(key: Hashable) -> bool:
-    """Whether there is such a step to be taken again."""
+    """Whether a step with this key is still taken."""
     return key in _steps
 
 
@@ -58,8 +58,8 @@ def unwatch(key: Hashable) -> None:
 
 
 def unwatch_all() -> None:
-    """Leave no step and no timer behind, and no job that waits for its step: it could never be
-    begun again."""
+    """Remove all steps and the timer, and cancel the jobs that rely on a step: without it, they
+    could never begin again."""
     for key in tuple(_steps):
         if isinstance(key, LatestJob):
             key.cancel()
@@ -69,10 +69,10 @@ def unwatch_all() -> None:
 
 
 def take_steps() -> float | None:
-    """The timer. A step that fails is reported and not taken again; the others go on."""
+    """The function of the timer. A step that fails is reported and removed; the others go on."""
     pauses = []
     for key, step in tuple(_steps.items()):
-        if _steps.get(key) is not step:  # a step before has ended it
+        if _steps.get(key) is not step:  # an earlier step has removed it
             continue
         try:
             pause = step()
@@ -83,7 +83,7 @@ def take_steps() -> float | None:
             pauses.append(pause)
         elif _steps.get(key) is step:
             del _steps[key]
-    # steps that were added meanwhile found this timer registered, and rely on it
+    # steps that were added meanwhile rely on this timer, which was registered
     return min(pauses, default=ARRIVAL_TIME) if _steps else None
 
 
@@ -98,8 +98,8 @@ class LatestJob[Key, Result]:
 
     Args:
         name: of its threads.
-        arrived: is called in the main thread when it is done, again and again until it is taken.
-        is_same: whether two keys stand for the same result.
+        arrived: called in the main thread when the work is done, repeatedly until it is taken.
+        is_same: whether two keys give the same result.
     """
 
     def __init__(
@@ -114,11 +114,11 @@ class LatestJob[Key, Result]:
         self._shown_stage = ""
 
     def want(self, key: Key, begin: Callable[[], Work[Result]]) -> None:
-        """Have this made.
+        """Request the result of this key.
 
         Args:
-            begin: is called in the main thread when its turn has come, so that it can read what is
-                needed then; gives the work.
+            begin: called in the main thread when this request's turn has come, so that it can read
+                its inputs then; returns the work.
         """
         if not self.wants(key):
             self._wanted = key, begin
@@ -126,17 +126,17 @@ class LatestJob[Key, Result]:
                 self._begin()
 
     def wants(self, key: Key) -> bool:
-        """Whether this is what was wanted last."""
+        """Whether this was requested last."""
         return self._wanted is not None and self._is_same(self._wanted[0], key)
 
     @property
     def is_pending(self) -> bool:
-        """Whether something is on its way."""
+        """Whether work runs, or is done and not yet taken."""
         return self._running is not None
 
     @property
     def stage(self) -> str:
-        """What is done now of what is on its way; "" when nothing is, or before the first stage."""
+        """The stage of the running work; "" where nothing runs, or before its first stage."""
         return "" if self._running is None else self._running.work.stage
 
     @property
@@ -145,12 +145,13 @@ class LatestJob[Key, Result]:
         return self._running is not None and self._running.work.is_done
 
     def take(self) -> Result | None:
-        """What was being made, maybe not what is wanted last; that begins now. Waits for it.
+        """The result of the running work, for which it waits.
 
-        None where it failed and something else is wanted.
+        If something else was requested meanwhile, the result is of the older request, or None where
+        that failed, and the last request begins now.
 
         Raises:
-            HairloomError: it is wanted, and cannot be made; or whatever else its work raises.
+            HairloomError: the last request cannot be made; or whatever else its work raises.
         """
         running, self._running = self._running, None
         assert running is not None, "nothing is being made"
@@ -169,7 +170,7 @@ class LatestJob[Key, Result]:
                 self._begin()
 
     def cancel(self) -> None:
-        """Nobody waits for it any more."""
+        """Drop the request and the running work."""
         if self._running is not None:
             self._running.work.give_up()
         self._running = self._wanted = None

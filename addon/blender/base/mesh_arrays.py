@@ -9,14 +9,14 @@ from ...arrays import Floats, Ints
 
 
 def vertex_places(mesh: bpy.types.Mesh) -> Floats:
-    """(vertex_count, 3) float32, in the mesh's own space."""
+    """Vertex positions, (vertex_count, 3) float32, in the mesh's own space."""
     places = np.empty((len(mesh.vertices), 3), np.float32)
     mesh.vertices.foreach_get("co", places.ravel())
     return places
 
 
 def edge_vertices(mesh: bpy.types.Mesh) -> Ints:
-    """(edge_count, 2) int32."""
+    """The vertices of each edge, (edge_count, 2) int32."""
     vertices = np.empty((len(mesh.edges), 2), np.int32)
     mesh.edges.foreach_get("vertices", vertices.ravel())
     return vertices
@@ -42,7 +42,7 @@ def triangle_corners(mesh: bpy.types.Mesh, of: str = "vertices") -> Ints:
 
 
 def of_triangles(mesh: bpy.types.Mesh, what: str) -> Ints:
-    """A number of each triangle, (triangle_count,) int32.
+    """An index of each triangle, (triangle_count,) int32.
 
     Args:
         what: "polygon_index" or "material_index".

@@ -1,4 +1,4 @@
-"""Our geometry node groups: each once in a file, known by a mark and the version of its nodes."""
+"""Our geometry node groups: once per file, found by a custom property with the nodes' version."""
 
 from __future__ import annotations
 
@@ -10,10 +10,11 @@ import bpy
 def own_node_group(
     name: str, mark: str, version: int, fill: Callable[[bpy.types.NodeTree], None]
 ) -> bpy.types.NodeTree:
-    """The group of this file, whatever its name, for a modifier.
+    """The group of this file for a modifier, whatever its name; made if there is none.
 
     Args:
-        fill: gives a new one, which has its sockets for geometry, its nodes.
+        mark: the custom property that holds the version.
+        fill: adds the nodes to a new group, which has its geometry sockets already.
     """
     known = (each for each in bpy.data.node_groups if each.get(mark) == version)
     found = next((each for each in known if each.library is None), None)

@@ -1,7 +1,7 @@
 """Finding objects again, and how far they have moved.
 
-A reference to a data-block does not survive undo or loading, and dies with its object. Its session
-number survives.
+A Python reference to a data-block becomes invalid at undo, at loading, and when the data-block is
+deleted. Its session number stays valid.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from ...errors import HairloomError
 
 type LayerKey = tuple[int, str]
 
-#: how many times longer along one axis than along another nothing is that has a volume
+#: from this ratio of scales along two axes on, an object counts as flat
 _FLAT = 1e6
 
 
@@ -99,8 +99,8 @@ def objects_in(layer: bpy.types.ViewLayer) -> list[bpy.types.Object]:
 def as_mesh(
     obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph
 ) -> Iterator[bpy.types.Mesh | None]:
-    """What an object is drawn as, even in Edit Mode, in its own space; None where that is nothing,
-    as of an Empty. It is freed at the end of the block."""
+    """The mesh that an object is drawn as, even in Edit Mode, in its own space; None where it has
+    none, such as an Empty. It is freed at the end of the block."""
     evaluated = obj.evaluated_get(depsgraph)
     mesh = evaluated.to_mesh()
     try:
@@ -125,9 +125,9 @@ def check_editable(obj: bpy.types.Object) -> None:
 
 
 def is_shape_editable(obj: bpy.types.Object) -> bool:
-    """Whether what it is made of can be changed in this file. Blender takes settings of a library
-    override, but neither points nor weights: it ignores some without a word, and drops others when
-    the file is saved."""
+    """Whether an object's points and weights can be changed in this file. A library override can
+    change settings only: Blender ignores some other changes silently, and drops others when the
+    file is saved."""
     data = obj.data
     if data is None:
         return bool(obj.is_editable)
@@ -136,7 +136,7 @@ def is_shape_editable(obj: bpy.types.Object) -> bool:
 
 def check_shape_editable(obj: bpy.types.Object) -> None:
     """Raises:
-    HairloomError: what it is made of cannot be changed in this file.
+    HairloomError: its points and weights cannot be changed in this file.
     """
     check_editable(obj)
     if not is_shape_editable(obj):
@@ -149,10 +149,10 @@ def check_shape_editable(obj: bpy.types.Object) -> None:
 
 
 def check_curves_editable(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> None:
-    """As `check_shape_editable`, for what places points in world space.
+    """As `check_shape_editable`, for edits that place points in world space.
 
     Raises:
-        HairloomError: see there; or no point of its own is where a point of the world is.
+        HairloomError: see there; or the object's matrix cannot be inverted.
     """
     check_shape_editable(hair)
     if not np.linalg.cond(matrix_of(hair, depsgraph)[:3, :3]) < _FLAT:
@@ -164,21 +164,21 @@ def check_curves_editable(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph
 
 
 def takes_objects(collection: bpy.types.Collection) -> bool:
-    """Whether Blender puts objects into it: it is neither linked nor overridden."""
+    """Whether objects can be added to a collection: it is neither linked nor overridden."""
     return bool(collection.is_editable and collection.override_library is None)
 
 
 def link_into(
     obj: bpy.types.Object, collections: Iterable[bpy.types.Collection], scene: bpy.types.Scene
 ) -> None:
-    """Put an object into these collections, or into the scene's where none takes objects."""
+    """Put an object into these collections, or into the scene's if none of them takes objects."""
     for collection in list(filter(takes_objects, collections)) or [scene.collection]:
         if obj.name not in collection.objects:
             collection.objects.link(obj)
 
 
 def remove_hair(hair: bpy.types.Object) -> None:
-    """Delete hair, and its curves where nothing else has them."""
+    """Delete hair, and its curves if nothing else uses them."""
     curves = hair.data
     bpy.data.objects.remove(hair)
     if not curves.users:
@@ -186,10 +186,10 @@ def remove_hair(hair: bpy.types.Object) -> None:
 
 
 def head_of(hair: bpy.types.Object) -> bpy.types.Object | None:
-    """The mesh that the hair grows from: its surface, else a mesh that is its parent.
+    """The mesh object that hair grows on: its surface, else its parent if that is a mesh.
 
-    Linked duplicates of hair and head share the curves, which name the first head. The head of a
-    duplicate is its parent then, an object with the same mesh.
+    Linked duplicates of hair and head share the curves, whose surface is the first head. The head
+    of such a duplicate is its parent, if that has the same mesh as the surface.
     """
     surface, parent = hair.data.surface, hair.parent
     carrier = parent if parent is not None and parent.type == "MESH" else None
@@ -199,7 +199,7 @@ def head_of(hair: bpy.types.Object) -> bpy.types.Object | None:
 
 
 def objects_with(data: bpy.types.ID) -> list[bpy.types.Object]:
-    """Those that share it, such as linked duplicates."""
+    """The objects that share this data, such as linked duplicates."""
     return [obj for obj in bpy.data.objects if obj.data == data]
 
 
@@ -210,8 +210,8 @@ def is_solid(obj: bpy.types.Object) -> bool:
 
 
 def is_hidden(obj: bpy.types.Object, layer: bpy.types.ViewLayer) -> bool:
-    """Whether neither the views nor the renders of a view layer show an object; one that renders
-    leave out in favour of the copy that shows its bake is shown."""
+    """Whether neither the views nor the renders of a view layer show an object; hair counts as
+    shown in renders if the copy that plays its bake is."""
     bake = obj.hairloom.bake
     is_left_out = bake.was_hidden if bake.hides else obj.hide_render
     is_left_out |= all(collection.hide_render for collection in obj.users_collection)
@@ -222,8 +222,8 @@ def is_hidden(obj: bpy.types.Object, layer: bpy.types.ViewLayer) -> bool:
 def without_hidden(
     objects: Iterable[bpy.types.Object], depsgraph: bpy.types.Depsgraph
 ) -> tuple[list[bpy.types.Object], tuple[str, ...]]:
-    """What is taken of these where none is named: neither what is hidden in views and renders nor
-    hair without curves. And why the others are left out."""
+    """The objects that are neither hidden in views and renders nor hair without curves; and why
+    the others are left out. For jobs where the user has named no object."""
     taken, left_out = [], []
     for obj in objects:
         if is_hidden(obj, depsgraph.view_layer):
@@ -247,13 +247,13 @@ def layers_with(obj: bpy.types.Object) -> frozenset[LayerKey]:
 
 
 def layer_key(scene: bpy.types.Scene, layer: bpy.types.ViewLayer) -> LayerKey:
-    """Identifies a view layer, also after undo."""
+    """A key of a view layer, which stays the same after undo."""
     return scene.session_uid, layer.name
 
 
 def spaces_without(obj: bpy.types.Object) -> frozenset[int]:
-    """The 3D views in which an object cannot be seen, by address: local view, local collections.
-    Those of workspaces that no window shows are among them, since nothing reports when one does."""
+    """The addresses of 3D views in which an object is invisible, by local view or collections.
+    Views of workspaces that no window shows count too, since nothing reports when one is shown."""
     return frozenset(
         space.as_pointer()
         for screen in bpy.data.screens
@@ -264,9 +264,9 @@ def spaces_without(obj: bpy.types.Object) -> frozenset[int]:
 
 
 def _without_area() -> Any:
-    """An area's local view would count: Blender asks the 3D view of the context, if there is one.
+    """An override without an area, since `visible_get` considers the local view of the area.
 
-    While a file browser comes or goes, its area has no member at all, and `temp_override` of the
-    context is None; its type still has it.
+    Called on the type: while a file browser opens or closes, the context has no members, and its
+    `temp_override` is None.
     """
     return bpy.types.Context.temp_override(bpy.context, area=None)

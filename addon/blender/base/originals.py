@@ -1,4 +1,4 @@
-"""Blender's own drawing of the hair that is previewed: out of the way, and back again."""
+"""Hiding Blender's own drawing of previewed hair, and showing it again."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ def show_originals(
     show: bool,
     has_own_shadow: bool = False,
 ) -> None:
-    """Solid view leaves out hair that is shown as wires, EEVEE what no camera can see. Of hair as
-    wires Blender draws nothing but, where it is selected, the outline of the strands; as bounds it
-    would draw a box, selected or not.
+    """Show or hide Blender's drawing of hair.
 
-    Touches the evaluated copy only.
+    To hide it: solid view does not draw hair displayed as wire, only the outline of its strands
+    while selected (as bounds it would draw a box always), and EEVEE does not draw what is invisible
+    to cameras. Only the evaluated copy is changed.
 
     Args:
-        has_own_shadow: ours lies on the head, so that Blender's strands are to throw none.
+        has_own_shadow: our shadow is on the head, so that Blender's strands must not cast one.
     """
     evaluated = hair.evaluated_get(depsgraph)
     if not evaluated.is_evaluated:
@@ -35,17 +35,18 @@ def show_originals(
 
 
 def all_depsgraphs() -> tuple[bpy.types.Depsgraph, ...]:
-    """Of all view layers that a window shows or has shown: each has evaluated copies of its own."""
+    """The depsgraphs of all view layers that a window shows or has shown; each has its own
+    evaluated copies."""
     layers = (layer for scene in bpy.data.scenes for layer in scene.view_layers)
     return tuple(layer.depsgraph for layer in layers if layer.depsgraph is not None)
 
 
 def shown_depsgraphs() -> tuple[bpy.types.Depsgraph, ...]:
-    """Of the view layers that windows show."""
+    """The depsgraphs of the view layers that windows show."""
     found = (window.view_layer.depsgraph for window in bpy.context.window_manager.windows)
     return tuple(depsgraph for depsgraph in found if depsgraph is not None)
 
 
 def refresh_views() -> None:
-    """Solid view shows the samples it has collected until it hears of an update."""
+    """Have views drawn again: solid view keeps its accumulated samples until an update."""
     bpy.context.scene.update_tag()

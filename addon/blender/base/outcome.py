@@ -18,7 +18,7 @@ from ...rig_flow import Rig
 
 @dataclass(frozen=True)
 class Outcome:
-    """A result in one line, what was dropped, and warnings."""
+    """A result in one line, counts of dropped strands by reason, and warnings."""
 
     result: str
     dropped: dict[str, int]
@@ -26,19 +26,19 @@ class Outcome:
 
 
 def notes_of(hair: bpy.types.Object, rig: Rig) -> tuple[str, ...]:
-    """Notes of the rig, with the hair's name."""
+    """The notes of a rig, each with the hair's name."""
     return tuple(f"{hair.name}: {note}" for note in rig.notes)
 
 
 def dropped_phrase(dropped: dict[str, int]) -> str:
-    """Such as "dropped 3 (fewer than two points), 1 (no length)"; empty if nothing was."""
+    """A phrase such as "dropped 3 (fewer than two points), 1 (no length)"; empty if none were."""
     reasons: Iterable[str] = (f"{count:,} ({reason})" for reason, count in dropped.items())
     return "dropped " + ", ".join(reasons) if dropped else ""
 
 
 @dataclass
 class Reports:
-    """What an operator has reported. error: what stopped it."""
+    """The reports of an operator. error: the one that stopped it."""
 
     messages: list[str] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
@@ -46,9 +46,9 @@ class Reports:
 
 
 class PastReport(NamedTuple):
-    """A report of an operator, to be read again.
+    """A report of an operator, kept for display.
 
-    time: of the day, as text. source: the operator's label.
+    time: of day, as text. source: the operator's label.
     """
 
     time: str
@@ -57,7 +57,7 @@ class PastReport(NamedTuple):
     text: str
 
 
-#: the last ones, the oldest first
+#: the most recent reports, the oldest first
 past_reports: deque[PastReport] = deque(maxlen=20)
 
 #: where reports go while a job without a window runs an operator; None: to Blender
@@ -66,7 +66,7 @@ _COLLECTED: ContextVar[Reports | None] = ContextVar("collected reports", default
 
 @contextmanager
 def collected_reports() -> Iterator[Reports]:
-    """All reports of operators come here; Blender would make text of errors."""
+    """Collect the reports of operators inside; through Blender, errors would become mere text."""
     reports = Reports()
     token = _COLLECTED.set(reports)
     try:
@@ -76,7 +76,7 @@ def collected_reports() -> Iterator[Reports]:
 
 
 def report(operator: bpy.types.Operator, kind: str, message: str | HairloomError) -> None:
-    """Report to whoever has run the operator.
+    """Report to Blender, or to the job that runs the operator.
 
     Args:
         kind: "INFO", "WARNING" or "ERROR"; the message of an error is the error itself.

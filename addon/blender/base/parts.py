@@ -1,9 +1,9 @@
-"""Long work of which some parts touch no data of Blender's, so that a thread can do them.
+"""Long work with parts that touch no data of Blender's, so that a thread can do them.
 
-A function that works so is a generator. It reads from the scene, yields such a part, gets what that
-has made, and writes it into the scene. Who calls it decides where the parts are done:
+Such a function is a generator. It reads from the scene, yields a part, is sent the part's result,
+and writes it into the scene. The caller decides where the parts run:
 
-    at_once                  here and now: scripts, and jobs without a window
+    at_once                  in the calling thread: scripts, and jobs without a window
     ui.long_work.in_parts    in a thread, while the window shows progress and may cancel
 """
 
@@ -20,7 +20,7 @@ from ...errors import HairloomError
 
 
 class Part(NamedTuple):
-    """title: what it makes, as a person reads it. work: makes it, from arrays alone."""
+    """title: of the result, for the user. work: computes it, from arrays alone."""
 
     title: str
     work: Callable[[], Any]
@@ -30,7 +30,7 @@ type Parts[Result] = Generator[Part, Any, Result]
 
 
 def at_once[Result](parts: Parts[Result]) -> Result:
-    """All parts one after the other; what one raises is raised where the work waits for it."""
+    """Run all parts one after the other; a part's error is raised at the yield of that part."""
     step = partial(next, parts)
     while True:
         try:
@@ -47,12 +47,12 @@ def at_once[Result](parts: Parts[Result]) -> Result:
 def together[Result](
     works: Iterable[Parts[Result]], failed: Callable[[HairloomError], None] | None = None
 ) -> Parts[list[Result]]:
-    """Works of one part each, such as one for each hair: all that may fail or be cancelled is done
-    before any of them writes.
+    """Several works of one part each, such as one per hair: all parts, which may fail or be
+    cancelled, run before any work writes.
 
     Args:
-        failed: gets the error of each work that cannot be done, and the others are; without it, the
-            first error is raised.
+        failed: called with the error of each work that fails, while the others go on; without it,
+            the first error is raised.
     """
     begun, results = [], list[Result]()
     for work in works:
@@ -74,22 +74,23 @@ def together[Result](
 
 @contextmanager
 def taken_back() -> Iterator[Callable[[], None]]:
-    """Data-blocks that are added inside go again if it fails or is cancelled.
+    """Remove data-blocks that were added inside if the block fails or is cancelled.
 
-    Gives a function to be called after each addition, before the next part: only what was added by
-    then goes. They are known by their numbers, since by then another file may have been loaded.
+    Yields a function to call after each addition, before the next part: only data-blocks added
+    until then are removed. They are kept by session number, since another file may be loaded
+    meanwhile.
     """
     before, added = _numbers(), set[int]()
     try:
         yield lambda: added.update(_numbers() - before)
-    except BaseException:  # being cancelled is none of Exception's
+    except BaseException:  # to be cancelled raises GeneratorExit, which is no Exception
         bpy.data.batch_remove([each for each in _data_blocks() if each.session_uid in added])
         raise
 
 
 @contextmanager
 def new_blocks_removed() -> Iterator[None]:
-    """Data-blocks that are added inside go again at the end, however it ends."""
+    """Remove data-blocks that were added inside at the end, however the block ends."""
     before = _numbers()
     try:
         yield

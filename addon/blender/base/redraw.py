@@ -1,4 +1,4 @@
-"""Asking Blender to redraw what has changed of ours, now or once all is quiet."""
+"""Redraws of views, panels and the status bar, and calls delayed until events pause."""
 
 from __future__ import annotations
 
@@ -7,19 +7,19 @@ from collections.abc import Callable
 
 import bpy
 
-#: Panels that tell times and counts are drawn again this often [s] while hair moves.
+#: Panels with times and counts are redrawn at this interval [s] while hair moves.
 _PAUSE = 0.5
 
 _last = 0.0
 
 
 def redraw_views() -> None:
-    """Ask all 3D views to draw themselves again."""
+    """Tag all 3D views for a redraw."""
     _redraw({("VIEW_3D", "WINDOW")})
 
 
 def redraw_view(address: int) -> bool:
-    """Ask one 3D view to draw itself again.
+    """Tag one 3D view for a redraw.
 
     Args:
         address: of its region's data.
@@ -37,12 +37,12 @@ def redraw_view(address: int) -> bool:
 
 
 def redraw_panels() -> None:
-    """Ask all places that have a panel of ours to draw themselves again."""
+    """Tag all regions that have panels of ours for a redraw."""
     _redraw({("VIEW_3D", "UI"), ("PROPERTIES", "WINDOW")})
 
 
 def refresh_panels() -> None:
-    """As `redraw_panels`, but not at every frame."""
+    """As `redraw_panels`, but at most every half second."""
     global _last
     now = time.monotonic()
     if now - _last >= _PAUSE:
@@ -51,11 +51,11 @@ def refresh_panels() -> None:
 
 
 def show_status(text: str | None) -> None:
-    """Write it into the status bar, whatever workspace its window shows now or later; None: what
-    Blender itself says there.
+    """Write into the status bars of all windows, whatever workspace they show now or later; None:
+    restore Blender's own text.
 
-    Blender writes into the workspace of its context, not into the one that it is asked for; and
-    where a window is overridden, it takes that one's.
+    `status_text_set` writes to the workspace of the context, not to the one that it is called on,
+    and an overridden window brings its own workspace. Hence two overrides, the workspace last.
     """
     override = bpy.context.temp_override
     for window in bpy.context.window_manager.windows:
@@ -65,7 +65,7 @@ def show_status(text: str | None) -> None:
 
 
 def soon(timer: Callable[[], None], pause: float) -> None:
-    """Once, this long [s] after the last call."""
+    """Call a timer once, this long [s] after the last call of `soon`."""
     if bpy.app.timers.is_registered(timer):
         bpy.app.timers.unregister(timer)
     bpy.app.timers.register(timer, first_interval=pause)

@@ -1,4 +1,4 @@
-"""What a run did: progress lines while it works, and report.json when it is done or has failed."""
+"""Reports of a run: progress lines while it works, and report.json when it is done or fails."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from .gpu_context import gpu_in_use
 from .interruption import stop_if_asked
 
 _MANIFEST = Path(__file__).parents[3] / "blender_manifest.toml"
-#: Who progress lines are written for: a reader, or a runner of Open Job Description.
+#: Styles of progress lines: for a reader, or for a runner of Open Job Description.
 STYLES = ("lines", "openjd")
 
 
@@ -46,7 +46,7 @@ class Report:
 
     @contextmanager
     def stage(self, name: str) -> Iterator[None]:
-        """Time what runs inside, under this name."""
+        """Time the block as a stage of this name."""
         stop_if_asked()
         if self._style == "openjd" and name != self._stage:
             print(f"openjd_status: {name}", flush=True)
@@ -59,11 +59,11 @@ class Report:
         return {name: round(statistics.median(times), 3) for name, times in self._times.items()}
 
     def add_input(self, path: Path) -> None:
-        """A file or folder that the result depends on, besides those that options name."""
+        """Add a file or folder that the result depends on, other than those in options."""
         self.inputs.append(path)
 
     def add_output(self, path: Path) -> None:
-        """A file or folder that was written."""
+        """Add a file or folder that was written."""
         self.outputs.append(path)
         self.facts["outputs"].append(path.name)
 
@@ -72,7 +72,7 @@ class Report:
         return Progress(name, total, self._style)
 
     def end(self, status: str) -> None:
-        """The job is "done", or was "skipped" because its result existed."""
+        """Record that the job is "done", or "skipped" because its result exists."""
         self.facts["status"] = status
 
     def fail(self, error: HairloomError) -> None:
@@ -82,7 +82,7 @@ class Report:
             print(f"openjd_fail: {error}", flush=True)
 
     def stop(self, signal_name: str) -> None:
-        """The job was interrupted."""
+        """Record that the job was interrupted."""
         self._break_off("interrupted", "the job was interrupted", signal_name, "Run it again")
 
     def _break_off(self, status: str, problem: str, place: str, remedy: str) -> None:
@@ -90,14 +90,14 @@ class Report:
         self.facts.update(status=status, error=error)
 
     def write(self, path: Path) -> None:
-        """Write report.json: facts, median milliseconds of each stage, and what it ran on."""
+        """Write report.json: facts, median milliseconds of each stage, and the environment."""
         memory = {"gpu_memory_mb": round(peak_memory(), 1)}
         content = {**self.facts, "stages_ms": self.stages_ms(), **memory, **environment()}
         write_text_atomic(path, json.dumps(content, indent=2) + "\n")
 
 
 def environment() -> dict[str, str]:
-    """What the run ran on; backend and renderer are empty where nothing was drawn."""
+    """Versions and GPU of this run; backend, renderer and driver are empty if nothing was drawn."""
     return {
         "hairloom": hairloom_version(),
         "blender": bpy.app.version_string,
@@ -113,8 +113,8 @@ def hairloom_version() -> str:
 
 
 class Progress:
-    """A progress line: rewritten in place on a terminal, elsewhere printed at each tenth, and for a
-    farm at every hundredth."""
+    """A progress line: rewritten in place on a terminal, printed at each tenth elsewhere, and at
+    each hundredth for a farm."""
 
     def __init__(self, name: str, total: int, style: str = "lines") -> None:
         self._name, self._total, self._style, self._shown = name, total, style, -1

@@ -1,4 +1,4 @@
-"""Suspending all reactions to Blender's events while a bake or an export steps through frames."""
+"""Suspends all reactions to Blender's events while a bake or an export steps through frames."""
 
 from __future__ import annotations
 

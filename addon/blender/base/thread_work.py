@@ -1,4 +1,4 @@
-"""Work in a thread beside the window, which asks the main thread for what only that one may do."""
+"""Background work in a thread, which hands steps to the main thread that only that may do."""
 
 from __future__ import annotations
 
@@ -10,29 +10,29 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
-#: The main thread works for a thread this long at a time [s], but one step at least.
+#: Time [s] that the main thread spends on a thread's steps at once; at least one step is taken.
 SERVING_TIME = 0.05
 
 
 class GivenUpError(Exception):
-    """Nobody waits for this work."""
+    """The work was given up: its result is not needed."""
 
 
 @dataclass
 class _Request:
-    """What the main thread is asked for, a step at a time."""
+    """Steps for the main thread, and the future for their result."""
 
     steps: Generator[None, None, Any]
     answer: Future[Any] = field(default_factory=Future)
 
 
 class ThreadWork[T]:
-    """A piece of work on its way.
+    """A piece of work that runs in a thread.
 
     Args:
-        work: is called in the thread with this very object; its result is this one's.
+        work: called in the thread with this object; returns the result.
 
-    stage: what the work says that it does now.
+    stage: the one last reported by the work.
     """
 
     def __init__(self, work: Callable[[ThreadWork[T]], T], name: str) -> None:
@@ -44,25 +44,25 @@ class ThreadWork[T]:
         self._end: Callable[[], None] | None = None
         self._result: list[T] = []
         self._error: BaseException | None = None
-        # a daemon, so that Blender may quit whatever is being done
+        # a daemon, so that Blender can quit at any time
         self._thread = threading.Thread(target=self._run, daemon=True, name=name)
         self._thread.start()
 
     def report(self, stage: str) -> None:
-        """In the thread: say what is done next.
+        """In the thread: report the stage that begins.
 
         Raises:
-            GivenUpError: it need not be done.
+            GivenUpError: the work was given up.
         """
         if self._is_given_up:
             raise GivenUpError
         self.stage = stage
 
     def on_main_thread[R](self, steps: Generator[None, None, R]) -> R:
-        """In the thread: the result of steps that the main thread does.
+        """In the thread: have the main thread take these steps, and return their result.
 
         Raises:
-            GivenUpError: they are not done any more. And whatever a step raises.
+            GivenUpError: the work was given up. And whatever a step raises.
         """
         request = _Request(steps)
         with self._lock:
@@ -74,10 +74,11 @@ class ThreadWork[T]:
 
     @contextmanager
     def committing(self) -> Iterator[None]:
-        """In the thread, for `exchange.files.moving.committing`: from here on it is not given up.
+        """In the thread, for `exchange.files.moving.committing`: files are moved to their places,
+        and `give_up` waits until all are.
 
         Raises:
-            GivenUpError: it was before.
+            GivenUpError: the work was given up before.
         """
         with self._lock:
             if self._is_given_up:
@@ -87,11 +88,11 @@ class ThreadWork[T]:
 
     @contextmanager
     def ending(self, end: Callable[[], None]) -> Iterator[None]:
-        """In the thread, for `exchange.files.child_process.ending`: whoever gives up the work
-        ends the child.
+        """In the thread, for `exchange.files.child_process.ending`: `give_up` also ends the child
+        process.
 
         Raises:
-            GivenUpError: it is given up.
+            GivenUpError: the work was given up.
         """
         with self._lock:
             if self._is_given_up:
@@ -107,7 +108,7 @@ class ThreadWork[T]:
 
     @property
     def is_committed(self) -> bool:
-        """Whether its files take their places, or have."""
+        """Whether its files are being moved to their places, or have been."""
         return self._is_committed
 
     @property
@@ -116,8 +117,11 @@ class ThreadWork[T]:
         return self._request is not None
 
     def run_main_thread_steps(self, duration: float = SERVING_TIME) -> bool:
-        """In the main thread: do what is asked for, for about this long [s]; whether the work is
-        done."""
+        """In the main thread: take the thread's steps for about this long [s].
+
+        Returns:
+            whether the work is done.
+        """
         request, end = self._request, time.perf_counter() + duration
         if request is not None:
             try:
@@ -127,7 +131,7 @@ class ThreadWork[T]:
             except StopIteration as last:
                 self._request = None
                 request.answer.set_result(last.value)
-            except Exception as error:  # it is raised where the thread waits, which reports it
+            except Exception as error:  # raised again in the thread, which reports it
                 self._request = None
                 request.answer.set_exception(error)
         return not self._thread.is_alive()
@@ -138,11 +142,11 @@ class ThreadWork[T]:
         return not self._thread.is_alive()
 
     def wait(self) -> None:
-        """Until it is done; only for work that asks the main thread for nothing."""
+        """Block until the work is done; only for work that needs no steps of the main thread."""
         self._thread.join()
 
     def result(self) -> T:
-        """What the work has made, once it is done.
+        """The result of the work, once it is done.
 
         Raises:
             GivenUpError: it was given up. And whatever the work has raised.
@@ -153,18 +157,18 @@ class ThreadWork[T]:
         return self._result[0]
 
     def give_up(self) -> None:
-        """In the main thread: nobody waits for it any more."""
+        """In the main thread: end the work as soon as possible and drop its result."""
         with self._lock:
             self._is_given_up = True
             request, self._request = self._request, None
             if self._end is not None:
                 self._end()
         if request is not None:
-            request.steps.close()  # here, since it may hold what only this thread may free
+            request.steps.close()  # here, as its locals may hold objects only this thread may free
             request.answer.set_exception(GivenUpError())
 
     def _run(self) -> None:
         try:
             self._result.append(self._work(self))
-        except BaseException as error:  # kept for whoever asks for the result
+        except BaseException as error:  # raised by `result`
             self._error = error

@@ -1,4 +1,4 @@
-"""What an artist has painted or computed on a mesh or on hair curves, by name."""
+"""Weights and colours that are painted or computed on a mesh or on hair curves, by name."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from .objects import as_mesh
 #: Attributes that may be painted; colours count by their luminance.
 _NUMBERS, _COLORS = ("FLOAT", "BOOLEAN"), ("FLOAT_COLOR", "BYTE_COLOR")
 _DOMAINS = ("POINT", "CORNER", "FACE", "CURVE")
-#: Of Blender's own that are no paint; and what it keeps among images that is none.
+#: Prefixes of Blender's own attributes, which are no paint; and types of images without a picture.
 _NOT_PAINT, _NO_IMAGES = ("sharp_", "radius"), ("RENDER_RESULT", "COMPOSITING")
 
 
 def weight_names(obj: bpy.types.Object) -> list[str]:
-    """The names that `read_weights` knows on this mesh object before its modifiers: its vertex
-    groups, then its attributes."""
+    """The names that `read_weights` accepts for this mesh object before its modifiers: vertex
+    groups, then attributes."""
     return [group.name for group in obj.vertex_groups] + attribute_names(obj.data)
 
 
@@ -42,7 +42,7 @@ def image_names() -> list[str]:
 
 
 def mask_choices(hair: bpy.types.Object | None, surface: bpy.types.Object | None) -> list[str]:
-    """The names of all that a setting of hair may be painted by, each once."""
+    """The names of everything that can be a mask for a hair setting, each once."""
     names: list[str] = []
     if surface is not None and surface.type == "MESH":
         names += weight_names(surface)
@@ -52,7 +52,7 @@ def mask_choices(hair: bpy.types.Object | None, surface: bpy.types.Object | None
 
 
 def color_choices(surface: bpy.types.Object | None) -> list[str]:
-    """The names of all that hair may be coloured by: colours of the surface it grows on, images."""
+    """The names of everything that can colour hair: colours of its surface, and images."""
     names: list[str] = []
     if surface is not None and surface.type == "MESH":
         names += color_names(surface.data)
@@ -71,8 +71,9 @@ def is_color(attribute: bpy.types.Attribute) -> bool:
 def read_weights(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, name: str) -> Floats:
     """Weight of each vertex of the evaluated mesh, (vertex_count,) float32.
 
-    A vertex group gives 0 to 1, and 0 where a vertex is not in it; an attribute gives its values,
-    the mean around a vertex where it is not on points. Where both have the name it is the group.
+    A vertex group gives 0 to 1, and 0 for vertices outside it; an attribute gives its values,
+    averaged around each vertex if it is not on points. A group goes before an attribute of the
+    same name.
 
     Raises:
         HairloomError: not a mesh, or neither a group nor such an attribute of this name.
@@ -94,14 +95,14 @@ def read_weights(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, name: st
 
 
 def has_weights(obj: bpy.types.Object, mesh: bpy.types.Mesh, name: str) -> bool:
-    """Whether `weights_on` finds any."""
+    """Whether `weights_on` finds this name."""
     attribute = mesh.attributes.get(name)
     return name in obj.vertex_groups or (attribute is not None and _is_weight(attribute))
 
 
 def weights_on(obj: bpy.types.Object, mesh: bpy.types.Mesh, name: str) -> tuple[Floats, str]:
-    """What is painted on a mesh of this object, before or after its modifiers, float32, and the
-    domain of it.
+    """The weights on a mesh of this object, before or after its modifiers, float32, and their
+    domain.
 
     Raises:
         HairloomError: as `read_weights`.
@@ -118,8 +119,8 @@ def weights_on(obj: bpy.types.Object, mesh: bpy.types.Mesh, name: str) -> tuple[
 def painted_attribute(
     data: bpy.types.Mesh | bpy.types.Curves, name: str
 ) -> tuple[Floats, str] | None:
-    """The numbers of an attribute, float32, and its domain; None where it is not there or is no
-    number."""
+    """The numbers of an attribute, float32, and its domain; None where it is missing or holds
+    neither numbers nor colours."""
     attribute = data.attributes.get(name)
     if attribute is None or not _is_weight(attribute):
         return None
@@ -139,7 +140,7 @@ def at_corners(mesh: bpy.types.Mesh, values: Floats, domain: str) -> Floats:
 
 
 def set_group(obj: bpy.types.Object, name: str, weights: Floats) -> None:
-    """A vertex group with these weights, (vertex_count,), those above 0."""
+    """Assign weights, (vertex_count,), to a vertex group in 255 steps; weights of 0 are skipped."""
     group = obj.vertex_groups.get(name) or obj.vertex_groups.new(name=name)
     steps = np.round(255.0 * weights).astype(np.int64)  # few calls for many vertices
     for step in np.unique(steps[steps > 0]):
@@ -148,7 +149,7 @@ def set_group(obj: bpy.types.Object, name: str, weights: Floats) -> None:
 
 @dataclass(frozen=True)
 class Memberships:
-    """What all vertices of a mesh have in all vertex groups: it takes as long to read as one group.
+    """The weights of all vertices in all vertex groups, which take as long to read as one group.
 
     vertex, group: (n,). weight: (n,) float32. vertex_count: of the mesh.
     """
@@ -163,7 +164,7 @@ class Memberships:
         counts: list[int] = []
         groups: list[int] = []
         weights: list[float] = []
-        for vertex in mesh.vertices:  # Blender gives the weights of groups in no faster way
+        for vertex in mesh.vertices:  # Blender has no faster way to read group weights
             members = vertex.groups
             counts.append(len(members))
             for member in members:
@@ -173,7 +174,7 @@ class Memberships:
         return cls(vertex, np.array(groups, int), np.array(weights, np.float32), len(counts))
 
     def weights(self, index: int) -> Floats:
-        """Those in one group, (vertex_count,) float32; 0 where a vertex is not in it."""
+        """The weights in one group, (vertex_count,) float32; 0 for vertices outside it."""
         found = np.zeros(self.vertex_count, np.float32)
         is_in = self.group == index
         found[self.vertex[is_in]] = self.weight[is_in]
@@ -187,10 +188,10 @@ def _is_weight(attribute: bpy.types.Attribute) -> bool:
 def missing_weights(
     obj: bpy.types.Object, name: str, attribute: bpy.types.Attribute | None
 ) -> HairloomError:
-    """That this mesh has no weights of this name.
+    """The error that a mesh has no weights of this name.
 
     Args:
-        attribute: it has this one.
+        attribute: the attribute of this name that is of another kind; None: there is none.
     """
     if attribute is None:
         problem = f"it has neither a vertex group nor an attribute named '{name}'"
