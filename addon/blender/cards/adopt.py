@@ -1,9 +1,9 @@
-"""Hair cards that an artist has made: a mesh of Blender is read as cards, sorted and shaded.
+"""Adopted cards: an artist's own mesh is read as cards, sorted, and given ambient occlusion.
 
-Written are the order of the mesh's own faces, which every exporter keeps, ambient occlusion and the
-place between root and tip. The latter two have the names that our own cards use: as attributes, and
-as a UV map, (occlusion, along), that every format carries. Faces are not triangulated: their
-corners, materials, maps and all else stay as they are.
+This writes the order of the mesh's own faces, which every exporter keeps, ambient occlusion, and
+the place between root and tip. The latter two have the names that our own cards use: as attributes,
+and as a UV map, (occlusion, along), which every format can store. Faces are not triangulated, and
+keep their corners, materials, UV maps and other attributes.
 """
 
 from __future__ import annotations
@@ -48,9 +48,9 @@ __all__ = [
     "sort_steps",
 ]
 
-#: What may be sorted: identifier, label, description.
+#: What can be sorted: identifier, label, description.
 (ORDERS,) = (p.choices for p in CardSettings.parameters() if p.name == "order_by")
-#: Weight from which on a vertex belongs to a vertex group.
+#: Weight from which a vertex counts as a member of a vertex group.
 _MEMBER = 0.5
 #: The group of cards that dangle.
 _DANGLING = 1
@@ -58,14 +58,14 @@ _DANGLING = 1
 
 @dataclass(frozen=True)
 class SortOptions:
-    """What the artist has chosen.
+    """The artist's choices.
 
-    head: what the hair grows from and is shaded by, or None.
+    head: the mesh that the hair grows on, which occludes it too, or None.
     by: see cards.sort.
     direction: see cards.uv_directions.
     dangling: a vertex group, whose cards are drawn after all others; "" for none.
     occlusion: None leaves ambient occlusion as it is.
-    alpha: a picture that says where cards are clear; None takes that of their material.
+    alpha: a picture with the alpha of the cards; None: that of their material.
     """
 
     head: bpy.types.Object | None = None
@@ -80,9 +80,9 @@ class SortOptions:
 class CardSource:
     """A mesh read as cards, world space.
 
-    polygon: (triangle_count,) the face that each triangle of the cards is of.
-    corner: (triangle_count, 3) the corner of a face that each of its corners is.
-    notes: what is doubtful, for the artist.
+    polygon: (triangle_count,) the face of the mesh that each triangle is part of.
+    corner: (triangle_count, 3) the face corner of the mesh at each corner of a triangle.
+    notes: doubts about the mesh, for the artist.
     """
 
     cards: AdoptedCards
@@ -94,7 +94,7 @@ class CardSource:
 
 @dataclass(frozen=True)
 class SortedCards:
-    """What was done. moved: how many faces have another place than before."""
+    """The result of sorting. moved: the number of faces whose place in the order has changed."""
 
     card_count: int
     face_count: int
@@ -107,7 +107,7 @@ def sort_steps(
 ) -> Generator[float, None, SortedCards]:
     """Put the faces of a mesh into the order in which its cards are to be drawn.
 
-    Each step gives the fraction that is done; the mesh changes in the last.
+    Each step yields the fraction that is done; the mesh changes in the last one.
 
     Raises:
         HairloomError: not a mesh, in Edit Mode, no faces, no UVs, or no such vertex group.
@@ -149,7 +149,7 @@ def sort_mesh(
 def read_cards(
     obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, options: SortOptions
 ) -> CardSource:
-    """A mesh as cards, as modifiers deform it, with the direction of the hair on them.
+    """A mesh as cards, deformed by its modifiers, with the direction of the hair on them.
 
     Raises:
         HairloomError: not a mesh, in Edit Mode, no faces, no UVs, or no such vertex group.
@@ -179,7 +179,7 @@ def _check(obj: bpy.types.Object) -> None:
 
 
 def _check_names(obj: bpy.types.Object) -> None:
-    """Refuse a mesh that has something of its own where occlusion would be written."""
+    """Refuse a mesh that has data of the artist's under the names that occlusion is written to."""
     mesh = obj.data
     if mesh.get(OCCLUSION_IS_OURS):
         return
@@ -196,7 +196,7 @@ def _check_names(obj: bpy.types.Object) -> None:
 def _read_faces(
     obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph
 ) -> tuple[Surface, Ints, Ints, list[str]]:
-    """Triangles as Blender draws them, in world space; the face and the corners of each; notes."""
+    """Triangles as Blender draws them, in world space; the face and face corners of each; notes."""
     matrix = matrix_of(obj, depsgraph)
     with evaluated_mesh(obj, depsgraph, obj.name) as bent:
         if np.array_equal(_corners(bent), _corners(obj.data)):
@@ -206,15 +206,18 @@ def _read_faces(
 
 
 def _corners(mesh: bpy.types.Mesh) -> Ints:
-    """Vertices of all faces, one after the other, and behind them where each face begins."""
+    """The vertices of all face corners, followed by the first corner of each face."""
     starts = np.empty(len(mesh.polygons), np.int32)
     mesh.polygons.foreach_get("loop_start", starts)
     return np.append(corner_vertices(mesh), starts)
 
 
 def loop_triangles(mesh: bpy.types.Mesh) -> tuple[Floats, Ints, Ints, Ints]:
-    """The vertices' places (n, 3) float32 in the mesh's own space, and of each triangle its
-    vertices and loops, both (m, 3) int32, and its polygon, (m,) int32.
+    """A mesh's triangles.
+
+    Returns:
+        vertex positions (n, 3) float32 in the mesh's own space, and the vertices (m, 3), loops
+        (m, 3) and polygon (m,) of each triangle, int32.
     """
     triangles, loops = triangle_corners(mesh), triangle_corners(mesh, "loops")
     return vertex_places(mesh), triangles, loops, of_triangles(mesh, "polygon_index")
@@ -224,7 +227,7 @@ def _triangles(mesh: bpy.types.Mesh, matrix: Floats) -> tuple[Surface, Ints, Int
     positions, triangles, corner, polygon = loop_triangles(mesh)
     corner_uv = read_corner_uv(mesh, corner) if len(triangles) else None
     surface = Surface(positions, triangles, corner_uv).transformed(matrix)
-    if np.linalg.det(matrix[:3, :3]) < 0.0:  # mirrored triangles have been turned over
+    if np.linalg.det(matrix[:3, :3]) < 0.0:  # `transformed` has flipped mirrored triangles
         corner = corner[:, ::-1]
     return surface, polygon, corner
 
@@ -253,13 +256,16 @@ def _shared(mesh: bpy.types.Mesh) -> list[str]:
 def _write_occlusion(
     mesh: bpy.types.Mesh, vertex: Ints, corner: Ints, openness: Floats, along: Floats
 ) -> list[str]:
-    """Occlusion and place along the hair into attributes, where a vertex on a seam has the mean of
-    its copies, and into a UV map; returns what could not be done.
+    """Write occlusion and place along the hair into attributes and into a UV map. In attributes, a
+    vertex on a UV seam has the mean of its copies.
 
     Args:
         vertex: (n,) the vertex of the mesh that each value belongs to.
-        corner: (loop_count,) the value of each corner of a face.
+        corner: (loop_count,) the index of the value of each face corner.
         openness, along: (n,).
+
+    Returns:
+        a note if the mesh has no room for the UV map.
     """
     mesh[OCCLUSION_IS_OURS] = True
     for name, values in zip(CARD_ATTRIBUTES, (openness, along), strict=True):
@@ -271,14 +277,14 @@ def _write_occlusion(
 
 
 def _at_source(values: Floats, vertex: Ints, count: int) -> Floats:
-    """Means over the copies of each of `count` vertices; 1 for a vertex of no face."""
+    """Means over the copies of each of `count` vertices; 1 for a vertex without faces."""
     means = means_by(vertex, values, count)
     means[np.bincount(vertex, minlength=count) == 0] = 1.0
     return means.astype(np.float32)
 
 
 def _face_order(polygon: Ints) -> Ints:
-    """Faces by the first of their triangles that is drawn, (face_count,)."""
+    """Faces in the order of their first triangles, (face_count,)."""
     faces, first = np.unique(polygon, return_index=True)
     order: Ints = faces[np.argsort(first, kind="stable")]
     return order

@@ -1,7 +1,7 @@
-"""From a groom's settings to its cards and their maps, for whoever shows, writes or keeps them.
+"""From a groom's settings to its cards and their maps, for the viewport, files and mesh objects.
 
-Any thread may build them. An atlas is drawn on the GPU, and textures are uploaded there: that is
-the main thread's, so a build in a thread waits until it is served.
+Cards can be built in any thread. Only the main thread may use the GPU, to draw an atlas and to
+upload textures, so a build in another thread waits until the main thread takes these steps.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ from .textures import chosen_pictures
 
 #: Draws flat strands into an atlas of this size [pixels].
 type AtlasDraw = Callable[[FlatStrands, int], AtlasMaps]
-#: Gives a context in which a named stage is timed.
+#: Makes a context manager that times a named stage.
 type Stage = Callable[[str], AbstractContextManager[None]]
 
 
@@ -77,11 +77,11 @@ def untimed(_name: str) -> AbstractContextManager[None]:
 
 @dataclass(frozen=True, eq=False)
 class CardInputs:
-    """All that cards are built from.
+    """The inputs of a build of cards.
 
     pictures: used instead of generated textures, see `textures.picture_as`.
-    occluders: hair of other grooms, which shades these, where it is while these are at rest.
-    edits: what the artist has changed of cards in the scene, or None.
+    occluders: hair of other grooms that occludes these cards, placed as if all were at rest.
+    edits: the artist's changes to the cards in the scene, or None.
     """
 
     rig: Rig
@@ -98,11 +98,11 @@ def read_inputs(
     keep_edits: bool = True,
     known: tuple[MadeRig, ...] = (),
 ) -> tuple[CardInputs, tuple[str, ...], dict[str, int]]:
-    """A groom by its own settings; what the artist should know; what was dropped and why.
+    """A groom with its own settings; notes for the artist; counts of dropped strands by reason.
 
     Args:
-        rig: of the groom's bake; None is that of its curves.
-        keep_edits: of cards in the scene.
+        rig: that of the groom's bake; None: made from its curves.
+        keep_edits: whether to keep the artist's changes to cards in the scene.
         known: see `MadeRig.of`.
 
     Raises:
@@ -135,10 +135,10 @@ def read_inputs(
 
 
 def cards_key(groom: GroomSettings) -> Hashable:
-    """The same for settings that give the same cards.
+    """A key that is equal for settings that give the same cards.
 
-    Of the strands in the atlas a change of colours alone counts as none, since the atlas holds how
-    strands differ from the mean, which colours hardly change.
+    The hair colour itself is no part of it: the atlas holds how strands differ from their mean,
+    which the colour hardly changes.
     """
     kinds = CardSettings, AtlasSettings, CardOcclusionSettings, TextureSettings
     look = groom[ShadingSettings]
@@ -152,14 +152,15 @@ def cards_key(groom: GroomSettings) -> Hashable:
 
 @dataclass(frozen=True)
 class CardMaps:
-    """by_name: those that are written, see exchange.texture_packing.MEANINGS.
+    """The maps of cards, for files and for drawing.
 
-    textures: those that our own pictures are drawn with; their base has the gain in it.
-    highlights: what breaks them up, "shift" or "tangent", see TextureSettings: the atlas holds the
-        directions of its own strands.
-    base_gain: what the written base is to be multiplied by.
-    is_view_compensated: the alpha is that of baked strands, see CardSnapshot.
-    base_color: as of CardSnapshot.
+    by_name: the maps that are written, see exchange.texture_packing.MEANINGS.
+    textures: the maps that Hairloom draws with; their base includes the gain.
+    highlights: the map that breaks highlights up, "shift" or "tangent", see TextureSettings; with
+        an atlas "tangent", as it holds the directions of its strands.
+    base_gain: the factor for the written base.
+    is_view_compensated: whether the alpha is that of baked strands, see CardSnapshot.
+    base_color: see CardSnapshot.
     """
 
     by_name: dict[str, Floats]
@@ -174,14 +175,14 @@ class CardMaps:
         return self.highlights == "tangent"
 
     def plain_card(self, shading: ShadingSettings) -> Floats:
-        """The albedo of the strands, whatever the model and the pigment, and alpha: what a plain
-        material shows, (height, width, 4) linear."""
+        """The picture for a plain material: albedo of the strands for any shading model, and alpha,
+        (height, width, 4) linear."""
         look = shading if self.base_color is None else in_color(self.base_color, shading)
         base = self.textures.base
         if "along" in self.by_name:
             sized = of_one_size({"base": base, "along": self.by_name["along"]})
             base, along = sized["base"], sized["along"]
-        else:  # one row of tiles, from the root to the tip
+        else:  # one row of tiles, each from root to tip
             along = np.linspace(0.0, 1.0, len(base))[:, None]
         color = plain_albedo(np.clip(base * card_color(along, look), 0.0, 1.0))
         return replace(self.textures, base=color.astype(np.float32)).card
@@ -189,7 +190,7 @@ class CardMaps:
 
 @dataclass(frozen=True)
 class MappedCards:
-    """Cards at rest, and their maps. notes: what the artist should know."""
+    """Cards at rest, and their maps. notes: for the artist."""
 
     build: CardBuild
     maps: CardMaps
@@ -199,10 +200,10 @@ class MappedCards:
 def build_steps(
     inputs: CardInputs, draw: AtlasDraw | None = None, stage: Stage = untimed
 ) -> Generator[str, None, MappedCards]:
-    """Cards with their maps; each step names what comes next.
+    """Build cards with their maps; each step yields the name of the next stage.
 
     Args:
-        draw: everything else may be done in any thread; None draws here.
+        draw: draws the atlas; all other work can run in any thread. None: draw in this thread.
 
     Raises:
         HairloomError: the atlas is too small for its tiles, or there is nothing to bake into it.
@@ -221,11 +222,11 @@ def build_steps(
 
 
 def built_in_thread(work: ThreadWork[Any], inputs: CardInputs) -> MappedCards:
-    """All steps in the thread of this work; the main thread draws the atlas.
+    """The cards, built in the thread of this work; the main thread draws the atlas.
 
     Raises:
         HairloomError: no cards can be made.
-        GivenUpError: nobody waits for them.
+        GivenUpError: the work was given up.
     """
 
     def draw(flat: FlatStrands, size: int) -> AtlasMaps:
@@ -235,20 +236,20 @@ def built_in_thread(work: ThreadWork[Any], inputs: CardInputs) -> MappedCards:
 
 
 def counts_line(cards: int, triangles: int, shell_layers: int) -> str:
-    """What there is, such as "800 cards, 15,296 triangles"."""
+    """A line such as "800 cards, 15,296 triangles"."""
     things = f"{shell_layers} layers of shells" if shell_layers else f"{cards:,} cards"
     return f"{things}, {triangles:,} triangles"
 
 
 def order_line(wrong_fraction: float) -> str:
-    """How often the order of cards is wrong, such as "18 % of pixels blend in the wrong order"."""
+    """A line such as "18 % of pixels blend in the wrong order"."""
     return f"{100.0 * wrong_fraction:.0f} % of pixels blend in the wrong order"
 
 
 def card_maps(inputs: CardInputs, build: CardBuild, draw: AtlasDraw) -> CardMaps:
-    """The maps of these cards: baked from strands, or made at random, with the artist's own.
+    """The maps of these cards: baked from strands or generated, some replaced by the artist's own.
 
-    Shift and noise break up highlights from strand to strand and are made at random in any case.
+    Shift and noise, which vary highlights between strands, are always generated at random.
     """
     settings, pictures = inputs.settings, inputs.pictures
     texture, color = settings[TextureSettings], inputs.rig.strands.color
@@ -261,7 +262,7 @@ def card_maps(inputs: CardInputs, build: CardBuild, draw: AtlasDraw) -> CardMaps
         mean = mean_look(color, look).base_color if colored else None
         return CardMaps(by_name, textures, texture.highlights, base_color=mean)
     maps = baked_atlas(inputs.rig, build.plan, look, strands, draw)
-    # as many strips above each other as the atlas has rows, and no finer than the atlas
+    # one strip for each row of the atlas, with no more texels than the atlas
     size, grid = build.plan.size, build.plan.grid
     across, along = (max(size // count, 8) for count in (grid.columns, grid.rows))
     fitting = replace(
@@ -287,7 +288,7 @@ def card_maps(inputs: CardInputs, build: CardBuild, draw: AtlasDraw) -> CardMaps
 
 
 def _lies_in_its_plane(plan: AtlasPlan | ShellPlan) -> bool:
-    """Whether what the tiles show lies in the plane of what shows them."""
+    """Whether the strands in the tiles lie in the plane of the geometry that shows them."""
     return not isinstance(plan, ShellPlan) or plan.is_flat
 
 
@@ -297,12 +298,12 @@ def _card_color(rig: Rig) -> Floats | None:
 
 
 def drawn_maps(flat: FlatStrands, size: int) -> AtlasMaps:
-    """Here and now; the main thread's."""
+    """The maps of flat strands, drawn on the GPU if there is one; for the main thread."""
     return baked_maps(flat, size) if has_gpu() else sampled_maps(flat, size)
 
 
 def drawing_maps(flat: FlatStrands, size: int) -> Generator[None, None, AtlasMaps]:
-    """The same in steps."""
+    """As `drawn_maps`, in steps."""
     if not has_gpu():
         return sampled_maps(flat, size)
     return (yield from baking(flat, size))
@@ -315,10 +316,11 @@ def baked_atlas(
     drawn: StrandSettings,
     draw: AtlasDraw = drawn_maps,
 ) -> AtlasMaps:
-    """The maps of all tiles, which go on where there is no hair: strands laid flat and drawn.
+    """The maps of all tiles: strands are laid flat and drawn, and colours are dilated to where
+    there is no hair.
 
     Args:
-        drawn: how wide strands are drawn.
+        drawn: for the width of strands.
     """
     groom = card_groom(rig, drawn)
     strands, grid = groom.strands, groom.strands.grid
@@ -333,7 +335,7 @@ def baked_atlas(
 
 
 def has_gpu() -> bool:
-    """Blender in the background has none until it is asked for, and on some machines none then."""
+    """Whether there is a GPU context; background mode tries to create one first."""
     try:
         ensure_gpu()
         gpu.platform.backend_type_get()
@@ -344,10 +346,10 @@ def has_gpu() -> bool:
 
 @dataclass(frozen=True, eq=False)
 class BuiltCards:
-    """Cards at rest, tied to the guides of their rig, with all that drawing them needs.
+    """Cards at rest, bound to the guides of their rig, with everything that drawing needs.
 
     shell_layers, wrong_fraction: see cards.build.CardBuild.
-    notes: what the artist should know.
+    notes: for the artist.
     """
 
     rig: Rig
@@ -393,7 +395,7 @@ class BuiltCards:
 
     @classmethod
     def now(cls, inputs: CardInputs) -> BuiltCards:
-        """Build them here and now.
+        """Build the cards in this thread.
 
         Raises:
             HairloomError: no cards can be made.
@@ -402,11 +404,11 @@ class BuiltCards:
 
     @classmethod
     def in_thread(cls, work: ThreadWork[BuiltCards], inputs: CardInputs) -> BuiltCards:
-        """Build them in the thread of this work, with their textures on the GPU.
+        """Build the cards in the thread of this work, with their textures on the GPU.
 
         Raises:
             HairloomError: no cards can be made.
-            GivenUpError: nobody waits for them.
+            GivenUpError: the work was given up.
         """
         built = cls.of(inputs.rig, built_in_thread(work, inputs))
         work.report("Textures")
@@ -418,17 +420,17 @@ class BuiltCards:
         return self.drawn(replace(self.rest, mesh=mesh), settings)
 
     def drawn(self, cards: CardSnapshot, settings: SettingsMap) -> CardSnapshot:
-        """The same cards by these settings."""
+        """The same cards with the drawing settings and the shadow density of these settings."""
         shadow = self.strand_area.shadow_area(settings[StrandSettings])
         thickness = shadow / max(self.card_shadow_area, 1.0e-12)
         return replace(cards, drawing=settings[CardDrawingSettings], thickness=thickness)
 
 
 def _uploaded(work: ThreadWork[Any], cards: CardSnapshot) -> CardTextures | None:
-    """In the thread: their textures on the GPU, so that no draw waits for them; None without one.
+    """In the thread: upload textures, so that no draw has to; None without a GPU.
 
     Raises:
-        GivenUpError: nobody waits for them.
+        GivenUpError: the work was given up.
     """
     packed = list(packed_textures(cards.textures, cards.mesh.atlas))
 

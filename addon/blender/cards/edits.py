@@ -1,7 +1,7 @@
-"""What an artist has edited on the object of cards, read back from its mesh.
+"""An artist's edits to the mesh of cards, read back from that mesh.
 
-Two things in the mesh tell it: the attribute `made_card`, a number for each face, 0 where it was
-not made by us; and the record of what was made, a custom property. See cards/edits.py.
+They are found by two things in the mesh: the face attribute `made_card`, the card's number, 0 for
+faces that are not ours; and the record of what was made, a custom property. See cards/edits.py.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ from ..scene.surfaces import OCCLUSION_LAYER
 from .adopt import loop_triangles
 from .made_objects import card_objects
 
-#: the attribute of faces: the number of the card on record, counted from 1
+#: the face attribute: the number of the card in the record, counted from 1
 MADE_ATTRIBUTE = "made_card"
 #: the custom property of the mesh that holds the record
 RECORD = "hairloom_made"
 #: the UV map on the atlas
 TILE_LAYER = "UVMap"
-#: what the record holds as arrays: name -> (dtype, shape of each card's)
+#: arrays of the record: name -> (dtype, shape for each card)
 _ARRAYS: dict[str, tuple[Any, tuple[int, ...]]] = {
     "places": (np.float32, (5, 3)),
     "tile": (np.int32, ()),
@@ -42,14 +42,14 @@ _ARRAYS: dict[str, tuple[Any, tuple[int, ...]]] = {
 def groom_edits(
     hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph, motion: Floats | None = None
 ) -> tuple[CardEdits | None, tuple[str, ...]]:
-    """What is to be kept of the cards of a groom in the scene, and what the artist should know;
-    None where nothing was changed, or nobody can tell.
+    """The artist's edits to a groom's cards in the scene, which are to be kept, and notes; None
+    where nothing was edited or edits cannot be recognised.
 
     Args:
-        motion: (4, 4) how the hair has moved since it was where its cards are built.
+        motion: (4, 4) how the hair has moved since the pose that its cards are built in.
 
     Raises:
-        HairloomError: the cards have lost their UVs, so that nobody can say what they show.
+        HairloomError: the cards have lost their UVs, so that their tiles are unknown.
     """
     objects = card_objects(hair.original)
     if not objects:
@@ -74,13 +74,13 @@ def groom_edits(
 
 
 def same_edits(one: CardEdits | None, other: CardEdits | None) -> bool:
-    """Whether the same is kept by both, wherever the hair is."""
+    """Whether both keep the same, wherever the hair is."""
     return one is other if one is None else one.is_like(other)
 
 
 def read_pieces(mesh: bpy.types.Mesh) -> tuple[Surface, Ints | None]:
-    """All triangles of a mesh with their UVs, in its own space, and the number of the card that
-    each was made as, see `edits_of`.
+    """All triangles of a mesh with their UVs, in its own space, and the number of the made card of
+    each, see `edits_of`.
 
     Raises:
         HairloomError: it has no UV map.
@@ -95,12 +95,12 @@ def read_pieces(mesh: bpy.types.Mesh) -> tuple[Surface, Ints | None]:
 
 
 def write_record(mesh: bpy.types.Mesh, made: MadeCards, marks: Ints, matrix: Floats) -> None:
-    """Put on record what a mesh holds.
+    """Write the record of the cards in a mesh.
 
     Args:
         made: world space.
-        marks: (card_count,) of the cards that are in the mesh as they were made.
-        matrix: (4, 4) of the object in whose space the mesh is.
+        marks: (card_count,) prints of the cards as they are in the mesh.
+        matrix: (4, 4) of the mesh's object.
     """
     local = made.moved(np.linalg.inv(matrix))
     content: dict[str, Any] = {
@@ -116,13 +116,13 @@ def write_record(mesh: bpy.types.Mesh, made: MadeCards, marks: Ints, matrix: Flo
 
 
 def forget_record(mesh: bpy.types.Mesh) -> None:
-    """Of a mesh that holds no cards any more."""
+    """Remove the record of a mesh that does not hold cards any more."""
     if RECORD in mesh:
         del mesh[RECORD]
 
 
 def read_record(mesh: bpy.types.Mesh) -> MadeCards | None:
-    """None without one, or where it was changed so that it no longer fits together."""
+    """The record of a mesh; None if there is none, or if it was changed and is inconsistent."""
     content = mesh.get(RECORD)
     try:
         arrays = {

@@ -1,7 +1,7 @@
-"""Hair cards into a GLB, FBX, USD or OBJ, through Blender's own exporters.
+"""Hair cards to GLB, FBX, USD or OBJ by Blender's own exporters.
 
-Cards become a scene for the time of one export. Exporters keep the order of the triangles as long
-as they are not asked to triangulate, which they need not: cards are triangles already.
+For each export, cards are put into a temporary scene. Exporters keep the order of the triangles
+unless they triangulate, which is off, as cards are triangles already.
 """
 
 from __future__ import annotations
@@ -32,19 +32,19 @@ from .material import fill_image, named_image, new_material
 from .mesh import fill_mesh
 
 _NAMED = ("objects", "meshes", "materials", "images", "scenes")
-#: the attribute of OBJ that holds occlusion and along
+#: the attribute that holds occlusion and along in OBJ
 _COLORS = "Occlusion color"
 
 
 @dataclass(frozen=True)
 class CardLook:
-    """The plain material of the file: which textures it has.
+    """The textures of the plain material in the file.
 
     card: (height, width, 4) linear with straight alpha, row 0 the lowest, to be packed into the
         file; or None.
-    base, alpha: files beside it, for formats that name files. alpha is read from the channel "a" of
-        the same file, else from the red of its own.
-    is_linear: whether the colours of base are not coded by sRGB's curve.
+    base, alpha: names of files beside it, for formats that reference files. alpha is the channel
+        "a" if both are one file, else the red channel of its own file.
+    is_linear: whether the colours of base are linear instead of sRGB-encoded.
     """
 
     card: Floats | None = None
@@ -54,7 +54,7 @@ class CardLook:
 
 
 def level_names(name: str, count: int) -> tuple[str, ...]:
-    """What the objects of `count` levels of detail are called, finest first."""
+    """The names of the objects of `count` levels of detail, finest first."""
     plain = plain_name(name)
     return (plain,) if count == 1 else tuple(f"{plain}_LOD{level}" for level in range(count))
 
@@ -69,14 +69,14 @@ def write_card_mesh(
     portable: bool = True,
     texels: Sequence[Floats] = (),
 ) -> None:
-    """Write each level as one object whose order of triangles is that of `triangles`.
+    """Write each level as one object, with its triangles in order.
 
     Args:
-        path: in a folder of its own, for exporters that write more than one file; see
+        path: in a folder of its own, as some exporters write more than one file; see
             `exchange.files.file_set.written_together`.
-        name: of the hair in the file.
+        name: the hair's name in the file.
         portable: without custom attributes, which some engines refuse.
-        texels: of each level, (vertex_count, 2) for a third UV map, see `card_scene`.
+        texels: for each level, (vertex_count, 2) for a third UV map, see `card_scene`.
 
     Raises:
         HairloomError: no cards, or Blender's exporter is missing or fails.
@@ -102,7 +102,7 @@ def write_card_mesh(
 
 
 def check_cards(levels: Sequence[CardMesh], place: str) -> None:
-    """Refuse to write nothing.
+    """Refuse an export without cards.
 
     Raises:
         HairloomError: a level has no cards.
@@ -133,7 +133,7 @@ def check_exporter(file_format: CardFormat, place: str) -> None:
         ) from error
 
 
-#: format -> its operator, looked up each time: add-ons come and go
+#: format -> its operator, looked up each time, as add-ons can be switched on and off
 _OPERATORS: dict[str, Callable[[], Any]] = {
     GLB.name: lambda: bpy.ops.export_scene.gltf,
     FBX.name: lambda: bpy.ops.export_scene.fbx,
@@ -158,8 +158,10 @@ def _export_glb(path: Path, portable: bool) -> None:
 
 
 def _export_fbx(path: Path, _portable: bool) -> None:
-    """In centimetres and with Y up in the vertices themselves, so that no object is scaled or
-    turned. It names textures by their folder too, so it is written where it will lie.
+    """Write FBX with vertices in centimetres and Y up, so that objects have no scale or rotation.
+
+    The exporter stores the folder of textures too, so the file is first written to its final
+    folder.
     """
     beside = path.parent.parent / f"{path.parent.name}.fbx"
     try:
@@ -230,13 +232,13 @@ def card_scene(
     portable: bool,
     texels: Sequence[Floats] = (),
 ) -> Iterator[bpy.types.Scene]:
-    """A scene with one object a level, below an empty where there are several.
+    """A temporary scene with an object for each level, below an Empty if there are several.
 
-    It vanishes afterwards with every data-block made in the meantime. Blocks of the user that have
-    the names of ours are called otherwise for the time.
+    It is removed afterwards with every data-block that was added inside. The user's data-blocks of
+    the same names are renamed meanwhile.
 
     Args:
-        texels: of each level, (vertex_count, 2): a third UV map, its second component from the top.
+        texels: for each level, (vertex_count, 2): a third UV map, with v from the top.
     """
     names = level_names(name, len(levels))
     with _free_names({plain_name(name), *names}), new_blocks_removed():
@@ -259,9 +261,9 @@ def card_scene(
 
 @contextmanager
 def shown(scene: bpy.types.Scene) -> Iterator[None]:
-    """The window shows this scene, as exporters want it, and then what it showed before.
+    """Show a scene in the window inside the block, as exporters need it.
 
-    Blender runs the frame change handlers at both changes.
+    Blender runs the frame change handlers at both changes of the scene.
     """
     window = bpy.context.window or bpy.context.window_manager.windows[0]
     user_scene, user_layer = window.scene, window.view_layer
@@ -276,7 +278,7 @@ def shown(scene: bpy.types.Scene) -> Iterator[None]:
 
 @contextmanager
 def _free_names(names: Iterable[str]) -> Iterator[None]:
-    """Nothing of the file has these names while the block runs: Blender would number ours."""
+    """Rename data-blocks with these names inside the block, else Blender would number ours."""
     taken = [
         (block, block.name)
         for kind in _NAMED
@@ -294,13 +296,13 @@ def _free_names(names: Iterable[str]) -> Iterator[None]:
 
 def _new_parent(scene: bpy.types.Scene, name: str) -> bpy.types.Object:
     parent = bpy.data.objects.new(name, None)
-    parent["fbx_type"] = "LodGroup"  # Blender's FBX exporter asks for it
+    parent["fbx_type"] = "LodGroup"  # read by Blender's FBX exporter
     scene.collection.objects.link(parent)
     return parent
 
 
 def _uv_maps(cards: CardMesh, texels: Floats | None, file_format: CardFormat) -> dict[str, Floats]:
-    """USD's importers go by the names of UV maps."""
+    """The UV maps by name; importers of USD rely on the names st, st1 and st2."""
     is_usd = file_format == USD
     # The exporter of glTF flips v.
     along = 1.0 - cards.along if file_format == GLB else cards.along
@@ -308,18 +310,18 @@ def _uv_maps(cards: CardMesh, texels: Floats | None, file_format: CardFormat) ->
         "st" if is_usd else "UVMap": cards.uv,
         "st1" if is_usd else OCCLUSION_LAYER: np.stack([cards.occlusion, along], axis=1),
     }
-    if texels is not None:  # Blender, and all files but glTF's, count v from the bottom
+    if texels is not None:  # v counts from the bottom in Blender, and in all formats but glTF
         maps["st2" if is_usd else "Motion"] = texels * [1.0, -1.0] + [0.0, 1.0]
     return maps
 
 
 def _attributes(cards: CardMesh, file_format: CardFormat, *, portable: bool) -> dict[str, Floats]:
-    """What a format carries beside UV maps and normals."""
+    """The attributes of a format beside UV maps and normals."""
     values: dict[str, Floats] = {}
     if not portable and file_format.extra:
         values["_AO"] = cards.occlusion
     if file_format == OBJ:
-        # It knows one UV map alone, so colours take the rest; its exporter codes them as sRGB.
+        # OBJ has a single UV map, so colours hold the rest; its exporter encodes them as sRGB.
         rest = np.stack([cards.occlusion, cards.along, np.zeros_like(cards.along)], axis=1)
         opaque = np.ones((len(rest), 1))
         values[_COLORS] = np.concatenate([srgb_decoded(rest), opaque], axis=1)
@@ -329,7 +331,7 @@ def _attributes(cards: CardMesh, file_format: CardFormat, *, portable: bool) -> 
 
 
 def _new_material(look: CardLook, name: str, file_format: CardFormat) -> bpy.types.Material:
-    """glTF's file holds its picture; the other exporters name those that are linked straight."""
+    """The material: GLB packs its picture; the other exporters write the names of linked images."""
     if file_format == GLB:
         packed = None if look.card is None else _packed_image(look.card, name)
         return new_material(name, packed, packed, blending="BLENDED")

@@ -1,5 +1,5 @@
-"""Hair cards of a groom as files: the mesh, the textures beside it, and the sidecar, which says how
-the cards are drawn and what the hair's look is made of."""
+"""Hair cards of a groom as files: the mesh, its textures, and the sidecar, which describes how to
+draw the cards and the look of the hair."""
 
 from __future__ import annotations
 
@@ -98,19 +98,19 @@ _UNITS = {
     "pixels": "px",
     "none": "1",
 }
-#: Maps that glTF's own material knows beside the colour.
+#: Maps that glTF's standard material can use beside the colour.
 _DIRECTIONS: tuple[str, ...] = ("normal", "tangent")
-#: Texels of the ramp that gives back a number between 0 and 1.
+#: Texels of the ramp from 0 to 1, through which glTF reads occlusion from a UV map.
 _RAMP_SIZE = 256
-#: of Marschner's model alone, though both models share the panel that they are drawn in
+#: settings of Marschner's model only, although both models share their panel
 _PIGMENT = {"pigment", "melanin", "redness", "absorption"}
-#: of strands alone: a material of cards has what they do in its textures
+#: settings of strands only: on cards, textures contain their effect
 _OF_STRANDS = {"model", "color_source", "color_map", "brow_source", "brow_color"}
-#: what the longest name of a file beside adds to the mesh's, or more
+#: a suffix at least as long as those of all files beside the mesh
 _LONGEST = "_motion_position.exr"
 _OF_KIND = {"color": "scene-linear Rec. 709", "choice": "name", "toggle": "true or false"}
 
-#: What is being done, and which fraction of it is done; None where that is unknown.
+#: Yields the current stage, and the fraction of it that is done; None where that is unknown.
 type FileSteps[Result] = Generator[tuple[str, float | None], None, Result]
 
 
@@ -118,10 +118,10 @@ type FileSteps[Result] = Generator[tuple[str, float | None], None, Result]
 class CardOutput:
     """How cards are written.
 
-    format: one of exchange.card_formats by name; None goes by the file's suffix.
-    name: of the hair in the file; None is the file's.
-    head_bone: of the character, which carries springs; None where there is none.
-    head_look: how the head of a web page is drawn; None is plain skin.
+    format: the name of one of exchange.card_formats; None: by the file's suffix.
+    name: of the hair in the file; None: that of the file.
+    head_bone: the character's bone that carries springs; None where there is none.
+    head_look: how the head on a web page is drawn; None: plain skin.
     """
 
     format: str | None = None
@@ -133,10 +133,10 @@ class CardOutput:
 
 @dataclass(frozen=True)
 class WrittenCards:
-    """What was written. files: the mesh first, the sidecar last.
+    """The result of an export. files: the mesh first, the sidecar last.
 
-    notes: what the artist should know, each with its remedy.
-    motion: what the sidecar says of it; empty without any. figures: of this motion.
+    notes: for the artist, each with its remedy.
+    motion: the sidecar's section on motion; empty without any. figures: of this motion.
     """
 
     build: CardBuild
@@ -167,12 +167,12 @@ def write_cards(
 
     Args:
         path: of the mesh; the textures go beside it as NAME_base.png and so on.
-        stage: gives a context in which a named stage is timed.
-        motion: of this rig.
+        stage: makes a context manager that times a named stage.
+        motion: that of this rig; None: the cards are at rest.
 
     Raises:
-        HairloomError: no cards, a format that cannot be written, or nothing can be written there.
-            Nothing is written then, and old files stay as they were.
+        HairloomError: no cards, a format that cannot be written, or a folder that cannot be
+            written. Nothing is written then, and old files stay as they were.
     """
     output = output or CardOutput()
     check_output(path, output, motion)
@@ -183,10 +183,10 @@ def write_cards(
 
 
 def check_output(path: Path, output: CardOutput, motion: GuideMotion | None) -> None:
-    """Refuse what cannot be written, before any work is done.
+    """Refuse an export that is bound to fail, before any work is done.
 
     Raises:
-        HairloomError: the place, the format, or motion in it.
+        HairloomError: the path, the format, or motion in this format.
     """
     path, file_format = format_of(path, output.format)
     check_place(path)
@@ -199,7 +199,8 @@ def check_output(path: Path, output: CardOutput, motion: GuideMotion | None) -> 
 
 
 def _check_neighbours(path: Path) -> None:
-    """Refuse names that would make one file of two: of sidecars, or on systems that ignore case.
+    """Refuse a name whose files would collide with another mesh's: by the sidecar, or where file
+    systems ignore case.
 
     Raises:
         HairloomError: naming the other file.
@@ -217,7 +218,7 @@ def check_no_input(path: Path, pictures: Iterable[Path]) -> None:
     """Refuse to write textures over the pictures that they are made from.
 
     Raises:
-        HairloomError: one of them has a name that the textures of this mesh get.
+        HairloomError: a picture has a name that textures of this mesh may have.
     """
     for picture in pictures:
         is_beside = os.path.realpath(picture.parent) == os.path.realpath(path.parent)
@@ -238,10 +239,10 @@ def file_steps(
     motion: GuideMotion | None = None,
     head: Surface | None = None,
 ) -> FileSteps[WrittenCards]:
-    """Write cards that are made; closing it leaves old files as they were.
+    """Write built cards; closing the generator leaves old files as they were.
 
     Args:
-        head: what hair grows on, for a web page.
+        head: the mesh that hair grows on, for a web page.
 
     Raises:
         HairloomError: as `write_cards`.
@@ -275,7 +276,7 @@ class _Writer:
     figures: CardFigures | None = None
 
     def steps(self, motion: GuideMotion | None) -> FileSteps[tuple[str, ...]]:
-        """Gives back what the artist should know."""
+        """Write everything; returns notes for the artist."""
         build = self.made.build
         parts = map(with_fans_apart, build.levels, build.backs)
         levels, backs = zip(*parts, strict=True)
@@ -339,7 +340,7 @@ class _Writer:
         texels: Sequence[Floats] = (),
         skeleton: JointMotion | SpringMotion | None = None,
     ) -> tuple[str, ...]:
-        """Textures, mesh, indices, and the sidecar last; what the artist should know."""
+        """Write textures, mesh and indices, and the sidecar last; returns notes for the artist."""
         path, build, maps = self.path, self.made.build, self.made.maps
         settings, nodes = self.output.settings, level_names(self._name, len(levels))
         shading = self.settings[ShadingSettings]
@@ -405,8 +406,8 @@ class _Writer:
         return notes
 
     def _complete_with_digest(self, sidecar: str) -> None:
-        """Give a GLB the digest of what lies beside it: engines that import a file again only where
-        its bytes have changed, as Godot does, then see another look.
+        """Store a digest of all files beside it in a GLB, so that engines that import a file again
+        only when its bytes have changed, such as Godot, notice a changed look.
         """
         if self.file_format != GLB:
             return
@@ -419,7 +420,8 @@ class _Writer:
         self.path.write_bytes(file.data())
 
     def _complete(self, levels: Sequence[CardMesh], nodes: Sequence[str]) -> tuple[str, ...]:
-        """What Blender's exporters do not write: which level is shown, and maps of a GLB."""
+        """Add what Blender's exporters do not write: the choice of levels, and further maps of a
+        GLB; returns notes for the artist."""
         if self.file_format == USD and len(levels) > 1:
             try:
                 usd_library(self.path)
@@ -437,7 +439,7 @@ class _Writer:
 
 
 def _direction_pictures(path: Path, maps: CardMaps) -> dict[str, bytes]:
-    """PNG files of the directions that glTF's own material knows."""
+    """PNG files of the direction maps that glTF's standard material can use."""
     directions = {name: maps.by_name[name] for name in _DIRECTIONS if name in maps.by_name}
     if not directions:
         return {}
@@ -449,7 +451,7 @@ def _direction_pictures(path: Path, maps: CardMaps) -> dict[str, bytes]:
 
 
 def _look(card: Floats, written: Sequence[WrittenTexture]) -> CardLook:
-    """The material of the mesh's own file: colour, and alpha where plain nodes can name it."""
+    """The material in the mesh's file: colour, and alpha if a plain material can reference it."""
     (colored,) = (texture for texture in written if "color" in texture.layout.sources)
     file, alpha = colored.path.name, None
     if colored.layout.has_coverage:
@@ -461,10 +463,10 @@ def _look(card: Floats, written: Sequence[WrittenTexture]) -> CardLook:
 
 
 def material_of(shading: ShadingSettings, tables: Mapping[str, str]) -> dict[str, Any]:
-    """What the sidecar says of the material.
+    """The sidecar's section on the material.
 
     Args:
-        tables: name -> file of the tables that lie beside it, see `write_tables`.
+        tables: name -> file of the tables beside it, see `write_tables`.
     """
     own: type[Settings] = KajiyaKaySettings if shading.model == "kajiya_kay" else MarschnerSettings
     left_out = _OF_STRANDS | (_PIGMENT if own is KajiyaKaySettings else set())
@@ -487,7 +489,7 @@ def material_of(shading: ShadingSettings, tables: Mapping[str, str]) -> dict[str
 
 @dataclass(frozen=True, eq=False)
 class CardExport:
-    """What is written of one hair, and where. notes: what the artist should know."""
+    """The export of one hair's cards. notes: for the artist."""
 
     hair: Handle
     kept: KeptCards
@@ -511,13 +513,13 @@ class CardExport:
         known: tuple[MadeRig, ...] = (),
         kept: KeptCards | None = None,
     ) -> CardExport:
-        """Read the hair; where it is to move, from its bake.
+        """Read the hair; if motion is to be written, from its bake.
 
         Args:
-            levels: of detail; None is what the groom's own settings say.
-            frames: of the bake; None is all of them.
+            levels: number of levels of detail; None: by the groom's own settings.
+            frames: of the bake; None: all of them.
             known: see `MadeRig.of`.
-            kept: cards that were built before; these are kept there.
+            kept: cards that were built before; the new ones are kept in it.
 
         Raises:
             HairloomError: no hair that can be used, no bake, or a format that cannot be written.
@@ -541,7 +543,7 @@ class CardExport:
         return self.kept.building(self.inputs, "hairloom card files")
 
     def writing(self, made: MappedCards) -> FileSteps[Outcome]:
-        """Write the cards that were made; closing it leaves old files as they were."""
+        """Write the built cards; closing the generator leaves old files as they were."""
         inputs = self.inputs
         self.kept.keep(self.hair, inputs, made)
         steps = file_steps(
@@ -555,7 +557,7 @@ class CardExport:
         return self.outcome((yield from steps))
 
     def outcome(self, written: WrittenCards) -> Outcome:
-        """What is reported to the artist."""
+        """The report for the artist."""
         first, *beside = written.files
         mesh, layers = written.mesh, written.build.shell_layers
         things = f"{layers} layers of shells" if layers else f"{mesh.card_count:,} cards"
@@ -572,7 +574,7 @@ class CardExport:
 
 
 def _motion_line(written: WrittenCards) -> str:
-    """How the motion was written, such as "; 127 chains of 2 joints, off by 0.6% of the
+    """A phrase on the written motion, such as "; 127 chains of 2 joints, off by 0.6% of the
     hair's length (root mean square; 99% by less than 2.1%, the worst by 14.0%)", or "; motion
     textures of 512 x 930 texels, which round by 0.001% of the hair's length at most".
     """

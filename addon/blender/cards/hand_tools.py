@@ -1,5 +1,5 @@
-"""What changes cards by hand in the mesh of their object: in Edit Mode the cards of which something
-is selected, in Object Mode new ones along curves."""
+"""Tools for cards in the mesh of their object: in Edit Mode they change selected cards, in Object
+Mode they add cards along curves."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from .made_objects import card_objects
 
 
 def edited_cards(context: bpy.types.Context) -> list[bpy.types.Object]:
-    """The objects of cards that are in Edit Mode; coarser levels are made from the finest."""
+    """The objects of cards in Edit Mode, without coarser levels, which are made from the finest."""
     if context.mode != "EDIT_MESH":
         return []
     objects = context.objects_in_mode
@@ -34,7 +34,7 @@ def edited_cards(context: bpy.types.Context) -> list[bpy.types.Object]:
 
 
 def shape_selected(obj: bpy.types.Object, shape: Callable[[CardVertices], Floats]) -> int:
-    """Move the vertices of all cards of which something is selected; gives how many cards.
+    """Move the vertices of all cards that have a selected vertex; returns the number of cards.
 
     Raises:
         HairloomError: the mesh has no UV map.
@@ -58,10 +58,10 @@ def shape_selected(obj: bpy.types.Object, shape: Callable[[CardVertices], Floats
 
 
 def put_on_tiles(obj: bpy.types.Object, tile_of: Callable[[Ints, int], Ints]) -> list[int]:
-    """Lay the UVs of all cards of which something is selected on other tiles; gives the tiles.
+    """Move the UVs of all cards that have a selected vertex to other tiles; returns these tiles.
 
     Args:
-        tile_of: from the tile of each card, and the number of tiles, to the wanted one.
+        tile_of: maps the tile of each card and the number of tiles to new tiles.
 
     Raises:
         HairloomError: the mesh has no UV map, or no record of its atlas.
@@ -91,14 +91,14 @@ def add_along_curves(
     width: float,
     tile: int,
 ) -> int:
-    """Add a card along each line of these curves to the cards of a groom; gives how many.
+    """Add a card along each line of these curves to the cards of a groom; returns their number.
 
     Args:
-        width: at the root [m]; 0 is that of the other cards.
-        tile: from 0; -1 is that of the nearest card.
+        width: at the root [m]; 0: that of the other cards.
+        tile: from 0; -1: that of the nearest card.
 
     Raises:
-        HairloomError: no cards yet, no line, or a tile that the atlas has not.
+        HairloomError: no cards yet, no line, or a tile that the atlas does not have.
     """
     objects = card_objects(hair)
     if not objects:
@@ -167,7 +167,7 @@ def _uv_layer(edited: bmesh.types.BMesh, obj: bpy.types.Object) -> bmesh.types.B
 
 
 def _selected_pieces(edited: bmesh.types.BMesh) -> list[list[bmesh.types.BMVert]]:
-    """The vertices of each piece of which a vertex is selected; those without faces are none."""
+    """The vertices of each connected piece with a selected vertex; loose vertices are left out."""
     seen: set[bmesh.types.BMVert] = set()
     pieces = []
     for start in edited.verts:
@@ -188,7 +188,7 @@ def _selected_pieces(edited: bmesh.types.BMesh) -> list[list[bmesh.types.BMVert]
 
 
 def _append(edited: bmesh.types.BMesh, card: CardMesh, matrix: Floats) -> None:
-    """Add a card, world space, to a mesh in the space of an object: one of the artist's own."""
+    """Add a card, world space, to a mesh in the space of an object, as one of the artist's own."""
     places = moved(card.positions, np.linalg.inv(matrix))
     normal = card.normal @ matrix[:3, :3]
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1.0e-12)

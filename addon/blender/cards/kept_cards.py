@@ -1,5 +1,4 @@
-"""The cards that were built last: what makes objects or files of them next does not build them
-again."""
+"""The cards that were built last, kept so that objects and files can share one build."""
 
 from __future__ import annotations
 
@@ -13,7 +12,7 @@ from .build import CardInputs, MappedCards, built_in_thread, has_gpu
 
 @dataclass(frozen=True, eq=False)
 class _Built:
-    """is_of_gpu: whether a GPU has drawn their atlas; None: they have none that is drawn."""
+    """A build. is_of_gpu: whether a GPU has drawn its atlas; None: it has no drawn atlas."""
 
     hair: Handle
     inputs: CardInputs
@@ -27,31 +26,31 @@ class _Built:
 
 
 class KeptCards:
-    """One build at most, the main thread's.
+    """At most one build; for the main thread only.
 
-    It is known by all that it was built from, bit for bit, so that nobody has to say when it is out
-    of date. Whoever has this forgets it where memory is to be free again.
+    A build is found by the content of its inputs, bit for bit, so nothing has to mark it as out of
+    date. Its owner calls `forget` to free the memory.
     """
 
     def __init__(self) -> None:
         self._last: _Built | None = None
 
     def building(self, inputs: CardInputs, name: str) -> ThreadWork[MappedCards]:
-        """Build cards in a thread of this name, or take those that are kept."""
+        """Build cards in a thread of this name, or return those that are kept."""
         if self._last is not None and self._last.is_of(inputs):
             made = self._last.made
             return ThreadWork(lambda _: made, name)
-        self.forget()  # before others take as much memory
+        self.forget()  # frees memory before the new build
         return ThreadWork(lambda work: built_in_thread(work, inputs), name)
 
     def keep(self, hair: Handle, inputs: CardInputs, made: MappedCards) -> None:
-        """These were built last."""
+        """Keep these cards instead of the last ones."""
         self._last = _Built(hair, inputs, made, None if made.build.plan is None else has_gpu())
 
     def forget(self) -> None:
         self._last = None
 
     def forget_gone(self) -> None:
-        """Forget those of hair that is gone."""
+        """Forget the cards if their hair is gone."""
         if self._last is not None and self._last.hair.find() is None:
             self.forget()

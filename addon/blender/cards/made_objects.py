@@ -1,4 +1,4 @@
-"""Which objects of the scene hold the cards of a groom, and which are copies of them."""
+"""Objects of the scene that hold the cards of a groom, as opposed to copies of these objects."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import bpy
 
 
 def card_objects(hair: bpy.types.Object) -> list[bpy.types.Object]:
-    """The objects that hold the cards of a groom, finest first; none of their copies."""
+    """The objects that hold the cards of a groom, finest first; without copies of them."""
     of_groom = [obj for obj in _all_cards() if obj.hairloom.card_object.groom == hair]
     made = {obj.hairloom.card_object.level: obj for obj in of_groom if _has_made_name(obj)}
     made |= {obj.hairloom.card_object.level: obj for obj in of_groom if _has_made_uid(obj)}
@@ -14,18 +14,18 @@ def card_objects(hair: bpy.types.Object) -> list[bpy.types.Object]:
 
 
 def remember_names() -> None:
-    """Before a file is saved: in another session the numbers of its objects are others."""
+    """Store the names of made objects before a file is saved: session numbers are not saved."""
     cards = _all_cards()
     made = {_place(obj) for obj in cards if _has_made_uid(obj)}
     for obj in cards:
         if _has_made_uid(obj):
             obj.hairloom.card_object.made_name = obj.name
-        elif _place(obj) in made:  # a copy may have been called as the first one was
+        elif _place(obj) in made:  # a copy may have the name that the made object had before
             obj.hairloom.card_object.made_name = ""
 
 
 def remember_numbers() -> None:
-    """After a file was opened: its objects may be renamed and copied from now on."""
+    """Store session numbers of made objects after a file was opened, before any is renamed."""
     for obj in _all_cards():
         is_made = _has_made_name(obj) and obj.library is None
         obj.hairloom.card_object.made_uid = obj.session_uid if is_made else 0
@@ -37,7 +37,7 @@ def _all_cards() -> list[bpy.types.Object]:
 
 
 def _place(obj: bpy.types.Object) -> tuple[bpy.types.Object, int]:
-    """Which groom's cards they are, and of which level."""
+    """The groom and the level of the cards in an object."""
     return obj.hairloom.card_object.groom, obj.hairloom.card_object.level
 
 

@@ -1,4 +1,4 @@
-"""The material of hair cards: its nodes, its pictures, and where cards are clear."""
+"""The material of hair cards: its nodes, pictures and alpha."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ def new_material(
     blending: str,
     occlusion: str = "",
 ) -> bpy.types.Material:
-    """A material that is seen from both sides.
+    """A two-sided material.
 
     Args:
-        base: its colour.
-        alpha: the alpha of `base` where it is the same picture, else the red of its own.
-        blending: "BLENDED", which exporters of glTF read as such, or "DITHERED".
+        base: the colour.
+        alpha: if it is `base`, its alpha channel is used, else its colour.
+        blending: "BLENDED", which Blender's glTF exporter writes as such, or "DITHERED".
         occlusion: an attribute that `base` is multiplied by; "" for none.
     """
     material = bpy.data.materials.new(name)
@@ -69,7 +69,7 @@ def _new_picture(material: bpy.types.Material, image: bpy.types.Image) -> bpy.ty
 def _product(
     material: bpy.types.Material, first: bpy.types.NodeSocket
 ) -> tuple[bpy.types.NodeSocket, bpy.types.NodeSocket]:
-    """This colour times that of another socket: their product, and the other socket."""
+    """Multiply a colour by another: the socket of the product, and the socket of the factor."""
     node = material.node_tree.nodes.new("ShaderNodeMix")
     node.data_type, node.blend_type = "RGBA", "MULTIPLY"
     node.inputs[0].default_value = 1.0
@@ -78,7 +78,7 @@ def _product(
 
 
 def _arrange(material: bpy.types.Material) -> None:
-    """Nodes from left to right, attributes below them."""
+    """Place nodes from left to right, with attributes below."""
     surface, output, *before = material.node_tree.nodes
     row = [node for node in before if node.type != "ATTRIBUTE"]
     for place, node in enumerate((*row, surface, output)):
@@ -88,7 +88,7 @@ def _arrange(material: bpy.types.Material) -> None:
 
 
 def named_image(file: str, space: str) -> bpy.types.Image:
-    """An image of which exporters want the file's name alone; it need not be there yet."""
+    """An image with a file name, which is all that exporters need; the file need not exist yet."""
     image = bpy.data.images.new(file, 1, 1, alpha=True)
     image.source = "FILE"
     image.filepath = file
@@ -97,8 +97,8 @@ def named_image(file: str, space: str) -> bpy.types.Image:
 
 
 def fill_image(image: bpy.types.Image, texture: Floats) -> None:
-    """Draw (height, width, 4), linear with straight alpha, row 0 the lowest; colour goes on where
-    alpha is 0."""
+    """Write a texture into an image: (height, width, 4), linear with straight alpha, row 0 the
+    lowest, with colours also where alpha is 0."""
     coded = np.array(texture, np.float32)
     coded[..., :3] = srgb_encoded(np.clip(coded[..., :3], 0.0, 1.0))
     image.pixels.foreach_set(coded.ravel())
@@ -107,7 +107,7 @@ def fill_image(image: bpy.types.Image, texture: Floats) -> None:
 def alpha_of(
     obj: bpy.types.Object, chosen: bpy.types.Image | None = None
 ) -> tuple[Floats | None, list[str]]:
-    """Where cards are clear, (height, width), and why not; None where they cover all over."""
+    """The alpha of cards, (height, width), and notes; None: they count as opaque."""
     images = [chosen] if chosen is not None else alpha_images(obj)
     image = images[0] if images else None
     if image is None:
@@ -124,7 +124,7 @@ def alpha_of(
 
 
 def alpha_images(obj: bpy.types.Object) -> list[bpy.types.Image]:
-    """The pictures that are linked to the alpha of a Principled BSDF of the object's materials."""
+    """The pictures linked to the alpha of a Principled BSDF in the object's materials."""
     found: list[bpy.types.Image] = []
     for slot in obj.material_slots:
         tree = None if slot.material is None else slot.material.node_tree

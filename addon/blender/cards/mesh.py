@@ -1,4 +1,4 @@
-"""Hair cards in a mesh of Blender: what fills it, and what puts the faces of one in order."""
+"""Hair cards in a mesh of Blender: filling a mesh, and reordering its faces."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ...cards.card_mesh import CardMesh
 from ...strands.vectors import unit
 from ..base.attributes import set_attribute
 
-#: marks a mesh whose occlusion we have written, so that it may be replaced
+#: marks a mesh whose occlusion is ours, and so can be replaced
 OCCLUSION_IS_OURS = "hairloom_occlusion"
 
 
@@ -26,12 +26,12 @@ def fill_mesh(
     faces: Mapping[str, Ints] | None = None,
     matrix: Floats | None = None,
 ) -> None:
-    """Replace what a mesh holds by cards with their normals, in the order of their triangles.
+    """Replace a mesh's geometry by cards with their normals, in the order of their triangles.
 
     Args:
         uv_maps: name -> (vertex_count, 2).
-        points, faces: attributes, name -> a value of each vertex or triangle.
-        matrix: (4, 4) of the object whose space the mesh is in; None is world space.
+        points, faces: attributes, name -> a value for each vertex or triangle.
+        matrix: (4, 4) of the object whose space the mesh is in; None: world space.
     """
     positions, normal = cards.positions, cards.normal
     triangles: Ints = cards.triangles
@@ -39,7 +39,7 @@ def fill_mesh(
         inverse = np.linalg.inv(matrix)
         positions = (positions @ inverse[:3, :3].T + inverse[:3, 3]).astype(np.float32)
         normal = unit(normal @ matrix[:3, :3])
-        if np.linalg.det(matrix[:3, :3]) < 0.0:  # a mirrored object turns faces around again
+        if np.linalg.det(matrix[:3, :3]) < 0.0:  # a mirrored object flips faces
             triangles = triangles[:, ::-1]
     corners: Ints = np.ascontiguousarray(triangles).ravel()
     mesh.clear_geometry()
@@ -59,7 +59,7 @@ def fill_mesh(
 
 
 def set_uv_map(mesh: bpy.types.Mesh, name: str, uv: Floats) -> bool:
-    """Write a UV map, (corner_count, 2); False where the mesh has as many as it can have."""
+    """Write a UV map, (corner_count, 2); False if the mesh has no room for another one."""
     layer = mesh.uv_layers.get(name) or mesh.uv_layers.new(name=name, do_init=False)
     if layer is not None:
         layer.uv.foreach_set("vector", np.ascontiguousarray(uv, np.float32).ravel())
@@ -67,7 +67,7 @@ def set_uv_map(mesh: bpy.types.Mesh, name: str, uv: Floats) -> bool:
 
 
 def reorder_faces(mesh: bpy.types.Mesh, order: Ints) -> int:
-    """The faces of a mesh in another order, with all that they have; gives how many moved."""
+    """Reorder the faces of a mesh with all their data; returns how many moved."""
     moved = int((order != np.arange(len(order))).sum())
     if not moved:
         return 0

@@ -39,18 +39,19 @@ from ...strands.arc_length import typical
 from ..bakes.guide_motion import GuideMotion
 from ..base.images import write_texture
 
-#: Fraction of the error by which joints may be off between keys.
+#: Fraction of the allowed error that the reduction of keys may add.
 _KEY_FRACTION = 0.5
-#: Balls that stand for the head, and the error that is worth a word, of the hair's length.
+#: Number of balls that approximate the head; error of springs that is reported, as a fraction of
+#: the hair's length.
 HEAD_BALLS = 12
 SPRING_ERROR = 0.1
-#: Motion of one frame says nothing.
+#: Minimum number of frames: a single one holds no motion.
 _FEWEST_FRAMES = 2
 
 
 @dataclass(frozen=True, eq=False)
 class MovedCards:
-    """tracks, and if they are wanted the normals and the tangents, as `CardTracks.moved`.
+    """Cards in all frames. normals, tangents: as `CardTracks.moved`, if requested.
 
     figures: of the finest level.
     """
@@ -64,10 +65,10 @@ class MovedCards:
 def check_motion(
     settings: CardExportSettings, motion: GuideMotion, file_format: CardFormat
 ) -> None:
-    """Refuse what cannot be written, before any work is done.
+    """Refuse motion that cannot be written, before any work is done.
 
     Raises:
-        HairloomError: one frame, or a format that has no place for it.
+        HairloomError: a single frame, or a format that cannot store such motion.
     """
     if len(motion.frames) < _FEWEST_FRAMES:
         raise HairloomError(
@@ -92,7 +93,7 @@ def moved_cards(
 
     Args:
         levels: at rest, world space.
-        space: "head" takes the head's motion out, "world" leaves it in.
+        space: "head": without the head's motion; "world": with it.
         with_directions: normals and tangents too.
     """
     rig, count = motion.rig, len(motion.frames)
@@ -137,7 +138,7 @@ def moved_cards(
 
 @dataclass(frozen=True, eq=False)
 class JointMotion:
-    """A skeleton that is ready to be written, and how near it comes."""
+    """A skeleton that is ready to be written, and its error."""
 
     tracks: CardTracks
     skeleton: Skeleton
@@ -146,7 +147,8 @@ class JointMotion:
 
     @property
     def carrier(self) -> Floats:
-        """(frame_count, 4, 4): where the root joint takes what lies on it at rest, world space."""
+        """The root joint's motion from rest, (frame_count, 4, 4), world space; (1, 4, 4) if it does
+        not move."""
         if self.settings.motion_space == "world":
             return self.tracks.carrier
         return np.eye(4)[None]
@@ -158,7 +160,7 @@ class JointMotion:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What the artist should know."""
+        """For the artist, if the error is larger than allowed."""
         wanted = self.settings.joint_error / 100.0
         if self.relative_error <= wanted:
             return ()
@@ -173,7 +175,7 @@ class JointMotion:
         return joint_motion(self.tracks, self.skeleton, self.error, self.settings.motion_space)
 
     def complete(self, path: Path, nodes: Sequence[str]) -> None:
-        """Put the skeleton into the GLB that lies there."""
+        """Add the skeleton to the GLB at this path."""
         data = path.read_bytes()
         levels = self.tracks.levels
         path.write_bytes(with_skeleton(data, nodes, levels, self.skeleton, path.name))
@@ -194,7 +196,7 @@ def joint_motion_steps(
         carried = tracks.carrier[:, :3, :3] @ tracks.root + tracks.carrier[:, :3, 3]
         size = np.ptp(tracks.levels[0].positions, axis=0).max()
         reach = np.array([float(size)])
-        # of the root joint's rest, which is no more than a place
+        # relative to the root joint's rest, which is a translation only
         root_keys = keys_of(tracks.carrier[None, :, :3, :3], carried[None], reach, allowed)
     skeleton = Skeleton(rig, keys, tracks.root, root_keys, tracks.frame_rate)
     yield 1.0
@@ -203,9 +205,7 @@ def joint_motion_steps(
 
 @dataclass(frozen=True, eq=False)
 class SpringMotion:
-    """Springs that are ready to be written, and how near they come. notes: what the artist should
-    know.
-    """
+    """Springs that are ready to be written, and their error. notes: for the artist."""
 
     tracks: CardTracks
     skeleton: SpringSkeleton
@@ -216,7 +216,7 @@ class SpringMotion:
         return spring_motion(self.tracks, self.skeleton, self.skeleton.rig.error)
 
     def complete(self, path: Path, nodes: Sequence[str]) -> None:
-        """Put joints and springs into the GLB that lies there."""
+        """Add joints and springs to the GLB at this path."""
         data = path.read_bytes()
         levels = self.tracks.levels
         path.write_bytes(with_springs(data, nodes, levels, self.skeleton, path.name))
@@ -232,7 +232,7 @@ def spring_motion_steps(
     """Fit springs; yields the fraction that is done.
 
     Args:
-        bone: that carries the head; None where there is none.
+        bone: the one that carries the head; None where there is none.
     """
     balls, notes = _head_balls(head, place)
     rig = yield from spring_steps(tracks, settings.spring_joints, balls)
@@ -248,7 +248,7 @@ def spring_motion_steps(
 
 
 def _head_balls(head: Surface | None, place: str) -> tuple[Balls, tuple[str, ...]]:
-    """What springs keep out of, and what the artist should know where there is nothing."""
+    """The balls that springs stay out of, and a note if there are none."""
     nothing = Balls.of(np.empty((0, 3)), np.empty(0))
     if head is None:
         return nothing, ("Hair without a head has nothing that springs keep out of.",)
@@ -278,7 +278,7 @@ class TextureMotion:
 
     @property
     def texels(self) -> tuple[Floats, ...]:
-        """Of each level, (vertex_count, 2), the second from the top of the picture."""
+        """The texels of each level's vertices, (vertex_count, 2), with v from the top."""
         sizes = [len(mesh.positions) for mesh in self.moved.tracks.levels]
         return tuple(np.split(vertex_texels(self.layout), np.cumsum(sizes)[:-1]))
 
@@ -302,14 +302,14 @@ class TextureMotion:
 
     @property
     def _offsets(self) -> list[Floats]:
-        """Of each level, (vertex_count, frame_count, 3) [m] from rest."""
+        """The offsets of each level's vertices from rest, (vertex_count, frame_count, 3) [m]."""
         tracks = self.moved.tracks
         rests = [mesh.positions[:, None] for mesh in tracks.levels]
         return [now - rest for now, rest in zip(tracks.moved, rests, strict=True)]
 
     @property
     def error(self) -> FitError:
-        """How far vertices are off by the rounding of what is stored."""
+        """The error of vertices by the rounding of stored values."""
         scale, depth = np.float32(self.file_format.units_per_metre), self.settings.motion_depth
         misses = [rounding(each * scale, depth) / scale for each in self._offsets]
         return FitError.of([np.linalg.norm(miss, axis=-1).ravel() for miss in misses])

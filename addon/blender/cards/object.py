@@ -1,8 +1,9 @@
-"""Hair cards as mesh objects in the artist's scene, one a level of detail.
+"""Hair cards as mesh objects in the artist's scene, one for each level of detail.
 
-They are made once, and later only filled again: object, modifiers, materials and whatever else
-the artist has added stay. Copies of them are the artist's and are never filled, whatever they are
-called. Their mesh lies in the space of the hair object, so cards that were moved aside stay there.
+Objects are made once, and later only their mesh is filled again: the object, its modifiers and
+materials, and whatever else the artist has added stay. Copies are the artist's and are never
+filled, whatever their names. The mesh is in the space of the hair object, so an object that was
+moved aside stays there.
 """
 
 from __future__ import annotations
@@ -31,18 +32,18 @@ from .mesh import OCCLUSION_IS_OURS, fill_mesh
 
 
 class CardObjectJob:
-    """Making the cards of one groom: read at once, made in a thread, then written.
+    """Makes the cards of one groom: reads the inputs here, builds in a thread, and then writes.
 
-    objects: those of the cards once they are written, finest first; order: how well it suits.
-    notes: what the artist should know. edits: how many cards are as the artist left them.
+    objects: of the cards once they are written, finest first. order: see `order_line`.
+    notes: for the artist. edits: counts of cards that are kept as the artist left them.
 
     Args:
-        keep_edits: what the artist has changed of the cards that are there.
+        keep_edits: whether to keep the artist's changes to existing cards.
         known: see `MadeRig.of`.
-        kept: cards that were built before; these are kept there.
+        kept: cards that were built before; the new ones are kept in it.
 
     Raises:
-        HairloomError: no hair that can be used, or its cards that are there cannot be changed.
+        HairloomError: no hair that can be used, or its existing cards cannot be changed.
     """
 
     def __init__(
@@ -66,11 +67,11 @@ class CardObjectJob:
         self.edits = EditCounts()
 
     def building(self) -> ThreadWork[MappedCards]:
-        """Build the cards in a thread, which touches nothing of Blender's."""
+        """Build the cards in a thread, which touches none of Blender's data."""
         return self._kept.building(self._inputs, "hairloom card objects")
 
     def write(self, made: MappedCards) -> None:
-        """Put them into the scene.
+        """Put the cards into the scene.
 
         Raises:
             HairloomError: the hair is gone, or its cards cannot be changed any more.
@@ -108,7 +109,7 @@ def _write(
     texture: Floats,
     matrix: Floats,
 ) -> list[bpy.types.Object]:
-    """Fill the objects of this groom, make those that are missing, remove those too many."""
+    """Fill the objects of this groom's cards, make missing ones and remove superfluous ones."""
     there = {obj.hairloom.card_object.level: obj for obj in reversed(card_objects(hair))}
     for level in [level for level in there if level >= len(build.levels)]:
         _remove(there.pop(level))
@@ -136,7 +137,7 @@ def _write(
 
 
 def _new_material(name: str, image: bpy.types.Image) -> bpy.types.Material:
-    """The one that cards start with; afterwards it is the artist's."""
+    """The initial material of cards; afterwards it is the artist's."""
     return new_material(name, image, image, blending="DITHERED", occlusion="occlusion")
 
 
@@ -152,7 +153,8 @@ def _remove(obj: bpy.types.Object) -> None:
 
 
 def _new_object(hair: bpy.types.Object, level: int, matrix: Floats) -> bpy.types.Object:
-    """An empty one beside the hair, carried by what carries it; coarser levels are hidden."""
+    """An object without geometry beside the hair, with the same carrier as parent; coarser levels
+    are hidden."""
     name = f"{hair.name} Cards" + (f" LOD{level}" if level else "")
     obj = bpy.data.objects.new(name, bpy.data.meshes.new(name))
     link_into(obj, hair.users_collection, bpy.context.scene)
@@ -185,12 +187,12 @@ def _fill(mesh: bpy.types.Mesh, cards: CardMesh, matrix: Floats) -> None:
 
 
 def _put_on_record(mesh: bpy.types.Mesh, made: MadeCards, cards: CardMesh, matrix: Floats) -> None:
-    """So that it is known later what the artist has changed of these cards."""
+    """Write the record by which the artist's changes to these cards are found later."""
     is_made = cards.card < len(made)
     set_attribute(mesh, MADE_ATTRIBUTE, "FACE", np.where(is_made, cards.card + 1, 0))
     surface, number = read_pieces(mesh)
     assert number is not None
-    # the artist's own cards together are one more
+    # all of the artist's own cards together count as one more card
     found = prints(surface, np.where(number < 0, len(made), number))
     marks = made.marks.copy()
     unprinted = np.flatnonzero(marks == UNPRINTED)
@@ -199,16 +201,16 @@ def _put_on_record(mesh: bpy.types.Mesh, made: MadeCards, cards: CardMesh, matri
 
 
 def _filled_image(image: bpy.types.Image | None, name: str, texture: Floats) -> bpy.types.Image:
-    """This picture in an image of the file, packed into it.
+    """An image with this texture, packed into the file.
 
     Args:
-        image: to be drawn again, or None for a new one.
+        image: the one to overwrite, or None for a new one.
         texture: (height, width, 4) linear with straight alpha, row 0 the lowest.
     """
     height, width = texture.shape[:2]
     if image is None or image.library is not None:
         image = bpy.data.images.new(name, width, height, alpha=True)
-    image.alpha_mode = "CHANNEL_PACKED"  # first: Blender reads the packed picture again for it
+    image.alpha_mode = "CHANNEL_PACKED"  # first, since Blender then reloads the packed picture
     if tuple(image.size) != (width, height):
         image.scale(width, height)
     fill_image(image, texture)

@@ -1,8 +1,8 @@
-"""Hair of other grooms in the scene, as it shades the cards of one.
+"""Hair of other grooms in the scene, which occludes the cards of one.
 
-That is every mesh that can be seen and that Make Cards or Sort Hair Cards has written, of the cards
-of a groom the finest level alone. A groom without such cards shades by its strands, of which quick
-cards are made that nobody sees. It is read at once, and made into cards wherever there is time.
+Occluders are all visible meshes that Make Cards or Sort Hair Cards has written, but only the finest
+level of a groom's cards. A groom without such cards occludes by its strands, from which quick cards
+are made for this purpose only. Objects are read in the main thread; a thread may make the cards.
 """
 
 from __future__ import annotations
@@ -31,13 +31,13 @@ from ..scene.source import Source, read_source
 from ..scene.surfaces import CARD_ATTRIBUTES, read_surface
 from .material import alpha_of
 
-#: Hair that is nearer than this to where it was has not moved, in terms of how far it reaches.
+#: Hair counts as unmoved within this tolerance, relative to its largest coordinate.
 _STILL = 1.0e-5
 _NO_MOTION = np.eye(4)
 
 
 class _Read(Protocol):
-    """One object as it was read."""
+    """An object that was read."""
 
     def occluder(self) -> CardOccluder:
         """Raises:
@@ -47,16 +47,16 @@ class _Read(Protocol):
 
     @property
     def state(self) -> tuple[object, ...]:
-        """All that its occlusion depends on."""
+        """All values that its occlusion depends on."""
         ...
 
 
 @dataclass(frozen=True, eq=False)
 class Occluders:
-    """All other hair that occludes, read from the scene: arrays that a thread may use.
+    """All other hair that occludes, read from the scene as arrays that a thread may use.
 
     uids: session numbers of the objects, including those that cannot be used.
-    notes: what the artist should know of how they were read.
+    notes: for the artist, from reading them.
     """
 
     uids: frozenset[int] = frozenset()
@@ -64,7 +64,7 @@ class Occluders:
     _read: tuple[_Read, ...] = ()
 
     def cards(self) -> tuple[tuple[CardOccluder, ...], tuple[str, ...]]:
-        """The hair as cards, and what the artist should know of it."""
+        """The hair as cards, and notes for the artist."""
         found: list[CardOccluder] = []
         notes = list(self.notes)
         for each in self._read:
@@ -75,7 +75,7 @@ class Occluders:
         return tuple(found), tuple(notes)
 
     def is_like(self, other: Occluders) -> bool:
-        """Whether both occlude alike."""
+        """Whether both give the same occlusion."""
         if (self.uids, self.notes) != (other.uids, other.notes):
             return False
         pairs = zip(self._read, other._read, strict=True)
@@ -124,10 +124,10 @@ def read_occluders(
     """All other hair, if the settings include it.
 
     Args:
-        own: hair curves, or a mesh of cards; None leaves nothing out.
-        depsgraph: None is that of the window, brought up to date.
-        motion: (4, 4) of the shaded hair since rest; the others are carried back by it, so that
-            they are where they would be if all of it were at rest.
+        own: hair curves or a mesh of cards that does not count; None leaves nothing out.
+        depsgraph: None: that of the window, brought up to date.
+        motion: (4, 4) of the occluded hair since rest; its inverse is applied to the others, so
+            that they are where they would be if all hair were at rest.
     """
     if not settings.others:
         return Occluders()
@@ -191,7 +191,7 @@ def _is_still(one: object, other: object) -> bool:
 def occluder_objects(
     own: bpy.types.Object | None, layer: bpy.types.ViewLayer
 ) -> list[bpy.types.Object]:
-    """The meshes of cards and the hair that shade what is not their own."""
+    """The visible meshes of cards, and hair without such, that occlude the cards of `own`."""
     seen = [obj for obj in objects_in(layer) if obj.visible_get(view_layer=layer)]
     meshes = [obj for obj in seen if _is_cards(obj)]
     carded = {obj.hairloom.card_object.groom for obj in meshes}
@@ -211,5 +211,5 @@ def _is_cards(obj: bpy.types.Object) -> bool:
 
 
 def _is_groom(obj: bpy.types.Object) -> bool:
-    """Hair curves; the copy of a bake stands for hair that counts already."""
+    """Whether an object is hair curves, and not the copy that shows a bake of other hair."""
     return obj.type == "CURVES" and not obj.data.hairloom.baked_in

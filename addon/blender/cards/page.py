@@ -1,4 +1,4 @@
-"""The web page beside a GLB of cards: what it holds, and when there can be one."""
+"""The web page beside a GLB of cards."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ PAGE_AT_REST = (
     "The web page shows the hair at rest, since it plays no vertex textures and no springs. "
     "Choose Joints for one that moves."
 )
-#: Texture -> what the page calls it, in the order in which it shows them.
+#: Texture -> its title, in the order on the page.
 _TITLES = {
     "base": "Colour",
     "alpha": "Alpha",
@@ -39,7 +39,7 @@ _TITLES = {
 
 
 def check_page(settings: CardExportSettings, file_format: CardFormat, place: str) -> None:
-    """Refuse a page beside another format, before any work is done.
+    """Refuse a page beside another format than GLB, before any work is done.
 
     Raises:
         HairloomError: the page could not show the file.
@@ -63,14 +63,14 @@ def write_page(
     settings: CardExportSettings,
     carrier: Floats,
 ) -> None:
-    """Write NAME.html beside the files of an export, all of which are there but the sidecar.
+    """Write NAME.html beside the files of an export, which all exist except the sidecar.
 
     Args:
         path: of the GLB.
         name: of the hair.
-        sidecar: of the GLB; the page holds one for its own, smaller files.
-        backs: of each level, see `index_buffer`.
-        carrier: (frame_count, 4, 4): where the motion takes hair and head as a whole, world space.
+        sidecar: of the GLB; the page holds another one for its own, smaller files.
+        backs: for each level, see `index_buffer`.
+        carrier: (frame_count, 4, 4): rigid motion of hair and head together, world space.
     """
     maps = small_maps(_shown(made.maps), made.build.finest.atlas, int(settings.page_texture))
     files = {
@@ -121,7 +121,7 @@ def write_page(
 
 
 def _shown(maps: CardMaps) -> dict[str, Floats]:
-    """Those that the viewer draws with."""
+    """The maps that the viewer draws with."""
     other = {"tangent": "shift", "shift": "tangent"}[maps.highlights]
     return {role: maps.by_name[role] for role in _TITLES if role in maps.by_name and role != other}
 
@@ -131,7 +131,7 @@ def _channels(values: Floats) -> str:
 
 
 def _corners(sidecar: CardFile, carrier: Floats) -> list[list[float]]:
-    """Of the bounds of the hair at rest, in all places to which it is carried."""
+    """The lowest and highest corner of the hair's bounds in all frames, as carried from rest."""
     rest = sidecar.levels[0].positions
     extent = zip(rest.min(axis=0), rest.max(axis=0), strict=True)
     corners = np.array(list(itertools.product(*extent)))

@@ -19,18 +19,18 @@ from ..scene.built_in_head import HeadLook
 from ..scene.head_look import PLAIN
 from ..scene.mesh_materials import MeshMaterial
 
-#: of pictures: the longest side [pixels], and the quality of their files
+#: longest side [pixels] and file quality of pictures
 _SIDE, _QUALITY = 1024, 90
 
 
 @dataclass(frozen=True)
 class PageHead:
-    """What a page holds of a head.
+    """A head in a page.
 
-    files: "head.triangles" (uint32), and of each vertex "head.positions", "head.normals" and, if
-        there are pictures, "head.uv" (float32), and these.
-    parts: material after material, in the order of the triangles: how many of these it has, and how
-        they are drawn; colours are scene-linear.
+    files: "head.triangles" (uint32); for each vertex "head.positions", "head.normals" and, if there
+        are pictures, "head.uv" (float32); and the pictures.
+    parts: for each material, in the order of the triangles, their number and how they are drawn;
+        colours are scene-linear.
     """
 
     files: dict[str, bytes]
@@ -41,8 +41,8 @@ class PageHead:
         cls, path: Path, head: Surface, look: HeadLook | None, file_format: CardFormat
     ) -> PageHead:
         """Args:
-        path: of the mesh of cards; pictures are made in its folder.
-        look: None is plain skin.
+        path: of the mesh of cards; temporary pictures are written in its folder.
+        look: None: plain skin.
         """
         chosen = look or ((np.arange(len(head.triangles)), PLAIN),)
         order = np.concatenate([triangles for triangles, _ in chosen])
@@ -85,15 +85,15 @@ def _color_of(material: MeshMaterial) -> Floats | None:
 
 
 def _coded(color: Floats) -> Floats:
-    """By the sRGB curve."""
+    """The colour encoded as sRGB."""
     coded = np.clip(color, 0.0, 1.0).astype(np.float32)
     coded[..., :3] = srgb_encoded(coded[..., :3])
     return coded
 
 
 def _split(head: Surface, order: Ints, *, has_uv: bool) -> tuple[Ints, Ints, Floats | None]:
-    """The head's vertices, apart where their UVs are: which vertex each is, the triangles in this
-    order, and each one's UV."""
+    """The head with vertices split at UV seams: the head's vertex that each vertex is, the
+    triangles in this order, and the UV of each vertex."""
     triangles = head.triangles[order]
     if not has_uv:
         return np.arange(len(head.positions)), triangles, None

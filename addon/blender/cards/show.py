@@ -1,7 +1,7 @@
-"""The cards that are shown in place of a groom's strands.
+"""The cards that are shown instead of a groom's strands.
 
-A build takes seconds, so that in a window it goes on beside everything else. What was shown before
-stays until it is done. In the background they are built at once.
+A build takes seconds, so with a window it runs in a thread, and the previous cards or strands stay
+until it is done. In background mode the call waits for it.
 """
 
 from __future__ import annotations
@@ -34,9 +34,9 @@ from .textures import chosen_pictures
 
 
 def as_shown(snapshot: Snapshot) -> Snapshot:
-    """The same with its cards alone where it has any, else with its strands.
+    """The snapshot with its cards alone if it has any, else with its strands.
 
-    Colours that stand for numbers are seen on strands.
+    Debug views, whose colours show numbers, are drawn on strands.
     """
     if snapshot.cards is None or snapshot.debug_view != "none":
         return replace(snapshot, cards=None)
@@ -44,7 +44,7 @@ def as_shown(snapshot: Snapshot) -> Snapshot:
 
 
 def without_strands(snapshot: Snapshot) -> Snapshot:
-    """The same with its cards at most."""
+    """The snapshot without strands, with its cards if it has any."""
     return replace(
         snapshot,
         points=np.zeros((0, 3), np.float32),
@@ -68,10 +68,10 @@ def without_strands(snapshot: Snapshot) -> Snapshot:
 class ShownCards:
     """The cards of one groom: those that are shown, and those that are being built.
 
-    warnings: what the artist should know of them, or why there are none.
+    warnings: about the cards, or why there are none.
 
     Args:
-        hair: finds the object. arrived: is called when `collect` has something to take over.
+        hair: finds the object. arrived: called when `collect` has cards to take over.
     """
 
     def __init__(
@@ -92,22 +92,22 @@ class ShownCards:
 
     @property
     def is_pending(self) -> bool:
-        """Whether other cards are on their way."""
+        """Whether other cards are being built."""
         return self._job.is_pending
 
     @property
     def stage(self) -> str:
-        """What is done now of cards that are on their way."""
+        """The current stage of cards that are being built."""
         return self._job.stage
 
     @property
     def has_arrived(self) -> bool:
-        """Whether `collect` has something to take over."""
+        """Whether `collect` has cards to take over."""
         return self._job.has_arrived
 
     @property
     def counts(self) -> tuple[int, int, int]:
-        """Cards, triangles and vertices of what is shown."""
+        """Numbers of cards, triangles and vertices that are shown."""
         if self._shown is None:
             return 0, 0, 0
         mesh = self._shown.mesh
@@ -115,7 +115,7 @@ class ShownCards:
 
     @property
     def lines(self) -> tuple[str, ...]:
-        """What is shown, for the panel."""
+        """Lines about the shown cards, for the panel."""
         if self._built is None or self._shown is None:
             return ()
         cards, triangles, _ = self.counts
@@ -123,24 +123,24 @@ class ShownCards:
         return line, order_line(self._built.wrong_fraction)
 
     def want(self, rig: Rig, settings: GroomSettings) -> None:
-        """Cards of this rig by these settings from now on; nothing is built twice."""
+        """Show cards of this rig with these settings from now on; the same are not built twice."""
         if self._wanted is None or not _same(self._wanted, (rig, settings)):
             self._wanted = rig, settings
             self._build()
 
     @property
     def is_shaded_by_others(self) -> bool:
-        """Whether other hair shades what is shown."""
+        """Whether other hair occludes the shown cards."""
         return self._wanted is not None and self._wanted[1][CardOcclusionSettings].others
 
     @property
     def shaded_by(self) -> frozenset[int]:
-        """Session numbers of the other hair that shades what is shown, or what is being built."""
+        """Session numbers of the other hair that occludes the cards shown or being built."""
         return self._occluders.uids
 
     def look_again(self) -> None:
-        """The same cards once more if other hair is elsewhere or other hair now, or if the artist
-        has edited cards in the scene."""
+        """Build the cards again if other hair has moved or changed, or if the artist has edited
+        cards in the scene."""
         if self._wanted is None:
             return
         occluders, edits = self._read_occluders(self._wanted[1]), self._read_edits()
@@ -149,17 +149,17 @@ class ShownCards:
             self._build(occluders)
 
     def collect(self) -> None:
-        """Take over what was built meanwhile."""
+        """Take over the cards that were built in the thread."""
         self._take(self._job.take)
 
     def now(
         self, rig: Rig, pose: Pose, guides: Callable[[], Floats], settings: SettingsMap
     ) -> CardSnapshot | None:
-        """The cards as they are now; where the rig is another one, as they were, until those of
-        this one are built. None without any.
+        """The cards in the current pose; while cards of another rig are still shown, as they were.
+        None if there are none.
 
         Args:
-            guides: gives the guides of the rig (guide_count, cv_count, 3) [m, world].
+            guides: returns the guides of the rig (guide_count, cv_count, 3) [m, world].
         """
         self._motion = pose.matrix
         built = self._built
@@ -172,10 +172,10 @@ class ShownCards:
         return self._shown
 
     def figures(self, solids: Solids | None) -> CardFigures | None:
-        """How long and how deep the cards are that are shown; None without any.
+        """Stretch of the shown cards, and their depth in colliders; None without cards.
 
         Args:
-            solids: what they are led out of; None: nothing.
+            solids: the colliders that they are led out of; None: none.
         """
         built, shown = self._built, self._shown
         if built is None or shown is None:
@@ -187,14 +187,14 @@ class ShownCards:
         return measure.figures
 
     def forget(self) -> None:
-        """Strands are shown; cards that are on their way are not waited for."""
+        """Show strands again, and drop cards that are being built."""
         self._job.cancel()
         self._built = self._wanted = self._shown = None
         self._occluders = Occluders()
         self.warnings = ()
 
     def _build(self, occluders: Occluders | None = None) -> None:
-        """Have what is wanted built; at once where nothing goes on until then."""
+        """Build the wanted cards, in a thread or, where calls block, at once."""
         assert self._wanted is not None
         rig, settings = self._wanted
         if latest_job.is_blocking():
@@ -208,14 +208,14 @@ class ShownCards:
         return partial(BuiltCards.in_thread, inputs=self._read(rig, settings, occluders))
 
     def _read(self, rig: Rig, settings: GroomSettings, occluders: Occluders | None) -> CardInputs:
-        """With the chosen pictures, the artist's edits and the other hair as they are now."""
+        """The inputs, with pictures, the artist's edits and other hair as they are now."""
         self._occluders = occluders or self._read_occluders(settings)
         self._edits = self._read_edits()
         pictures, _ = chosen_pictures(self._hair().data.hairloom.card_images)
         return CardInputs(rig, settings.sections, pictures, self._occluders, self._edits)
 
     def _read_edits(self) -> CardEdits | None:
-        """Cards that cannot be read are drawn as they are made, with a warning."""
+        """The artist's edits; if they cannot be read, there are none, with a warning."""
         depsgraph = bpy.context.view_layer.depsgraph
         try:
             edits, self._doubts = groom_edits(self._hair(), depsgraph, self._motion)

@@ -1,4 +1,4 @@
-"""Pictures of hair cards: the artist's own, and all that are written as files beside a mesh."""
+"""Pictures of hair cards: the artist's own, and those written as files beside a mesh."""
 
 from __future__ import annotations
 
@@ -18,14 +18,15 @@ from ...shading.settings import ShadingSettings
 from ...shading.textures import TEXTURES, picture_as
 from ..base.images import read_image, read_texture, write_texture
 
-#: Texels along a side of a table: half of those of our own pictures, in which one sees no more.
+#: Texels along a side of a table: half of what our own renderer uses, with no visible difference.
 TABLE_SIZE = 128
 
 
 def chosen_pictures(group: Any) -> tuple[dict[str, Floats], tuple[str, ...]]:
-    """Those pictures of a HAIRLOOM_PG_card_images that can be used, and a warning for each other.
+    """The pictures of a HAIRLOOM_PG_card_images that can be used, and a warning for each of the
+    others.
 
-    Pictures are (height, width) or (height, width, 3), as `picture_as` has them.
+    Pictures are (height, width) or (height, width, 3), as `picture_as` returns them.
     """
     pictures, warnings = {}, []
     for name in TEXTURES:
@@ -49,10 +50,10 @@ def picture_files(group: Any) -> list[Path]:
 
 
 def named_pictures(arguments: list[str]) -> dict[str, Floats]:
-    """The pictures that the command line names as NAME=FILE.
+    """The pictures from command line arguments NAME=FILE.
 
     Raises:
-        HairloomError: another name, or a file that cannot be used.
+        HairloomError: an unknown name, or a file that cannot be used.
     """
     pictures = {}
     for argument in arguments:
@@ -75,13 +76,13 @@ def write_textures(
     grid: AtlasGrid,
     settings: CardExportSettings,
 ) -> list[WrittenTexture]:
-    """Write all textures of a preset.
+    """Write all textures of a packing preset.
 
     Args:
         maps: name -> (height, width) or (height, width, 3), of any sizes.
 
     Raises:
-        HairloomError: nothing can be written there, or not in this format.
+        HairloomError: the folder cannot be written, or the format is not available.
     """
     return [
         texture
@@ -100,7 +101,7 @@ def write_textures(
 def texture_roles(
     written: Iterable[WrittenTexture], maps: Collection[str]
 ) -> dict[str, dict[str, Any]]:
-    """Each of these maps -> the file and the channels that hold it, as the sidecar has it."""
+    """Each of these maps -> the file and the channels that hold it, for the sidecar."""
     roles: dict[str, dict[str, Any]] = {}
     for texture in written:
         channels = dict(zip("rgba", texture.layout.channels, strict=False))
@@ -120,7 +121,7 @@ def texture_roles(
 
 
 def texture_channels(written: Iterable[WrittenTexture]) -> dict[str, dict[str, Any]]:
-    """Each file -> what its channels hold."""
+    """Each file -> its colour space and the content of its channels."""
     return {
         texture.path.name: {
             "color_space": texture.color_space,
@@ -133,8 +134,8 @@ def texture_channels(written: Iterable[WrittenTexture]) -> dict[str, dict[str, A
 def _together(
     maps: Mapping[str, Floats], settings: CardExportSettings
 ) -> list[Mapping[str, Floats]]:
-    """Maps that must be of one size. Those that have a file each need not be, but for mip maps,
-    which alpha weighs.
+    """Groups of maps that must have one size: all, as they share files, or as alpha weighs their
+    mip maps in DDS. Maps with a file each and no mip maps can have any sizes.
     """
     if settings.packing == "hairloom" and not settings.textures.startswith("dds"):
         return [{name: image} for name, image in maps.items()]
@@ -142,11 +143,11 @@ def _together(
 
 
 def png_of(path: Path, pixels: Floats, *, is_color: bool = False) -> bytes:
-    """(height, width, channels) as a PNG of 8 bits; `path` lies in the folder it may use."""
+    """An 8-bit PNG of (height, width, channels); a temporary file is written beside `path`."""
     picture = path.with_name(".picture.png")
     try:
         write_texture(picture, pixels, is_color=is_color, depth="uint8", is_packed=True)
-    except HairloomError as error:  # of the file that it is for, not of one that nobody knows
+    except HairloomError as error:  # name the file that it is for, not the temporary one
         place = error.place.replace(picture.name, path.name)
         raise HairloomError(error.problem, place=place, remedy=error.remedy) from error
     data = picture.read_bytes()
@@ -155,11 +156,11 @@ def png_of(path: Path, pixels: Floats, *, is_color: bool = False) -> bytes:
 
 
 def write_tables(folder: Path, stem: str, shading: ShadingSettings) -> dict[str, str]:
-    """Marschner's tables as EXR files of 32 bits, name -> file; nothing for the other model, or
-    without OpenImageIO. They have no compression: games by Godot read them without a library.
+    """Marschner's tables as 32-bit EXR files, name -> file; none for the other model, or without
+    OpenImageIO. They are uncompressed, so that games made with Godot read them without a library.
 
     Raises:
-        HairloomError: nothing can be written there.
+        HairloomError: the folder cannot be written.
     """
     if not texture_files.has_openimageio():
         return {}
