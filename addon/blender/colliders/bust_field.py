@@ -1,7 +1,7 @@
-"""The distance field of the built-in head, which ships: nobody waits for it on the first click.
+"""The distance field of the built-in head, shipped so that the first preview need not build it.
 
-`tools/make_bust_field.py` writes the file. It has the key of what it is of, so a head that is
-moved, shaped or subdivided in another way gets a field of its own.
+`tools/make_bust_field.py` writes the file, with the key of its mesh. So a head that is moved,
+shaped or subdivided in another way gets a field of its own.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ FILE = Path(__file__).with_name("bust_field.npz")
 
 
 def shipped_field(surface: Surface, key: str) -> DistanceField | None:
-    """That of this surface; None where another one ships.
+    """The shipped field if it is that of this surface, else None.
 
     Args:
         key: of the surface and its resolution, see `fields`.

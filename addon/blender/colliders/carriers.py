@@ -1,9 +1,9 @@
 """Following an object that collides: by its matrix, and by how an armature deforms its mesh.
 
 Most heads in Blender do not move as objects: an armature moves their vertices. A collider moves by
-the rotation, scale and translation that fit the vertices best; a mesh is bent by the rest. If there
-is hair, the vertices near its roots count, because the rest of a body moves independently of the
-head.
+the rotation, scale and translation that fit the vertices best; the remainder deforms a mesh
+collider. With hair, only vertices near its roots count, because the rest of a body moves
+independently of the head.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from ...strands.affine import moved
 from ..base.objects import Body
 from ..scene.surfaces import read_positions
 
-#: Number of vertices that a mesh is tracked by; more would not change the result.
+#: Maximum number of vertices that a mesh is tracked by; more would not change the result.
 _ENOUGH = 2000
 #: Rings of triangles around the roots that count as near them.
 _RINGS = 2
@@ -55,7 +55,7 @@ class Carrier:
     def of_mesh(cls, body: Body, surface: Surface, roots: Ints | None = None) -> Carrier:
         """Args:
         surface: world space, with the body at rest.
-        roots: indices of the vertices that hair grows from; None: all vertices count.
+        roots: indices of the vertices that hair grows on; None: all vertices count.
         """
         used = np.unique(surface.triangles)
         if roots is not None and len(roots):
@@ -117,7 +117,7 @@ def is_left_out(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bool:
     if obj.hide_viewport or not obj.evaluated_get(depsgraph).is_evaluated:
         return True
     if layer.objects.get(obj.name) != obj and obj not in layer.objects.values():
-        return True  # lookup by name is fast, but several libraries may use the same name
+        return True  # lookup by name is fast, but libraries may have objects of the same name
     is_seen = obj.visible_get(view_layer=layer)
     return not is_seen and all(each.hide_viewport for each in obj.users_collection)
 
@@ -129,7 +129,7 @@ def scales_of(matrix: Floats) -> Floats:
 
 
 def _around(triangles: Ints, roots: Ints, vertex_count: int) -> Ints:
-    """The vertices of the triangles around the roots, some rings wide."""
+    """The vertices of `_RINGS` rings of triangles around the roots."""
     chosen = np.zeros(vertex_count, bool)
     chosen[np.asarray(roots)] = True
     for _ in range(_RINGS):

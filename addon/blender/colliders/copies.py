@@ -1,5 +1,5 @@
-"""What acts on a groom of the scene, copied for hair in a scene of its own, on a head that stands
-at the origin: each object as it is now, as a child of that head."""
+"""Copies of the objects that act on a groom, for hair in another scene whose head is at the origin:
+each object as it is now, as a child of that head."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from .ties import ties_of
 
 @dataclass
 class StillCopies:
-    """Copies of objects, one each.
+    """Static copies of objects, each copied once.
 
-    head: their parent. scene: they are in its collection.
+    head: their parent. scene: the one whose collection they are in.
     """
 
     head: bpy.types.Object
@@ -25,13 +25,13 @@ class StillCopies:
     made: dict[bpy.types.Object, bpy.types.Object] = field(default_factory=dict)
 
     def of(self, obj: bpy.types.Object) -> bpy.types.Object:
-        """The copy of an object: no animation, constraint or modifier acts on it any more."""
+        """The copy of an object, without animation, constraints and modifiers."""
         if obj not in self.made:
             self.made[obj] = self._copied(obj)
         return self.made[obj]
 
     def collection(self, name: str, objects: list[bpy.types.Object]) -> bpy.types.Collection | None:
-        """A collection of their copies; None of no objects."""
+        """A collection of copies of these objects; None if there are no objects."""
         if not objects:
             return None
         collection = bpy.data.collections.new(name)
@@ -55,7 +55,7 @@ class StillCopies:
 
 
 def copy_holders(source: bpy.types.Object, hair: bpy.types.Object, copies: StillCopies) -> None:
-    """Hold hair by what holds another groom: its ties, and what its tips are held by."""
+    """Hold hair by copies of another groom's ties and tip surface."""
     hair.hairloom.tie_collection = copies.collection("Ties", list(ties_of(source)))
     surface = source.hairloom.tip_surface
     hair.hairloom.tip_surface = None if surface is None else copies.of(surface)
@@ -68,10 +68,10 @@ def copy_colliders(
     hair: bpy.types.Object,
     copies: StillCopies,
 ) -> None:
-    """Keep hair out of what another groom stays out of.
+    """Give hair copies of another groom's colliders.
 
     Args:
-        head: the object of that groom's scene that stands at the origin as `copies.head`.
+        head: the head of that groom, which `copies.head` replaces.
     """
     if head is not None:
         copies.head.hairloom.collider_shape = head.hairloom.collider_shape

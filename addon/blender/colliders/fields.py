@@ -1,8 +1,8 @@
-"""Distance fields of meshes, each made once, beside the window's work where nobody may wait.
+"""Distance fields of meshes, each made once, in a thread if the caller cannot wait.
 
-A field depends only on the mesh and its resolution, so it is found again by their hash: in the next
-preview, by the next groom on the same head, by a bake. It is the same to the bit, whichever thread
-builds it. That of the built-in head ships.
+A field depends only on the mesh and its resolution, so it is found again by their hash: by the next
+preview, the next groom on the same head, or a bake. It is bitwise the same, whichever thread builds
+it. The field of the built-in head is shipped.
 """
 
 from __future__ import annotations
@@ -17,16 +17,16 @@ from ..base.digests import digest
 from ..base.thread_work import ThreadWork
 from .bust_field import shipped_field
 
-#: Fields that are kept though nothing may collide with them any more, 6 MB each by default.
+#: Number of fields that are kept, used or not; 6 MB each by default.
 KEPT = 8
 
 _works: dict[str, ThreadWork[DistanceField]] = {}
-#: threads that make hair ask for fields too
+#: threads that make hair get fields too
 _lock = Lock()
 
 
 class NotMadeYetError(Exception):
-    """The field is being made; ask again when `is_made` says so."""
+    """The field is being made; try again once `are_made` is true."""
 
 
 def field_of(
@@ -35,12 +35,12 @@ def field_of(
     """The field of a closed mesh, which takes a second to make for the first time.
 
     Args:
-        place: names it in messages.
-        blocking: False: have it made in a thread, and do not wait for that.
+        place: the mesh's name in messages.
+        blocking: False: do not wait until a thread has made it.
 
     Raises:
         HairloomError: see `DistanceField.from_surface`.
-        NotMadeYetError: it is being made, and nobody waits.
+        NotMadeYetError: it is being made, and the call is not blocking.
     """
     key = field_key(surface, settings)
     with _lock:
@@ -55,16 +55,16 @@ def field_of(
         raise NotMadeYetError
     try:
         return work.result()
-    except HairloomError as error:  # a surface that cannot be one stays so, under any name
+    except HairloomError as error:  # kept, since the same surface would fail again
         raise HairloomError(error.problem, place=place, remedy=error.remedy) from error
     except Exception:
         with _lock:
-            _works.pop(key, None)  # as where memory ran out, which may go well the next time
+            _works.pop(key, None)  # another try may succeed, such as after a lack of memory
         raise
 
 
 def solid_of(head: Surface | None) -> DistanceField | None:
-    """The field of what hair grows on, by default settings; None where that encloses nothing."""
+    """The field of the mesh that hair grows on, with default settings; None if it has no inside."""
     if head is None:
         return None
     try:
@@ -80,7 +80,11 @@ def are_made() -> bool:
 
 
 def trim() -> None:
-    """Keep the youngest only. Not while somebody waits for many: he could never have them all."""
+    """Drop all but the `KEPT` fields used last.
+
+    Not to be called while a caller that does not block gathers more fields than that: it would
+    never get them all.
+    """
     with _lock:
         made = [key for key, work in _works.items() if work.is_done]
         for key in made[:-KEPT]:
@@ -88,7 +92,7 @@ def trim() -> None:
 
 
 def forget() -> None:
-    """Keep none."""
+    """Drop all fields."""
     with _lock:
         _works.clear()
 
@@ -98,5 +102,5 @@ def _made(surface: Surface, settings: DynamicsSettings, key: str) -> DistanceFie
 
 
 def field_key(surface: Surface, settings: DynamicsSettings) -> str:
-    """What a field depends on."""
+    """The digest of everything that a field depends on."""
     return digest(surface.positions, surface.triangles, settings.collider_resolution)

@@ -17,13 +17,13 @@ from .carriers import is_left_out
 from .obstacle_parts import Track, is_solid_scale
 
 #: A set is unchanged if its balls moved relative to each other by less than this fraction of the
-#: largest.
+#: largest radius.
 _SAME_SET = 1.0e-3
 
 
 @dataclass(frozen=True)
 class Ball:
-    """A ball that stays with an object. center: (3,), radius: object space [m]."""
+    """A ball that moves with an object. center: (3,), radius: object space [m]."""
 
     body: Body
     center: Floats
@@ -34,8 +34,8 @@ class Ball:
 class BallsPart:
     """Balls that move together, as one collider.
 
-    Its matrix is the similarity transform that fits the motion of the balls best. A remainder, as
-    when they are attached to skin that bends, creates a new set of balls for the next frame.
+    Its matrix is the similarity transform that fits the motion of the balls best. If a remainder is
+    left, as on skin that deforms, a new set of balls is built.
 
     rest: (n, 4, 4) the objects' matrices at rest.
     """
@@ -102,7 +102,8 @@ class BallsPart:
     def _set_of(
         self, centers: Floats, radii: Floats, members: tuple[int, ...]
     ) -> SphereSetCollider:
-        """The previous set, if it has changed by rounding only: building its grid takes time."""
+        """A set of balls; the previous one if it differs by rounding only, as a new one has to
+        build its grid."""
         known = self._set
         if known is not None and members == self._members:
             tolerance = _SAME_SET * float(radii.max())
@@ -114,8 +115,8 @@ class BallsPart:
 
 
 def _markers(center: Floats, radius: Floats, matrix: Floats) -> Floats:
-    """(4 n, 3) points that move with n balls: the centres and one point on each axis, so that the
-    rotation of even a single ball is known."""
+    """(4 n, 3) points that move with n balls: the centres and one point on each axis, which give
+    the rotation even of a single ball."""
     local = center[:, None] + radius[:, None, None] * np.vstack([np.zeros(3), np.eye(3)])
     world: Floats = local @ np.moveaxis(matrix[:, :3, :3], 1, 2) + matrix[:, None, :3, 3]
     return world.reshape(-1, 3)

@@ -25,9 +25,9 @@ from ...strands.affine import mean_scale, moved
 from .carriers import Carrier, scales_of
 from .fields import field_of
 
-#: A mesh that returns to its rest within this part of its extent is the same mesh.
+#: A mesh counts as the same if it differs from its rest by less than this fraction of its extent.
 _SAME_SHAPE = 1.0e-5
-#: What counts as near the tracked vertices, in the radius of a ball around these.
+#: Distance that counts as near the tracked vertices, in radii of a ball around them.
 NEAR = 3.0
 #: Axes whose lengths differ by less than this fraction count as equal.
 _EVEN = 0.01
@@ -36,10 +36,10 @@ _EVEN = 0.01
 class Part(Protocol):
     """One collider of a groom.
 
-    name: of the object that it is made of, or of one of them.
-    uid: the object's session number, or None where it is made of several.
+    name: of its object, or of the first one.
+    uid: the object's session number, or None if it consists of several objects.
     track: where it was in the last two frames.
-    warnings: object -> what the artist should know since it was last seen.
+    warnings: object -> a warning for the artist, from the last call of `now`.
     """
 
     track: Track
@@ -52,20 +52,19 @@ class Part(Protocol):
     def uid(self) -> int | None: ...
 
     def now(self, depsgraph: bpy.types.Depsgraph) -> tuple[Collider, Floats]:
-        """The collider, and its matrix (4, 4) to world space. Looking at it changes no motion.
+        """The collider, and its matrix (4, 4) to world space; does not touch `track`.
 
         Raises:
             HairloomError: it is gone, or it is another mesh.
         """
 
     def swollen(self) -> float:
-        """How far the shape that was seen last has changed since this was asked before, see
-        `PosedCollider`."""
+        """How far the shape has changed between the last two calls of this, see `PosedCollider`."""
 
 
 @dataclass
 class Track:
-    """Matrices (4, 4) of the frames before, None where there was none.
+    """Matrices (4, 4) of the last two frames, None where there was none.
 
     duration: [s] of the last frame.
     """
@@ -80,7 +79,7 @@ class Track:
     def go(
         self, collider: Collider, matrix: Floats, duration: float, swelling: float = 0.0
     ) -> PosedCollider:
-        """The trajectory since the previous frame, by the same formula as the roots'."""
+        """The trajectory since the previous frame, with the same formula as for roots."""
         if self.before is None:
             self.rest(matrix)
         assert self.before is not None
@@ -94,7 +93,7 @@ class Track:
 
 @dataclass(frozen=True, eq=False)
 class _Seen:
-    """shape: (vertex_count, 3) [m], of a mesh in its own space. scale: of that space."""
+    """A mesh as last seen. shape: (vertex_count, 3) [m] in its own space. scale: of that space."""
 
     shape: Floats
     scale: float
@@ -104,8 +103,8 @@ class _Seen:
 class FieldPart:
     """A mesh, as its signed distance in world space with the mesh at rest.
 
-    surface: world space at rest; its field takes a second to build. Where the mesh has another
-    shape, the field is made again around what has moved, which takes some hundredths of a second.
+    surface: world space at rest; its field takes a second to build. If the mesh deforms, the field
+    is updated around the vertices that have moved, which takes some hundredths of a second.
     """
 
     carrier: Carrier
@@ -123,7 +122,7 @@ class FieldPart:
     def new(
         cls, carrier: Carrier, surface: Surface, settings: DynamicsSettings, *, blocking: bool
     ) -> FieldPart:
-        """As `fields.field_of`."""
+        """Raises and blocks as `fields.field_of`."""
         made = field_of(surface, settings, place=carrier.body.handle.name, blocking=blocking)
         return cls(carrier, surface, made, settings.collider_resolution)
 
@@ -157,13 +156,13 @@ class FieldPart:
         return float(np.sqrt(np.einsum("ij,ij->i", path, path).max(initial=0.0))) * seen.scale
 
     def take_bent(self, other: FieldPart) -> None:
-        """Go on with the last shape of a part that was made from the same mesh."""
+        """Take over the last shape of a part that was made from the same mesh."""
         self._bent, self._at = other._bent, other._at
 
     @cached_property
     def _near(self) -> Bools:
-        """(vertex_count,) what is near the vertices that it is tracked by: how far hands move in a
-        frame says nothing about hair on a head."""
+        """(vertex_count,) whether vertices are near the tracked ones, since the motion of hands,
+        for example, does not matter to hair on a head."""
         tracked = self.carrier.rest
         if not len(tracked):
             return np.ones(len(self.surface.positions), bool)
@@ -173,7 +172,7 @@ class FieldPart:
         return result
 
     def is_of(self, surface: Surface, matrix: Floats, settings: DynamicsSettings) -> bool:
-        """Whether it was made from this mesh, before `matrix` (4, 4) moved it from its rest."""
+        """Whether this part was made from this mesh at rest, which `matrix` (4, 4) has moved."""
         if (
             self.resolution != settings.collider_resolution
             or self.surface.positions.shape != surface.positions.shape
@@ -212,10 +211,10 @@ class ShapePart:
 
 
 def _solid(matrix: Floats, name: str) -> Floats:
-    """It, if nothing is scaled to nothing.
+    """The matrix, if it has a volume.
 
     Raises:
-        HairloomError: it is.
+        HairloomError: it scales an axis to zero.
     """
     if not is_solid_scale(matrix):
         raise HairloomError("its scale is zero", place=name, remedy="Correct its scale")

@@ -1,4 +1,4 @@
-"""Reading how an object collides, from its shape and from the artist's choice."""
+"""Reading the collider of an object, from its shape and from the artist's choice."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ _SOLID = frozenset(("CURVE", "SURFACE", "META", "FONT", "VOLUME", "POINTCLOUD"))
 class Reader:
     """Builds the part of one object.
 
-    known: its field from before, if it had one. blocking: for a new one; see `fields.field_of`.
+    known: its previous part, if that has a field. blocking: for a new field; see `fields.field_of`.
     """
 
     obj: bpy.types.Object
@@ -45,7 +45,8 @@ class Reader:
     blocking: bool
 
     def part_of_head(self, head: Body, at_rest: Surface, roots: Ints | None) -> Part | Ball | None:
-        """The head was read when the session started, perhaps in another pose."""
+        """The part of the head, whose mesh was read when the session started, perhaps in another
+        pose."""
         if shape_of(self.obj) != "mesh":
             return self.part()
         carrier = Carrier.of_mesh(head, at_rest, roots)
@@ -54,7 +55,7 @@ class Reader:
     def part(self) -> Part | Ball | None:
         """Raises:
         HairloomError: it cannot collide as it should.
-        NotMadeYetError: its field is being made, and nobody waits.
+        NotMadeYetError: its field is being made, and the call is not blocking.
         """
         shape, obj = shape_of(self.obj), self.obj
         if shape == "none":
@@ -113,17 +114,17 @@ def shape_of(obj: bpy.types.Object) -> str:
     if chosen != "automatic":
         return chosen
     if obj.type == "MESH" or obj.type in _SOLID:
-        return "mesh"  # reading it reports that it is not a mesh
+        return "mesh"  # for other types, reading it reports that it is no mesh
     return "sphere" if obj.type == "EMPTY" and obj.empty_display_type == "SPHERE" else "none"
 
 
 def sized_axis(empty: bpy.types.Object) -> int:
-    """Along which of its axes the border of an Empty is a display size away from its middle."""
+    """The axis along which the border of an Empty is one display size away from its centre."""
     return 2 if shape_of(empty) == "capsule" else 0
 
 
 def _ball_or_part(carrier: Carrier, ball: Ball) -> Part | Ball:
-    """Round balls form a set; a ball that its scale makes an ellipsoid is a part of its own."""
+    """A round ball, which becomes part of a set; or an ellipsoid, by its scale, as its own part."""
     if is_round(carrier.body.rest):
         return ball
     return ShapePart(carrier, SphereCollider(ball.center, ball.radius), carrier.body.rest)

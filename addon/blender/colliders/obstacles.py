@@ -1,9 +1,9 @@
 """The colliders of one groom, or of one cloth fin.
 
-They are the surface that the hair grows from, or the one collider that the artist has chosen
-instead, and every object of a collection. `hairloom.collider_shape` says how an object collides: as
-a mesh (signed distance), as a ball or a capsule around its bounding box, or not at all. What cannot
-be used is left out with a warning.
+These are the surface that the hair grows on, or the collider that the artist has chosen instead,
+and all objects of a collection. `hairloom.collider_shape` sets how an object collides: as a mesh
+(signed distance), as a ball or capsule around its bounding box, or not at all. Objects that cannot
+be used are left out with a warning.
 """
 
 from __future__ import annotations
@@ -55,14 +55,14 @@ class Obstacles:
 
         Args:
             owner: the hair curves, or a fin.
-            head: what it grows from, and head_at_rest: its mesh in world space at rest; or None.
-            known: its distance fields are reused if nothing has changed.
-            roots: vertices of the head that hair grows from; the head is tracked by them.
-            blocking: False: do not wait for fields that are to be made.
+            head, head_at_rest: the surface, and its mesh in world space at rest; or None.
+            known: the previous colliders, whose distance fields are reused if nothing has changed.
+            roots: vertices of the head that hair grows on; the head is tracked by them.
+            blocking: False: do not wait for distance fields to be built.
 
         Raises:
             HairloomError: as `move`.
-            NotMadeYetError: a field is being made, and nobody waits.
+            NotMadeYetError: a field is being made, and the call is not blocking.
         """
         found = cls([], None if head is None else head.handle.uid)
         fields = {} if known is None else known._fields()
@@ -79,7 +79,7 @@ class Obstacles:
             except HairloomError as error:
                 found._unusable[obj.name] = str(_named(obj.name, error))
                 continue
-            except NotMadeYetError:  # the others are begun as well
+            except NotMadeYetError:  # go on, so that the other fields are begun too
                 is_whole = False
                 continue
             if isinstance(made, Ball):
@@ -97,14 +97,14 @@ class Obstacles:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What is left out and why, and what cannot be followed well."""
+        """Objects that are left out and why, and doubts about those that are used."""
         seen = [text for part in self.parts for text in part.warnings.values()]
         lost = (*self._unusable.values(), *self._failed.values())
         return tuple(dict.fromkeys([*lost, *self._doubtful, *seen]))
 
     @property
     def meshes(self) -> tuple[Surface, ...]:
-        """Those that collide as meshes, at rest."""
+        """The meshes of all mesh colliders, at rest."""
         return tuple(part.surface for part in self.parts if isinstance(part, FieldPart))
 
     def move(self, depsgraph: bpy.types.Depsgraph, duration: float) -> tuple[PosedCollider, ...]:
@@ -123,7 +123,7 @@ class Obstacles:
         return tuple(posed)
 
     def rest(self, depsgraph: bpy.types.Depsgraph) -> tuple[PosedCollider, ...]:
-        """Jump to the present pose, at rest; returns where they stand.
+        """Jump to the present pose, at rest; returns the colliders there.
 
         Raises:
             HairloomError: as `move`.
@@ -140,7 +140,8 @@ class Obstacles:
         return tuple(posed)
 
     def standing(self, depsgraph: bpy.types.Depsgraph) -> tuple[PosedCollider, ...]:
-        """Where they stand now; those that cannot be used, which Play tells of, are left out."""
+        """The colliders where they are now; those that cannot be used are left out, as Play reports
+        them."""
         found = []
         for part in self.parts:
             with suppress(HairloomError):
@@ -149,7 +150,7 @@ class Obstacles:
         return tuple(found)
 
     def _there(self, depsgraph: bpy.types.Depsgraph) -> Iterator[Part]:
-        """The parts that Blender evaluates; others start at rest when they return."""
+        """The parts that are enabled in the scene; others start from rest when enabled again."""
         self._failed.clear()
         for part in self.parts:
             if self._is_left_out(part, depsgraph):
@@ -195,7 +196,7 @@ def sources_of(
 
 
 def _unused_collection(owner: bpy.types.Object) -> Iterator[str]:
-    """What is said where nothing in its collection collides."""
+    """A warning if nothing in the collider collection collides."""
     collection = owner.hairloom.collider_collection
     if collection is None:
         return
@@ -207,7 +208,7 @@ def _unused_collection(owner: bpy.types.Object) -> Iterator[str]:
 
 
 def _mesh_notes(surface: Surface, name: str) -> Iterator[str]:
-    """What keeps a mesh from being a closed surface, and what that does to hair."""
+    """Defects that keep a mesh from being a closed surface, and their effect on hair."""
     edges = edges_of(surface)
     if edges.open_count:
         yield (
@@ -231,7 +232,7 @@ def _edges(count: int) -> str:
 
 
 def _carried_by(obj: bpy.types.Object) -> object:
-    """Balls with the same carrier move together: those attached to one mesh or bone."""
+    """The parent mesh or bone of a ball; balls with the same one move together."""
     if obj.parent is None:
         return None
     return obj.parent.session_uid, obj.parent_bone if obj.parent_type == "BONE" else ""

@@ -1,4 +1,4 @@
-"""Hair that was read, made ready by settings."""
+"""Rigs from hair that was read and its settings."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ from ..properties.groom_settings import GroomSettings
 from ..scene.source import Source
 from .fields import solid_of
 
-#: What a rig is made from of what is read.
+#: The fields of `Source` that a rig is made from.
 _OF_RIG = ("strands", "head", "density", "masks", "partings", "holders")
 
 
 def rig_from(
     source: Source, settings: SettingsMap, *, place: str, kept: Kept = NOTHING_KEPT
 ) -> Rig:
-    """The hair made ready, at rest as it was read; from arrays alone.
+    """The rig of hair, at rest as it was read; from arrays alone.
 
     Args:
-        place: names the hair in messages.
+        place: the hair's name in messages.
         kept: see `rig_flow.prepare`.
 
     Raises:
@@ -53,7 +53,7 @@ def rig_from(
 
 @dataclass(frozen=True, eq=False)
 class MadeRig:
-    """Hair made ready, and what it was made from: who needs it again need not make it again."""
+    """A rig with its inputs, kept so that the same rig is not made twice."""
 
     source: Source
     settings: GroomSettings
@@ -61,10 +61,11 @@ class MadeRig:
 
     @classmethod
     def of(cls, hair: bpy.types.Object, source: Source, known: tuple[MadeRig, ...] = ()) -> MadeRig:
-        """The hair made ready by its own settings, at rest as it was read.
+        """The rig of hair with its own settings, at rest as it was read.
 
         Args:
-            known: what was made before, maybe of this hair; one that is the same is taken.
+            known: rigs that were made before, maybe of this hair; one with the same inputs is
+                returned.
 
         Raises:
             HairloomError: no hair that can be used.
@@ -76,7 +77,7 @@ class MadeRig:
         return cls(source, settings, rig_from(source, settings.sections, place=hair.name))
 
     def is_of(self, source: Source, settings: GroomSettings) -> bool:
-        """Whether the same rig is made of that, to the last bit."""
+        """Whether the rig made from these inputs is the same, to the last bit."""
         return self.settings.of_rig == settings.of_rig and all(
             same_content(getattr(self.source, name), getattr(source, name)) for name in _OF_RIG
         )

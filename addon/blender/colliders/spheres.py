@@ -1,8 +1,8 @@
 """Spheres fitted to a mesh: created, parented to it so that they follow it, and removed.
 
-Each is an empty shown as a sphere, whose display size is its radius in metres. Its parent is three
-vertices of the mesh as modified, so it follows a head that an armature turns. Where vertices cannot
-be parents, the object is.
+Each is an Empty shown as a sphere, whose display size is its radius in metres. It is parented to
+three vertices of the evaluated mesh, so it follows a head that an armature turns. Where vertices
+cannot be parents, it is parented to the object.
 """
 
 from __future__ import annotations
@@ -32,19 +32,19 @@ __all__ = [
     "use_spheres",
 ]
 
-#: Custom property of what was created here: on the collection the mesh, on each empty True.
+#: Custom property of data-blocks made here: on the collection the mesh, on each Empty True.
 MARK = "hairloom_fitted"
-#: Custom property of the collection: how the mesh collided before its spheres did so instead.
+#: Custom property of the collection: the mesh's collider shape before its spheres replaced it.
 _BEFORE = "hairloom_collided_as"
-#: Vertices that a sphere may be parented to: their distance in radii, and their minimum number.
+#: Vertices that a sphere may be parented to: maximum distance in radii, and minimum number.
 _REACH, _LEAST = 1.3, 12
-#: Modifiers that make several vertices of one; Blender uses their centre as the parent.
+#: Modifiers that make several vertices from one; Blender uses their centre as the parent.
 _COPYING = frozenset(("MIRROR", "ARRAY", "SCREW", "SKIN", "REMESH", "BOOLEAN", "BUILD", "NODES"))
 
 
 @dataclass(frozen=True)
 class FittedSpheres:
-    """What was created. unskinned: how many spheres follow the object only, not its shape."""
+    """The fitted spheres. unskinned: how many follow the object only, not its deformation."""
 
     collection: bpy.types.Collection
     fit: SphereFit
@@ -86,8 +86,8 @@ def fitted_collections(mesh: bpy.types.Object) -> list[bpy.types.Collection]:
 def use_spheres(
     hair: bpy.types.Object, collection: bpy.types.Collection, scene: bpy.types.Scene
 ) -> None:
-    """Let hair collide with a collection, in addition to the one it has; where that is not to be
-    changed, such as the spheres of another mesh, both go into a new one."""
+    """Let hair collide with a collection, in addition to its present one. If that must not be
+    changed, such as the spheres of another mesh, both go into a new collection."""
     used = hair.hairloom.collider_collection
     if used is None:
         hair.hairloom.collider_collection = collection
@@ -101,7 +101,7 @@ def use_spheres(
 
 
 def replace_mesh(mesh: bpy.types.Object, collection: bpy.types.Collection) -> None:
-    """Let its spheres, in this collection, collide instead of a mesh."""
+    """Let the spheres in this collection collide instead of their mesh."""
     if mesh.hairloom.collider_shape != "none":
         collection[_BEFORE] = mesh.hairloom.collider_shape
         mesh.hairloom.collider_shape = "none"
@@ -121,7 +121,7 @@ def remove_spheres(mesh: bpy.types.Object) -> int:
 
 
 def grown_on(mesh: bpy.types.Object, view_layer: bpy.types.ViewLayer) -> list[bpy.types.Object]:
-    """The hair of a mesh."""
+    """The hair that grows on a mesh."""
     return [obj for obj in objects_in(view_layer) if obj.type == "CURVES" and head_of(obj) == mesh]
 
 
@@ -169,7 +169,7 @@ def _parent_to(
             unskinned += 1
         else:
             empty.parent_type, empty.parent_vertices = "VERTEX_3", carriers.tolist()
-    context.view_layer.update()  # Blender works out the frame of each sphere's parent
+    context.view_layer.update()  # Blender computes the frame of each sphere's parent
     for empty, center in zip(empties, fit.centers, strict=True):
         empty.matrix_parent_inverse = empty.matrix_world.inverted_safe()
         empty.matrix_basis = Matrix.Translation([float(value) for value in center])

@@ -1,9 +1,9 @@
-"""What holds the hair of one groom beside its roots: hair ties, and the surface that holds tips.
+"""Hair ties, and the surface that holds tips: what holds a groom's hair beside its roots.
 
-The ties are the objects of the groom's collection. A circle Empty is a ring as large as it is
-drawn, any other Empty a ball. A curve or a mesh is a ring too, the ellipse that fits its points
-best, or a ball where it is as thick as wide. Ties move by their matrix, and as an armature deforms
-them. What is gone or disabled holds nothing.
+The ties are the objects of the groom's collection. A circle Empty is a ring of the drawn size, any
+other Empty is a ball. A curve or a mesh is the ellipse that fits its points best, or a ball if it
+is thick. Ties move by their matrix, and with their mesh if an armature deforms it. Objects that are
+gone or disabled hold nothing.
 """
 
 from __future__ import annotations
@@ -39,21 +39,21 @@ from .obstacle_parts import is_solid_scale
 #: Types of objects whose points form a ring.
 _DRAWN = frozenset(("MESH", "CURVE", "SURFACE", "FONT"))
 TIE_TYPES = frozenset(("EMPTY",)) | _DRAWN
-#: As thick as this, in terms of its width, a mesh is a ball and no ring.
+#: From this thickness on, relative to its width, a mesh is a ball instead of a ring.
 _THICK = 0.5
-#: A ring narrower than this, in terms of its width, is a line.
+#: Below this width, relative to its length, a ring is a line, which holds nothing.
 _LINE = 0.01
-#: Radius of a new ring, in terms of the hair's length.
+#: Radius of a new ring, relative to the hair's length.
 _NEW_RADIUS = 0.1
-#: Ties whose shape differs by less than this, in terms of their size, are unchanged.
+#: Ties are unchanged if their shape differs by less than this, relative to their size.
 _SAME = 1.0e-4
 
 
 @dataclass
 class _TrackedTie:
-    """A tie, and what it is tracked by.
+    """A tie, and the points that it is tracked by.
 
-    points: (n, 3) [m] world at rest, of a mesh that deforms; none of others.
+    points: (n, 3) [m] world at rest, those of a mesh; none for other objects.
     """
 
     body: Body
@@ -64,7 +64,7 @@ class _TrackedTie:
         """(4, 4), world space, from its rest to where it is now.
 
         Raises:
-            HairloomError: it holds nothing now.
+            HairloomError: it is gone, disabled or scaled to zero.
         """
         obj = self.body.found()
         if is_left_out(obj, depsgraph):
@@ -87,7 +87,7 @@ class _TrackedTie:
 class Holding:
     """The ties of one groom and the surface that holds its tips, at rest and now.
 
-    holders: at rest. warnings: what cannot hold hair and why, in the pose that was seen last.
+    holders: at rest. warnings: objects that cannot hold hair and why, in the pose last seen.
     """
 
     holders: Holders = field(default_factory=Holders)
@@ -105,10 +105,10 @@ class Holding:
         known: Holding | None = None,
         back: Floats | None = None,
     ) -> Holding:
-        """What holds this hair, at rest in its present pose.
+        """The ties and the tip surface of hair, at rest in its present pose.
 
         Args:
-            known: as it was read before: what is unchanged keeps its rest.
+            known: as read before; objects that are unchanged keep their rest.
             back: (4, 4), from the present pose to that in which the hair is at rest.
         """
         back = np.eye(4) if back is None else back
@@ -143,7 +143,7 @@ class Holding:
 
     @property
     def uids(self) -> frozenset[int]:
-        """Session numbers of the objects."""
+        """Session numbers of the ties and the tip surface."""
         ties = {one.body.handle.uid for one in self._ties}
         return frozenset(ties if self._tips is None else ties | {self._tips.uid})
 
@@ -153,7 +153,7 @@ class Holding:
         return np.array([one.body.rest for one in self._ties]).reshape(-1, 4, 4)
 
     def at_rests(self, rests: Floats) -> Holding:
-        """The same ties, at rest where they were when a bake was made."""
+        """The same ties with these rest matrices, (tie_count, 4, 4), as those of a bake."""
         if len(rests) != len(self._ties):
             return self
         ties = []
@@ -167,7 +167,7 @@ class Holding:
     def anchors(
         self, hair: bpy.types.Object, holds: Holds, depsgraph: bpy.types.Depsgraph
     ) -> Floats:
-        """Where all anchors are now, see `groom.holds.anchors_of`."""
+        """The matrices of all anchors now, see `groom.holds.anchors_of`."""
         idle = []
         matrices = np.full((holds.tie_count, 4, 4), np.nan)
         current = {obj.session_uid for obj in ties_of(hair)}
@@ -210,7 +210,7 @@ class Holding:
         return positions
 
     def is_outdated(self, hair: bpy.types.Object, edited: set[int]) -> bool:
-        """Whether there is more to be held by than was read, or it has another shape.
+        """Whether an object that holds hair was added or has changed its shape since it was read.
 
         Args:
             edited: session numbers of data-blocks whose geometry has changed.
@@ -228,13 +228,13 @@ def ties_of(hair: bpy.types.Object) -> tuple[bpy.types.Object, ...]:
 
 
 def holders_of(hair: bpy.types.Object) -> tuple[bpy.types.Object, ...]:
-    """The same with the object that may hold tips, as the last."""
+    """The objects that may hold this hair: ties, and the tip surface last."""
     surface = hair.hairloom.tip_surface
     return ties_of(hair) if surface is None else (*ties_of(hair), surface)
 
 
 def new_ring(hair: bpy.types.Object, context: bpy.types.Context) -> bpy.types.Object:
-    """A ring at the 3D cursor that goes with the surface."""
+    """A ring at the 3D cursor, parented to the surface."""
     ring = bpy.data.objects.new("Hair Tie", None)
     ring.empty_display_type = "CIRCLE"
     strands = shown_curves(hair, context.evaluated_depsgraph_get()).strands
@@ -251,7 +251,7 @@ def new_ring(hair: bpy.types.Object, context: bpy.types.Context) -> bpy.types.Ob
 
 
 def add_ties(hair: bpy.types.Object, rings: list[bpy.types.Object], scene: bpy.types.Scene) -> None:
-    """Put rings into the hair's collection of ties, which is made where there is none."""
+    """Put rings into the hair's collection of ties, which is made if there is none."""
     put_into(hair, "tie_collection", "Ties", rings, scene)
 
 
@@ -259,7 +259,7 @@ def remove_tie(hair: bpy.types.Object, name: str, scene: bpy.types.Scene) -> Non
     """Take an object out of the hair's collection of ties, but not out of the scene.
 
     Raises:
-        HairloomError: it is not in that collection itself.
+        HairloomError: it is not directly in that collection.
     """
     take_out(hair, "tie_collection", "Ties", name, scene)
 
@@ -267,7 +267,7 @@ def remove_tie(hair: bpy.types.Object, name: str, scene: bpy.types.Scene) -> Non
 def held_by(
     hair: bpy.types.Object, ring: bpy.types.Object, depsgraph: bpy.types.Depsgraph
 ) -> tuple[int, int]:
-    """How many of the hair's curves a ring holds where both are now, and how many there are.
+    """How many of the hair's curves a ring holds in the present pose, and the number of curves.
 
     Raises:
         HairloomError: it cannot be a tie, or the hair has no curves.
@@ -278,7 +278,7 @@ def held_by(
 
 
 def _drawn_as(obj: bpy.types.Object) -> str:
-    """What an Empty's shape depends on; changing it edits no data."""
+    """A key of an object's shape as far as a change of it edits no data: an Empty's display."""
     return f"{obj.empty_display_type} {obj.empty_display_size}" if obj.type == "EMPTY" else obj.type
 
 
@@ -311,7 +311,7 @@ def _read_tie(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, back: Float
 
 
 def _of_empty(obj: bpy.types.Object) -> tuple[Floats, bool]:
-    """Blender draws circles around the Empty's own y."""
+    """The shape of a tie, and whether it is a ball. Blender draws circles around an Empty's y."""
     size = obj.empty_display_size
     shape = np.diag([size, size, size, 1.0])
     if obj.empty_display_type != "CIRCLE":
@@ -320,16 +320,16 @@ def _of_empty(obj: bpy.types.Object) -> tuple[Floats, bool]:
 
 
 def _points_of(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Floats:
-    """(n, 3) object space, of a mesh or of a curve as it is drawn."""
+    """The points of a mesh or curve as it is drawn, (n, 3) object space."""
     with as_mesh(obj, depsgraph) as mesh:
         return np.empty((0, 3), np.float32) if mesh is None else vertex_places(mesh)
 
 
 def _fitted(points: Floats, name: str) -> tuple[Floats, bool]:
-    """The shape of a tie, and whether it is a ball, by the points (n, 3) around it.
+    """The shape of a tie, and whether it is a ball, from its points (n, 3).
 
-    Points spread evenly over an ellipse have half the square of each half-axis as their variance
-    along it; over an ellipsoid a third.
+    Points spread evenly along an ellipse have a variance of half the squared half-axis along each
+    axis; those on an ellipsoid a third.
     """
     if len(points) >= 3 and np.isfinite(points).all():
         middle = points.mean(axis=0)
@@ -364,13 +364,13 @@ def _read_tips(
 
 
 def _again(read: _TrackedTie, known: Holding | None) -> _TrackedTie:
-    """As it was read before, unless it has another shape now; moving alone changes none."""
+    """The tie as read before, unless its shape has changed; a new pose is no change of shape."""
     for one in () if known is None else known._ties:
         if one.body.handle.uid != read.body.handle.uid:
             continue
         here, there = (np.linalg.pinv(each.body.rest) @ each.tie.shape for each in (read, one))
         is_alike = read.tie.is_ball == one.tie.is_ball and len(read.points) == len(one.points)
-        # a ring's axes in its own plane are any, and so are their signs
+        # a ring's axes in its own plane and their signs are arbitrary, so compare squares
         squares = [each[:3, :3] @ each[:3, :3].T for each in (here, there)]
         size = float(np.trace(squares[1]))
         if (
@@ -386,7 +386,7 @@ def _again(read: _TrackedTie, known: Holding | None) -> _TrackedTie:
 
 
 def _same_surface(read: TipSurface, known: TipSurface | None) -> TipSurface:
-    """The one of before for the same triangles: it may be in another pose now."""
+    """The surface as read before if it has the same triangles, since only its pose may differ."""
     if known is None:
         return read
     one, other = read.surface.triangles, known.surface.triangles
