@@ -35,7 +35,7 @@ def bake(job: Job) -> None:
 
 
 def _check_saved_with(objects: list[bpy.types.Object]) -> None:
-    """Refuse what a saved scene would not play: Blender saves nothing of linked objects.
+    """Refuse linked objects, whose bakes a saved scene would not play: Blender does not save them.
 
     Raises:
         HairloomError: naming the first of them.
@@ -68,12 +68,12 @@ def _bake(objects: list[bpy.types.Object], job: Job) -> None:
 def write_bake(plan: Bake, report: Report, label: str, stage: str) -> None:
     """Bake frame by frame, with progress under this label."""
     progress, steps = report.progress(label, plan.frame_count), plan.steps()
-    with closing(steps):  # an interrupted bake leaves the one before
+    with closing(steps):  # if interrupted, the earlier bake stays
         for _ in range(plan.frame_count):
             with report.stage(stage):
                 done = next(steps)
             progress.show(done)
-        for _ in steps:  # what is left is to put the bakes in place
+        for _ in steps:  # runs the rest of the generator, which publishes the bakes
             raise AssertionError("a bake has as many steps as frames")
 
 
@@ -86,11 +86,11 @@ def _delete(objects: list[bpy.types.Object], report: Report) -> None:
 
 
 def _objects(names: list[str]) -> tuple[list[bpy.types.Object], tuple[str, ...]]:
-    """Those that were named, else all hair and cloth of the view layer to be simulated; and
-    what is said of those left out.
+    """The named objects, else all hair and cloth of the view layer to be simulated; and notes on
+    objects that are left out.
 
     Raises:
-        HairloomError: there is none, or no such.
+        HairloomError: there are none, or a name is wrong.
     """
     if names:
         return named_objects(names, bakeable, "hair curves or cloth"), ()

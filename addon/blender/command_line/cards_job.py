@@ -52,7 +52,7 @@ def cards(job: Job) -> None:
 
 
 def _own_pictures(job: Job) -> dict[str, Floats]:
-    """Those that the artist has chosen for the hair object that --groom names."""
+    """The pictures that the artist has chosen for the hair object of --groom."""
     hair = job.hair
     if hair is None:
         return {}
@@ -69,7 +69,7 @@ def written_cards(
     output: CardOutput | None = None,
     motion: GuideMotion | None = None,
 ) -> WrittenCards:
-    """Build and write the cards, and say what they are."""
+    """Build and write the cards, and report them."""
     print("building hair cards", flush=True)
     levels = getattr(job.options, "levels", None)
     settings, report = job.settings, job.report
@@ -109,7 +109,7 @@ def written_cards(
 
 
 def _moving(job: Job, settings: CardExportSettings) -> tuple[Rig, GuideMotion | None]:
-    """The hair, and what moves it if motion is asked for: the bake of a folder or of an object."""
+    """The hair, and its motion if requested: the bake in a folder or of an object."""
     options = job.options
     frames = frames_of_option(options.frames)
     _check_idle_options(job, settings)
@@ -126,7 +126,7 @@ def _moving(job: Job, settings: CardExportSettings) -> tuple[Rig, GuideMotion | 
 
 
 def _check_idle_options(job: Job, settings: CardExportSettings) -> None:
-    """Refuse options that say how another motion is written, or a page that is not."""
+    """Refuse options of another kind of motion, and options of a page that is not written."""
     for name in () if settings.page else ("page_texture", "page_head"):
         if getattr(job.options, name) is not None:
             raise HairloomError(

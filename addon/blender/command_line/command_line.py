@@ -1,8 +1,8 @@
 """Hairloom without a window: `blender -b --command hairloom VERB ...`.
 
 Exit codes: 0 done, 1 bad input (one line on stderr says what, where and what to do), 2 wrong usage,
-128 and the signal's number when interrupted (130 for Ctrl-C). Every file is written whole or not at
-all.
+128 plus the signal's number when interrupted (130 for Ctrl-C). Every file is written completely or
+not at all.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ VERBS: tuple[Verb, ...] = (
 
 
 def run(arguments: list[str]) -> int:
-    """Blender calls this with what follows `--command hairloom`."""
+    """Run the arguments after `--command hairloom`; called by Blender. Returns the exit code."""
     try:
         options = parser().parse_args(arguments)
     except SystemExit as stop:  # argparse has printed its message or the help
@@ -77,7 +77,7 @@ def run(arguments: list[str]) -> int:
     except Exception as fault:
         report.fail(_our_fault(fault))
         _reported(report, options.report)
-        raise  # its traceback is for whoever fixes it; Blender's exit code is 1
+        raise  # so that Blender prints the traceback and exits with 1
     return code if _reported(report, options.report) else code or 1
 
 
@@ -96,7 +96,7 @@ def parser() -> argparse.ArgumentParser:
 
 
 def _code(verb: Verb, options: argparse.Namespace, report: Report) -> int:
-    """Do it, and say how it went."""
+    """Run a verb, and report errors; returns the exit code."""
     try:
         with interruptible(), gpu_refusals():
             _run(verb, options, report)
@@ -112,8 +112,8 @@ def _code(verb: Verb, options: argparse.Namespace, report: Report) -> int:
 
 
 def _reported(report: Report, path: str | None) -> bool:
-    """Write the report, where one is wanted: before the work too, so that no older one is taken for
-    this one's. Whether it could be written."""
+    """Write the report if requested, also before the work, lest an older one be taken for this
+    run's; returns whether that worked."""
     if path is None:
         return True
     try:
@@ -133,7 +133,7 @@ def _our_fault(fault: Exception) -> HairloomError:
 
 
 def _run(verb: Verb, options: argparse.Namespace, report: Report) -> None:
-    """The job, unless it is done already."""
+    """Run a verb, unless --skip-existing finds that it is done already."""
     check_numbers(options)
     check_outputs(verb, options)
     stamp = Stamp(options) if getattr(options, "skip_existing", False) else None
@@ -157,7 +157,7 @@ def _run(verb: Verb, options: argparse.Namespace, report: Report) -> None:
 
 
 def _job(verb: Verb, options: argparse.Namespace, report: Report) -> Job:
-    """Open the scene, and gather what the verb needs."""
+    """Open the scene, and gather the inputs of the verb."""
     if verb.opens_scene and options.scene:
         with report.stage("open scene"):
             open_scene(Path(options.scene))
@@ -199,10 +199,10 @@ def _sources(verb: Verb, options: argparse.Namespace) -> Sources:
 
 
 def _styled(options: argparse.Namespace, report: Report) -> str:
-    """The hair of --style, added to the open scene as the artist's button does; its name.
+    """Add the hair of --style to the open scene, as the artist's button does; returns its name.
 
     Raises:
-        HairloomError: other hair is named too, or the head is none that it grows on.
+        HairloomError: other hair is named too, or the hairstyle does not fit the head.
     """
     if options.groom:
         raise HairloomError(
@@ -225,7 +225,7 @@ def _styled(options: argparse.Namespace, report: Report) -> str:
 
 
 def _only_groom(options: argparse.Namespace, report: Report) -> str | None:
-    """The hair of the scene that was named, where nothing else is named that hair could come from.
+    """The only hair of --scene, if no option names another source of hair; else None.
 
     Raises:
         HairloomError: there are several, or it is hidden or empty.
@@ -245,6 +245,6 @@ def _only_groom(options: argparse.Namespace, report: Report) -> str | None:
 
 
 def _own_density(groom: str | None) -> str:
-    """What the artist has chosen for the hair object of this name, if it is one."""
+    """The density of children that is set on the hair object of this name, if it is one."""
     hair = hair_named(groom)
     return str(hair.hairloom.children_density) if hair is not None else ""

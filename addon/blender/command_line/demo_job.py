@@ -64,7 +64,7 @@ def _write_close_up(job: Job, path: Path, studio: Studio, rig: Rig) -> None:
 def _write_card_still(
     job: Job, path: Path, studio: Studio, rig: Rig, written: WrittenCards, still: Floats
 ) -> None:
-    """The strands of the still, and beside them the cards."""
+    """Write a picture of the still and the cards side by side."""
     options = job.options
     built = BuiltCards.of(rig, MappedCards(written.build, written.maps))
     shown = built.drawn(built.rest, job.settings)

@@ -1,4 +1,4 @@
-"""The verb `export`: strands as a file for engines, still or in motion, or a check of it alone."""
+"""The verb `export`: strands as a file for engines, still or in motion, or only a check of it."""
 
 from __future__ import annotations
 
@@ -73,13 +73,13 @@ def export(job: Job) -> None:
 
 def _check_layout(kind: StrandFormat, settings: StrandExportSettings) -> None:
     """Raises:
-    HairloomError: an option that the format does not have, by the name that it has here.
+    HairloomError: an option that the format does not have, by its name on the command line.
     """
     try:
         layout_of(kind, settings)
     except HairloomError as error:
         option = "--" + error.place.replace("_", "-")
-        is_choice = error.place == "engine"  # which the format has, but not with this value
+        is_choice = error.place == "engine"  # the format has this option, but not this value
         problem = error.problem if is_choice else f"it is no option of {kind.title}"
         raise HairloomError(problem, place=option, remedy=error.remedy) from error
 
@@ -106,7 +106,7 @@ def _of_objects(
         if options.use_bake:
             _check_baked(plan)
         for folder in filter(None, map(folder_of, hair if plan.moving else ())):
-            job.report.add_input(folder)  # also one that is empty: a bake may come into it
+            job.report.add_input(folder)  # also an empty one, as a later bake may fill it
         plan = plan.standing() if still else plan
     tell_drops(job, plan.dropped, ", ".join(each.name for each in hair))
     return plan
@@ -114,7 +114,7 @@ def _of_objects(
 
 def _check_baked(plan: StrandExport) -> None:
     """Raises:
-    HairloomError: hair that has no bake, where --use-bake asks for it.
+    HairloomError: hair that has no bake, although --use-bake requires one.
     """
     for part in plan.moving:
         if not isinstance(part, BakedMotion):
@@ -128,7 +128,7 @@ def _check_baked(plan: StrandExport) -> None:
 def _of_rig(
     job: Job, kind: StrandFormat, settings: StrandExportSettings, frames: range | None
 ) -> StrandExport:
-    """Hair of --groom, of --bake, or hair that is grown here."""
+    """The hair of --groom or --bake, or hair that is grown here."""
     needs, look = request_of(kind, settings), job.settings[ShadingSettings]
     if job.options.bake is None:
         if frames is not None:
@@ -162,7 +162,7 @@ def _of_rig(
 
 
 def _groom(rig: Rig, inputs: Inputs) -> Groom:
-    """The strands with their own points; those of the rig where they are children."""
+    """The strands with their own points; the rig's strands if it has children."""
     name = Path(inputs.groom_name).stem
     if inputs.strands.strand_count != rig.strands.strand_count:
         return Groom(rig.strands, name)
@@ -173,7 +173,7 @@ def _groom(rig: Rig, inputs: Inputs) -> Groom:
 
 
 def _of_strands(groom: Groom) -> dict[str, Any]:
-    """What a groom says of whole strands."""
+    """The values of a groom that belong to whole strands."""
     names = ("strand_id", "is_guide", "closest_guides", "guide_weights", "group_names")
     return {name: getattr(groom, name) for name in names}
 
@@ -196,7 +196,7 @@ def _tell_check(facts: dict[str, Any], form: str) -> None:
 
 
 def add_export_options(parser: argparse.ArgumentParser) -> None:
-    """The same choices as the artist's, and when."""
+    """Add the artist's export settings, and options for frames."""
     add_moment_options(parser, "; of the scene, for --object or all of --scene")
     hair = parser.add_argument_group("hair of the scene")
     add_object_option(

@@ -32,7 +32,7 @@ def grow(job: Job) -> None:
             )
         )
     hair.name = options.name or hair.name
-    # by what is set of growth it has grown, and been fitted, already
+    # settings of growth have been used already, to grow and fit the hair
     others = [each for each in options.set if not each.startswith("grow.")]
     put_settings(hair, options.preset, others)
     if options.children_density:

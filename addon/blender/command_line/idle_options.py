@@ -1,5 +1,5 @@
-"""Options that would change nothing beside the others. They are refused: whoever gives one expects
-something of it."""
+"""Options without effect in combination with others. They are refused, since a user who gives one
+expects an effect."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .verb import Verb
 
 @dataclass(frozen=True)
 class _Idle:
-    """Options, when they mean nothing, and what is said then."""
+    """Options, when they have no effect, and the message then."""
 
     names: tuple[str, ...]
     when: Callable[[argparse.Namespace], bool]
@@ -24,8 +24,8 @@ class _Idle:
 
 
 def is_of_scene(options: argparse.Namespace) -> bool:
-    """Whether an export is of hair of the scene with all that it has of its own: of the objects
-    that are named, or of all where a scene is named and nothing else that strands could come from.
+    """Whether an export writes hair objects of the scene, with their own settings, head and bake:
+    those of --object, or all of --scene if no other source of strands is named.
     """
     if not hasattr(options, "object") or not hasattr(options, "groom"):
         return False
@@ -34,7 +34,7 @@ def is_of_scene(options: argparse.Namespace) -> bool:
 
 
 def _is_in_file(options: argparse.Namespace) -> bool:
-    """Whether the groom is none of the scene."""
+    """Whether --groom names a file instead of an object of the scene."""
     return bool(options.groom) and bpy.data.objects.get(options.groom) is None
 
 
@@ -119,10 +119,10 @@ _IDLE = (
 
 
 def check_idle_options(verb: Verb, options: argparse.Namespace) -> None:
-    """Look at what was given, with the scene open that objects are of.
+    """Refuse options without effect; called when the scene is open.
 
     Raises:
-        HairloomError: naming the first option that means nothing, and why.
+        HairloomError: naming the first option without effect, and why.
     """
     usual = argparse.ArgumentParser(add_help=False)
     verb.add_all_options(usual)

@@ -20,7 +20,7 @@ from .verb import Verb
 
 
 def import_grooms(job: Job) -> None:
-    """Import grooms of files into a scene: hair curves, bound to a head if one is named."""
+    """Import grooms from files into a scene: hair curves, bound to a head if one is named."""
     options, report = job.options, job.report
     choices = StrandImport(options.groom_up, options.groom_scale, options.guides)
     ground, notes = _ground(options.head, options.head_scale)
@@ -49,7 +49,7 @@ def import_grooms(job: Job) -> None:
 
 
 def _ground(head: str | None, scale: float) -> tuple[Ground | None, tuple[str, ...]]:
-    """The mesh of the scene, or of a file, that hair is bound to, and what is to be said of it."""
+    """The mesh of the scene, or of a file, that hair is bound to, and notes on it."""
     notes: tuple[str, ...] = ()
     if head is None:
         if scale != 1.0:

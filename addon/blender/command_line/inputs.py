@@ -1,4 +1,4 @@
-"""A groom, its head and its collider, whatever names them: a file, an object or nothing."""
+"""A groom, its head and its collider, each from a file, an object or a default."""
 
 from __future__ import annotations
 
@@ -40,10 +40,10 @@ _SKIN = "light"
 
 @dataclass(frozen=True)
 class Sources:
-    """What the caller asks for; each is a file, an object of the open scene, or None.
+    """The requested inputs; each is a file, an object of the open scene, or None.
 
-    groom None: one is grown on the head. head None: the one that hair curves name as their
-    surface; the built-in one where a groom is grown. collider None: the head itself.
+    groom None: one is grown on the head. head None: the surface of the hair curves; the built-in
+    head where a groom is grown. collider None: the head itself.
     groom_scale, groom_up: of a groom's file, see `strand_reading.read_strands`.
     head_scale: of the files of head and collider.
     need_head: whether a groom without a head is refused.
@@ -51,8 +51,8 @@ class Sources:
     density_group, length_group: vertex groups or attributes of a head in the open scene, by name,
         for hair that is grown here.
     children_density: the same for the children between guides.
-    skin: of the built-in head where it comes without materials, one of bust_skin.TONES.
-    with_face: whether brows and lashes come with a groom of the scene, where its head is built in.
+    skin: of the built-in head if it has no materials, one of bust_skin.TONES.
+    with_face: whether to add brows and lashes to a groom of the scene on the built-in head.
     """
 
     groom: str | None = None
@@ -72,10 +72,10 @@ class Sources:
 
 @dataclass(frozen=True)
 class Inputs:
-    """What was found, in world space at rest.
+    """The inputs that were read, in world space at rest.
 
-    groom: all that a groom's file says of the strands, or None.
-    notes: what of that file was left out or changed.
+    groom: the content of a groom's file, or None.
+    notes: for the artist, such as what of that file was left out or changed.
     density: (vertex_count,) how densely children grow on the head, or None.
     partings: see `Source.partings`.
     """
@@ -93,7 +93,7 @@ class Inputs:
 
 
 def read_inputs(sources: Sources, grow_settings: GrowSettings) -> Inputs:
-    """Read all three.
+    """Read groom, head and collider.
 
     Raises:
         HairloomError: naming the file or object that cannot be used, and what to do.
@@ -132,8 +132,8 @@ def read_inputs(sources: Sources, grow_settings: GrowSettings) -> Inputs:
 def _grown(
     head: Surface, head_name: str | None, sources: Sources, settings: GrowSettings
 ) -> StrandSet:
-    """Hair on this head; combed hair of a bust, the built-in one or one with the same vertex
-    groups, comes with brows and lashes."""
+    """Hair grown on this head. Combed hair comes with brows and lashes if the head is the built-in
+    one or has the same vertex groups."""
     density = _weights(sources.density_group, head_name)
     length = _weights(sources.length_group, head_name)
     if settings.method != "combed":
@@ -151,13 +151,12 @@ def _grown(
 
 
 def look_of_head(sources: Sources, head: Surface | None) -> HeadLook | None:
-    """How this head, or that of a bake, is drawn; see `head_look`."""
+    """The look of this head, or of a bake's head; see `head_look`."""
     return head_look(named_head(sources), head, sources.skin)
 
 
 def _read_head(name: str | None, sources: Sources) -> tuple[Surface | None, tuple[str, ...]]:
-    """The head of this name; without one the built-in head, for hair that is grown here. And what
-    is to be said of it."""
+    """The head of this name, or the built-in head for hair that is grown here; and notes on it."""
     if sources.head_scale != 1.0 and (name is None or not _is_mesh_file(name)):
         raise HairloomError(
             "only a head that is read from a file can be scaled",
@@ -185,8 +184,8 @@ def _read_head(name: str | None, sources: Sources) -> tuple[Surface | None, tupl
 
 
 def head_of_sources(sources: Sources) -> Surface | None:
-    """The head that is named, or that hair curves of the scene name; the built-in one where neither
-    hair nor head is; None without one."""
+    """The mesh of the named head, or of the surface of hair curves; the built-in head if neither
+    hair nor head is named; None if hair has no head."""
     name = named_head(sources)
     if name is None and sources.groom is None:
         return built_in_head().surface
@@ -194,12 +193,12 @@ def head_of_sources(sources: Sources) -> Surface | None:
 
 
 def named_head(sources: Sources) -> str | None:
-    """The head that is named, or that hair curves of the scene name."""
+    """The name of --head, or of the surface of the scene's hair curves."""
     return sources.head or _surface_name(sources.groom)
 
 
 def _partings(groom: str | None) -> tuple[Floats | None, tuple[str, ...]]:
-    """Those of hair curves of the scene, and what of them cannot be used."""
+    """The partings of hair curves of the scene, and notes on those that cannot be used."""
     hair = hair_named(groom)
     if hair is None:
         return None, ()
@@ -222,7 +221,7 @@ def _weights(group: str, head_name: str | None) -> Floats | None:
 
 
 def _surface_name(groom: str | None) -> str | None:
-    """The mesh that a hair curves object of the scene says it grows on."""
+    """The name of the mesh that a hair curves object of the scene grows on."""
     hair = hair_named(groom)
     surface = None if hair is None else head_of(hair)
     return None if surface is None else surface.name
@@ -246,7 +245,7 @@ def _read_groom(
 
 
 def _read_mesh(source: str, sources: Sources) -> tuple[Surface, tuple[str, ...]]:
-    """The mesh of an object or a file, and what is to be said of it."""
+    """The mesh of an object or a file, and notes on it."""
     mesh_object, need_uv = bpy.data.objects.get(source), sources.need_uv
     if mesh_object is not None:
         depsgraph = bpy.context.evaluated_depsgraph_get()
@@ -261,14 +260,14 @@ def _read_mesh(source: str, sources: Sources) -> tuple[Surface, tuple[str, ...]]
 
 
 def _is_mesh_file(source: str) -> bool:
-    """Whether it names a file rather than an object of the scene."""
+    """Whether a name is that of a file rather than of an object of the scene."""
     return bpy.data.objects.get(source) is None and bool(Path(source).suffix)
 
 
 def _size_notes(
     sources: Sources, strands: StrandSet | None, head: Surface | None
 ) -> tuple[str, ...]:
-    """What to say of files that seem to be in another unit than metres."""
+    """Notes on files that seem to be in another unit than metres."""
     hair = at = None
     if sources.groom and strands is not None and bpy.data.objects.get(sources.groom) is None:
         hair = Path(sources.groom).name, strands.points

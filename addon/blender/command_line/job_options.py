@@ -1,4 +1,4 @@
-"""Options that several verbs of the command line have, and what they may hold."""
+"""Options that several verbs of the command line share, and checks of their values."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from .overrides import overrides
 
 
 def add_hair_options(parser: argparse.ArgumentParser) -> None:
-    """The hair that a verb works on, see inputs.Sources."""
+    """Add options for the hair that a verb works on, see inputs.Sources."""
     sources = parser.add_argument_group("what to work on (files, or objects of the scene)")
     files = ", ".join(SUFFIXES)
     sources.add_argument("--groom", help=f"hair curves or a file, {files} (default: grown here)")
@@ -102,7 +102,7 @@ def add_save_option(parser: argparse.ArgumentParser) -> None:
 
 
 def add_object_option(parser: Any, about: str) -> None:
-    """--object, as often as there are objects."""
+    """Add --object, which can be given once for each object."""
     parser.add_argument("--object", action="append", default=[], metavar="NAME", help=about)
 
 
@@ -120,10 +120,10 @@ def add_max_frames_option(parser: Any) -> None:
 
 
 def frames_of_option(given: list[int] | None, max_frames: int | None = None) -> range | None:
-    """The frames that --frames names, the last one too, or the first of them; None without it.
+    """The frames of --frames, including the last one, cut to --max-frames; None without --frames.
 
     Raises:
-        HairloomError: the last frame comes before the first, or there are to be none.
+        HairloomError: the last frame comes before the first, or --max-frames cannot be used.
     """
     if max_frames is not None and (max_frames < 1 or given is None):
         raise HairloomError(
@@ -139,7 +139,7 @@ def frames_of_option(given: list[int] | None, max_frames: int | None = None) -> 
 
 
 def add_bake_option(parser: Any) -> None:
-    """--bake, alone or with a folder; see job_steps.motion_of."""
+    """Add --bake, alone or with a folder; see job_steps.motion_of."""
     parser.add_argument(
         "--bake",
         nargs="?",
@@ -151,10 +151,10 @@ def add_bake_option(parser: Any) -> None:
 
 
 def add_moment_options(parser: argparse.ArgumentParser, beside: str = "") -> None:
-    """At which frame of a bake, see job_steps.posed_hair.
+    """Add options for a frame of a bake, see job_steps.posed_hair.
 
     Args:
-        beside: what else may have that frame.
+        beside: text for the help on other hair that --frame applies to.
     """
     moment = parser.add_argument_group("when")
     add_bake_option(moment)
@@ -167,7 +167,7 @@ def add_moment_options(parser: argparse.ArgumentParser, beside: str = "") -> Non
 
 
 def add_picture_options(parser: argparse.ArgumentParser, width: int, height: int) -> None:
-    """The size of a picture [pixels], its samples and its stage."""
+    """Add options for the size of a picture [pixels], its samples and its stage."""
     picture = parser.add_argument_group("the picture")
     samples = "samples of a pixel along each side, each lit by other points of the lights"
     for name, default, what in (
@@ -186,12 +186,12 @@ def add_picture_options(parser: argparse.ArgumentParser, width: int, height: int
 
 
 def _stages() -> list[str]:
-    """The stages that ship, by their short names."""
+    """The short names of the shipped stages."""
     return [entry.path.stem for entry in shipped("stage")]
 
 
 def add_motion_options(parser: argparse.ArgumentParser) -> None:
-    """What moves the hair: a shake, or the scene."""
+    """Add options for what moves the hair: a shake, or the scene."""
     motion = parser.add_argument_group("the motion")
     motion.add_argument(
         "--seconds",
@@ -226,7 +226,7 @@ def add_texture_option(parser: argparse.ArgumentParser) -> None:
 
 
 def add_settings_options(parser: argparse.ArgumentParser) -> None:
-    """Presets and single parameters."""
+    """Add options for presets and single parameters."""
     settings = parser.add_argument_group("settings")
     settings.add_argument(
         "--preset",
@@ -246,7 +246,7 @@ def add_settings_options(parser: argparse.ArgumentParser) -> None:
 
 
 def add_parameter_options(parser: Any, kind: type[Settings]) -> None:
-    """An option for each parameter of a section, over --set; see `parameters_of`."""
+    """Add an option for each parameter of a section, which overrides --set; see `parameters_of`."""
     for parameter in kind.parameters():
         name = "--" + parameter.name.replace("_", "-")
         about = parameter.description.replace("%", "%%")
@@ -265,7 +265,7 @@ def add_parameter_options(parser: Any, kind: type[Settings]) -> None:
 
 
 def parameters_of[S: Settings](options: argparse.Namespace, settings: S) -> S:
-    """A section with what its own options say, see `add_parameter_options`."""
+    """A section changed by its own options, see `add_parameter_options`."""
     given = {
         parameter.name: value
         for parameter in settings.parameters()
@@ -275,7 +275,7 @@ def parameters_of[S: Settings](options: argparse.Namespace, settings: S) -> S:
 
 
 def add_farm_options(parser: argparse.ArgumentParser, *, can_skip: bool) -> None:
-    """What is reported to whoever started the job, and what a second run does again."""
+    """Add options for reports, and for what a second run does again."""
     job = parser.add_argument_group("the job")
     job.add_argument(
         "--report",
@@ -299,7 +299,7 @@ def add_farm_options(parser: argparse.ArgumentParser, *, can_skip: bool) -> None
 
 
 def check_numbers(options: argparse.Namespace) -> None:
-    """Refuse sizes that nobody can draw before any work is done."""
+    """Refuse numbers out of range, such as sizes that cannot be drawn, before any work is done."""
     for name, least, most in _LIMITS:
         value = getattr(options, name, None)
         if value is not None and not least <= value <= most:
@@ -329,7 +329,7 @@ _LIMITS = (
 
 
 def _presets(options: argparse.Namespace) -> list[Preset[Any]]:
-    """Those of --preset, and over them that of --stage."""
+    """The presets of --preset, and that of --stage last, which overrides them."""
     presets, stage = (
         [named_preset(name) for name in options.preset],
         getattr(options, "stage", None),
@@ -341,8 +341,8 @@ def _presets(options: argparse.Namespace) -> list[Preset[Any]]:
 
 
 def chosen_settings(options: argparse.Namespace) -> SettingsMap:
-    """All parameter sets, the later over the earlier: the defaults, those of the hair object that
-    --groom names, --preset or a material, --set."""
+    """All settings; later sources override earlier ones: defaults, the hair object of --groom,
+    --preset, the material, --set."""
     chosen: dict[str, Settings] = {section: made() for section, made in ALL_SETTINGS.items()}
     name = getattr(options, "groom", None)
     groom = hair_named(name)

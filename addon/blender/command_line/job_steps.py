@@ -1,4 +1,4 @@
-"""What verbs of the command line share: what a job is, and the steps from files to a picture."""
+"""Jobs of the command line, and the steps that verbs share, from files to a picture."""
 
 from __future__ import annotations
 
@@ -43,9 +43,9 @@ from .object_settings import hair_named
 
 @dataclass(frozen=True)
 class Job:
-    """One call of a verb: what to work on, how, where the result goes, and what is reported.
+    """One call of a verb: its inputs, settings, output and report.
 
-    chosen: the settings as they are stored; `settings`: as they act.
+    chosen: the settings as they are stored; `settings`: as they act where hair is wet or dusty.
     """
 
     verb: str
@@ -61,12 +61,12 @@ class Job:
 
     @property
     def hair(self) -> bpy.types.Object | None:
-        """The hair of the open scene that --groom names; None where it names something else."""
+        """The hair object of the open scene that --groom names; None if it names none."""
         return hair_named(self.sources.groom)
 
 
 def read_hair(job: Job) -> Inputs:
-    """Read what the job names."""
+    """Read the inputs of a job."""
     report = job.report
     print("reading", job.sources.groom or "(a groom grown here)", flush=True)
     with report.stage("read inputs"):
@@ -86,7 +86,7 @@ def read_hair(job: Job) -> Inputs:
 
 
 def read_rig(job: Job) -> tuple[Rig, Inputs]:
-    """Read what the job names and make it ready to move."""
+    """Read the inputs of a job and make their rig."""
     inputs, report = read_hair(job), job.report
     with report.stage("bind roots, choose guides"):
         rig = rig_from(_source(job, inputs), job.settings, place=inputs.groom_name)
@@ -98,7 +98,7 @@ def read_rig(job: Job) -> tuple[Rig, Inputs]:
 
 
 def _source(job: Job, inputs: Inputs) -> Source:
-    """What was read, as a session has it of hair of the scene: with what holds that."""
+    """The inputs as the source of a rig, with the ties and tip surface of hair of the scene."""
     hair, holding = job.hair, Holding()
     if hair is not None:
         holding = Holding.of(hair, bpy.context.evaluated_depsgraph_get())
@@ -116,15 +116,15 @@ def _source(job: Job, inputs: Inputs) -> Source:
 
 
 def colored_rig(job: Job, rig: Rig) -> Rig:
-    """The same in the colours that are painted under it; raises as `job_colors`."""
+    """The rig with the colours of the colour map; raises as `job_colors`."""
     return colored(rig, job_colors(job, rig), job.settings[ShadingSettings])
 
 
 def job_colors(job: Job, rig: Rig) -> PaintedColor | None:
-    """What is painted under this hair; None where nothing is to be.
+    """The colour map under this hair; None where none is set.
 
     Raises:
-        HairloomError: it is not there, or cannot be used.
+        HairloomError: it is missing, or cannot be used.
     """
     name, place = job.settings[ShadingSettings].color_map, job.sources.groom or "hair"
     if not name:
@@ -138,10 +138,10 @@ def job_colors(job: Job, rig: Rig) -> PaintedColor | None:
 def read_job_masks(
     job: Job, inputs: Inputs, kind: type[Settings] = ChildrenSettings
 ) -> dict[str, Mask]:
-    """Those that settings name, by the names of the parameters.
+    """The masks that settings name, by the names of the parameters.
 
     Raises:
-        HairloomError: one of them is not there, or cannot be used.
+        HairloomError: one of them is missing, or cannot be used.
     """
     settings, depsgraph = job.settings[kind], bpy.context.evaluated_depsgraph_get()
     names = mask_names(settings)
@@ -157,7 +157,7 @@ def read_job_masks(
 
 
 def tell_rig(report: Report, rig: Rig, name: str) -> None:
-    """What hair there is."""
+    """Add the counts and bounds of a rig to the report."""
     low, high = rig.strands.bounds()
     report.facts.update(
         groom=Path(name).name,
@@ -175,7 +175,7 @@ def tell_rig(report: Report, rig: Rig, name: str) -> None:
 
 
 def tell_drops(job: Job, dropped: Mapping[str, int], place: str) -> None:
-    """Say what was dropped of the hair of this name; with --strict that is an error."""
+    """Print what was dropped of the hair of this name; with --strict that is an error."""
     if not dropped:
         return
     reasons = ", ".join(f"{count} with {reason}" for reason, count in dropped.items())
@@ -189,7 +189,7 @@ def tell_drops(job: Job, dropped: Mapping[str, int], place: str) -> None:
 
 
 def tell_notes(notes: list[str], report: Report) -> None:
-    """Say what the artist should know, and put it into the report."""
+    """Print notes for the artist, and add them to the report."""
     for note in notes:
         print(f"hairloom: {note}", flush=True)
     report.facts["notes"] = [*report.facts.get("notes", ()), *notes]
@@ -215,7 +215,7 @@ class PosedHair:
 
 
 def motion_of(job: Job, frames: range | None = None) -> BakedGuides:
-    """The motion of --bake: of a folder, or of the hair object that --groom names.
+    """The motion of --bake: from a folder, or of the hair object that --groom names.
 
     Raises:
         HairloomError: no bake, or frames that it does not hold.
@@ -248,8 +248,8 @@ def posed_hair(job: Job) -> PosedHair:
 
 
 def with_uvs(rig: Rig, sources: Sources) -> Rig:
-    """A bake's rig with the UVs of the head, which bakes do not hold; the hair's shadow on the head
-    is laid out by them. Without where no head is named, or it has other triangles by now."""
+    """A bake's rig with the UVs of the head, which bakes do not hold and which the shadow on the
+    head needs. Unchanged if no head is named, or if its triangles have changed."""
     now = head_of_sources(replace(sources, need_uv=False, need_head=False))
     if rig.head is None or now is None or not np.array_equal(now.triangles, rig.head.triangles):
         return rig
@@ -257,7 +257,7 @@ def with_uvs(rig: Rig, sources: Sources) -> Rig:
 
 
 def card_edits(job: Job) -> CardEdits | None:
-    """What the artist has changed of the cards of --groom in the scene, unless --discard-edits."""
+    """The artist's edits to the cards of --groom in the scene; None with --discard-edits."""
     hair = job.hair
     if hair is None or getattr(job.options, "discard_edits", False):
         return None
@@ -267,7 +267,7 @@ def card_edits(job: Job) -> CardEdits | None:
 
 
 def open_studio(job: Job, rig: Rig) -> Studio:
-    """What draws this job's hair in its look."""
+    """The studio that draws this job's hair."""
     with job.report.stage("ambient occlusion"):
         groom = prepared(rig, job.settings[AmbientSettings])
     edits = card_edits(job)
@@ -278,7 +278,7 @@ def open_studio(job: Job, rig: Rig) -> Studio:
 
 
 def finish(job: Job, output: Path) -> None:
-    """Name the result."""
+    """Print the name of the result, and add it to the report if nothing else was."""
     if not job.report.facts["outputs"]:
         job.report.add_output(output)
     print(f"Wrote {output}")

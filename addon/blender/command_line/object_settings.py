@@ -1,4 +1,4 @@
-"""Settings of objects of a scene, as a job without a window finds and changes them."""
+"""Finding objects of a scene and changing their settings, for jobs without a window."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ from .overrides import overrides
 def named_objects(
     names: list[str], is_wanted: Callable[[bpy.types.Object], bool], what: str
 ) -> list[bpy.types.Object]:
-    """Objects of the view layer by their names, each once: where it was named last, since the last
-    one is active in `run`.
+    """Objects of the view layer by their names, each once, at its last place in the list, since the
+    last one becomes active in `run`.
 
     Args:
         what: such as "a mesh", for the message.
@@ -43,21 +43,21 @@ def named_objects(
 
 
 def is_groom(obj: bpy.types.Object) -> bool:
-    """Whether it is hair, but no copy that shows a bake."""
+    """Whether an object is hair, but not a copy that shows a bake."""
     return bool(obj.type == "CURVES" and not obj.data.hairloom.baked_in)
 
 
 def hair_named(name: str | None) -> bpy.types.Object | None:
-    """The hair of the open file that has this name; None where it has none."""
+    """The hair of this name in the open file; None where there is none."""
     named = bpy.data.objects.get(name or "")
     return named if named is not None and is_groom(named) else None
 
 
 def named_grooms(names: list[str]) -> tuple[list[bpy.types.Object], tuple[str, ...]]:
-    """Those that were named, else all of the view layer, and what is said of those left out.
+    """The named grooms, else all of the view layer; and notes on grooms that are left out.
 
     Raises:
-        HairloomError: there is none, or no such.
+        HairloomError: there are none, or a name is wrong.
     """
     if names:
         return named_objects(names, is_groom, "hair curves"), ()
@@ -74,14 +74,14 @@ def named_grooms(names: list[str]) -> tuple[list[bpy.types.Object], tuple[str, .
 def all_of_scene(
     is_wanted: Callable[[bpy.types.Object], bool], option: str = "--object"
 ) -> tuple[list[bpy.types.Object], tuple[str, ...]]:
-    """Such objects of the view layer, but for those that are hidden or only instanced, and for
-    hair without curves; and what is said of these.
+    """The wanted objects of the view layer, without hidden or only instanced ones and hair without
+    curves; and notes on these.
 
     Args:
-        option: which names an object.
+        option: the one that names an object, for messages.
 
     Raises:
-        HairloomError: all that there are would be left out, or are instances.
+        HairloomError: all of them are left out.
     """
     own = objects_in(bpy.context.view_layer)
     found = [obj for obj in own if is_wanted(obj)]
@@ -106,7 +106,7 @@ def all_of_scene(
 
 
 def _instances_any(obj: bpy.types.Object, is_wanted: Callable[[bpy.types.Object], bool]) -> bool:
-    """Whether an Empty shows such objects by an instance of their collection."""
+    """Whether an Empty shows wanted objects by an instance of their collection."""
     if obj.instance_type != "COLLECTION" or obj.instance_collection is None:
         return False
     objects = obj.instance_collection.all_objects
@@ -123,7 +123,7 @@ def _only_instanced(instances: list[bpy.types.Object]) -> HairloomError:
 
 
 def own_settings(obj: bpy.types.Object) -> dict[str, Settings]:
-    """What the artist has set for this object, by section."""
+    """The artist's settings of an object, by section."""
     groups = {section: _group(obj, section) for section in ALL_SETTINGS}
     return {
         section: settings_of(group, ALL_SETTINGS[section])
@@ -135,14 +135,14 @@ def own_settings(obj: bpy.types.Object) -> dict[str, Settings]:
 def put_settings(
     obj: bpy.types.Object, presets: list[str], assignments: list[str], *, grows_again: bool = False
 ) -> None:
-    """Change the object's own settings by --preset and --set, as the artist would.
+    """Change an object's own settings by --preset and --set, as the artist would.
 
     Args:
-        grows_again: hair that was combed is to grow again afterwards, by what is set here.
+        grows_again: whether combed hair is going to grow again afterwards, with these settings.
 
     Raises:
-        HairloomError: no such preset or parameter, or a value that it cannot have; or hair that was
-            combed does not follow settings of growth.
+        HairloomError: no such preset or parameter, or a value out of range; or settings of growth
+            that combed hair does not follow.
     """
     chosen: dict[str, Settings] = {}
     for name in presets:
@@ -163,7 +163,7 @@ def put_settings(
 
 def _check_growth(obj: bpy.types.Object) -> None:
     """Raises:
-    HairloomError: the hair is not as its settings of growth say now.
+    HairloomError: the hair has not followed its new settings of growth.
     """
     problem = obj.data.hairloom.grow.problem
     if not problem and is_behind(obj.data):
@@ -179,7 +179,7 @@ def _check_growth(obj: bpy.types.Object) -> None:
 def check_sections(
     objects: list[bpy.types.Object], presets: list[str], assignments: list[str]
 ) -> None:
-    """Refuse settings that would act on none of these objects, and presets of such alone.
+    """Refuse settings that act on none of these objects, and presets of such settings only.
 
     Raises:
         HairloomError: naming the first of them.
@@ -211,7 +211,7 @@ def _is_simulated(obj: bpy.types.Object) -> bool:
 
 
 def put_map(obj: bpy.types.Object, chosen: SettingsMap) -> None:
-    """Have all of the object's own settings be these."""
+    """Set all of an object's own settings."""
     for section, kind in ALL_SETTINGS.items():
         group = _group(obj, section)
         if group is not None:
@@ -224,6 +224,6 @@ def _write(group: Any, settings: Settings) -> None:
 
 
 def _group(obj: bpy.types.Object, section: str) -> Any:
-    """The object's properties of a section; None where it has none."""
+    """An object's properties of a section; None where it has none."""
     owners = (obj.data.hairloom, obj.hairloom) if obj.type == "CURVES" else (obj.hairloom,)
     return next((g for owner in owners if (g := getattr(owner, section, None)) is not None), None)

@@ -29,13 +29,13 @@ def overrides(assignments: list[str], section: str) -> dict[str, Any]:
     return values
 
 
-#: A number as people write it, .5 and 1. among them, which JSON refuses; perhaps in degrees.
+#: A number, also as .5 or 1., which JSON refuses; in degrees if a unit follows.
 _NUMBER = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?)(deg|°)?", re.IGNORECASE)
 
 
 def plain_value(text: str) -> Any:
-    """A JSON value, a number, several with commas (a colour or a curve), or the text itself (a
-    choice). An angle is in radians, or in degrees where `deg` follows it.
+    """The value of a text: JSON, a number, several with commas (a colour or a curve), or the text
+    itself (a choice). Angles are in radians, or in degrees if followed by `deg`.
     """
     if not text.strip():
         return text

@@ -1,5 +1,5 @@
-"""Where a job writes, looked at before any work: no file that it reads, no two results in one, no
-place where nothing can be written, and no name of another kind of file."""
+"""Checks, before any work, of the paths that a job writes: none is read by it, none is used twice,
+all can be written, and suffixes fit."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ...errors import HairloomError
 from ...exchange.files.atomic import check_folder_place, check_place
 from .verb import Verb
 
-#: options that name a file to be written, and its suffix where that is not the verb's to say
+#: options for files to write beside --output, and their suffix
 _ALSO = {
     "save_as": ".blend",
     "slices": ".png",
@@ -23,7 +23,7 @@ _OUTPUTS = ("output", *_ALSO)
 
 
 def check_report(options: argparse.Namespace) -> None:
-    """The report is written before all else, over what was there.
+    """Check the path of the report, which is written before all else.
 
     Raises:
         HairloomError: it would replace another kind of file, or one that the job reads.
@@ -33,7 +33,7 @@ def check_report(options: argparse.Namespace) -> None:
 
 
 def check_outputs(verb: Verb, options: argparse.Namespace) -> None:
-    """Refuse what the job could not write, or should not.
+    """Refuse paths that the job could not or should not write.
 
     Raises:
         HairloomError: naming the option or the file, and what to do.
@@ -55,7 +55,7 @@ def check_outputs(verb: Verb, options: argparse.Namespace) -> None:
 
 
 def check_not_read(path: Path, options: argparse.Namespace) -> None:
-    """Refuse to write over what the job reads; a scene may be saved over itself.
+    """Refuse to write over an input of the job; a scene may be saved over itself.
 
     Raises:
         HairloomError: the job reads this file or folder.
@@ -70,8 +70,8 @@ def check_not_read(path: Path, options: argparse.Namespace) -> None:
 
 
 def named_inputs(options: argparse.Namespace) -> set[str]:
-    """The files that are there and that options name, also as NAME=FILE, and the folder of a bake,
-    but for those to be written."""
+    """Existing files that options name, also as NAME=FILE, and the folder of --bake; without
+    outputs."""
     words = []
     for name, value in vars(options).items():
         if name not in ("verb", *_OUTPUTS):
@@ -101,7 +101,7 @@ def _check_file(path: Path, name: str, suffix: str, options: argparse.Namespace)
 
 
 def _is_same(path: Path, other: str | Path | None) -> bool:
-    """Whether both name one file, also through a link or by another case."""
+    """Whether both paths are one file, also through a link or in another case."""
     if other is None:
         return False
     if os.path.exists(path) and os.path.exists(other):

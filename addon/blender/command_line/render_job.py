@@ -1,7 +1,5 @@
-"""The verb `render`: a still, and what explains it: shadow maps, the shadow on skin, the motion.
-
-At rest, or at a frame of a bake.
-"""
+"""The verb `render`: a still at rest or at a frame of a bake, and pictures that explain it: shadow
+maps, the shadow on skin, and frames of the motion."""
 
 from __future__ import annotations
 
@@ -21,7 +19,7 @@ from .job_steps import Job, PosedHair, finish, motion_of, open_studio, posed_hai
 from .verb import Verb
 
 SHEET_COLUMNS, SHEET_ROWS = 4, 3
-#: of each of its pictures [pixels]
+#: size of each picture of a sheet [pixels]
 SHEET_SIZE = 360, 270
 
 
@@ -43,7 +41,7 @@ def render(job: Job) -> None:
 
 
 def write_still(job: Job, path: Path, studio: Studio, hair: PosedHair) -> Floats:
-    """One picture of the strands, which is returned, and how much was drawn."""
+    """Write a picture of the strands, and report how much was drawn; returns the picture."""
     print("drawing the still", flush=True)
     options, report = job.options, job.report
     with report.stage("draw still"):
@@ -69,7 +67,7 @@ def write_still(job: Job, path: Path, studio: Studio, hair: PosedHair) -> Floats
 
 
 def write_sheet(job: Job, path: Path, studio: Studio, motion: BakedGuides) -> None:
-    """Frames spread evenly over the motion, as one picture."""
+    """Write frames spread evenly over the motion, as one picture."""
     count = min(SHEET_COLUMNS * SHEET_ROWS, len(motion.frames))
     progress, pictures = job.report.progress("drawing the contact sheet", count), []
     for place in np.linspace(0, len(motion.frames) - 1, count).round().astype(int):
@@ -86,7 +84,7 @@ def write_sheet(job: Job, path: Path, studio: Studio, motion: BakedGuides) -> No
 
 
 def _check(job: Job) -> None:
-    """Refuse what cannot be drawn before anything is read."""
+    """Refuse pictures that cannot be drawn, before inputs are read."""
     if job.options.sheet and job.options.bake is None:
         raise HairloomError(
             "a contact sheet needs motion", place="--sheet", remedy="Give a bake with --bake"
@@ -108,7 +106,7 @@ def _check(job: Job) -> None:
 
 
 def _write_slices(job: Job, path: Path, studio: Studio, hair: PosedHair) -> None:
-    """The layers of the shadow maps."""
+    """Write the layers of the shadow maps."""
     with job.report.stage("draw slices"):
         picture = studio.slices(hair.pose, hair.points)
     write_png(path, picture)
@@ -116,7 +114,7 @@ def _write_slices(job: Job, path: Path, studio: Studio, hair: PosedHair) -> None
 
 
 def _write_skin_shadow(job: Job, path: Path, studio: Studio, hair: PosedHair) -> None:
-    """The map of the soft shadow on the head."""
+    """Write the map of the soft shadow on the head."""
     with job.report.stage("draw skin shadow"):
         picture = studio.skin_shadow(hair.pose, hair.points)
     write_png(path, picture)

@@ -1,4 +1,4 @@
-"""The verb `run`: what the artist's buttons do to a scene, one operator at a time."""
+"""The verb `run`: runs one of the operators behind the artist's buttons on a scene."""
 
 from __future__ import annotations
 
@@ -106,7 +106,7 @@ def run_operator(job: Job) -> None:
 
 def _check_nothing_asked(options: argparse.Namespace) -> None:
     """Raises:
-    HairloomError: a changed scene is wanted, so that something was forgotten.
+    HairloomError: an option for a changed scene is given, so the operator was forgotten.
     """
     if options.output or options.save or options.object:
         raise HairloomError(
@@ -118,7 +118,7 @@ def _check_nothing_asked(options: argparse.Namespace) -> None:
 
 @dataclass(frozen=True)
 class _Operator:
-    """One that may run, and its class as it is registered."""
+    """An operator that can run without a window, and its registered class."""
 
     name: str
     kind: type[Any]
@@ -142,10 +142,10 @@ class _Operator:
         return {each.identifier: each for each in properties if each.identifier != "rna_type"}
 
     def values(self, assignments: list[str]) -> dict[str, Any]:
-        """The properties that NAME=VALUE set.
+        """The properties from NAME=VALUE arguments.
 
         Raises:
-            HairloomError: it has no such property, or one that takes no such value.
+            HairloomError: there is no such property, or the value cannot be used.
         """
         known, values = self.properties, dict[str, Any]()
         for assignment in assignments:
@@ -156,10 +156,10 @@ class _Operator:
         return values
 
     def run(self, values: dict[str, Any]) -> Reports:
-        """Press the button.
+        """Run the operator.
 
         Raises:
-            HairloomError: it would be grey, or it has failed.
+            HairloomError: its button would be grey, or it has failed.
         """
         reason = self._why_grey()
         if reason:
@@ -174,7 +174,7 @@ class _Operator:
         return reports
 
     def _why_grey(self) -> str:
-        """What the button would say of why it is grey; empty where it is not."""
+        """Why the button would be grey, as its tooltip says; empty if it would not be."""
         said: list[str] = []
 
         class Asked(self.kind):  # type: ignore[name-defined]
@@ -186,7 +186,11 @@ class _Operator:
 
 
 def _value(known: Any, text: str) -> Any:
-    """What is meant for this property."""
+    """The value of a text for this property.
+
+    Raises:
+        HairloomError: it has another type, or is out of range.
+    """
     if known.type == "STRING":
         return text
     if known.type == "ENUM":
@@ -221,7 +225,7 @@ _KINDS = {"BOOLEAN": "true or false", "INT": "a whole number", "FLOAT": "a numbe
 
 
 def _refuse_properties(assignments: list[str]) -> dict[str, Any]:
-    """Without an operator there are no properties."""
+    """Refuse properties, since without an operator there are none."""
     if assignments:
         raise HairloomError(
             f"'{assignments[0]}' does not name a parameter",
@@ -232,7 +236,7 @@ def _refuse_properties(assignments: list[str]) -> dict[str, Any]:
 
 
 def _select(objects: list[bpy.types.Object]) -> None:
-    """Select these alone, the last is active; without any all stays as it was saved."""
+    """Select only these, with the last one active; for none, keep the selection of the file."""
     if not objects:
         return
     for obj in bpy.context.selected_objects:
@@ -243,7 +247,7 @@ def _select(objects: list[bpy.types.Object]) -> None:
 
 
 def _change_settings(job: Job, assignments: list[str]) -> None:
-    """--preset and --set SECTION.NAME=VALUE on the selected hair and meshes."""
+    """Apply --preset and --set SECTION.NAME=VALUE to the selected hair and meshes."""
     chosen = [obj for obj in bpy.context.selected_objects if obj.type in {"CURVES", "MESH"}]
     if not chosen:
         raise HairloomError(
@@ -251,7 +255,7 @@ def _change_settings(job: Job, assignments: list[str]) -> None:
             place="--object",
             remedy="Name hair curves or a mesh of the scene",
         )
-    if job.options.operator != "fin_add":  # which makes a mesh cloth, with these settings
+    if job.options.operator != "fin_add":  # its mesh becomes cloth, which has these settings
         check_sections(chosen, job.options.preset, assignments)
     for obj in chosen:
         check_editable(obj)
@@ -261,7 +265,7 @@ def _change_settings(job: Job, assignments: list[str]) -> None:
 
 
 def _unknown(problem: str, place: str, known: Any) -> HairloomError:
-    """With the names that were meant, or all that there are."""
+    """An error whose remedy lists similar names, or all known ones."""
     wrong = problem.split("'")[1]
     meant = get_close_matches(wrong, known) or list(known)
     remedy = "Use one of " + ", ".join(meant) if meant else "Leave it out"
@@ -273,7 +277,7 @@ def _line(text: str) -> str:
 
 
 def _list_operators() -> None:
-    """Each operator with what it does and its properties."""
+    """Print each operator with its description and properties."""
     for name in OPERATORS:
         operator = _Operator.named(name)
         print(f"{name}: {_line(operator.rna.description)}.")

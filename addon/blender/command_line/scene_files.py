@@ -24,13 +24,14 @@ from ...exchange.files.stale_temp_files import temporary_beside
 from ..bakes.bake_settings import folder_of, shown_folder_of
 from ..base.suspension import suspended
 
-#: how compressed files begin and end, the number of their frames, and what a file's end needs
+#: start and end of compressed files; format of their number of frames, and sizes of a file's end
+#: [bytes] to read for them and for plain files
 _ZSTD, _SEEK_TABLE = b"\x28\xb5\x2f\xfd", b"\xb1\xea\x92\x8f"
 _COUNT, _END_SIZE, _END_BLOCK = struct.Struct("<I"), 64, 32
 
 
 def open_scene(path: Path) -> None:
-    """Open a .blend file in place of the open one.
+    """Open a .blend file instead of the open one.
 
     Raises:
         HairloomError: there is none, or Blender cannot read it.
@@ -52,13 +53,13 @@ def open_scene(path: Path) -> None:
 
 
 def check_saving(output: Path | None, *, over: bool) -> None:
-    """Before any work: it is said where the changed scene goes, and said once.
+    """Check, before any work, that there is exactly one path for the changed scene.
 
     Args:
-        over: whether over the scene's own file.
+        over: whether to save over the scene's own file.
 
     Raises:
-        HairloomError: it is not, or no scene can be written there.
+        HairloomError: there is none or two, or no scene can be written there.
     """
     if over == (output is not None):
         raise HairloomError(
@@ -78,13 +79,13 @@ def check_saving(output: Path | None, *, over: bool) -> None:
 
 
 def save_scene(path: Path | None = None) -> Path:
-    """Save the open scene, over its own file or as another one, whole or not at all.
+    """Save the open scene, over its own file or as another one, completely or not at all.
 
-    Blender says nothing when the disk fills up while it writes a compressed file, and replaces the
-    old one with what it has. So it writes a copy here, which is checked first.
+    When the disk is full while Blender writes a compressed file, it reports nothing and replaces
+    the old file with an incomplete one. So it writes a copy here, which is checked first.
 
     Raises:
-        HairloomError: it has no file of its own, or it cannot be written.
+        HairloomError: the scene has no file of its own, or the file cannot be written.
     """
     check_saving(path, over=path is None)
     own = Path(bpy.data.filepath) if bpy.data.filepath else None
@@ -111,8 +112,8 @@ def _is_same(path: Path, other: Path | None) -> bool:
 def is_whole(path: Path) -> bool:
     """Whether a .blend file has been written to its end.
 
-    A compressed one is a row of frames and a table of their sizes (Zstandard's seekable format),
-    another one ends with a block of this name.
+    A compressed file consists of frames and a table of their sizes (Zstandard's seekable format);
+    others end with a block named ENDB.
     """
     size = path.stat().st_size
     with path.open("rb") as file:
@@ -133,8 +134,8 @@ def is_whole(path: Path) -> bool:
 
 
 def _keep_versions(path: Path) -> None:
-    """Keep the file before as PATH1, that one as PATH2 and so on, as Blender does, as many as the
-    preferences say."""
+    """Keep the previous file as PATH1, the one before as PATH2 and so on, as Blender does, up to
+    the number in the preferences."""
     count = bpy.context.preferences.filepaths.save_version
     names = [path, *(path.with_name(f"{path.name}{n}") for n in range(1, count + 1))]
     for newer, older in reversed(list(pairwise(names[1:]))):
@@ -150,8 +151,8 @@ def _keep_versions(path: Path) -> None:
 
 
 def _keep_bakes(folder: Path) -> None:
-    """Have objects name their bakes as seen from this folder, which Blender does not do by itself
-    for properties of extensions."""
+    """Make the paths of bakes relative to this folder, which Blender does not do for properties of
+    extensions."""
     for obj in bpy.data.objects:
         bake = folder_of(obj)
         if obj.library is None and bake is not None:

@@ -1,4 +1,4 @@
-"""The verb `self-test`: whether a machine is fit."""
+"""The verb `self-test`: checks whether a machine can run Hairloom."""
 
 from __future__ import annotations
 

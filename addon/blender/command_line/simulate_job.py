@@ -1,6 +1,6 @@
-"""The verb `simulate`: hair of files or of the scene, moved by a shake or by the scene, as a bake.
+"""The verb `simulate`: bakes hair of files or of the scene, moved by a shake or by the scene.
 
-What comes from files goes into a separate scene, which is baked as the button Bake does.
+For a shake, the hair goes into a separate scene, which is baked as the button Bake does.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from .job_steps import Job, finish, read_hair, read_job_masks, tell_notes
 from .object_settings import put_map
 from .verb import Verb
 
-#: the shake: how far the head turns and sways, and how often
+#: amplitudes and rate of the head's shake
 SHAKE_ANGLE = np.radians(25.0)
 SHAKE_SWAY = 0.03  # [m]
 SHAKE_RATE = 1.0  # [1/s]
@@ -48,12 +48,13 @@ def simulate(job: Job) -> None:
 
 
 def simulated(job: Job, inputs: Inputs, folder: Path) -> BakedGuides:
-    """Bake the hair under the scene's animation or the shake; call it `at_rest`."""
+    """Bake the hair under the scene's animation or the shake; call it inside `at_rest`."""
     with _scene_of(job, inputs) as hair:
         put_map(hair, job.chosen)
         widths = hair.data.hairloom.widths
         if widths.method == "auto" and not inputs.strands.has_widths:
-            widths.method = "found"  # the curves have had them since they were written
+            # `write_curves` has stored found widths, which "auto" would take for the groom's own
+            widths.method = "found"
         own = bpy.context.scene
         frames = range(own.frame_start, own.frame_end + 1)
         plan = Bake.of([hair], own, frames=frames, folder=folder.resolve())
@@ -73,7 +74,7 @@ def simulated(job: Job, inputs: Inputs, folder: Path) -> BakedGuides:
 
 @contextmanager
 def at_rest(job: Job) -> Iterator[None]:
-    """With --animated, rest is where everything is in the scene's first frame."""
+    """With --animated, set the scene to its first frame, which is rest, inside the block."""
     scene, shown = bpy.context.scene, bpy.context.scene.frame_current
     try:
         if job.options.animated:
@@ -85,7 +86,7 @@ def at_rest(job: Job) -> Iterator[None]:
 
 @contextmanager
 def _scene_of(job: Job, inputs: Inputs) -> Iterator[bpy.types.Object]:
-    """The hair object, in the open scene or in one of its own whose head is shaken."""
+    """The hair object, in the open scene or in a temporary scene whose head is shaken."""
     if job.options.animated:
         yield _hair_of_open_scene(job, inputs)
         return
@@ -126,8 +127,8 @@ def _scene_of(job: Job, inputs: Inputs) -> Iterator[bpy.types.Object]:
 
 
 def _put_mask(mask: Mask, name: str, hair: bpy.types.Object, strands: StrandSet) -> None:
-    """Give a mask to hair of a scene of its own, on a head that `mesh_object` has made; images are
-    those of the file."""
+    """Copy a mask to hair of the temporary scene, on a head that `mesh_object` has made; masks by
+    images need no copy, as images belong to the file."""
     if isinstance(mask, SurfaceMask):
         set_attribute(hair.data.surface.data, name, "CORNER", mask.corners.ravel())
     elif isinstance(mask, StrandMask):
@@ -136,7 +137,7 @@ def _put_mask(mask: Mask, name: str, hair: bpy.types.Object, strands: StrandSet)
 
 
 def _hair_of_open_scene(job: Job, inputs: Inputs) -> bpy.types.Object:
-    """The object that --groom names; else its strands as a new object on the head."""
+    """The hair object that --groom names; else a new one on the head, with the strands."""
     if inputs.head_object is None:
         raise HairloomError(
             "only an object of the scene is animated",
@@ -165,7 +166,7 @@ def _hair_of_open_scene(job: Job, inputs: Inputs) -> bpy.types.Object:
 
 
 def mesh_object(name: str, surface: Surface, scene: bpy.types.Scene) -> bpy.types.Object:
-    """A surface of world space as an object at the origin."""
+    """An object at the origin with a surface in world space."""
     mesh = bpy.data.meshes.new(name)
     mesh.from_pydata(surface.positions, [], surface.triangles)
     if surface.corner_uv is not None:
@@ -177,9 +178,8 @@ def mesh_object(name: str, surface: Surface, scene: bpy.types.Scene) -> bpy.type
 
 
 def shake(head: bpy.types.Object, centre: Floats, last: int, rate: float) -> None:
-    """Animate an object at the origin: it turns left and right and sways from frame 0 to `last`.
-
-    It eases in, so that frame 0 is at rest.
+    """Animate an object at the origin, and the scene's frames: it turns left and right and sways
+    from frame 0 to `last`. The motion eases in, so that frame 0 is at rest.
     """
     scene = bpy.context.scene
     scene.frame_start, scene.frame_end = 0, last
@@ -195,7 +195,7 @@ def shake(head: bpy.types.Object, centre: Floats, last: int, rate: float) -> Non
 
 
 def shake_matrix(centre: Floats, seconds: float) -> Floats:
-    """(4, 4), where the shake has the head at a time."""
+    """The head's transform at a time of the shake, (4, 4)."""
     phase = 2.0 * np.pi * SHAKE_RATE * seconds
     ease = min(seconds / 0.25, 1.0)
     matrix = turned_about(centre, ease * SHAKE_ANGLE * np.sin(phase))

@@ -1,11 +1,11 @@
-"""What lets a farm run a task again and have only that done which is missing.
+"""Stamps, by which a farm can run all tasks again and only the unfinished ones do work.
 
-A job with --skip-existing leaves a stamp beside its output: what was requested, and digests of all
-that it has read and written. It is done while all of these are the same; a changed scene, another
-option, or a truncated or missing file makes it run again.
+A job with --skip-existing writes a stamp beside its output: its options, and digests of all files
+that it has read and written. The job counts as done while all of these are the same; a changed
+scene, another option, or a truncated or missing file makes it run again.
 
-Paths are as seen from the stamp, so that a job whose folders are moved together, or are mounted
-elsewhere on another machine, is still done.
+Paths are relative to the stamp, so that a job is still done after its folders were moved together,
+or on another machine that mounts them elsewhere.
 """
 
 from __future__ import annotations
@@ -32,20 +32,20 @@ from ..setup.hairstyles import files_of_hairstyle
 from .places import named_inputs
 
 SUFFIX = ".done.json"
-#: options that say nothing about the result
+#: options without effect on the result
 _NOT_ASKED = frozenset(("report", "progress", "skip_existing"))
-#: facts of a report that are of the result, and so of each later report about it
+#: facts about the result, which reports of skipped runs repeat
 _REPORTED = ("outputs", "dropped", "notes")
 
 
 class Stamp:
     """The stamp of one job, beside its output.
 
-    reported: what the report said when the job was done; empty before `why_not_done` is asked.
+    reported: facts of the report when the job was done; empty before `why_not_done` is called.
 
     Raises:
-        HairloomError: the job names no output, or saves over its own input; or nothing can be
-            written beside its output.
+        HairloomError: the job has no output, or saves over its own input; or the folder of the
+            output cannot be written.
     """
 
     def __init__(self, options: argparse.Namespace) -> None:
@@ -62,7 +62,7 @@ class Stamp:
                 place="--skip-existing",
                 remedy="Save another file: --save-as, or --output",
             )
-        output = Path(os.path.abspath(output))  # "." has a name then
+        output = Path(os.path.abspath(output))  # so that "." has a name
         self.path = output.with_name(output.name + SUFFIX)
         check_place(self.path)
         self.reported: dict[str, Any] = {}
@@ -88,7 +88,7 @@ class Stamp:
         return f"{changed[0]} is not as it was" if changed else ""
 
     def write(self, report: Report) -> None:
-        """After the job: all that was read, and all that was written.
+        """Write the stamp after the job, with all files that were read and written.
 
         Raises:
             HairloomError: the stamp cannot be written.
@@ -115,14 +115,14 @@ class Stamp:
         write_text_atomic(self.path, json.dumps(content, indent=2) + "\n")
 
     def _digest_as_read(self, path: Path) -> str:
-        """Of what the job has read; "" where that has changed since, so that it is done again."""
+        """The digest of an input; "" if it has changed since the job began: it will run again."""
         files = path.rglob("*") if path.is_dir() else (path,) if path.exists() else ()
         is_newer = any(file.stat().st_mtime_ns > self._begun for file in files)
         return "" if is_newer else file_digest(path)
 
 
 def file_digest(path: Path) -> str:
-    """Of a file's content, or of all files in a folder with their names; "" for neither."""
+    """The digest of a file, or of all files in a folder with their names; "" for neither."""
     if path.is_dir():
         lines = [
             f"{file.relative_to(path).as_posix()} {file_digest(file)}\n"
@@ -141,7 +141,7 @@ def _pairs(*tables: dict[str, str]) -> Iterable[tuple[str, str]]:
 
 
 def _seen_from(folder: Path, path: str) -> str:
-    """An absolute path as seen from a folder; as it is where that is on another drive."""
+    """An absolute path made relative to a folder; unchanged if it is on another drive."""
     try:
         return Path(os.path.relpath(path, folder)).as_posix()
     except ValueError:
@@ -149,8 +149,8 @@ def _seen_from(folder: Path, path: str) -> str:
 
 
 def _asked(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
-    """All options as JSON has them, absolute paths in them as seen from a folder; what their
-    presets and hairstyle say; and which Hairloom and Blender."""
+    """All options as JSON values, with absolute paths made relative to a folder; the content of
+    presets and of the hairstyle; and the versions of Hairloom and Blender."""
     asked = {
         name: _moved_with(folder, value)
         for name, value in vars(options).items()
@@ -165,7 +165,7 @@ def _asked(options: argparse.Namespace, folder: Path) -> dict[str, Any]:
 
 
 def _moved_with(folder: Path, value: Any) -> Any:
-    """An option's value, in which absolute paths, also those of NAME=FILE, are seen from here."""
+    """An option's value with absolute paths, also in NAME=FILE, made relative to the folder."""
     if isinstance(value, list):
         return [_moved_with(folder, each) for each in value]
     if isinstance(value, Path):
@@ -177,7 +177,7 @@ def _moved_with(folder: Path, value: Any) -> Any:
 
 
 def _files_read(options: argparse.Namespace) -> set[str]:
-    """The files that options name; and the open scene's, where none is named."""
+    """The files that options name; and the file of the open scene without --scene."""
     named = named_inputs(options)
     if not getattr(options, "scene", None) and bpy.data.filepath:
         named.add(os.path.abspath(bpy.data.filepath))
@@ -185,11 +185,11 @@ def _files_read(options: argparse.Namespace) -> set[str]:
 
 
 def _files_of_scene() -> list[str]:
-    """The files that the open scene takes more from: libraries, pictures, caches; but for those
-    that Blender brings along, which lie elsewhere on another machine."""
+    """The files that the open scene refers to: libraries, pictures, caches; without Blender's own,
+    whose paths differ between machines."""
     paths: list[str] = bpy.utils.blend_paths(absolute=True, packed=False, local=False)
     folders = [bpy.utils.resource_path(kind) for kind in ("LOCAL", "SYSTEM")]
     of_blender = tuple(os.path.join(os.path.abspath(each), "") for each in folders if each)
-    # one that is missing may come
+    # missing files count, as they may appear later
     found = [os.path.abspath(path) for path in paths if not Path(path).is_dir()]
     return [path for path in found if not path.startswith(of_blender)]

@@ -1,4 +1,4 @@
-"""What a verb of the command line is: its flow, its options and what it writes."""
+"""Verbs of the command line: their flow, options and outputs."""
 
 from __future__ import annotations
 
@@ -21,27 +21,27 @@ SCENE_OUTPUT = "scene to write (.blend)"
 
 
 def no_options(_: argparse.ArgumentParser) -> None:
-    """For a verb that has none of its own."""
+    """The options of a verb that has none of its own."""
 
 
 @dataclass(frozen=True)
 class Verb:
-    """One verb; it stands at the end of the file with its flow.
+    """A verb; it is defined at the end of the file with its flow.
 
     flow: does the work; the first line of its docstring is the help.
-    add_options: adds what only this verb has.
-    output: what --output is; "" for a verb without one.
-    suffix: of the file that --output is; "" where the flow says which there may be.
+    add_options: adds the options that only this verb has.
+    output: the help of --output; "" for a verb without one.
+    suffix: of the file of --output; "" if the flow checks it.
     writes_folder: whether --output is a folder.
     default_output: where it writes without --output.
     needs_output: whether --output must be given.
-    takes_hair: whether it works on hair that --groom, --head and --collider name.
+    takes_hair: whether it works on hair of --groom, --head and --collider.
     needs_head: whether it refuses hair without a head.
     takes_settings: whether it has --set and --preset.
     opens_scene: whether it has --scene.
     saves_scene: whether it changes the scene, which is saved as --output or, with --save, over its
         own file.
-    operators: names of the artist's buttons whose work it does.
+    operators: names of the operators whose work it does.
     """
 
     name: str
@@ -64,7 +64,7 @@ class Verb:
         return (self.flow.__doc__ or "").strip().splitlines()[0]
 
     def add_all_options(self, parser: argparse.ArgumentParser) -> None:
-        """What it works on, what it writes, how, and what farms need; its own in their midst."""
+        """Add all options in the order of --help: inputs, output, its own, settings, farms."""
         if self.opens_scene:
             add_scene_option(parser)
         output, is_needed = self.output, self.needs_output and self.default_output is None

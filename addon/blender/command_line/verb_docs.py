@@ -1,4 +1,4 @@
-"""The page of the documentation that lists all verbs and their options, from the verbs."""
+"""The page of the documentation that lists all verbs and their options."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ _HEADING = """# Verbs
 Made by `make docs` from the verbs themselves. [command-line.md](command-line.md) says how to call
 them; `VERB --help` says the same as here.
 """
-#: titles of the groups of options that many verbs have, listed once
+#: titles of groups of options that many verbs share, which the page lists once
 _SHARED = ("what to work on (files, or objects of the scene)", "settings", "the job")
 
 type Groups = dict[str, list[argparse.Action]]
 
 
 def page(verbs: Iterable[Verb]) -> str:
-    """docs/verbs.md, whole."""
+    """The text of docs/verbs.md."""
     shared: Groups = {}
     lines = [_HEADING]
     for verb in verbs:
@@ -34,7 +34,7 @@ def page(verbs: Iterable[Verb]) -> str:
 
 
 def _groups(verb: Verb) -> Groups:
-    """Its options by the titles of their groups, as --help shows them."""
+    """A verb's options by the titles of their groups, as --help shows them."""
     parser = argparse.ArgumentParser(add_help=False)
     verb.add_all_options(parser)
     found = {str(group.title): list(group._group_actions) for group in parser._action_groups}
@@ -60,7 +60,7 @@ def _table(actions: list[argparse.Action]) -> Iterator[str]:
 
 
 def _form(action: argparse.Action) -> str:
-    """Such as --frames FIRST LAST."""
+    """The form of an option, such as --frames FIRST LAST."""
     name = action.option_strings[0] if action.option_strings else ""
     if action.nargs == 0:
         return "` / `".join(action.option_strings)
