@@ -1,5 +1,5 @@
-"""The render engine Hairloom, as Blender knows it: what is behind it is in engine_still.py and
-engine_view.py."""
+"""The render engine as it is registered in Blender; engine_still.py and engine_view.py do the
+work."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ class HAIRLOOM_RE_engine(bpy.types.RenderEngine):
     bl_label = "Hairloom"
     bl_use_preview = False
     bl_use_eevee_viewport = True
-    # With it Blender makes a context before it asks us, and crashes where none can be had: in the
-    # background we look first. It is needed there too, where another engine has rendered before.
+    # If true, Blender makes a GPU context before it calls the engine, and crashes without a driver,
+    # so background mode looks for one first. It needs this too if another engine rendered before.
     bl_use_gpu_context = not bpy.app.background or can_draw()
 
     def __init__(self, *args: Any, **keywords: Any) -> None:
@@ -38,13 +38,13 @@ class HAIRLOOM_RE_engine(bpy.types.RenderEngine):
         self.failure = ""
 
     def update_render_passes(self, scene: Any, renderlayer: Any) -> None:
-        """Tell Blender's compositor and file outputs what passes there will be."""
+        """Register the passes for Blender's compositor and file outputs."""
         for each in (COMBINED, *wanted_passes(scene, renderlayer)):
             channels = len(each.channels), each.channels
             self.register_pass(scene, renderlayer, each.name, *channels, each.kind)
 
     def render(self, depsgraph: Any) -> None:
-        """F12 and animations, once for each view layer; in a separate thread in the window."""
+        """Called by F12 and animations for each view layer; with a window, in a separate thread."""
         try:
             self._render(depsgraph)
         finally:
@@ -61,14 +61,14 @@ class HAIRLOOM_RE_engine(bpy.types.RenderEngine):
         except Exception as error:
             if not isinstance(error, (HairloomError, ShaderError)):
                 traceback.print_exc()
-            # error_set() alone tells nobody in the background
+            # error_set() alone prints nothing in background mode
             self.report({"ERROR"}, f"Hairloom: {error}")
             return
         for warning in still.warnings:
             self.report({"WARNING"}, warning)
 
     def view_update(self, context: Any, depsgraph: Any) -> None:
-        """Blender has evaluated something again."""
+        """Called when Blender has evaluated something again."""
         self.failure = ""
         self._attempt(self.view.read, context, depsgraph)
 
@@ -85,7 +85,7 @@ class HAIRLOOM_RE_engine(bpy.types.RenderEngine):
             self.tag_redraw()
 
     def _attempt(self, action: Any, context: Any, depsgraph: Any) -> Any:
-        """Do it; an error is reported once, not at every redraw, until the scene is another one."""
+        """Run an action; an error is reported once, and not at every redraw until a change."""
         if self.failure:
             return None
         try:
@@ -100,7 +100,7 @@ class HAIRLOOM_RE_engine(bpy.types.RenderEngine):
 
 
 def _views(render: Any) -> list[str]:
-    """The names of the views of a picture; one without a name if there is but one."""
+    """The names of the views of a picture; a single empty one without stereoscopy."""
     if not render.use_multiview:
         return [""]
     return [view.name for view in render.views if view.use]
@@ -108,7 +108,7 @@ def _views(render: Any) -> list[str]:
 
 @persistent
 def on_load_pre(*_: Any) -> None:
-    """Hair of the file before is kept no longer, nor waited for."""
+    """Forget the hair of the previous file, and cancel what is being built of it."""
     engine_hair.forget()
 
 
@@ -122,7 +122,7 @@ def register() -> None:
 
 
 def unregister() -> None:
-    """Keep nothing in memory."""
+    """Remove the handlers, and free everything in memory."""
     event_handlers.remove(HANDLERS)
     engine_hair.forget()
     skin_layouts.forget()

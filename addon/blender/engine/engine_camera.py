@@ -1,4 +1,4 @@
-"""The camera of a render, as the renderer knows it."""
+"""The camera and lens of a render, for the renderer."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from ...render.camera import Camera
 from ...render.camera_window import Window, cropped
 from ...render.lens import Lens
 
-#: Blender's own limit of a picture's side
+#: Blender's own minimum of a picture's side [pixels]
 _SMALLEST = 1
-#: the aperture that a wider one is taken for [f-stops], as in Cycles
+#: minimum f-stop, as in Cycles
 _SMALLEST_STOP = 1.0e-5
 
 
 def read_camera(
     engine: Any, depsgraph: bpy.types.Depsgraph, width: int, height: int, window: Window
 ) -> Camera:
-    """The camera that renders now, of the view that is rendered.
+    """The active camera, for the view that is rendered.
 
     Args:
-        width, height: of the whole picture [pixels].
+        width, height: of the full picture [pixels].
         window: the part of it that is drawn.
 
     Raises:
@@ -57,19 +57,19 @@ def read_camera(
 
 
 def _chosen(engine: Any, depsgraph: bpy.types.Depsgraph) -> bpy.types.Object | None:
-    """The camera that renders now; None where the scene has none, or another object for it."""
+    """The active camera; None where the scene has none, or an object of another type."""
     camera = engine.camera_override or depsgraph.scene.camera
     return camera if camera is not None and camera.type == "CAMERA" else None
 
 
 def read_lens(engine: Any, depsgraph: bpy.types.Depsgraph) -> Lens | None:
-    """The lens of the camera that renders now; None where all is sharp."""
+    """The lens of the active camera; None without depth of field."""
     camera = _chosen(engine, depsgraph)
     if camera is None or not camera.data.dof.use_dof:
         return None
     evaluated = camera.evaluated_get(depsgraph)
     data = evaluated.data
-    # as Cycles has it; a lens is given in millimetres
+    # the radius as in Cycles; the focal length is in millimetres
     wide = 1.0 if data.type == "ORTHO" else 1.0e-3 * data.lens
     radius = wide / (2.0 * max(data.dof.aperture_fstop, _SMALLEST_STOP))
     focus = _focus_distance(evaluated, depsgraph)
@@ -81,7 +81,7 @@ def read_lens(engine: Any, depsgraph: bpy.types.Depsgraph) -> Lens | None:
 
 
 def _focus_distance(camera: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> float:
-    """Along the view [m]: to what the camera is focused on, or as far as it says."""
+    """The distance along the view [m] to the focus object, or the camera's focus distance."""
     dof = camera.data.dof
     if dof.focus_object is None:
         return float(dof.focus_distance)
@@ -94,7 +94,7 @@ def _focus_distance(camera: bpy.types.Object, depsgraph: bpy.types.Depsgraph) ->
 
 
 def camera_warnings(engine: Any, depsgraph: bpy.types.Depsgraph) -> tuple[str, ...]:
-    """What the artist should know about the camera, with its remedy; mostly nothing."""
+    """Warnings about the camera, each with its remedy; mostly none."""
     camera = _chosen(engine, depsgraph)
     if camera is None or camera.data.type != "PANO":
         return ()
@@ -107,14 +107,14 @@ def camera_warnings(engine: Any, depsgraph: bpy.types.Depsgraph) -> tuple[str, .
 def border_window(
     render: bpy.types.RenderSettings, width: int, height: int
 ) -> tuple[Window, tuple[int, int]]:
-    """The part of the picture that is rendered, and how many pixels that is.
+    """The part of the picture that is rendered, and its width and height [pixels].
 
     Raises:
         HairloomError: the part has no pixels.
     """
     left, bottom, right, top = 0, 0, width, height
     if render.use_border:
-        # single floats, as Blender counts: 0.9 of 120 are 108
+        # single precision, as in Blender, where 0.9 of 120 pixels are 108
         x, y = np.float32(width), np.float32(height)
         left, right = (int(x * np.float32(b)) for b in (render.border_min_x, render.border_max_x))
         bottom, top = (int(y * np.float32(b)) for b in (render.border_min_y, render.border_max_y))
@@ -131,14 +131,14 @@ def border_window(
 def view_rectangle(
     context: Any, depsgraph: bpy.types.Depsgraph, width: int, height: int
 ) -> tuple[int, int, int, int]:
-    """The part of a 3D view that is drawn: its render region, in a camera's view the scene's.
+    """The part of a 3D view that is drawn: its render region, or that of the scene in camera view.
 
     Args:
         width, height: of the view [pixels].
 
     Returns:
-        Left, bottom, width and height [pixels]; the two last are 0 where the region lies outside
-        of the view or has no pixels.
+        Left, bottom, width and height [pixels]; width or height are 0 if the region has no pixels
+        inside the view.
     """
     space, region, scene = context.space_data, context.region_data, depsgraph.scene
     corners = np.array([[0.0, 0.0], [1.0, 1.0]])
@@ -156,14 +156,14 @@ def view_rectangle(
 
 
 def _border(owner: Any, name: str) -> Floats:
-    """Lower left and upper right corner, (2, 2), as fractions of the picture."""
+    """The lower left and upper right corner of a border, (2, 2), as fractions of the picture."""
     return np.array(
         [[getattr(owner, f"{name}_{end}_{axis}") for axis in "xy"] for end in ("min", "max")]
     )
 
 
 def _camera_frame(camera: bpy.types.Object, scene: bpy.types.Scene, region: Any) -> Floats:
-    """Lower left and upper right corner of what a camera sees, as fractions of its 3D view."""
+    """The lower left and upper right corner of a camera's frame, as fractions of its 3D view."""
     frame = np.array([(*corner, 1.0) for corner in camera.data.view_frame(scene=scene)])
     clip = frame @ np.array(region.window_matrix).T
     places = 0.5 + 0.5 * clip[:, :2] / clip[:, 3:]
@@ -171,7 +171,7 @@ def _camera_frame(camera: bpy.types.Object, scene: bpy.types.Scene, region: Any)
 
 
 def _view_matrix(matrix: Floats) -> Floats:
-    """World to view space of a camera's matrix, whose scale counts for nothing."""
+    """From world to view space, (4, 4), by a camera's matrix without its scale."""
     rigid = np.eye(4)
     rigid[:3, :3] = matrix[:3, :3] / np.linalg.norm(matrix[:3, :3], axis=0)
     rigid[:3, 3] = matrix[:3, 3]
@@ -181,7 +181,7 @@ def _view_matrix(matrix: Floats) -> Floats:
 def _fit_fraction(
     camera: bpy.types.Camera, render: bpy.types.RenderSettings, width: int, height: int
 ) -> float:
-    """The side that a shift is a fraction of, as a fraction of the picture's width."""
+    """The side of the picture that shifts refer to, relative to the picture's width."""
     wide, high = width * render.pixel_aspect_x, height * render.pixel_aspect_y
     is_by_width = camera.sensor_fit == "HORIZONTAL" or (
         camera.sensor_fit == "AUTO" and wide >= high

@@ -1,9 +1,9 @@
 """The grooms of a render: as they were baked, or else as Blender has evaluated their curves.
 
-What costs time and seldom changes, such as children and ambient occlusion, is kept from frame to
-frame as long as curves, head and settings are the same, for all views, view layers and renders:
-what one of them does not show another one may. For Rendered mode it is made beside the
-window's work: until it is there the picture has what was drawn before, or none. Renders wait.
+Results that take time and seldom change, such as children and ambient occlusion, are kept from
+frame to frame while curves, head and settings are the same. All views, view layers and renders
+share them. For Rendered mode they are built in a thread; until then the picture shows the hair that
+was drawn before, or none. Renders wait.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ from ..sessions.snapshots import snapshot_of, with_all_strands, with_settings
 
 
 class HairNotMadeYetError(Exception):
-    """There is nothing to be shown; ask again once it is no longer pending."""
+    """There is no hair to show yet; try again once it is no longer pending."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +66,7 @@ class _Made:
     _colored: list[Rig] = field(default_factory=list)
 
     def colored(self, colors: PaintedColor | None, look: ShadingSettings) -> Rig:
-        """In what is painted under it; the same object where that looks as it did last."""
+        """The rig with the colours of a colour map; the same object if they have not changed."""
         rig = colored(self.rig, colors, look)
         for known in self._colored:
             if are_same(known.strands.color, rig.strands.color):
@@ -82,10 +82,11 @@ class _Made:
         others: Occluders,
         edits: CardEdits | None,
     ) -> BuiltCards:
-        """Its cards; those of the last settings, edits and other hair are kept, to the last colour.
+        """The groom's cards; the last ones are returned while settings, including colours, edits
+        and other hair are the same.
 
-        Baked hair stays at rest, whatever other hair does in the frames: its cards are not built
-        again for each of them.
+        Cards of baked hair are built at rest, so they are not built again in frames where other
+        hair has only moved.
         """
         key = cards_key(settings), settings[ShadingSettings]
         for known, built, before, edits_before in self._cards:
@@ -100,7 +101,7 @@ class _Made:
 
 
 class _Kept:
-    """What is made of one groom, and what is being made of it for Rendered mode."""
+    """The last result for one groom, and the job that builds another one for Rendered mode."""
 
     def __init__(self) -> None:
         self.made: _Made | None = None
@@ -111,7 +112,7 @@ class _Kept:
 
     @property
     def is_pending(self) -> bool:
-        """Whether other hair is on its way."""
+        """Whether other hair is being built."""
         return self._job.is_pending
 
     def is_of(self, made_from: tuple[Any, ...]) -> bool:
@@ -120,14 +121,15 @@ class _Kept:
     def have(
         self, made_from: tuple[Any, ...], make: Callable[[], _Made], *, blocking: bool
     ) -> _Made | None:
-        """What was made last, None if nothing was; blocking, it is made of these values.
+        """The last result, None if there is none. If blocking, it is built from these values; else
+        a job is started if they differ.
 
         Raises:
-            HairloomError: it cannot be made of these values.
+            HairloomError: hair cannot be built from these values.
         """
         made = self.made
         if blocking:
-            # a render's thread, beside which the window may have other hair made
+            # in a render's thread; a job of the window for other hair goes on
             if made is None or not _alike(made.made_from, made_from):
                 self.made = made = make()
         elif self.is_of(made_from):
@@ -141,12 +143,12 @@ class _Kept:
         return made
 
     def cancel(self) -> None:
-        """Nobody waits any more for other hair of this groom."""
+        """Cancel the job for other hair of this groom."""
         self._job.cancel()
         self._error = None
 
     def _take(self) -> None:
-        """What was made meanwhile; views that are drawn again show it, or report why not."""
+        """Take the job's result, and redraw views, which show it or report its error."""
         try:
             self.made = self._job.take() or self.made
         except Exception as error:
@@ -155,8 +157,8 @@ class _Kept:
 
 
 def _again(error: Exception) -> Exception:
-    """The same error, to be raised once more. One that is raised refers to all that goes on where
-    it is, and one that is raised again and again to more and more of it."""
+    """A copy of an error, to be raised again: each time that one error object is raised, its
+    traceback grows and keeps more frames alive."""
     if isinstance(error, HairloomError):
         return HairloomError(error.problem, place=error.place, remedy=error.remedy)
     return type(error)(*error.args)
@@ -166,34 +168,34 @@ _kept: dict[int, _Kept] = {}
 
 
 def owner_of(hair: bpy.types.Object) -> bpy.types.Object:
-    """The groom that a copy for renders stands for; of all other hair, itself.
+    """The groom that a copy for renders shows; for all other hair, itself.
 
     Args:
         hair: not the evaluated copy.
     """
     if not hair.data.hairloom.baked_in:
         return hair
-    named = hair.hairloom.bake.stands_for  # copies of older bakes name nothing
+    named = hair.hairloom.bake.stands_for  # not set in copies of older bakes
     return named or next((obj for obj in bpy.data.objects if obj.hairloom.bake.copy == hair), hair)
 
 
 def read_groom(
     hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph, *, blocking: bool = True
 ) -> Snapshot:
-    """One groom as a render shows it, in world space, without light.
+    """One groom as a render shows it, in world space, without lights.
 
     Args:
-        hair: not the evaluated copy; hair curves, or the copy of a bake.
-        blocking: False: it is made in a thread, and what was made last is shown until then.
+        hair: hair curves, or the copy that shows a bake; not the evaluated object.
+        blocking: False: it is built in a thread, and the last result is returned until then.
 
     Raises:
-        HairNotMadeYetError: it is being made for the first time, and nobody waits.
+        HairNotMadeYetError: it is being built for the first time, and the call is not blocking.
         HairloomError: none of its curves can be used, or its bake is damaged.
     """
     owner = owner_of(hair)
     settings = GroomSettings.of(owner, depsgraph)
     cache, scene = playback.cache_of(owner), depsgraph.scene
-    # A copy stays as it is beyond the baked frames; curves of the artist's go on by themselves.
+    # Beyond the baked frames a copy stays as it is, and the artist's own curves are as evaluated.
     if cache is not None and (owner != hair or _shows_bake(owner, cache, scene.frame_current)):
         strands = playback.strands_in(cache, scene.frame_current, scene.frame_subframe)
         baked = playback.rig_in(cache)
@@ -217,14 +219,14 @@ def read_groom(
 
 
 def state_of(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> tuple[Any, ...]:
-    """What decides how hair looks, but for its curves and its head.
+    """A key of everything that the look of hair depends on, except its curves and its head.
 
     Raises:
         HairloomError: its bake is damaged.
     """
     owner, scene = owner_of(hair), depsgraph.scene
     cache = playback.cache_of(owner)
-    # where a bake is shown, it moves from frame to frame
+    # hair with a bake moves from frame to frame
     frame = 0.0 if cache is None else scene.frame_current_final
     return GroomSettings.of(owner, depsgraph), cache, owner.hairloom.bake.is_shown, frame
 
@@ -237,8 +239,8 @@ def uids_of(hair: bpy.types.Object) -> set[int]:
 
 
 def placed(snapshot: Snapshot, motion: Floats) -> Snapshot:
-    """The same, moved by an affine (4, 4) matrix, as an instance is. Hair gets thicker as it gets
-    longer on average, and in a mirror what lies across a strand lies on its other side."""
+    """The snapshot of an instance, moved by an affine (4, 4) matrix. Radii grow with the mean
+    scale, and a mirror flips vectors across strands to the other side."""
     cards, center, scale = snapshot.cards, snapshot.volume_center, mean_scale(motion)
     is_mirrored = bool(np.linalg.det(motion[:3, :3]) < 0.0)
     if cards is not None:
@@ -266,8 +268,8 @@ def placed(snapshot: Snapshot, motion: Floats) -> Snapshot:
 
 
 def _placed_light(light: Floats | None, is_mirrored: bool) -> Floats | None:
-    """Openness (n, 4) or the skin that is seen (n, 8), whose vectors lie by axes of which the third
-    is the cross product of the others."""
+    """Openness (n, 4) or visible skin (n, 8) of an instance. The third axis of their vectors is the
+    cross product of the others, so a mirror flips its sign."""
     if light is None or not is_mirrored:
         return light
     sign = np.ones(light.shape[1], np.float32)
@@ -276,17 +278,17 @@ def _placed_light(light: Floats | None, is_mirrored: bool) -> Floats | None:
 
 
 def is_pending(uid: int) -> bool:
-    """Whether other hair than what is shown is on its way, by session number."""
+    """Whether new hair of a groom, given by session number, is being built."""
     return uid in _kept and _kept[uid].is_pending
 
 
 def forget() -> None:
-    """Keep no groom in memory, and wait for none."""
+    """Drop all grooms, and cancel all jobs."""
     _keep_only(set())
 
 
 def forget_gone() -> None:
-    """Keep no groom whose object is gone."""
+    """Drop grooms whose objects are gone."""
     _keep_only({obj.session_uid for obj in bpy.data.objects})
 
 
@@ -341,20 +343,20 @@ def _made(
     blocking: bool,
 ) -> _Made:
     def make() -> _Made:
-        # a render leaves no strand out, so that nothing need hide any
+        # a render leaves no strands out, so it needs no occluder spheres
         groom = prepared(rig(), settings[AmbientSettings], with_occluders=False)
         return _Made(made_from, groom.rig, snapshot_of(groom), is_baked)
 
     kept = _kept.setdefault(owner.session_uid, _Kept())
     made = kept.have(made_from, make, blocking=blocking)
-    # of a bake no other hair is shown, as the strands of each frame belong to its own
+    # a bake's strands fit its own rig only, so an earlier result cannot be shown
     if made is None or (is_baked and not kept.is_of(made_from)):
         raise HairNotMadeYetError
     return made
 
 
 def _values(made: StrandSet | Surface) -> tuple[Any, ...]:
-    """All that it holds."""
+    """The values of all fields."""
     return tuple(getattr(made, each.name) for each in fields(made))
 
 

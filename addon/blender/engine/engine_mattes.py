@@ -1,4 +1,4 @@
-"""What covers each pixel, sample by sample: the passes Hair Alpha and Cryptomatte."""
+"""Coverage of each pixel, summed over samples: the passes Hair Alpha and Cryptomatte."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ class Mattes:
     def of(
         cls, wanted: Mapping[str, Any], layer: bpy.types.ViewLayer, width: int, height: int
     ) -> Mattes | None:
-        """None where no pass asks for them."""
+        """The mattes of a picture; None if no pass needs them."""
         is_wanted = any(name == HAIR_ALPHA.name or name.startswith(CRYPTOMATTE) for name in wanted)
         return cls(height, width, layer) if is_wanted else None
 
     def add(self, objects: Mapping[str, Floats], hair: Floats) -> None:
-        """What covers the pixels of one sample, see ScenePass.coverages."""
+        """Add the coverages of one sample, see ScenePass.coverages."""
         self._count += 1
         self._hair += hair
         if self._objects is None:
@@ -44,7 +44,7 @@ class Mattes:
             self._objects.add(name, coverage)
 
     def write(self, wanted: Mapping[str, Any]) -> None:
-        """Into Blender's passes."""
+        """Write the mattes into Blender's passes."""
         if HAIR_ALPHA.name in wanted:
             write(wanted[HAIR_ALPHA.name], self._hair / max(self._count, 1))
         if self._objects is None:
@@ -55,7 +55,7 @@ class Mattes:
 
     @property
     def metadata(self) -> dict[str, str]:
-        """What files are to say of the Cryptomatte."""
+        """The metadata of the Cryptomatte, for files."""
         if self._objects is None:
             return {}
         return metadata(f"{self._layer.name}.{CRYPTOMATTE}", self._names)

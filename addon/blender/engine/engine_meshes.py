@@ -1,4 +1,4 @@
-"""Evaluated objects as meshes to draw: meshes, and whatever Blender turns into one."""
+"""Evaluated objects as meshes to draw: meshes, and objects that Blender converts to meshes."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ from ..base.mesh_arrays import corner_vertices, of_triangles, triangle_corners, 
 from ..scene.mesh_materials import MeshMaterial, material_of
 from ..scene.surfaces import read_corner_uv
 
-#: types of objects that have faces; Blender hands out what texts and legacy curves become as meshes
+#: types of objects with faces; instances of texts and legacy curves come from Blender as meshes
 SOLID_TYPES = frozenset({"MESH", "META"})
 
 
 def read_meshes(
     obj: bpy.types.Object, matrix: Floats, *, is_head: bool
 ) -> tuple[MeshSnapshot, ...]:
-    """One for each material that an evaluated object uses; none without faces.
+    """A mesh for each material that an evaluated object uses; none without faces.
 
     Args:
         matrix: (4, 4) from object to world space, of the instance.
-        is_head: whether hair grows on it, whose shadow is soft then.
+        is_head: whether hair grows on it, so that the hair's shadow on it may be soft.
     """
-    # a mesh that is being edited has its data elsewhere
+    # in Edit Mode, the mesh's data is elsewhere
     is_plain = obj.type == "MESH" and not obj.data.is_editmode
     mesh = obj.data if is_plain else obj.to_mesh()
     if mesh is None:
@@ -45,7 +45,7 @@ def _split(
     mesh: bpy.types.Mesh, obj: bpy.types.Object, matrix: Floats, is_head: bool
 ) -> tuple[MeshSnapshot, ...]:
     triangles, positions, normals = _corners(mesh)
-    # rows: the transpose of the inverse, which normals need, from the right
+    # multiplied from the right, as normals transform by the inverse transpose
     from_world = np.linalg.pinv(matrix[:3, :3])
     positions = moved(positions, matrix)
     if not np.isfinite(positions).all():
@@ -70,7 +70,7 @@ def _split(
 
 
 def _corners(mesh: bpy.types.Mesh) -> tuple[Ints, Floats, Floats]:
-    """Triangles, positions and normals; a vertex is there once for each of its normals."""
+    """Triangles, positions and normals; split normals split vertices."""
     positions = vertex_places(mesh)
     if mesh.normals_domain == "POINT":
         normals = np.empty_like(positions)
@@ -100,8 +100,8 @@ def _with_material(mesh: MeshSnapshot, material: MeshMaterial) -> MeshSnapshot:
 
 
 def as_before(old: MeshSnapshot, new: MeshSnapshot) -> MeshSnapshot:
-    """The old one where both draw the same, so that it may stay on the GPU; of a head that has
-    only moved, the new one with the old triangles and UVs.
+    """The old mesh if both draw the same, so that it can stay on the GPU; for a head that has only
+    moved, the new mesh with the old triangles and UVs.
     """
     is_same = (
         _looks(old) == _looks(new)
@@ -120,7 +120,7 @@ def as_before(old: MeshSnapshot, new: MeshSnapshot) -> MeshSnapshot:
 
 
 def _looks(mesh: MeshSnapshot) -> tuple[object, ...]:
-    """What decides how it is drawn, beside its surface."""
+    """A key of everything that drawing depends on, except the surface."""
     pictures = mesh.pictures or MeshPictures()
     return (
         *(mesh.color, mesh.specular, mesh.roughness),

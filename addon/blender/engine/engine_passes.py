@@ -1,5 +1,4 @@
-"""The passes of the render engine: what Blender's compositor and files know each by, and when there
-is which."""
+"""The passes of the render engine: their names and channels in Blender, and which are enabled."""
 
 from __future__ import annotations
 
@@ -18,7 +17,7 @@ from . import hair_scene
 
 @dataclass(frozen=True)
 class RenderPass:
-    """channels: their names. kind: of a socket. empty: what it holds where nothing is."""
+    """A pass. channels: their names. kind: of its socket. empty: the value where nothing is."""
 
     name: str
     channels: str
@@ -31,21 +30,21 @@ DEPTH = RenderPass("Depth", "Z", empty=FAR_AWAY)
 NORMAL = RenderPass("Normal", "XYZ", "VECTOR")
 VECTOR = RenderPass("Vector", "XYZW", "VECTOR")
 OBJECT_INDEX = RenderPass("Object Index", "X")
-#: of the strand that is nearest, counted from 1
+#: index of the nearest strand, counted from 1
 STRAND_INDEX = RenderPass("Strand Index", "X")
-#: from root to tip, world space
+#: direction from root to tip, world space
 TANGENT = RenderPass("Hair Tangent", "XYZ", "VECTOR")
-#: how much hair covers
+#: coverage of hair
 HAIR_ALPHA = RenderPass("Hair Alpha", "X")
-#: the fraction of their light that hair leaves to meshes; hair scenes have it always
+#: the fraction of light that hair lets through to meshes; hair scenes always have this pass
 SHADOW = RenderPass("Hair Shadow", "RGB", "COLOR", empty=1.0)
-#: of hair scenes: shafts of light, to be added to the picture
+#: only in hair scenes: shafts of light, to be added to the picture
 SHAFTS = RenderPass("Hair Shafts", "RGB", "COLOR")
-#: what the names of a Cryptomatte's pictures begin with
+#: prefix of the names of Cryptomatte passes
 CRYPTOMATTE = "CryptoObject"
-#: what is nearest in the middle of each pixel, by name
+#: names of the passes that hold data of the nearest thing at the centre of each pixel
 DATA = frozenset(each.name for each in (DEPTH, NORMAL, VECTOR, OBJECT_INDEX, STRAND_INDEX, TANGENT))
-#: settings of view layers -> what they ask for; Blender's own, and ours
+#: settings of view layers -> the passes that they enable; Blender's own, and ours
 _ASKED = {
     "use_pass_z": DEPTH,
     "use_pass_normal": NORMAL,
@@ -61,7 +60,7 @@ _ASKED_OF_US = {
 
 
 def wanted_passes(scene: bpy.types.Scene, layer: bpy.types.ViewLayer) -> Iterator[RenderPass]:
-    """What there is beside the picture."""
+    """The enabled passes beside the picture."""
     is_hair_scene = hair_scene.drawn_by(scene) is not None
     for owner, asked in ((layer, _ASKED), (layer.hairloom, _ASKED_OF_US)):
         for name, found in asked.items():
@@ -74,13 +73,13 @@ def wanted_passes(scene: bpy.types.Scene, layer: bpy.types.ViewLayer) -> Iterato
 
 
 def cryptomatte_passes(layer: bpy.types.ViewLayer) -> list[RenderPass]:
-    """As many as hold the levels that are asked for."""
+    """As many passes as the view layer's number of levels needs."""
     count = -(-layer.pass_cryptomatte_depth // PAIRS)
     return [RenderPass(f"{CRYPTOMATTE}{number:02}", "RGBA", "COLOR") for number in range(count)]
 
 
 def empty_of(name: str) -> float:
-    """What a pass of this name holds where nothing is."""
+    """The value of a pass of this name where nothing is seen."""
     known = (DEPTH, SHADOW)
     return next((each.empty for each in known if each.name == name), 0.0)
 

@@ -1,8 +1,8 @@
 """The picture that Blender's own engine has just rendered, for hair that is laid over it.
 
-Blender renders the artist's scene first and hair scenes after it, before it composites. Between the
-two the picture lies in *Render Result*, which hands its pixels out to files alone: so it goes
-through one, scene-linear and in whole floats, and the scene's own file format is put back at once.
+Blender renders the artist's scene first, then hair scenes, and composites last. Until then the
+picture is in *Render Result*, whose pixels can only be written to files. So it goes through a
+temporary file, scene-linear in 32-bit floats, and the scene's own file format is restored at once.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from ...arrays import Floats
 from ...errors import HairloomError
 from ..base.images import read_texture
 
-#: of a file format, in an order in which each may be set
+#: settings of the file format, in an order in which each can be set
 _FORMAT = {
     "media_type": "IMAGE",
     "file_format": "OPEN_EXR",
@@ -37,8 +37,8 @@ def engine_picture(
     row 0 at the bottom; None where there is none.
 
     Args:
-        whole: width and height of all of it [pixels].
-        corner, size: of the part that is wanted [pixels].
+        whole: width and height of the full picture [pixels].
+        corner, size: of the part to return [pixels].
     """
     result = next((each for each in bpy.data.images if each.type == "RENDER_RESULT"), None)
     if result is None or scene.render.use_multiview:

@@ -1,6 +1,6 @@
-"""A scene as the render engine draws it, read from one evaluation of Blender's.
+"""A scene as the render engine draws it, read from one depsgraph evaluation.
 
-Reading writes nothing, and keeps no reference into Blender's data.
+Reading changes nothing, and keeps no references to Blender's data.
 """
 
 from __future__ import annotations
@@ -42,7 +42,8 @@ class Visibility:
 
 @dataclass(frozen=True, eq=False)
 class _ReadMesh:
-    """notes: on its materials; skin_notes: on its UVs, of a head on which a shadow may be soft."""
+    """A mesh that was read. notes: on its materials. skin_notes: on the UVs of a head, which a soft
+    shadow needs."""
 
     matrix: Floats
     is_holdout: bool
@@ -53,18 +54,19 @@ class _ReadMesh:
 
 @dataclass(frozen=True, eq=False)
 class _ReadGroom:
-    """state: all that it depends on, except its curves and its head."""
+    """A groom that was read. state: see `engine_hair.state_of`, with matrix and holdout."""
 
     state: tuple[Any, ...]
     groom: DrawnGroom
 
 
 class SceneReader:
-    """Reads a scene again and again; what is the same stays the same object.
+    """Reads a scene repeatedly; unchanged meshes and grooms stay the same objects.
 
-    warnings: what the artist should know of the last reading, each with its remedy.
+    warnings: from the last reading, each with its remedy.
     previewed: grooms that were left out because they are previewed, by session number.
-    pending: grooms that are shown as they were, until their new hair is built.
+    pending: session numbers of grooms whose new hair is being built; until then they are shown as
+        before, if they were.
     """
 
     def __init__(self) -> None:
@@ -85,15 +87,16 @@ class SceneReader:
         is_expected: Callable[[int], bool] = lambda _: False,
         blocking: bool = True,
     ) -> SceneSnapshot:
-        """The scene of this evaluation.
+        """The scene in this evaluation.
 
         Args:
-            changed: session numbers of what may have another shape or material than when it was
-                read last; None: all.
-            is_shown: whether an object is seen at all.
-            is_previewed: whether a groom is left out, by its session number; its instances are not.
-            is_expected: whether a groom stays as it was, as its preview is about to be there.
-            blocking: False: hair is made in a thread, and is as it was until then.
+            changed: session numbers of data-blocks whose shape or material may have changed since
+                the last reading; None: all.
+            is_shown: whether an object is visible.
+            is_previewed: whether a groom, by session number, is left out; its instances are not.
+            is_expected: whether a groom, by session number, stays as it was, since its preview is
+                about to be shown.
+            blocking: False: hair is built in a thread, and stays as it was until then.
         """
         warnings: list[str] = []
         drawn: list[MeshSnapshot] = []
@@ -110,7 +113,7 @@ class SceneReader:
                 continue
             key, matrix = _key(instance), np.array(instance.matrix_world)
             visibility = _visibility(instance, layer)
-            # a preview draws a groom once; its instances are read as of any other hair
+            # a preview draws a groom once; its instances are read like any other hair
             is_own = obj.type == "CURVES" and not instance.is_instance
             if behind is not None and obj.type in SOLID_TYPES:
                 visibility = replace(visibility, is_holdout=True)
@@ -131,7 +134,7 @@ class SceneReader:
                 )
                 grooms |= {} if groom is None else {key: groom}
         self._meshes, self._grooms = read, grooms
-        if not blocking:  # the thread of a render asks for no list that the window may change
+        if not blocking:  # a render's thread must not read bpy.data.objects, as the window may edit
             engine_hair.forget_gone()
         found = tuple(each.groom for each in grooms.values())
         center = _center(found, drawn)
@@ -199,7 +202,7 @@ class SceneReader:
         is_holdout: bool,
         blocking: bool,
     ) -> _ReadGroom | None:
-        """None, and a warning, where the hair cannot be drawn."""
+        """A groom; None with a warning if it cannot be drawn, or None until it is built."""
         if hair.type != "CURVES":
             warnings.append(
                 f"{hair.name}: hair that modifiers make on an object of another kind is not "
@@ -216,7 +219,7 @@ class SceneReader:
             snapshot = engine_hair.read_groom(hair, depsgraph, blocking=blocking)
         except HairNotMadeYetError:
             self.pending.add(uid)
-            return None if known is None else _ReadGroom((), known.groom)  # to be read again
+            return None if known is None else _ReadGroom((), known.groom)  # no state: read again
         except HairloomError as error:
             warnings.append(str(error))
             return None
@@ -239,7 +242,7 @@ def _has_soft_shadow(snapshot: Snapshot) -> bool:
 def _skin_notes(
     name: str, meshes: tuple[MeshSnapshot, ...], known: _ReadMesh | None
 ) -> tuple[str, ...]:
-    """What is wrong with a head's UVs; looked for only where they are others than before."""
+    """Problems of a head's UVs; checked again only if the UVs have changed."""
     if not meshes:
         return ()
     skin = meshes[0].skin
@@ -259,7 +262,7 @@ def _heads(depsgraph: bpy.types.Depsgraph) -> frozenset[int]:
 
 
 def _holder(instance: bpy.types.DepsgraphObjectInstance) -> bpy.types.Object:
-    """The object of the scene that an instance is there for."""
+    """The scene's object behind an instance: its instancer, or itself if it is no instance."""
     return (instance.parent if instance.is_instance else instance.object).original
 
 
@@ -282,10 +285,10 @@ def _uids(obj: bpy.types.Object) -> set[int]:
 def _visibility(
     instance: bpy.types.DepsgraphObjectInstance, layer: bpy.types.ViewLayer
 ) -> Visibility:
-    """The artist's settings, not what a preview has written into the evaluated copy."""
+    """The artist's settings of visibility, without a preview's changes to the evaluated copy."""
     obj, holder = instance.object.original, _holder(instance)
     is_indirect = holder.indirect_only_get(view_layer=layer)
-    # a copy for renders stands for the groom, and is as that is
+    # a copy for renders has the visibility of its groom
     owner = engine_hair.owner_of(obj) if obj.type == "CURVES" else obj
     marked = (each.is_holdout for each in (obj, owner, holder))
     is_holdout = any(marked) or holder.holdout_get(view_layer=layer)
@@ -294,7 +297,7 @@ def _visibility(
 
 
 def _center(grooms: tuple[DrawnGroom, ...], meshes: list[MeshSnapshot]) -> Floats:
-    """The middle of what is lit, (3,) [m]: of the hair, else of the meshes."""
+    """The centre of the lit objects, (3,) [m]: of the hair, else of the meshes."""
     if grooms:
         return np.mean([groom.snapshot.center for groom in grooms], axis=0)
     if meshes:

@@ -47,7 +47,7 @@ from .engine_passes import (
 from .engine_picture import engine_picture
 from .engine_scene import SceneReader
 
-#: while it renders, the picture so far is shown this often [s]
+#: interval at which the picture so far is shown [s]
 _SHOWN_EVERY = 1.0
 
 
@@ -59,10 +59,10 @@ _UNSEEN = (
 
 @dataclass(frozen=True)
 class SampleTime:
-    """When samples are taken.
+    """Samples that are taken at one time.
 
-    time: [frames], from the frame that is rendered.
-    places: (n, 2) the samples' places [pixels].
+    time: [frames], relative to the rendered frame.
+    places: (n, 2) the samples' offsets [pixels].
     """
 
     time: float
@@ -72,7 +72,7 @@ class SampleTime:
 def sample_times(
     settings: PictureSettings, render: bpy.types.RenderSettings
 ) -> tuple[SampleTime, ...]:
-    """How the samples are shared out in time; all at once without motion blur."""
+    """The samples distributed over the shutter time; all at one time without motion blur."""
     places = jitters(settings.samples, render.filter_size)
     steps = min(settings.motion_steps, settings.samples) if render.use_motion_blur else 1
     if steps == 1:
@@ -85,10 +85,10 @@ def sample_times(
 
 
 class Still:
-    """Renders view layers one after the other, in the context of one render.
+    """Renders the views of one view layer.
 
     Args:
-        engine: Blender's render engine, which shows progress and knows when to stop.
+        engine: Blender's render engine, which shows progress and signals cancellation.
 
     Raises:
         HairloomError: no GPU, or a picture without pixels.
@@ -115,7 +115,7 @@ class Still:
         self.warnings: tuple[str, ...] = ()
 
     def view(self, name: str) -> None:
-        """Render the view of this name (of a camera without eyes it is empty).
+        """Render the view of this name, which is empty without stereoscopy.
 
         Raises:
             HairloomError: there is no camera.
@@ -136,7 +136,7 @@ class Still:
 
     def _fill(self, result: Any) -> None:
         timed = self._depsgraph.scene
-        # frame_set stretches time itself
+        # without time stretching, which frame_set applies itself
         frame = timed.frame_current + timed.frame_subframe
         moments = sample_times(self._settings, self._render)
         lens = read_lens(self._engine, self._depsgraph)
@@ -178,8 +178,8 @@ class Still:
             self._mattes.write(wanted)
 
     def _beside(self, behind: bpy.types.Scene, scene: SceneSnapshot) -> ShaftsApart | None:
-        """Where shafts of light go; None without any. They come from the picture of Blender's own
-        engine too, where they are to come from what is bright."""
+        """The target for shafts of light; None without any. Shafts from bright things also need the
+        picture of Blender's own engine."""
         settings = shafts_of(scene)
         if settings is None:
             return None
@@ -197,7 +197,7 @@ class Still:
         return ShaftsApart(light, texture_from(seen, "RGBA32F"), shows_world)
 
     def _moment(self) -> tuple[SceneSnapshot, Camera]:
-        """Scene and camera as they are evaluated now."""
+        """Scene and camera as evaluated now."""
         seen = read_camera(self._engine, self._depsgraph, *self._whole, self._window)
         scene = self._reader.read(self._depsgraph)
         found = (*self._reader.warnings, *camera_warnings(self._engine, self._depsgraph))
@@ -229,7 +229,7 @@ class Still:
     def _add_data(
         self, wanted: dict[str, Any], frame: float, scene: SceneSnapshot, camera: Camera
     ) -> None:
-        """What is nearest in the middle of each pixel, at the frame itself."""
+        """Write the passes of the nearest thing at each pixel's centre, at the exact frame."""
         drawing = self._target, self._size
         nearest = self._pass.nearest(scene, camera, *drawing)
         if self._behind is not None:
@@ -254,14 +254,14 @@ class Still:
     def _motion(
         self, nearest: Nearest, frame: float, scene: SceneSnapshot, camera: Camera
     ) -> Floats:
-        """Where what is nearest was a frame before, and will be a frame later."""
+        """The Vector pass: motion of the nearest thing from one frame before to one frame after."""
         moments = {}
         for step in (-1, 1):
             self._go_to(frame + step)
             moments[step] = Moment.of(scene, *self._moment())
         self._go_to(frame)
         moments[0] = Moment.of(scene, scene, camera)
-        # cards, and what lies behind all, move as the camera makes them
+        # cards and the background only have the motion of the camera
         is_there, is_mesh = (nearest.depth < 1.0)[..., None], (nearest.mesh >= 0)[..., None]
         seen, behind = unprojected(camera, nearest.depth), background(camera, nearest.depth)
         still, places = np.where(is_there, seen, behind), {}
@@ -282,20 +282,20 @@ class Still:
 
 
 def _leave_empty(result: Any) -> None:
-    """No hair, and no shadow of any: whoever lays it over a picture changes nothing."""
+    """Fill all passes with their empty values, so that compositing them changes nothing."""
     for name, each in passes_in(result).items():
         write(each, np.full(len(each.rect) * each.channels, empty_of(name)))
 
 
 def _calm(settings: PictureSettings) -> PictureSettings:
-    """With as many samples as it takes where strands are hashed because they cannot be layers."""
+    """The settings, with enough samples for hashed strands where the GPU cannot draw layers."""
     if capabilities().image_atomics:
         return settings
     return replace(settings, samples=max(settings.samples, CALM_SAMPLES))
 
 
 def sky_of(scene: SceneSnapshot, render: bpy.types.RenderSettings) -> Rgba:
-    """What is seen where nothing is, premultiplied."""
+    """The background colour, premultiplied."""
     return (0.0, 0.0, 0.0, 0.0) if render.film_transparent else (*scene.ambient, 1.0)
 
 

@@ -1,4 +1,4 @@
-"""The viewport in Rendered mode: a picture that gets better while nothing moves."""
+"""The viewport in Rendered mode: a picture that accumulates samples while nothing changes."""
 
 from __future__ import annotations
 
@@ -34,10 +34,10 @@ from .engine_still import sky_of
 
 @dataclass(frozen=True, eq=False)
 class _Shown:
-    """All that a sample depends on; equal ones accumulate.
+    """All inputs of a sample; samples with equal inputs accumulate.
 
-    scene: with what is previewed in it.
-    marks: numbers and objects that are others as soon as the picture is another one.
+    scene: with the previewed hair in it.
+    marks: values and objects, some of which change whenever the picture does.
     """
 
     scene: SceneSnapshot
@@ -56,7 +56,7 @@ class EngineView:
     """One 3D view that is drawn by the engine."""
 
     def __init__(self) -> None:
-        # Blender drops it as the view leaves Rendered mode, and may draw nothing of ours after that
+        # Blender drops this when the view leaves Rendered mode, and may never draw with it again
         weakref.finalize(self, free_soon).atexit = False
         self._reader, self._pass = SceneReader(), ScenePass()
         self._target, self._picture = Target(), Accumulation()
@@ -66,15 +66,15 @@ class EngineView:
         self._local: int = 0
 
     def read(self, context: Any, depsgraph: bpy.types.Depsgraph) -> None:
-        """Take over what Blender has evaluated again."""
+        """Read what Blender has evaluated again."""
         changed = {update.id.original.session_uid for update in depsgraph.updates}
         self._read(context, depsgraph, changed if self._scene is not None else None)
 
     def draw(self, context: Any, depsgraph: bpy.types.Depsgraph) -> tuple[int, int]:
-        """Add a sample to the picture if it is to have more, and draw it.
+        """Add a sample to the picture unless it has all, and draw it.
 
         Returns:
-            Samples so far, and how many there are to be.
+            the number of samples so far, and the final number.
         """
         space, render = context.space_data, depsgraph.scene.render
         local = space.local_view.as_pointer() if space.local_view else 0
@@ -93,7 +93,7 @@ class EngineView:
         self._shown = shown
         if self._picture.count < settings.viewport_samples:
             self._add_sample(shown, render)
-        # beyond its region Blender's background stays
+        # outside the render region Blender's background stays
         gpu.state.viewport_set(left + x, bottom + y, *size)
         self._picture.show(left + x, bottom + y)
         gpu.state.viewport_set(left, bottom, wide, high)
@@ -109,7 +109,7 @@ class EngineView:
 
     @property
     def is_waiting(self) -> bool:
-        """Whether hair is being made, and the picture is without it."""
+        """Whether hair is being built that the picture does not show yet."""
         return bool(self._reader.pending or overlay.expected())
 
     @property
@@ -118,7 +118,7 @@ class EngineView:
 
     @property
     def count(self) -> int:
-        """Samples so far of what is shown."""
+        """The number of samples so far."""
         return self._picture.count
 
     @property
@@ -182,5 +182,5 @@ def _previewed() -> tuple[frozenset[int], ...]:
 
 
 def _serial(snapshot: Snapshot) -> int:
-    """Grows with every moment that the GPU computes into the same texture."""
+    """A number that grows whenever the GPU computes new points into the same texture."""
     return 0 if snapshot.device_points is None else snapshot.device_points.serial

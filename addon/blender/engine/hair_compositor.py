@@ -13,13 +13,13 @@ STRENGTH = "Shadow Strength"
 #: custom property of node trees that are ours: the group, and a compositor made for it
 _KIND = "hairloom"
 _LAYERS = "CompositorNodeRLayers"
-#: of nodes [pixels], below and beside that of the picture
+#: distances of nodes below and beside the node of the picture [pixels]
 _BELOW, _BESIDE = 320.0, 340.0
 
 
 def link(scene: bpy.types.Scene, hair: bpy.types.Scene, layer: str) -> None:
-    """Lay the hair over each Render Layers node of this view layer, in a compositor made for it if
-    there is none."""
+    """Lay the hair over each Render Layers node of this view layer; makes a compositor if there is
+    none."""
     tree = scene.compositing_node_group or _new_compositor(scene)
     for node in [each for each in _pictures(tree, scene) if each.layer == layer]:
         beside = tree.nodes.new(_LAYERS)
@@ -34,12 +34,12 @@ def link(scene: bpy.types.Scene, hair: bpy.types.Scene, layer: str) -> None:
         tree.links.new(picture, group.inputs[IMAGE])
         tree.links.new(beside.outputs[IMAGE], group.inputs[HAIR])
         for name in (SHADOW, SHAFTS):
-            if name in group.inputs:  # a group of an older file knows no shafts
+            if name in group.inputs:  # a group of an older file has no input for shafts
                 tree.links.new(beside.outputs[name], group.inputs[name])
 
 
 def unlink(scene: bpy.types.Scene, hair: bpy.types.Scene | None) -> None:
-    """Give the picture back to what asked for it, and remove our nodes, but for those of another
+    """Link the picture to where it was linked before, and remove our nodes, except those of another
     scene with the same compositor."""
     tree = scene.compositing_node_group
     if tree is None:
@@ -61,7 +61,7 @@ def unlink(scene: bpy.types.Scene, hair: bpy.types.Scene | None) -> None:
 
 
 def is_linked(scene: bpy.types.Scene, hair: bpy.types.Scene) -> bool:
-    """Whether the compositor asks for the hair and uses it."""
+    """Whether the compositor has a Render Layers node of the hair and uses it."""
     tree = scene.compositing_node_group
     if tree is None or not any(_hair_layers(tree, hair)):
         return False
@@ -74,7 +74,7 @@ def _pictures(tree: Any, scene: bpy.types.Scene) -> Iterator[Any]:
 
 
 def _hair_layers(tree: Any, hair: bpy.types.Scene | None) -> Iterator[Any]:
-    """Of a hair scene that is gone, those of no scene."""
+    """The Render Layers nodes of a hair scene; None: nodes without a scene, as it was removed."""
     return _pictures(tree, hair)
 
 
@@ -88,21 +88,21 @@ def _groups(tree: Any) -> Iterator[Any]:
 
 
 def _lays(group: Any, hair: bpy.types.Scene | None) -> bool:
-    """Whether the hair of this scene is what a group lays over a picture, or that of no scene."""
+    """Whether a group lays the hair of this scene over a picture, or that of no scene."""
     scenes, seen = set(), set()
     asked = [link.from_node for link in group.inputs[HAIR].links]
     while asked:
         node = asked.pop()
         if node.bl_idname == _LAYERS:
             scenes.add(node.scene)
-        elif node.name not in seen:  # the artist's, such as a blur
+        elif node.name not in seen:  # a node of the artist's, such as a blur
             seen.add(node.name)
             asked += [link.from_node for each in node.inputs for link in each.links]
     return not scenes or hair in scenes
 
 
 def _new_compositor(scene: bpy.types.Scene) -> Any:
-    """What Blender does without one: the picture as it is rendered."""
+    """A compositor that outputs the picture as rendered, as Blender does without one."""
     tree = bpy.data.node_groups.new(f"{scene.name} Compositing", "CompositorNodeTree")
     tree[_KIND] = "compositor"
     tree.interface.new_socket(IMAGE, in_out="OUTPUT", socket_type="NodeSocketColor")
@@ -119,7 +119,7 @@ def _known_group() -> Any:
 
 
 def _group() -> Any:
-    """Picture times shadow, hair over it, and shafts of light over all."""
+    """The node group: picture times shadow, then hair over it, plus shafts of light."""
     tree = _known_group()
     if tree is not None:
         return tree
@@ -160,5 +160,5 @@ def _group() -> Any:
 
 
 def _of_type(sockets: Any, kind: str, number: int) -> Any:
-    """Sockets of a node that mixes whatever it is set to have the same names for all kinds."""
+    """A socket by type and number: those of a Mix node have the same names for all data types."""
     return [each for each in sockets if each.type == kind][number]

@@ -1,12 +1,12 @@
 """Hair over the pictures of EEVEE and Cycles, by a scene that draws the hair of another.
 
-The hair scene holds nothing. Its engine is Hairloom, and the artist's scene is its background set,
-so it shows whatever is there. The compositor of the artist's scene asks for both: Blender renders
-each by its own engine, with progress, cancel and the frames of an animation, and the node group
-*Hairloom Hair* darkens Blender's picture by the shadow of the hair and lays the hair over it.
+The hair scene is empty. Its engine is Hairloom, and the artist's scene is its background set, whose
+objects it shows. The compositor of the artist's scene uses both: Blender renders each with its own
+engine, with progress, cancel and the frames of an animation, and the node group *Hairloom Hair*
+darkens Blender's picture by the shadow of the hair and lays the hair over it.
 
-While it renders, Blender's own engine sees no hair curves; they keep what they were in a property,
-from which a file that was saved meanwhile is healed.
+During a render, hair curves are hidden from Blender's own engine. A property keeps the artist's
+visibility, from which it is restored, also in a file that was saved meanwhile.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ from ..properties import changed
 from ..viewport.overlay import ENGINE
 from . import hair_compositor
 
-#: what an object may be hidden from, in the order of its bits in `hidden_rays`
+#: kinds of rays that an object can be hidden from, in the order of the bits in `hidden_rays`
 RAYS = ("camera", "diffuse", "glossy", "transmission", "volume_scatter", "shadow")
-#: bit that says that rays are hidden at all
+#: bit that is set while hair is hidden
 HIDDEN = 1 << len(RAYS)
 _CAMERA = 1 << RAYS.index("camera")
-#: what the hair scene has as the artist's scene has it
+#: render settings that the hair scene copies from the artist's scene
 _RENDER = (
     *("resolution_x", "resolution_y", "resolution_percentage", "pixel_aspect_x", "pixel_aspect_y"),
     *("use_border", "use_crop_to_border", "border_min_x", "border_min_y"),
@@ -36,7 +36,7 @@ _RENDER = (
     *("use_motion_blur", "motion_blur_position", "motion_blur_shutter"),
     *("use_multiview", "views_format"),
 )
-#: what its view layer has as that of the artist's scene has it
+#: settings that its view layer copies from that of the artist's scene
 _LAYER = (
     *("use_pass_z", "use_pass_normal", "use_pass_vector", "use_pass_object_index"),
     *("use_pass_cryptomatte_object", "pass_cryptomatte_depth"),
@@ -46,7 +46,7 @@ _LAYER = (
 def hair_scene_of(scene: bpy.types.Scene) -> bpy.types.Scene | None:
     """The scene that draws the hair of this one; None where there is none."""
     found = scene.hairloom.hair_scene
-    # a copy of a scene names the hair scene of its original
+    # a copy of a scene still points to the hair scene of its original
     return found if found is not None and found.background_set == scene else None
 
 
@@ -58,23 +58,23 @@ def drawn_by(scene: bpy.types.Scene) -> bpy.types.Scene | None:
 
 
 def drawn_layer(scene: bpy.types.Scene) -> bpy.types.ViewLayer:
-    """The view layer of a scene of which a background set is made: the first that is rendered."""
+    """The view layer that a background set shows of a scene: the first one that is rendered."""
     return next((layer for layer in scene.view_layers if layer.use), scene.view_layers[0])
 
 
 def is_needed(scene: bpy.types.Scene) -> bool:
-    """Whether the engine of a scene leaves its hair to the hair scene."""
+    """Whether a scene's engine is not ours, so that the hair scene draws its hair."""
     return scene.render.engine != ENGINE
 
 
 def was_seen(hair: bpy.types.Object) -> bool:
-    """Whether the artist lets the camera see these curves, hidden for a render or not."""
+    """Whether curves are visible to the camera by the artist's setting, also while hidden."""
     hidden = hair.hairloom.hidden_rays
     return bool(hidden & _CAMERA) if hidden else hair.visible_camera
 
 
 def problem_of(scene: bpy.types.Scene) -> str:
-    """Why Blender's engine draws the hair itself though Hairloom is to; empty: it does not."""
+    """Why Blender's engine draws the hair instead of Hairloom; empty if it does not."""
     hair = hair_scene_of(scene)
     if hair is None:
         return "The scene that draws the hair is gone. Turn Hairloom Hair off and on."
@@ -91,7 +91,7 @@ def problem_of(scene: bpy.types.Scene) -> str:
 
 
 def switched(scene: bpy.types.Scene) -> None:
-    """The artist has turned *Hairloom Hair* on or off."""
+    """Add or remove the hair scene after the artist has switched *Hairloom Hair*."""
     hair = hair_scene_of(scene)
     if scene.hairloom.use_hair_scene and hair is None:
         _add(scene)
@@ -108,14 +108,14 @@ def _add(scene: bpy.types.Scene) -> None:
     hair.render.film_transparent = True
     hair.background_set, hair.hairloom.is_hair_scene = scene, True
     scene.hairloom.hair_scene = hair
-    # what a render's thread hides may not be drawn meanwhile
+    # the window must not draw while a render's thread hides hair
     scene.render.use_lock_interface = True
     follow(scene, hair)
     hair_compositor.link(scene, hair, drawn_layer(scene).name)
 
 
 def follow(scene: bpy.types.Scene, hair: bpy.types.Scene) -> None:
-    """Give the hair scene the camera, the world and the picture of the artist's scene."""
+    """Copy camera, world, picture settings and passes of the artist's scene to the hair scene."""
     pairs = [(scene.render, hair.render, name) for name in _RENDER]
     pairs += [(scene, hair, name) for name in ("camera", "world", "frame_start", "frame_end")]
     for section in ("picture", "mesh_shadows"):
@@ -129,14 +129,14 @@ def follow(scene: bpy.types.Scene, hair: bpy.types.Scene) -> None:
 
 
 def _follow_passes(scene: bpy.types.Scene, hair: bpy.types.Scene) -> None:
-    """Give the hair scene the passes of the view layer whose hair it draws."""
+    """Copy the passes of the view layer whose hair is drawn to the hair scene."""
     ours, theirs = drawn_layer(scene), hair.view_layers[0]
     of_hair = ((ours.hairloom, theirs.hairloom, name) for name in ours.hairloom.__annotations__)
     _copy([*((ours, theirs, name) for name in _LAYER), *of_hair])
 
 
 def _copy(pairs: Iterable[tuple[Any, Any, str]]) -> None:
-    """Properties by name, from one owner to the other, where they differ."""
+    """Copy properties by name from one owner to the other, where they differ."""
     for ours, theirs, name in pairs:
         value = getattr(ours, name)
         if getattr(theirs, name) != value:
@@ -144,7 +144,7 @@ def _copy(pairs: Iterable[tuple[Any, Any, str]]) -> None:
 
 
 def passes_changed(scene: bpy.types.Scene) -> None:
-    """The artist has turned a pass of hair on or off."""
+    """Update the passes after the artist has switched one."""
     for layer in scene.view_layers:
         layer.update_render_passes()
     hair = hair_scene_of(scene)
@@ -153,7 +153,7 @@ def passes_changed(scene: bpy.types.Scene) -> None:
 
 
 def _hair_in(collection: bpy.types.Collection, seen: set[str]) -> Iterator[bpy.types.Object]:
-    """All hair curves of a collection, also of the collections that it has instances of."""
+    """All hair curves of a collection, also in collections that it instances."""
     for obj in collection.all_objects:
         if obj.type == "CURVES":
             yield obj
@@ -164,7 +164,7 @@ def _hair_in(collection: bpy.types.Collection, seen: set[str]) -> Iterator[bpy.t
 
 
 def hide_hair(scene: bpy.types.Scene) -> None:
-    """Let Blender's own engine see no hair curves of this scene."""
+    """Hide all hair curves of a scene from Blender's own engine."""
     for hair in _hair_in(scene.collection, set()):
         if hair.hairloom.hidden_rays:
             continue
@@ -175,7 +175,7 @@ def hide_hair(scene: bpy.types.Scene) -> None:
 
 
 def show_hair() -> None:
-    """Every engine sees all hair curves again as the artist has them."""
+    """Restore the artist's visibility of all hair curves."""
     for hair in bpy.data.objects:
         hidden = hair.hairloom.hidden_rays if hair.type == "CURVES" else 0
         if hidden:
@@ -186,7 +186,7 @@ def show_hair() -> None:
 
 @persistent
 def on_render_begin(scene: bpy.types.Scene, *_: object) -> None:
-    """Runs in the thread of the render: only what it alone reads is written."""
+    """Prepare the hair scene; runs in the render's thread, and writes only what no other reads."""
     hair = hair_scene_of(scene)
     if hair is None:
         return
@@ -200,7 +200,7 @@ def on_render_begin(scene: bpy.types.Scene, *_: object) -> None:
 
 @persistent
 def on_frame_begin(scene: bpy.types.Scene, *_: object) -> None:
-    """Cameras may be others from frame to frame; a file that is saved amid a render shows hair."""
+    """Update the camera, which may change at any frame, and hide hair again if saving showed it."""
     _follow_camera(scene)
     if hair_scene_of(scene) is not None and is_needed(scene) and not problem_of(scene):
         hide_hair(scene)
@@ -219,8 +219,8 @@ def on_render_end(*_: object) -> None:
 
 @persistent
 def on_update(scene: bpy.types.Scene, *_: object) -> None:
-    """Blender asks all scenes of a compositor for a camera before a render begins, and the nodes
-    of the compositor have the passes of these scenes."""
+    """Keep the hair scene up to date: before a render, Blender needs a camera in all scenes of a
+    compositor, and nodes of the compositor show the passes of their scene."""
     _follow_camera(scene)
     hair = hair_scene_of(scene)
     if hair is not None:
@@ -229,7 +229,7 @@ def on_update(scene: bpy.types.Scene, *_: object) -> None:
 
 @persistent
 def heal(*_: object) -> None:
-    """Files that were saved amid a render, and hair scenes whose scene is gone."""
+    """Restore hair in files saved during a render, and remove hair scenes whose scene is gone."""
     show_hair()
     named = {scene.hairloom.hair_scene for scene in bpy.data.scenes}
     for scene in list(bpy.data.scenes):
@@ -248,7 +248,7 @@ HANDLERS = (
 )
 
 
-#: the properties that the artist changes, and what follows
+#: properties that the artist changes -> functions called then
 LISTENERS = (("hair_scene", switched), ("passes", passes_changed))
 
 
