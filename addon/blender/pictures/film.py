@@ -1,4 +1,4 @@
-"""Pictures of the studio as files, shown by Blender's own view transform."""
+"""Pictures of the studio as files, through Blender's view transforms."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ...shading.stage_settings import StageSettings
 from ..base.images import save_coded_png, straight_alpha
 from ..viewport.view_transform import ColorView, shown_by_blender
 
-#: view of the settings -> Blender's names of transform and look
+#: choice of `StageSettings.view` -> Blender's names of view transform and look
 _TRANSFORMS = {
     "agx": ("AgX", "None"),
     "agx_contrast": ("AgX", "AgX - Medium High Contrast"),
@@ -23,7 +23,7 @@ _TRANSFORMS = {
 
 
 def write_picture(path: Path, linear: Floats, stage: StageSettings) -> None:
-    """Write a picture as it looks on this stage's film, as PNG in 8 bits.
+    """Write a picture through this stage's film settings, as 8-bit PNG.
 
     Args:
         linear: (height, width, 4) scene-linear Rec.709, premultiplied alpha, row 0 at the bottom.
@@ -37,12 +37,12 @@ def write_picture(path: Path, linear: Floats, stage: StageSettings) -> None:
 
 
 def _developed(colors: Floats, stage: StageSettings) -> Floats:
-    """Code values in [0, 1] of scene-linear colours."""
+    """Display-encoded values in [0, 1] of scene-linear colours."""
     transform, look = _TRANSFORMS[stage.view]
     view = ColorView(transform=transform, look=look, exposure=stage.exposure)
     try:
         return shown_by_blender(view, colors)
-    except TypeError as error:  # this Blender has another configuration of colours
+    except TypeError as error:  # this Blender has another OpenColorIO configuration
         raise HairloomError(
             f"this Blender has no view transform '{transform}' with the look '{look}'",
             place="stage.view",
@@ -57,8 +57,8 @@ def _developed(colors: Floats, stage: StageSettings) -> Floats:
 
 
 def _dithered(coded: Floats) -> Floats:
-    """Each colour moved by up to half a step of 8 bits, always the same way, so that a soft
-    backdrop has no bands. What is quite black or white stays so."""
+    """Colours with noise of up to half an 8-bit step, the same in every picture, so that a soft
+    backdrop has no bands. Pure black and white stay as they are."""
     noise = np.random.default_rng(0).random((*coded.shape[:2], 3), np.float32) - 0.5
     moved = coded.copy()
     moved[..., :3] = np.clip(coded[..., :3] + noise / 255.0, 0.0, 1.0)

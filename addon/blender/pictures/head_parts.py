@@ -9,7 +9,7 @@ from ..scene.built_in_head import HeadLook
 
 
 def head_parts(whole: MeshSnapshot, look: HeadLook) -> tuple[MeshSnapshot, ...]:
-    """A head's parts, which share its vertices; the shadow on it stays soft across them.
+    """A head's parts, which share its vertices, and the skin that soft shadows are computed on.
 
     Args:
         whole: the head with its normals and occlusion.

@@ -19,8 +19,8 @@ from ..base.images import contact_sheet
 from ..properties.presets import named_preset, shipped
 from .studio import Studio
 
-#: name of a view, how far it is turned from the front [degrees], and its height, see
-#: GoodSide.turned; None is where the groom is best seen
+#: name of a view, and its angle from the front [degrees] and height, see GoodSide.turned; None:
+#: the direction from which the groom is best seen
 VIEWS = (
     ("Front", (0.0, 0.08)),
     ("Three-quarter", None),
@@ -30,7 +30,8 @@ VIEWS = (
 )
 CLOSE_UP = "Close-up"
 COLUMNS = 3
-#: of a close-up: how much of the groom it shows, and which fraction of all strands is near the eye
+#: for a close-up: the fraction of the groom's size that it shows, and the fraction of all strands
+#: that counts as near the eye
 _CLOSE_FRACTION, _NEAREST_FRACTION = 0.2, 0.1
 
 
@@ -40,7 +41,7 @@ class Sheet:
     Args:
         pose, points, guides: see Studio.picture.
         size: width and height of each picture [pixels].
-        by_looks: one view in all looks that come with Hairloom, instead of all views.
+        by_looks: one view in all shipped looks, instead of all views.
     """
 
     def __init__(
@@ -72,7 +73,7 @@ class Sheet:
 
     @property
     def picture(self) -> Floats:
-        """The whole sheet, (height, width, 4)."""
+        """The complete sheet, (height, width, 4)."""
         return contact_sheet(self._pictures, COLUMNS)
 
     def _views(self) -> Iterator[tuple[str, Floats]]:
@@ -112,7 +113,7 @@ class Sheet:
 
 
 _FONT = 0
-#: height of letters, and their distance from the border, as fractions of the shorter side
+#: height of text, and its distance from the border, as fractions of the shorter side
 _SIZE, _MARGIN = 0.045, 0.035
 _MIN_SIZE = 9
 _BRIGHTNESS = 0.8

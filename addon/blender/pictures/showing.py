@@ -29,7 +29,7 @@ class ShownGroom:
     """A groom as it is now.
 
     points, guides: see Studio.picture.
-    notes: what the artist should know.
+    notes: for the artist.
     """
 
     studio: Studio
@@ -65,7 +65,7 @@ def shown_groom(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Shown
 
 
 def file_name(name: str) -> str:
-    """A data-block's name as that of a file."""
+    """A file name for a data-block's name."""
     return no_device(re.sub(r"[^\w .-]+", "_", name).strip(" .") or "groom")
 
 

@@ -19,22 +19,22 @@ from ...shading.skin.diffusion import SKIN_LIGHTS
 from ...strands import Surface
 from .slices import lit_as_in
 
-#: the image that it is shown in, always the same
+#: name of the image that shows it, reused each time
 IMAGE = "Skin Shadow"
 
 
 def shown_skin_shadow(snapshot: Snapshot, strand_pass: StrandPass, *, place: str) -> Floats:
     """The transmittance of light to the skin, (rows, columns, 4) scene-linear, row 0 at v = 0.
 
-    White is full light, transparent is no skin. The maps of up to four lights are side by side, in
-    the order of the lights.
+    White is full light, and transparent texels are no skin. The maps of up to four lights are side
+    by side, in the order of the lights.
 
     Args:
-        snapshot: its meshes are the head.
+        snapshot: with the head as its meshes.
         place: for errors.
 
     Raises:
-        HairloomError: there is no such shadow; says why.
+        HairloomError: there is no such shadow, and why.
     """
     maps = strand_pass.opacity(snapshot)
     if maps is None or not snapshot.skin.soft_shadow or not snapshot.skin.softness:
@@ -64,7 +64,7 @@ def shown_skin_shadow(snapshot: Snapshot, strand_pass: StrandPass, *, place: str
 def skin_shadow_of_view(
     snapshot: Snapshot, rig: Rig, pose: Pose, context: bpy.types.Context, *, place: str
 ) -> Floats:
-    """The same for previewed hair on its head, in the light of the 3D view.
+    """As `shown_skin_shadow`, for previewed hair on its head, in the light of the 3D view.
 
     Raises:
         HairloomError: as `shown_skin_shadow`.

@@ -14,7 +14,7 @@ from ...shading.lights import three_point_lights
 from ...shading.volume.opacity import layer_ends
 from ..viewport.overlay import lit
 
-#: the image that they are shown in, always the same
+#: name of the image that shows them, reused each time
 IMAGE = "Hair Slices"
 
 
@@ -22,7 +22,7 @@ def shown_slices(snapshot: Snapshot, strand_pass: StrandPass) -> Floats:
     """The layers of all lights' maps side by side, see opacity_tiles.
 
     Raises:
-        HairloomError: there are no shadows, or no light throws any.
+        HairloomError: there are no shadows, or no light casts any.
     """
     maps = strand_pass.opacity(snapshot)
     if maps is None:
@@ -35,7 +35,7 @@ def shown_slices(snapshot: Snapshot, strand_pass: StrandPass) -> Floats:
 
 
 def slices_of_view(snapshot: Snapshot, context: bpy.types.Context) -> Floats:
-    """The same in the light of the 3D view; without one, in the scene's light.
+    """As `shown_slices`, in the light of the 3D view; without one, in the snapshot's own light.
 
     Raises:
         HairloomError: as `shown_slices`.
@@ -44,7 +44,7 @@ def slices_of_view(snapshot: Snapshot, context: bpy.types.Context) -> Floats:
 
 
 def lit_as_in(context: bpy.types.Context, snapshot: Snapshot) -> Snapshot:
-    """In the light of the 3D view; without one, in the scene's light."""
+    """The snapshot in the light of the 3D view; without one, in its own light."""
     space = context.space_data
     if not isinstance(space, bpy.types.SpaceView3D):
         return snapshot

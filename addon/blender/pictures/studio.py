@@ -1,4 +1,4 @@
-"""The studio of the command line: a groom on its head, on a stage, before one camera."""
+"""The studio, which draws pictures of a groom on its head, on a stage, with a fixed camera."""
 
 from __future__ import annotations
 
@@ -42,20 +42,22 @@ from .skin_picture import shown_skin_shadow
 from .slices import shown_slices
 
 FIELD_OF_VIEW = np.radians(30.0)
-#: how far around the groom its head is shown, as a fraction of the groom's size
+#: distance around the groom within which the head is shown, as a fraction of the groom's size
 HEAD_ROOM = 0.25
-#: where a close-up looks from: degrees from the front, and z; how much of the groom it shows
+#: for a close-up: its direction (degrees from the front, and z), and the fraction of the groom's
+#: size that it shows
 CLOSE_UP, CLOSE_REACH = (50.0, 0.3), 0.2
-#: room around what the camera holds
+#: margin around the points that the camera holds, as a factor
 MARGIN = 1.16
 
 
 class Studio:
-    """Draws moments of one groom, always with the same framing, so that pictures compare.
+    """Draws one groom at any time of its motion, with the same framing, so that pictures compare.
 
     Args:
-        card_pictures: what takes the place of textures where cards are shown.
-        look: materials of the head, see head_look; None is plain skin.
+        card_pictures: used instead of generated textures where cards are shown.
+        look: materials of the head, see head_look; None: plain skin.
+        edits: the artist's edits to cards, or None.
     """
 
     def __init__(
@@ -98,9 +100,9 @@ class Studio:
         Args:
             points: (point_count, 3) [m], world space.
             samples: sub-pixels along each side of a pixel.
-            camera: in place of the studio's own.
-            lights: in place of the stage's, which are attached to the camera.
-            guides: (guide_count, cv_count, 3) [m], what cards ride on; None is in their style.
+            camera: None: the studio's own.
+            lights: None: those of the stage, which are attached to the camera.
+            guides: (guide_count, cv_count, 3) [m] that cards ride on; None: in their style.
             is_transparent: without the backdrop.
             is_soft: soft shadows; without them, a picture takes a third of the time.
         """
@@ -139,11 +141,11 @@ class Studio:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What the artist should know of all pictures so far, each with its remedy."""
+        """Notes for the artist on all pictures so far, each with its remedy."""
         return tuple(self._notes)
 
     def write(self, path: Path, picture: Floats) -> None:
-        """Write a picture, or several in one, as it looks on the stage's film.
+        """Write a picture, or several in one, through the stage's film settings.
 
         Raises:
             HairloomError: it cannot be written.
@@ -155,9 +157,9 @@ class Studio:
         return self.settings[StageSettings]
 
     def lights(self, camera: Camera) -> tuple[Light, ...]:
-        """The stage's, around the groom at rest, as they are attached to a camera.
+        """The lights of the stage, around the groom at rest, attached to a camera.
 
-        The main light is on the side of the hair that the camera sees.
+        They are mirrored so that the main light is on the side of the hair that the camera sees.
         """
         front, eye = self.side.front, np.linalg.inv(camera.view)[:3, 3] - self._ball.center
         is_mirrored = bool(front[0] * eye[1] - front[1] * eye[0] < 0.0)
@@ -170,14 +172,14 @@ class Studio:
 
     @cached_property
     def side(self) -> GoodSide:
-        """From where the groom at rest is best seen, by its own strands: children grow again, by
-        chance, in a scene of another size.
+        """The directions from which the groom at rest is best seen, by its own strands: children,
+        which are random, would change the view.
         """
         own = np.arange(self._rig.strands.strand_count - self._rig.child_count)
         return good_side(self._rig.strands.take(own), self._rig.head)
 
     def _cards_at(self, pose: Pose, guides: Floats | None) -> CardSnapshot | None:
-        """The cards riding on these guides, where cards are shown."""
+        """The cards on these guides; None where strands are shown."""
         if not self.settings.shows_cards:
             return None
         key, sections = cards_key(self.settings), self.settings.sections
@@ -221,7 +223,7 @@ class Studio:
         samples: int,
         camera: Camera | None = None,
     ) -> Floats:
-        """These cards in place of the strands at rest; arguments as in `picture`."""
+        """A picture of these cards instead of the strands at rest; arguments as in `picture`."""
         camera = camera or self._camera(width / height)
         snapshot = Snapshot(
             points=np.zeros((0, 3), np.float32),
@@ -239,7 +241,7 @@ class Studio:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What the artist should know about shadows, in the studio's light."""
+        """Warnings about shadows in the studio's light, and about materials of the head."""
         lights = self.lights(self._camera(1.0))
         snapshot = self._at_rest
         return (
@@ -250,11 +252,11 @@ class Studio:
 
     @property
     def statistics(self) -> Statistics:
-        """What was drawn of the hair in the last picture."""
+        """The counts of what was drawn of the hair in the last picture."""
         return self._passes[1].statistics
 
     def held(self, pose: Pose, points: Floats) -> Floats:
-        """What pictures show, (n, 3) [m]: the hair and what of the head is near it."""
+        """Points that pictures show, (n, 3) [m]: the hair, and vertices of the head near it."""
         places = points.reshape(-1, 3)
         if pose.head_positions is None:
             return places
@@ -265,23 +267,23 @@ class Studio:
         return np.concatenate([places, head[is_near]])
 
     def bounds(self, pose: Pose, points: Floats) -> tuple[Floats, Floats]:
-        """Lowest and highest corner [m] of what pictures show."""
+        """Lowest and highest corner [m] of the points that pictures show."""
         held = self.held(pose, points)
         return held.min(axis=0), held.max(axis=0)
 
     def framed(self, held: Floats, direction: Floats, aspect: float) -> Camera:
-        """The camera in a direction from points (n, 3) [m] that holds them, with room around."""
+        """A camera in this direction from points (n, 3) [m] that frames them with a margin."""
         return frame_points(held, direction, FIELD_OF_VIEW, aspect, margin=MARGIN)
 
     def _camera(self, aspect: float) -> Camera:
-        """Holds the groom at rest and what of the head is near it, with room for the motion."""
-        if aspect not in self._cameras:  # each frame of a motion asks, of a million points
+        """The camera that frames the groom at rest and the head near it."""
+        if aspect not in self._cameras:  # kept, as there may be a million points, in each frame
             held = self.held(self._rig.rest_pose, self._rig.strands.points)
             self._cameras[aspect] = self.framed(held, self.side.three_quarter, aspect)
         return self._cameras[aspect]
 
     def close_up(self, aspect: float) -> Camera:
-        """Holds a part of the groom at rest: that around the roots that are nearest to the eye."""
+        """The camera that frames the part of the groom at rest around the root nearest the eye."""
         direction, roots = self.side.turned(*CLOSE_UP), self._rig.strands.roots
         held = self.held(self._rig.rest_pose, self._rig.strands.points)
         nearest = roots[(roots @ direction).argmax()]
@@ -289,7 +291,7 @@ class Studio:
         return self.framed(held[np.linalg.norm(held - nearest, axis=1) < reach], direction, aspect)
 
     def middles(self, points: Floats) -> Floats:
-        """The middle point of each strand, (strand_count, 3) [m]; points as of `picture`."""
+        """The middle point of each strand, (strand_count, 3) [m]; points as for `picture`."""
         offsets = self._rig.strands.offsets
         return points.reshape(-1, 3)[(offsets[:-1] + offsets[1:]) // 2]
 

@@ -1,7 +1,7 @@
-"""A turntable: the camera circles a groom once, one picture a frame, and a video of them.
+"""A turntable: the camera circles a groom once, with a picture for each frame, and a video.
 
 Pictures are written into a temporary folder and moved together when all are done, so that a
-cancelled or failed turntable leaves nothing half-finished, and the one before as it was.
+cancelled or failed turntable leaves no partial files, and an earlier one as it was.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from ...strands.affine import turned_about
 from .studio import Studio
 from .video import write_video
 
-#: what the lights move with: identifier, label, description
+#: choices of what lights move with: identifier, label, description
 LIGHTS = (
     (
         "camera",
@@ -37,9 +37,9 @@ LIGHTS = (
 )
 #: frame count and sides of pictures [pixels], min and max
 FRAMES, SIDES = (1, 10_000), (16, 4096)
-#: how far above the groom the camera stands, as z of a direction of unit length across
+#: height of the camera: z of a direction whose horizontal length is 1
 _HEIGHT = 0.14
-#: layers of what turns, and corners of a circle around one
+#: number of layers of the turning points, and number of corners of the circle around each
 _LAYERS, _CORNERS = 48, 64
 
 
@@ -47,7 +47,7 @@ _LAYERS, _CORNERS = 48, 64
 class TurntableSettings:
     """Settings of a turntable.
 
-    frames: in a whole turn.
+    frames: in a full turn.
     width, height: of the pictures [pixels].
     samples: sub-pixels along each side of a pixel.
     lights: one of LIGHTS.
@@ -117,7 +117,7 @@ class Turntable:
         return self.folder / f"{self.name}_{number:04}.png"
 
     def picture(self, frame: int) -> Floats:
-        """The picture of a frame, from 0; a whole turn later it is the same."""
+        """The picture of a frame, from 0; the same after a full turn."""
         chosen = self.settings
         return self.studio.picture(
             self.pose,
@@ -134,12 +134,12 @@ class Turntable:
     def camera(self, frame: int) -> Camera:
         """The camera of a frame, on a circle around the groom, from its front to its right."""
         first, middle = self._first
-        turns = frame / self.settings.frames % 1.0  # exactly 0 after whole ones
+        turns = frame / self.settings.frames % 1.0  # exactly 0 after full turns
         return replace(first, view=first.view @ turned_about(middle, 2.0 * np.pi * turns))
 
     @cached_property
     def _first(self) -> tuple[Camera, Floats]:
-        """The camera of frame 0, which holds what the groom passes as it turns, and the middle."""
+        """The camera of frame 0, which frames the groom in all its rotations; and the centre."""
         held = self.studio.held(self.pose, self.points).astype(np.float64)
         middle = (held.min(axis=0) + held.max(axis=0)) / 2.0
         aspect = self.settings.width / self.settings.height
@@ -150,7 +150,7 @@ class Turntable:
         """Write everything; yields the number of finished pictures.
 
         Raises:
-            HairloomError: nothing can be written there.
+            HairloomError: the folder cannot be written.
         """
         chosen = self.settings
         with _written_when_done(self.files[0]) as beside:
@@ -163,7 +163,7 @@ class Turntable:
         self._remove_earlier()
 
     def _remove_earlier(self) -> None:
-        """Pictures and a video of an earlier turn would be taken for this one's."""
+        """Remove further pictures and the video of an earlier turn, which would pass for ours."""
         numbers = count(self.settings.frames + 1)
         more = map(self._picture_path, numbers)
         videos = [] if self.has_video else [self.folder / f"{self.name}.mp4"]
@@ -174,7 +174,7 @@ class Turntable:
                 raise unwritable(path, error.strerror or str(error)) from error
 
     def _write_video(self, beside: Path, frames: list[Path]) -> None:
-        """A video, or a note why there is none; the pictures are written in any case."""
+        """Write a video, or note why there is none; the pictures are written in any case."""
         chosen = self.settings
         try:
             size = chosen.width, chosen.height
@@ -188,8 +188,8 @@ class Turntable:
 
 
 def turned_around(points: Floats, middle: Floats) -> Floats:
-    """The outline (n, 3) of all that points (m, 3) pass as they turn about the vertical through the
-    middle (3,): circles, at both ends of each of _LAYERS layers as wide as what is in it."""
+    """Points (n, 3) that enclose points (m, 3) in all rotations about the vertical through the
+    middle (3,): in each of _LAYERS layers, circles at the lowest and the highest point."""
     reach = np.hypot(*(points - middle)[:, :2].T)
     low, high = points[:, 2].min(), points[:, 2].max()
     thick = max(float(high - low), 1.0e-30) / _LAYERS
@@ -211,8 +211,8 @@ def turned_around(points: Floats, middle: Floats) -> Floats:
 
 @contextmanager
 def _written_when_done(first: Path) -> Iterator[Path]:
-    """An empty folder whose files move beside `first`, which is one of them, when the block ends
-    well. When it does not, a folder that was not there before goes again."""
+    """An empty folder whose files, one of which is named as `first`, move into its folder when the
+    block succeeds. If it fails, that folder is removed again if it was new."""
     folder = first.parent
     is_new = not folder.exists()
     try:

@@ -1,6 +1,6 @@
-"""Pictures as a video, written by Blender itself; no other program is needed.
+"""Pictures as a video, written by Blender itself without other programs.
 
-Blender writes the video of a scene's sequencer, so a temporary scene is created for it.
+The pictures become a strip in the sequencer of a temporary scene.
 """
 
 from __future__ import annotations
@@ -57,10 +57,10 @@ def write_video(
 
 
 def is_whole(path: Path) -> bool:
-    """Whether an .mp4 has been written to its end; Blender is silent about a full disk.
+    """Whether an .mp4 has been written to its end; Blender reports no error if the disk is full.
 
-    It is a row of boxes, each with its size and its kind, among them the index of all frames (ISO
-    base media file format).
+    The file is a sequence of boxes, each with its size and type, one of which (moov) is the index
+    of all frames (ISO base media file format).
     """
     end, at, kinds = path.stat().st_size, 0, set[bytes]()
     with path.open("rb") as file:
