@@ -1,7 +1,7 @@
-"""Baking: all frames simulated in order, as playback does it, and written to disk.
+"""Baking: simulate all frames in order, as playback does, and write them to disk.
 
-The very same steps as those of the timeline, so that a bake equals what the artist saw. A bake
-that is cancelled or fails leaves the one before as it was.
+The steps are those of the timeline, so that a bake equals what the artist saw. A bake that is
+cancelled or fails leaves the earlier bake as it was.
 """
 
 from __future__ import annotations
@@ -45,8 +45,8 @@ from .bystanders import Bystanders
 class _Part:
     """One groom or fin of a bake.
 
-    folder: where it goes. named: the same as its object names it once it is there.
-    replaced: what is said of the bake that was there.
+    folder: where the bake is written. named: the object's folder setting once it is published.
+    replaced: note that another scene's bake was replaced; "": none was.
     """
 
     handle: Handle
@@ -61,12 +61,12 @@ class _Part:
     measure: Measure | None = None
 
     def groom_in(self, frame: int) -> Session | None:
-        """Its session, if it is a groom that has begun, and this frame is one of its own."""
+        """Its session, if it is a groom that has begun and this is one of its frames."""
         session = self.session
         return session if frame in self.frames and isinstance(session, Session) else None
 
     def go(self, frame: int, depsgraph: bpy.types.Depsgraph) -> None:
-        """Simulate this frame, if it is one of its own."""
+        """Simulate this frame, if it is one of its frames."""
         if frame not in self.frames:
             return
         if self.writer is None or self.session is None:
@@ -82,11 +82,11 @@ class _Part:
         else:
             session = self.session
             if isinstance(session, Session):
-                session.take_settings()  # those that are animated
+                session.take_settings()  # animated ones
             session.advance(depsgraph, 1.0 / frame_rate(depsgraph.scene))
 
     def write(self, frame: int, depsgraph: bpy.types.Depsgraph) -> None:
-        """This frame, if it is one of its own and all have come to its end."""
+        """Write this frame, if it is one of its frames, once all parts have simulated it."""
         session = self.session
         if frame not in self.frames or self.writer is None or session is None:
             return
@@ -97,7 +97,7 @@ class _Part:
         self.writer.add(frame, session.recorded(), session.frame_hash(depsgraph))
 
     def finish(self, rate: float) -> None:
-        """All its frames are written."""
+        """Write the facts, after all frames."""
         assert self.writer is not None and self.session is not None
         self.writer.finish(
             Facts(
@@ -114,7 +114,7 @@ class _Part:
         )
 
     def abandon(self) -> None:
-        """Leave nothing half written."""
+        """Delete what is half written."""
         if self.writer is not None:
             self.writer.abandon()
 
@@ -123,7 +123,7 @@ class _Part:
 
 
 def _replaced(obj: bpy.types.Object, folder: Path, frames: range) -> str:
-    """What is said where scenes share hair, and with it the bake of another's frames."""
+    """A note if a bake of other frames is replaced because scenes share this hair; else ""."""
     before, scenes = facts_in(folder), len(obj.users_scene)
     if before is None or scenes < 2 or (before.first in frames and before.last in frames):
         return ""
@@ -149,16 +149,17 @@ class Bake:
         frames: range | None = None,
         folder: Path | None = None,
     ) -> Bake:
-        """Plan it.
+        """Plan a bake.
 
         Args:
-            frames: in place of those that the objects ask for.
-            folder: in place of the objects' own folders, whoever's bake it holds; several objects
-                get one below it each.
+            frames: replace the objects' own frame ranges.
+            folder: replaces the objects' own folders, even if it holds another object's bake;
+                several objects get a subfolder each.
 
         Raises:
-            HairloomError: nothing to bake, no frames, no place that can be written to, or no such
-                weights as children are to grow by; or a linked object without a folder.
+            HairloomError: there is nothing to bake, no frame or no folder that can be written to;
+                the weights that set the density of children are missing; or a linked object has
+                no folder.
         """
         if not objects:
             raise HairloomError(
@@ -196,25 +197,25 @@ class Bake:
 
     @property
     def notes(self) -> list[str]:
-        """What the artist should know about what was baked so far."""
+        """Notes for the artist about what was baked so far."""
         found = (note for part in self.parts for note in (part.replaced, *part.notes))
         return [*dict.fromkeys(filter(None, found)), *self.unfelt]
 
     @property
     def unfelt(self) -> list[str]:
-        """Which hair was left out, and why."""
+        """Notes on hair nearby that the baked hair did not feel, and why."""
         return list(self._bystanders.notes.values())
 
     def objects(self) -> list[bpy.types.Object]:
         return [part.found() for part in self.parts]
 
     def steps(self) -> Generator[int]:
-        """Bake, one frame at a time; gives how many are done. Closing it cancels the bake.
+        """Bake one frame at a time; yields how many are done. Closing the generator cancels.
 
         Leaves the scene at the frame where it was.
 
         Raises:
-            HairloomError: a groom cannot be simulated, or a file not be written.
+            HairloomError: a groom cannot be simulated, or a file cannot be written.
         """
         scene = bpy.context.scene
         shown, subframe = scene.frame_current, scene.frame_subframe
@@ -252,7 +253,7 @@ class Bake:
         return [groom for groom in found if groom is not None]
 
     def _publish(self) -> None:
-        """All of them take the places of those before, or none does."""
+        """Replace all earlier bakes by the new ones, or none."""
         writers = [part.writer for part in self.parts if part.writer is not None]
         try:
             for writer in writers:
@@ -269,7 +270,7 @@ class Bake:
             part.found().hairloom.bake.owner = part.handle.name
 
     def _show(self) -> None:
-        """Previewed grooms show the new bake, or what they showed before."""
+        """Let previewed grooms show the new bake, or what they showed before."""
         depsgraph = bpy.context.evaluated_depsgraph_get()
         for part in self.parts:
             obj = part.handle.find()
@@ -279,7 +280,7 @@ class Bake:
 
 @contextmanager
 def _folders_kept(objects: list[bpy.types.Object]) -> Iterator[None]:
-    """Objects name their folders as before again, whose bakes they show until there are others."""
+    """Restore the objects' folders afterwards, so that they show their old bakes for now."""
     before = [obj.hairloom.bake.folder for obj in objects]
     try:
         yield
@@ -290,7 +291,7 @@ def _folders_kept(objects: list[bpy.types.Object]) -> Iterator[None]:
 
 @contextmanager
 def _named(frame: int) -> Iterator[None]:
-    """What goes wrong says in which frame."""
+    """Add the frame to errors raised inside."""
     try:
         yield
     except HairloomError as error:
@@ -302,8 +303,7 @@ def _named(frame: int) -> Iterator[None]:
 
 
 def simulated_for(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Simulated:
-    """What simulates this object: that of its preview, where there is one in the size that the
-    object has at the beginning.
+    """The session of this object's preview, or a new one if there is none or its size has changed.
 
     Raises:
         HairloomError: it cannot be simulated.
@@ -321,21 +321,21 @@ def simulated_for(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Simu
 
 
 def form_of_session(session: Simulated) -> str:
-    """What computed it: "numpy" or "compute"."""
+    """The kind of solver that simulates it: "numpy" or "compute"."""
     return session.solver.form if isinstance(session, Session) else "numpy"
 
 
 def bakeable(obj: bpy.types.Object) -> bool:
-    """Whether it is a fin, or hair other than the copy that shows a bake."""
+    """Whether it is a fin, or hair that is not itself the copy that shows a bake."""
     if obj.type == "CURVES":
         return not obj.data.hairloom.baked_in
     return fin_modifier(obj) is not None
 
 
 def show_in_renders(objects: list[bpy.types.Object], depsgraph: bpy.types.Depsgraph) -> bool:
-    """After a bake: hair whose artist wants it gets a copy for renders, other hair loses it.
+    """After a bake, add a copy for renders to hair with *Show in Renders*; remove that of others.
 
-    Returns whether the window is locked during renders from now on, which it was not before.
+    Returns whether this turned on the lock of the window during renders.
     """
     was_locked = depsgraph.scene.render.use_lock_interface
     for obj in objects:
@@ -352,7 +352,7 @@ def show_in_renders(objects: list[bpy.types.Object], depsgraph: bpy.types.Depsgr
 def free(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> None:
     """Delete the bake of a groom or fin from disk; renders show the object itself again.
 
-    A bake that belongs to another object or another file stays, and is shown here no longer.
+    A bake that belongs to another object or file stays on disk, but is no longer shown here.
 
     Raises:
         HairloomError: the files cannot be deleted, or the object is linked.

@@ -1,4 +1,4 @@
-"""Grooms that are not baked now, but felt by those that are: as in their own bakes, or at rest."""
+"""Grooms that the baked ones feel but that are not baked now: as in their own bakes, or at rest."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ from .preview import rig_for
 
 
 class Bystander:
-    """One of them; fulfils `together.Felt`.
+    """One such groom; implements `together.Felt`.
 
     Raises:
-        HairloomError: no hair curves, none that can be used, or of another scale than the head.
+        HairloomError: there are no hair curves, none can be used, or their scale is not the head's.
     """
 
     def __init__(self, hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> None:
@@ -40,10 +40,10 @@ class Bystander:
         return hair is not None and not hair.hide_render
 
     def move(self, depsgraph: bpy.types.Depsgraph) -> None:
-        """To the scene's frame.
+        """Move it to the scene's frame.
 
         Raises:
-            HairloomError: it or its head is gone or broken, or its bake is.
+            HairloomError: it, its head or its bake is gone or broken.
         """
         hair, frame = self._source.hair.found(), depsgraph.scene.frame_current
         cache = playback.cache_of(hair) if hair.hairloom.bake.is_shown else None
@@ -67,9 +67,9 @@ class Bystander:
 
 
 class Bystanders(dict[int, Bystander]):
-    """Those of a bake, by session number of their objects, once they may be near to it.
+    """The bystanders of a bake, by session number of their objects; added once they may be near.
 
-    notes: why others are not felt, by the same numbers.
+    notes: why other grooms are not felt, by session number too.
     """
 
     def __init__(self) -> None:
@@ -77,7 +77,7 @@ class Bystanders(dict[int, Bystander]):
         self.notes: dict[int, str] = {}
 
     def join(self, sessions: list[Session], depsgraph: bpy.types.Depsgraph) -> None:
-        """All that these may feel and that are none of them, but for those that cannot be used."""
+        """Add grooms that these sessions may feel; those that cannot be used get a note instead."""
         for session in sessions:
             self.pop(session.uid, None)
         for obj in near_to(sessions, depsgraph):
@@ -89,7 +89,7 @@ class Bystanders(dict[int, Bystander]):
                 self.notes[obj.session_uid] = f"not felt by hair that was baked beside it: {error}"
 
     def move(self, depsgraph: bpy.types.Depsgraph) -> None:
-        """All of them to the scene's frame.
+        """Move all of them to the scene's frame.
 
         Raises:
             HairloomError: as `Bystander.move`.
@@ -99,7 +99,7 @@ class Bystanders(dict[int, Bystander]):
 
 
 def near_to(sessions: list[Session], depsgraph: bpy.types.Depsgraph) -> list[bpy.types.Object]:
-    """Other grooms of the view layer that these may feel; quick enough to ask at every redraw."""
+    """Other grooms of the view layer that these may feel; fast enough for every redraw."""
     feeling = [session.hair.found() for session in sessions if session.feels_hair]
     balls = [_ball(hair, depsgraph) for hair in feeling]
     found, uids = [], {session.uid for session in sessions}
@@ -113,7 +113,7 @@ def near_to(sessions: list[Session], depsgraph: bpy.types.Depsgraph) -> list[bpy
 
 
 def _ball(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> tuple[Floats, float]:
-    """One in which its hair is now, however that swings: its middle (3,) and its radius [m]."""
+    """A ball that its hair cannot leave, however it swings: middle (3,) and radius [m]."""
     corners = _corners(hair, depsgraph)
     reach = float(np.linalg.norm(np.ptp(corners, axis=0)))
     head = head_of(hair)
@@ -123,7 +123,7 @@ def _ball(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> tuple[Float
 
 
 def _corners(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Floats:
-    """Of its box as evaluated, (8, 3) world [m]."""
+    """The corners of its evaluated bounding box, (8, 3) world [m]."""
     matrix = matrix_of(obj, depsgraph)
     corners = np.array(obj.evaluated_get(depsgraph).bound_box, np.float64)
     return corners @ matrix[:3, :3].T + matrix[:3, 3]

@@ -1,4 +1,4 @@
-"""What is wrong with a groom and can be fixed by one button, and the fixing."""
+"""Diagnostics of a groom: issues that one button fixes, and some of the fixes."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from ..sessions.session import Session
 from . import previews
 from .bystanders import near_to
 
-#: Scales that differ by less are rounding.
+#: Scales whose ratio is smaller differ by rounding alone.
 _UNEVEN = 1.01
-#: How many roots, evenly chosen, decide which mesh they are on.
+#: Number of roots, evenly chosen, that decide which mesh they are on.
 _ASKED = 100
-#: How many instances of a scene are searched for those of a groom, 1 us each.
+#: Number of instances in a scene that are searched for those of a groom, 1 us each.
 _MAX_INSTANCES = 10_000
 
 
@@ -30,8 +30,8 @@ _MAX_INSTANCES = 10_000
 class Issue:
     """One thing that is wrong.
 
-    operator: what fixes it, by its name. button: its text.
-    instead_of: the warning that says the same without a button.
+    operator: name of the operator that fixes it. button: its text.
+    instead_of: the warning that reports the same without a button.
     """
 
     text: str
@@ -41,10 +41,10 @@ class Issue:
 
 
 def issues_of(hair: bpy.types.Object, session: Session | None) -> tuple[Issue, ...]:
-    """What is wrong with this groom, worst first; quick enough to ask at every redraw.
+    """What is wrong with this groom, worst first; fast enough for every redraw.
 
     Args:
-        session: its preview; without one it is unknown where roots are.
+        session: its preview; without one, loose roots are not found.
     """
     head = head_of(hair)
     known = "" if session is None else session.source.head_warning
@@ -87,8 +87,8 @@ def issues_of(hair: bpy.types.Object, session: Session | None) -> tuple[Issue, .
 
 
 def instances_note(hair: bpy.types.Object) -> str:
-    """What the preview leaves out where the hair is instanced, such as by a collection or geometry
-    nodes; "" if it is not. Quick enough to ask at every redraw."""
+    """A note that the preview does not draw instances of this hair, such as those of a collection
+    or of geometry nodes; "" if there are none. Fast enough for every redraw."""
     layer = bpy.context.view_layer
     if not any(_may_instance(obj) for obj in objects_in(layer) if obj != hair):
         return ""
@@ -99,8 +99,8 @@ def instances_note(hair: bpy.types.Object) -> str:
 
 
 def unfelt_note(session: Session) -> str:
-    """Which hair the preview leaves out that a bake would feel; "" if there is none. Quick enough
-    to ask at every redraw."""
+    """A note on hair that is not previewed, but that a bake would feel; "" if there is none. Fast
+    enough for every redraw."""
     near = near_to([session], bpy.context.view_layer.depsgraph)
     names = [obj.name for obj in near if previews.session_of(obj) is None]
     if not names:
@@ -121,8 +121,8 @@ def is_unevenly_scaled(obj: bpy.types.Object) -> bool:
 def surface_for(
     hair: bpy.types.Object, candidates: list[bpy.types.Object], depsgraph: bpy.types.Depsgraph
 ) -> bpy.types.Object:
-    """The mesh that hair grows from: the one whose vertices are closest to its roots. Cards are
-    none, whose roots are where those of their hair are.
+    """The mesh whose vertices are closest to the roots of the hair, to grow it from. Cards do not
+    count, as their roots are where those of their hair are.
 
     Raises:
         HairloomError: there is no mesh with faces, or no hair.
@@ -152,7 +152,7 @@ def surface_for(
 
 
 def set_surface(hair: bpy.types.Object, mesh: bpy.types.Object) -> None:
-    """As Blender's own tools have it; the hair stays where it is."""
+    """Attach hair to a mesh as Blender's own tools do; the hair stays where it is."""
     place = hair.matrix_world.copy()
     attach(hair, mesh)
     hair.matrix_world = place

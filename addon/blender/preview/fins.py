@@ -1,4 +1,4 @@
-"""Fins that are previewed: begun by the artist, or where grooms play."""
+"""Starting the preview of fins: by the artist, or when grooms play."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ def start(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> FinSession:
     """Preview this fin: Play, playback and its bake move it from now on.
 
     Raises:
-        HairloomError: it is no fin, or cannot be cloth.
+        HairloomError: it is not a fin, or cannot be cloth.
     """
     session = FinSession(obj, depsgraph)
     previews.add(session, depsgraph)
@@ -21,7 +21,7 @@ def start(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> FinSession:
 
 
 def start_enabled(depsgraph: bpy.types.Depsgraph) -> list[str]:
-    """Preview all fins of the view layer that are to be simulated; returns warnings."""
+    """Preview all fins of the view layer for which *Simulate* is on; returns warnings."""
     warnings = []
     for obj in fins_in(bpy.context.view_layer):
         if obj.hairloom.fin.enabled and previews.simulated_of(obj) is None:

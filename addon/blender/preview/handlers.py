@@ -1,4 +1,4 @@
-"""Blender's events, handed on to the previews."""
+"""Handlers that pass Blender's events on to the previews."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def on_load_pre(*_: Any) -> None:
     registry.forget_all()
     mesh_materials.forget()
     unwatch_all()  # Blender drops the timer itself
-    show_status(None)  # Play's ticks, which would have removed it, are among these
+    show_status(None)  # Play's ticks, which would have removed it, are unwatched too
 
 
 @persistent
@@ -38,7 +38,7 @@ def on_load_post(*_: Any) -> None:
 
 @persistent
 def on_load_fail(*_: Any) -> None:
-    """The scene that was open stays, in which nothing is previewed any longer."""
+    """The scene that was open stays open, but nothing in it is previewed any longer."""
     registry.show_all_without()
 
 
@@ -74,8 +74,8 @@ def on_frame_change(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> 
 
 @persistent
 def on_frame_change_begin(scene: bpy.types.Scene, *_: Any) -> None:
-    """Runs in renders too, there in the render's thread: only what is baked is written."""
-    playback.show_fins(scene)  # hair that is baked or exported collides with them
+    """Runs in renders too, in the render's thread, and so writes only what is baked."""
+    playback.show_fins(scene)  # also while suspended: baked and exported hair collides with them
     if suspension.is_suspended():
         return
     if playback.needs_copies():
@@ -93,7 +93,7 @@ def on_render_end(*_: Any) -> None:
 
 
 def _react(reaction: Callable[[bpy.types.Depsgraph], None], depsgraph: bpy.types.Depsgraph) -> None:
-    """Once at a time, and not for a render, which has its own copy of the scene and its thread."""
+    """React to one event at a time; never in renders, which have their own scene and thread."""
     if previews.is_reacting or suspension.is_suspended() or not previews:
         return
     if depsgraph.mode != "VIEWPORT":
@@ -126,7 +126,7 @@ def on_bake_changed(owner: bpy.types.ID) -> None:
         registry.bake_changed(owner, bpy.context.evaluated_depsgraph_get())
 
 
-#: properties that the artist changes, and what follows
+#: kind of changed property -> the reaction
 LISTENERS = (
     ("settings", scene_events.settings_changed),
     ("display", scene_events.display_changed),

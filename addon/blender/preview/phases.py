@@ -1,16 +1,16 @@
-"""Every phase of a preview, and what each event makes of it.
+"""The phases of a preview, and the phase and action that each event leads to.
 
     REST       in its style, on its body
-    WAITING    the same; it plays as soon as its hair and its colliders are made
+    WAITING    at rest; plays as soon as its hair and its colliders are made
     FREE       simulated by Play's clock
     TIMELINE   simulated by Blender's timeline, frame by frame
     DEFERRED   at rest while Blender plays; simulated as soon as its hair and colliders are made
     BAKED      a frame of its bake
 
-A frame that is baked is shown from its bake. Else the first frame rests there, one frame on is one
-advance, and anywhere else (scrubbing) is rest in that pose: how the hair would hang there depends
-on all frames before it, which nobody wants to wait for while dragging the playhead. Where Blender
-plays and drops frames, they are advanced by in one go.
+A baked frame is shown from the bake. Otherwise the first frame starts from rest, the next frame is
+one advance, and any other frame (scrubbing) is rest in that pose: its simulated shape depends on
+all frames before it, which take too long to simulate while the playhead is dragged. Frames that
+Blender's playback drops are advanced over in one go.
 """
 
 from __future__ import annotations
@@ -49,22 +49,22 @@ _ANY = {
     Event.UNMADE: (Phase.DEFERRED, Action.REST),
     Event.FAILED: (Phase.REST, Action.REST),
 }
-#: in place of what any phase does
+#: exceptions to `_ANY` for single phases, and events that only matter in these
 _SPECIAL = {
     (Phase.FREE, Event.TICK): (Phase.FREE, Action.ADVANCE),
     (Phase.FREE, Event.NEXT): (Phase.TIMELINE, Action.ADVANCE),
     (Phase.TIMELINE, Event.NEXT): (Phase.TIMELINE, Action.ADVANCE),
     (Phase.TIMELINE, Event.JUMP): (Phase.TIMELINE, Action.REST),
-    # Play waits at rest: nothing moves but its body, which it follows anyway
+    # Play waits at rest: only the body moves, and the hair follows that anyway
     (Phase.FREE, Event.UNMADE): (Phase.WAITING, Action.NONE),
-    # a bake leaves no motion to go on from
+    # a bake leaves no velocities to continue from
     (Phase.BAKED, Event.SAME): (Phase.REST, Action.NONE),
     (Phase.BAKED, Event.RESET): (Phase.REST, Action.REST),
 }
 
 
 def next_phase(phase: Phase, event: Event) -> tuple[Phase, Action]:
-    """Where an event leads, and what is to be done."""
+    """The phase that an event leads to, and the action to take."""
     if event in _ANY:
         return _SPECIAL.get((phase, event), _ANY[event])
     action = Action.REST if event is Event.RESET else Action.NONE
@@ -74,12 +74,12 @@ def next_phase(phase: Phase, event: Event) -> tuple[Phase, Action]:
 def frame_event(
     before: int | None, now: int, first: int, *, is_played: bool, longest: float
 ) -> tuple[Event, int]:
-    """What a frame of the scene is to a preview, and the frames by which it is ahead.
+    """The event that a scene frame causes in a preview, and the number of frames to advance.
 
     Args:
-        before: the frame that the hair stands at, None for none.
+        before: the frame at which the hair is; None: at none.
         first: the frame at which playback begins.
-        longest: frames that may be dropped in playback.
+        longest: the most frames ahead that count as dropped by playback.
     """
     if now == first:
         return Event.FIRST, 0

@@ -2,14 +2,14 @@
 
 While Blender plays, no frame waits for what is being made:
 
-    hair that is not made yet         Blender's own strands are shown, and the frames go on
-    other hair is being made          the hair that is there plays on
-    a collider that is not made yet   the hair goes with its body, at rest
+    the hair is not made yet      Blender's own strands are shown, and playback goes on
+    the hair is being rebuilt     the hair that exists plays on
+    a collider is not made yet    the hair follows its body at rest
 
-It begins, from rest, at the frame at which all is there. The next round begins at the first frame,
-and is then what a bake is. To make up for what was missed would take the bodies of all frames
-before. Steps of a single frame, scripts, bakes and renders wait, those of the viewport too: what
-they show is exact.
+The hair begins, from rest, at the first frame for which everything is made. The next loop of
+playback begins at the first frame and then equals a bake. To catch up earlier, the bodies of all
+missed frames would be needed. Single frame steps, scripts, bakes and renders (viewport renders
+too) wait, so that what they show is exact.
 """
 
 from __future__ import annotations
@@ -32,16 +32,16 @@ from ..properties.groom_settings import GroomSettings
 from ..sessions.session import Session
 from .phases import SIMULATED, Action, Event, Phase, frame_event, next_phase
 
-#: More frames than those of this time [s] on are a jump, not frames that were dropped.
+#: A step ahead of more time [s] than this is a jump, not dropped frames.
 _LONGEST_DROP = 1.0
 
 
 @dataclass(frozen=True)
 class KnownBake:
-    """The bake of a groom or fin, as it stands to the scene.
+    """The bake of a groom or fin, compared with the scene.
 
-    changed: what has changed since, in words; nothing: it is up to date.
-    frame_hash: hashes of the scene in the frame that is shown.
+    changed: what has changed since it was made, in words; empty: it is up to date.
+    frame_hash: frame hash of the scene in the frame that is shown.
     """
 
     facts: Facts
@@ -52,14 +52,14 @@ class KnownBake:
 class Preview:
     """One previewed groom or fin.
 
-    frame: the scene frame up to which the timeline has brought it; None: it does not move it.
-    bake: None: it has none. rig_hash: of what the bake depends on beside the animation; "": it was
-        not asked for yet.
+    frame: the scene frame up to which the timeline has moved it; None: the timeline does not.
+    bake: None: it has none. rig_hash: what it should be for the bake to be up to date; "": not
+        computed yet.
     problem, bake_problem: why it is not simulated, or its bake not shown.
-    cards_are_stale: whether its cards are to be shaded again once edits have settled.
-    is_to_rest: whether it was stopped where it could not be read, and rests once it is read again.
+    cards_are_stale: whether its cards need to be shaded again once edits have settled.
+    is_to_rest: whether it was stopped while it was left out, and must rest once it is read again.
 
-    Methods raise HairloomError when what it is made of is gone or broken.
+    Methods raise HairloomError when an object that it is made of is gone or broken.
     """
 
     def __init__(self, session: Simulated) -> None:
@@ -87,7 +87,7 @@ class Preview:
 
     @property
     def may_begin(self) -> bool:
-        """Whether nothing that it needs to be simulated is being made."""
+        """Whether everything that it needs to be simulated is made."""
         return self.session.is_made and fields.are_made()
 
     @property
@@ -97,7 +97,7 @@ class Preview:
 
     @property
     def is_deferred(self) -> bool:
-        """Whether it stands at rest while Blender plays."""
+        """Whether it is at rest while Blender plays, because something is still being made."""
         return self.phase is Phase.DEFERRED and not _is_exact()
 
     @property
@@ -106,9 +106,11 @@ class Preview:
         return " ".join(filter(None, (self.problem, self.bake_problem)))
 
     def is_left_out(self, depsgraph: bpy.types.Depsgraph) -> bool:
-        """Whether this evaluation leaves out what it is made of: that is in another scene, in a
-        collection that is excluded, or disabled in viewports. Blender gives the original of such
-        an object, which no modifier has changed. What is gone is not left out.
+        """Whether this depsgraph leaves out an object that it is made of.
+
+        Such an object is in another scene, in an excluded collection, or disabled in viewports;
+        `evaluated_get` then returns the original, without modifiers. A deleted object does not
+        count.
         """
         bodies = (body.handle.find() for body in self.session.bodies)
         return not all(
@@ -116,12 +118,12 @@ class Preview:
         )
 
     def stop(self, depsgraph: bpy.types.Depsgraph) -> None:
-        """Play it no longer: it rests, or shows the scene's frame from its bake."""
+        """Stop playing it: it rests, or shows the scene's frame from its bake."""
         self.act(Event.STOP, depsgraph)
         self.show_frame(depsgraph)
 
     def halt(self, depsgraph: bpy.types.Depsgraph) -> None:
-        """As `stop` where it is left out. Cloth rests, hair does so once it is read again."""
+        """`stop` for a preview that is left out: cloth rests now, hair once it is read again."""
         self.phase, self.session.is_playing = Phase.REST, False
         self.session.is_stale = self.is_to_rest = True
         if self.groom is None:
@@ -139,7 +141,7 @@ class Preview:
         *,
         blocking: bool = True,
     ) -> None:
-        """Do what this event asks for; what cannot be simulated just now only follows its body.
+        """React to an event; hair that cannot be simulated at the moment only follows its body.
 
         Args:
             duration: of an advance [s].
@@ -159,7 +161,7 @@ class Preview:
         *,
         blocking: bool = True,
     ) -> None:
-        """As `go`, but a failure of the simulation is raised; it is at rest then."""
+        """As `go`, but raise errors of the simulation; the preview is at rest then."""
         self.phase, action = next_phase(self.phase, event)
         session = self.session
         if self.phase not in SIMULATED:
@@ -169,7 +171,7 @@ class Preview:
         try:
             match action:
                 case Action.BEGIN:
-                    # in playback nothing is read at each frame just to find it unmade
+                    # saves reading the scene in each frame of playback just to find it unmade
                     is_frame = self.phase is Phase.TIMELINE
                     if is_frame and not blocking and not self.may_begin:
                         raise NotMadeYetError
@@ -187,7 +189,7 @@ class Preview:
             raise
 
     def finish_frame(self, depsgraph: bpy.types.Depsgraph) -> None:
-        """After a frame that its groom has gone through with others."""
+        """Finish a frame that its groom was simulated in together with others."""
         assert self.groom is not None, "fins go alone"
         try:
             self.groom.finish_frame()
@@ -196,11 +198,11 @@ class Preview:
             self.problem = str(error)
 
     def release(self) -> None:
-        """The timeline moves it no longer, until it takes it up again."""
+        """Detach it from the timeline, until `follow`."""
         self.frame = None
 
     def follow(self, depsgraph: bpy.types.Depsgraph) -> None:
-        """The scene has gone to a frame."""
+        """React to a change of the scene's frame."""
         obj, scene = self.found(), depsgraph.scene
         now, before = scene.frame_current, self.frame
         if before is None and self.phase is Phase.FREE:
@@ -220,8 +222,10 @@ class Preview:
         self.go(event, depsgraph, frames / rate, blocking=_is_exact())
 
     def keep_or_rest(self, depsgraph: bpy.types.Depsgraph) -> bool:
-        """Blender has evaluated the body again, within a frame; the hair rests if that moved.
-        Returns whether it rests."""
+        """React to a new evaluation of the body within a frame: hair rests if its body has moved.
+
+        Returns whether the hair is at rest.
+        """
         assert self.groom is not None
         if self.phase is Phase.BAKED and self.bake is not None:
             if self.session.frame_hash(depsgraph) == self.bake.frame_hash:
@@ -234,13 +238,15 @@ class Preview:
         return True
 
     def take_bake(self, depsgraph: bpy.types.Depsgraph) -> None:
-        """Find its bake, and show the scene's frame of it."""
+        """Find its bake, and show the scene's frame from it."""
         self.check(depsgraph)
         self.show_frame(depsgraph)
 
     def is_resized(self, depsgraph: bpy.types.Depsgraph) -> bool:
-        """Whether its hair is to be made again, since its object or its head has another size now;
-        what plays keeps its size until it is at rest, and what is baked keeps that of its bake."""
+        """Whether its hair must be made again because its object or head has another size now.
+
+        Playing hair keeps its size until it rests, and baked hair that of its bake.
+        """
         if self.groom is None or self.bake is not None or playback.is_played():
             return False
         return self.phase not in (Phase.FREE, Phase.WAITING) and self.groom.is_resized(depsgraph)
@@ -253,20 +259,20 @@ class Preview:
         self.bake = None if cache is None else self._state(cache.facts, depsgraph)
 
     def look_again(self, depsgraph: bpy.types.Depsgraph) -> None:
-        """A setting was changed, which may make the bake out of date."""
+        """Compare the bake with the scene again after a setting was changed."""
         if self.bake is not None:
             self.bake = self._state(self.bake.facts, depsgraph)
 
     def show_frame(self, depsgraph: bpy.types.Depsgraph) -> bool:
-        """Show the scene's frame from the bake, if it is there; returns whether it is."""
+        """Show the scene's frame from the bake; returns whether the bake has it."""
         return self._show_baked(self.found(), depsgraph)
 
     def forget_bake(self) -> None:
-        """It was deleted, or another one put in its place."""
+        """Forget a bake that was deleted or replaced."""
         self.bake, self.bake_problem = None, ""
 
     def _show_baked(self, obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bool:
-        """What is wrong with a bake is reported in the panel; the hair is simulated then."""
+        """As `show_frame`; a broken bake is reported in the panel, and the hair is simulated."""
         frame = depsgraph.scene.frame_current
         self.bake_problem = ""
         cache = self._cache_of(obj) if obj.hairloom.bake.is_shown else None
@@ -308,7 +314,7 @@ class Preview:
 
 
 def rig_for(hair: bpy.types.Object, scene: bpy.types.Scene) -> BakedRig | None:
-    """The rig of the groom's bake, if that was made from the curves and the head as they are."""
+    """The rig of the groom's bake, if it was made from the curves and the head as they are now."""
     try:
         cache = playback.cache_of(hair)
         if cache is None:
@@ -316,15 +322,15 @@ def rig_for(hair: bpy.types.Object, scene: bpy.types.Scene) -> BakedRig | None:
         now = groom_rig_hash(hair, head_of(hair), GroomSettings.of(hair), scene)
         changed = differences(cache.facts.rig_hash, now)
         return None if set(changed) & set(RIG_PARTS) else playback.rig_in(cache)
-    except HairloomError:  # reported when the bake is to be shown
+    except HairloomError:  # `show_frame` reports it
         return None
 
 
 def _first_frame(scene: bpy.types.Scene) -> int:
-    """Where playback begins."""
+    """The frame at which playback begins."""
     return int(scene.frame_preview_start if scene.use_preview_range else scene.frame_start)
 
 
 def _is_exact() -> bool:
-    """Whether a frame is not left before all of its hair is there."""
+    """Whether each frame waits until all of its hair is made."""
     return latest_job.is_blocking() or not playback.is_played()

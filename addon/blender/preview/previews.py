@@ -1,6 +1,6 @@
-"""All previewed grooms and fins: begun and ended by the artist, kept in step with Blender.
+"""All previewed grooms and fins: started and ended by the artist, kept in step with Blender.
 
-See `scene_events` for what follows from Blender's events, `phases` for what a preview does.
+See `scene_events` for the reactions to Blender's events, and `phases` for what a preview does.
 """
 
 from __future__ import annotations
@@ -38,18 +38,18 @@ from ..viewport.debug_lines import is_combed
 from .phases import Event, Phase
 from .preview import KnownBake, Preview, rig_for
 
-#: What is reported of hair that is about to play, and of hair that is not there yet.
+#: Notes on hair that is about to play, and on hair that is not made yet.
 WAITING, BUILDING = "plays as soon as its collider is made", "is being made"
 
 
 class Previews(dict[int, Preview]):
-    """By session number of their objects.
+    """The previews, by session number of their objects.
 
-    notice: why one ended by itself, until the next one begins.
-    is_paused: whether all that plays freely is held where it is.
-    last_edit: when one was edited [s], by the clock that never goes back.
-    is_reacting: whether an event of Blender's is being followed.
-    built_cards: as objects or files were made of them last, previewed or not.
+    notice: why one ended by itself; kept until the next one begins.
+    is_paused: whether everything that plays freely is paused.
+    last_edit: time of the last edit [s], by the monotonic clock.
+    is_reacting: whether a reaction to one of Blender's events is running.
+    built_cards: cards as they were last made into objects or files, of previewed grooms or not.
     """
 
     def __init__(self) -> None:
@@ -63,12 +63,12 @@ previews = Previews()
 
 
 def start(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Session:
-    """Preview this groom; where the scene's frame is baked, as it was baked.
+    """Preview this groom; if the scene's frame is baked, show it from the bake.
 
     In a window its hair is made in a thread: see `latest_job`.
 
     Raises:
-        HairloomError: it cannot be previewed; says why and what to do.
+        HairloomError: it cannot be previewed.
     """
     baked = rig_for(hair, depsgraph.scene)
     session = Session(
@@ -85,7 +85,7 @@ def start(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Session:
 
 
 def begin_over(preview: Preview, depsgraph: bpy.types.Depsgraph) -> None:
-    """Preview a groom as it is now: in another size, or on another head. The timeline goes on.
+    """Preview a groom again, in another size or on another head; the timeline goes on.
 
     Raises:
         HairloomError: as `start`.
@@ -95,7 +95,7 @@ def begin_over(preview: Preview, depsgraph: bpy.types.Depsgraph) -> None:
 
 
 def add(session: Simulated, depsgraph: bpy.types.Depsgraph) -> None:
-    """Let the timeline and Play move it from now on, in place of what was there for its object.
+    """Let the timeline and Play move it from now on; replaces an earlier preview of its object.
 
     Raises:
         HairloomError: it cannot be shown.
@@ -122,7 +122,7 @@ def end() -> None:
 
 
 def forget_all() -> None:
-    """As `stop_all` when the objects are about to go: touches none of them."""
+    """`stop_all` for objects that are about to be freed: touches none of them."""
     for uid in tuple(previews):
         _forget(uid)
     previews.notice, previews.is_paused = "", False
@@ -131,7 +131,7 @@ def forget_all() -> None:
 
 
 def stop(session: Simulated) -> None:
-    """Preview it no longer: hair is Blender's own again, cloth as it is without a preview."""
+    """End its preview: Blender draws the hair again, and cloth is as without a preview."""
     _forget(session.uid)
     redraw_panels()
     obj = session.bodies[0].handle.find()
@@ -141,7 +141,7 @@ def stop(session: Simulated) -> None:
 
 
 def show_all_without() -> None:
-    """All hair and cloth, as without a preview, whatever was previewed."""
+    """Show all hair and cloth as without a preview, whatever was previewed."""
     for obj in bpy.data.objects:
         _show_without(obj)
     refresh_views()
@@ -162,7 +162,7 @@ def stop_all() -> None:
 
 
 def _forget(uid: int) -> None:
-    """As `stop` when its object is about to go: touches nothing of it."""
+    """`stop` for an object that is about to be freed: does not touch it."""
     preview = previews.pop(uid, None)
     previews.built_cards.forget()
     unwatch((uid, "lines"))
@@ -183,12 +183,12 @@ def simulated() -> tuple[Simulated, ...]:
 
 
 def simulated_in(depsgraph: bpy.types.Depsgraph) -> tuple[Simulated, ...]:
-    """Those of them that this evaluation does not leave out."""
+    """The previewed grooms and fins that this depsgraph does not leave out."""
     return tuple(each.session for each in previews.values() if not each.is_left_out(depsgraph))
 
 
 def made_rigs() -> dict[int, MadeRig]:
-    """Of the previewed grooms, by session number: each made ready, as it was read last."""
+    """The rigs of the previewed grooms that are made, by session number, as they were last read."""
     made = {session.uid: session.made_rig for session in sessions()}
     return {uid: each for uid, each in made.items() if each is not None}
 
@@ -199,7 +199,7 @@ def session_of(hair: bpy.types.Object | None) -> Session | None:
 
 
 def simulated_of(obj: bpy.types.Object | None) -> Simulated | None:
-    """The groom or fin of this object while it is previewed."""
+    """The groom or fin of this object, if it is previewed."""
     found = None if obj is None else previews.get(obj.session_uid)
     return None if found is None else found.session
 
@@ -221,7 +221,7 @@ def is_playing() -> bool:
 
 
 def windows_of_play() -> dict[int, bpy.types.Window]:
-    """For each scene in which hair or cloth plays, by session number, a window that shows it."""
+    """A window for each scene in which hair or cloth plays, by session number of the scene."""
     playing = [each for each in previews.values() if each.is_playing]
     found: dict[int, bpy.types.Window] = {}
     for window in bpy.context.window_manager.windows:
@@ -232,7 +232,7 @@ def windows_of_play() -> dict[int, bpy.types.Window]:
 
 
 def waiting() -> tuple[str, ...]:
-    """The names of what plays as soon as all is made."""
+    """The names of previews that play as soon as everything is made."""
     return tuple(each.session.name for each in previews.values() if each.phase is Phase.WAITING)
 
 
@@ -241,17 +241,16 @@ def is_paused() -> bool:
 
 
 def pause(is_paused: bool) -> None:
-    """Hold all hair that plays freely where it is, or let it go on."""
+    """Pause all hair that plays freely, or let it go on."""
     previews.is_paused = is_paused
     redraw_panels()
 
 
 def play(depsgraph: bpy.types.Depsgraph, *, blocking: bool = True) -> list[str]:
-    """Let all that is previewed, and is in this evaluation, play freely, from rest; returns
-    warnings.
+    """Play all previews in this depsgraph freely, from rest; returns warnings.
 
     Args:
-        blocking: False: what lacks hair or a collider that is being made begins later, in
+        blocking: False: a preview whose hair or collider is still being made begins later, in
             `advance`.
     """
     pause(False)
@@ -266,7 +265,7 @@ def play(depsgraph: bpy.types.Depsgraph, *, blocking: bool = True) -> list[str]:
 
 
 def begin(session: Simulated, depsgraph: bpy.types.Depsgraph, *, blocking: bool) -> None:
-    """Let one play freely, now or as soon as its hair and its colliders are made; see `play`.
+    """Play one preview freely, now or as soon as its hair and its colliders are made; see `play`.
 
     Raises:
         HairloomError: as `Simulated.play`.
@@ -283,7 +282,7 @@ def advance(depsgraph: bpy.types.Depsgraph, duration: float) -> None:
     with together(depsgraph):
         for preview in tuple(previews.values()):
             if preview.phase is Phase.WAITING and preview.may_begin:
-                # its first frame is the next tick's, so that neither holds the window up for long
+                # its first frame waits for the next tick, so that neither blocks the window long
                 attempt(preview, depsgraph, partial(_begin, preview, depsgraph))
             elif preview.phase is Phase.FREE and not previews.is_paused:
                 attempt(preview, depsgraph, partial(preview.go, Event.TICK, depsgraph, duration))
@@ -291,7 +290,7 @@ def advance(depsgraph: bpy.types.Depsgraph, duration: float) -> None:
 
 @contextmanager
 def together(depsgraph: bpy.types.Depsgraph) -> Iterator[None]:
-    """A frame of all previewed grooms of the scene: those that feel each other go on at its end."""
+    """A frame of all previewed grooms of the scene; those that feel each other move at its end."""
     here = [each for each in simulated_in(depsgraph) if isinstance(each, Session)]
     with Together([] if is_interrupted() else here) as frame:
         yield
@@ -306,12 +305,12 @@ def _begin(preview: Preview, depsgraph: bpy.types.Depsgraph) -> None:
 
 
 def rest(depsgraph: bpy.types.Depsgraph, *, keep_playing: bool) -> None:
-    """All hair back into its style; if it is to play no longer and is baked, to the baked frame."""
+    """Put all hair back into its style; or, unless it keeps playing, into its baked frame."""
     for preview in tuple(previews.values()):
         if preview.is_playing and not keep_playing and preview.is_left_out(depsgraph):
             preview.halt(depsgraph)
             for each in shown_depsgraphs():
-                each.scene.update_tag()  # another window that shows it reads it again
+                each.scene.update_tag()  # has it read again in another window that shows it
             continue
         back = partial(_put_back, preview, depsgraph, keep_playing)
         attempt(preview, depsgraph, back)
@@ -327,7 +326,7 @@ def _put_back(preview: Preview, depsgraph: bpy.types.Depsgraph, keep_playing: bo
 
 
 def bake_changed(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> None:
-    """A bake was made or deleted, or is to be shown or not."""
+    """React to a bake that was made, deleted, shown or hidden."""
     folder = folder_of(obj)
     if folder is not None:
         playback.drop(folder)
@@ -358,27 +357,27 @@ def attempt(
     *,
     needs_gpu: bool = True,
 ) -> None:
-    """Do it and show the result; a groom that cannot go on is stopped, with a notice.
+    """Run an action and show the result; a preview that fails is stopped, with a notice.
 
-    A defect of ours ends it as well, reported in full but once, not at every event from now on.
+    A bug of ours stops it too: the traceback is printed once, not at every later event.
 
     Args:
-        needs_gpu: where there is no GPU for a moment, do nothing but read it again later.
+        needs_gpu: whether to only mark it to be read again later while there is no GPU.
     """
     session = preview.session
     if preview.is_left_out(depsgraph):
         if all(map(preview.is_left_out, shown_depsgraphs())):
             session.is_stale = True  # until it is evaluated again
             overlay.hide(session.uid)
-        return  # if it is in another window, what happens here is nothing to it
+        return  # if another window shows it, it must not be changed from here
     if needs_gpu and is_interrupted():
         session.is_stale = True
         redraw_views()
-        refresh_views()  # the update that follows has it read again
+        refresh_views()  # triggers the update in which it is read again
         return
     try:
         action()
-        if previews.get(session.uid) is preview:  # it was not begun again by the action
+        if previews.get(session.uid) is preview:  # the action has not replaced it
             publish(preview, depsgraph)
     except Exception as error:
         if not isinstance(error, HairloomError):
@@ -408,17 +407,17 @@ def publish(preview: Preview, depsgraph: bpy.types.Depsgraph) -> None:
     if is_missing_lines and not fields.are_made():
         watch((session.uid, "lines"), partial(_show_lines, preview))
     refresh_panels()
-    # our own strands come into the place of Blender's where nobody edits these or a brush combs
-    # them, and not before they are made; an overlay that has failed shows nothing
+    # our strands replace Blender's once they are made, in object mode and under a combing brush;
+    # an overlay that has failed shows nothing
     is_replaced = (hair.mode == "OBJECT" or is_combed(hair)) and not overlay.failure()
     hides = is_replaced and hair.hairloom.hide_original and session.is_made
-    # without a head ours lies nowhere, and there are casters only where it has a shadow
+    # without a head our shadow has nothing to fall on, and casters exist only where it is cast
     has_own_shadow = session.settings[VolumeSettings].on_body and bool(session.snapshot.casters)
     show_originals(hair, depsgraph, show=not hides, has_own_shadow=has_own_shadow)
 
 
 def _show_lines(preview: Preview) -> float | None:
-    """A step of `latest_job`: the lines of colliders, once they are made."""
+    """A step of `latest_job`: show the lines of colliders once they are made."""
     if not fields.are_made():
         return ARRIVAL_TIME
     attempt(preview, bpy.context.evaluated_depsgraph_get(), lambda: None)
@@ -427,23 +426,23 @@ def _show_lines(preview: Preview) -> float | None:
 
 
 def _take_arrivals(session: Session) -> None:
-    """Show hair and cards that were made beside the window's work."""
+    """Show hair and cards that were made in the background."""
     preview = previews.get(session.uid)
     if preview is None or preview.session is not session:
         return
     depsgraph = _shown_depsgraph(preview)
     if depsgraph is None:
-        return  # it is offered until it is shown again
+        return  # called again until some window shows it
     if session.has_arrived:
         attempt(preview, depsgraph, partial(_take_made, preview, session, depsgraph))
-        refresh_views()  # Blender's own strands, which were shown until now
+        refresh_views()  # to hide Blender's own strands, shown until now
     elif session.cards.has_arrived:
         attempt(preview, depsgraph, session.take_cards)
     redraw_panels()
 
 
 def _shown_depsgraph(preview: Preview) -> bpy.types.Depsgraph | None:
-    """Of a window that shows it, evaluated; None where no window does."""
+    """The evaluated depsgraph of a window that shows it; None: no window does."""
     for window in bpy.context.window_manager.windows:
         depsgraph = window.view_layer.depsgraph
         if depsgraph is not None and not preview.is_left_out(depsgraph):
@@ -453,10 +452,10 @@ def _shown_depsgraph(preview: Preview) -> bpy.types.Depsgraph | None:
 
 
 def finish(session: Session, depsgraph: bpy.types.Depsgraph) -> None:
-    """Wait for hair that is being made; one that cannot be made ends its preview.
+    """Wait for hair that is being made; if it cannot be made, its preview ends.
 
     Raises:
-        HairloomError: it is left out here, and made when it is shown again.
+        HairloomError: it is left out here, and will only be made when it is shown again.
     """
     preview = previews[session.uid]
     if preview.is_left_out(depsgraph):

@@ -1,9 +1,9 @@
-"""What follows from Blender's events for all previewed grooms and fins.
+"""Reactions of all previewed grooms and fins to Blender's events.
 
-Reactions only read; they write nothing into bpy.data. There are two exceptions. The evaluated copy
-of a previewed object is shown as wires, so that Blender's own strands do not stand among ours: that
-is no data of the artist's, neither saved nor undone nor rendered, and Blender makes a fresh copy
-when it evaluates the object again. And a fin shows itself by an attribute of its own mesh.
+Reactions only read; they write nothing into bpy.data, with two exceptions. The evaluated copy of a
+previewed object is shown as wires, so that Blender's own strands do not show among ours: the copy
+is not saved, undone or rendered, and Blender makes a new one when it evaluates the object again.
+And a fin is shown by an attribute of its own mesh.
 """
 
 from __future__ import annotations
@@ -33,18 +33,18 @@ from .previews import attempt, previews
 
 type _Brush = Callable[[bpy.types.Depsgraph], None]
 
-#: Edits come in bursts, as brush strokes do: read again when this long [s] nothing came.
+#: Edits come in bursts, as brush strokes do: hair is read again after this time [s] without one.
 SETTLING_TIME = 0.1
 
-#: Shading is drawn by quick tables while a slider moves, by full ones when it rests this long [s].
+#: Shading uses coarse tables while a slider moves, full ones once it has rested this long [s].
 REFINING_TIME = 0.3
 
-#: what may change the light on hair; a light that is hidden or deleted changes its scene
+#: types whose update may change the light on hair; hiding or deleting a light updates its scene
 _LIGHTING = (bpy.types.Light, bpy.types.World, bpy.types.Collection, bpy.types.Scene)
 
 
 def settings_changed(owner: bpy.types.ID) -> None:
-    """A slider was moved: what can act at once does."""
+    """Apply a changed setting; settings that act at once do."""
     depsgraph = bpy.context.view_layer.depsgraph
     for preview, session in _grooms():
         hair = session.hair.handle.find()
@@ -58,7 +58,7 @@ def settings_changed(owner: bpy.types.ID) -> None:
 
 
 def _grooms() -> list[tuple[Preview, Session]]:
-    """The previewed grooms; a list, as an attempt may end one."""
+    """The previewed grooms; a list, since `attempt` may end one."""
     return [(each, each.groom) for each in previews.values() if each.groom is not None]
 
 
@@ -74,13 +74,13 @@ def _take_settings(preview: Preview, session: Session, depsgraph: bpy.types.Deps
 
 
 def display_changed(owner: bpy.types.ID) -> None:
-    """Whether Blender's own strands are to be seen has been changed."""
+    """React to showing or hiding Blender's own strands."""
     settings_changed(owner)
     refresh_views()
 
 
 def updated(depsgraph: bpy.types.Depsgraph) -> None:
-    """Blender has evaluated the scene: follow what moved, read again what was edited."""
+    """After an evaluation of the scene, follow what moved and read again what was edited."""
     moved, edited, light_changed = changes(depsgraph)
     for preview, session in _grooms():
         is_combed, is_painted = is_edited(session, edited), weights_changed(session, edited)
@@ -94,7 +94,7 @@ def updated(depsgraph: bpy.types.Depsgraph) -> None:
             session.forget_shown_map()
             _read_again_soon()
         elif session.is_stale and not bpy.app.timers.is_registered(_read_again):
-            _read_again_soon()  # it is shown again
+            _read_again_soon()  # it was left out and is shown again
         if occluders_changed(session, moved, depsgraph.view_layer) or cards_edited(session, edited):
             _look_at_cards_soon(preview)
         follows = preview.phase is not Phase.FREE and is_among(session, moved)
@@ -115,7 +115,7 @@ def _update(
     brushes: Sequence[_Brush],
     colors: Sequence[_Brush],
 ) -> None:
-    """Follow brushes, those of shape where hair is at rest."""
+    """Follow lights, brushes and the body; brushes that change shape only where hair is at rest."""
     if light_changed:
         session.light(depsgraph)
     for brush in (*colors, *(brushes if preview.phase is Phase.REST else ())):
@@ -126,10 +126,10 @@ def _update(
 
 
 def frame_changed(depsgraph: bpy.types.Depsgraph) -> None:
-    """The scene has gone to a frame: simulate it, show it as it was baked, or follow the body.
+    """After a frame change, simulate the hair, show it from its bake, or let it follow its body.
 
-    Animated settings and lights are taken over. Curves that are animated themselves are not read
-    again at every frame.
+    Animated settings and lights apply. Curves that are animated themselves are not read again in
+    every frame.
     """
     _, _, light_changed = changes(depsgraph)
     with registry.together(depsgraph):
@@ -146,7 +146,7 @@ def _go(preview: Preview, depsgraph: bpy.types.Depsgraph, light_changed: bool) -
             session.light(depsgraph)
     is_free = preview.phase is Phase.FREE
     if preview.found().hairloom.bake.follows:
-        # hair that plays freely swings when the playhead is dragged, and goes over to playback
+        # freely playing hair goes on swinging while the playhead is dragged; playback takes it over
         if not is_free or playback.is_played():
             preview.follow(depsgraph)
     elif preview.phase is Phase.WAITING or not (is_free or preview.show_frame(depsgraph)):
@@ -154,13 +154,13 @@ def _go(preview: Preview, depsgraph: bpy.types.Depsgraph, light_changed: bool) -
 
 
 def _refine_soon(session: Session) -> None:
-    """Once the slider rests; every move puts it off."""
+    """Refine the shading once the slider rests; every move delays that."""
     if session.is_coarse:
         soon(_refine, REFINING_TIME)
 
 
 def _refine() -> None:
-    """A timer of Blender's: the shading of a slider that is no longer moved, at its best."""
+    """A timer for Blender: full shading tables once a slider is no longer moved."""
     depsgraph = bpy.context.view_layer.depsgraph
     for preview, session in _grooms():
         if session.is_coarse:
@@ -168,9 +168,9 @@ def _refine() -> None:
 
 
 def undone() -> None:
-    """Anything may be different after undo and redo: look again, once Blender has settled.
+    """After undo or redo, which may have changed anything, read everything again soon.
 
-    Hair whose creation was undone is simply gone; that needs no report.
+    Hair whose creation was undone is gone; that needs no report.
     """
     for _, session in _grooms():
         if session.hair.handle.find() is None:
@@ -184,7 +184,7 @@ def undone() -> None:
 
 
 def follow_undo() -> None:
-    """A timer of Blender's: curves that were put back are followed as those under a brush are."""
+    """A timer for Blender: follow curves that undo put back, like curves under a brush."""
     depsgraph = bpy.context.evaluated_depsgraph_get()
     for preview, session in _grooms():
         if preview.phase is Phase.REST:
@@ -200,7 +200,7 @@ def _read_again_soon() -> None:
 
 
 def _read_again() -> float | None:
-    """A timer of Blender's: reads what was edited once the edits have settled."""
+    """A timer for Blender: read what was edited once the edits have settled."""
     pause = time.monotonic() - previews.last_edit
     if pause < SETTLING_TIME:
         return SETTLING_TIME - pause
@@ -209,7 +209,7 @@ def _read_again() -> float | None:
 
 
 def catch_up(depsgraph: bpy.types.Depsgraph) -> None:
-    """Read what was edited; hair in another size or on another head begins over."""
+    """Read what was edited; hair in another size or on another head is previewed again."""
     for preview in tuple(previews.values()):
         if preview.session.is_stale:
             attempt(preview, depsgraph, partial(_read, preview, depsgraph))
@@ -244,7 +244,7 @@ def clear() -> None:
 
 
 def changes(depsgraph: bpy.types.Depsgraph) -> tuple[set[int], set[int], bool]:
-    """Session numbers of what has moved or changed shape, of changed shapes; if lights changed."""
+    """Session numbers of what moved or was edited, of what was edited; and if lights changed."""
     moved, edited, light_changed = set(), set(), False
     for update in depsgraph.updates:
         changed = update.id.original  # the evaluated copy has no session number
@@ -258,7 +258,7 @@ def changes(depsgraph: bpy.types.Depsgraph) -> tuple[set[int], set[int], bool]:
 
 
 def is_edited(session: Session, edited: set[int]) -> bool:
-    """Whether the curves changed by themselves, not because modifiers carry them with the head."""
+    """Whether the curves themselves changed, not only modifiers that carry them with the head."""
     if session.uid not in edited:
         return False
     hair = session.hair.handle.find()
@@ -267,7 +267,7 @@ def is_edited(session: Session, edited: set[int]) -> bool:
 
 
 def weights_changed(session: Session, edited: set[int]) -> bool:
-    """Whether the head's own mesh or an image changed, and with it maybe what is painted there."""
+    """Whether the head's own mesh or an image changed, which may hold what is painted."""
     settings, hair = session.settings, session.hair.handle.find()
     if hair is None:
         return False
@@ -286,7 +286,7 @@ def weights_changed(session: Session, edited: set[int]) -> bool:
 
 
 def occluders_changed(session: Session, changed: set[int], layer: bpy.types.ViewLayer) -> bool:
-    """Whether other hair that shades the cards of this groom may have changed, come or gone."""
+    """Whether other hair that shades this groom's cards may have changed, appeared or vanished."""
     if not session.cards.is_shaded_by_others:
         return False
     others = occluder_objects(session.hair.handle.find(), layer)

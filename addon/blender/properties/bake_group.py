@@ -1,4 +1,4 @@
-"""The properties of a bake; they live on the object that is baked."""
+"""The properties of a bake, on the object that is baked."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What an object of cards remembers, and the artist's pictures for cards."""
+"""Properties of objects that hold cards, and the artist's pictures for cards."""
 
 from __future__ import annotations
 

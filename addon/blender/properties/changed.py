@@ -1,4 +1,4 @@
-"""Notifies subscribers of changed properties, so that properties need not import what uses them."""
+"""Notifies subscribers of changed properties, so that properties need not import their users."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _listeners: dict[str, list[Listener]] = {
     "hair_scene": [],
     "passes": [],
 }
-#: changes that wait for the end of `together`: kinds and data-blocks; None outside of it
+#: changes (kind, data-block) that wait for the end of `together`; None outside of it
 _HELD: ContextVar[list[tuple[str, bpy.types.ID]] | None] = ContextVar("held changes", default=None)
 
 
@@ -43,12 +43,12 @@ def grow(owner: bpy.types.ID) -> None:
 
 
 def display(owner: bpy.types.ID) -> None:
-    """Whether Blender's own strands are to be seen was changed."""
+    """Blender's own strands were shown or hidden."""
     _call("display", owner)
 
 
 def bake(owner: bpy.types.ID) -> None:
-    """Where the bake is, or whether it is shown, was changed."""
+    """The folder of the bake, or whether it is shown, was changed."""
     _call("bake", owner)
 
 
@@ -58,13 +58,13 @@ def hair_scene(owner: bpy.types.ID) -> None:
 
 
 def passes(owner: bpy.types.ID) -> None:
-    """Which passes a view layer of a scene has was changed."""
+    """The passes of a view layer were changed."""
     _call("passes", owner)
 
 
 @contextmanager
 def together() -> Iterator[None]:
-    """Many properties that are set inside count as one change, at the end."""
+    """All properties of a data-block that are set inside count as one change, at the end."""
     if _HELD.get() is not None:
         yield
         return

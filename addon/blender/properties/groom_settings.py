@@ -1,4 +1,4 @@
-"""All that the artist has set for one groom, checked, as it acts."""
+"""All settings of one groom, checked, with the effects of wetness and dust applied."""
 
 from __future__ import annotations
 
@@ -24,12 +24,13 @@ from .properties import settings_of
 
 @dataclass(frozen=True)
 class GroomSettings:
-    """The settings of the curves and of their object, as they act where hair is wet or dusty;
+    """The settings of the curves and of their object, adjusted where hair is wet or dusty.
+
     `groom[ShadingSettings]` is one section.
 
     card_pictures: (texture, picture) by name, of pictures instead of generated textures.
     children_density: vertex group or attribute of the head, by name; empty: none.
-    debug_view: what strands are coloured by, see render.snapshot.DEBUG_VIEWS.
+    debug_view: the quantity that strands are coloured by, see render.snapshot.DEBUG_VIEWS.
     """
 
     sections: SettingsMap = field(default_factory=SettingsMap)
@@ -44,10 +45,11 @@ class GroomSettings:
     def of(
         cls, hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph | None = None
     ) -> GroomSettings:
-        """What is set at the moment.
+        """The settings at the moment.
 
-        Blender writes animated and driven settings into the data itself only where a window shows
-        them. A render has them in its own copies alone, which in a window lag behind edits.
+        Blender writes animated and driven settings into the original data only where a window
+        shows them. A render has them in its evaluated copies alone, which lag behind edits in a
+        window.
 
         Args:
             hair: not the evaluated copy.
@@ -73,7 +75,7 @@ class GroomSettings:
         )
 
     def with_settings(self, *settings: Settings) -> GroomSettings:
-        """The same but for these sections."""
+        """These settings with the given sections replaced."""
         return replace(self, sections=self.sections.with_settings(*settings))
 
     @property
@@ -83,7 +85,7 @@ class GroomSettings:
 
     @property
     def of_rig(self) -> tuple[SettingsMap, str, bool]:
-        """What decides which strands and guides there are, and by which points."""
+        """The settings that determine strands, guides and their points."""
         is_animated = self[DynamicsSettings].animated_style
         if self[ChildrenSettings].method == "none":
             return self.sections.only(GuideSettings, WidthSettings), "", is_animated
@@ -91,17 +93,17 @@ class GroomSettings:
         return self.sections.only(*kinds), self.children_density, is_animated
 
     def acts_at_once(self, before: GroomSettings) -> bool:
-        """Whether only such settings differ that need nothing to be read or made again."""
+        """Whether the settings that differ need nothing to be read or made again."""
         return self._read == before._read
 
     @property
     def _read(self) -> tuple[Any, ...]:
-        """What decides what is read and made."""
+        """The settings that determine what is read and made."""
         names = mask_names(self[DynamicsSettings]), self[ShadingSettings].color_map
         return self.of_rig, self[AmbientSettings], names
 
     def at_once(self, before: GroomSettings) -> GroomSettings:
-        """These, but for what waits until the hair is read again."""
+        """These settings, but with earlier values of those that need the hair to be read again."""
         kinds = (GuideSettings, WidthSettings, ChildrenSettings, AmbientSettings)
         waiting = (before[kind] for kind in kinds)
         return replace(self.with_settings(*waiting), children_density=before.children_density)

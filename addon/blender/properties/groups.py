@@ -22,7 +22,7 @@ from .properties import (
     weights_of_surface,
 )
 
-#: Shapes that the artist can choose from; "automatic" is what an object looks like.
+#: Shapes of colliders for the artist to choose from; "automatic" is what the object looks like.
 COLLIDER_SHAPES = (
     (
         "automatic",
@@ -48,7 +48,7 @@ COLLIDER_SHAPES = (
     ),
     ("none", "None", "No collisions with this object"),
 )
-#: What acts on the hair and can be shown as lines in the viewport.
+#: Overlays: what acts on the hair, and what happens to it, as lines in the viewport.
 OVERLAYS = (
     ("colliders", "Colliders", "Spheres, capsules, and the boxes of distance fields"),
     (
@@ -122,7 +122,7 @@ def _is_mesh(_group: Any, obj: bpy.types.Object) -> bool:
 
 
 def _tip_groups(group: Any, _context: bpy.types.Context, typed: str) -> list[str]:
-    """Where the mesh that holds tips may hold them."""
+    """The weights of the mesh that holds tips, for the search of Tip Group."""
     return weights_meant(group.tip_surface, typed)
 
 
@@ -134,7 +134,7 @@ def _hidden_text(name: str, description: str) -> Any:
     return StringProperty(name=name, description=description, options={"HIDDEN"})
 
 
-#: section -> its class of properties, of all that a file keeps
+#: section -> its PropertyGroup class, for all settings that are saved in files
 SECTION_GROUPS = {
     section: property_group(kind, _redraw if kind.owner == "scene" else changed.settings)
     for section, kind in ALL_SETTINGS.items()
@@ -180,15 +180,15 @@ SECTION_GROUPS["fin"].__annotations__ |= {
 
 
 def operator_properties(section: str) -> dict[str, Any]:
-    """For the `__annotations__` of an operator that works by the settings of one section."""
+    """The `__annotations__` of an operator that uses the settings of one section."""
     return property_annotations(ALL_SETTINGS[section].parameters())
 
 
 def _switch(section: str, parameter: str, values: tuple[str, str], name: str, text: str) -> Any:
-    """A checkbox for a choice of which one value means off, as headers of panels have it.
+    """A checkbox, for the header of a panel, for a choice in which one value means off.
 
     Args:
-        values: of the choice when off, and what it becomes when turned on.
+        values: the values of the choice for off and for on.
     """
 
     def get(groom: Any) -> bool:
@@ -251,7 +251,7 @@ class HAIRLOOM_PG_groom(bpy.types.PropertyGroup):
 
 
 class HAIRLOOM_PG_character(bpy.types.PropertyGroup):
-    """Everything about the hair of one object, of which several may share their curves."""
+    """Everything about the hair of one object; several objects may share their curves."""
 
     __annotations__ = {
         **_pointers("character"),
@@ -480,7 +480,7 @@ CLASSES = (
 
 
 def register() -> None:
-    """After CLASSES are registered."""
+    """Add the property groups to Blender's types; CLASSES must be registered."""
     bpy.types.Curves.hairloom = PointerProperty(
         type=HAIRLOOM_PG_groom,
         name="Hairloom",

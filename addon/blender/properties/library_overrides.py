@@ -1,11 +1,11 @@
-"""Settings on library overrides, which shall last when the file is saved.
+"""Makes settings on library overrides survive saving and loading.
 
-Blender stores what differs from the library, setting by setting, and sets it again when the file is
-loaded. Of a group of settings that the library does not hold yet, because nobody has looked at it
-there or because it is newer than the library, it stores that the whole group differs, and cannot
-set that: all that was set in the group is lost. A group is held as soon as it was looked at once,
-so before a file is saved all groups are looked at: those of the overrides, and those of what they
-override, as it is in memory. The library on disk stays as it is.
+Blender stores each setting that differs from the library, and sets it again when the file is
+loaded. A group of settings may not exist in the library yet, because nothing has accessed it there
+or because it is newer than the library. Blender then stores that the whole group differs, cannot
+set that when loading, and all settings of the group are lost. A group exists once it has been
+accessed, so all groups are accessed before a file is saved: those of the overrides, and those of
+the overridden data in memory. The library on disk stays as it is.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import bpy
 
 
 def make_last() -> None:
-    """To be called before a file is saved."""
+    """Access all groups of settings; call it before a file is saved."""
     for owner in (*bpy.data.objects, *bpy.data.hair_curves):
         override = owner.override_library
         if override is not None and override.reference is not None:

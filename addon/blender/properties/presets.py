@@ -1,7 +1,7 @@
-"""Presets: those that come with Hairloom and the artist's own, found by section, put onto a groom.
+"""Presets, those that come with Hairloom and the artist's own: find, apply, save and delete them.
 
 The artist's own are in the folder that Blender keeps for the extension. They are data like all
-presets, checked and never executed; other files there are reported and otherwise left alone.
+presets, checked and never executed; other files in the folder are only reported.
 """
 
 from __future__ import annotations
@@ -29,12 +29,12 @@ from .properties import settings_of
 PRESET_FOLDER = Path(__file__).resolve().parents[3] / "presets"
 #: what the names of the artist's own presets begin with
 OWN = "own/"
-#: no preset is nearly as long [bytes]
+#: longer files [bytes] are not read; presets are far shorter
 _LONGEST = 1_000_000
 _LONGEST_TITLE = 40
-#: section of a preset -> those that it keeps as well: cards are little without their atlas
+#: section of a preset -> further sections that it stores, as cards need their atlas
 _TOGETHER = {"cards": ("atlas", "card_texture")}
-#: the package that Blender knows: what stands before `.addon`
+#: the name of the package as Blender knows it: what precedes `.addon`
 _EXTENSION = __package__.rpartition(".addon")[0]
 
 
@@ -42,7 +42,7 @@ _EXTENSION = __package__.rpartition(".addon")[0]
 class Entry:
     """One preset in a menu.
 
-    name: as `named_preset` knows it.
+    name: the name that `named_preset` takes.
     """
 
     name: str
@@ -92,7 +92,7 @@ def own(section: str) -> tuple[tuple[Entry, ...], tuple[str, ...]]:
 def titles(section: str) -> dict[str, str]:
     """Title of each preset of one section -> its name; those that ship come first.
 
-    A preset whose title another has before it stands under its name.
+    If an earlier preset has the same title, a preset is listed under its name.
     """
     found: dict[str, str] = {}
     for entry in (*shipped(section), *own(section)[0]):
@@ -101,7 +101,7 @@ def titles(section: str) -> dict[str, str]:
 
 
 def own_folder() -> Path:
-    """Where the artist's own presets lie; it may not be there yet."""
+    """The folder of the artist's own presets; it may not exist yet."""
     try:
         return Path(bpy.utils.extension_path_user(_EXTENSION, path="presets"))
     except ValueError:  # not installed as an extension
@@ -109,12 +109,12 @@ def own_folder() -> Path:
 
 
 def kept_settings(hair: bpy.types.Object, section: str) -> tuple[Settings, ...]:
-    """What a preset of this section keeps of a groom: that section, then those that go with it."""
+    """The settings that a preset of this section stores: its own, then those that go with it."""
     return tuple(_kept(hair, name) for name in (section, *_TOGETHER.get(section, ())))
 
 
 def _kept(hair: bpy.types.Object, section: str) -> Settings:
-    """The settings of one section that a groom or its object keeps."""
+    """The settings of one section, from the groom or its object."""
     owners = hair.data.hairloom, hair.hairloom
     owner = next(each for each in owners if hasattr(each, section))
     return settings_of(getattr(owner, section), ALL_SETTINGS[section])
@@ -123,10 +123,10 @@ def _kept(hair: bpy.types.Object, section: str) -> Settings:
 def preset_of(
     hair: bpy.types.Object, entries: Iterable[Entry], ignored: Container[str] = ()
 ) -> Entry | None:
-    """The first of these presets whose values are all as this groom has them.
+    """The first of these presets whose values all equal those of this groom.
 
     Args:
-        ignored: names of parameters that make no difference on this hair.
+        ignored: names of parameters that have no effect on this hair.
     """
     kept: dict[str, Settings] = {}
     for entry in entries:
@@ -145,11 +145,11 @@ def _is_same(one: Settings, other: Settings, ignored: Container[str]) -> bool:
 
 
 def save_own(title: str, settings: Settings, *also: Settings) -> Path:
-    """Keep settings as a preset of this title; one that has the same title is replaced.
+    """Save settings as a preset of this title; one with the same title is replaced.
 
     Args:
-        settings: of the section under which it is found.
-        also: of others that go with it.
+        settings: of the section under which the preset is listed.
+        also: settings of other sections that go with it.
 
     Raises:
         HairloomError: the title is empty, or the file cannot be written.
@@ -165,7 +165,7 @@ def save_own(title: str, settings: Settings, *also: Settings) -> Path:
 
 
 def _as_title(text: str) -> str:
-    """As titles are kept: in one line, and not too long."""
+    """The text as titles are stored: in one line, and not too long."""
     return " ".join(text.split())[:_LONGEST_TITLE].rstrip()
 
 
@@ -175,7 +175,7 @@ def replaced_preset(title: str, section: str) -> bool:
 
 
 def free_title(title: str, section: str) -> str:
-    """This title, or one with a number that no preset of the artist's has."""
+    """This title, with a number if one of the artist's presets has it already."""
     title, number, free = _as_title(title), 2, _as_title(title)
     while replaced_preset(free, section):
         free = f"{title[: _LONGEST_TITLE - 1 - len(str(number))].rstrip()} {number}"
@@ -206,7 +206,7 @@ def named_preset(name: str, sections: Iterable[str] = tuple(ALL_SETTINGS)) -> Pr
     """A preset by its name, such as looks/blond or own/mine, or by the path of a file.
 
     Args:
-        sections: those whose presets are proposed in place of one that is not there.
+        sections: those whose presets the error message suggests if there is none of this name.
 
     Raises:
         HairloomError: there is no such preset, or it is damaged.
@@ -222,7 +222,7 @@ def named_preset(name: str, sections: Iterable[str] = tuple(ALL_SETTINGS)) -> Pr
 
 
 def _no_preset(name: str, known: list[str]) -> HairloomError:
-    """With the names that may have been meant, and all that there are."""
+    """The error for a missing preset, with the likely names and all known ones."""
     said = PurePath(name).stem
     stems = {each: PurePath(each).name for each in known}
     meant = [said] if said in stems.values() else get_close_matches(said, stems.values())
@@ -235,11 +235,11 @@ def _no_preset(name: str, known: list[str]) -> HairloomError:
 
 
 def apply(settings: Settings, hair: bpy.types.Object) -> None:
-    """Put all values of one section onto a groom or its object, which keeps its own masks where
-    these settings name none.
+    """Apply all values of one section to a groom or its object; its own masks stay where these
+    settings name none.
 
     Raises:
-        HairloomError: settings that a groom does not keep, such as those for growing one.
+        HairloomError: a groom does not store these settings.
     """
     owners = hair.data.hairloom, hair.hairloom
     for owner in owners:
@@ -269,21 +269,21 @@ def _own_files() -> list[Path]:
 
 
 def _own_path(name: str) -> Path | None:
-    """The file of a name such as own/mine, if there is one; never one outside of the folder."""
+    """The file of a name such as own/mine, if it exists; never one outside the folder."""
     found = {OWN + path.stem: path for path in _own_files()} if name.startswith(OWN) else {}
     return found.get(name)
 
 
 @lru_cache(maxsize=256)
 def _read(path: Path, _changed: int, size: int) -> Preset[Any]:
-    """The preset of a file; read again only when it has changed."""
+    """The preset in a file; cached until the file changes."""
     if size > _LONGEST:
         raise HairloomError("it is too long", place=path.name, remedy="Delete it")
     return read_any_preset(path, ALL_SETTINGS)
 
 
 def _file_for(stem: str, title: str, section: str) -> Path:
-    """The file of this title, else a new one whose name no other has."""
+    """The file of the preset with this title, or a new path that no other file has."""
     known = _of_title(title, section)
     if known is not None:
         return known.path
@@ -292,6 +292,6 @@ def _file_for(stem: str, title: str, section: str) -> Path:
 
 
 def _of_title(title: str, section: str) -> Entry | None:
-    """The artist's own preset of a title, in capitals or not."""
+    """The artist's own preset with a title, ignoring case."""
     entries, _ = own(section)
     return next((each for each in entries if as_compared(each.title) == as_compared(title)), None)

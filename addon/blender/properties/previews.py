@@ -11,7 +11,7 @@ import bpy.utils.previews
 
 @cache
 def pictures() -> Any:
-    """Blender's collection of them, from the first use until the extension is unregistered."""
+    """Blender's collection of the pictures; lasts until the extension is unregistered."""
     return bpy.utils.previews.new()
 
 
@@ -21,7 +21,7 @@ def unregister() -> None:
 
 
 def icon_of(preset: Path) -> int:
-    """The number by which layouts know its picture; 0 without one.
+    """The icon number of a preset's picture in layouts; 0 without one.
 
     Blender reads the picture when it is first drawn; a damaged one stays empty.
     """
@@ -36,7 +36,7 @@ def icon_of(preset: Path) -> int:
 
 
 def forget(preset: Path) -> None:
-    """Its picture is another one now, or gone."""
+    """Drop the picture of a preset, as it has changed or is gone."""
     name, known = str(preset.with_suffix(".png")), pictures()
     if name in known:
         del known[name]

@@ -36,17 +36,17 @@ _SHOWN_AS = {
     "percent": {"subtype": "PERCENTAGE"},
     "pixels": {"subtype": "PIXEL"},
 }
-#: decimals that a field shows; lengths of hair are fractions of a millimetre
+#: decimals that a field shows; lengths may be fractions of a millimetre
 _PRECISION = {"length": 5, "rate": 2, "pixels": 2}
-#: float32, which Blender stores, holds this many decimal digits of what the artist typed
+#: Blender stores float32, which holds this many decimal digits
 _STORED_DIGITS = 7
 _LARGEST_INTEGER = 2**31 - 1
-#: Of a groom that is linked from another file, an override may have settings of its own.
+#: Lets library overrides of linked grooms have their own settings.
 OVERRIDABLE = {"LIBRARY_OVERRIDABLE"}
 
 
 def property_group(settings: type[Settings], changed: Changed | None = None) -> type[Any]:
-    """A PropertyGroup class with one property a parameter, same names, same order.
+    """A PropertyGroup class with one property per parameter, in the same order.
 
     Args:
         changed: called with the data-block that owns the group, as soon as a value is edited; not
@@ -70,7 +70,7 @@ def property_annotations(
 def settings_of[S: Settings](group: Any, settings: type[S]) -> S:
     """The values in a property group (or operator) made from these settings, checked.
 
-    An operator may have a part of them; the others are the defaults.
+    An operator may have only some of them; the others are defaults.
     """
     return settings(
         **{p.name: _value(group, p) for p in settings.parameters() if hasattr(group, p.name)}
@@ -78,7 +78,7 @@ def settings_of[S: Settings](group: Any, settings: type[S]) -> S:
 
 
 def weights_of_surface(group: Any, _context: bpy.types.Context, typed: str) -> list[str]:
-    """What is painted on the surface of this hair, by which it may grow."""
+    """The weights and images on the surface of this hair, for the search of a growth mask."""
     owner, head = group.id_data, None
     if isinstance(owner, bpy.types.Curves):
         head = owner.surface
@@ -88,7 +88,7 @@ def weights_of_surface(group: Any, _context: bpy.types.Context, typed: str) -> l
 
 
 def masks_of_groom(group: Any, _context: bpy.types.Context, typed: str) -> list[str]:
-    """All by which a setting of this hair may be painted."""
+    """All weights, attributes and images that may be a mask of this hair, for the search."""
     owner = group.id_data
     if isinstance(owner, bpy.types.Curves):
         hair = next((each for each in bpy.data.objects if each.data == owner), None)
@@ -101,24 +101,24 @@ def masks_of_groom(group: Any, _context: bpy.types.Context, typed: str) -> list[
 
 
 def colors_of_groom(group: Any, _context: bpy.types.Context, typed: str) -> list[str]:
-    """All in which this hair may be painted."""
+    """All colours of the surface, and images, that may colour this hair, for the search."""
     owner = group.id_data
     hair = next((each for each in bpy.data.objects if each.data == owner), None)
     surface = None if hair is None else head_of(hair)
     return [name for name in color_choices(surface) if typed.lower() in name.lower()]
 
 
-#: kind of a parameter that names what is painted -> what there is
+#: kind of a parameter that names painted data -> its search
 _SEARCHED = {"mask": masks_of_groom, "map": colors_of_groom}
 
 
 def maps_meant(obj: bpy.types.Object | None, typed: str) -> list[str]:
-    """The weights of a mesh, and the images, that what was typed may mean."""
+    """The weights of a mesh, and the images, whose names contain the typed text."""
     return [name for name in mask_choices(None, obj) if typed.lower() in name.lower()]
 
 
 def weights_meant(obj: bpy.types.Object | None, typed: str) -> list[str]:
-    """The weights of a mesh that what was typed may mean."""
+    """The weights of a mesh whose names contain the typed text."""
     names = [] if obj is None or obj.type != "MESH" else weight_names(obj)
     return [name for name in names if typed.lower() in name.lower()]
 
@@ -150,9 +150,9 @@ def _property(parameter: Parameter, changed: Changed | None) -> Any:
 
 
 def _digits(parameter: Parameter) -> int:
-    """Decimals that a field shows: as many as its default has, where that is a plain number."""
+    """Decimals that a field shows; as many as its default has, if that has at most five."""
     shown = _PRECISION.get(parameter.unit, 3)
-    if parameter.unit == "angle":  # shown in degrees, kept in radians
+    if parameter.unit == "angle":  # shown in degrees, stored in radians
         return shown
     enough = (
         each for each in range(shown, 6) if round(parameter.default, each) == parameter.default
@@ -184,7 +184,7 @@ def _value(group: Any, parameter: Parameter) -> Any:
     if parameter.kind in {"color", "curve"}:
         return tuple(_as_typed(channel) for channel in value)
     if parameter.kind == "number":
-        # 30 degrees in radians have more digits than are stored: what was declared comes first
+        # 30 degrees in radians have more digits than are stored, so declared values come first
         declared = (parameter.default, *(parameter.hard_range or ()))
         return next((one for one in declared if np.float32(one) == value), _as_typed(value))
     return value

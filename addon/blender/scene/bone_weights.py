@@ -21,7 +21,7 @@ def bones_of(
     """The bones of hair on a skinned head; None where no bone moves the head.
 
     Args:
-        strands: of the hair; bound where it has a usable head.
+        strands: of the hair; bound if it has a usable head.
     """
     skin = head_of(hair)
     names = () if skin is None else _bone_names(skin)
@@ -63,7 +63,7 @@ def has_bones(hair: bpy.types.Object) -> bool:
 
 
 def unmoved_by(hair: bpy.types.Object) -> list[str]:
-    """A sentence where the head has an armature none of whose bones moves it."""
+    """A note if the head has an armature but no bone of it moves the head; else empty."""
     skin = head_of(hair)
     armature = None if skin is None else skin.find_armature()
     if skin is None or armature is None:
@@ -75,7 +75,7 @@ def unmoved_by(hair: bpy.types.Object) -> list[str]:
 
 
 def _bone_names(skin: bpy.types.Object) -> tuple[str, ...]:
-    """Deforming bones that have a vertex group, in the order of the groups."""
+    """The deforming bones that have a vertex group, in the order of the groups."""
     armature = skin.find_armature()
     if armature is None:
         return ()

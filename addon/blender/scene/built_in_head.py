@@ -1,4 +1,4 @@
-"""A head that is always available: the bust that ships, as it is drawn and as hair grows on it."""
+"""A head that is always available: the bust that ships, for drawing and for growing hair on it."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from .bust_skin import EYE_IOR, EYE_ROUGHNESS, SKIN_IOR, SKIN_ROUGHNESS, TONES, 
 from .mesh_materials import MeshMaterial
 from .surfaces import read_material_slots, read_surface
 
-#: which triangles of a head have which material
+#: the materials of a head, each with its triangles
 type HeadLook = tuple[tuple[Ints, MeshMaterial], ...]
 
 
 @dataclass(frozen=True, eq=False)
 class BuiltInHead:
-    """Subdivided, facing -Y, around the middle of its skull, in metres.
+    """The bust, subdivided, facing -Y, with the origin in the middle of its skull, in metres.
 
     weights: (vertex_count,) of each of HAIR_GROUPS.
     material: (triangle_count,) SKIN or EYES.
@@ -35,7 +35,7 @@ class BuiltInHead:
     material: Ints
 
     def look(self, tone: str) -> HeadLook:
-        """How it is drawn, for a tone of bust_skin.TONES."""
+        """Its materials, for a tone of bust_skin.TONES."""
         pictures = MeshPictures(color=painted(tone))
         parts = ((SKIN, SKIN_IOR, SKIN_ROUGHNESS), (EYES, EYE_IOR, EYE_ROUGHNESS))
         return tuple(
@@ -54,7 +54,7 @@ class BuiltInHead:
 
 @cache
 def built_in_head() -> BuiltInHead:
-    """The same each time; not to be changed."""
+    """The built-in head; cached, so it must not be changed."""
     head = bust_object("Hairloom head", None)
     mesh = head.data
     try:

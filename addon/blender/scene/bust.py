@@ -21,12 +21,12 @@ from .bust_skin import (
     painted,
 )
 
-#: how far light goes below the skin [m], and how much of it, in Cycles and EEVEE
+#: fraction of light that scatters below the skin, and how far [m], in Cycles and EEVEE
 _SCATTERED, _DEPTH = 0.15, 0.004
 
 
 def bust_object(name: str, tone: str | None) -> bpy.types.Object:
-    """The bust around its origin, subdivided once; it is in no collection yet.
+    """The bust around its origin, subdivided once by a modifier; it is in no collection yet.
 
     Args:
         tone: one of TONES; None leaves the materials out.
@@ -38,7 +38,7 @@ def bust_object(name: str, tone: str | None) -> bpy.types.Object:
         set_group(obj, group, bust.weights[group])
     modifier = obj.modifiers.new("Smooth", "SUBSURF")
     modifier.levels = modifier.render_levels = 1
-    # the picture is painted over the map as it is
+    # the picture is painted for the UV map without smoothing
     modifier.uv_smooth = "NONE"
     if tone is not None:
         picture = _picture(tone)
@@ -62,7 +62,7 @@ def _mesh(name: str, bust: Bust) -> bpy.types.Mesh:
 
 @lru_cache(maxsize=1)
 def encoded_skin(tone: str) -> Floats:
-    """The picture of the skin as an image has it; from arrays alone, which takes some seconds."""
+    """The picture of the skin, sRGB encoded; made from arrays alone, which takes some seconds."""
     picture = painted(tone).copy()
     picture[..., :3] = srgb_encoded(picture[..., :3])
     return picture

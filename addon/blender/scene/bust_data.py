@@ -17,20 +17,21 @@ from ...arrays import Floats, Ints, number_in_piece, piece_starts
 _FILE = Path(__file__).with_name("bust.npz")
 #: vertex groups, each from 0 to 1: where hair grows
 HAIR_GROUPS = ("scalp", "brows", "lashes", "beard")
-#: of `material`
+#: values of `Bust.material`
 SKIN, EYES = 0, 1
 
 
 @dataclass(frozen=True, eq=False)
 class Bust:
-    """Polygons, one after the other, most of them quads; to be subdivided once.
+    """Polygons, most of them quads, stored one after the other; to be subdivided once.
 
     positions: (vertex_count, 3) [m]. uv: (uv_count, 2), without overlaps, from 0 to 1.
     sizes: (polygon_count,) corners of each polygon; material: SKIN or EYES of each.
     corner_vertex, corner_uv: (corner_count,) indices.
-    weights: by name, (vertex_count,) from 0 to 1: HAIR_GROUPS; lips; cavity, the light from around
-        that no fold keeps off.
-    makehuman: (vertex_count,) index in MakeHuman's base mesh; -1 for eyes and what closes the cut.
+    weights: by name, (vertex_count,) from 0 to 1: HAIR_GROUPS; lips; cavity, the fraction of
+        ambient light that folds leave.
+    makehuman: (vertex_count,) index in MakeHuman's base mesh; -1 for eyes and for the faces that
+        close the cut.
     """
 
     positions: Floats
@@ -56,7 +57,7 @@ class Bust:
 
 @cache
 def load_bust() -> Bust:
-    """Read once; not to be changed."""
+    """The bust; cached, so it must not be changed."""
     with np.load(_FILE, allow_pickle=False) as file:
         arrays = {name: file[name] for name in file.files}
     integers = {

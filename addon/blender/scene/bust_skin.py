@@ -1,4 +1,4 @@
-"""The skin and the eyes of the bust, painted over its map: no picture ships, only this recipe."""
+"""The skin and eyes of the bust, painted by this code onto its UV map, so that no picture ships."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from .bust_data import EYES, load_bust
 
 type Color = tuple[float, float, float]
 
-#: texels along each side of the picture, and those painted around each island
+#: texels along each side of the picture, and the width of the rim around each island in texels
 RESOLUTION, _RIM = 1024, 4
-#: of the boundary, as Principled has them
+#: roughness and IOR of the Principled BSDF
 SKIN_ROUGHNESS, EYE_ROUGHNESS = 0.45, 0.12
 SKIN_IOR, EYE_IOR = 1.4, 1.376
 
 
 @dataclass(frozen=True)
 class Tone:
-    """Scene-linear colours. flush: what blood near the surface makes of the skin, as a factor."""
+    """Scene-linear colours. flush: factor on the skin's colour where blood is near the surface."""
 
     skin: Color
     lips: Color
@@ -41,13 +41,13 @@ TONES = {
 }
 _SCLERA: Color = (0.66, 0.60, 0.57)
 _PUPIL: Color = (0.004, 0.004, 0.004)
-#: what is hidden in folds keeps its red longest
+#: factor on colours in folds, where red light survives best
 _FOLD: Color = (0.36, 0.17, 0.14)
-#: skin between the hairs of scalp and brows, as a factor: a parting does not shine, and a head that
-#: wears a beard alone has no cap
+#: factor on skin between the hairs of scalp and brows: darker, so that a parting does not shine,
+#: but not so dark that a head with only a beard seems to wear a cap
 _BETWEEN_HAIRS: Color = (0.72, 0.68, 0.66)
 _BELOW_EYES: Color = (0.90, 0.83, 0.85)
-#: where more blood shows: place of the left side or of the middle [m], reach [m], strength
+#: where more blood shows: place, on the left side or in the middle [m], reach [m], strength
 _FLUSHED = (
     ((0.041, -0.073, -0.040), 0.024, 0.5),
     ((0.0, -0.108, -0.043), 0.013, 0.6),
@@ -55,9 +55,9 @@ _FLUSHED = (
     ((0.0, -0.090, -0.108), 0.015, 0.35),
     ((0.031, -0.085, 0.004), 0.012, 0.35),
 )
-#: middle of the shade below the left eye [m], its reach across and down [m]
+#: middle of the shade below the left eye, (x, z) [m]; its reach across and down [m]
 _SHADE, _SHADE_REACH = (0.029, -0.0205), (0.013, 0.0055)
-#: middle of the left eye [m]; angles from its axis [degrees]: the pupil's rim, the iris' rim
+#: middle of the left eye [m]; rims of pupil and iris, as angles from its axis [degrees]
 _EYE, _PUPIL_RIM, _IRIS_RIM = (0.0307767, -0.064535, -0.0065861), 9.2, 25.0
 #: size [m] and strength of blotches and pores
 _MOTTLE = ((0.016, 0.05), (0.005, 0.04), (0.0016, 0.05))
@@ -152,7 +152,7 @@ def _step(value: Floats) -> Floats:
 
 
 def _noise(points: Floats, size: float) -> Floats:
-    """Smooth noise in space from -1 to 1, alike on both sides of a seam, (n,) float32.
+    """Smooth noise in space from -1 to 1, so that seams do not show, (n,) float32.
 
     Args:
         size: of its lattice [m].
@@ -170,7 +170,7 @@ def _noise(points: Floats, size: float) -> Floats:
 
 
 def _widen(picture: Floats) -> None:
-    """Paint the texels around what is painted with the mean of their neighbours."""
+    """Paint the texels next to painted ones with the mean of their painted neighbours."""
     is_painted = picture[..., 3] > 0.0
     total = np.zeros_like(picture)
     for axis in (0, 1):

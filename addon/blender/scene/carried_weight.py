@@ -1,5 +1,8 @@
-"""Settled hair hangs under its weight already, and would sag once more where the style does not
-carry all of it: Sag Correction is 1 while it has settled, on all objects that share its curves."""
+"""Sag Correction of settled hair.
+
+Settled hair hangs under its weight already, and would sag a second time if the style did not carry
+all of it. So Sag Correction is 1 while hair is settled, on all objects that share its curves.
+"""
 
 from __future__ import annotations
 
@@ -7,12 +10,12 @@ import bpy
 
 from ..base.objects import objects_with
 
-#: custom property of the object: its Sag Correction before
+#: custom property of the object: its Sag Correction before it was settled
 _BEFORE = "hairloom_combed_sag"
 
 
 def carry_whole_weight(curves: bpy.types.Curves) -> tuple[str, ...]:
-    """Curves have settled; what is said of the Sag Correction of their objects."""
+    """Set Sag Correction to 1 on all objects with these settled curves; returns notes on it."""
     notes = []
     for hair in objects_with(curves):
         dynamics = hair.hairloom.dynamics
@@ -30,7 +33,7 @@ def carry_whole_weight(curves: bpy.types.Curves) -> tuple[str, ...]:
 
 
 def carry_as_before(curves: bpy.types.Curves) -> None:
-    """The settled shape is gone."""
+    """Restore Sag Correction, once the settled shape is gone."""
     for hair in objects_with(curves):
         before = hair.pop(_BEFORE, None)
         if before is not None:

@@ -1,4 +1,4 @@
-"""Hair curves in and out of Blender: evaluated curves to a `StrandSet`, and back."""
+"""Reading hair curves from Blender into a `StrandSet`, and writing them back."""
 
 from __future__ import annotations
 
@@ -17,22 +17,21 @@ from ...strands.curve_types import CurveShapes, CurveType, DrawnCurves, Knots, d
 from ..base.attributes import read_attribute, set_attribute
 from ..base.objects import link_into
 
-#: Curve attributes that may hold a strand's group. The first one found wins; its name is the one
-#: that Unreal and USD use.
+#: Curve attributes that may hold a strand's group. The first one found wins; the first name is
+#: that of Unreal and USD, and is written.
 GROUP_ATTRIBUTES = ("groom_group_id", "group")
 #: The attribute of Blender's own importers, per point or per curve.
 COLOR_ATTRIBUTE = "color"
-#: The attribute of curves that says what the noise of a strand depends on, see `StrandSet.seed`.
+#: The attribute of curves with the seed of each strand's noise, see `StrandSet.seed`.
 SEED_ATTRIBUTE = "strand_seed"
-#: What `read_curves` takes beside places and groups, and how many numbers a value has.
+#: Attributes that `read_curves` reads beside positions and groups, and the size of their values.
 VALUE_ATTRIBUTES = (
     ("radius", 1),
     ("surface_uv_coordinate", 2),
     (SEED_ATTRIBUTE, 1),
     (COLOR_ATTRIBUTE, 4),
 )
-#: What Blender keeps of curves that are not all open Catmull-Rom curves: of each curve, or of each
-#: of their points.
+#: Attributes that Blender stores unless all curves are open Catmull-Rom curves: name, domain, size.
 SHAPE_ATTRIBUTES = (
     ("curve_type", "CURVE", 1),
     ("cyclic", "CURVE", 1),
@@ -51,7 +50,7 @@ _REMEDIES = {
 
 def read_curves(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Cleaned:
     """The hair as Blender shows it after all modifiers, in world space, without unusable curves.
-    Curves of all types have points on the curve, see `curve_types`.
+    The points lie on the curves, whatever their type, see `curve_types`.
 
     Raises:
         HairloomError: the object holds no hair curves.
@@ -65,7 +64,7 @@ def read_curves(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Cleane
 def read_own_curves(
     obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, points: Floats | None = None
 ) -> Cleaned:
-    """The same before all modifiers, as brushes comb it: by control points, whatever their type.
+    """The hair before all modifiers, as brushes comb it: the control points of curves of any type.
 
     Args:
         points: (point_count, 3) object space, instead of the curves' own.
@@ -95,7 +94,7 @@ def _read(
     points: Floats | None = None,
     drawn: DrawnCurves | None = None,
 ) -> Cleaned:
-    """Args: drawn: the points to take in place of control points."""
+    """The curves in world space. Args: drawn: points on the curves, instead of control points."""
     radius = read_attribute(curves, "radius", "POINT")
     color, offsets = _colors(curves), curve_offsets(curves)
     group = next(
@@ -120,8 +119,8 @@ def _read(
 
 
 def curves_as_drawn(curves: bpy.types.Curves) -> DrawnCurves | None:
-    """Points on the curves, object space; None where these are their own, as on Catmull-Rom
-    curves."""
+    """Points on the curves, object space; None if all are Catmull-Rom curves, which pass through
+    their own points."""
     kind = read_attribute(curves, "curve_type", "CURVE")
     if kind is None or not (kind != CurveType.CATMULL_ROM).any():
         return None
@@ -138,7 +137,7 @@ def curves_as_drawn(curves: bpy.types.Curves) -> DrawnCurves | None:
     left, right, weight = (found[n] for n in ("handle_left", "handle_right", "nurbs_weight"))
     shapes = CurveShapes(
         kind,
-        # what Blender takes where a curve says nothing
+        # Blender's defaults where there is no attribute
         of_curves("resolution", 12),
         of_curves("nurbs_order", 4),
         of_curves("knots_mode", Knots.NORMAL),
@@ -150,7 +149,7 @@ def curves_as_drawn(curves: bpy.types.Curves) -> DrawnCurves | None:
 
 
 def unfit_curves(curves: bpy.types.Curves) -> dict[str, Bools]:
-    """What is no hair, or cannot be read: reason -> (curve_count,) which curves."""
+    """Curves that are not hair, or cannot be read: reason -> mask (curve_count,)."""
     found = {}
     cyclic = read_attribute(curves, "cyclic", "CURVE")
     if cyclic is not None and cyclic.any():
@@ -166,7 +165,7 @@ def unfit_curves(curves: bpy.types.Curves) -> dict[str, Bools]:
 def write_own_curves(
     obj: bpy.types.Object, own: Cleaned, points: Floats, depsgraph: bpy.types.Depsgraph
 ) -> None:
-    """Move the curves that `read_own_curves` has given; those that it dropped stay.
+    """Move the curves that `read_own_curves` returned; those that it dropped stay.
 
     Args:
         points: (point_count, 3) [m] world space, of the strands of `own`.
@@ -181,14 +180,14 @@ def write_own_curves(
 
 
 def move_curves(curves: bpy.types.Curves, points: Floats) -> None:
-    """As `put_points`, and with them the handles of Bezier curves, each as much longer as the piece
-    of the curve on its side."""
+    """`put_points` that moves the handles of Bezier curves too; each is scaled as the piece of the
+    curve on its side."""
     before = curve_points(curves)
     for name, side in (("handle_left", 1), ("handle_right", -1)):
         handles = read_attribute(curves, name, "POINT", 3)
         if handles is None:
             continue
-        # a curve's outer handles act nowhere, so that it need not be known where curves begin
+        # the outer handles of a curve have no effect, so rolling past its ends does no harm
         was, now = (np.linalg.norm(p - np.roll(p, side, axis=0), axis=1) for p in (before, points))
         longer = np.divide(now, was, out=np.ones_like(was), where=was > 0.0)
         set_attribute(curves, name, "POINT", points + longer[:, None] * (handles - before))
@@ -198,8 +197,8 @@ def move_curves(curves: bpy.types.Curves, points: Floats) -> None:
 def put_points(curves: bpy.types.Curves, points: Floats) -> None:
     """Move all points, (point_count, 3) [m] object space, and nothing else of the curves.
 
-    As an attribute: nodes that go along curves would find them where they were, by what Blender
-    keeps of `position_data`.
+    Written as an attribute: after writing to `position_data`, Blender keeps its cached curves, and
+    nodes that evaluate curves would find the old shape.
     """
     places = curves.attributes["position"].data
     places.foreach_set("vector", np.ascontiguousarray(points, np.float32).ravel())
@@ -217,10 +216,10 @@ def write_curves(
     """A new hair curves object that holds these strands, attached to a surface if there is one.
 
     Args:
-        strands: world space, which is also object space: the object is at the origin. If nobody
-            knows their widths, the curves have those that are found.
-        collection: where it goes, or the scene's where that is linked or overridden.
-        are_found: they were found already; see `groom.widths.with_widths`.
+        strands: world space, which is also object space: the object is at the origin. Strands
+            without widths get estimated ones.
+        collection: where it goes; the scene's is used if this is linked or overridden.
+        are_found: whether the widths are estimates already; see `groom.widths.with_widths`.
     """
     curves = bpy.data.hair_curves.new(name)
     fill_curves(curves, strands)
@@ -253,7 +252,7 @@ def fill_curves(curves: bpy.types.Curves, strands: StrandSet) -> None:
 
 def set_colors(curves: bpy.types.Curves, strands: StrandSet) -> None:
     """Write the strands' own colours, if they have any; -1 where a strand has none, since Blender
-    would draw no number at all."""
+    cannot draw NaN."""
     if strands.color is not None:
         opaque = np.ones((strands.point_count, 4), np.float32)
         opaque[:, :3] = np.nan_to_num(strands.color, nan=-1.0)
@@ -289,7 +288,7 @@ def _colors(curves: bpy.types.Curves) -> Floats | None:
 
 
 def _seeds(curves: bpy.types.Curves) -> Ints | None:
-    """(curve_count,), 0 where Blender has made a curve since; None without any."""
+    """(curve_count,), 0 for curves that Blender has added since; None without any."""
     seeds = read_attribute(curves, SEED_ATTRIBUTE, "CURVE")
     return seeds if seeds is not None and seeds.dtype.kind == "i" else None
 

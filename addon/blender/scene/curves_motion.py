@@ -1,7 +1,6 @@
-"""Motion of imported hair curves: an attribute for each frame, and a modifier that shows the one
-of the scene's frame.
+"""Motion of imported hair curves: one attribute per frame, and a modifier that shows the scene's.
 
-So the file needs nothing but itself, and curves move without Hairloom, too.
+So the file depends on no other file, and curves move without Hairloom too.
 """
 
 from __future__ import annotations
@@ -12,16 +11,16 @@ from ...arrays import Floats
 from ..base.attributes import set_attribute
 from ..base.node_groups import own_node_group
 
-#: of the modifier and its node group
+#: name of the modifier and of its node group
 NAME = "Hairloom Motion"
-#: of the attributes; the frame follows
+#: prefix of the attributes; the number of the frame follows
 PREFIX = "motion_"
 _FIRST, _LAST = "First Frame", "Last Frame"
 _MARK, _VERSION = "hairloom_curves_motion", 2
 
 
 def store_motion(hair: bpy.types.Object, first: int, positions: Floats) -> None:
-    """Let curves move.
+    """Store a motion on hair curves, with the modifier that shows it.
 
     Args:
         first: the scene frame of the first positions.
@@ -37,7 +36,7 @@ def store_motion(hair: bpy.types.Object, first: int, positions: Floats) -> None:
 
 
 def _fill(tree: bpy.types.NodeTree) -> None:
-    """Between two frames points go straight; before the first and after the last they rest."""
+    """Nodes that interpolate linearly between frames, and hold the first and the last frame."""
     new_socket, new, link = tree.interface.new_socket, tree.nodes.new, tree.links.new
     for name in (_FIRST, _LAST):
         new_socket(name, in_out="INPUT", socket_type="NodeSocketInt")
@@ -71,14 +70,15 @@ def _fill(tree: bpy.types.NodeTree) -> None:
 
 
 def _whole(tree: bpy.types.NodeTree, mode: str) -> bpy.types.Node:
-    """A whole number: as text a float above -1 is -0, which names no attribute."""
+    """A node that rounds to an integer: a float just above -1 becomes the text "-0", which names
+    no attribute."""
     node = tree.nodes.new("FunctionNodeFloatToInt")
     node.rounding_mode = mode
     return node
 
 
 def _of_frame(tree: bpy.types.NodeTree, frame: bpy.types.Node) -> bpy.types.Node:
-    """The attribute of a whole frame."""
+    """The node that reads the attribute of an integer frame."""
     new, link = tree.nodes.new, tree.links.new
     text, name, attribute = (
         new("FunctionNodeValueToString"),

@@ -1,4 +1,4 @@
-"""Lines that are drawn on the surface of hair: curves, or meshes of edges."""
+"""Lines that are drawn on the surface of hair: curves, or meshes of edges alone."""
 
 from __future__ import annotations
 
@@ -15,9 +15,10 @@ from .surfaces import read_surface
 
 #: types of objects that can be a line
 LINE_TYPES = ("CURVE", "MESH")
-#: A line is on the surface within this part of the surface's diagonal.
+#: Greatest distance of a line on the surface, as a fraction of the surface's diagonal.
 _ON = 0.1
-#: A new line: points, and how far it goes over the head, as parts of its depth from the front.
+#: A new line: its points, and where it starts and ends, as fractions of the head's depth from the
+#: front.
 _POINTS, _FRONT, _BACK = 9, 0.12, 0.62
 
 
@@ -28,8 +29,8 @@ def chosen_lines(context: bpy.types.Context) -> list[bpy.types.Object]:
 
 
 def pieces_of(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Floats:
-    """The straight pieces of a line as it is drawn, (n, 2, 3) float32 [m] world space; those of a
-    curve from its first point to its last.
+    """The straight pieces of a line as Blender draws it, (n, 2, 3) float32 [m] world space; those
+    of a curve in order from its first point to its last.
 
     Raises:
         HairloomError: it has no line.
@@ -68,7 +69,7 @@ def pieces_of(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Floats:
 
 
 def lines_of(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> list[Floats]:
-    """The same as lines (m, 3): where a piece ends and another begins, they are one.
+    """The pieces joined to lines (m, 3), where one begins at the end of the one before.
 
     Raises:
         HairloomError: see `pieces_of`.
@@ -86,8 +87,10 @@ def is_wire(obj: bpy.types.Object) -> bool:
 def check_on_surface(
     line: bpy.types.Object, hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph
 ) -> None:
-    """Raises:
-    HairloomError: it has no line, or is away from the surface of this hair.
+    """Check that a line lies on the surface of this hair.
+
+    Raises:
+        HairloomError: it has no line, or is away from the surface.
     """
     pieces, head = pieces_of(line, depsgraph), head_of(hair)
     if head is None:
@@ -112,10 +115,10 @@ def _no_surface(hair: bpy.types.Object) -> HairloomError:
 
 
 def new_line(hair: bpy.types.Object, name: str, context: bpy.types.Context) -> bpy.types.Object:
-    """A line over the middle of the surface from the front to the crown, that goes with it.
+    """A new line over the middle of the surface from the front to the crown, parented to it.
 
     Raises:
-        HairloomError: the hair has no surface, or nothing of it is up there.
+        HairloomError: the hair has no surface, or no part of it lies below that line.
     """
     head = head_of(hair)
     if head is None:
@@ -123,7 +126,7 @@ def new_line(hair: bpy.types.Object, name: str, context: bpy.types.Context) -> b
     depsgraph = context.evaluated_depsgraph_get()
     evaluated = head.evaluated_get(depsgraph)
     low, high = np.array(evaluated.bound_box)[[0, 6]]
-    # heads look along -Y; where the object stands on its Y, as from other programs, along Z
+    # heads look along -Y, or along Z if the object's Y axis is up, as from other programs
     has_y_up = _points_up(matrix_of(head, depsgraph)).argmax() == 1
     depth, up, front, back = (2, 1, high, low) if has_y_up else (1, 2, low, high)
     points, above, down = [], 0.5 * (low + high), np.zeros(3)
@@ -155,7 +158,7 @@ def new_line(hair: bpy.types.Object, name: str, context: bpy.types.Context) -> b
 
 
 def _points_up(matrix: Floats) -> Floats:
-    """How far each axis (3,) of an object points up in the world, -1 to 1."""
+    """World Z of each unit axis of an object, (3,), -1 to 1."""
     up: Floats = matrix[2, :3] / np.maximum(np.linalg.norm(matrix[:3, :3], axis=0), 1e-30)
     return up
 
@@ -163,7 +166,7 @@ def _points_up(matrix: Floats) -> Floats:
 def chosen_or_new_lines(
     hair: bpy.types.Object, name: str, context: bpy.types.Context
 ) -> list[bpy.types.Object]:
-    """The selected curves, which are drawn on its surface; a new line of this name where none is.
+    """The selected lines on the hair's surface; without any, a new line of this name.
 
     Raises:
         HairloomError: the hair has no surface, or a curve is not on it.

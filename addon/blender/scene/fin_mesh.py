@@ -1,4 +1,4 @@
-"""What the simulation of a fin reads from its original mesh, beside its triangles."""
+"""Data of a fin's original mesh that its simulation reads, beside the triangles."""
 
 from __future__ import annotations
 
@@ -13,8 +13,10 @@ from .fin_modifier import fin_modifier, other_fin_with
 
 
 def check_usable(obj: bpy.types.Object, handle: Handle) -> None:
-    """Raises:
-    HairloomError: it is not a fin, is being edited, or shares its mesh with another fin.
+    """Check that a fin can be simulated.
+
+    Raises:
+        HairloomError: it is not a fin, is being edited, or shares its mesh with another fin.
     """
     if obj.type != "MESH" or fin_modifier(obj) is None:
         raise HairloomError(
@@ -34,7 +36,7 @@ def check_usable(obj: bpy.types.Object, handle: Handle) -> None:
 
 
 def loose_edges_of(mesh: bpy.types.Mesh) -> Ints:
-    """Edges of no face, (n, 2) int32."""
+    """Edges without a face, (n, 2) int32."""
     is_loose = np.empty(len(mesh.edges), bool)
     mesh.edges.foreach_get("is_loose", is_loose)
     loose: Ints = edge_vertices(mesh)[is_loose]

@@ -1,7 +1,7 @@
-"""How a fin shows in Blender: a Geometry Nodes modifier, fed by an attribute of the mesh.
+"""How Blender shows a fin: a Geometry Nodes modifier that reads an attribute of the mesh.
 
     Store `hairloom_carried`   where the modifiers above and the animation put each vertex
-    Store `hairloom_index`     the vertex's index, to find it again below subdivisions and mirrors
+    Store `hairloom_index`     the vertex's index, to find it again after subdivision or mirroring
     Set Position               to `hairloom_position`, if the mesh has that attribute
 
 The simulation adds `hairloom_position` to the original mesh and removes it again. The artist's data
@@ -25,7 +25,7 @@ NAME = "Hairloom Cloth"
 POSITION = "hairloom_position"
 CARRIED = "hairloom_carried"
 INDEX = "hairloom_index"
-#: marks our node group, whatever its name, with the version of its nodes
+#: custom property that marks our node group, whatever its name, and holds its version
 _MARK = "hairloom_fin"
 _VERSION = 1
 
@@ -40,7 +40,7 @@ def fin_modifier(obj: bpy.types.Object) -> bpy.types.Modifier | None:
 
 
 def has_fins() -> bool:
-    """Whether the file has any fin; far cheaper than asking each of its objects."""
+    """Whether the file has any fin; far cheaper than checking each of its objects."""
     return any(group.users and group.get(_MARK) for group in bpy.data.node_groups)
 
 
@@ -91,7 +91,7 @@ def show(mesh: bpy.types.Mesh, positions: Floats) -> None:
 
 
 def clear(mesh: bpy.types.Mesh) -> None:
-    """Remove the simulation: the mesh is bit for bit what it was before."""
+    """Remove the simulated frame; the mesh is then bit for bit what it was before."""
     attribute = mesh.attributes.get(POSITION)
     if attribute is not None:
         mesh.attributes.remove(attribute)
@@ -99,7 +99,7 @@ def clear(mesh: bpy.types.Mesh) -> None:
 
 
 def read_carried(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Floats:
-    """The vertices that reach our modifier, (vertex_count, 3) float32, object space.
+    """The vertices as they enter our modifier, (vertex_count, 3) float32, object space.
 
     Raises:
         HairloomError: the modifier is missing or off, or modifiers above or below it change the

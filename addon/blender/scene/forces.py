@@ -20,7 +20,7 @@ from ...dynamics.force_fields import (
 )
 from ...strands.vectors import triple
 
-#: Blender's kinds that act on hair -> ours; and why the others do not.
+#: Blender's kinds of fields that act on hair -> ours; and the reasons why the others do not.
 _KINDS = {
     "FORCE": "force",
     "WIND": "wind",
@@ -39,9 +39,9 @@ _EXCLUDED = {
     "FLUID_FLOW": "a fluid cannot be asked at every point of the hair",
 }
 _SHAPES = {"POINT": "point", "LINE": "line", "PLANE": "plane", "POINTS": "points"}
-#: Points of a mesh that act each by itself, at most.
+#: Most vertices of a mesh with the shape Every Point.
 MAX_POINTS = 64
-#: Beyond it numbers could overflow; hair cannot follow a thousandth of it.
+#: Strengths are clamped to this, as numbers could overflow; hair cannot follow a thousandth of it.
 _STRONGEST = 1.0e6
 
 
@@ -53,13 +53,13 @@ def gravity_of(scene: bpy.types.Scene) -> Floats:
 def force_fields_of(
     owner: bpy.types.Object, depsgraph: bpy.types.Depsgraph
 ) -> tuple[ForceFields, tuple[str, ...]]:
-    """The force fields that act on an object in this frame, and what to say of others.
+    """The force fields that act on an object in this frame, and notes on others.
 
-    As in Blender, those that are hidden or excluded from the view layer have no effect, nor have
-    those that do not affect location. Particles with a field act as if they had none.
+    As in Blender, fields that are hidden, excluded from the view layer or do not affect location
+    have no effect. Fields of particles are ignored.
 
     Args:
-        owner: hair curves or cloth. Where it names a collection, only the fields in there act.
+        owner: hair curves or cloth. If it names a collection, only the fields in there act.
     """
     found: list[ForceField] = []
     notes: list[str] = []
@@ -87,7 +87,7 @@ def force_fields_of(
 
 
 def _unusable(obj: bpy.types.Object, field: bpy.types.FieldSettings) -> str:
-    """Why a field does not act on hair; empty where it does."""
+    """Why a field does not act on hair; empty if it does."""
     if field.type in _EXCLUDED:
         return _EXCLUDED[field.type]
     if field.shape == "SURFACE":
@@ -106,7 +106,7 @@ def _unusable(obj: bpy.types.Object, field: bpy.types.FieldSettings) -> str:
 
 
 def _read(obj: bpy.types.Object, field: bpy.types.FieldSettings, frame: int) -> list[ForceField]:
-    """A field of an object; one for each point where every point acts."""
+    """The field of an object; with the shape Every Point, one for each vertex."""
     matrix = np.array(obj.matrix_world, np.float64)
     one = ForceField(
         kind=_KINDS[field.type],
@@ -145,7 +145,7 @@ def _at_point(one: ForceField, matrix: Floats, vertex: bpy.types.MeshVertex) -> 
 
 
 def _noise_of(field: bpy.types.FieldSettings, frame: int) -> float:
-    """What noise adds to the strength in a frame, the same for all hair: spread as Blender's is."""
+    """What noise adds to the strength in a frame, equal for all hair; distributed as Blender's."""
     if not field.noise:
         return 0.0
     random = np.random.default_rng([field.seed, abs(frame)])
@@ -165,12 +165,12 @@ def _unit(vector: Floats) -> Floats:
 
 @lru_cache(maxsize=1)
 def permutation() -> Ints:
-    """The permutation of Blender's improved Perlin noise, found by asking it, (256,).
+    """The permutation p of Blender's improved Perlin noise, found by sampling it, (256,).
 
-    Beside a corner (x, y, z) of its lattice the noise rises along a gradient that
-    p[p[p[x] + y] + z] chooses. So along z one sees the gradients of p from p[p[x] + y] on: how far
-    the row of y is ahead of that of 0 is p[p[0] + y], less the first of them. This is all of p, but
-    for where it begins, which only one place explains.
+    Near a lattice corner (x, y, z) the noise rises along the gradient number p[p[p[x] + y] + z].
+    So the gradients along z at x = 0 are a window of p that begins at p[p[0] + y]. How far the
+    window of y is ahead of that of y = 0 gives p[p[0] + y] - p[p[0]], from which p follows once
+    p[0] is known. All values of p[0] are tried; only one explains the gradients that were seen.
     """
     seen = [_gradient(0, 0, z) for z in range(256)]
     window, edges = 24, [tuple(edge) for edge in GRADIENTS.astype(int).tolist()]

@@ -1,8 +1,8 @@
-"""What a groom holds besides its strands, as attributes of hair curves, in both directions.
+"""Reading and writing what a groom holds besides its strands, as attributes of hair curves.
 
-Blender shows them in Data properties > Attributes, and its modifiers pass them on. Names follow
+Blender lists them in Data properties > Attributes, and its modifiers pass them on. Names follow
 Epic's "Alembic for Grooms Specification" 1.5. Each closest guide has its own attribute, because
-Blender has no type of three integers.
+Blender has no attribute type of three integers.
 """
 
 from __future__ import annotations
@@ -50,15 +50,15 @@ def stored_groom(
 ) -> dict[str, Any]:
     """What the evaluated hair holds besides its strands: the other arguments of `Groom`.
 
-    IDs are left out if two curves have the same one, as copied curves do; closest guides are left
-    out if one of them no longer exists.
+    IDs are left out if two curves share one, as copied curves do; closest guides are left out if
+    one of them no longer exists.
 
     Args:
         kept: (strand_count,) indices of the curves that became strands, from `read_curves`.
 
     Returns:
-        group_names, and those of strand_id, is_guide, closest_guides and guide_weights that
-        the hair has.
+        group_names, and whichever of strand_id, is_guide, closest_guides and guide_weights the
+        hair has.
     """
     curves = hair.evaluated_get(depsgraph).data
     fields: dict[str, Any] = {"group_names": group_names(hair)}

@@ -1,7 +1,7 @@
-"""A material for Blender's own engines that answers light as a look does.
+"""A material for Blender's own engines that shades hair as a look does.
 
-One Principled Hair node has the shape of the highlights. What it has no input for, the tint of the
-tips and the differences between strands, are nodes before its colour.
+One Principled Hair node shapes the highlights. It has no inputs for the tint of the tips and the
+differences between strands, which are nodes before its colour.
 """
 
 from __future__ import annotations
@@ -22,18 +22,18 @@ from ..base.digests import digest
 from .curves import COLOR_ATTRIBUTE
 from .principled import INPUTS
 
-#: Under which name the material finds the curves' colours: Cycles takes "color" for that of a
+#: Attribute from which the material reads the curves' colours: Cycles takes "color" for that of a
 #: volume, and reads black (Blender 5.2).
 MATERIAL_COLOR = "hair_color"
 #: property that marks a material of ours
 _MARK = "hairloom_look"
-#: which look it has, and which nodes it was given for it
+#: properties with digests of its look and of the nodes that were made for it
 _LOOK, _NODES = "hairloom_look_settings", "hairloom_look_nodes"
 _ACROSS, _DOWN = 190.0, 180.0
 
 
 def has_look_material(curves: bpy.types.Curves) -> bool:
-    """Whether hair curves have a material that `put_look_material` would write again."""
+    """Whether hair curves have a material that `put_look_material` would overwrite."""
     return look_material(curves) is not None
 
 
@@ -44,16 +44,16 @@ def put_look_material(
     are_final: bool = False,
     painted: Floats | None = None,
 ) -> tuple[bpy.types.Material, tuple[str, ...]]:
-    """Give hair curves a material of a look; one that it has of an earlier look is written again.
+    """Give hair curves the material of a look; their material of an earlier look is overwritten.
 
-    A material of the artist's own is not changed: ours takes its place in the first slot.
+    A material of the artist's own is not changed: ours replaces it in the first slot.
 
     Args:
-        are_final: whether the curves' own colours hold all that the look does to colours.
-        painted: (curve_count, 4), see `painted_colors.colors_of_curves`, in place of their own.
+        are_final: whether the look's effects on colours are in the curves' own colours already.
+        painted: (curve_count, 4), see `painted_colors.colors_of_curves`, instead of their own.
 
     Returns:
-        the material, and notes on what of the look it does not have.
+        the material, and notes on what it lacks of the look.
     """
     has_colors = put_colors(curves, shading, painted)
     slots, material = curves.materials, _own_material(curves)
@@ -72,8 +72,8 @@ def put_look_material(
 
 
 def put_colors(curves: bpy.types.Curves, shading: ShadingSettings, painted: Floats | None) -> bool:
-    """Give hair curves the colours that their material reads, as `put_look_material` does; whether
-    they have any."""
+    """Give hair curves the colours that their material reads, as `put_look_material` does; returns
+    whether they have any."""
     if painted is not None:
         set_attribute(curves, MATERIAL_COLOR, "CURVE", painted)
         return True
@@ -86,19 +86,19 @@ def put_colors(curves: bpy.types.Curves, shading: ShadingSettings, painted: Floa
 
 
 def is_as_made(material: bpy.types.Material) -> bool:
-    """Whether no artist has changed its nodes since it was made of a look."""
+    """Whether its nodes have not been changed since it was made from a look."""
     return bool(material.get(_NODES) == digest(_nodes(material), size=8))
 
 
 def is_behind(material: bpy.types.Material, look: ShadingSettings) -> bool:
-    """Whether it was made of another look, and is still as it was made: with nodes that an artist
-    has changed it is the artist's own."""
+    """Whether it was made from another look and its nodes have not been changed since; with changed
+    nodes it is the artist's own."""
     known = material.get(_LOOK)
     return known not in (None, digest(look, size=8)) and is_as_made(material)
 
 
 def _nodes(material: bpy.types.Material) -> list[object]:
-    """All that one can change of them but their places."""
+    """Everything of the nodes that an artist can change, except their places."""
     found: list[object] = []
     for node in material.node_tree.nodes:
         found.append((node.bl_idname, getattr(node, "parametrization", ""), node.mute))
@@ -116,14 +116,14 @@ def _plain(value: Any) -> list[float]:
 
 
 def look_material(curves: bpy.types.Curves) -> bpy.types.Material | None:
-    """The material of an earlier look that the curves have."""
+    """The material of a look that the curves have, if it can be edited."""
     marked = (each for each in curves.materials if each is not None and _MARK in each)
     return next((each for each in marked if each.is_editable), None)
 
 
 def _own_material(curves: bpy.types.Curves) -> bpy.types.Material | None:
-    """The same; a copy for these curves where others have it too, such as those of a duplicate,
-    whose look is another one. What renders show of a bake goes with its hair."""
+    """As `look_material`, but a copy for these curves if others use it too, such as those of a
+    duplicate, which may have another look. Copies that show their bake in renders share it."""
     material = look_material(curves)
     if material is None or material.users - material.use_fake_user == 1:
         return material
@@ -156,7 +156,7 @@ def _write(
     hair, notes = hair_from(shading)
     nodes = _Nodes(material.node_tree)
     node = nodes.hair(hair)
-    # what Blender's other engine and its Solid view show
+    # for Workbench and the Solid view
     material.diffuse_color = (*hair.color, 1.0)
     material.roughness = hair.roughness
     if has_colors:
@@ -174,7 +174,7 @@ def _write(
 
 
 def _differs(shading: ShadingSettings, hair: PrincipledHair) -> bool:
-    """Whether hair differs between strands or along them in ways that the node has no input for."""
+    """Whether colour varies between strands or along them in ways the node has no input for."""
     has_own_variation = shading.color_variation > 0.0 and hair.parametrization != "MELANIN"
     return has_own_variation or shading.tip_tint > 0.0 or shading.grey_fraction > 0.0
 
@@ -201,14 +201,14 @@ class _Nodes:
         self.tree.links.new(giver, taker)
 
     def put(self, socket: bpy.types.NodeSocket, value: Any) -> None:
-        """A number, a colour, or what another node gives."""
+        """Set an input to a number or a colour, or link it to an output."""
         if isinstance(value, bpy.types.NodeSocket):
             self.link(value, socket)
         else:
             socket.default_value = value
 
     def hair(self, hair: PrincipledHair) -> bpy.types.Node:
-        """The node at the output, with these inputs."""
+        """The Principled Hair node with these inputs, linked to the material's output."""
         output = self.add("ShaderNodeOutputMaterial")
         node = self.add(
             "ShaderNodeBsdfHairPrincipled", model=hair.model, parametrization=hair.parametrization
@@ -224,8 +224,8 @@ class _Nodes:
     def own_color(
         self, hair: PrincipledHair, shading: ShadingSettings, *, are_final: bool
     ) -> bpy.types.NodeSocket:
-        """The curves' colours for this node. A colour is a power of Euler's number by the root of
-        absorption, so that a factor on absorption is an exponent of colour."""
+        """The curves' colours for this node. Colour is exp(-c sqrt(absorption)), so that a factor
+        on absorption becomes an exponent of colour."""
         color = self.add("ShaderNodeAttribute", attribute_name=MATERIAL_COLOR).outputs["Color"]
         exponent: Any = color_exponent(hair.around)
         if not are_final:
@@ -255,7 +255,7 @@ class _Nodes:
         return self._vector("SCALE", value, amount).outputs["Vector"]
 
     def _whole(self, color: bpy.types.NodeSocket, look: tuple[float, ...]) -> bpy.types.NodeSocket:
-        """Curves without a colour have one of -1: they get the look's."""
+        """The colour, replaced by the look's for curves without one, which have -1."""
         red = self.add("ShaderNodeSeparateColor")
         self.put(red.inputs["Color"], color)
         is_own = self._math("GREATER_THAN", red.outputs["Red"], -0.5)
@@ -322,7 +322,7 @@ class _Nodes:
 
 
 def _socket(mix: bpy.types.Node, name: str) -> bpy.types.NodeSocket:
-    """Of a Mix node, which has one of each name for each type of data."""
+    """The enabled socket of this name; a Mix node has one for each type of data."""
     return next(each for each in mix.inputs if each.name == name and each.enabled)
 
 

@@ -11,14 +11,14 @@ import bpy
 from ...errors import HairloomError
 
 _LIBRARY = "assets/nodes/procedural_hair_node_assets.blend"
-#: types of input sockets that values are given to -> what Python calls the value
+#: types of input sockets that can be set -> Python types of their values
 _KINDS: dict[str, tuple[type, ...]] = {
     "NodeSocketBool": (bool,),
     "NodeSocketInt": (int,),
     "NodeSocketFloat": (int, float),
     "NodeSocketMenu": (str,),
 }
-#: the input of curls and braids that counts turns along a length
+#: the input of curls and braids that is a number of turns per length
 _PER_LENGTH = "Frequency"
 
 
@@ -27,13 +27,13 @@ def add_hair_nodes(
 ) -> bpy.types.Modifier:
     """Add one of Blender's node groups for hair as a modifier, with these values.
 
-    A group of this name that is in the file is used if it has these inputs; else Blender's own is
-    added once more.
+    A group of this name in the file is used if it has these inputs; else Blender's own is added
+    again.
 
     Args:
         values: by the names of inputs, as the artist sees them.
-        scale: how much larger than a human's the hair is; distances and frequencies are
-            fitted to it.
+        scale: size of the hair relative to a human's; distances and frequencies are scaled
+            accordingly.
 
     Raises:
         HairloomError: this Blender has no such group, or it has no such inputs.
@@ -61,7 +61,7 @@ def add_hair_nodes(
 
 
 def library_path() -> Path:
-    """Where this Blender keeps its node groups for hair."""
+    """The file with this Blender's node groups for hair."""
     folder = bpy.utils.system_resource("DATAFILES")
     return Path(folder) / _LIBRARY
 
@@ -95,7 +95,7 @@ def _inputs(group: bpy.types.NodeTree) -> dict[str, Any]:
 
 
 def _unknown(group: bpy.types.NodeTree, values: Mapping[str, Any]) -> list[str]:
-    """The inputs that the group lacks, or that take no such value."""
+    """The names of inputs that the group lacks, or that cannot take the value."""
     inputs = _inputs(group) if group.bl_idname == "GeometryNodeTree" else {}
     return [
         name

@@ -1,4 +1,4 @@
-"""How a head is drawn: by its own materials, as our bust, or as plain skin."""
+"""The materials that a head is drawn with: its own, those of our bust, or plain skin."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ from .mesh_files import meshes_of_file
 from .mesh_materials import MeshMaterial, material_of
 from .surfaces import read_material_slots
 
-#: faces without a material, as of a head without any
+#: for faces without a material
 PLAIN = MeshMaterial(SKIN, SKIN_SPECULAR, SKIN_ROUGHNESS)
-#: of our bust in a scene, if it has lost its materials
+#: tone of our bust in a scene, if it has lost its materials
 _TONE = "light"
 
 
 def head_look(name: str | None, head: Surface | None, tone: str) -> HeadLook | None:
-    """The materials of a head: its own, if it has any; of a mesh that is our bust, however it got
-    here, the skin and eyes of the bust; None is plain skin.
+    """The materials of a head: its own, if it has any; else, if its mesh is our bust, the skin and
+    eyes of the bust; else None, for plain skin.
 
     Args:
         name: of the head's object or file; None for the built-in one.
-        head: as it is drawn; materials count only where its mesh has as many triangles.
+        head: as it is drawn; own materials are used only if their meshes have as many triangles.
         tone: of our bust, one of bust_skin.TONES.
     """
     if head is None:
@@ -40,19 +40,19 @@ def head_look(name: str | None, head: Surface | None, tone: str) -> HeadLook | N
 
 
 def is_our_bust(head: Surface) -> bool:
-    """Whether it has the mesh of the built-in head, however it got here."""
+    """Whether it has the mesh of the built-in head, from wherever it was loaded."""
     ours = built_in_head().surface.triangles
     return head.corner_uv is not None and np.array_equal(head.triangles, ours)
 
 
 def look_below(hair: bpy.types.Object, head: Surface | None) -> HeadLook | None:
-    """The same of the head that this hair grows on."""
+    """`head_look` of the head that this hair grows on."""
     found = head_of(hair)
     return head_look(None if found is None else found.name, head, _TONE)
 
 
 def _own_look(name: str | None) -> HeadLook | None:
-    """The materials of an object of the scene or of a file; None where there are none."""
+    """The materials of an object in the scene or of a file; None: there are none."""
     if name is None:
         return None
     found = bpy.data.objects.get(name)
@@ -66,7 +66,7 @@ def _own_look(name: str | None) -> HeadLook | None:
 
 
 def _look_of(meshes: list[bpy.types.Object]) -> HeadLook | None:
-    """The materials of evaluated meshes, one after the other; None where no mesh has any."""
+    """The materials of evaluated meshes, one after the other; None: no mesh has any."""
     if not any(slot.material for mesh in meshes for slot in mesh.material_slots):
         return None
     depsgraph = bpy.context.evaluated_depsgraph_get()

@@ -1,4 +1,4 @@
-"""Shapes that curves had, kept in attributes of their points: a tool can be taken back."""
+"""Shapes of curves from before a tool, kept in attributes of their points to undo the tool."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ _ORDER = "hairloom_kept"
 class KeptShape:
     """The shape from before one tool.
 
-    attribute: of the points: where they were, object space [m].
-    done: custom property of the curves: a digest of what the tool made of them.
-    tool: its button.
+    attribute: name of the point attribute with the positions before, object space [m].
+    done: custom property of the curves with a digest of the shape that the tool made.
+    tool: label of the tool's button.
     """
 
     attribute: str
@@ -45,22 +45,25 @@ class KeptShape:
         return kept
 
     def keep(self, hair: bpy.types.Object) -> None:
-        """The tool is about to change the curves. What it has changed last, and nothing else since,
-        goes back to the shape from before both times."""
+        """Store the shape, before the tool changes the curves.
+
+        If only this tool has changed them since it was last used, the shape from before that use
+        stays.
+        """
         if self.before(hair) is None:
             set_attribute(hair.data, self.attribute, "POINT", curve_points(hair.data))
             others = (each for each in _in_order(hair.data) if each != self.attribute)
             hair.data[_ORDER] = " ".join((*others, self.attribute))
 
     def seal(self, hair: bpy.types.Object) -> None:
-        """The tool has changed the curves."""
+        """Store the digest of the shape that the tool has made."""
         hair.data[self.done] = digest(curve_points(hair.data).tobytes())
 
     def back(self, hair: bpy.types.Object) -> bool:
-        """Give curves their kept shape; those that were drawn since stay as they are. What other
-        tools have kept since then goes, as it is later than what the curves are now.
+        """Restore the kept shape; curves that were drawn since stay as they are. Shapes that other
+        tools have kept since then are deleted, as they are later than the restored one.
 
-        Returns whether anything has changed the curves since the tool, which is gone now.
+        Returns whether other changes, made since the tool was used, were lost.
 
         Raises:
             HairloomError: there is no such shape, or it is linked from another file.
@@ -95,12 +98,12 @@ KEPT_SHAPES = (COMBED, BEFORE_TRIM, BEFORE_FLOW)
 
 
 def _in_order(curves: bpy.types.Curves) -> list[str]:
-    """The attributes with kept shapes, the latest last."""
+    """The names of the attributes with kept shapes, the latest last."""
     return str(curves.get(_ORDER, "")).split()
 
 
 def _have_extent(points: Floats, offsets: np.ndarray) -> Bools:
-    """Curves (curve_count,) whose points are not all the same: Blender gives new ones zeros."""
+    """Mask (curve_count,) of curves whose points differ: those of new curves are all zero."""
     if len(offsets) < 2:
         return np.zeros(0, bool)
     low, high = (find.reduceat(points, offsets[:-1], axis=0) for find in (np.minimum, np.maximum))

@@ -26,14 +26,17 @@ def read_lights(
 
     Args:
         center: (3,) [m], world space.
-        suns: those of the world.
+        suns: the suns in the world's environment.
     """
     return brightest([*_lights(depsgraph), *suns], center)
 
 
 def light_warnings(depsgraph: bpy.types.Depsgraph, suns: Sequence[Light] = ()) -> tuple[str, ...]:
-    """Warnings about the scene's lights, each with its remedy; usually none. Suns as of
-    `read_lights`."""
+    """Warnings about the scene's lights, each with its remedy; usually none.
+
+    Args:
+        suns: see `read_lights`.
+    """
     count = sum(1 for _ in _lights(depsgraph)) + len(suns)
     if count <= LIGHT_CAPACITY:
         return ()
@@ -47,7 +50,7 @@ def light_warnings(depsgraph: bpy.types.Depsgraph, suns: Sequence[Light] = ()) -
 def no_light_warnings(lights: Sequence[Light], ambient: Color) -> tuple[str, ...]:
     """A warning if a view uses the scene's lights but there are none.
 
-    Such a view shows hair by the world alone, or, if that is black, by a studio's lights; see
+    Such a view lights hair by the world alone, or, if that is black, by studio lights; see
     `overlay.lit`.
     """
     if lights or not scene_lights_are_shown():
@@ -94,7 +97,7 @@ def _lights(depsgraph: bpy.types.Depsgraph) -> Iterator[Light]:
 
 
 def _light(instance: bpy.types.Object) -> Light | None:
-    """None: it emits no light of its own, or its scale is zero, so that it has no direction."""
+    """None: it is a portal and emits no light, or its scale is zero and it has no direction."""
     data, matrix = instance.data, instance.matrix_world
     color = _emission(data) * np.array(data.color) * data.energy * 2.0**data.exposure
     if data.use_temperature:
@@ -130,7 +133,7 @@ def _panel(data: bpy.types.AreaLight, matrix: Matrix) -> Panel:
     height = data.size_y if data.shape in ("RECTANGLE", "ELLIPSE") else data.size
     along = -back / np.linalg.norm(back)
     width_scale, height_scale = float(np.linalg.norm(right)), float(np.linalg.norm(up))
-    # the axes of an area light are perpendicular, whatever those of its matrix are
+    # the axes of an area light are perpendicular, even if its matrix is sheared
     up = np.cross(along, right)
     if not up.any():
         right = np.cross(along, np.eye(3)[np.abs(along).argmin()])

@@ -1,4 +1,4 @@
-"""Materials of looks follow their looks, until an artist changes their nodes."""
+"""Keeps materials of looks up to date with their looks, until an artist changes their nodes."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from ..properties.properties import settings_of
 from .hair_material import is_as_made, is_behind, look_material, put_colors, put_look_material
 from .painted_colors import colors_of_curves
 
-#: how long painted colours wait for further edits [s]
+#: time without edits before painted colours are looked up again [s]
 _PAUSE = 0.3
 
-#: session numbers of curves whose material waits
+#: session numbers of curves whose material is updated then
 _deferred: set[int] = set()
 
 
 def put_look(hair: bpy.types.Object) -> tuple[bpy.types.Material, tuple[str, ...]]:
-    """Give hair the material of its look, and keep what it was given; and what is to be said of it.
+    """Give hair the material of its look; returns the material and notes.
 
     Raises:
         HairloomError: see `colors_of_curves`.
@@ -32,7 +32,7 @@ def put_look(hair: bpy.types.Object) -> tuple[bpy.types.Material, tuple[str, ...
 
 
 def follow_curves(hair: bpy.types.Object) -> None:
-    """Its curves were replaced: its material reads the colours of those before."""
+    """Update the material, or the colours that it reads, after the hair's curves were replaced."""
     look, material = _look_of(hair.data), look_material(hair.data)
     try:
         if material is not None and is_as_made(material):
@@ -40,19 +40,19 @@ def follow_curves(hair: bpy.types.Object) -> None:
         else:
             depsgraph = bpy.context.evaluated_depsgraph_get()
             put_colors(hair.data, look, colors_of_curves(hair, look, depsgraph)[0])
-    except HairloomError:  # what is painted cannot be read; the preview says so
+    except HairloomError:  # painted colours cannot be read; the preview reports it
         return
 
 
 def follow(owner: bpy.types.ID) -> None:
-    """A setting was edited: where the look is another one now, its material gets it."""
+    """After a setting was edited, update the material if the look has changed."""
     if not isinstance(owner, bpy.types.Curves) or not owner.is_editable:
         return
     material = look_material(owner)
     look = _look_of(owner)
     if material is None or not is_behind(material, look):
         return
-    if look.color_map and not bpy.app.background:  # which takes long to look up
+    if look.color_map and not bpy.app.background:  # looking up a colour map is slow
         _deferred.add(owner.session_uid)
         if not bpy.app.timers.is_registered(_follow_deferred):
             bpy.app.timers.register(_follow_deferred, first_interval=_PAUSE)
@@ -61,7 +61,7 @@ def follow(owner: bpy.types.ID) -> None:
 
 
 def _follow_deferred() -> None:
-    """A timer of Blender's."""
+    """A timer for Blender: update the materials that were deferred."""
     for curves in [each for each in bpy.data.hair_curves if each.session_uid in _deferred]:
         _put_again(curves)
     _deferred.clear()
@@ -72,7 +72,7 @@ def _put_again(owner: bpy.types.Curves) -> None:
     try:
         if hair is not None:
             put_look(hair)
-    except HairloomError:  # what is painted cannot be read; the preview says so
+    except HairloomError:  # painted colours cannot be read; the preview reports it
         return
 
 

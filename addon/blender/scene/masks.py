@@ -1,7 +1,7 @@
-"""Reading what is painted of a groom's settings.
+"""Reading the masks of a groom's settings.
 
-A name is looked for as a vertex group and as an attribute of the surface, then as an attribute of
-the curves, then as an image, which lies on the surface's active UV map.
+A name is looked up as a vertex group, then as an attribute of the surface, then as an attribute of
+the curves, then as an image on the surface's active UV map.
 """
 
 from __future__ import annotations
@@ -62,14 +62,14 @@ class _Groups:
 
 @dataclass(frozen=True, eq=False)
 class Canvas:
-    """On what a groom may be painted.
+    """What masks of a groom are read from.
 
-    hair: its curves; None: they are of a file. surface: the object that it grows on, or None.
+    hair: its curves; None: they are from a file. surface: the object that it grows on, or None.
+    head: the surface as it was read. strands: of the usable curves. kept: indices of these.
+    good: the last usable state of every mask, by name.
     is_own: whether the strands are the hair's curves before their modifiers.
-    head: that as it was read. strands: those of the curves that are usable. kept: which these are.
-    good: every mask by its name, as it could be used last.
 
-    It is of one moment: vertex groups are read once, and shown as they were then.
+    Make a new one for each reading: vertex groups are read once, and not updated.
     """
 
     hair: bpy.types.Object | None
@@ -84,9 +84,11 @@ class Canvas:
     def masks(
         self, settings: Settings, depsgraph: bpy.types.Depsgraph
     ) -> tuple[Masks, tuple[str, ...]]:
-        """Those that settings name, and what is to be said of them. One that cannot be used stays
-        as it was last; one that never could acts nowhere. A selection is read whether or not it
-        acts, as keyframes may let it."""
+        """The masks that settings name, and warnings.
+
+        A mask that cannot be used stays as it was last; one that never could has no effect. The
+        selection is read even while it has no effect, as keyframes may turn it on.
+        """
         acting, labels = mask_names(settings), {p.name: p.label for p in settings.parameters()}
         named = dict(acting)
         if hasattr(settings, "only_selected") and self._has_selection(depsgraph):
@@ -114,7 +116,7 @@ class Canvas:
         return Masks(found), tuple(warnings)
 
     def read(self, name: str, depsgraph: bpy.types.Depsgraph) -> tuple[Mask | None, str]:
-        """A mask, and a warning; the one that was good last where it cannot be used now."""
+        """A mask, and a warning; if it cannot be used now, the one that was usable last."""
         try:
             mask = self.mask(name, depsgraph)
         except HairloomError as error:
@@ -126,8 +128,10 @@ class Canvas:
         return mask, ""
 
     def mask(self, name: str, depsgraph: bpy.types.Depsgraph) -> Mask:
-        """Raises:
-        HairloomError: there is none of this name, or none that can be used.
+        """The mask of this name.
+
+        Raises:
+            HairloomError: there is none of this name, or it cannot be used.
         """
         if name == SELECTION:
             return self._selection(depsgraph)
@@ -185,8 +189,8 @@ class Canvas:
         return StrandMask.of_points(self.strands, values)
 
     def _selection(self, depsgraph: bpy.types.Depsgraph) -> StrandMask:
-        """How much each curve is selected: as much as the most selected of its points. Where
-        Blender has no attribute all are."""
+        """The selection of each curve: the maximum over its points. Without the attribute, all are
+        selected."""
         found = self._on_curves(SELECTION, depsgraph)
         if found is None:
             return StrandMask(np.ones((self.strands.strand_count, 1), np.float32))
@@ -205,7 +209,7 @@ class Canvas:
         return curves
 
     def _on_curves(self, name: str, depsgraph: bpy.types.Depsgraph) -> tuple[Floats, str] | None:
-        """An attribute of the curves that are usable, or of their points, and its domain."""
+        """The values of an attribute on the usable curves or on their points, and its domain."""
         if self.hair is None:
             return None
         curves = self._curves(self.hair, depsgraph)
@@ -252,11 +256,11 @@ class Canvas:
 
 
 def read_map(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, name: str) -> Floats:
-    """As `read_weights`; where the mesh has none of this name but there is such an image, what that
-    is at the vertices.
+    """As `read_weights`; if the mesh has no weights of this name, an image of this name at the
+    vertices.
 
     Raises:
-        HairloomError: not a mesh, or nothing of this name that can be used.
+        HairloomError: not a mesh, or nothing usable of this name.
     """
     if name not in image_names() or obj.type != "MESH":
         return read_weights(obj, depsgraph, name)
@@ -289,11 +293,11 @@ def usable_image(
     """An image of one tile with pixels, for a surface with UVs.
 
     Args:
-        place: names the surface in messages. instead: what else may be painted.
+        place: names the surface in messages. instead: what the message suggests to paint instead.
 
     Raises:
-        HairloomError: there are no UVs, no pixels, or several tiles: Blender gives the pixels of
-            the first alone.
+        HairloomError: there are no UVs, no pixels, or several tiles, of which Blender's API only
+            gives the pixels of the first.
     """
     if corner_uv is None:
         raise HairloomError(
@@ -302,7 +306,7 @@ def usable_image(
             remedy=f"Unwrap it (Edit Mode, UV > Unwrap), or paint {instead}",
         )
     image = bpy.data.images[name]
-    if not (all(image.size) and image.has_data):  # asking for the size loads it
+    if not (all(image.size) and image.has_data):  # reading the size loads the image
         raise HairloomError(
             f"the image '{name}' has no pixels",
             place=place,
@@ -318,7 +322,7 @@ def usable_image(
 
 
 def image_values(image: bpy.types.Image) -> Floats:
-    """The pixels of an image as they are kept, by luminance, (height, width) float32."""
+    """The luminance of an image's pixels as stored, without decoding, (height, width) float32."""
     (width, height), channels = image.size, image.channels
     pixels = np.empty(width * height * channels, np.float32)
     image.pixels.foreach_get(pixels)
@@ -330,10 +334,10 @@ def image_values(image: bpy.types.Image) -> Floats:
 
 
 def usable(values: Floats, name: str, place: str) -> Floats:
-    """Not negative.
+    """The values, with negative ones raised to 0.
 
     Raises:
-        HairloomError: not finite.
+        HairloomError: a value is not finite.
     """
     if not np.isfinite(values).all():
         raise HairloomError(

@@ -1,4 +1,4 @@
-"""Meshes from files, through Blender's own importers: as data, or as objects of the scene."""
+"""Meshes from files, by Blender's own importers: as data, or as objects in the scene."""
 
 from __future__ import annotations
 
@@ -30,8 +30,7 @@ _IMPORTERS: dict[str, Callable[[str], Any]] = {
 
 
 def read_mesh_file(path: Path, *, need_uv: bool) -> tuple[Surface, tuple[str, ...]]:
-    """All meshes of a file as one Surface, in metres, Blender's Z up, and what is to be said of
-    it; the scene is not changed.
+    """All meshes of a file as one Surface, in metres, Z up, and notes; the scene is not changed.
 
     Raises:
         HairloomError: no such file, a format that Blender does not read, no faces, or no UVs
@@ -46,7 +45,7 @@ def read_mesh_file(path: Path, *, need_uv: bool) -> tuple[Surface, tuple[str, ..
 
 @contextmanager
 def meshes_of_file(path: Path) -> Iterator[list[bpy.types.Object]]:
-    """The file's mesh objects, sorted by name, in the open scene; gone at the end of the block.
+    """The file's mesh objects, sorted by name, in the open scene; removed at the end of the block.
 
     Raises:
         HairloomError: no such file, or a format that Blender does not read.
@@ -56,8 +55,9 @@ def meshes_of_file(path: Path) -> Iterator[list[bpy.types.Object]]:
 
 
 def import_mesh_file(path: Path, scale: float = 1.0) -> tuple[bpy.types.Object, tuple[str, ...]]:
-    """The mesh of a file, added to the open scene, and what is to be said of it; its place and size
-    are scaled. Several meshes, as of a head with its eyes, are joined to one.
+    """The mesh of a file, added to the open scene and scaled about the origin, and notes.
+
+    Several meshes, as of a head with its eyes, are joined to one.
 
     Raises:
         HairloomError: no such file, or a format that Blender does not read.
@@ -65,7 +65,7 @@ def import_mesh_file(path: Path, scale: float = 1.0) -> tuple[bpy.types.Object, 
     meshes = _imported(path)
     names = [each.name for each in meshes]
     bpy.context.view_layer.update()
-    mesh = max(meshes, key=lambda each: max(each.dimensions))  # gives its name to all
+    mesh = max(meshes, key=lambda each: max(each.dimensions))  # the joined mesh has its name
     notes: tuple[str, ...] = ()
     if len(meshes) > 1:
         _join(mesh, meshes)
@@ -76,9 +76,9 @@ def import_mesh_file(path: Path, scale: float = 1.0) -> tuple[bpy.types.Object, 
 
 
 def _join(target: bpy.types.Object, meshes: list[bpy.types.Object]) -> None:
-    """All meshes into the target, with one UV map: that which each of them shows."""
+    """Join all meshes into the target, with one UV map from the active map of each."""
     for each in meshes:
-        if each.data.users > 1:  # of linked duplicates each becomes a part
+        if each.data.users > 1:  # so that each linked duplicate becomes a part
             each.data = each.data.copy()
         if each.data.uv_layers.active is not None:
             each.data.uv_layers.active.name = "UVMap"
@@ -89,7 +89,7 @@ def _join(target: bpy.types.Object, meshes: list[bpy.types.Object]) -> None:
 
 
 def scale_object(obj: bpy.types.Object, scale: float) -> None:
-    """Scale an object about the world's origin, as its file had been in another unit."""
+    """Scale an object about the world's origin, as if its file had been in another unit."""
     bpy.context.view_layer.update()
     obj.matrix_world = Matrix.Scale(scale, 4) @ obj.matrix_world
     bpy.context.view_layer.update()

@@ -1,7 +1,7 @@
-"""What the renderer uses of a mesh's material: its Principled BSDF, if that is simple.
+"""Reads from a mesh's material what the renderer uses of it: a simple Principled BSDF.
 
 Base colour, alpha and normal map are read, each as a value or as one image; emission as a value.
-What other nodes do to them is ignored, and reported.
+The effects of other nodes on them are ignored, and reported.
 """
 
 from __future__ import annotations
@@ -20,20 +20,21 @@ from ..base.images import read_image
 type Color = tuple[float, float, float]
 
 _GREY: Color = (0.8, 0.8, 0.8)
-#: what Principled reflects where light falls straight in, at its default IOR of 1.5
+#: reflectance of Principled at normal incidence, at its default IOR of 1.5
 _SPECULAR = 0.04
 _ROUGHNESS = 0.5
 
-#: pictures by image and channel, the youngest last, kept until the image changes
+#: (session number of the image, kind) -> its state and pixels; the most recently used last
 _pictures: dict[tuple[int, str], tuple[tuple[object, ...], Floats]] = {}
-#: how many are kept, 16 MB each for images of 1,024 pixels
+#: number of pictures that are cached, 16 MB each for images of 1,024 pixels
 _KEPT = 16
 
 
 @dataclass(frozen=True)
 class MeshMaterial:
-    """color: scene-linear albedo; for an image, its mean. The others: see MeshSnapshot.
+    """A mesh's material for the renderer; fields without a description: see MeshSnapshot.
 
+    color: scene-linear albedo; for an image, its mean.
     notes: what could not be read, each with its remedy.
     """
 
@@ -81,14 +82,14 @@ def material_of(material: bpy.types.Material | None) -> MeshMaterial:
 
 
 def material_notes(obj: bpy.types.Object) -> tuple[str, ...]:
-    """What could not be read of an object's materials, each reported once."""
+    """Notes on what could not be read of an object's materials, each once."""
     found = (material_of(slot.material).notes for slot in obj.material_slots)
     return tuple(dict.fromkeys(note for notes in found for note in notes))
 
 
 def can_be_seen_through(obj: bpy.types.Object) -> bool:
-    """Whether a view may show what is behind an object: by its colour, or by a material's colour,
-    method, shader or alpha."""
+    """Whether an object may be transparent in a view: by its colour, or by the colour, render
+    method, shader or alpha of a material."""
     materials = (slot.material for slot in obj.material_slots)
     return obj.color[3] < 1.0 or any(_lets_through(each) for each in materials if each is not None)
 
@@ -141,7 +142,7 @@ class _Reader:
         return picture, own if picture is None else _mean(picture)
 
     def emission(self, socket: bpy.types.NodeSocket, strength: bpy.types.NodeSocket) -> Color:
-        """Light that it gives off, everywhere the same: of an image its mean."""
+        """The emitted light, as one value; for an image, its mean."""
         factor = float(strength.default_value)
         if not factor > 0.0:
             return (0.0, 0.0, 0.0)
@@ -169,7 +170,7 @@ class _Reader:
         key, state = (image.session_uid, kind), _state(image)
         known = _pictures.pop(key, None)
         if known is not None and known[0] == state and not image.is_dirty:
-            _pictures[key] = known  # now the youngest
+            _pictures[key] = known  # now the most recently used
             return known[1]
         try:
             picture = read_image(image, is_color=is_color, place=f"Image '{image.name}'")
@@ -191,12 +192,12 @@ class _Reader:
 
 
 def forget() -> None:
-    """Keep no picture."""
+    """Drop all cached pictures."""
     _pictures.clear()
 
 
 def _state(image: bpy.types.Image) -> tuple[object, ...]:
-    """What is another one where the pixels are others: among it when the file was written."""
+    """A state that changes with the pixels; includes the file's modification time."""
     file = Path(bpy.path.abspath(image.filepath, library=image.library))
     written = file.stat().st_mtime_ns if image.packed_file is None and file.is_file() else None
     settings = image.colorspace_settings.name, image.alpha_mode
@@ -214,7 +215,7 @@ def _shader(material: bpy.types.Material) -> bpy.types.Node | None:
 
 
 def _giver(socket: bpy.types.NodeSocket) -> tuple[bpy.types.Node, str] | None:
-    """The node that is linked to an input, and its output; None: the input has its own value."""
+    """The node linked to an input, and the name of its output; None: the input's value is used."""
     while socket.links:
         link = socket.links[0]
         if link.from_node.type != "REROUTE":
@@ -224,7 +225,7 @@ def _giver(socket: bpy.types.NodeSocket) -> tuple[bpy.types.Node, str] | None:
 
 
 def _specular(node: bpy.types.Node) -> float:
-    """The fraction of light that it reflects where light falls straight in."""
+    """The reflectance of a Principled node at normal incidence."""
     ior = node.inputs["IOR"].default_value
     level = 2.0 * node.inputs["Specular IOR Level"].default_value
     return float(min(((ior - 1.0) / (ior + 1.0)) ** 2 * level, 1.0))

@@ -1,4 +1,4 @@
-"""Collections that hair names in its settings, such as its ties: what acts on it is in there."""
+"""Collections named in the settings of hair, with the objects that act on it, such as its ties."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from ..base.objects import takes_objects
 
 
 def objects_in(hair: bpy.types.Object, setting: str) -> tuple[bpy.types.Object, ...]:
-    """What is in a collection of the hair, each once."""
+    """The objects in a collection of the hair, each once."""
     collection = getattr(hair.hairloom, setting)
     objects = () if collection is None else collection.all_objects
     return tuple(obj for obj in dict.fromkeys(objects) if obj is not None and obj != hair)
@@ -22,12 +22,14 @@ def put_into(
     objects: list[bpy.types.Object],
     scene: bpy.types.Scene,
 ) -> None:
-    """Put objects into a collection of the hair. It is made where there is none, and around one
-    that is linked or overridden.
+    """Put objects into a collection of the hair.
+
+    The collection is made if there is none. A linked or overridden one becomes the child of a new
+    one.
 
     Args:
         setting: the property of the hair that names it.
-        kind: what is in it, such as "Ties".
+        kind: what it holds, such as "Ties".
     """
     collection = getattr(hair.hairloom, setting)
     if collection is None or not takes_objects(collection):

@@ -1,7 +1,7 @@
-"""Reading the colours that are painted under hair.
+"""Reading the colours that are painted on the surface under hair.
 
-A name is looked for as a colour attribute of the surface, then as an image, which lies on the
-surface's active UV map.
+A name is looked up as a colour attribute of the surface, then as an image on the surface's active
+UV map.
 """
 
 from __future__ import annotations
@@ -27,15 +27,15 @@ from .curves import read_own_curves
 from .masks import usable, usable_image
 from .surfaces import evaluated_mesh, read_corner_uv, read_surface
 
-#: Colour spaces of images whose pixels Blender keeps as they are in scene-linear Rec. 709.
+#: Colour spaces of images whose stored pixels are scene-linear Rec. 709 already.
 _LINEAR = ("Linear Rec.709", "Non-Color")
 
 
 def read_colors(
     hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph, triangle_count: int | None
 ) -> tuple[PaintedColor | None, tuple[str, ...]]:
-    """What the hair's look names, None where it names nothing or nothing that can be used; and what
-    is to be said of it.
+    """The colour map that the hair's look names, None if there is none or it is unusable; and
+    warnings.
 
     Args:
         triangle_count: of the surface that the hair was made on; None: there is none.
@@ -65,7 +65,7 @@ def painted_colors(
         place: names the hair in messages.
 
     Raises:
-        HairloomError: there are none, or none that can be used.
+        HairloomError: there are none, or they are unusable.
     """
     if surface is None or triangle_count is None:
         raise HairloomError(
@@ -94,12 +94,13 @@ def painted_colors(
 def colors_of_curves(
     hair: bpy.types.Object, look: ShadingSettings, depsgraph: bpy.types.Depsgraph
 ) -> tuple[Floats | None, tuple[str, ...]]:
-    """What is painted under each curve before all modifiers, which hand it on to those that they
-    add, (curve_count, 4), -1 where it has the look's; None where nothing is. And what is to be said
-    of it.
+    """The colour under each curve before all modifiers, (curve_count, 4), -1 where it has the
+    look's colour; None without a colour map. And warnings.
+
+    Modifiers that add curves pass the colours on to these.
 
     Raises:
-        HairloomError: the curves are of another scale than their surface.
+        HairloomError: the scale of the curves is not that of their surface.
     """
     surface = head_of(hair)
     if not look.color_map or surface is None or surface.type != "MESH":
@@ -135,14 +136,16 @@ def _of_image(mesh: bpy.types.Mesh, name: str, place: str) -> ImageColor | None:
     meant = _meaning(image, place)
     pixels = np.empty(width * height * channels, np.float32)
     image.pixels.foreach_get(pixels)
-    if image.is_float:  # all others are whole numbers
+    if image.is_float:  # other images are stored as integers, which are always finite
         pixels = usable(pixels, name, place)
     return ImageColor(pixels.reshape(height, width, channels), meant, corner_uv)
 
 
 def _meaning(image: bpy.types.Image, place: str) -> Callable[[Floats], Floats]:
-    """What its pixels mean; those of floats are scene-linear and multiplied by opacity, whatever
-    its colour space, others are as the file has them."""
+    """The function from stored pixels to scene-linear premultiplied colours.
+
+    Pixels of float images are that already, whatever the colour space; others are as in the file.
+    """
     space, has_opacity = image.colorspace_settings.name, image.alpha_mode in ("STRAIGHT", "PREMUL")
     if image.is_float:
         return partial(_whole, has_opacity=has_opacity)
@@ -163,7 +166,7 @@ def _decoded(stored: Floats, *, is_coded: bool, has_opacity: bool) -> Floats:
 
 
 def _whole(stored: Floats, *, has_opacity: bool) -> Floats:
-    """Pixels (n, k) as colours with an opacity, (n, 4)."""
+    """Pixels (n, channels) as colours with an opacity, (n, 4)."""
     whole = np.ones((len(stored), 4), np.float32)
     whole[:, :3] = stored[:, :3] if stored.shape[1] >= 3 else stored[:, :1]
     if has_opacity and stored.shape[1] == 4:

@@ -1,4 +1,4 @@
-"""Particle hair to hair curves that are attached to their surface.
+"""Converting particle hair to hair curves that are attached to their surface.
 
 Blender's own conversion copies positions only: no surface, no parent, no root UVs.
 """
@@ -22,7 +22,7 @@ from .surfaces import read_surface
 
 
 def hair_systems(mesh: bpy.types.Object) -> list[bpy.types.ParticleSystem]:
-    """The hair of a mesh that is still particles: not of those that are hidden everywhere."""
+    """The hair particle systems of a mesh, except those hidden in both viewport and renders."""
     shown = [
         each.particle_system
         for each in mesh.modifiers
@@ -73,9 +73,8 @@ def convert_particle_hair(
 def _read(
     context: bpy.types.Context, mesh: bpy.types.Object, name: str
 ) -> tuple[Cleaned, Surface, bpy.types.Collection] | None:
-    """The hair of a particle system, as Blender converts it, what it grows on, and where Blender
-    puts it; the object that it makes is removed. None where there is no hair in it, as of particles
-    that are not shown."""
+    """The hair of a particle system as Blender converts it, its surface, and the collection where
+    Blender puts it; Blender's object is removed. None without hair, as of hidden particles."""
     mesh.particle_systems.active_index = mesh.particle_systems.find(name)
     was_selected = mesh.select_get()
     with context.temp_override(object=mesh, active_object=mesh):

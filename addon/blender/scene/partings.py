@@ -1,4 +1,4 @@
-"""Partings of one groom: curves that are drawn on its surface, the objects of a collection."""
+"""Partings of one groom: curves that are drawn on its surface, the objects in a collection."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ def partings_of(hair: bpy.types.Object) -> tuple[bpy.types.Object, ...]:
 
 
 def parting_state(hair: bpy.types.Object) -> tuple[Floats | str, ...]:
-    """Which lines part the hair, and where the artist has put them; what carries them with the
-    surface, such as a head that turns, or by itself, as an animation does, is not in it."""
+    """A state that changes if the artist changes or moves a parting, but not if the surface or an
+    animation carries it."""
     state: list[Floats | str] = []
     for obj in partings_of(hair):
         state += [f"{obj.session_uid} {obj.type}", _line_points(obj)]
@@ -34,7 +34,7 @@ def parting_state(hair: bpy.types.Object) -> tuple[Floats | str, ...]:
 
 
 def _placed_by(line: bpy.types.Object, head: bpy.types.Object | None) -> Iterator[bpy.types.Object]:
-    """The parents by which an artist moves a line over a head: neither that, nor what carries
+    """The parents by which an artist moves a line over a head: not the head, and not what carries
     both."""
     carriers = [] if head is None else [head, *_parents(head)]
     for each in _parents(line):
@@ -52,7 +52,7 @@ def _parents(obj: bpy.types.Object) -> Iterator[bpy.types.Object]:
 
 
 def is_same_state(one: tuple[Floats | str, ...], other: tuple[Floats | str, ...]) -> bool:
-    """Whether two `parting_state` are the same."""
+    """Whether two results of `parting_state` are equal."""
     return len(one) == len(other) and all(map(np.array_equal, one, other))
 
 
@@ -77,9 +77,10 @@ def _line_points(obj: bpy.types.Object) -> Floats:
 def read_partings(
     hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph
 ) -> tuple[Floats, tuple[str, ...]]:
-    """The straight pieces of all lines, (n, 2, 3) float32 [m] world space; and what cannot be used.
+    """The straight pieces of all lines, (n, 2, 3) float32 [m] world space; and notes on unusable
+    ones.
 
-    Nothing else of the objects counts: neither their thickness nor whether they are shown.
+    The thickness of the lines, and whether they are hidden, do not matter.
     """
     found, unusable = [_NONE], []
     for obj in partings_of(hair):
@@ -93,7 +94,7 @@ def read_partings(
 def add_partings(
     hair: bpy.types.Object, lines: list[bpy.types.Object], scene: bpy.types.Scene
 ) -> None:
-    """Put lines into the hair's collection of partings, which is made where there is none."""
+    """Put lines into the hair's collection of partings, which is made if there is none."""
     put_into(hair, "parting_collection", "Partings", lines, scene)
 
 
@@ -113,8 +114,8 @@ def copy_partings(
     scene: bpy.types.Scene,
     depsgraph: bpy.types.Depsgraph,
 ) -> None:
-    """Part hair along the partings of another groom where they are now, as a mesh that is a child
-    of a head that stands at the origin."""
+    """Give hair the partings of another groom where they are now, as a mesh that is a child of a
+    head at the origin."""
     lines, _ = read_partings(source, depsgraph)
     if not len(lines):
         return

@@ -1,4 +1,4 @@
-"""Where a groom's surface is in Blender's current evaluation."""
+"""The pose of a groom's surface in Blender's current evaluation."""
 
 from __future__ import annotations
 
@@ -21,7 +21,8 @@ def read_pose(
         vertex_count: of the head that the hair was bound to.
 
     Raises:
-        HairloomError: hair or head is gone, its position is not finite, or it is another mesh.
+        HairloomError: hair or head is gone, a position is not finite, or the number of vertices
+            has changed.
     """
     hair.found()
     if head is None:

@@ -13,7 +13,7 @@ from ...shading.marschner.principled import PrincipledHair, settings_from
 from ...shading.settings import ShadingSettings
 
 _NODE = "BSDF_HAIR_PRINCIPLED"
-#: input of the node -> our name for it; inputs that the node's options hide are not read
+#: input of the node -> field of `PrincipledHair`; inputs that the node's options hide are not read
 INPUTS = {
     "Color": "color",
     "Melanin": "melanin",
@@ -46,7 +46,7 @@ def look_from_material(
     """Settings that look like its material, and notes on what could not be read.
 
     Args:
-        before: settings that a material has no equivalent of are kept from these.
+        before: source of settings that have no equivalent in a material.
 
     Raises:
         HairloomError: there is no material with a Principled Hair.
@@ -67,7 +67,7 @@ def look_from_material(
 
 
 def look_from_named(name: str | None, before: Settings) -> tuple[ShadingSettings, tuple[str, ...]]:
-    """The same for a hair object of the open scene, by name.
+    """`look_from_material` for a hair object of the open scene, by name.
 
     Raises:
         HairloomError: there is no such hair object, or see `look_from_material`.
@@ -96,7 +96,7 @@ def _node_of(material: bpy.types.Material) -> bpy.types.Node | None:
 def _behind(
     ends: list[bpy.types.Node], entered: set[bpy.types.NodeTree]
 ) -> Iterator[bpy.types.Node]:
-    """These nodes and all nodes linked to them, nearest first, also those inside groups."""
+    """These nodes and all nodes that feed them, nearest first, also those inside groups."""
     waiting, seen = list(ends), set()
     while waiting:
         found = waiting.pop(0)

@@ -1,4 +1,4 @@
-"""Run by another Blender: renders a world alone, as a panorama whose middle is +X.
+"""A script for another Blender process: renders a world alone, as a panorama with +X in the middle.
 
 render_panorama.py -- WORLD.blend PANORAMA.exr
 """
@@ -8,7 +8,7 @@ import sys
 
 import bpy
 
-#: small suns want as many samples as these in all
+#: small suns need this many samples in total
 SIZE, SAMPLES = (1024, 512), 16
 
 

@@ -28,7 +28,7 @@ from .surfaces import read_rest_surfaces, read_surface
 
 #: node group of the modifier that Blender 5.2 gives to new hair
 _OWN_DYNAMICS = "Hair Dynamics"
-#: Its mode, and the one in which it only puts hair onto its deformed surface.
+#: Its input for the mode, and the mode in which it only puts hair onto its deformed surface.
 _MODE, _ATTACHES = "Mode", "Animation"
 
 
@@ -39,11 +39,12 @@ class Source:
     dropped: reason -> number of curves that cannot be used.
     kept: (strand_count,) indices of the curves that became strands.
     density: (vertex_count,) how densely children grow on the head, or None.
-    masks: what is painted of the settings of children.
-    head_warning, density_warning: a warning with its remedy, or empty. mask_warnings: such.
-    colors: what is painted under it, or None.
-    color_warnings: about that, and about strands without a colour.
-    holders: what holds it beside its roots, at rest.
+    masks: of the settings of children.
+    head_warning, density_warning: a warning with its remedy, or empty.
+    mask_warnings: warnings, each with its remedy.
+    colors: colours painted under the hair, or None.
+    color_warnings: about these, and about strands without a colour.
+    holders: what holds the hair beside its roots, at rest.
     partings: the straight pieces of its partings, (n, 2, 3) [m] world space; None: there are none.
     parting_warnings: about objects that cannot be partings.
     rest: the hair as it is stored, where it had to be put onto the posed head; else None.
@@ -92,7 +93,7 @@ def read_source(
     """Read hair and head; without a usable head, the hair alone, with a warning.
 
     Args:
-        good: see `Canvas`, which is filled.
+        good: see `Canvas`; new masks are added to it.
 
     Raises:
         HairloomError: the object holds no hair curves, or none that can be used.
@@ -136,12 +137,12 @@ def _on_head(
     head: Surface | None,
     depsgraph: bpy.types.Depsgraph,
 ) -> tuple[StrandSet, RestHair | None]:
-    """Strands on the head as it is posed, and as they are stored, if they had to be put there. An
-    animated style is where its curves are."""
+    """Strands on the posed head, and the stored rest hair if they had to be moved there. Curves of
+    an animated style are used where they are."""
     if head is None or hair.hairloom.dynamics.animated_style:
         return strands, None
     rests, is_deformed_only = read_rest_surfaces(head_of(hair), depsgraph, head)
-    # Subdivision moves a surface too, which is no pose
+    # subdivision moves the surface too, but that is not a pose
     least = DEFORMED if is_deformed_only else LOOSE_DISTANCE
     found = RestHair.found(strands, rests, head, least)
     return (strands, None) if found is None else (found.on(head), found)
@@ -153,7 +154,7 @@ def read_source_colors(
     head: Surface | None,
     depsgraph: bpy.types.Depsgraph,
 ) -> tuple[PaintedColor | None, tuple[str, ...]]:
-    """What is painted under hair, and all that is to be said of its colours."""
+    """The colours painted under hair, and all warnings about its colours."""
     found, problems = read_colors(hair, depsgraph, None if head is None else len(head.triangles))
     return found, (*problems, *color_notes(hair.name, strands))
 
@@ -173,9 +174,10 @@ def read_density(
 
 
 def check_density(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> None:
-    """Raises:
-    HairloomError: the head has no weights by which the artist wants children to grow, or none that
-        can be used.
+    """Check the weights that set the density of children.
+
+    Raises:
+        HairloomError: they are missing on the head, or unusable.
     """
     name = _density_name(hair)
     if not name:
@@ -187,7 +189,7 @@ def check_density(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Non
 
 
 def _density_name(hair: bpy.types.Object) -> str:
-    """By which children are to grow; empty where none are, or everywhere."""
+    """Name of the weights for children's density; empty: no children, or children everywhere."""
     has_children = hair.data.hairloom.children.method != "none"
     return str(hair.hairloom.children_density) if has_children else ""
 
@@ -201,8 +203,7 @@ def _no_density(name: str, head: bpy.types.Object | None) -> HairloomError:
 
 
 def own_dynamics(hair: bpy.types.Object) -> list[bpy.types.Modifier]:
-    """The object's enabled modifiers in which Blender's own dynamics simulate hair, in viewport or
-    render.
+    """The object's modifiers with Blender's own hair dynamics that simulate in viewport or render.
 
     They would move the hair a second time. Those in mode *Animation*, as new hair has them, only
     put it onto its surface.
@@ -219,7 +220,7 @@ def own_dynamics(hair: bpy.types.Object) -> list[bpy.types.Modifier]:
 
 
 def _mode(modifier: bpy.types.Modifier) -> Any:
-    """The input in which Hair Dynamics has its mode; None in a group without one."""
+    """The input with the mode of Hair Dynamics; None in a group without one."""
     sockets = modifier.node_group.interface.items_tree
     found = [each for each in sockets if each.item_type == "SOCKET" and each.name == _MODE]
     return getattr(modifier.properties.inputs, found[0].identifier, None) if found else None
@@ -251,8 +252,8 @@ def dynamics_warnings(hair: bpy.types.Object) -> tuple[str, ...]:
 
 
 def mute_own_dynamics(hair: bpy.types.Object) -> int:
-    """Let Blender's own hair dynamics only put hair onto its surface, or turn them off where they
-    cannot; returns how many."""
+    """Set Blender's own hair dynamics to only put hair onto its surface; modifiers without that
+    mode are turned off. Returns how many were changed."""
     modifiers = own_dynamics(hair)
     for modifier in modifiers:
         mode = _mode(modifier)

@@ -1,4 +1,4 @@
-"""Strokes of one groom: curves that its hair follows, the objects of a collection."""
+"""Strokes of one groom: curves that its hair is combed along, the objects in a collection."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from ...errors import HairloomError
 from .drawn_lines import lines_of
 from .own_collections import objects_in
 
-#: setting of the hair that names the collection, and what is in it
+#: setting of the hair that names the collection, and the name for what it holds
 SETTING, KIND = "stroke_collection", "Strokes"
 
 
@@ -21,8 +21,8 @@ def strokes_of(hair: bpy.types.Object) -> tuple[bpy.types.Object, ...]:
 def read_strokes(
     hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph
 ) -> tuple[tuple[Floats, ...], tuple[str, ...]]:
-    """All strokes from their first point to their last, (m, 3) [m] world space each; and what
-    cannot be used."""
+    """All strokes, each from its first point to its last, (m, 3) [m] world space; and notes on
+    unusable ones."""
     found: list[Floats] = []
     unusable: list[str] = []
     for obj in strokes_of(hair):

@@ -1,7 +1,7 @@
 """Meshes that hair grows from or collides with: evaluated mesh to a `Surface` in world space.
 
-A mesh that is read again, by another groom or after an edit elsewhere, gives the same surface while
-it is in use, with all that has been found on it: its search trees, the balls within it.
+A mesh that is read again, for another groom or after an edit elsewhere, gives the same `Surface`
+object while that is in use, with all that was computed on it: its search trees, the balls within.
 """
 
 from __future__ import annotations
@@ -30,14 +30,14 @@ CARD_ATTRIBUTES = ("occlusion", "along")
 
 @dataclass
 class _Read:
-    """in_use: surfaces that somebody may have. last: the one that was read last, kept for who reads
-    it again."""
+    """The surfaces that were read. in_use: those that may still be in use. last: the one that was
+    read last, kept in case it is read again."""
 
     in_use: list[weakref.ref[Surface]] = field(default_factory=list)
     last: Surface | None = None
 
     def kept(self, surface: Surface) -> Surface:
-        """The surface that is in use already if it is the same."""
+        """An equal surface that is in use already, or else this one."""
         there = [known for one in self.in_use if (known := one()) is not None]
         self.last = next((known for known in there if _is_same(surface, known)), surface)
         if self.last is surface:
@@ -55,7 +55,7 @@ def read_surface(
     """The mesh that Blender shows after all modifiers, triangulated, in world space.
 
     Args:
-        need_uv: without it a mesh without UVs gives a Surface without them.
+        need_uv: False: a mesh without UVs gives a Surface without them.
         place: names the mesh in error messages.
 
     Raises:
@@ -67,7 +67,7 @@ def read_surface(
             raise HairloomError(
                 "this mesh has no faces", place=place, remedy="Choose a mesh with faces"
             )
-        # triangles would give their vertices one by one, this is a copy of all
+        # faster than the vertices of loop triangles, which are not stored as an array
         triangles = read_attribute(mesh, ".corner_vert", "CORNER")[loops]
         corner_uv = read_corner_uv(mesh, loops)
         if corner_uv is None and need_uv:
@@ -83,11 +83,11 @@ def read_surface(
 def read_rest_surfaces(
     obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, posed: Surface
 ) -> tuple[list[Surface], bool]:
-    """The same mesh before its shape keys and modifiers, and with its shape keys alone, each where
-    it is known, with the triangles of the posed one; and whether modifiers only deform it.
+    """The mesh at rest: before shape keys and modifiers, and with its shape keys alone, each if it
+    is known, with the triangles of the posed one; and whether modifiers only deform it.
 
     Args:
-        posed: as `read_surface` gives it now.
+        posed: what `read_surface` returns now.
     """
     with evaluated_mesh(obj, depsgraph, obj.name) as mesh:
         rest = read_attribute(mesh, "rest_position", "POINT", 3)
@@ -106,7 +106,7 @@ def read_rest_surfaces(
 
 
 def _keyed(mesh: bpy.types.Mesh, depsgraph: bpy.types.Depsgraph) -> Floats | None:
-    """Its vertices by its relative shape keys alone, as they are now; None where it has none."""
+    """The vertices with the current relative shape keys alone; None without any."""
     if mesh.shape_keys is None or not mesh.shape_keys.use_relative:
         return None
     keys = mesh.shape_keys.evaluated_get(depsgraph).key_blocks
@@ -115,7 +115,7 @@ def _keyed(mesh: bpy.types.Mesh, depsgraph: bpy.types.Depsgraph) -> Floats | Non
         key.points.foreach_get("co", places[key.name].ravel())
     result: Floats = places[keys[0].name].copy()
     for key in keys[1:]:
-        # a vertex group would limit it, which is rare: then another surface fits better
+        # vertex groups of keys are rare and ignored: another surface then fits better
         if not key.mute and key.value:
             change = places[key.name] - places[key.relative_key.name]
             result += np.float32(key.value) * change
@@ -133,7 +133,7 @@ def _is_same(one: Surface, other: Surface) -> bool:
 
 
 def uv_map_note(obj: bpy.types.Object) -> str:
-    """Which of several UV maps counts; "" where there are not several."""
+    """A note on which of several UV maps is used; "" if there are not several."""
     maps = obj.data.uv_layers
     if len(maps) < 2:
         return ""
@@ -188,8 +188,8 @@ def _positions(mesh: bpy.types.Mesh) -> Floats:
 
 
 def read_corner_uv(mesh: bpy.types.Mesh, loops: Ints) -> Floats | None:
-    """UVs of the active map at each triangle's corners, (triangle_count, 3, 2), or None. Where that
-    is the one in which we have written the occlusion of cards, those of the first other one.
+    """UVs of the active map at each triangle's corners, (triangle_count, 3, 2), or None. If the
+    active map is the one that holds the occlusion of cards, the first other map is used.
 
     Args:
         loops: (triangle_count, 3), see `mesh_arrays.triangle_corners`.

@@ -1,4 +1,4 @@
-"""What trims a groom: closed meshes, and Empties or flat meshes as planes, of a collection."""
+"""Trim shapes of a groom: the closed meshes, flat meshes and Empties (planes) in a collection."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from ..base.objects import head_of, matrix_of
 from .own_collections import objects_in
 from .surfaces import read_surface
 
-#: setting of the hair that names the collection, and what is in it
+#: setting of the hair that names the collection, and the name for what it holds
 SETTING, KIND = "trim_collection", "Trim Shapes"
 
 
@@ -41,14 +41,14 @@ def trim_shapes_of(hair: bpy.types.Object) -> tuple[bpy.types.Object, ...]:
 
 
 def may_trim(obj: bpy.types.Object, hair: bpy.types.Object) -> bool:
-    """Whether an object that is selected beside the hair is meant to trim it."""
+    """Whether an object that is selected together with the hair is meant to trim it."""
     return obj.type in {"MESH", "EMPTY"} and obj != head_of(hair)
 
 
 def read_shapes(
     objects: tuple[bpy.types.Object, ...], depsgraph: bpy.types.Depsgraph
 ) -> tuple[tuple[Shape, ...], tuple[str, ...]]:
-    """The shapes in world space, and what cannot be used."""
+    """The shapes in world space, and notes on unusable objects."""
     found: list[Shape] = []
     unusable: list[str] = []
     for obj in objects:
@@ -60,10 +60,10 @@ def read_shapes(
 
 
 def read_shape(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Shape:
-    """A shape in world space: of an Empty the plane across its Z axis.
+    """A shape in world space; for an Empty, the plane across its Z axis.
 
     Raises:
-        HairloomError: it is no Empty and no mesh, has no size, or is open and not flat.
+        HairloomError: it is neither an Empty nor a mesh, has no size, or is open and not flat.
     """
     if obj.type == "EMPTY":
         return _plane_of(obj, depsgraph)
@@ -82,7 +82,7 @@ def read_shape(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Shape:
 
 def _plane_of(empty: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Plane:
     matrix = matrix_of(empty, depsgraph)
-    # across X and Y, which a sheared parent may not leave across Z
+    # perpendicular to X and Y; Z may not be, under a sheared parent
     normal = np.cross(matrix[:3, 0], matrix[:3, 1])
     size = float(np.linalg.norm(normal))
     if not (np.isfinite(matrix).all() and size > 0.0):

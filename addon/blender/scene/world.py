@@ -1,9 +1,8 @@
-"""The light of a scene's world, by direction: an Environment of its nodes.
+"""The light of a scene's world, by direction: an Environment from its nodes.
 
-A plain colour is one; an Environment Texture, turned by a Mapping, is read from its image; whatever
-else there is, such as a Sky Texture, another Blender renders as a small panorama, once for each
-state of the nodes. In the window that is done beside it, and the world is its plain colour until
-then.
+A plain colour, or an Environment Texture turned by a Mapping, is read directly. All other nodes,
+such as a Sky Texture, are rendered by another Blender as a small panorama, once for each state of
+the nodes. In the window this runs in the background, and until then the world has its plain colour.
 """
 
 from __future__ import annotations
@@ -33,24 +32,24 @@ from ..base.images import read_image
 from ..base.latest_job import LatestJob
 
 _SCRIPT = Path(__file__).with_name("render_panorama.py")
-#: states of worlds that are kept, so that an animated one does not fill the memory
+#: number of states of worlds that are cached, so that an animated one does not fill the memory
 _KEPT = 16
-#: seconds for another Blender to start and render a panorama, on a busy machine too
+#: timeout [s] for another Blender to start and render a panorama, on a busy machine too
 _PATIENCE = 120.0
-#: settings of nodes that change no light, and how deep groups are looked into
+#: settings of nodes that do not affect light, and the depth to which groups are compared
 _UNSEEN = {each.identifier for each in bpy.types.Node.bl_rna.properties} - {"mute"}
 _DEPTH = 16
 
 
 @dataclass(frozen=True, eq=False)
 class _Read:
-    """note: what could not be read, with its remedy; empty if all is well."""
+    """A world as it was read. note: what could not be read, with its remedy; empty: all is well."""
 
     environment: Environment
     note: str = ""
 
 
-#: the last that were asked for, the youngest at the end
+#: cache, the most recently used last
 _known: dict[Hashable, _Read] = {}
 
 
@@ -58,19 +57,19 @@ def read_environment(scene: bpy.types.Scene, *, blocking: bool = True) -> Enviro
     """The world's light; the same object while nothing of it changes.
 
     Args:
-        blocking: False: what takes a while is done beside the window; until then a plain colour.
+        blocking: False: render nodes in the background; until then a plain colour is returned.
     """
     return _read(scene.world, blocking=blocking).environment
 
 
 def world_notes(scene: bpy.types.Scene) -> tuple[str, ...]:
-    """What of the world could not be read, with its remedy; usually nothing."""
+    """Notes on what of the world could not be read, with remedies; usually none."""
     note = _read(scene.world, blocking=False).note
     return (note,) if note else ()
 
 
 def studio_environment(shading: bpy.types.View3DShading) -> Environment:
-    """The picture of a world that a 3D view lights by in place of the scene's; black where it has
+    """The world picture by which a 3D view is lit instead of the scene's world; black if it has
     none, as in Solid mode.
 
     Only the view's own settings are read, and each file once.
@@ -86,7 +85,7 @@ def _studio(path: str, rotation: float, intensity: float) -> Environment:
     panorama = _studio_panorama(path)
     if panorama is None:
         return Environment()
-    # Blender turns the direction in which it looks the picture up
+    # Blender turns the lookup direction, so the picture turns the other way
     turn = np.array(Euler((0.0, 0.0, -rotation)).to_matrix())
     return environment_of(intensity * panorama, turn)
 
@@ -114,7 +113,7 @@ def _read(world: bpy.types.World | None, *, blocking: bool) -> _Read:
         return _plain(world)
     uid, key = world.original.session_uid, _key(world)
     if key not in _known and not blocking:
-        # a sky that is being turned stays as it was until the new one is there
+        # while a sky is being edited, its last rendering is used until the new one is there
         _want(uid, key, _colors(world))
         return _rendered_last(uid) or _plain(world)
 
@@ -131,18 +130,18 @@ def _key(world: bpy.types.World) -> Hashable:
 
 
 def _rendered_last(uid: int) -> _Read | None:
-    """What the world of this number was when it was last asked for; None where nobody did."""
+    """The last rendering of the world with this session number; None: there is none."""
     keys = (each for each in reversed(_known) if isinstance(each, tuple))
     return next((_known[key] for key in keys if key[:2] == ("nodes", uid)), None)
 
 
 def _want(uid: int, key: Hashable, plain: tuple[float, float, float]) -> None:
-    """Have the world of this number rendered beside the window."""
+    """Have the world with this session number rendered in the background."""
 
     def begin() -> Callable[[object], tuple[Hashable, _Read]]:
         found = (each for each in bpy.data.worlds if each.session_uid == uid)
         world = next(found, None)
-        if world is None or world.node_tree is None:  # gone since, and nobody asks for it
+        if world is None or world.node_tree is None:  # gone since, so the result is not used
             return lambda _: (key, _Read(Environment(plain)))
         folder = tempfile.TemporaryDirectory(prefix="hairloom")
         _write(world, Path(folder.name))
@@ -150,7 +149,7 @@ def _want(uid: int, key: Hashable, plain: tuple[float, float, float]) -> None:
         return lambda _: work()
 
     if _job.wants(key) and not _job.is_pending:
-        _job.cancel()  # what it gave is forgotten
+        _job.cancel()  # its result has dropped out of the cache
     _job.want(key, begin)
 
 
@@ -163,7 +162,7 @@ def _once(key: Hashable, make: Callable[[], _Read]) -> _Read:
 
 
 def _plain(world: bpy.types.World) -> _Read:
-    """The Background's own colour, whatever is linked to it, or that of a world without nodes."""
+    """The colour of the Background, ignoring other nodes, or of a world without nodes."""
     color = _colors(world)
     return _once(("plain", color), lambda: _Read(Environment(color)))
 
@@ -183,7 +182,7 @@ def _colors(world: bpy.types.World) -> tuple[float, float, float]:
 
 
 def _surface(world: bpy.types.World) -> bpy.types.Node | None:
-    """What the world shows; None without nodes, or where nothing is shown."""
+    """The node linked to the world's output; None: there are no nodes, or none is linked."""
     if world.node_tree is None:
         return None
     output = world.node_tree.get_output_node("CYCLES") or world.node_tree.get_output_node("EEVEE")
@@ -221,7 +220,7 @@ def _picture(surface: bpy.types.Node) -> _Read | None:
 
 
 def _turn(socket: bpy.types.NodeSocket) -> Floats | None:
-    """From a panorama's directions to those of the world, (3, 3); None if it is no rotation."""
+    """The rotation from a panorama's directions to the world's, (3, 3); None: it is not one."""
     if not socket.is_linked:
         return np.eye(3)
     node, output = socket.links[0].from_node, socket.links[0].from_socket
@@ -250,7 +249,7 @@ def _giver(socket: bpy.types.NodeSocket) -> bpy.types.Node | None:
 
 
 def _image_state(image: bpy.types.Image) -> Hashable:
-    """Equal while its pixels are."""
+    """A state that is equal while the pixels are."""
     path = bpy.path.abspath(image.filepath, library=image.library)
     written = os.path.getmtime(path) if os.path.isfile(path) else 0.0
     packed = 0 if image.packed_file is None else image.packed_file.size
@@ -265,9 +264,9 @@ def _image_state(image: bpy.types.Image) -> Hashable:
 
 @lru_cache(maxsize=1)
 def _panorama(uid: int, _state: Hashable) -> Floats:
-    """Pixels of the image of this number in scene-linear colour, few enough, (rows, columns, 3).
+    """Scene-linear pixels of the image with this session number, reduced, (rows, columns, 3).
 
-    Kept while its state is the same, so that turning it does not read it again.
+    Cached by its state, so that it is not read again when the panorama is turned.
 
     Raises:
         HairloomError: its file is missing or broken.
@@ -278,13 +277,13 @@ def _panorama(uid: int, _state: Hashable) -> Floats:
 
 
 def _rgb(picture: Floats) -> Floats:
-    """A file's colours, grey ones too."""
+    """The colours of a picture, (rows, columns, 3), also of a grey one."""
     colors = picture[..., :3] if picture.shape[-1] >= 3 else picture[..., :1]
     return np.broadcast_to(colors, (*colors.shape[:2], 3))
 
 
 def _state(tree: bpy.types.NodeTree, depth: int = 0) -> Hashable:
-    """Equal while the nodes give the same light."""
+    """A state that is equal while the nodes give the same light."""
     nodes = tuple((node.name, *_node_state(node, depth)) for node in tree.nodes)
     links = tuple(
         (link.from_node.name, link.from_socket.identifier)
@@ -332,11 +331,11 @@ def _write(world: bpy.types.World, folder: Path) -> None:
 
 
 def _rendered(folder: Path, name: str, plain: tuple[float, float, float]) -> _Read:
-    """What another Blender renders of the world that was written there."""
+    """The world that was written into this folder, rendered by another Blender."""
     panorama = folder / "panorama.exr"
     program, settings = blender_command(), None
     if program is None:
-        # among the modules of this one are those of Blender itself, which need it around them
+        # this process may have Blender's modules on its path, which only work within Blender
         program, settings = python_program(sys.executable), {"PYTHONPATH": ""}
     files = str(folder / "world.blend"), str(panorama)
     try:
@@ -366,7 +365,7 @@ def _rendered_beside(
 
 
 def _take() -> None:
-    """What was rendered beside the window has arrived: worlds are read again."""
+    """Take a world rendered in the background, and have worlds read again."""
     found = _job.take()
     if found is not None:
         key, read = found
