@@ -1,4 +1,4 @@
-"""What both solvers do alike: with the motion that is shown, and with baked guides."""
+"""What both solvers share: the motion that is shown, and showing baked guides."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from ...rig_flow import Pose, Rig
 
 
 class BaseSolver:
-    """Has a motion, of which baked guides may be shown; see `solvers.Solver`."""
+    """Holds the motion of a solver, whose guides may come from a bake; see `solvers.Solver`."""
 
     def __init__(self, rig: Rig, motion: Motion | None) -> None:
         self._rig = rig
@@ -48,12 +48,16 @@ class BaseSolver:
         self._led, self._is_baked = led, True
 
     def _take(self, motion: Motion) -> None:
-        """Show this motion; what was drawn, led out or baked before is over."""
+        """Show this motion; drops earlier strands, led-out strands and baked guides."""
         raise NotImplementedError
 
 
 def carried_motion(rig: Rig, motion: Motion, pose: Pose, guides: Floats) -> Motion:
-    """A motion that shows baked guides, if they belong to this rig; colliders are no matter."""
+    """A motion that shows baked guides, without colliders.
+
+    Raises:
+        HairloomError: the shape of the guides is not this rig's.
+    """
     wanted = rig.guide_grid.shape
     if guides.shape != wanted:
         raise HairloomError(
@@ -68,7 +72,7 @@ def carried_motion(rig: Rig, motion: Motion, pose: Pose, guides: Floats) -> Moti
 
 
 def let_go(rig: Rig, shown: Motion) -> Motion:
-    """The motion that starts from shown guides at no speed."""
+    """The motion that starts from the shown guides at rest."""
     begun = motion_flow.begin(rig, shown.pose)
     rows = rows_of(shown.guides, "bake")
     dynamics = replace(begun.dynamics, position=rows, previous=rows)

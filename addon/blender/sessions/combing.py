@@ -1,4 +1,4 @@
-"""What all tools do that comb the curves of one hair, before their modifiers."""
+"""What all tools share that comb the curves of one hair object, before their modifiers."""
 
 from __future__ import annotations
 
@@ -31,11 +31,10 @@ class Combed:
 
 
 def surface_to_comb_on(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Surface:
-    """What the hair grows on, in world space.
+    """The surface of the hair, in world space.
 
     Raises:
-        HairloomError: it has no surface, or one that cannot be used; or as
-            `check_curves_editable`.
+        HairloomError: it has no usable surface, or as `check_curves_editable`.
     """
     check_curves_editable(hair, depsgraph)
     head = head_of(hair)
@@ -57,15 +56,15 @@ def comb(
     *,
     kept_as: KeptShape | None = None,
 ) -> Parts[Combed]:
-    """Give the hair's curves other points; those that change are led out of the surface.
+    """Move the points of the hair's curves; curves that change are led out of the surface.
 
     Args:
-        points_of: strands that are bound to the surface, world space -> their points.
-        begin: (point_count, 3) object space, the points to begin with; None: as they are.
-        kept_as: what keeps the shape that they have before.
+        points_of: from strands in world space, bound to the surface, to their new points.
+        begin: (point_count, 3) object space, the points to begin with; None: the present ones.
+        kept_as: keeps the shape from before.
 
     Raises:
-        HairloomError: no curves that can be used.
+        HairloomError: no usable curves.
     """
     own = read_own_curves(hair, depsgraph, begin)
     place, count = hair.name, own.strands.strand_count

@@ -26,12 +26,13 @@ from .base_solver import BaseSolver
 
 
 class ComputeSolver(BaseSolver):
-    """On the GPU. Textures come with the first frame that is simulated or shown.
+    """Solver on the GPU. Textures are made with the first frame that is simulated or shown.
+
+    The dynamics of the motion that it holds are those from which the GPU started; newer states are
+    on the GPU alone.
 
     Args:
         texels: see `texels_of`.
-
-    It keeps a motion whose dynamics are those from which the GPU started; what is newer lies there.
     """
 
     form = "compute"
@@ -42,7 +43,7 @@ class ComputeSolver(BaseSolver):
         super().__init__(rig, motion)
         self._is_resting = motion is None
         self._is_drawn = False
-        self._since = np.inf  # time since the frame that leading out goes on from [s]
+        self._since = np.inf  # time since the frame that leading out continues from [s]
         self._dynamics: DynamicsPass | None = None
         self._colliders = UploadedColliders()
         self._ride = RidePass(
@@ -86,7 +87,7 @@ class ComputeSolver(BaseSolver):
         if self._is_baked:
             self._take(self.motion)
         if self._motion.clearance is not None and not self._is_resting:
-            self._draw()  # what was not shown counts too: motion does not depend on who looks
+            self._draw()  # so that motion does not depend on which frames are shown
             self._since = frame.hair_time
         self.meet(frame.colliders, frame.settings, frame.painted)
         motion = self._motion
@@ -108,7 +109,7 @@ class ComputeSolver(BaseSolver):
 
     def take_style(self, rig: Rig) -> None:
         if self._motion.clearance is not None and not self._is_resting:
-            self._draw()  # the frame before, by its style
+            self._draw()  # the last frame, with its own style
         self._rig, self._motion = rig, motion_flow.with_style(rig, self._motion)
         self._ride.take_style(rig.strands, rig.guide_grid, rig.riders)
         if self._dynamics is not None:
@@ -135,7 +136,7 @@ class ComputeSolver(BaseSolver):
         return replace(snapshot, device_points=self._ride.points)
 
     def release(self) -> None:
-        """Let go of all that lies on the GPU; the next frame goes on from what was read back."""
+        """Free everything on the GPU; the next frame goes on from the motion that was read back."""
         is_resting, is_baked, led = self._is_resting, self._is_baked, self._led
         motion = self._motion if is_baked else self.motion
         self._ride.release()
@@ -144,11 +145,11 @@ class ComputeSolver(BaseSolver):
 
     @property
     def _guides_texture(self) -> Any:
-        """The guides on the GPU; None where those of the motion are meant."""
+        """The guides on the GPU; None if those of the motion are current."""
         return None if self._dynamics is None else self._dynamics.guides
 
     def _take(self, motion: Motion) -> None:
-        """Show the guides of this motion; what was simulated on the GPU is over."""
+        """Show the guides of this motion; the simulation on the GPU ends."""
         if self._dynamics is not None:
             self._dynamics.release()
             self._dynamics = None
@@ -157,7 +158,7 @@ class ComputeSolver(BaseSolver):
         self._is_baked = self._is_resting = self._is_drawn = False
 
     def _draw(self) -> None:
-        """Bring the strands on the GPU to this moment, once."""
+        """Update the strands on the GPU to this moment, once."""
         if self._is_drawn and self._ride.points.texture is not None:
             return
         pose, texture = self.pose, self._guides_texture
@@ -172,5 +173,5 @@ class ComputeSolver(BaseSolver):
 
 
 def texels_of(rig: Rig) -> RideTexels:
-    """What a solver will upload of this rig's strands, so that a thread may make it before."""
+    """The data of this rig's strands that a solver uploads; a thread may make it earlier."""
     return RideTexels.of(rig.strands, rig.root_holds, rig.riders)

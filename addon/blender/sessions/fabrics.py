@@ -1,7 +1,7 @@
-"""The fabric of a fin, made where it begins to play.
+"""The fabric of a fin, made when it begins to play.
 
-That takes a second for 10,000 vertices: longer than a window may stand still. So Play and playback
-have it made beside the window's work, and it is kept, as each round of playback begins alike.
+That takes a second for 10,000 vertices, too long for a window to freeze. So Play and playback have
+it made in the background, and it is cached, as each loop of playback begins with the same mesh.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ from ..base.redraw import redraw_panels
 from ..base.thread_work import ThreadWork
 from ..colliders.fields import NotMadeYetError
 
-#: Meshes of so few triangles take a hundredth of a second, and are waited for.
+#: Meshes with at most this many triangles take a hundredth of a second, and are waited for.
 AT_ONCE = 500
 
 
 @dataclass(frozen=True, eq=False)
 class ClothMesh:
-    """A mesh that begins to move as cloth; arrays as in `start_cloth`."""
+    """A mesh that is to move as cloth; arrays as in `start_cloth`."""
 
     positions: Floats
     triangles: Ints
@@ -30,7 +30,7 @@ class ClothMesh:
     edges: Ints
 
     def is_woven_as(self, other: ClothMesh) -> bool:
-        """Whether all but its place and pose is the same."""
+        """Whether everything except the positions is the same."""
         return (
             len(self.positions) == len(other.positions)
             and np.array_equal(self.triangles, other.triangles)
@@ -42,7 +42,8 @@ class ClothMesh:
         return self.is_woven_as(other) and np.array_equal(self.positions, other.positions)
 
     def fabric(self) -> Fabric:
-        """
+        """The fabric of this mesh.
+
         Raises:
             HairloomError: see `start_cloth`.
         """
@@ -50,7 +51,7 @@ class ClothMesh:
 
 
 class FabricJob:
-    """The fabric of the mesh that was asked for last."""
+    """The fabric of the mesh that was requested last."""
 
     def __init__(self) -> None:
         self._mesh: ClothMesh | None = None
@@ -59,19 +60,19 @@ class FabricJob:
 
     @property
     def is_pending(self) -> bool:
-        """Whether it is on its way."""
+        """Whether it is being made."""
         return self._work is not None and not self._work.is_done
 
     def made(self, mesh: ClothMesh, *, blocking: bool) -> Fabric:
-        """The fabric of this mesh. A mesh that moves is waited for once: what was begun for the
-        same mesh in another pose will do.
+        """The fabric of this mesh. If work has begun for the same mesh in another pose, its result
+        is used, so that a moving mesh is waited for only once.
 
         Args:
-            blocking: False: have it made in a thread, unless that takes no time.
+            blocking: False: have it made in a thread, unless it is quick.
 
         Raises:
             HairloomError: see `start_cloth`.
-            NotMadeYetError: it is being made, and nobody waits.
+            NotMadeYetError: it is being made, and the call does not block.
         """
         if blocking or len(mesh.triangles) <= AT_ONCE:
             self.cancel()
@@ -94,7 +95,7 @@ class FabricJob:
         return self._fabric
 
     def cancel(self) -> None:
-        """Nobody waits for what is on its way."""
+        """Give up the fabric that is being made."""
         if self._work is not None:
             self._work.give_up()
             self._mesh = self._work = None

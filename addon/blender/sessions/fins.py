@@ -1,4 +1,4 @@
-"""The live session of one fin: a mesh of the artist's that moves as cloth.
+"""The live session of one fin: an artist's mesh that moves as cloth.
 
 A session holds numbers and arrays, never a reference into Blender's data.
 """
@@ -34,7 +34,7 @@ class FinSession:
     """One fin, while it is previewed or baked; see `simulated.Simulated`.
 
     Raises:
-        HairloomError: not a mesh with our modifier, or a mesh that cannot be cloth.
+        HairloomError: not a mesh with our modifier, or one that cannot be cloth.
     """
 
     def __init__(self, obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> None:
@@ -64,7 +64,7 @@ class FinSession:
 
     @property
     def is_made(self) -> bool:
-        """Whether nothing of it is being made just now."""
+        """Whether its fabric is not being made at the moment."""
         return not self._fabric.is_pending
 
     @property
@@ -72,7 +72,7 @@ class FinSession:
         return settings_of(self.body.found().hairloom.fin, FinSettings)
 
     def rest(self, depsgraph: bpy.types.Depsgraph) -> None:
-        """The mesh as the animation carries it, at no speed."""
+        """Show the mesh where the animation carries it, without velocity."""
         obj = self._found()
         self._shown, self._matrix = self._read(obj, depsgraph)
         self._carried, self._earlier = self._world(), None
@@ -89,7 +89,7 @@ class FinSession:
     def play(
         self, depsgraph: bpy.types.Depsgraph, *, blocking: bool = True, is_frame: bool = False
     ) -> None:
-        """Get ready to be simulated; the mesh as it arrives now is what edges keep."""
+        """Get ready to be simulated; edges keep the lengths that they have now."""
         obj = self._found()
         self._corners = corners_of(obj.data)
         self.state = None
@@ -110,7 +110,7 @@ class FinSession:
         self.is_playing = True
 
     def stop(self, depsgraph: bpy.types.Depsgraph) -> None:
-        """Back to where the animation carries it."""
+        """End the simulation; the mesh is where the animation carries it."""
         self.is_playing = False
         self.forget()
         obj = self.body.handle.find()
@@ -118,14 +118,14 @@ class FinSession:
             clear(obj.data)
 
     def forget(self) -> None:
-        """Nobody waits any more for its fabric."""
+        """Give up its fabric, if that is being made."""
         self._fabric.cancel()
 
     def advance(self, depsgraph: bpy.types.Depsgraph, duration: float) -> None:
         """Simulate the time [s] in which everything moved to where it is now.
 
         Raises:
-            HairloomError: what it is made of is gone or has changed.
+            HairloomError: an object that it needs is gone or has changed.
         """
         obj, state = self._found(), self.state
         assert state is not None and self.obstacles is not None, "play comes first"
@@ -148,7 +148,7 @@ class FinSession:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What the artist should know of its colliders and pins."""
+        """Warnings about its colliders, force fields and pins."""
         known = () if self.obstacles is None else self.obstacles.warnings
         known += self._field_notes
         if self.state is None or self.state.fabric.pin.any():
@@ -170,7 +170,7 @@ class FinSession:
         return {"position": self._shown.copy()}
 
     def show_recorded(self, frame: Arrays, solids: Solids | None = None) -> None:
-        """See `simulated.Simulated`; cloth is led out of nothing.
+        """See `simulated.Simulated`; cloth is not led out of colliders.
 
         Raises:
             HairloomError: the frame is of another mesh.
@@ -227,7 +227,7 @@ class FinSession:
             )
 
     def _read(self, obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> tuple[Floats, Floats]:
-        """Where the animation carries the mesh: object space (vertex_count, 3), matrix (4, 4)."""
+        """Where the animation carries the mesh: (vertex_count, 3) object space; matrix (4, 4)."""
         carried, matrix = read_carried(obj, depsgraph), matrix_of(obj, depsgraph)
         if not np.isfinite(matrix).all() or np.linalg.cond(matrix[:3, :3]) > 1.0e6:
             raise HairloomError(
@@ -236,7 +236,7 @@ class FinSession:
         return carried, matrix
 
     def _world(self) -> Floats:
-        """What is shown, (vertex_count, 3) float64 world [m]."""
+        """The shown vertices, (vertex_count, 3) float64 world [m]."""
         shown = self._shown.astype(np.float64)
         return shown @ self._matrix[:3, :3].T + self._matrix[:3, 3]
 
@@ -256,7 +256,7 @@ class FinSession:
         return read_weights(obj, depsgraph, name)[:count]
 
     def _named[T](self, action: Callable[[], T]) -> T:
-        """Do it; an error names this object."""
+        """Run an action; its errors name this object."""
         try:
             return action()
         except HairloomError as error:

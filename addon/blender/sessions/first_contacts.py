@@ -1,7 +1,7 @@
-"""How far hair stays from its colliders, found where it begins to play.
+"""Finds how far hair stays from its colliders, when it begins to play.
 
 That takes some hundredths of a second, with many children a tenth: longer than a frame. So Play has
-it found beside the window's work, and it is kept, as each round of playback begins alike.
+it found in the background, and it is cached, as each loop of playback begins at the same place.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ from ..colliders.fields import NotMadeYetError
 
 @dataclass(frozen=True, eq=False)
 class Start:
-    """Where hair begins to play.
+    """The state in which hair begins to play.
 
-    colliders: as they stand.
+    colliders: at rest where they are at that moment.
     """
 
     rig: Rig
@@ -30,7 +30,7 @@ class Start:
     settings: DynamicsSettings
 
     def is_as(self, other: Start) -> bool:
-        """Whether hair is as far from as many colliders; `with_clearance` looks at the settings."""
+        """Whether rig, pose and colliders are the same; `with_clearance` compares the settings."""
         return (
             self.rig is other.rig
             and self.pose.is_as(other.pose)
@@ -39,24 +39,24 @@ class Start:
         )
 
     def motion(self) -> Motion:
-        """Hair at rest that knows how far it stays from them."""
+        """The motion of hair at rest, with its clearance from the colliders."""
         motion = motion_flow.begin(self.rig, self.pose)
         return motion_flow.with_clearance(self.rig, motion, self.colliders, self.settings)
 
 
 class FirstContacts:
-    """The motion of the start that was asked for last."""
+    """The motion of the start that was requested last."""
 
     def __init__(self) -> None:
         self._start: Start | None = None
         self._motion: Motion | ThreadWork[Motion] | None = None
 
     def keep(self, start: Start, motion: Motion) -> None:
-        """It was found elsewhere."""
+        """Store a motion that was found elsewhere."""
         self._start, self._motion = start, motion
 
     def known(self, start: Start) -> Motion | None:
-        """The motion of this start if it is known, or about to be, which is waited for."""
+        """The motion of this start, if it is known or being found; waits for it."""
         if self._start is None or not self._start.is_as(start):
             return None
         if not isinstance(self._motion, ThreadWork):
@@ -65,11 +65,11 @@ class FirstContacts:
         return self._motion.result()
 
     def find(self, start: Start) -> None:
-        """Have it found in a thread, unless it is known. A body that moves is waited for once: that
-        of the start which was asked for before will do.
+        """Have the motion of this start found in a thread, unless it is known. If work on an
+        earlier start is done, that will do, so that a moving body is waited for only once.
 
         Raises:
-            NotMadeYetError: that is not done yet.
+            NotMadeYetError: it is being found.
         """
         if isinstance(self._motion, ThreadWork):
             if not self._motion.is_done:

@@ -1,4 +1,4 @@
-"""Hair combed along its strokes, which can be taken back and done again with other strokes."""
+"""Comb hair along its strokes; can be undone, and repeated with other strokes."""
 
 from __future__ import annotations
 
@@ -17,12 +17,11 @@ from .combing import comb, surface_to_comb_on
 def comb_flow(
     hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph, settings: FlowSettings
 ) -> Parts[Outcome]:
-    """Let the curves of this hair follow its strokes, before their modifiers. Hair that nothing
-    else has changed since it was combed so begins again from its shape before.
+    """Let the curves of this hair follow its strokes, before their modifiers. If nothing has
+    changed the hair since it was last combed so, it begins again from the shape before that.
 
     Raises:
-        HairloomError: no hair that can be used, no surface, no stroke, or it is linked from
-            another file.
+        HairloomError: no usable hair, no surface, no stroke, or it is linked from another file.
     """
     surface = surface_to_comb_on(hair, depsgraph)
     lines, unusable = read_strokes(hair, depsgraph)

@@ -1,4 +1,4 @@
-"""What is read of one groom: curves, head and settings, and where both bodies are.
+"""The data that is read of one groom: curves, head and settings, and the places of both objects.
 
 It holds numbers and arrays, never a reference into Blender's data.
 """
@@ -44,8 +44,8 @@ from ..scene.source import (
 from ..scene.surfaces import read_positions
 from .prepared_groom import BuildRequest, requested_rig
 
-#: Points that lie nearer than this to where they were have not moved, as a part of how far they are
-#: from the origin.
+#: Points that moved by less than this, as a fraction of their distance from the origin, have not
+#: moved.
 _ROUNDING = 1e-6
 
 
@@ -53,14 +53,14 @@ class GroomSource:
     """One groom as it was read.
 
     source, settings: of the hair that is shown.
-    painted: by which density children grow, and which masks shape them, as it was read last.
-    request: what was read last, from which hair is being made unless it is shown already.
+    painted: density and masks of children, as they were last read.
+    request: what was last read; hair is being made from it, or is shown already.
 
     Args:
         hair: a hair curves object.
 
     Raises:
-        HairloomError: no hair curves, or none that can be used.
+        HairloomError: no hair curves, or none are usable.
     """
 
     def __init__(self, hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> None:
@@ -100,8 +100,8 @@ class GroomSource:
         return RestMatrices(self.hair.rest, head, self._holding.rests)
 
     def is_resized(self, depsgraph: bpy.types.Depsgraph) -> bool:
-        """Whether hair or head has been scaled or mirrored since rest; not where one has no size,
-        as no hair can be made of that.
+        """Whether hair or head has been scaled or mirrored since rest; False if one has size 0,
+        from which no hair can be made.
 
         Raises:
             ObjectGoneError: one of them no longer exists.
@@ -112,7 +112,7 @@ class GroomSource:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What the artist should know about what was read, and about what holds the hair now."""
+        """Warnings about what was read, and about what holds the hair now."""
         style = filter(None, (self._style_warning,))
         own = self.source.warnings
         motion = (each for each in self._motion_warnings if each not in own)
@@ -129,12 +129,12 @@ class GroomSource:
         return hair is not None and self.request.holding.is_outdated(hair, edited)
 
     def has_other_partings(self) -> bool:
-        """Whether partings have come or gone, or have been moved or edited."""
+        """Whether partings have been added, removed, moved or edited."""
         hair = self.hair.handle.find()
         return hair is not None and not is_same_state(parting_state(hair), self._parting_state)
 
     def rig(self) -> Rig:
-        """The groom made ready to move.
+        """The groom prepared to move.
 
         Raises:
             HairloomError: the groom is of another scale than the head.
@@ -142,14 +142,14 @@ class GroomSource:
         return requested_rig(self.request)
 
     def use_bake(self, baked: BakedRig | None) -> None:
-        """Request the rig of a bake of this very groom, to be the same to the bit."""
+        """Request the rig of a bake of this groom, so that it is the same to the bit."""
         if baked is not None and (baked.rests.head is None) == (self.head is None):
             rig = self._rig_of(baked)
             self._holding = self._holding.at_rests(baked.rests.ties)
             self.request = BuildRequest(self.name, self.source, self.settings, rig, self._holding)
 
     def _rig_of(self, baked: BakedRig) -> Rig:
-        """The rig of a bake; rest is where hair and head were then."""
+        """The rig of a bake; rest becomes the place of hair and head at the bake's rest."""
         back = baked.rests.hair @ np.linalg.pinv(self.hair.rest)
         lines = self.source.partings
         if lines is not None:
@@ -165,11 +165,11 @@ class GroomSource:
         return rig
 
     def _in_pose_of(self, baked: BakedRig, back: Floats) -> tuple[StrandSet, RestHair | None]:
-        """The strands where body and head were at the rest of a bake, and as they are stored if
-        they had to be put there.
+        """The strands in the pose of hair and head at a bake's rest; and the stored rest hair if
+        they had to be moved there.
 
         Args:
-            back: (4, 4), from where the hair's object is to where it was.
+            back: (4, 4), from the hair object's transform to that at the bake's rest.
         """
         read, start = self.source.at_rest, self.source.at_rest.head
         strands, head = read.strands.transformed(back), baked.rig.head
@@ -185,13 +185,13 @@ class GroomSource:
         return (head and head.session_uid) != self._head_uid
 
     def read_again(self, depsgraph: bpy.types.Depsgraph) -> BuildRequest | None:
-        """Read edited curves, weights and settings; what is to be made of them, None where nothing
-        is.
+        """Read edited curves, weights and settings; returns a request for the hair to make from
+        them, or None if the rig is still up to date.
 
-        The curves are taken to be in the pose in which the reading began, as edits are.
+        Curves are brought into the pose of the first reading.
 
         Raises:
-            HairloomError: the hair is gone, or none that can be used is left.
+            HairloomError: the hair is gone, or no usable hair is left.
         """
         hair, known = self.hair.found(), self.request
         before = known.source
@@ -201,7 +201,7 @@ class GroomSource:
         strands = self._on_head(stored, depsgraph)
         is_animated = settings[DynamicsSettings].animated_style
         if is_animated and np.array_equal(strands.offsets, before.strands.offsets):
-            strands = strands.with_points(before.strands.points)  # each frame has its own
+            strands = strands.with_points(before.strands.points)  # they differ in each frame
         if _same(strands, before.strands, back):
             strands, rest = before.strands, before.rest
         canvas = self._canvas(replace(before, strands=strands, kept=read.kept))
@@ -254,15 +254,18 @@ class GroomSource:
     def _read_curves(
         self, hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph
     ) -> tuple[Cleaned, StrandSet, Floats]:
-        """The curves, these as strands where the object was at rest, and the way back (4, 4)."""
+        """The curves; as strands where the object was at rest; the transform back to it (4, 4)."""
         read = usable_curves(hair, depsgraph)
         back = self.hair.rest @ np.linalg.pinv(matrix_of(hair, depsgraph))
         is_there = np.allclose(back, np.eye(4))
         return read, read.strands if is_there else read.strands.transformed(back), back
 
     def _on_head(self, read: StrandSet, depsgraph: bpy.types.Depsgraph) -> StrandSet:
-        """Curves that were read, on the head in the pose in which the reading began: hair that no
-        modifier attaches is stored on the undeformed head, other hair stands on it as it is now."""
+        """Curves that were read, on the head in the pose of the first reading.
+
+        Hair that no modifier attaches is stored on the undeformed head; other hair is on the head
+        as it is deformed now.
+        """
         source, hair = self.request.source, self.hair.found()
         if source.head is None or hair.hairloom.dynamics.animated_style:
             return read
@@ -273,8 +276,8 @@ class GroomSource:
         return read if found is None else found.on(source.head)
 
     def _head_now(self, rest: Surface, depsgraph: bpy.types.Depsgraph) -> Surface | None:
-        """The head as it is deformed now, where its object was at rest; None where nothing deforms
-        it."""
+        """The head as it is deformed now, with its object's transform at rest; None if nothing
+        deforms it."""
         head = None if self.head is None else self.head.handle.find()
         if self.head is None or head is None:
             return None
@@ -288,11 +291,11 @@ class GroomSource:
         return replace(rest, positions=positions)
 
     def moved_curves(self, depsgraph: bpy.types.Depsgraph) -> tuple[StrandSet, Ints] | None:
-        """The curves that have moved since this was last asked for, or since other hair was
-        accepted, and which of all they are; None where others have come or gone, or none has moved.
+        """The curves that have moved since the last call, or since other hair was accepted, and
+        their numbers; None if curves were added or removed, or none has moved.
 
         Raises:
-            HairloomError: the hair is gone, or none that can be used is left.
+            HairloomError: the hair is gone, or no usable hair is left.
         """
         before = self._combed
         _, stored, back = self._read_curves(self.hair.found(), depsgraph)
@@ -310,15 +313,15 @@ class GroomSource:
         return strands.take(number), number
 
     def has_other_paint(self, depsgraph: bpy.types.Depsgraph) -> bool:
-        """Whether children are to grow by another density or by other masks than when this was last
-        asked for, or since other hair was accepted.
+        """Whether density or masks of children have changed since the last call, or since other
+        hair was accepted.
 
         Raises:
             HairloomError: the hair is gone.
         """
         hair, (density, masks) = self.hair.found(), self.painted
         canvas, settings = self._canvas(self.source), self.settings[ChildrenSettings]
-        self._brushed = canvas  # which the overlay looks at before anything else is painted
+        self._brushed = canvas  # the overlay reads it before anything else is painted
         self.painted = (
             read_density(hair, canvas, depsgraph)[0],
             canvas.masks(settings, depsgraph)[0],
@@ -327,7 +330,7 @@ class GroomSource:
         return not (is_same and masks == self.painted[1])
 
     def read_colors(self, depsgraph: bpy.types.Depsgraph) -> bool:
-        """Read what is painted under the hair that is shown; whether anything is to be.
+        """Read the colours painted under the shown hair; returns whether it has a colour map.
 
         Raises:
             HairloomError: the hair is gone.
@@ -340,7 +343,8 @@ class GroomSource:
         return True
 
     def accept(self, request: BuildRequest) -> None:
-        """Its hair is shown from now on; what acts at once is as it is set now."""
+        """Show the hair of this request from now on, with the present values of settings that act
+        at once."""
         self.source, self._holding = request.source, request.holding
         self._brushed = self._shown_map = None
         self._combed = self.source.strands
@@ -348,13 +352,13 @@ class GroomSource:
         self.settings = GroomSettings.of(self.hair.found()).at_once(request.settings)
 
     def take_settings(self) -> bool:
-        """Take over what acts at once; whether there is more, which needs other hair."""
+        """Take over settings that act at once; returns whether others need new hair."""
         settings = GroomSettings.of(self.hair.found())
         self.settings = settings.at_once(self.settings)
         return not settings.acts_at_once(self.request.settings)
 
     def pose(self, rig: Rig, depsgraph: bpy.types.Depsgraph) -> Pose:
-        """Where the body is now; see `poses.read_pose`."""
+        """The present pose; see `poses.read_pose`."""
         vertex_count = None if rig.head is None else len(rig.head.positions)
         pose = read_pose(self.hair, self.head, vertex_count, depsgraph)
         if rig.holds is None:
@@ -362,8 +366,8 @@ class GroomSource:
         return replace(pose, anchors=self._holding.anchors(self.hair.found(), rig.holds, depsgraph))
 
     def styled(self, rig: Rig, depsgraph: bpy.types.Depsgraph) -> Rig:
-        """The rig with the curves as they are in this frame; with those of the last frame that
-        fitted, and a warning, where there are others now.
+        """The rig in the style of this frame's curves; if their number has changed, in that of the
+        last frame that fitted, with a warning.
 
         Raises:
             HairloomError: the hair is gone.
@@ -382,7 +386,7 @@ class GroomSource:
         return known.rig
 
     def painted_guides(self, rig: Rig) -> PaintedGuides | None:
-        """By what settings of the motion are multiplied at each guide; None: nothing is painted."""
+        """Factors on settings of the motion at each guide, from masks; None: nothing is painted."""
         if not self._motion_masks:
             return None
         known = self._painted_guides
@@ -392,8 +396,7 @@ class GroomSource:
         return known[2]
 
     def shown_map(self, rig: Rig, depsgraph: bpy.types.Depsgraph) -> Floats | None:
-        """What is painted at each guide of the map that is shown, (cv_count or 1, guide_count);
-        None: there is none."""
+        """The shown map at each guide, (cv_count or 1, guide_count); None: there is none."""
         name = shown_map_name(self.hair.found())
         if self._shown_map is None or self._shown_map[0] != name:
             canvas = self._brushed or self._canvas(self.source)
@@ -404,11 +407,11 @@ class GroomSource:
         return None if painted is None else painted.factors[name]
 
     def forget_shown_map(self) -> None:
-        """It is to be read again."""
+        """Read the shown map again when it is next needed."""
         self._shown_map = self._brushed = None
 
     def _canvas(self, source: Source) -> Canvas:
-        """On what it is painted."""
+        """The canvas of this source."""
         hair = self.hair.found()
         return Canvas(hair, head_of(hair), source.head, source.strands, source.kept, self._good)
 
@@ -433,8 +436,8 @@ class GroomSource:
 
 
 def _with_uv(rig: Rig, read: Surface | None) -> Rig:
-    """The rig of a bake, which has none, with the UVs of its head as it was read: images lie on
-    them."""
+    """The rig of a bake, with the UVs of the head as it was read: bakes store none, and images
+    need them."""
     head = rig.head
     if head is None or read is None or not np.array_equal(head.triangles, read.triangles):
         return rig
@@ -442,7 +445,7 @@ def _with_uv(rig: Rig, read: Surface | None) -> Rig:
 
 
 def shown_map_name(hair: bpy.types.Object) -> str:
-    """The map that the overlay shows: what is chosen, else the first that a setting names."""
+    """The map that the overlay shows: the chosen one, else the first that a setting names."""
     settings = GroomSettings.of(hair)
     named = (
         hair.hairloom.shown_map,
@@ -454,7 +457,7 @@ def shown_map_name(hair: bpy.types.Object) -> str:
 
 
 def _misfit(name: str, now: StrandSet, known: StrandSet, depsgraph: bpy.types.Depsgraph) -> str:
-    """What is said where the curves of a frame are not those that the hair was made from."""
+    """A warning if a frame's curves are not those that the hair was made from; else ""."""
     if np.array_equal(now.offsets, known.offsets):
         return ""
     counts = (
@@ -470,9 +473,9 @@ def _misfit(name: str, now: StrandSet, known: StrandSet, depsgraph: bpy.types.De
 
 @dataclass(frozen=True, eq=False)
 class _Styled:
-    """A rig by the style of a frame.
+    """A rig in the style of a frame.
 
-    base: the rig that it comes from. curves: the artist's own, at rest, that it was made by.
+    base: the rig that it was made from. curves: the artist's curves in that frame, at rest.
     """
 
     base: Rig
@@ -481,7 +484,7 @@ class _Styled:
 
 
 def _same(one: StrandSet, other: StrandSet, back: Floats) -> bool:
-    """Whether two readings give the same hair, but for rounding on the way `back` to rest."""
+    """Whether two readings give the same hair, within the rounding of the transform `back`."""
     return (
         np.array_equal(one.offsets, other.offsets)
         and _same_places(one, other, back)
@@ -494,6 +497,6 @@ def _same(one: StrandSet, other: StrandSet, back: Floats) -> bool:
 
 
 def _same_places(one: StrandSet, other: StrandSet, back: Floats) -> bool:
-    """Whether the points of two readings are the same, but for rounding on the way `back`."""
+    """Whether two readings give the same points, within the rounding of the transform `back`."""
     farthest = max(np.abs(one.points).max(initial=0.0), np.abs(back[:3, 3]).max())
     return np.allclose(one.points, other.points, rtol=0.0, atol=_ROUNDING * farthest)

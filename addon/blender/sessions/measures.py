@@ -1,4 +1,4 @@
-"""How long the parts of a frame take and how much memory a groom has, for panel and viewport."""
+"""Times of the parts of a frame, and memory of a groom, for panel and viewport."""
 
 from __future__ import annotations
 
@@ -14,28 +14,27 @@ import numpy as np
 
 from ...dynamics.figures import CardFigures, Figures, blank_table
 
-#: The median of this many frames is reported, and only of those not older than this [s].
+#: The median of at most this many frames is reported, none older than this [s].
 _REPORTED, _LATEST = 15, 10.0
-#: Frames of which the times are kept, for a graph.
+#: Number of frames whose times are kept, for a graph.
 _KEPT = 60
 
-#: of a frame
+#: timed parts of a frame
 PARTS = ("simulation", "drawing")
 
 
 class FrameTimes:
-    """How long the parts of the last frames of one groom took."""
+    """Times of the parts of the last frames of one groom."""
 
     def __init__(self) -> None:
         self._times = {part: deque[tuple[float, float]](maxlen=_KEPT) for part in PARTS}
 
     @contextmanager
     def measured(self, part: str, *, goes_on: bool = False) -> Iterator[None]:
-        """Time what runs inside, as a part of a frame; of a GPU's work only its handing over
-        counts.
+        """Time what runs inside, as a part of a frame; of GPU work only its submission counts.
 
         Args:
-            goes_on: more of what was measured last.
+            goes_on: add the time to the last measurement.
         """
         begin = time.perf_counter()
         yield
@@ -44,8 +43,8 @@ class FrameTimes:
         known.append((end, end - begin + before))
 
     def milliseconds(self, part: str) -> float | None:
-        """The median of the last frames; None where there were none lately."""
-        # a frame that takes long does not make its own parts old
+        """The median of the last frames; None: there were none lately."""
+        # the duration of the frame itself does not count as age
         frame = sum(times[-1][1] for times in self._times.values() if times)
         oldest = time.perf_counter() - _LATEST - frame
         last = list(self._times[part])[-_REPORTED:]
@@ -53,13 +52,13 @@ class FrameTimes:
         return 1000.0 * median(recent) if recent else None
 
     def history(self, part: str) -> list[float]:
-        """Of the last frames, however old, the latest last [ms]."""
+        """The times [ms] of the last frames, however old, the latest last."""
         return [1000.0 * spent for _, spent in self._times[part]]
 
     @property
     def line(self) -> str:
-        """Such as "simulation 4.1 ms   drawing 12.3 ms"; empty where nothing was measured
-        lately."""
+        """The times as text, such as "simulation 4.1 ms   drawing 12.3 ms"; empty if nothing was
+        measured lately."""
         parts = ((part, self.milliseconds(part)) for part in PARTS)
         return "   ".join(f"{part} {spent:.1f} ms" for part, spent in parts if spent is not None)
 
@@ -85,10 +84,10 @@ def _collect(thing: Any, seen: dict[int, int]) -> None:
 
 
 def table_of(figures: Figures | None) -> tuple[tuple[str, ...], ...]:
-    """For a panel, as large where nothing was measured."""
+    """The figures as rows of a panel; blank rows of the same number if nothing was measured."""
     return blank_table(Figures) if figures is None else figures.table
 
 
 def card_table_of(figures: CardFigures | None) -> tuple[tuple[str, ...], ...]:
-    """The same of cards."""
+    """As `table_of`, for cards."""
     return blank_table(CardFigures) if figures is None else figures.table

@@ -1,4 +1,4 @@
-"""Hair mirrored from one side of its surface to the other, with all that its curves carry."""
+"""Mirror hair from one side of its surface to the other, with all attributes of its curves."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from ..scene.groom_attributes import CLOSEST_GUIDES, GUIDE, STRAND_ID
 from ..scene.kept_shape import KEPT_SHAPES
 from .combing import surface_to_comb_on
 
-#: attributes of points that are places in object space, beside the position
+#: point attributes that hold positions in object space, beside the position itself
 _PLACES = (
     "handle_left",
     "handle_right",
@@ -36,12 +36,11 @@ _PLACES = (
 def mirror_hair(
     hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph, settings: MirrorSettings
 ) -> Parts[Outcome]:
-    """Replace the curves of one side by those of the other, before their modifiers. Curves in the
-    middle stay.
+    """Replace the curves of one side by mirrored ones of the other, before their modifiers. Curves
+    in the middle stay.
 
     Raises:
-        HairloomError: no surface, no hair on the side that is to be mirrored, or it is linked from
-            another file.
+        HairloomError: no surface, no hair on the side to mirror, or it is linked from another file.
     """
     surface = surface_to_comb_on(hair, depsgraph)
     head = head_of(hair)
@@ -73,7 +72,7 @@ def mirror_hair(
         to_own,
         to_own @ across @ hair_frame,
     )
-    for shape in unchanged:  # what is kept is mirrored too
+    for shape in unchanged:  # kept shapes are mirrored too, so they can still be restored
         shape.seal(hair)
     middle = int((side == 0).sum())
     result = f"{hair.name}: {len(source):,} curves mirrored, {len(replaced):,} replaced"
@@ -83,7 +82,7 @@ def mirror_hair(
 
 
 def _led_out(made: Mirrored, surface: Surface) -> Mirrored:
-    """What the surface's own asymmetry has put into it is led out."""
+    """Lead out curves that an asymmetric surface has swallowed."""
     shifted = np.flatnonzero(made.is_shifted)
     solid = solid_of(surface) if len(shifted) else None
     if solid is None:
@@ -103,7 +102,7 @@ def _replace(
     to_own: Floats,
     across: Floats,
 ) -> None:
-    """Take curves away, and add mirrored ones that are like their sources in all else.
+    """Remove curves, and add mirrored ones with all other attributes of their sources.
 
     Args:
         source, replaced: numbers of curves.
@@ -143,7 +142,7 @@ def _replace(
 
 
 def _inside(counts: Ints) -> Ints:
-    """The number of each point in its own curve."""
+    """The number of each point within its curve."""
     return number_in_piece(counts)
 
 
@@ -162,8 +161,8 @@ class _Gone:
 
 
 def _name_again(curves: bpy.types.Curves, source: Ints, new: Ints, gone: _Gone) -> None:
-    """IDs of their own for mirrored curves, and mirrored guides as their closest ones; a guide that
-    is gone is named by the mirrored one whose root is nearest."""
+    """Give mirrored curves new IDs, and mirrored guides as their closest guides; references to a
+    guide that is gone are replaced by the mirrored guide whose root is nearest to its root."""
     ids = read_attribute(curves, STRAND_ID, "CURVE")
     if ids is None:
         return
@@ -187,7 +186,7 @@ def _name_again(curves: bpy.types.Curves, source: Ints, new: Ints, gone: _Gone) 
 
 
 def _renamed(values: Ints, known: Ints, other: Ints) -> Ints:
-    """Values that are among the known ones replaced by their others."""
+    """The values, with each that is in `known` replaced by its counterpart in `other`."""
     if not len(known):
         return values
     order = np.argsort(known, kind="stable")

@@ -19,7 +19,7 @@ from .base_solver import BaseSolver
 
 
 class NumpySolver(BaseSolver):
-    """On the CPU; the same to the last bit on every machine."""
+    """Solver on the CPU; the same to the last bit on every machine."""
 
     form = "numpy"
 
@@ -29,7 +29,7 @@ class NumpySolver(BaseSolver):
 
     @classmethod
     def at_rest(cls, rig: Rig, pose: Pose) -> Self:
-        """With hair in its style in this pose, as `rest` brings it there."""
+        """A solver with hair at rest in this pose, as after `rest`."""
         solver = cls(rig, motion_flow.begin(rig, pose))
         solver._strands = motion_flow.strands_at_rest(rig, pose)
         return solver
@@ -49,14 +49,14 @@ class NumpySolver(BaseSolver):
         )
 
     def steps(self, frame: FrameInput) -> Steps[None]:
-        # what was not shown counts too: motion does not depend on who looks
+        # so that motion does not depend on which frames are shown
         led = NOT_LED if self._motion.clearance is None else self.led()
         motion = yield from motion_flow.steps(self._rig, self.motion, frame, led)
         self._take(motion)
 
     def take_style(self, rig: Rig) -> None:
         if self._motion.clearance is not None:
-            self.led()  # of the frame before, by its style
+            self.led()  # of the last frame, with its own style
         self._rig, self._motion = rig, motion_flow.with_style(rig, self._motion)
 
     def guides(self) -> Floats:

@@ -1,8 +1,8 @@
-"""Balls inside a head that go with it: what lies wholly behind one of them is not drawn.
+"""Spheres inside a head that move with it: strands wholly behind one of them are not drawn.
 
-In a head that bends a ball goes as its surroundings go, by the similarity that fits the mesh around
-it best, and it shrinks by as much as that mesh has come nearer than the similarity says. So it
-stays inside of a head whose jaw opens, and vanishes where the mesh around it folds up.
+In a head that deforms, a sphere follows the similarity transform that best fits the mesh around it,
+and its radius shrinks by the largest residual of that fit. So it stays inside a head whose jaw
+opens, and vanishes where the mesh around it folds up.
 """
 
 from __future__ import annotations
@@ -16,21 +16,21 @@ from ...rig_flow import Pose
 from ...strands import Surface
 from ...strands.affine import moved
 
-#: The mesh around a ball: triangles within this many radii of its middle.
+#: The mesh around a sphere: triangles within this many radii of its middle.
 _AROUND = 2.0
-#: A head bends if a vertex is elsewhere by more than this part of a ball's radius.
+#: A head deforms if a vertex is off by more than this fraction of the smallest sphere's radius.
 _RIGID = 1.0e-3
-#: Vertices that tell where a ball has gone: more would say the same.
+#: Vertices that a sphere's transform is fitted to; more would not change it.
 _ENOUGH = 300
 
 
 class OccluderSpheres:
-    """The balls of one head.
+    """The occluder spheres of one head.
 
     Args:
         head: world space at rest.
-        roots: (n, 3) [m], of the hair, or the corners of their box; other parts of a body hide none
-            of it.
+        roots: (n, 3) [m], of the hair, or the corners of their box; parts of a body away from them
+            get no spheres.
     """
 
     def __init__(self, head: Surface, roots: Floats) -> None:
@@ -39,7 +39,7 @@ class OccluderSpheres:
         self._around = [_vertices_around(head, ball) for ball in self._balls]
 
     def at(self, pose: Pose) -> Floats | None:
-        """(k, 4) center and radius [m], world space, in this pose; None where there are none."""
+        """Centers and radii in this pose, (k, 4) [m] world space; None: there are none."""
         if pose.head_positions is None or not len(self._balls):
             return None
         bent = np.abs(moved(self._rest, pose.matrix) - pose.head_positions).max()
@@ -54,7 +54,7 @@ class OccluderSpheres:
 
 
 def _vertices_around(head: Surface, ball: Floats) -> Ints:
-    """Of all triangles whose box comes near the ball; of all there are, if none does."""
+    """The vertices of triangles whose box is near the ball; of all triangles, if none is."""
     corners = head.positions[head.triangles] - ball[:3]
     outside = np.maximum(corners.min(axis=1), -corners.max(axis=1)).clip(min=0.0)
     near = (outside**2).sum(axis=1) <= (_AROUND * ball[3]) ** 2
@@ -62,7 +62,7 @@ def _vertices_around(head: Surface, ball: Floats) -> Ints:
 
 
 def _carried(ball: Floats, rest: Floats, now: Floats) -> Floats | None:
-    """The sphere (4,) where its surroundings have gone; None where that is unknown."""
+    """The sphere (4,), moved with the vertices around it; None if no similarity fits them."""
     some = slice(None, None, max(len(rest) // _ENOUGH, 1))
     fit = fit_similarity(rest[some], now[some])
     if fit is None:

@@ -1,4 +1,4 @@
-"""Hair combed away from its partings, as brushes would."""
+"""Comb hair away from its partings, as brushes would."""
 
 from __future__ import annotations
 
@@ -19,8 +19,7 @@ def comb_parting(
     """Let the curves of this hair lean away from its partings, before their modifiers.
 
     Raises:
-        HairloomError: no hair that can be used, no surface, no parting, or it is linked from
-            another file.
+        HairloomError: no usable hair, no surface, no parting, or it is linked from another file.
     """
     surface = surface_to_comb_on(hair, depsgraph)
     lines, unusable = read_partings(hair, depsgraph)

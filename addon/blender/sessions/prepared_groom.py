@@ -1,8 +1,8 @@
-"""A groom made ready to be shown, from arrays alone, so that a thread may do it.
+"""Prepares a groom to be shown, from arrays alone, so that a thread may do it.
 
-That takes a second, and with many children ten. In a window it goes on beside everything else: what
-was shown before stays until the new hair is there, and before the first one Blender's own strands
-do. In the background it is made at once.
+That takes a second, or ten with many children. In a window it runs in a thread: until the new hair
+is made, the hair before it is shown, or Blender's own strands before the first. In background mode
+it is made at once.
 """
 
 from __future__ import annotations
@@ -32,22 +32,22 @@ from .occluder_spheres import OccluderSpheres
 
 type Report = Callable[[str], None]
 
-#: Strands of the placeholder of a groom that is being made.
+#: Number of strands of a placeholder.
 _FEW = 32
-#: Roots farther from their surface than this part of its diagonal are not on it; those of grooms
-#: that fit lie within half of it.
+#: Roots farther from their surface than this fraction of its diagonal are loose; those of grooms
+#: that fit are within half of it.
 _LOOSE = 0.02
-#: Heads of more triangles take longer to search than an artist waits.
+#: Heads with more triangles take too long to search for a placeholder.
 _LARGE = 4000
 
 
 @dataclass(frozen=True, eq=False)
 class BuildRequest:
-    """What a groom is to be made from.
+    """What a groom is made from.
 
-    name: of the groom, in messages. rig: that of its bake; None: it is to be made.
-    holding: what holds the hair beside its roots, and follows these objects.
-    kept: what was made last for the same session, which makes one thing at a time.
+    name: of the groom, in messages. rig: that of its bake; None: it must be made.
+    holding: what holds the hair beside its roots; follows those objects.
+    kept: results of the last build for the same session, which runs one build at a time.
     """
 
     name: str
@@ -58,7 +58,7 @@ class BuildRequest:
     kept: Kept = NOTHING_KEPT
 
     def gives_rig_of(self, other: BuildRequest) -> bool:
-        """Whether both give the same rig, as far as is known without building it."""
+        """Whether both surely give the same rig; does not build it."""
         one, two = self.source, other.source
         return (
             self.settings.of_rig == other.settings.of_rig
@@ -73,13 +73,13 @@ class BuildRequest:
 
 @dataclass(frozen=True, eq=False)
 class PreparedGroom:
-    """A groom made ready to be shown.
+    """A groom prepared to be shown.
 
-    ambient: what its light was made by.
-    light: at rest; None where it was left out.
-    rank: (strand_count,), see `rig_flow.strand_ranks`; None where it was left out.
-    occluders: spheres in the head that hide hair; None where it has none, or they were left out.
-    is_placeholder: whether these are a few of its strands only, which are not seen.
+    ambient: settings that its light was made with.
+    light: at rest; None: left out.
+    rank: (strand_count,), see `rig_flow.strand_ranks`; None: left out.
+    occluders: spheres in the head that hide hair; None: there are none, or they were left out.
+    is_placeholder: whether it has only a few of the strands, which are not drawn.
     """
 
     rig: Rig
@@ -96,7 +96,7 @@ class PreparedGroom:
 
     @cached_property
     def loose_roots(self) -> int:
-        """How many roots are too far from the surface to be on it."""
+        """Number of roots that are too far from the surface to be on it."""
         rig = self.rig
         if rig.head is None or rig.rest_frames is None:
             return 0
@@ -107,7 +107,7 @@ class PreparedGroom:
 
 
 def requested_rig(request: BuildRequest) -> Rig:
-    """The groom made ready to move.
+    """The groom prepared to move.
 
     Raises:
         HairloomError: the groom is of another scale than the head.
@@ -126,12 +126,12 @@ def build(
     is_quick: bool = False,
     report: Report = lambda stage: None,
 ) -> PreparedGroom:
-    """Make a groom; what nothing changes is taken from before.
+    """Make a groom; parts that the request does not change are reused.
 
     Args:
-        before: what was made last, and what it was made from.
+        before: the last groom, and the request that it was made from.
         is_drawn: False leaves out what only drawing needs.
-        is_quick: whether it may have quick light, until `lit` has found its own.
+        is_quick: whether it may have approximate light, until `lit` has found its own.
         report: see `prepared`.
 
     Raises:
@@ -156,18 +156,17 @@ def prepared(
     is_quick: bool = False,
     report: Report = lambda stage: None,
 ) -> PreparedGroom:
-    """All that drawing a rig needs, for a preview, a render and a picture alike.
+    """Everything that drawing a rig needs, for previews, renders and pictures.
 
     Args:
-        known: what was made before; other guides on the same hair leave its shade and its head as
-            they are.
-        with_occluders: False leaves out the spheres, which take a search through the head.
+        known: the groom before; light and occluders are reused if only guides differ.
+        with_occluders: False leaves out the spheres, which need a search through the head.
         is_quick: see `build`.
-        report: is called before each stage with its name; may end it all by an exception.
+        report: called before each stage with its name; may cancel by raising an exception.
     """
     report("ambient occlusion")
     with ThreadPoolExecutor(1) as beside:
-        # here, as the window's first frame would wait for it; numpy leaves room for both
+        # cached here, or the window's first frame would wait for it; both run at once under numpy
         moving = beside.submit(lambda: (rig.riders, rig.root_holds, rig.strands.uneven_along))
         groom = _drawn(rig, ambient, known, with_occluders, is_quick, report)
         moving.result()
@@ -182,7 +181,7 @@ def _drawn(
     is_quick: bool,
     report: Report,
 ) -> PreparedGroom:
-    """As `prepared`, without what moves it."""
+    """As `prepared`, without the cached data for motion."""
     light, relit = None if known is None else known.light, None
     if known is not None and light is not None and known.rig is rig and known.ambient != ambient:
         relit = light_flow.relit(rig, light, known.ambient, ambient)
@@ -206,7 +205,7 @@ def _drawn(
 
 
 def lit(groom: PreparedGroom, report: Report = lambda stage: None) -> PreparedGroom:
-    """The same groom in its own light.
+    """The groom with its full light instead of quick light.
 
     Args:
         report: see `prepared`.
@@ -217,7 +216,7 @@ def lit(groom: PreparedGroom, report: Report = lambda stage: None) -> PreparedGr
 
 
 def placeholder(request: BuildRequest) -> PreparedGroom:
-    """What a session moves until its groom is made: a few of its strands.
+    """The groom of a session until the real one is made: a few of its strands.
 
     Raises:
         HairloomError: as `requested_rig`.
@@ -232,7 +231,7 @@ def placeholder(request: BuildRequest) -> PreparedGroom:
 
 
 def _quickly_bound(few: StrandSet, head: Surface | None, request: BuildRequest) -> Rig:
-    """A few strands on a head of any size; of a large one the triangles near their roots will do.
+    """A few strands on a head; a large head is reduced to the triangles near their roots.
 
     Raises:
         HairloomError: as `requested_rig`.
@@ -241,7 +240,7 @@ def _quickly_bound(few: StrandSet, head: Surface | None, request: BuildRequest) 
         near = _triangles_near(few.roots, head)
         uv = None if head.corner_uv is None else head.corner_uv[near]
         part = replace(head, triangles=head.triangles[near], corner_uv=uv)
-        # roots that seem far away may be near to the rest of the head
+        # fails if roots are far from these triangles; then the whole head is searched
         with suppress(HairloomError):
             rig = rig_flow.prepare(few, part, request.settings[GuideSettings], place=request.name)
             bound = replace(rig.strands, root_triangle=near[rig.strands.root_triangle])
@@ -250,7 +249,7 @@ def _quickly_bound(few: StrandSet, head: Surface | None, request: BuildRequest) 
 
 
 def _triangles_near(points: Floats, surface: Surface) -> Ints:
-    """Those at the vertices that are nearest to any of these points."""
+    """The triangles at the vertices that are nearest to any of these points."""
     middle = surface.positions.mean(axis=0)
     vertices, asked = surface.positions - middle, points - middle
     away = (vertices**2).sum(axis=1)[:, None] - 2.0 * vertices @ asked.T

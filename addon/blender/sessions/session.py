@@ -51,26 +51,26 @@ from .solvers import Solver, computed_on, form_of, solver_of
 
 
 class Session:
-    """One groom while it is previewed or baked; fulfils `simulated.Simulated`.
+    """One groom while it is previewed or baked; implements `simulated.Simulated`.
 
     uid, hair, head: of its objects.
-    groom: what it was made into; a placeholder until the first hair is made in a thread.
-    known_hair: what it knows of other grooms.
-    has_company: whether it goes through a frame with others, see `together`: what it will do is in
-        `waiting` then. failure: what went wrong in it.
-    figures, card_figures: as measured last since the hair was at rest; of cards only where they are
-        shown. are_figures_current: whether it has not moved since.
+    groom: the prepared groom; a placeholder until the first hair is made in a thread.
+    known_hair: data about other grooms that its dynamics keeps from frame to frame.
+    has_company: whether it is simulated together with others in this frame, see `together`;
+        `waiting` then holds its steps. failure: the error of these steps.
+    figures, card_figures: last measurement since the hair was at rest; those of cards only while
+        cards are shown. are_figures_current: whether the hair has not moved since.
 
     Args:
         hair: a hair curves object.
-        baked: the rig of a bake of this very groom, to be the same to the bit.
+        baked: the rig of a bake of this groom, to be the same to the bit.
         is_drawn: False leaves out what only drawing needs.
         blocking: False: the hair is made in a thread, with a few strands as its placeholder.
-        arrived: is called with this session when hair or cards can be taken over that were made
-            in a thread.
+        arrived: called with this session when hair or cards that were made in a thread can be
+            taken over.
 
     Raises:
-        HairloomError: no hair curves, none that can be used, or of another scale than the head.
+        HairloomError: no hair curves, none are usable, or they are of another scale than the head.
     """
 
     groom: PreparedGroom
@@ -92,7 +92,7 @@ class Session:
         self.uid = self.hair.handle.uid
         self._is_drawn = is_drawn
         self._job = LatestJob[BuildRequest, _Built]("hair", partial(arrived, self))
-        # light of the hair that was made last; never while other hair is made
+        # full light of the hair that was made last; does not run while other hair is made
         self._light_job = LatestJob[PreparedGroom, PreparedGroom]("light", partial(arrived, self))
         self.times = FrameTimes()
         self.obstacles: Obstacles | None = None
@@ -123,28 +123,28 @@ class Session:
 
     @property
     def name(self) -> str:
-        """Of its object, which may be renamed."""
+        """The name of its object when it was read."""
         return self._source.name
 
     @property
     def source(self) -> Source:
-        """What was read of the hair that is shown."""
+        """The data that the shown hair was made from."""
         return self._source.source
 
     @property
     def settings(self) -> GroomSettings:
-        """What the artist has set, as far as it is taken over."""
+        """The artist's settings, as far as they have been taken over."""
         return self._source.settings
 
     @property
     def rig(self) -> Rig:
-        """The groom in the style of the frame that is shown."""
+        """The rig in the style of the shown frame."""
         return self._styled or self.groom.rig
 
     @property
     def made_rig(self) -> MadeRig | None:
-        """The groom made ready, and from what; None without children of its own, as before it is
-        made and where it comes from a bake."""
+        """The rig, and what it was made from; None if it has not grown children itself, as before
+        it is made and when it comes from a bake."""
         request, groom = self._made
         if groom.rig.grown is None:
             return None
@@ -152,32 +152,32 @@ class Session:
 
     @property
     def posed(self) -> tuple[PosedCollider, ...]:
-        """What the hair collides with, where it is in the frame that is shown."""
+        """The colliders in the shown frame."""
         return self._posed
 
     @property
     def is_made(self) -> bool:
-        """Whether there is hair to be shown; False until the first one is made."""
+        """Whether there is hair to show; False until the first hair is made."""
         return not self.groom.is_placeholder
 
     @property
     def is_pending(self) -> bool:
-        """Whether hair is being made, the first or other hair, or its light is found."""
+        """Whether hair or its light is being made."""
         return self._job.is_pending or self._light_job.is_pending
 
     @property
     def is_lighting(self) -> bool:
-        """Whether hair is there, and its light is found."""
+        """Whether the hair is made, and its full light is being found."""
         return self._light_job.is_pending
 
     @property
     def stage(self) -> str:
-        """What is done now of what is being made."""
+        """The present stage of the work on hair or light."""
         return self._job.stage or self._light_job.stage
 
     @property
     def has_arrived(self) -> bool:
-        """Whether the hair that was being made, or its light, can be taken over."""
+        """Whether finished hair or light can be taken over."""
         return self._job.has_arrived or self._light_job.has_arrived
 
     def has_another_head(self) -> bool:
@@ -186,12 +186,12 @@ class Session:
 
     @property
     def rests(self) -> RestMatrices:
-        """Where hair, head and ties were when the hair was made."""
+        """The transforms of hair, head and ties when the hair was made."""
         return self._source.rests
 
     def is_resized(self, depsgraph: bpy.types.Depsgraph) -> bool:
-        """Whether hair or head has been scaled or mirrored since the hair was made, which no motion
-        of the roots follows.
+        """Whether hair or head has been scaled or mirrored since the hair was made; motion of the
+        roots cannot follow that.
 
         Raises:
             HairloomError: the hair or its head is gone.
@@ -204,7 +204,7 @@ class Session:
         return self._source.holder_uids
 
     def has_other_holders(self, edited: set[int]) -> bool:
-        """Whether ties have come or changed shape since the hair was read.
+        """Whether ties were added or have changed shape since the hair was read.
 
         Args:
             edited: session numbers of data-blocks whose geometry has changed.
@@ -212,7 +212,7 @@ class Session:
         return self._source.has_other_holders(edited)
 
     def has_other_partings(self) -> bool:
-        """Whether partings have come, gone, been moved or edited."""
+        """Whether partings have been added, removed, moved or edited."""
         return self._source.has_other_partings()
 
     def constants(self) -> Arrays:
@@ -235,7 +235,7 @@ class Session:
         return self._source.pose(self.rig, depsgraph)
 
     def _begin(self) -> None:
-        """Have made what was requested last, once nothing else is being made."""
+        """Have the last request built in a thread, once nothing else is being built."""
         request = self._source.request
         self._light_job.cancel()
 
@@ -246,7 +246,7 @@ class Session:
         self._job.want(request, begin)
 
     def _moment(self) -> _Moment | None:
-        """That hair which is being made will go on from; None: it will begin at rest."""
+        """The state from which hair that is being made will go on; None: it will start at rest."""
         if not self.is_playing or not self._posed:
             return None
         standing = tuple(each.at_end() for each in self._posed)
@@ -260,17 +260,17 @@ class Session:
 
     @property
     def snapshot(self) -> Snapshot:
-        """What is drawn."""
+        """The snapshot that is drawn."""
         return self.picture.snapshot
 
     @property
     def posed_head(self) -> Surface | None:
-        """What hair grows on, where it is shown, world space."""
+        """The head in the shown pose, world space."""
         return self.picture.head
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What the artist should know about hair, head, children, colliders and lights."""
+        """Warnings about hair, head, children, colliders, cards and lights."""
         hair = self.hair.handle.find()
         doubled = () if hair is None else dynamics_warnings(hair)
         found = () if self.obstacles is None else self.obstacles.warnings
@@ -281,7 +281,7 @@ class Session:
 
     @property
     def computed_on(self) -> str:
-        """Such as "GPU (OpenGL, llvmpipe)"."""
+        """The device that simulates it, such as "GPU (OpenGL, llvmpipe)"."""
         return computed_on(self.solver.form)
 
     @property
@@ -292,9 +292,9 @@ class Session:
     def _take(
         self, made: _Built, before: PreparedGroom | None, depsgraph: bpy.types.Depsgraph
     ) -> None:
-        """Everything that depends on the strands and on the choice of guides.
+        """Take over new hair, and update everything that depends on its strands and guides.
 
-        Hair that plays goes on, unless its guides are others now.
+        Hair that plays goes on, unless its guides have changed.
         """
         request, groom = made.request, made.groom
         self._made = request, groom
@@ -303,7 +303,7 @@ class Session:
         is_same = before is not None and before.rig is groom.rig
         goes_on = before is not None and self.is_playing and _same_guides(groom.rig, before.rig)
         if not is_same:
-            # strands are others now, and guides go on
+            # the strands are new, but the guides go on
             motion = replace(self.solver.motion, clearance=made.clearance) if goes_on else None
             form = self.settings[DynamicsSettings].device
             self.solver = solver_of(groom.rig, form, motion, made.texels)
@@ -322,7 +322,7 @@ class Session:
             self._light_job.want(groom, lambda: partial(_light_in_thread, groom=groom))
 
     def take_made(self, depsgraph: bpy.types.Depsgraph) -> None:
-        """Show the hair or the light that was made meanwhile; waits for it.
+        """Show the hair or the light that is being made; waits for it.
 
         Raises:
             HairloomError: it cannot be made.
@@ -333,12 +333,12 @@ class Session:
         made = self._job.take()
         if made is not None:
             self._take(made, self.groom, depsgraph)
-            self.comb(depsgraph)  # a brush has gone on meanwhile
+            self.comb(depsgraph)  # brushes may have gone on meanwhile
             self.color(depsgraph)
             self.paint(depsgraph)
 
     def _take_light(self) -> None:
-        """Show the hair that was made last in its own light, combed or painted since or not."""
+        """Show the last hair, which may have been combed or painted since, in its full light."""
         found = self._light_job.take()
         assert found is not None, "no other hair is made meanwhile"
         request, made = self._made
@@ -357,16 +357,16 @@ class Session:
             self.take_made(depsgraph)
 
     def forget(self) -> None:
-        """Nobody waits any more for hair and cards that are on their way."""
+        """Give up hair, light and cards that are being made."""
         self._job.cancel()
         self._light_job.cancel()
         self.cards.forget()
 
     def read_again(self, depsgraph: bpy.types.Depsgraph, *, blocking: bool = True) -> None:
-        """Take over edited curves and settings of the rig; what did not change stays as it is.
+        """Take over edited curves and settings of the rig; unchanged parts are reused.
 
         Args:
-            blocking: False: other hair is made in a thread, and what was shown is shown until then.
+            blocking: False: new hair is made in a thread, and the old hair is shown until then.
         """
         request = self._source.read_again(depsgraph)
         self.is_stale = False
@@ -380,13 +380,13 @@ class Session:
             self._begin()
         elif self.groom is not self._made[1] and not self._job.is_pending:
             made = _Built(*self._made)
-            self._take(made, self.groom, depsgraph)  # combed, and back by an undo
+            self._take(made, self.groom, depsgraph)  # it was combed, and the combing undone
         if blocking:
             self.finish(depsgraph)
 
     def comb(self, depsgraph: bpy.types.Depsgraph) -> None:
-        """Have hair at rest follow curves that a brush has moved, as far as that is done at once;
-        `read_again` is to come.
+        """Let hair at rest follow curves that a brush has moved, as far as can be done at once;
+        `read_again` does the rest later.
 
         Raises:
             HairloomError: as `rest`.
@@ -394,7 +394,7 @@ class Session:
         if self.is_playing or not self.is_made:
             return
         if self.settings[DynamicsSettings].animated_style:
-            self.rest(depsgraph)  # which reads the curves as they are
+            self.rest(depsgraph)  # reads the present curves
             return
         moved = self._source.moved_curves(depsgraph)
         if moved is None:
@@ -404,7 +404,7 @@ class Session:
         self._show()
 
     def color(self, depsgraph: bpy.types.Depsgraph) -> None:
-        """Have hair follow the colours that a brush has painted; its cards wait for `read_again`.
+        """Let hair follow colours that a brush has painted; its cards wait for `read_again`.
 
         Raises:
             HairloomError: the hair is gone.
@@ -414,12 +414,12 @@ class Session:
             self._show()
 
     def _color(self) -> None:
-        """Draw what is painted under the strands, as it was read last."""
+        """Draw strands in the painted colours that were read last."""
         self.picture.take_colors(self.rig, self.source.colors, self.settings)
 
     def paint(self, depsgraph: bpy.types.Depsgraph) -> None:
-        """Have children at rest follow what a brush has painted, as far as that is done at once;
-        `read_again` is to come. Hair that is held, and that of bakes, waits for it.
+        """Let children at rest follow masks that a brush has painted, as far as can be done at
+        once; `read_again` does the rest later. Held hair and hair of bakes wait for that.
 
         Raises:
             HairloomError: as `rest`.
@@ -440,15 +440,15 @@ class Session:
         return self._source.shown_map(self.rig, depsgraph)
 
     def forget_shown_map(self) -> None:
-        """What is shown of it has been painted since."""
+        """Read the shown map again, as it may have been painted."""
         self._source.forget_shown_map()
 
     def take_settings(self) -> None:
-        """Take over what acts at once; settings of guides, children and ambient light make the
+        """Take over settings that act at once; those of guides, children and ambient light make the
         session stale.
 
         Raises:
-            HairloomError: the form of computing that was chosen is not to be had here.
+            HairloomError: the chosen device is not available here.
         """
         before = self.settings
         self.is_stale |= self._source.take_settings()
@@ -458,27 +458,27 @@ class Session:
             self._change_form(self.settings[DynamicsSettings].device)
 
     def take_cards(self) -> None:
-        """Show the cards that were built meanwhile."""
+        """Show the cards that were built in a thread."""
         self.cards.collect()
         self._show()
 
     def look_at_cards_again(self) -> None:
-        """Other hair that shades its cards may be elsewhere now, or other hair; or the artist may
-        have edited its cards in the scene."""
+        """Update its cards after other hair that shades them may have changed, or the artist may
+        have edited them in the scene."""
         self.cards.look_again()
         self._show()
 
     @property
     def is_coarse(self) -> bool:
-        """Whether a slider is being moved, so that it is shaded by tables that are quickly made."""
+        """Whether it is shaded with coarse, quickly made tables, as while a slider moves."""
         return self.picture.is_coarse
 
     def refine(self) -> None:
-        """Shade by tables of full size again."""
+        """Shade with tables of full size again."""
         self.picture.refine()
 
     def _change_form(self, form: str) -> None:
-        """Go on where the hair is now, with another solver."""
+        """Go on from the present motion with another solver."""
         if form_of(form) != self.solver.form:
             self.solver = solver_of(self.rig, form, self.solver.motion)
             self._show()
@@ -488,10 +488,10 @@ class Session:
         self.picture.light(depsgraph)
 
     def rest(self, depsgraph: bpy.types.Depsgraph) -> None:
-        """Hair in its style, carried by the head as it is posed now.
+        """Put hair into its style, carried by the head in its present pose.
 
         Raises:
-            HairloomError: the hair or its head is gone, or the head's mesh is another one.
+            HairloomError: the hair or its head is gone, or the head's mesh has changed.
         """
         self._take_style(depsgraph)
         pose, self.figures, self.card_figures = self._pose(depsgraph), None, None
@@ -514,20 +514,20 @@ class Session:
         self._show()
 
     def _take_style(self, depsgraph: bpy.types.Depsgraph) -> None:
-        """Go by the curves as they are in this frame, where the style is animated."""
+        """If the style is animated, use the curves of this frame as the style."""
         rig = self.groom.rig
         if self.settings[DynamicsSettings].animated_style and self.is_made:
             rig = self._source.styled(rig, depsgraph)
         self._go_by(rig)
 
     def _go_by(self, rig: Rig) -> None:
-        """Let the solver go by this style of the groom."""
+        """Use this rig, the groom in another style, in the solver."""
         if rig is not self.rig:
             self.solver.take_style(rig)
         self._styled = None if rig is self.groom.rig else rig
 
     def has_moved(self, depsgraph: bpy.types.Depsgraph) -> bool:
-        """Whether the body is elsewhere than in what is shown.
+        """Whether the body's pose differs from the shown one.
 
         Raises:
             HairloomError: as `rest`.
@@ -537,15 +537,15 @@ class Session:
     def play(
         self, depsgraph: bpy.types.Depsgraph, *, blocking: bool = True, is_frame: bool = False
     ) -> None:
-        """Get ready to simulate from the style on; makes the colliders, which can take a second.
+        """Get ready to simulate, starting at rest; makes the colliders, which can take a second.
 
         Args:
             blocking, is_frame: see `simulated.Simulated`.
 
         Raises:
             HairloomError: as `rest`, or Blender's own hair dynamics is on.
-            NotMadeYetError: a field, all of the hair, or how far that stays from colliders is
-                being made, and nobody waits.
+            NotMadeYetError: a distance field, the hair, or its first contacts are being made, and
+                the call does not block.
         """
         self.is_playing = False
         refuse_own_dynamics(self.hair.found())
@@ -565,9 +565,9 @@ class Session:
         return Start(self.rig, pose, standing, self.settings[DynamicsSettings])
 
     def make_fields(self, depsgraph: bpy.types.Depsgraph) -> None:
-        """Have the fields of its colliders made beside the window's work, so that Play finds them.
+        """Have the distance fields of its colliders made in the background, before Play.
 
-        Play reports what is wrong with a collider.
+        Errors of colliders are reported by Play, not here.
         """
         with suppress(HairloomError, NotMadeYetError):
             self._read_obstacles(depsgraph, blocking=False)
@@ -585,7 +585,7 @@ class Session:
         )
 
     def stop(self, depsgraph: bpy.types.Depsgraph) -> None:
-        """Back to the style."""
+        """End the simulation; hair is in its style again."""
         self.is_playing = False
         self.rest(depsgraph)
 
@@ -602,17 +602,17 @@ class Session:
             alone(steps)
 
     def finish_frame(self) -> None:
-        """After a frame with others.
+        """Finish a frame that was simulated together with others.
 
         Raises:
-            HairloomError: what went wrong in it.
+            HairloomError: the error of this groom in that frame.
         """
         failure, self.failure = self.failure, None
         if failure is not None:
             raise failure
 
     def _steps(self, depsgraph: bpy.types.Depsgraph, duration: float) -> Steps[None]:
-        """See `advance`. With others it takes as long as all of them."""
+        """The steps of `advance`. With other grooms, the measured time is that of all of them."""
         with self.times.measured("simulation"):
             self._is_recorded = False
             self._take_style(depsgraph)
@@ -633,11 +633,11 @@ class Session:
 
     @property
     def pose(self) -> Pose:
-        """Where the body is in what is shown."""
+        """The pose of the body as it is shown."""
         return self.solver.pose
 
     def guides(self) -> Floats:
-        """As they are shown, (guide_count, cv_count, 3) [m, world]; reads back from a GPU."""
+        """The shown guides, (guide_count, cv_count, 3) [m, world]; reads back from a GPU."""
         return self.solver.guides()
 
     def style_seen(self) -> Style:
@@ -647,7 +647,7 @@ class Session:
     def _simulate(
         self, depsgraph: bpy.types.Depsgraph, duration: float, time_scale: float = 1.0
     ) -> Steps[None]:
-        """A frame of this duration [s], in which the hair's time goes at this speed."""
+        """Simulate a frame of this duration [s]; the hair's time runs faster by this factor."""
         pose, settings = self._pose(depsgraph), self.settings[DynamicsSettings]
         goes_along = not time_scale or self.solver.has_jumped(pose, settings, duration)
         if self.obstacles is not None and goes_along:
@@ -667,21 +667,21 @@ class Session:
             yield from self.solver.steps(frame)
 
     def measure(self) -> None:
-        """Find the figures of this moment, while it is simulated."""
+        """Measure the figures of this moment; the hair must be simulated."""
         measure = self.new_measure()
         self.measure_into(measure)
         self.figures, self.are_figures_current = measure.figures, True
         self.card_figures = self.cards.figures(self._solids)
 
     def new_measure(self) -> Measure:
-        """For the frames from rest on; while it is simulated."""
+        """A measure for the frames since rest; the hair must be simulated."""
         assert self._begun is not None, "it is simulated"
         pose, posed, rig = self._begun.pose, self._begun.colliders, self.rig
         guides = start(motion_flow.carried_guides(rig, pose), rig.curl_room)
         return Measure(guides, motion_flow.carried(rig, pose), rig.strands.offsets, posed)
 
     def measure_into(self, measure: Measure) -> None:
-        """Take the present frame into account; reads strands back from a GPU."""
+        """Add the present frame to a measure; reads strands back from a GPU."""
         guides, rig = self.solver.guides(), self.rig
         if self._styled is not None:
             style = motion_flow.carried_guides(rig, self.solver.pose)
@@ -689,22 +689,22 @@ class Session:
         measure.add(self.solver.strands(), self._rest_lengths(), guides, self._posed)
 
     def _rest_lengths(self) -> Floats:
-        """Of all strands."""
+        """Lengths of all strands in their style."""
         rig = self.rig
         if rig.head is not None:
             return rig.rest_lengths
         return lengths(self.rest_points(), rig.strands.offsets)
 
     def rest_points(self) -> Floats:
-        """All strands as long as in their style, (point_count, 3) [m]; those of hair without a head
-        grow with its object."""
+        """All strands at the lengths of their style, (point_count, 3) [m]; hair without a head is
+        scaled with its object."""
         rig = self.rig
         if rig.head is not None:
             return rig.strands.points
         return motion_flow.carried(rig, self.solver.pose)
 
     def solids(self, depsgraph: bpy.types.Depsgraph) -> tuple[PosedCollider, ...]:
-        """What the hair would collide with now; none before they are made."""
+        """The colliders of the hair at this moment; none until they are made."""
         if self.obstacles is None:
             self.make_fields(depsgraph)
         return () if self.obstacles is None else self.obstacles.standing(depsgraph)
@@ -721,7 +721,7 @@ class Session:
         return () if self.obstacles is None else self.obstacles.meshes
 
     def show_recorded(self, frame: Arrays, solids: Solids | None = None) -> None:
-        """Hair as it was recorded, on the head as that was.
+        """Show recorded hair on the recorded head.
 
         Raises:
             HairloomError: the frame is of another groom.
@@ -745,7 +745,7 @@ class Session:
 
     @property
     def _solids(self) -> Solids | None:
-        """What cards are led out of."""
+        """The solids that cards are led out of."""
         if self._is_recorded:
             return self.solver.pose.solids
         return None if self._begun is None else SimulatedSolids(self._begun, self._posed)
@@ -753,9 +753,9 @@ class Session:
 
 @dataclass(frozen=True, eq=False)
 class _Moment:
-    """A moment of hair that plays.
+    """The state of playing hair at one moment.
 
-    colliders: as they stand. size: see `Solver.size`.
+    colliders: at their places at that moment. size: see `Solver.size`.
     """
 
     pose: Pose
@@ -766,11 +766,11 @@ class _Moment:
 
 @dataclass(frozen=True, eq=False)
 class _Built:
-    """Hair, and what else was made of it beside the window's work.
+    """New hair, with the data that a thread has made for it.
 
-    texels: what the GPU gets of its strands.
-    clearance: of hair that was playing when it was asked for, if it goes on. start: else where it
-        begins again, and its motion.
+    texels: data of its strands for the GPU.
+    clearance: if hair was playing when this was requested, and will go on.
+    start: if it was playing, but will start again: where, and the motion.
     """
 
     request: BuildRequest
@@ -806,5 +806,5 @@ def _light_in_thread(work: ThreadWork[PreparedGroom], groom: PreparedGroom) -> P
 
 
 def _same_guides(one: Rig, other: Rig) -> bool:
-    """Whether what moves the guides of one moves those of the other."""
+    """Whether two rigs have the same guides on the same head, so that a motion fits both."""
     return one.head is other.head and np.array_equal(one.guide_grid, other.guide_grid)

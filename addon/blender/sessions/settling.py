@@ -1,7 +1,7 @@
-"""Settle: hair falls onto what it collides with, and that becomes the shape of the curves.
+"""Settle: hair falls onto its colliders, and the fallen shape becomes that of the curves.
 
-What falls are the curves as brushes comb them, before their modifiers: a modifier that curls them
-does so after they have fallen. The combed shape stays with them, as an attribute of their points.
+The curves fall as brushes comb them, before their modifiers: a modifier that curls them acts on the
+fallen curves. The combed shape is kept as an attribute of their points.
 """
 
 from __future__ import annotations
@@ -40,15 +40,16 @@ from .prepared_groom import PreparedGroom
 def settle_hair(
     hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph, settings: SettleSettings
 ) -> Generator[float, None, Callable[[], Outcome]]:
-    """Let hair fall in the present pose of its body; yields how much is done, 0 to 1. Returns what
-    gives the curves their settled shape: nothing changes before that is called.
+    """Let hair fall in the present pose of its body; yields the progress, 0 to 1.
+
+    Returns a function that writes the settled shape; until it is called, the curves do not change.
 
     Hair that has settled, and has not been combed since, falls from its combed shape again, so that
     other settings can be tried.
 
     Raises:
-        HairloomError: no hair that can be used, it is linked from another file, its roots are away
-            from its surface, or the surface is gone.
+        HairloomError: no usable hair, it is linked from another file, its roots are away from its
+            surface, or the surface is gone.
     """
     check_curves_editable(hair, depsgraph)
     source = GroomSource(hair, depsgraph)
@@ -90,11 +91,11 @@ def _stored(
     warnings: tuple[str, ...],
     depsgraph: bpy.types.Depsgraph,
 ) -> Outcome:
-    """Write the settled shape, and keep the combed one; hair that settles a second time without
-    having been combed keeps the first.
+    """Write the settled shape, and keep the combed one. If hair settles again without having been
+    combed, the combed shape from before the first time stays.
 
     Args:
-        is_out: (strand_count,) whether each has come out of the surface.
+        is_out: (strand_count,) whether each strand is outside the surface.
     """
     COMBED.keep(hair)
     write_own_curves(hair, own, settled.points, depsgraph)
@@ -114,8 +115,10 @@ def _stored(
 
 
 def _check_roots(hair: bpy.types.Object, rig: Rig) -> None:
-    """Raises:
-    HairloomError: most roots are away from the surface as it stands now.
+    """Check that the roots are on the surface.
+
+    Raises:
+        HairloomError: most roots are away from the surface in its present pose.
     """
     loose = PreparedGroom(rig, AmbientSettings()).loose_roots
     if 2 * loose > rig.strands.strand_count:
@@ -134,7 +137,7 @@ def _colliders(
     dynamics: DynamicsSettings,
     depsgraph: bpy.types.Depsgraph,
 ) -> tuple[tuple[PosedCollider, ...], tuple[str, ...]]:
-    """What the hair falls onto, and warnings."""
+    """The colliders that the hair falls onto, and warnings."""
     roots, head = rig.root_vertices, source.head
     obstacles = Obstacles.of(hair, head, rig.head, dynamics, depsgraph, None, roots)
     return obstacles.rest(depsgraph), (*source.warnings, *obstacles.warnings)

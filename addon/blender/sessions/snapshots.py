@@ -1,5 +1,5 @@
-"""What is drawn of a groom: a snapshot, by its rig and by what the artist has set; and, while it is
-previewed, in step with settings, motion and light."""
+"""The snapshot of a groom for drawing, from its rig and settings; for previews, it is kept in step
+with settings, motion and light."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ from .solvers import Solver
 
 
 def snapshot_of(groom: PreparedGroom) -> Snapshot:
-    """The groom at rest, with all that does not change while it moves."""
+    """The groom at rest, with everything that does not change while it moves."""
     strands, light = groom.rig.strands, groom.light
     snapshot = Snapshot(
         points=strands.points,
@@ -59,33 +59,33 @@ def snapshot_of(groom: PreparedGroom) -> Snapshot:
 
 
 def with_light(snapshot: Snapshot, light: HairLight) -> Snapshot:
-    """The same groom with this light at its points."""
+    """The snapshot with this light at its points."""
     return replace(
         snapshot, occlusion=light.occlusion, openness=light.openness, skin_seen=light.skin_seen
     )
 
 
 def with_settings(snapshot: Snapshot, settings: GroomSettings) -> Snapshot:
-    """The same groom by these settings."""
+    """The snapshot with these settings."""
     sections: dict[str, Any] = {name: settings[kind] for name, kind in SECTIONS.items()}
     sections["volume"] = settings[VolumeSettings].multiplied(extinction=snapshot.extinction)
     return replace(snapshot, debug_view=settings.debug_view, **sections)
 
 
 def with_tables(snapshot: Snapshot, size: int) -> Snapshot:
-    """The same by look-up tables of this size, for hair that needs any."""
+    """The snapshot with look-up tables of this size, if its hair uses any."""
     return snapshot if snapshot.table_size == size else replace(snapshot, table_size=size)
 
 
 def shapes_alike(one: ShadingSettings, other: ShadingSettings) -> bool:
-    """Whether the same look-up tables serve both; a change of colour needs no others."""
+    """Whether `other` needs no new look-up tables; a change of colour never does."""
     if other.model != "marschner":
         return True
     return one.model == other.model and shape_of(fibre_of(one)) == shape_of(fibre_of(other))
 
 
 def with_all_strands(snapshot: Snapshot) -> Snapshot:
-    """The same where nothing hides hair, so that none is left out."""
+    """The snapshot without culling and occluder spheres, so that all strands are drawn."""
     return replace(snapshot, occluder_spheres=None, detail=replace(snapshot.detail, culling="none"))
 
 
@@ -93,13 +93,13 @@ class GroomPicture:
     """The snapshot of a groom, and the cards in it.
 
     Args:
-        hair: finds the object.
+        hair: returns the object.
         is_drawn: False leaves out what only drawing needs.
         arrived: see `ShownCards`.
     """
 
     snapshot: Snapshot
-    #: what it grows on, as it is posed, world space
+    #: the posed head, world space
     head: Surface | None = None
 
     def __init__(
@@ -119,7 +119,7 @@ class GroomPicture:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What the artist should know about the light."""
+        """Warnings about lights, world and shadows."""
         dark = no_light_warnings(self.snapshot.lights, self.snapshot.ambient)
         return (*self._light_warnings, *dark, *self._shadow_warnings())
 
@@ -133,10 +133,10 @@ class GroomPicture:
     def take_groom(
         self, groom: PreparedGroom, settings: GroomSettings, colors: PaintedColor | None
     ) -> None:
-        """All that depends on the strands, at rest and without light.
+        """Make the snapshot of a new groom, at rest and without lights.
 
         Args:
-            colors: what is painted under them.
+            colors: colours painted under its strands.
         """
         self._groom = groom
         self.snapshot = with_settings(snapshot_of(groom), settings)
@@ -144,21 +144,21 @@ class GroomPicture:
         self._want_cards(groom.rig, settings)
 
     def take_light(self, groom: PreparedGroom) -> None:
-        """The same strands, as many points each, in the light that was found meanwhile."""
+        """Use the light of this groom, which has as many strands and points as the one before."""
         assert groom.light is not None
         self._groom = groom
         self.snapshot = with_light(self.snapshot, groom.light)
 
     def take_colors(self, rig: Rig, colors: PaintedColor | None, settings: GroomSettings) -> None:
-        """The same strands, of this rig, with other colours painted under them; their cards wait
-        until settings are taken over."""
+        """Use other painted colours on the same strands, those of this rig; cards get them in
+        `take_settings`."""
         self._colors = colors
         found = with_colors(rig.strands, colors, settings[ShadingSettings]).color
         if not are_same(found, self.snapshot.color):
             self.snapshot = replace(self.snapshot, color=found)
 
     def take_settings(self, rig: Rig, was: GroomSettings, now: GroomSettings) -> bool:
-        """Take over what acts at once; whether hair has to be shown again where it is."""
+        """Take over settings that act at once; returns whether `show` must be called again."""
         looks = was[ShadingSettings], now[ShadingSettings]
         if looks[0] != looks[1] and any(look.color_map or is_coated(look) for look in looks):
             self.take_colors(rig, self._colors, now)
@@ -172,7 +172,7 @@ class GroomPicture:
         return self._want_cards(rig, now) or is_other
 
     def _want_cards(self, rig: Rig, settings: GroomSettings) -> bool:
-        """Have cards built if they are to be shown; whether what is shown of them changes now."""
+        """Have cards built if they are to be shown; returns whether `show` must be called again."""
         is_whole = self._groom is not None and not self._groom.is_placeholder
         if not (self._is_drawn and is_whole and settings.shows_cards):
             self.cards.forget()
@@ -183,15 +183,15 @@ class GroomPicture:
 
     @property
     def is_coarse(self) -> bool:
-        """Whether a slider is being moved, so that it is shaded by tables that are quickly made."""
+        """Whether it is shaded with coarse, quickly made tables, as while a slider moves."""
         return self.snapshot.table_size < DEFAULT_SIZE
 
     def refine(self) -> None:
-        """Shade by tables of full size again."""
+        """Shade with tables of full size again."""
         self.snapshot = with_tables(self.snapshot, DEFAULT_SIZE)
 
     def _painted(self, rig: Rig) -> Rig:
-        """The rig as its cards were asked for."""
+        """The rig in the colours with which its cards were requested."""
         known = self._of_cards
         return known[1] if known is not None and known[0] is rig else rig
 
@@ -212,7 +212,7 @@ class GroomPicture:
     def show(
         self, rig: Rig, solver: Solver, settings: GroomSettings, solids: Solids | None
     ) -> None:
-        """The hair where the solver has it, with cards led out of these; None: of nothing."""
+        """Show the hair where the solver has it, with cards led out of these solids, if any."""
         pose, spheres = replace(solver.pose, solids=solids), None
         known = None if self._groom is None else self._groom.occluders
         if known is not None and settings[DetailSettings].culling == "hidden":
@@ -233,8 +233,8 @@ def _with_color(rig: Rig, color: Floats | None) -> Rig:
 
 
 def _head(rig: Rig, pose: Pose, known: Surface | None) -> Surface | None:
-    """As it is posed, world space; the known one where that stands still, so that nothing is found
-    or uploaded of it again."""
+    """The posed head, world space; the known one if it has not moved, so that nothing is computed
+    or uploaded again."""
     if rig.head is None or pose.head_positions is None:
         return None
     if (

@@ -1,7 +1,7 @@
-"""What moves the hair of one groom from frame to frame: numpy, or the GPU's compute shaders.
+"""Solvers move the hair of one groom from frame to frame: with numpy, or with compute shaders.
 
-Both give the same motion within rounding. On the GPU the guides stay there from the simulation to
-the drawing: only the head's vertices go up, and nothing comes back unless it is asked for.
+Both give the same motion within rounding. On the GPU, guides stay there from simulation to drawing:
+only the head's vertices are uploaded, and results are read back only on request.
 """
 
 from __future__ import annotations
@@ -30,14 +30,14 @@ from ..base.gpu_context import gpu_in_use
 from .compute_solver import ComputeSolver
 from .numpy_solver import NumpySolver
 
-#: How far apart [m] the two may be after the frame that is tried out.
+#: Greatest distance [m] between the results of both solvers after the test frame.
 _AGREEMENT = 1.0e-4
-#: Blender's names of what it draws and computes by -> those that artists know
+#: Blender's identifiers of GPU backends -> their usual names
 _BACKENDS = {"OPENGL": "OpenGL", "VULKAN": "Vulkan", "METAL": "Metal"}
 
 
 class Solver(Protocol):
-    """Moves one groom. A new one has its hair at rest, in the pose of the rig.
+    """Moves one groom. A new solver has its hair at rest, in the pose of the rig.
 
     form: "numpy" or "compute".
     """
@@ -46,21 +46,21 @@ class Solver(Protocol):
 
     @property
     def pose(self) -> Pose:
-        """Where the body is in what is shown."""
+        """The pose of the body as it is shown."""
 
     @property
     def motion(self) -> Motion:
-        """All that another solver needs to go on from here; read back where it must be."""
+        """Everything that another solver needs to go on from here; read back if need be."""
 
     @property
     def size(self) -> float:
-        """How long its guides were when the motion began, the median [m]."""
+        """The median length of the guides when the motion began [m]."""
 
     def rest(self, pose: Pose, known: Motion | None = None) -> None:
-        """Hair in its style, carried by the body, at no speed.
+        """Put hair into its style, carried by the body, without velocity.
 
         Args:
-            known: this very motion, if it has been found already.
+            known: the motion at rest in this pose, if it has been found already.
         """
 
     def meet(
@@ -69,43 +69,43 @@ class Solver(Protocol):
         settings: DynamicsSettings,
         painted: PaintedGuides | None = None,
     ) -> None:
-        """Find how far hair stays from colliders, see `motion_flow.with_clearance`; what
-        has not met them does so when it advances."""
+        """Find how far hair stays from colliders, see `motion_flow.with_clearance`; otherwise
+        `steps` does so."""
 
     def steps(self, frame: FrameInput) -> Steps[None]:
-        """One frame of motion, as motion_flow.steps."""
+        """One frame of motion, as `motion_flow.steps`."""
 
     def take_style(self, rig: Rig) -> None:
-        """Go by this rig in the next frame: the same groom with curves of other shapes, see
+        """Use this rig from the next frame on: the same groom with curves of other shapes, see
         `motion_flow.with_style`."""
 
     def has_jumped(self, pose: Pose, settings: DynamicsSettings, duration: float) -> bool:
-        """Whether the head is elsewhere all of a sudden, see `motion_flow.has_jumped`."""
+        """Whether the head has moved suddenly, as at a cut, see `motion_flow.has_jumped`."""
 
     def go_along(self, frame: FrameInput) -> None:
-        """A frame in which hair goes along with its roots, see `motion_flow.go_along`."""
+        """A frame in which hair moves rigidly with its roots, see `motion_flow.go_along`."""
 
     def carry(self, pose: Pose, guides: Floats, led: LedOut = NOT_LED) -> None:
-        """Show guides (guide_count, cv_count, 3) [m, world], and strands that were led out of
-        colliders, which come from a bake.
+        """Show guides of a bake, (guide_count, cv_count, 3) [m, world], and its strands that were
+        led out of colliders.
 
-        To advance from them is to let go of them at no speed.
+        Advancing from them starts without velocity.
 
         Raises:
             HairloomError: guides of another shape.
         """
 
     def guides(self) -> Floats:
-        """At the frame's end, (guide_count, cv_count, 3) [m, world]; read back if need be."""
+        """Guides at frame's end, (guide_count, cv_count, 3) [m, world]; read back if need be."""
 
     def strands(self) -> Floats:
-        """At the frame's end, (point_count, 3) [m, world]; read back if need be."""
+        """Strands at frame's end, (point_count, 3) [m, world]; read back if need be."""
 
     def led(self) -> LedOut:
-        """Those of them that were led out of colliders; read back if need be."""
+        """The strands that were led out of colliders; read back if need be."""
 
     def shown(self, snapshot: Snapshot) -> Snapshot:
-        """The snapshot with the strands of this moment: an array, or a texture on the GPU."""
+        """The snapshot with the present strands, as an array or as a texture on the GPU."""
 
 
 def solver_of(
@@ -114,12 +114,12 @@ def solver_of(
     """A solver for this groom.
 
     Args:
-        form: "numpy", "compute", or "automatic": compute where it works, else numpy.
-        motion: to go on from, of a solver for the same rig; None: from rest.
+        form: "numpy", "compute", or "automatic": compute if it works, else numpy.
+        motion: motion to go on from, of a solver for the same rig; None: start at rest.
         texels: see `texels_of`, if they are made already.
 
     Raises:
-        HairloomError: "compute" where it does not work.
+        HairloomError: the form is "compute", and that does not work.
     """
     if form == "numpy" or (form == "automatic" and not compute_available()):
         return NumpySolver(rig, motion)
@@ -140,7 +140,7 @@ def form_of(form: str) -> str:
 
 
 def computed_on(form: str) -> str:
-    """What computes by a form: "CPU (numpy)", or such as "GPU (OpenGL, llvmpipe)"."""
+    """The device of a form: "CPU (numpy)", or such as "GPU (OpenGL, llvmpipe)"."""
     if form == "numpy":
         return "CPU (numpy)"
     used = gpu_in_use()
@@ -149,15 +149,15 @@ def computed_on(form: str) -> str:
 
 
 def compute_available() -> bool:
-    """Whether the GPU can simulate here and now; the first call with a GPU tries it out."""
+    """Whether the GPU can simulate at the moment; the first call with a GPU runs a test."""
     return not compute_problem()
 
 
 def compute_problem() -> str:
-    """Why the GPU cannot simulate here; empty where it can.
+    """Why the GPU cannot simulate here; empty if it can.
 
-    Blender in the background has no GPU until gpu.init(), so that is asked each time; what a GPU
-    can do is found out once.
+    Blender in background mode has no GPU until gpu.init(), so its presence is checked in each call;
+    the GPU itself is tested once.
     """
     try:
         gpu.platform.backend_type_get()
@@ -168,7 +168,7 @@ def compute_problem() -> str:
 
 @cache
 def _tried_out() -> str:
-    """What is wrong with a frame of a few strands on the GPU, compared with numpy."""
+    """The error of a test frame on the GPU, compared with numpy; empty if they agree."""
     along = np.linspace(0.0, 0.2, 6)
     points = np.zeros((3, len(along), 3))
     points[..., 0], points[:, 0, 1] = along, (0.0, 0.1, 0.2)

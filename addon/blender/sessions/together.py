@@ -1,10 +1,11 @@
-"""Grooms that feel each other go through a frame together, see `dynamics.neighbours`.
+"""Grooms that feel each other are simulated together in each frame, see `dynamics.neighbours`.
 
     with Together(sessions) as frame:
         ...                 each session is moved as if it were alone; one that feels others waits
-        frame.go_on()       those that have waited go on, all at once
+        frame.go_on()       those that waited are simulated, all together
 
-What is not simulated, plays a bake or feels nothing goes straight from where it was to where it is.
+Others see the guides of hair that is not simulated, plays a bake or feels nothing move in straight
+lines within the frame.
 """
 
 from __future__ import annotations
@@ -33,17 +34,17 @@ class Felt(Protocol):
 
     @property
     def is_felt(self) -> bool:
-        """Whether it counts: hair that renders leave out does not."""
+        """Whether others feel it; hair that renders leave out is not felt."""
 
     @property
     def rig(self) -> Rig: ...
 
     @property
     def pose(self) -> Pose:
-        """Where its body was when it was moved last."""
+        """The pose of its body when it was last moved."""
 
     def guides(self) -> Floats:
-        """Where they are, (guide_count, cv_count, 3) [m, world]."""
+        """Its guides, (guide_count, cv_count, 3) [m, world]."""
 
     def style_seen(self) -> Style:
         """See `motion_flow.style_seen`."""
@@ -51,9 +52,10 @@ class Felt(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class _Begin:
-    """A groom at the frame's begin.
+    """A groom at the beginning of the frame.
 
-    reach: how far [m] its hair gets from a middle. near: what others it feels, by number.
+    reach: radius [m] of the ball that its hair cannot leave. near: the grooms that it feels, by
+    session number.
     """
 
     groom: Felt
@@ -64,7 +66,7 @@ class _Begin:
 
     @property
     def mover(self) -> Mover:
-        """The groom in the frame, once all have been moved that do not wait."""
+        """The groom's motion in the frame, once all grooms that do not wait have been moved."""
         groom = self.groom
         straight = Straight(self.guides, groom.guides, self.reach)
         if not isinstance(groom, Session):
@@ -99,8 +101,7 @@ class Together:
             session.has_company, session.waiting = False, None
 
     def go_on(self) -> list[Session]:
-        """Bring those that wait to the frame's end; returns them. `Session.finish_frame` is to
-        come."""
+        """Simulate the sessions that wait; returns them, to call `Session.finish_frame` on each."""
         waiting = [session for session in self._sessions if session.waiting is not None]
         if waiting:
             movers = {begun.groom.uid: begun.mover for begun in self._begun}
@@ -112,7 +113,7 @@ class Together:
 
 
 def _begun(grooms: list[Felt]) -> list[_Begin]:
-    """Those that feel others, and those that they feel."""
+    """The grooms that feel others, and those that they feel."""
     feeling = {each.uid for each in grooms if isinstance(each, Session) and each.feels_hair}
     if not feeling or len(grooms) < 2:
         return []
@@ -133,7 +134,7 @@ def _begun(grooms: list[Felt]) -> list[_Begin]:
 
 
 def _touching(uid: int, balls: dict[int, tuple[Floats, float]]) -> frozenset[int]:
-    """The numbers of other balls, a middle and a radius, that touch this one."""
+    """The numbers of other balls (middle, radius) that touch this one."""
     middle, radius = balls[uid]
     return frozenset(
         other

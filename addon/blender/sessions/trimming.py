@@ -1,4 +1,4 @@
-"""Hair cut by its trim shapes, which can be taken back and done again with other shapes."""
+"""Cut hair by its trim shapes; can be undone, and repeated with other shapes."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from ..scene.trim_shapes import read_shapes, trim_shapes_of
 
 
 def trim_to_shapes(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Parts[Outcome]:
-    """End the curves of this hair where they leave its trim shapes, before their modifiers. Hair
-    that nothing else has changed since it was trimmed begins again from its shape before.
+    """Cut the curves of this hair where they leave its trim shapes, before their modifiers. If
+    nothing has changed the hair since it was last trimmed, it begins again from the shape before.
 
     Raises:
-        HairloomError: no hair that can be used, no shape, or it is linked from another file.
+        HairloomError: no usable hair, no shape, or it is linked from another file.
     """
     check_curves_editable(hair, depsgraph)
     shapes, unusable = read_shapes(trim_shapes_of(hair), depsgraph)
