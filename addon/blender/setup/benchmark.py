@@ -1,9 +1,9 @@
-"""How fast frames are on this machine: what `self-test --benchmark` writes, for anyone to send.
+"""Measures frame times on this machine: the report of `self-test --benchmark`, for anyone to send.
 
-A ball of hair that is shaken, simulated where this machine simulates, drawn as the preview draws
-it: by layers, in a studio's light, with its shadows. Each time ends when the GPU has done the work,
-since a pixel that it leads to is read back then; rounds that compile, or wake up a GPU that has
-slowed down to rest, do not count.
+A ball of hair is shaken, simulated on the device that this machine uses, and drawn as in the
+preview: in layers, in studio light, with shadows. Each measurement ends when the GPU has finished,
+as a pixel is read back that depends on the work. Rounds that compile shaders, or that run before
+an idle GPU has reached its full clock rate, do not count.
 """
 
 from __future__ import annotations
@@ -40,13 +40,13 @@ from ..sessions.prepared_groom import prepared
 from ..sessions.snapshots import snapshot_of
 from ..sessions.solvers import Solver, computed_on, form_of, solver_of
 
-#: of the JSON: another number when figures mean something else
+#: version of the JSON; raise it when the meaning of a figure changes
 VERSION = 2
 SIZES = ((960, 540), (1920, 1080), (3840, 2160))
 STRANDS, POINTS = 11_400, 16
-#: rounds at most, and seconds after which there is no further one
+#: most rounds, and the time [s] after which no further round begins
 _ROUNDS, _SECONDS = 9, 3.0
-#: [s] for which a GPU works before it is timed
+#: time [s] that a GPU works before it is timed
 _WAKING = 0.5
 _DIRECTION, _FIELD_OF_VIEW = (0.0, -1.0, 0.2), 0.5
 _GRAVITY, _FRAME = np.array([0.0, 0.0, -9.81]), 1.0 / 60.0
@@ -55,14 +55,14 @@ _GRAVITY, _FRAME = np.array([0.0, 0.0, -9.81]), 1.0 / 60.0
 def measured(
     sizes: tuple[tuple[int, int], ...] = SIZES, strand_count: int = STRANDS
 ) -> dict[str, Any]:
-    """All figures, as they are written; takes seconds on a GPU, and minutes without one.
+    """All figures, as written to the JSON; takes seconds on a GPU, and minutes in software.
 
     Args:
         sizes: of pictures [pixels].
 
     Raises:
         HairloomError: there is no GPU here.
-        ShaderError: it cannot draw hair.
+        ShaderError: the GPU cannot draw hair.
     """
     ensure_gpu()
     rig = hair_ball(strand_count)
@@ -99,12 +99,12 @@ class _Bench:
 
     def __post_init__(self) -> None:
         points = self.rig.strands.points
-        # found once: over all points it takes as long as the frame that is to be timed
+        # computed once, as finding it over all points takes as long as the timed frame
         self._box = points.min(axis=0), points.max(axis=0)
         self._lights = three_point_lights(self.camera(1.0).view)
 
     def simulate(self) -> None:
-        """A frame of motion, with the strands that ride on the guides."""
+        """Simulate a frame, with the strands that ride on the guides."""
         self.moments += 1
         moved = np.eye(4)
         moved[0, 3] = 0.02 * np.sin(0.3 * self.moments)
@@ -122,7 +122,7 @@ class _Bench:
         self.strands.opacity(self.shown())
 
     def frame(self, width: int, height: int) -> dict[str, float]:
-        """Of one size: drawn as at rest, and all of a frame that plays, as a viewport draws it."""
+        """Times of one size: drawing alone, with hair at rest; and a playing frame in full."""
         camera = self.camera(width / height)
         asked: list[float] = []
 
@@ -148,7 +148,7 @@ class _Bench:
         }
 
     def time(self, work: Callable[[], None], before: Callable[[], None] | None = None) -> float:
-        """Median milliseconds until the GPU has done it. `before`: is not timed."""
+        """Median milliseconds until the GPU has finished `work`; `before` is not timed."""
         times: list[float] = []
         is_awake, begin = False, time.perf_counter()
         while not times or (len(times) < _ROUNDS and time.perf_counter() - begin < _SECONDS):
@@ -165,14 +165,14 @@ class _Bench:
 
 
 def _finish() -> None:
-    """Wait for all that the GPU has still to do: it works in order, and a pixel comes back."""
+    """Wait until the GPU has finished: it works in order, so reading back a pixel waits for all."""
     last = gpu_objects.texture((1, 1), format="R32F")
     last.clear(format="FLOAT", value=(0.0,))
     last.read()
 
 
 def hair_ball(strand_count: int) -> Rig:
-    """Strands of 15 cm out of a ball of 10 cm, evenly spread and bent downwards."""
+    """Strands of 15 cm on a ball of 10 cm radius, evenly distributed and bent downwards."""
     along = np.linspace(0.0, 1.0, POINTS)
     points = even_directions(strand_count)[:, None] * (0.1 + 0.15 * along[:, None])
     points[..., 2] -= 0.1 * along * along

@@ -1,4 +1,4 @@
-"""Heads that are not the built-in one: MakeHuman's by their topology, others by fitting."""
+"""Hair on heads other than the built-in one: MakeHuman's are matched by topology, others fitted."""
 
 from __future__ import annotations
 
@@ -32,29 +32,30 @@ from ..scene.built_in_head import built_in_head
 from ..scene.bust_data import SKIN, load_bust
 from ..scene.surfaces import read_positions, read_surface
 
-#: modifiers that move vertices and leave their number as it is
+#: modifiers that move vertices without changing their number
 _DEFORMING = {
     "ARMATURE", "CAST", "CURVE", "DISPLACE", "HOOK", "LAPLACIANDEFORM", "LATTICE", "MESH_DEFORM",
     "SHRINKWRAP", "SIMPLE_DEFORM", "SMOOTH", "CORRECTIVE_SMOOTH", "LAPLACIANSMOOTH",
     "SURFACE_DEFORM", "WARP", "WAVE",
 }  # fmt: skip
-#: of the built-in head's edges, how many a mesh of MakeHuman's has at least
+#: fraction of the built-in head's edges that a mesh must have to be MakeHuman's
 _SAME_EDGES = 0.9
-#: a mesh with fewer vertices is no head
+#: a mesh with fewer vertices is not a head
 _MIN_VERTICES = 150
-#: height [m] in the built-in head above which vertices are the head's, not neck or shoulders
+#: height [m] on the built-in head that separates head vertices from neck and shoulders
 _CHIN = -0.115
-#: how far [m on the built-in head] a root may be from the mesh, and the part that may be farther
+#: distance from the mesh [m on the built-in head] beyond which a root is missing; fraction of
+#: missing roots beyond which there is an error
 _MISSING, _MAX_MISSING = 0.012, 0.25
-#: how far skin may be from a fitted mesh on average before a warning asks to look [m]
+#: mean distance of the skin from the mesh [m on the built-in head] beyond which there is a warning
 _LOOSE = 0.002
-#: the same of single roots, and how many of them may be farther
+#: distance beyond which a root is loose, likewise; fraction of loose roots for a warning
 _LOOSE_ROOT, _MAX_LOOSE = 0.004, 0.05
-#: of vertex groups: what is farther from the fitted skin has no weight [m]
+#: vertices farther than this from the fitted skin [m on the built-in head] get no weight in groups
 _GROUP_REACH = 0.02
-#: custom property of landmarks: where each was guessed, as its location
+#: custom property of landmarks: the location at which each was guessed
 _GUESSED = "hairloom_guessed"
-#: how large landmarks are shown, as a part of a head of 1 m
+#: display size [m] of landmarks that span 0.3 m; scales with their extent
 _SHOWN = 0.006
 
 
@@ -63,9 +64,9 @@ class ForeignHead:
     """A mesh with the built-in head fitted to it, in world space.
 
     built_in: the built-in head.
-    skin: its skin as it lies on the mesh, with its own UVs.
-    away: how far from the mesh that is, on average [m on the built-in head].
-    landmarks: guessed or placed; none where the topology says where everything is.
+    skin: the built-in head's skin, fitted to the mesh, with its own UVs.
+    away: mean distance of that skin from the mesh [m on the built-in head].
+    landmarks: guessed or placed; none if the mesh is matched by its topology.
     """
 
     name: str
@@ -78,15 +79,15 @@ class ForeignHead:
 
     @property
     def scale(self) -> float:
-        """How much larger than the built-in head it is."""
+        """Its size relative to the built-in head."""
         return self.warp.scale
 
     def hair(self, guides: RootedShapes) -> tuple[StrandSet, list[str]]:
-        """Guides of the built-in head on this one, but for those below which it has no skin; and
+        """Guides of the built-in head on this one, except those whose roots are off the mesh; and
         warnings.
 
         Raises:
-            HairloomError: too many of them.
+            HairloomError: too many roots are off the mesh.
         """
         outside = OuterSearch(self.surface, self.skin, self.scale)
         made, roots = guides.on(self.built_in), guides.on(self.skin).roots
@@ -114,18 +115,18 @@ class ForeignHead:
         return fitted.strands.take(np.flatnonzero(~missing)), warnings
 
     def weights(self, group: str, positions: Floats) -> Floats:
-        """What one of the built-in head's groups is at positions (n, 3) on this head."""
+        """The weights of one of the built-in head's groups at positions (n, 3) on this head."""
         own = load_bust().weights[group]
         return warped_weights(own, self.skin, positions, _GROUP_REACH * self.scale)
 
 
 @dataclass(frozen=True, eq=False)
 class ReadHead:
-    """What is read of a mesh that hair of the built-in head is to grow on.
+    """What is read of a mesh on which hair of the built-in head is to grow.
 
-    own: where its vertices are, see `own_positions`, if it is MakeHuman's; else None.
-    landmarks: those that it has. guessed: which of them still stand where they were guessed.
-    upright: (4, 4), from where the mesh is now to where it was when they were guessed.
+    own: positions of its vertices, see `own_positions`, if it is MakeHuman's; else None.
+    landmarks: those that it has. guessed: the names of those that have not been moved since.
+    upright: (4, 4), from the mesh's present place to that when they were guessed.
     """
 
     name: str
@@ -137,8 +138,11 @@ class ReadHead:
     upright: Floats = field(default_factory=lambda: np.eye(4))
 
     def points(self) -> dict[str, Floats] | None:
-        """Where to fit the built-in head to: landmarks that an artist has dragged or that a mesh
-        unlike a head has, and a guess of the others; None if it has none."""
+        """Landmarks to fit the built-in head to; None if the mesh has none.
+
+        Those that the artist has dragged are used as they are, the others guessed again; on a mesh
+        unlike a head, all are used as they are.
+        """
         if not self.landmarks:
             return None
         dragged = {name: at for name, at in self.landmarks.items() if name not in self.guessed}
@@ -152,7 +156,7 @@ class ReadHead:
 
 
 def read_foreign_head(head: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> ReadHead:
-    """The scene is not changed.
+    """Read a mesh to fit the built-in head to; the scene is not changed.
 
     Raises:
         HairloomError: it has no faces, or too few vertices to be a head.
@@ -181,7 +185,7 @@ def fitted_to(read: ReadHead) -> ForeignHead:
     """The built-in head fitted to a mesh, from arrays alone.
 
     Raises:
-        HairloomError: it is too unlike a head; landmarks that are mistaken.
+        HairloomError: the mesh is too unlike a head, or its landmarks are wrong.
     """
     if read.own is not None:
         warp, positions = _by_topology(read.own)
@@ -195,13 +199,13 @@ def fitted_to(read: ReadHead) -> ForeignHead:
 
 
 def may_be_head(mesh: bpy.types.Object) -> bool:
-    """Whether it has as many vertices as a head needs."""
+    """Whether it is a mesh with enough vertices for a head."""
     return mesh.type == "MESH" and len(mesh.data.vertices) >= _MIN_VERTICES
 
 
 @cache
 def fit_model() -> FitModel:
-    """The built-in head as others are fitted to it."""
+    """The built-in head as a model to fit to others."""
     bust = load_bust()
     is_skin = bust.makehuman >= 0
     is_open = is_skin & (bust.weights["cavity"] > 0.4)
@@ -211,7 +215,7 @@ def fit_model() -> FitModel:
 
 
 def _skin(positions: Floats) -> Surface:
-    """The built-in head without its eyes, with its vertices elsewhere."""
+    """The built-in head without its eyes, with other vertex positions."""
     bust = load_bust()
     corners, material = bust.fans
     corners = corners[material == SKIN]
@@ -228,7 +232,7 @@ def has_makehuman_topology(mesh: bpy.types.Mesh) -> bool:
 
 @cache
 def _makehuman_edges() -> Ints:
-    """The edges of the built-in head between vertices of MakeHuman's, by its numbers, (n, 2)."""
+    """The built-in head's edges between vertices of MakeHuman's mesh, as indices there, (n, 2)."""
     bust = load_bust()
     last = np.cumsum(bust.sizes) - 1
     following = np.arange(len(bust.corner_vertex)) + 1
@@ -244,7 +248,7 @@ def _keys(edges: Ints) -> Ints:
 
 
 def _by_topology(positions: Floats) -> tuple[Warp, Floats]:
-    """From the built-in head to a mesh of MakeHuman's, and where its own vertices are there."""
+    """The warp from the built-in head to a mesh of MakeHuman's, and the vertices moved by it."""
     bust = load_bust()
     known = np.flatnonzero(bust.makehuman >= 0)
     source = bust.positions[known].astype(np.float64)
@@ -256,8 +260,8 @@ def _by_topology(positions: Floats) -> tuple[Warp, Floats]:
 
 
 def own_positions(head: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Floats:
-    """Where the vertices of a mesh are before modifiers add some or take some away, but as posed
-    and shaped: (vertex_count, 3) world space."""
+    """The vertices of a mesh, posed and shaped, but before modifiers that change their number:
+    (vertex_count, 3) world space."""
     positions = read_positions(head, depsgraph, place=head.name)
     if len(positions) == len(head.data.vertices):
         return positions
@@ -267,7 +271,7 @@ def own_positions(head: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Flo
 
 @contextmanager
 def _only_deformed(head: bpy.types.Object) -> Iterator[bpy.types.Object]:
-    """The same object without modifiers that change how many vertices there are."""
+    """A copy of the object without modifiers that change the number of vertices."""
     same = head.copy()
     try:
         for modifier in same.modifiers:
@@ -279,7 +283,7 @@ def _only_deformed(head: bpy.types.Object) -> Iterator[bpy.types.Object]:
 
 
 def placed_landmarks(head: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> dict[str, Floats]:
-    """Where the landmarks of a head are, by name, in world space; none if it has none."""
+    """The positions of a head's landmarks in world space, by name."""
     return {
         name: np.array(obj.evaluated_get(depsgraph).matrix_world.translation, np.float64)
         for name, obj in landmarks_of(head).items()
@@ -298,8 +302,8 @@ def landmarks_of(head: bpy.types.Object) -> dict[str, bpy.types.Object]:
 def add_landmarks(
     head: bpy.types.Object, depsgraph: bpy.types.Depsgraph, collection: bpy.types.Collection
 ) -> Parts[tuple[list[bpy.types.Object], bool]]:
-    """Empties where landmarks may be, for those that a head lacks; and whether the mesh is like a
-    head, so that the guess may be good.
+    """Add Empties at guessed places for the landmarks that a head lacks; also returns whether the
+    mesh is enough like a head to trust the guess.
 
     Raises:
         HairloomError: it has no faces.
@@ -314,7 +318,7 @@ def add_landmarks(
 def put_landmarks(
     head: bpy.types.Object, places: Mapping[str, Floats], collection: bpy.types.Collection
 ) -> list[bpy.types.Object]:
-    """Empties at places in world space, for those that a head lacks."""
+    """Add Empties, at these places in world space, for the landmarks that a head lacks."""
     there, made = landmarks_of(head), []
     extent = float(np.linalg.norm(np.ptp(np.array(list(places.values())), axis=0)))
     for name, place in places.items():
@@ -333,7 +337,7 @@ def put_landmarks(
 
 
 def move_landmarks(head: bpy.types.Object, places: Mapping[str, Floats]) -> None:
-    """Move the landmarks that nobody has dragged to where they are now, in world space."""
+    """Move landmarks that have not been dragged to these places in world space."""
     for name, empty in landmarks_of(head).items():
         if name in places and _is_as_guessed(empty):
             to_world = head.matrix_world @ empty.matrix_parent_inverse
@@ -346,7 +350,7 @@ def _put_guess(empty: bpy.types.Object, location: Vector) -> None:
 
 
 def _is_as_guessed(empty: bpy.types.Object) -> bool:
-    """Whether a landmark still stands where it was guessed, by its place on its head."""
+    """Whether a landmark is still where it was guessed, relative to its head."""
     guessed = empty.get(_GUESSED)
     is_of_object = empty.parent_type == "OBJECT"
     return guessed is not None and is_of_object and tuple(guessed) == empty.location[:]

@@ -1,4 +1,4 @@
-"""Hairstyles: those that come with Hairloom, and how one is added to a head."""
+"""Hairstyles: finding those that come with Hairloom, and adding one to a head."""
 
 from __future__ import annotations
 
@@ -51,15 +51,15 @@ from .starting import REAL, fit_motion, fitted, fitting_factor
 
 HAIRSTYLE_FOLDER = Path(__file__).resolve().parents[3] / "hairstyles"
 _HEAD = "Head"
-#: a note says so where more guides than this part are left out
+#: fraction of guides left out beyond which there is a warning
 _NOTED_LOSS = 0.02
-#: how far modifiers may bring hair into a head [m on the built-in head]
+#: depth to which modifiers may bring hair into a head [m on the built-in head]
 _DEEP = 0.0008
 
 
 @dataclass(frozen=True)
 class Entry:
-    """One style in a menu. name: as `named_hairstyle` knows it."""
+    """One hairstyle in a menu. name: the name that `named_hairstyle` takes."""
 
     name: str
     title: str
@@ -73,7 +73,7 @@ class Entry:
 
 @cache
 def shipped() -> tuple[Entry, ...]:
-    """The styles that come with Hairloom, in their order."""
+    """The hairstyles that come with Hairloom, in their order."""
     found = []
     for path in HAIRSTYLE_FOLDER.glob("*.json"):
         order, title = read_title(path)
@@ -82,16 +82,16 @@ def shipped() -> tuple[Entry, ...]:
 
 
 def files_of_hairstyle(name: str) -> tuple[Path, Path]:
-    """Where a style that ships says what it is, and where its guides are; fur has none."""
+    """The files of a hairstyle that ships: its description, and its guides; fur has none."""
     path = HAIRSTYLE_FOLDER / f"{name}.json"
     return path, path.with_suffix(".npz")
 
 
 def named_hairstyle(name: str) -> Hairstyle:
-    """A style by its name, such as bob, or by the path of its file.
+    """A hairstyle by its name, such as bob, or by the path of its file.
 
     Raises:
-        HairloomError: there is no such style, or it is damaged.
+        HairloomError: there is no such hairstyle, or it is damaged.
     """
     by_name = {entry.name: entry.path for entry in shipped()}
     path = by_name.get(name) or Path(name)
@@ -120,7 +120,7 @@ def add_head(collection: bpy.types.Collection, skin: str) -> Parts[bpy.types.Obj
     Args:
         skin: one of bust_skin.TONES.
     """
-    yield Part("Painting the skin", partial(encoded_skin, skin))  # which keeps it
+    yield Part("Painting the skin", partial(encoded_skin, skin))  # fills its cache
     head = bust_object(_HEAD, skin)
     collection.objects.link(head)
     return head
@@ -128,13 +128,13 @@ def add_head(collection: bpy.types.Collection, skin: str) -> Parts[bpy.types.Obj
 
 @dataclass(frozen=True)
 class _Growth:
-    """What a style is on a mesh, before anything of it is in the scene.
+    """A hairstyle on a mesh, before anything of it is in the scene.
 
-    size: how much larger than it was made the hair is.
-    factor: the same for its motion, 1 for all that may be human.
-    solid: of a head that is not built in, what its modifiers may bring hair into.
-    groups: weights of vertices by the names of groups that the mesh lacks.
-    landmarks: where those that it lacks may be, by name.
+    size: of the hair, relative to that for which it was made.
+    factor: the same for its motion, but 1 for heads of about human size.
+    groups: weights of vertices, by name of a vertex group that the mesh lacks.
+    landmarks: positions, guessed or placed, by name.
+    solid: of a head other than the built-in one; modifiers must not bring hair into it.
     """
 
     strands: StrandSet
@@ -148,7 +148,7 @@ class _Growth:
 
 @dataclass(frozen=True)
 class AddedHair:
-    """done: what else was added to the scene, a sentence each."""
+    """New hair. done: what else was added to the scene, a sentence each."""
 
     hair: bpy.types.Object
     done: tuple[str, ...]
@@ -163,18 +163,18 @@ def add_hairstyle(
     *,
     hairline: str = "",
 ) -> Parts[AddedHair]:
-    """Hair curves in this style on a head, or fur on any mesh, with its modifiers and settings.
+    """Hair curves in this hairstyle on a head, or fur on any mesh, with its modifiers and settings.
 
-    A head that is neither the built-in one nor MakeHuman's gets landmarks. One without the vertex
-    group by which the style's children grow gets it.
+    A head that is neither the built-in one nor MakeHuman's gets landmarks. A head without the
+    vertex group for the density of the hairstyle's children gets that.
 
     Args:
-        hairline: a vertex group or attribute of the head instead of the style's own.
+        hairline: a vertex group or attribute of the head instead of the hairstyle's own.
 
     Raises:
-        HairloomError: a mesh that it does not grow on, a mask that it has not or that is empty, a
-            preset or node group that is not there, a head that lacks the group and is linked.
-            Nothing is added then, nor if it is cancelled.
+        HairloomError: the hairstyle does not fit the mesh; a mask, preset or node group is missing,
+            or a mask is empty; or the head lacks the vertex group and is linked. Nothing is added
+            then, nor if it is cancelled.
     """
     masks = {**style.masks, **({"children": hairline} if hairline and style.masks else {})}
     _check_masks(style, head, depsgraph, masks.values(), needed=hairline)
@@ -204,7 +204,7 @@ def add_hairstyle(
 def _put(
     growth: _Growth, head: bpy.types.Object, collection: bpy.types.Collection
 ) -> tuple[str, ...]:
-    """Give a head the vertex groups and landmarks that it lacks; what was done."""
+    """Give a head the vertex groups and landmarks that it lacks; returns what was done."""
     done = []
     for name, weights in growth.groups.items():
         set_group(head, name, weights)
@@ -221,12 +221,12 @@ def _put(
 def fit_again(
     grooms: Sequence[bpy.types.Object], depsgraph: bpy.types.Depsgraph
 ) -> Parts[tuple[str, ...]]:
-    """Give hair the curves of its hairstyle again, by the landmarks and the shape that its head has
-    now; modifiers and settings stay. Returns warnings.
+    """Fit hairstyles again to the present landmarks and shapes of their heads; modifiers and
+    settings stay. Returns warnings.
 
     Raises:
-        HairloomError: some was not added as a hairstyle, has no head, does not fit on it, or is
-            linked from another file. All is as it was then, and if it is cancelled.
+        HairloomError: some hair was not added as a hairstyle, has no head, does not fit its head,
+            or is linked from another file. Nothing is changed then, nor if it is cancelled.
     """
     grown = []
     for hair in grooms:
@@ -264,7 +264,11 @@ def _check_masks(
     names: Iterable[str],
     needed: str,
 ) -> None:
-    """Raise where a mask is empty, or is not there and nothing can make it."""
+    """Check the masks of a hairstyle on a head.
+
+    Raises:
+        HairloomError: a mask is empty, or is missing and cannot be made.
+    """
     made = () if is_bust(head) else set(style.masks.values()) - {needed}
     for name in names:
         if name in made and name not in weight_names(head):
@@ -284,7 +288,7 @@ def _growth(
     depsgraph: bpy.types.Depsgraph,
     masks: Mapping[str, str],
 ) -> Parts[_Growth]:
-    """Reads the mesh; the rest is made from arrays alone."""
+    """The hairstyle on a mesh: reads the mesh, then works on arrays alone."""
     if style.guides is None:
         title, work = f"Growing {style.title}", _fur(style, head, depsgraph)
     elif is_bust(head):
@@ -334,7 +338,7 @@ def _on_foreign(
     depsgraph: bpy.types.Depsgraph,
     masks: Mapping[str, str],
 ) -> Callable[[], _Growth]:
-    """Guides on a head that is not built in."""
+    """Work that puts guides on a head other than the built-in one."""
     read, name = read_foreign_head(head, depsgraph), head.name
     mask = masks.get("children", "")
     weights = read_weights(head, depsgraph, mask) if mask in weight_names(head) else None
@@ -370,7 +374,7 @@ def _within(
     """The strands whose roots have a weight above 0.
 
     Raises:
-        HairloomError: none has.
+        HairloomError: there are none.
     """
     triangle, barycentric = strands.root_triangle, strands.root_barycentric
     assert triangle is not None and barycentric is not None
@@ -386,7 +390,7 @@ def _within(
 
 
 def _leave_out_inside(hair: bpy.types.Object, growth: _Growth) -> tuple[str, ...]:
-    """Take away the curves that their modifiers, such as curls, bring into the head; warnings."""
+    """Remove curves that modifiers, such as curls, bring into the head; returns warnings."""
     if growth.solid is None or not hair.modifiers:
         return ()
     bpy.context.view_layer.update()
@@ -403,8 +407,8 @@ def _leave_out_inside(hair: bpy.types.Object, growth: _Growth) -> tuple[str, ...
 
 
 def _outside(strands: StrandSet, solid: DistanceField | None) -> StrandSet:
-    """Strands led out of the mesh that they grow on, without those that nothing leads out, such as
-    fur on parts within it."""
+    """Strands led out of the mesh that they grow on; those that stay inside, such as fur on inner
+    parts, are dropped."""
     if solid is None:
         return strands
     led, is_out = led_out_at_rest(strands, solid, float(np.median(strands.lengths())))
@@ -412,7 +416,7 @@ def _outside(strands: StrandSet, solid: DistanceField | None) -> StrandSet:
 
 
 def grows_anywhere(style: Hairstyle) -> bool:
-    """Whether it is fur."""
+    """Whether it is fur, which grows on any mesh."""
     return style.guides is None
 
 
@@ -445,10 +449,10 @@ def add_face_hair(
 def face_hair(
     head: bpy.types.Object, surface: Surface, depsgraph: bpy.types.Depsgraph
 ) -> Parts[StrandSet]:
-    """Brows and lashes of the built-in head, where its own vertex groups say.
+    """Brows and lashes of the built-in head, by its vertex groups.
 
     Raises:
-        HairloomError: these are empty or gone.
+        HairloomError: the groups are empty or gone.
     """
     brows, lashes = (read_weights(head, depsgraph, name) for name in ("brows", "lashes"))
 
@@ -459,12 +463,12 @@ def face_hair(
 
 
 def _size_of(head: bpy.types.Object) -> float:
-    """How much larger than by its own measures the head stands in the scene."""
+    """The mean scale of the head's object."""
     return mean_scale(np.array(head.matrix_world))
 
 
 def _put_settings(style: Hairstyle, hair: bpy.types.Object) -> None:
-    """The style's own values, over those of its presets and the defaults."""
+    """Apply the hairstyle's own settings on top of its presets and the defaults."""
     for section in set(style.settings) - {GROWN}:
         kind, values = ALL_SETTINGS[section], style.settings[section]
         owners = hair.data.hairloom, hair.hairloom

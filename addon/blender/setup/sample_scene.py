@@ -31,7 +31,7 @@ _LIGHTS = {
     "Rim": ((-0.8, 0.8, 0.3), 6.0, 0.4, (1.0, 1.0, 1.0)),
 }
 _CAMERA_AT, _LENS = (-0.34, -0.68, 0.02), 58.0
-#: below the centre of the head, since hair hangs down and shoulders are below
+#: target of camera and lights; below the middle of the head, for hanging hair and shoulders
 _LOOKED_AT = Vector((0.0, 0.0, -0.07))
 _WORLD = (0.05, 0.058, 0.07, 1.0)
 _FILM_LOOK = "AgX - Medium High Contrast"
@@ -48,7 +48,7 @@ def add_sample_scene(
         presets: of the groom, by name.
         skin: of the head, one of bust_skin.TONES.
     """
-    yield Part("Painting the skin", partial(encoded_skin, skin))  # which keeps it
+    yield Part("Painting the skin", partial(encoded_skin, skin))  # fills its cache
     with taken_back() as note:
         scene, head = _scene_with_head(skin)
         note()
@@ -83,7 +83,7 @@ def _scene_with_head(skin: str) -> tuple[bpy.types.Scene, bpy.types.Object]:
 def _grown(
     head: bpy.types.Object, depsgraph: bpy.types.Depsgraph, collection: bpy.types.Collection
 ) -> Parts[bpy.types.Object]:
-    """Hair by the vertex groups of the head."""
+    """Hair grown by the vertex groups of the head."""
     surface = read_surface(head, depsgraph, need_uv=True, place=head.name)
     weights = {name: read_weights(head, depsgraph, name) for name in HAIR_GROUPS}
     strands = yield Part(
@@ -94,7 +94,7 @@ def _grown(
 
 
 def _animate(head: bpy.types.Object) -> None:
-    """Animate the head: it looks to both sides, in a loop."""
+    """Let the head look to both sides, in a loop."""
     for frame, turn, nod in (*_TURNS, (_FRAMES + 1, *_TURNS[0][1:])):
         head.rotation_euler = np.radians((nod, 0.0, turn))
         head.keyframe_insert("rotation_euler", frame=frame)

@@ -100,7 +100,7 @@ def _checked(name: str, check: Callable[[], str]) -> Check:
 
 
 def _compute() -> Check:
-    """Whether the shaders' motion equals numpy's, see `solvers`; without a GPU, the CPU is used."""
+    """Whether motion on the GPU equals numpy's, see `solvers`; otherwise the CPU is used."""
     problem = compute_problem()
     name = "Simulation on the GPU"
     if problem:
@@ -109,7 +109,7 @@ def _compute() -> Check:
 
 
 def _limits() -> str:
-    """What the GPU can do, as far as passes ask; a format that is missing is a failure."""
+    """The capabilities of the GPU that passes need; a missing texture format is a failure."""
     found = capabilities()
     if found.missing_formats:
         raise RuntimeError(f"there are no textures as {', '.join(found.missing_formats)}")
@@ -124,7 +124,7 @@ def _limits() -> str:
 
 
 def _atomics() -> Check:
-    """Whether strands can be lists of each pixel; without atomics of images they are hashed."""
+    """Whether image atomics work, for lists of strands per pixel; else they are drawn hashed."""
     name, problem = "Image atomics", capabilities().atomics_problem
     if problem:
         return Check(name, "absent", f"{problem}; strands are drawn as Hashed")
@@ -132,7 +132,7 @@ def _atomics() -> Check:
 
 
 def _looks() -> dict[str, tuple[ShadingSettings, VolumeSettings]]:
-    """Transparency methods, each with its own shaders."""
+    """Shading and shadows that each have their own shaders, by name."""
     plain = VolumeSettings(shadows="none")
     return {
         "Kajiya-Kay": (ShadingSettings(model="kajiya_kay"), plain),
@@ -184,7 +184,7 @@ def _brush() -> Rig:
 
 
 def _files() -> str:
-    """A groom and a picture written to the folder for temporary files, and the groom read again."""
+    """Write a groom and a picture to the folder for temporary files, and read the groom again."""
     strands = _brush().strands
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "groom.tfx"
@@ -200,7 +200,7 @@ def _files() -> str:
 
 
 def _package(name: str, use: str) -> Check:
-    """Only look for it: loading a second build of a library may crash the process."""
+    """Look for a package, but do not load it: a second build of a library may crash the process."""
     if find_spec(name) is None:
         return Check(name, "absent", f"not here: no {use}")
     return Check(name, "passed", use)

@@ -1,4 +1,4 @@
-"""The first groom, on any mesh or empty hair: sized to its mesh, with a look and motion."""
+"""The first groom, on any mesh or from empty hair: sized to its mesh, with a look and motion."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ from ..scene.source import mute_own_dynamics
 from ..scene.surfaces import read_positions
 from ..strands.growing import grow_on
 
-#: Smallest extent [m] of a head of human size; lengths are declared for it.
+#: Smallest extent [m] of a human head, for which default lengths are declared.
 _HEAD_SIZE = 0.19
-#: Meshes within these factors are heads or bodies of real size, and are not fitted.
+#: Meshes within this factor of that size are heads or bodies of real size: hair is not scaled.
 REAL = 2.5
 #: lengths that belong to the whole head, not to single hairs
 _LENGTHS = ("length", "wave", "wave_length", "frizz", "clearance", "volume")
-#: settings of dynamics -> the power of the size that they scale with; frequencies are kept
+#: settings of dynamics -> the power of the size that they scale with; frequencies do not scale
 _MOTION = {
     "gravity": 1,
     "wind_speed": 1,
@@ -39,9 +39,9 @@ _MOTION = {
 
 
 def fitting_factor(head: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> float:
-    """How much larger than a human head a mesh is; 1 if it may be a head or a body.
+    """The size of a mesh relative to a human head; 1 if it may be a head or a body.
 
-    The smallest extent counts: a body of 2 m is thin somewhere, a cube of 2 m is not.
+    The smallest extent is compared: a body of 2 m is thin in one direction, a cube of 2 m is not.
     """
     positions = read_positions(head, depsgraph, place=head.name)
     if not len(positions):
@@ -52,17 +52,18 @@ def fitting_factor(head: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> fl
 
 
 def fitted(settings: GrowSettings, factor: float) -> GrowSettings:
-    """The same hair on a head that is larger by a factor, within the declared limits."""
+    """Settings for the same hair on a head that is larger by a factor, within their limits."""
     if factor == 1.0:
         return settings
     longer = settings.multiplied(**dict.fromkeys(_LENGTHS, factor))
-    # which is a turn in each 2 cm, whatever the size
+    # droop is a turn per 2 cm of hair, on heads of any size
     return longer.clipped(droop=1.0 - (1.0 - settings.droop) ** (1.0 / factor))
 
 
 def fit_motion(hair: bpy.types.Object, factor: float) -> None:
-    """Let hair swing on a larger head as it would on a human one: by the same angles, in the same
-    time. Without this, a breeze of two metres a second would not move hair of two metres.
+    """Let hair swing on a larger head by the same angles in the same time as on a human one.
+
+    Otherwise a breeze of two metres per second would not move hair of two metres.
     """
     if factor == 1.0:
         return
@@ -120,7 +121,7 @@ def dress(hair: bpy.types.Object, presets: tuple[str, ...]) -> None:
     for name in presets:
         for settings in named_preset(name).all:
             apply(settings, hair)
-    if presets:  # which nobody chose for this hair: it keeps the colours that it has
+    if presets:  # not chosen for this hair, so it keeps colours of its own
         hair.data.hairloom.shading.color_source = "own"
 
 
@@ -129,20 +130,20 @@ def take_over(
 ) -> Parts[tuple[bpy.types.Object, tuple[str, ...]]]:
     """Prepare Blender's hair curves for Hairloom; returns the groom, and what was done.
 
-    Blender's Hair Dynamics is muted. Empty hair is replaced by a groom that is grown.
+    Blender's Hair Dynamics is muted. Empty hair is replaced by a new groom.
 
     Args:
-        presets: for hair whose look was never set.
+        presets: for hair whose look has not been set.
 
     Raises:
-        HairloomError: it has no curves, and no surface on which some could grow.
+        HairloomError: it has no curves, and no surface to grow some on.
     """
     done, factor = [], 1.0
     if not len(hair.data.curves) and not read_curves(hair, depsgraph).strands.strand_count:
         hair, factor = yield from _grown_in_place(hair, depsgraph)
         done.append("grew hair, since there was none")
     else:
-        yield Part("Reading the hair", lambda: None)  # before which nothing changes
+        yield Part("Reading the hair", lambda: None)  # nothing has changed if it is cancelled here
         if mute_own_dynamics(hair):
             done.append("muted Blender's Hair Dynamics")
     if is_untouched(hair):
@@ -153,7 +154,7 @@ def take_over(
 
 
 def _material_look(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> list[str]:
-    """Take the look from its material's Principled Hair BSDF if it has one; what was done."""
+    """Take the look from its material's Principled Hair BSDF, if any; returns what was done."""
     if not has_principled_hair(hair):
         return []
     settings, notes = look_from_material(hair, depsgraph)
@@ -170,8 +171,8 @@ def is_untouched(hair: bpy.types.Object) -> bool:
 def _grown_in_place(
     hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph
 ) -> Parts[tuple[bpy.types.Object, float]]:
-    """A groom with the name and the collections of empty hair, which it replaces; and how much
-    larger than a human head its head is.
+    """Replace empty hair by a groom with its name and collections; also returns the factor by which
+    its head is larger than a human one.
     """
     head = head_of(hair)
     if head is None:

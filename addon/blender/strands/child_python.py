@@ -1,8 +1,8 @@
-"""The command that starts another Python beside this Blender, with the same packages.
+"""The command that starts another Python process with the packages of this Blender.
 
-Official builds bring a Python along and name it `sys.executable`, the bpy module runs in one, and
-those of Linux distributions use the system's. But there it may lack packages that Blender has, or
-the libraries that these need. Then Blender itself runs the script, without a window.
+Official builds of Blender include a Python, which is `sys.executable`; the bpy module runs in one;
+and builds of Linux distributions use the system's. That may lack packages that Blender has, or
+libraries that these need. Then Blender itself runs the script, without a window.
 """
 
 from __future__ import annotations
@@ -19,16 +19,16 @@ from ...exchange.files.child_process import python_program, run_child
 from ...exchange.strand_formats import ALEMBIC, USD, strand_format
 from ..base.blender_program import blender_command
 
-#: Packages whose files another process reads, and what of them must load there.
+#: Packages that the other process needs, and the module of each that must load there.
 _PACKAGES = {"numpy": "numpy", "alembic3d": "alembic3d", "pxr": "pxr.Usd"}
-#: Seconds for a Python to start and load them, on a slow disk too.
+#: Timeout [s] for a Python to start and load them, also from a slow disk.
 _PATIENCE = 30.0
 
 
 def python_command() -> tuple[str, ...] | None:
     """The command, to which a script and its arguments are added.
 
-    None: there is no Python with these packages, and no Blender to start either.
+    None: there is neither a Python with these packages nor a Blender to start.
     """
     try:
         return found_python() or blender_command()
@@ -38,11 +38,11 @@ def python_command() -> tuple[str, ...] | None:
 
 @cache
 def found_python() -> tuple[str, ...] | None:
-    """The first Python with these packages, looked for once; None: there is none.
+    """The first Python with these packages; the result is cached. None: there is none.
 
     Raises:
-        TimeoutExpired: one was too slow to tell, and no other has them. That is not kept: next
-            time its files are in memory.
+        TimeoutExpired: one was too slow, and no other has them. This is not cached: at the next
+            call its files are in memory.
     """
     loaded = [module for name, module in _PACKAGES.items() if importlib.util.find_spec(name)]
     too_slow: TimeoutExpired | None = None
@@ -58,10 +58,10 @@ def found_python() -> tuple[str, ...] | None:
 
 
 def python_for(path: Path) -> tuple[str, ...] | None:
-    """The command for reading a file of strands; None where it is read in this process.
+    """The command for reading a file of strands; None: it is read in this process.
 
     Raises:
-        HairloomError: the file's suffix is of no format.
+        HairloomError: the suffix belongs to no format.
     """
     return python_command() if strand_format(path) in (ALEMBIC, USD) else None
 
@@ -79,8 +79,11 @@ def _programs() -> Iterator[str]:
 
 
 def _in_search_path(name: str) -> Iterator[str]:
-    """Where the system's own is found. A relative folder of the path may hold anything, and so may
-    the current one, where Windows looks first; there official builds have a Python."""
+    """The system's Python, from absolute folders of PATH alone.
+
+    Relative folders may hold any program. So may the current folder, where Windows looks first:
+    Windows is skipped, as all its builds of Blender include a Python.
+    """
     for folder in os.get_exec_path() if os.name == "posix" else ():
         program = os.path.join(folder, name)
         if os.path.isabs(folder) and os.access(program, os.X_OK):
@@ -93,4 +96,4 @@ def _loads(command: tuple[str, ...], modules: list[str]) -> bool:
     try:
         return run_child([*command, *code], seconds=_PATIENCE).returncode == 0
     except OSError:
-        return False  # so that the next one is tried
+        return False  # the next one is tried

@@ -1,4 +1,4 @@
-"""What an engine will see of hair, while an artist still chooses how it is written."""
+"""Checks what an engine will see of hair, while the artist still chooses export settings."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ from .strand_export import StrandExport, request_of
 
 @dataclass
 class ExportCheck:
-    """Hair that is read once, as it was when the artist began, and checked for each choice.
+    """Hair that is read once, when the dialog opens, and checked for each choice of settings.
 
-    lines: what will be there. warnings: what the artist should know of it.
+    lines: what the file will contain. warnings: for the artist.
     """
 
     hair: list[Handle]
@@ -45,8 +45,10 @@ class ExportCheck:
     def of(
         cls, hair: list[bpy.types.Object], known: Mapping[int, MadeRig] | None = None
     ) -> ExportCheck:
-        """Args:
-        known: what was made ready of hair, by its session number.
+        """Begin a check.
+
+        Args:
+            known: rigs of hair that are made already, by session number.
         """
         check = cls([Handle.of(each) for each in hair])
         uids = {each.uid for each in check.hair}
@@ -55,7 +57,7 @@ class ExportCheck:
 
     @property
     def made(self) -> tuple[MadeRig, ...]:
-        """The hair made ready, of which a file is written without making it again."""
+        """The rigs that were made, so that writing the file need not make them again."""
         return tuple(self._made.values())
 
     def reading(
@@ -64,14 +66,14 @@ class ExportCheck:
         kind: StrandFormat,
         settings: StrandExportSettings,
     ) -> Parts[None]:
-        """What takes long of the first `refresh`, and of those for other formats."""
+        """The slow part of the first `refresh`, and of one for another format."""
         request = request_of(kind, settings)
         for hair in filter(None, [each.find() for each in self.hair]):
             uid, name = hair.session_uid, hair.name
             if not needs_rig(hair, request):
                 continue
             groom = GroomSettings.of(hair)
-            with suppress(HairloomError):  # which `refresh` meets as well, and keeps
+            with suppress(HairloomError):  # `refresh` gets it too, and reports it
                 source = read_source(hair, depsgraph)
                 known = self._made.get(uid)
                 if known is None or not known.is_of(source, groom):
@@ -85,7 +87,7 @@ class ExportCheck:
         kind: StrandFormat,
         settings: StrandExportSettings,
     ) -> bool:
-        """Check it for a format and what is asked of it; whether anything may be new since."""
+        """Check for a format and settings; returns whether the result may have changed."""
         if self._checked == (kind, settings):
             return False
         if self._checked is None:
@@ -101,7 +103,7 @@ class ExportCheck:
         return True
 
     def motion_lines(self, *, use_bake: bool) -> list[str]:
-        """What each hair goes by where frames are written."""
+        """The source of motion of each hair, when frames are written."""
         hair = filter(None, (each.find() for each in self.hair))
         return [f"{each.name}: {self._moved_by(each, use_bake)}" for each in hair]
 
@@ -134,11 +136,11 @@ class ExportCheck:
         return f"{line}, out of date ({', '.join(changed)})" if changed else line
 
     def _look_at_bakes(self, depsgraph: bpy.types.Depsgraph) -> None:
-        """Once: hashing all that a bake depends on takes too long for drawing."""
+        """Find stale bakes, once: hashing all inputs of a bake is too slow for drawing."""
         for hair in filter(None, (each.find() for each in self.hair)):
             try:
                 cache = playback.cache_of(hair)
                 changed = () if cache is None else changed_since(hair, cache, depsgraph)
-            except HairloomError:  # reported in the lines of its motion, and when it is written
+            except HairloomError:  # reported by `motion_lines`, and when the file is written
                 changed = ()
             self._stale[hair.session_uid] = changed

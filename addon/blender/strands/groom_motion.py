@@ -1,4 +1,4 @@
-"""Hair in motion as it goes into files: from its bake, or as Blender's own animation moves it."""
+"""Hair in motion for files: from its bake, or moved by Blender's own animation."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ from .read_hair import ExportRequest, ExportStrands, baked_hair, still_hair
 
 
 class Moving(Protocol):
-    """One hair of a file, at all frames.
+    """One hair in a file, at all frames.
 
-    rate: frames in a second.
-    needs_scene: whether the scene goes to each frame before it is asked for.
+    rate: frames per second.
+    needs_scene: whether the scene must be at a frame before `at` is called for it.
     """
 
     @property
@@ -45,12 +45,12 @@ class Moving(Protocol):
     def needs_scene(self) -> bool: ...
 
     def at(self, frame: int, depsgraph: bpy.types.Depsgraph) -> Floats:
-        """The points of the strands that are seen, (point_count, 3) [m]."""
+        """The points of the strands in `out.seen`, (point_count, 3) [m]."""
 
 
 @dataclass(frozen=True)
 class BakedMotion:
-    """Hair that goes by its bake."""
+    """Hair that is moved by its bake."""
 
     out: ExportStrands
     cache: Cache
@@ -66,7 +66,7 @@ class BakedMotion:
 
 @dataclass(frozen=True)
 class ShownMotion:
-    """Hair that modifiers and animation move, read again at each frame."""
+    """Hair that modifiers and animation move, read again in each frame."""
 
     out: ExportStrands
     hair: Handle
@@ -85,8 +85,8 @@ class ChildrenMotion:
     """Children between guides that modifiers and animation move.
 
     guides: indices of the guides among the curves that are read.
-    count: of those curves.
-    body: what carries the roots.
+    count: number of those curves.
+    body: the object that carries the roots.
     """
 
     out: ExportStrands
@@ -120,16 +120,15 @@ def moving_hair(
     *,
     use_bake: bool,
 ) -> tuple[Moving, tuple[str, ...]]:
-    """The hair in motion, and what the artist should know.
+    """The hair in motion, and notes for the artist.
 
     Args:
         frames: scene frames.
         known: see `still_hair`.
-        use_bake: go by its bake, if it has one.
+        use_bake: whether its bake moves it, if it has one.
 
     Raises:
-        HairloomError: frames that are not in the bake, a damaged bake or one that is gone, or no
-            usable hair.
+        HairloomError: the bake lacks frames, is damaged or gone; or there is no usable hair.
     """
     cache = playback.cache_if_baked(hair) if use_bake else None
     if cache is not None:
@@ -153,10 +152,10 @@ def moving_hair(
 
 
 def common_rate(parts: Sequence[Moving]) -> float:
-    """Frames in a second.
+    """Frames per second of all parts.
 
     Raises:
-        HairloomError: the bakes of hair that goes into one file differ.
+        HairloomError: the frame rates of the parts differ.
     """
     rates = {part.rate for part in parts}
     if len(rates) > 1:
@@ -171,12 +170,12 @@ def common_rate(parts: Sequence[Moving]) -> float:
 
 
 def positions_of(parts: Sequence[Moving], frames: range) -> Generator[Floats]:
-    """The points of all parts, one after the other, at each frame.
+    """The points of all parts, one after the other, in each frame.
 
-    Leaves the scene at the frame where it was, also when it is closed before its end.
+    Leaves the scene at the frame where it was, also if the generator is closed before its end.
 
     Raises:
-        HairloomError: hair that is gone, or has other curves than in the first frame.
+        HairloomError: hair is gone, or has other curves than in the first frame.
     """
     needs_scene = any(part.needs_scene for part in parts)
     with _scene_kept() as go_to:
@@ -187,7 +186,7 @@ def positions_of(parts: Sequence[Moving], frames: range) -> Generator[Floats]:
 
 @contextmanager
 def _scene_kept() -> Iterator[Callable[[int], bpy.types.Depsgraph]]:
-    """Lets the scene go to frames, and brings it back to the one where it was."""
+    """A function that brings the scene to a frame; at the end, the scene returns to its frame."""
     scene = bpy.context.scene
     shown, subframe, has_gone = scene.frame_current, scene.frame_subframe, False
 

@@ -1,7 +1,7 @@
-"""Hair that grows on a mesh, and again as its settings are edited, as long as nobody has combed it.
+"""Grows hair on a mesh, and again when its settings are edited, unless the hair was combed.
 
-The settings are the groom's own. With them is kept what they made: the curves follow an edit only
-if they are still as they grew.
+The settings are stored in the groom, with a digest of the curves that they made: curves follow an
+edit of the settings only if they are still as they grew.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from ..scene.look_materials import follow_curves
 from ..scene.masks import read_map
 from ..scene.surfaces import read_surface
 
-#: what hair has as it grows
+#: attributes of hair as it grows
 _OWN_ATTRIBUTES = ("position", "radius", "surface_uv_coordinate")
 
 
@@ -46,16 +46,16 @@ def grow_on(
     density_group: str = "",
     length_group: str = "",
 ) -> Parts[bpy.types.Object]:
-    """Hair curves grown on a mesh, with the settings that they grow by.
+    """Hair curves grown on a mesh, which store the settings that they grew by.
 
     Args:
         values: an operator or group with the properties of GrowSettings.
-        density_group, length_group: vertex groups, attributes or images, by name. Without
-            a density combed hair grows on the scalp of an upright head, hair along the normals
-            everywhere; without a length all is as long as the settings say.
+        density_group, length_group: vertex groups, attributes or images, by name. Without a
+            density, combed hair grows on the scalp of an upright head, and hair along the normals
+            grows everywhere. Without a length, all hair has the length in the settings.
 
     Raises:
-        HairloomError: it has no faces to grow on, there is no group of this name, or all is 0.
+        HairloomError: the mesh has no faces, there is no group of this name, or it is 0 everywhere.
     """
     settings = settings_of(values, GrowSettings)
     strands = yield from _grown(head, depsgraph, settings, density_group, length_group)
@@ -69,11 +69,11 @@ def grow_on(
 
 
 def grow_again(grooms: Sequence[bpy.types.Object], depsgraph: bpy.types.Depsgraph) -> Parts[None]:
-    """Give hair the curves that its settings make now, whatever was done to those that it has.
+    """Replace the curves of hair by those that its settings make now, even if they were combed.
 
     Raises:
-        HairloomError: some has no mesh to grow on, Blender does not evaluate it or its head, it is
-            linked from another file, or as `grow_on`. All is as it was then.
+        HairloomError: some hair has no mesh to grow on, is linked from another file, or Blender
+            does not evaluate it or its head; or as `grow_on`. Nothing is changed then.
     """
     made = []
     for hair in grooms:
@@ -116,8 +116,8 @@ def _grown_again(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Part
 def replace_curves(
     hair: bpy.types.Object, strands: StrandSet, depsgraph: bpy.types.Depsgraph
 ) -> None:
-    """Give hair other curves, in world space. All that went with those before is gone, but the
-    colours that its material reads: they are found again."""
+    """Give hair other curves, in world space. All attributes of the old curves are lost, except the
+    colours that its material reads, which are made again."""
     curves = hair.data
     back = np.linalg.inv(matrix_of(hair, depsgraph))
     has_colors = MATERIAL_COLOR in curves.attributes
@@ -132,7 +132,7 @@ def replace_curves(
 
 
 def follow_settings(curves: bpy.types.ID) -> None:
-    """A setting by which hair grows was edited: hair that is still as it grew grows again."""
+    """After a setting of growth was edited, grow hair again that is still as it grew."""
     assert isinstance(curves, bpy.types.Curves)
     own = curves.hairloom.grow
     if not curves.is_editable or own.made_by == _settings_digest(own) or losses(curves):
@@ -143,12 +143,12 @@ def follow_settings(curves: bpy.types.ID) -> None:
     try:
         if users:
             at_once(grow_again(users[:1], depsgraph))
-    except HairloomError as error:  # the panel shows it; the settings may be on their way
+    except HairloomError as error:  # shown in the panel; the artist may not have finished editing
         own.problem = str(error)
 
 
 def losses(curves: bpy.types.Curves) -> tuple[str, ...]:
-    """What growing again would lose, in a few words each; nothing: it follows its settings."""
+    """What growing again would lose, in a few words each; empty: curves follow their settings."""
     own = curves.hairloom.grow
     if not own.shape:
         return (f"{len(curves.curves):,} curves",) if len(curves.curves) else ()
@@ -157,12 +157,12 @@ def losses(curves: bpy.types.Curves) -> tuple[str, ...]:
 
 
 def has_grown(curves: bpy.types.Curves) -> bool:
-    """Whether they come from settings, and not from a file or a brush."""
+    """Whether the curves were grown by settings, not drawn by a brush or read from a file."""
     return bool(curves.hairloom.grow.shape)
 
 
 def is_behind(curves: bpy.types.Curves) -> bool:
-    """Whether the settings are others than those by which they have grown."""
+    """Whether the settings have changed since the curves grew."""
     own = curves.hairloom.grow
     return bool(own.made_by != _settings_digest(own))
 
@@ -175,10 +175,10 @@ def _grown(
     length_group: str,
     before: bpy.types.Object | None = None,
 ) -> Parts[StrandSet]:
-    """In world space, on the head as it is posed now.
+    """Strands grown in world space, on the head in its present pose.
 
     Args:
-        before: the hair whose curves these replace, and whose widths they keep.
+        before: the hair whose curves they replace, and whose widths they keep.
     """
     surface = read_surface(head, depsgraph, need_uv=False, place=head.name)
     density = read_map(head, depsgraph, density_group) if density_group else None
@@ -201,29 +201,32 @@ def _is_evaluated(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bool
 
 
 def _radius_in_world(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Floats | None:
-    """Of the points of its curves, (point_count,) [m]; None where they have no widths."""
+    """Radii of the points of its curves, (point_count,) [m]; None: they have no widths."""
     own: Floats | None = read_attribute(hair.data, "radius", "POINT")
     return None if own is None else own * np.float32(mean_scale(matrix_of(hair, depsgraph)))
 
 
 def _with_widths(strands: StrandSet, radius: Floats | None, offsets: Ints) -> StrandSet:
-    """Strands as wide as those that they replace, or, where there are none, or more or fewer, with
-    widths that are found for them."""
+    """Strands with the widths of those that they replace; if there are none, or their number
+    differs, with estimated widths."""
     if radius is not None and np.array_equal(offsets, strands.offsets):
         return replace(strands, radius=radius, has_widths=True)
     return with_widths(strands, "found")[0]
 
 
 def _other_attributes(curves: bpy.types.Curves) -> tuple[str, ...]:
-    """Names of what curves have beside what has grown, such as painted colours, what follows from
-    the look, and what is selected or hidden, whose names begin with a dot in Blender."""
+    """Names of attributes that were added to grown curves, such as painted colours.
+
+    Attributes made from the look do not count, nor selection and visibility, whose names begin
+    with a dot in Blender.
+    """
     names = (attribute.name for attribute in curves.attributes)
     own = (*_OWN_ATTRIBUTES, MATERIAL_COLOR)
     return tuple(n for n in names if n not in own and not n.startswith("."))
 
 
 def _seal(curves: bpy.types.Curves) -> None:
-    """These curves are what these settings make."""
+    """Store digests of the curves and of the settings that they have just grown by."""
     own = curves.hairloom.grow
     own.shape, own.made_by = _shape_digest(curves), _settings_digest(own)
 

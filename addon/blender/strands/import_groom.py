@@ -1,7 +1,7 @@
-"""Strands of files into the open scene: hair curves on a mesh, with all that the files say.
+"""Imports strands from files into the open scene, as hair curves on a mesh with all attributes.
 
-A file is read without Blender's data, so that a thread can do it: `read_in_thread`. What was read
-comes into the scene at once.
+A file is read without Blender's data, so that a thread can do it: `read_in_thread`. The result is
+then added to the scene in one go.
 """
 
 from __future__ import annotations
@@ -38,13 +38,13 @@ from .child_python import python_for
 
 #: title of each format, and the suffixes of its files
 FILE_KINDS = tuple((each.title, each.suffixes) for each in STRAND_FORMATS)
-#: what becomes of guides beside strands: left out, hair curves of their own, among the strands
+#: treatment of guides beside strands: left out, as hair curves of their own, or among the strands
 GUIDES = ("leave", "apart", "among")
 
 
 @dataclass(frozen=True)
 class StrandImport:
-    """How files are read; see `strand_reading.read_strands`.
+    """Options for reading files; see `strand_reading.read_strands`.
 
     guides: one of GUIDES.
     python: the command that starts another Python.
@@ -60,10 +60,10 @@ class StrandImport:
 class Ground:
     """The mesh that imported hair is bound to, read once for all files.
 
-    name: of the head, which a thread must not ask for.
+    name: of the head, as a thread must not access the object.
     surface: in world space, scaled.
-    scale: of the head, which it gets when hair comes into the scene.
-    notes: what is to be said of it.
+    scale: applied to the head when hair is added to the scene.
+    notes: for the artist.
     """
 
     head: bpy.types.Object
@@ -75,7 +75,7 @@ class Ground:
 
 @dataclass(frozen=True)
 class FileStrands:
-    """What a file brings into the scene: hair of these names, and what is said of it."""
+    """The contents of a file for the scene: each hair with its name, and a report."""
 
     hair: tuple[tuple[Groom, str], ...]
     outcome: Outcome
@@ -105,7 +105,7 @@ def import_strands(
     """Read a file into hair curves, bound to a mesh if there is one.
 
     Returns:
-        The new objects, guides that stand apart last; what happened.
+        The new objects, separate guides last; and a report.
 
     Raises:
         HairloomError: the file cannot be read, or is of another scale or place than the mesh.
@@ -115,7 +115,7 @@ def import_strands(
 
 
 def read_file(path: Path, ground: Ground | None, choices: StrandImport) -> FileStrands:
-    """Read a file and bind it to the mesh; touches nothing of Blender's.
+    """Read a file and bind it to the mesh; uses none of Blender's data.
 
     Raises:
         HairloomError: as `import_strands`.
@@ -136,9 +136,9 @@ def read_file(path: Path, ground: Ground | None, choices: StrandImport) -> FileS
 def read_in_thread(
     paths: Sequence[Path], ground: Ground | None, choices: StrandImport
 ) -> ThreadWork[list[FileStrands | HairloomError]]:
-    """Read files beside the window, each to what it holds or why it cannot be used.
+    """Read files in a thread; the result for each is its contents, or the error.
 
-    Who gives the work up ends the process that reads.
+    Giving up the work ends the process that reads.
     """
 
     def read(path: Path) -> FileStrands | HairloomError:
@@ -148,7 +148,7 @@ def read_in_thread(
             return error
 
     def work(thread: ThreadWork[list[FileStrands | HairloomError]]) -> Any:
-        child_process.ending.set(thread.ending)  # of this thread alone
+        child_process.ending.set(thread.ending)  # a context variable of this thread alone
         found = []
         for number, path in enumerate(paths, 1):
             which = f", {number} of {len(paths)}" if len(paths) > 1 else ""
@@ -168,14 +168,14 @@ def settle_ground(ground: Ground) -> None:
 def add_to_scene(
     read: FileStrands, ground: Ground | None, collection: bpy.types.Collection
 ) -> tuple[list[bpy.types.Object], Outcome]:
-    """The new objects, guides that stand apart last; what happened."""
+    """Add hair to the scene; returns the new objects, separate guides last, and a report."""
     hair = [_written(groom, name, ground, collection) for groom, name in read.hair]
     cut = [f"{name}: {note}" for groom, name in read.hair for note in cut_notes(groom.motion)]
     return hair, replace(read.outcome, warnings=(*read.outcome.warnings, *cut))
 
 
 def _objects(groom: Groom, guides: str) -> list[tuple[Groom, str]]:
-    """What becomes an object of its own, and what its name ends in."""
+    """The grooms that become separate objects, each with the suffix of its name."""
     is_guide = groom.is_guide
     if guides != "apart" or is_guide is None or is_guide.all() or not is_guide.any():
         return [(groom, "")]
@@ -194,23 +194,22 @@ def _written(
 
 
 def cut_notes(motion: ReadMotion | None) -> tuple[str, ...]:
-    """What is said of frames of a file that the scene does not get."""
+    """Notes on frames of a file that are left out of the scene."""
     note = "" if motion is None else motion.cut_note(frame_rate(bpy.context.scene))
     return (note,) if note else ()
 
 
 def let_move(hair: bpy.types.Object, motion: ReadMotion) -> None:
-    """Let new curves, which lie in the world, go where a file has them at each frame; they are the
-    style of the frame then."""
+    """Let new curves, in world space, follow the motion of a file, as an animated style."""
     store_motion(hair, *motion.at_frames(frame_rate(bpy.context.scene)))
-    hair.parent = None  # the file says where they are, whatever carries the surface
+    hair.parent = None  # the file's motion is in world space: the surface must not carry them too
     hair.hairloom.dynamics.animated_style = True
 
 
 def _bound(
     read: ReadGroom, ground: Ground | None, choices: StrandImport, path: Path
 ) -> tuple[Groom, tuple[str, ...]]:
-    """Strands with the mesh's UVs at their roots, which Blender's own hair tools go by."""
+    """Strands bound to the mesh, with its UVs at their roots, which Blender's hair tools need."""
     groom = read.groom
     if ground is None:
         note = size_note((path.name, groom.strands.points), None)
@@ -244,7 +243,7 @@ def _bound(
 def _remedy(
     strands: StrandSet, axes: FileSpace, surface: Surface, choices: StrandImport
 ) -> str | None:
-    """How the file would fit the mesh, if there is a way."""
+    """Which axes and scale would fit the file to the mesh; None: no combination does."""
     up = "Y" if axes.up == "Z" else "Z"
     in_file = axes.to_file(strands.roots)
     candidates = {"": strands.roots, up: replace(axes, up=up).from_file(in_file)}

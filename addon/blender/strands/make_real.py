@@ -1,4 +1,4 @@
-"""All hair that Hairloom draws as Blender's ordinary hair curves, for every other tool."""
+"""Turns all hair that Hairloom draws into ordinary hair curves of Blender, for other tools."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ from ..scene.hair_material import put_look_material
 from ..scene.masks import Canvas
 from ..scene.source import Source, read_source
 
-#: what of the scene moves hair, as properties of an object's group
+#: properties of an object's group that refer to objects which act on its hair
 _POINTERS = (
     "collider",
     "collider_collection",
@@ -50,14 +50,14 @@ _POINTERS = (
 
 
 class MadeReal(NamedTuple):
-    """New hair curves, and what is said of them."""
+    """New hair curves, and a report."""
 
     hair: bpy.types.Object
     outcome: Outcome
 
 
 class _Drawn(NamedTuple):
-    """What is drawn of hair, as arrays alone. masks: of its motion."""
+    """The drawn strands of hair, as arrays alone. masks: of its motion."""
 
     source: Source
     settings: GroomSettings
@@ -69,15 +69,15 @@ class _Drawn(NamedTuple):
 def make_real(
     grooms: Sequence[bpy.types.Object], depsgraph: bpy.types.Depsgraph
 ) -> Parts[tuple[MadeReal, ...]]:
-    """New hair curves beside these: every strand that is drawn, as it is combed, with its children,
-    curls, widths and colours, and a material equal to the look.
+    """New hair curves with every drawn strand of these grooms as combed, with children, curls,
+    widths and colours, and a material equal to the look.
 
-    Drawn by Hairloom they look the same: they keep its settings, but for what they hold themselves.
-    The hair that they are made from is hidden.
+    Drawn by Hairloom they look the same: they keep the settings, except those whose effects are in
+    the curves themselves. The original hair is hidden.
 
     Raises:
-        HairloomError: no hair that can be used, or one of another scale than its head. All is as
-            it was then.
+        HairloomError: there is no usable hair, or some is of another scale than its head. Nothing
+            is changed then.
     """
     drawn = []
     for hair in grooms:
@@ -101,14 +101,14 @@ def _drawn(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Parts[_Dra
 
 
 def _stored(strands: StrandSet, source: Source) -> StrandSet:
-    """As the hair that they are made from is stored, in the rest pose of its head."""
+    """The strands in the pose in which the original hair is stored, the rest pose of its head."""
     if source.rest is None or source.head is None:
         return strands
     return carried(strands, source.head, source.rest.surface)
 
 
 def _coloured(rig: Rig, source: Source, settings: GroomSettings) -> StrandSet:
-    """With the widths, colours and noise that they are drawn with."""
+    """The strands of a rig with the widths, colours and noise that they are drawn with."""
     strands = with_colors(rig.strands, source.colors, settings[ShadingSettings])
     place, counts = along(strands.points, strands.offsets), strands.point_counts
     seed = strand_seeds(rig)
@@ -124,7 +124,7 @@ def _coloured(rig: Rig, source: Source, settings: GroomSettings) -> StrandSet:
         radius=drawn_radius(strands.radius, settings[StrandSettings], place),
         color=np.clip(color, 0.0, 1.0),
         has_widths=True,
-        seed=np.where(seed == 0, SEED_LIMIT, seed),  # which is 0 again, where 0 is a number
+        seed=np.where(seed == 0, SEED_LIMIT, seed),  # 0 means none; SEED_LIMIT acts as 0
     )
 
 
@@ -142,7 +142,7 @@ def _written(hair: bpy.types.Object, drawn: _Drawn) -> MadeReal:
 
 
 def real_look(shading: ShadingSettings) -> ShadingSettings:
-    """The look of strands whose colours hold what it does to them."""
+    """The look of strands whose own colours include its effects on colour."""
     return replace(
         shading,
         color_source="own",
@@ -157,7 +157,7 @@ def real_look(shading: ShadingSettings) -> ShadingSettings:
 
 
 def _keep_settings(real: bpy.types.Object, hair: bpy.types.Object, settings: GroomSettings) -> None:
-    """All settings, but for those whose effect real hair has in itself."""
+    """Copy all settings, except those whose effects are in the real strands themselves."""
     own = settings.with_settings(
         real_look(settings[ShadingSettings]),
         replace(settings[StrandSettings], fullness=1.0, tip_width=1.0),
@@ -174,7 +174,7 @@ def _keep_settings(real: bpy.types.Object, hair: bpy.types.Object, settings: Gro
 def _keep_masks(
     curves: bpy.types.Curves, rig: Rig, masks: Masks, dynamics: DynamicsSettings
 ) -> None:
-    """What is painted on the curves that these are made from; on their surface it is there."""
+    """Copy masks that are painted on the original curves; those on the surface need no copy."""
     for of, name in mask_names(dynamics).items():
         mask = masks.masks.get(of)
         if isinstance(mask, StrandMask) and name not in curves.attributes:
@@ -184,7 +184,7 @@ def _keep_masks(
 
 
 def _hide(hair: bpy.types.Object) -> None:
-    """From the viewport and from renders, whichever of its copies they show."""
+    """Hide hair in the viewport and in renders, with the copy that shows its bake."""
     bake = hair.hairloom.bake
     if bake.hides:
         bake.was_hidden = True

@@ -1,4 +1,4 @@
-"""Hair as it goes into files: what Blender shows of it, with its guides and all attributes."""
+"""Reads hair for export: the strands that Blender shows, with guides and all attributes."""
 
 from __future__ import annotations
 
@@ -36,11 +36,11 @@ _OF_GUIDES = ("is_guide", "closest_guides", "guide_weights")
 
 @dataclass(frozen=True)
 class ExportRequest:
-    """What a file asks for.
+    """What a file needs.
 
     guides: curves for the guides beside the strands.
-    color: the look's colour where the hair has none of its own.
-    roots: where on the head each root is, for bones.
+    color: the look's colour for strands without their own.
+    roots: the place of each root on the head, for bones.
     """
 
     guides: bool = True
@@ -50,14 +50,15 @@ class ExportRequest:
 
 @dataclass(frozen=True)
 class ExportStrands:
-    """A hair as it goes into a file.
+    """Hair for a file.
 
-    seen: its strands; in the groom copies of guides may come behind them.
-    copied: indices of the points of `seen` that are there once more behind them.
+    groom: the strands, followed by copies of guides if the file needs them.
+    seen: the strands alone.
+    copied: indices of the points of `seen` that the copies of guides repeat.
     dropped: reason -> number of curves left out.
-    notes: what the artist should know.
-    made: its hair made ready, where it had to be.
-    has_children: whether there are strands that are no curves.
+    notes: for the artist.
+    made: the rig, if one had to be made.
+    has_children: whether some strands are not curves of the scene.
     """
 
     groom: Groom
@@ -69,12 +70,12 @@ class ExportStrands:
     has_children: bool = False
 
     def points(self, seen: Floats) -> Floats:
-        """The groom's points where those that are seen are at these, (point_count, 3)."""
+        """The points of `groom` for these points of `seen`, (point_count, 3)."""
         return np.concatenate([seen, seen[self.copied]]) if len(self.copied) else seen
 
 
 def needs_rig(hair: bpy.types.Object, request: ExportRequest) -> bool:
-    """Whether `still_hair` may have to make the hair ready, which takes long."""
+    """Whether `still_hair` may have to make a rig, which is slow."""
     return hair.data.hairloom.children.method != "none" or request.guides
 
 
@@ -84,15 +85,16 @@ def still_hair(
     request: ExportRequest,
     known: tuple[MadeRig, ...] = (),
 ) -> ExportStrands:
-    """All strands after the modifiers, with their own points; or guides and children if there are.
+    """All strands after the modifiers, with their own points; or guides and children, if any.
 
-    Guides that the hair has marked stay; else there are copies of those that Hairloom chooses.
+    Guides that are marked in the hair are kept; otherwise copies of those that Hairloom chooses are
+    added.
 
     Args:
-        known: what was made ready before, maybe of the same hair.
+        known: rigs that were made before, maybe of the same hair.
 
     Raises:
-        HairloomError: no hair that can be used, or one of another scale than its head.
+        HairloomError: no usable hair, or it is of another scale than its head.
     """
     source = read_source(hair, depsgraph)
     has_children = hair.data.hairloom.children.method != "none"
@@ -125,7 +127,7 @@ def still_hair(
 def baked_hair(
     hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph, cache: Cache, request: ExportRequest
 ) -> ExportStrands:
-    """The strands of a bake at rest, and what the hair says of them where they are its curves.
+    """The strands of a bake at rest, with the hair's attributes if they are its curves.
 
     Raises:
         HairloomError: the bake is damaged.
@@ -155,11 +157,11 @@ def hair_of_rig(
     look: ShadingSettings,
     colors: PaintedColor | None = None,
 ) -> ExportStrands:
-    """Hair of the command line.
+    """Hair of the command line, from a rig.
 
     Args:
         groom: the rig's strands, or the same with other points.
-        colors: what is painted under them.
+        colors: colours painted under them.
     """
     strands = with_colors(_bound_as(groom.strands, rig.strands), colors, look)
     bound = replace(groom, strands=strands)
@@ -175,7 +177,7 @@ def _look(hair: bpy.types.Object) -> ShadingSettings:
 def _out(
     groom: Groom, rig: Rig | None, request: ExportRequest, look: ShadingSettings
 ) -> ExportStrands:
-    """In the colours that are drawn, with the copies of the rig's guides if they are wanted."""
+    """Hair for a file in its drawn colours, with copies of the rig's guides if requested."""
     of_points = np.repeat(groom.strands.group, np.diff(groom.strands.offsets))
     color = own_colors(groom.color, of_points, look)
     if color is not None or request.color:
@@ -204,7 +206,7 @@ def _as_wide_as_drawn(hair: bpy.types.Object, strands: StrandSet) -> StrandSet:
 
 
 def _bound_as(strands: StrandSet, bound: StrandSet) -> StrandSet:
-    """Held where the same strands with other points are."""
+    """These strands, with the roots bound as those of the same strands with other points."""
     return replace(
         strands,
         root_uv=bound.root_uv,
@@ -214,15 +216,15 @@ def _bound_as(strands: StrandSet, bound: StrandSet) -> StrandSet:
 
 
 def _without_empty_marks(said: dict[str, Any]) -> dict[str, Any]:
-    """Marks of guides count where there are guides."""
+    """The attributes without marks of guides, if no curve is marked."""
     if "is_guide" in said and not said["is_guide"].any():
         return {name: value for name, value in said.items() if name not in _OF_GUIDES}
     return said
 
 
 def _weighed(groom: Groom, cv_count: int) -> Groom:
-    """With the closest of its marked guides; without where a group has no guide, as those are
-    weighed within their group."""
+    """The groom with closest guides and weights from its marked guides; unchanged if a group has no
+    guide, as strands follow guides of their own group."""
     assert groom.is_guide is not None
     guides = np.flatnonzero(groom.is_guide)
     group = groom.strands.group

@@ -1,4 +1,4 @@
-"""Strands out of the open scene: one file of one hair or several, still or over frames."""
+"""Exports strands of the open scene: one or several grooms in one file, still or over frames."""
 
 from __future__ import annotations
 
@@ -31,10 +31,10 @@ from .read_hair import ExportRequest, ExportStrands, still_hair
 
 @dataclass
 class StrandExport:
-    """What goes into one file, read and ready.
+    """The contents of one file, read and ready to write.
 
     frames: of the motion; None for a still.
-    done: how many frames were asked for so far. files: what was written.
+    done: number of frames read so far. files: those that were written.
     """
 
     groom: Groom
@@ -49,7 +49,7 @@ class StrandExport:
     files: tuple[Path, ...] = ()
 
     def __post_init__(self) -> None:
-        """Where all curves are marked as guides and strands are asked for, they are the strands."""
+        """If strands are requested but all curves are marked as guides, they count as strands."""
         is_guide, parts = self.groom.is_guide, layout_of(self.kind, self.settings).parts
         if parts != "guides" and is_guide is not None and is_guide.all():
             self.groom = replace(self.groom, is_guide=None, closest_guides=None, guide_weights=None)
@@ -65,15 +65,15 @@ class StrandExport:
         frames: range | None = None,
         known: tuple[MadeRig, ...] = (),
     ) -> StrandExport:
-        """Read hair of the scene; several become one groom, each with groups of its own.
+        """Read hair of the scene; several objects become one groom, each with its own groups.
 
         Args:
-            frames: scene frames; None: as it is now.
+            frames: scene frames; None: a still of the present frame.
             known: see `still_hair`.
 
         Raises:
-            HairloomError: no hair that can be used, frames that were not baked, or an engine or
-                option that cannot be.
+            HairloomError: no usable hair, frames that were not baked, or an engine or option that
+                the format does not support.
         """
         with_bones = kind is TRESSFX and settings.bones
         has_roots = with_bones and any(has_bones(each) for each in hair)
@@ -108,18 +108,18 @@ class StrandExport:
         return 0 if self.frames is None else len(self.frames)
 
     def check(self) -> dict[str, Any]:
-        """What the engine will see, see `exchange.strand_check`; and frames: first, last, a second,
-        for motion."""
+        """What the engine will see, see `exchange.strand_check`; with motion also "frames": first,
+        last, and frames per second."""
         facts = check_strands(self.groom, self.kind, self.settings)
         if self.frames is not None:
             facts["frames"] = [self.frames[0], self.frames[-1], self.rate]
         return facts
 
     def write(self, path: Path, positions: Iterator[Floats] | None = None) -> Outcome:
-        """Write the file, and what lies beside it.
+        """Write the file, and the files beside it.
 
         Args:
-            positions: of the frames, where they do not come from `positions`.
+            positions: of the frames, if they do not come from the method `positions`.
 
         Raises:
             HairloomError: as `exchange.strand_writing.write_strands`, or a frame cannot be read.
@@ -132,7 +132,7 @@ class StrandExport:
         return self._outcome(written)
 
     def positions(self) -> Generator[Floats]:
-        """All points of each frame, in the main thread."""
+        """All points of each frame; for the main thread only."""
         assert self.frames is not None
         for points in positions_of(self.moving, self.frames):
             yield points
@@ -150,10 +150,10 @@ class StrandExport:
         return replace(self, groom=groom, frames=None, moving=())
 
     def writing(self, path: Path, positions: Generator[Floats]) -> ThreadWork[Outcome]:
-        """The same in a thread, which asks the main thread for each frame of `positions`."""
+        """`write` in a thread, which has the main thread produce each frame of `positions`."""
 
         def work(thread: ThreadWork[Outcome]) -> Outcome:
-            committing.set(thread.committing)  # of this thread alone
+            committing.set(thread.committing)  # a context variable of this thread alone
             return self.write(path, _asked(thread, positions))
 
         return ThreadWork(work, "Hairloom strands")
@@ -173,13 +173,13 @@ class StrandExport:
 
 
 def request_of(kind: StrandFormat, settings: StrandExportSettings) -> ExportRequest:
-    """What has to be read of hair for such a file.
+    """What must be read of hair for such a file.
 
     Raises:
         HairloomError: as `layout_of`.
     """
     guides = layout_of(kind, settings).parts != "strands"
-    # one colour for all points would fill a .tfx, where it says nothing
+    # in a .tfx, one colour for all points would only waste space
     return ExportRequest(guides=guides, color=kind in (ALEMBIC, USD))
 
 
@@ -213,7 +213,7 @@ def _moving(
 def _bones(
     hair: list[bpy.types.Object], depsgraph: bpy.types.Depsgraph, outs: list[ExportStrands]
 ) -> tuple[BoneWeights | None, tuple[str, ...]]:
-    """The bones of all strands, none where some hair has no skinned head; and what is odd."""
+    """The bones of all strands, None if some hair has no skinned head; and warnings."""
     bones, without = [], []
     notes: list[str] = []
     for each, out in zip(hair, outs, strict=True):

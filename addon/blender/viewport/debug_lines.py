@@ -1,6 +1,6 @@
-"""What acts on the hair, as thin lines in the 3D view: colliders, wind and lights; what happens to
-it, see `motion_lines`; and the guides, while brushes comb them and Blender's own thick strands are
-hidden."""
+"""Overlays: thin lines in the 3D view that show colliders, wind, force fields and lights; what
+happens to the hair, see `motion_lines`; and the guides, while brushes comb them and Blender's own
+thick strands are hidden."""
 
 from __future__ import annotations
 
@@ -31,24 +31,24 @@ from ..scene.forces import force_fields_of
 from ..sessions.session import Session
 from .motion_lines import contact_lines, density_lines, painted_lines, stretch_lines
 
-#: Linear colours with alpha.
+#: Scene-linear colours with alpha.
 COLORS = {
     "colliders": (0.1, 0.75, 0.45, 0.7),
     "wind": (0.2, 0.55, 1.0, 0.9),
     "lights": (1.0, 0.8, 0.25, 0.7),
 }
 MOTION_LINES = {"stretch": stretch_lines, "contacts": contact_lines, "density": density_lines}
-#: Of guides under a brush.
+#: Colour of guides under a brush.
 GUIDES = (0.9, 0.9, 0.9, 0.35)
 #: Corners of a circle.
 _CORNERS = 32
-#: More spheres of a set than these only clutter the view.
+#: Number of spheres of a set that are drawn; more would clutter the view.
 _MAX_SPHERES = 200
-#: A wind of this speed [m/s] has an arrow as long as the hair is wide; its head is this fraction.
+#: Wind speed [m/s] whose arrow is as long as the hair is wide; head of an arrow, as a fraction.
 _BRISK, _HEAD = 10.0, 0.2
-#: Guides whose points show what force fields do, about.
+#: Number of guides, roughly, at whose points force fields are shown.
 _FIELD_GUIDES = 40
-#: A light farther away than this many radii of the hair has its line cut there.
+#: Length of a line to a distant light, in radii of the hair.
 _AWAY = 1.6
 
 
@@ -57,8 +57,8 @@ class Lines:
     """Lines of one colour.
 
     points: (2n, 3) float32 [m] world, two for each line.
-    roots, normals: (n, 3) where each line is held on a head, and that head's normal there; lines on
-        its far side are not seen. None: all are.
+    roots, normals: (n, 3) root of each line on a head, and the head's normal there; lines on the
+        far side are hidden. None: all are visible.
     """
 
     color: tuple[float, float, float, float]
@@ -67,7 +67,7 @@ class Lines:
     normals: Floats | None = None
 
     def seen_from(self, eye: Floats) -> Lines:
-        """Those that no head hides.
+        """The lines that their head does not hide.
 
         Args:
             eye: (4,), homogeneous, as Camera.eye.
@@ -82,7 +82,7 @@ class Lines:
 def debug_lines_of(
     session: Session, hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph
 ) -> tuple[Lines, ...]:
-    """The lines that the artist wants to see of this groom."""
+    """The lines of this groom's enabled overlays."""
     wanted = hair.hairloom.shown_overlays
     combed: tuple[Lines, ...] = ()
     if is_combed(hair) and hair.hairloom.hide_original and session.is_made:
@@ -112,12 +112,12 @@ def debug_lines_of(
 
 
 def is_combed(hair: bpy.types.Object) -> bool:
-    """Whether Blender's brushes are at work on it."""
+    """Whether it is in the mode of Blender's brushes for curves."""
     return bool(hair.mode == "SCULPT_CURVES")
 
 
 def guide_lines(session: Session) -> Lines:
-    """The guides at rest where their roots are now."""
+    """The guides in their style, carried by their roots."""
     rig, pose = session.rig, session.solver.pose
     grid = carried_guides(rig, pose)
     turns = root_turns(rig, pose)
@@ -130,14 +130,14 @@ def guide_lines(session: Session) -> Lines:
 
 
 def collider_lines(session: Session, depsgraph: bpy.types.Depsgraph) -> Floats:
-    """(2n, 3): all that the groom collides with, where it is now; none before they are made."""
+    """Lines of the groom's colliders at this moment, (2n, 3); none until they are made."""
     solids = session.solids(depsgraph)
     lines = [moved(shape_lines(solid.collider), solid.matrix_now) for solid in solids]
     return np.concatenate([np.zeros((0, 3)), *lines])
 
 
 def shape_lines(collider: Collider) -> Floats:
-    """(2n, 3) of one collider in its own space."""
+    """Lines of one collider in its own space, (2n, 3)."""
     if isinstance(collider, SphereCollider):
         return _ball(collider.center, collider.radius)
     if isinstance(collider, SphereSetCollider):
@@ -154,7 +154,7 @@ def shape_lines(collider: Collider) -> Floats:
 
 
 def wind_length(radius: float) -> float:
-    """Of the arrow of a wind of 1 m/s [m], for hair of this radius [m]."""
+    """Length [m] of the arrow for a wind of 1 m/s, for hair of this radius [m]."""
     return 2.0 * radius / _BRISK
 
 
@@ -174,7 +174,7 @@ def wind_lines(air: Air | None, center: Floats, radius: float) -> Floats:
 
 
 def field_lines(session: Session, fields: ForceFields, radius: float) -> Floats:
-    """From some of the guides' points where force fields push them, (2n, 3)."""
+    """Lines from points of some guides in the direction of the force fields there, (2n, 3)."""
     acting = fields.by(session.settings[DynamicsSettings].force_fields)
     if acting is None:
         return np.zeros((0, 3))
@@ -183,7 +183,7 @@ def field_lines(session: Session, fields: ForceFields, radius: float) -> Floats:
     points = grid[::every, :: max(grid.shape[1] // 3, 1)].reshape(-1, 3).astype(np.float32)
     push = felt(acting, np.ascontiguousarray(points.T), np.zeros_like(points.T)).push.T
     strength = np.linalg.norm(push, axis=1, keepdims=True)
-    scale = 2.0 * radius / np.maximum(strength, _BRISK)  # stronger ones are no longer
+    scale = 2.0 * radius / np.maximum(strength, _BRISK)  # limits the length of strong ones
     return np.stack([points, points + push * scale], axis=1).reshape(-1, 3)
 
 
@@ -228,7 +228,7 @@ def _capsule(capsule: CapsuleCollider) -> Floats:
 
 
 def _circle(center: Floats, one: Floats, other: Floats, fraction: float = 1.0) -> Floats:
-    """(2n, 3), from center + one by way of center + other."""
+    """Lines of an arc, (2n, 3), from center + one through center + other."""
     angle = np.linspace(0.0, 2.0 * np.pi * fraction, int(_CORNERS * fraction) + 1)[:, None]
     corners = center + np.cos(angle) * one + np.sin(angle) * other
     return np.stack([corners[:-1], corners[1:]], axis=1).reshape(-1, 3)
@@ -241,7 +241,7 @@ def _box(low: Floats, high: Floats) -> Floats:
 
 
 def draw_lines(lines: Lines) -> None:
-    """Into the view that is being drawn, in front of everything; leaves the state as it was."""
+    """Draw lines into the current view, in front of everything; restores the GPU state."""
     points = lines.points
     shader = gpu.shader.from_builtin("UNIFORM_COLOR")
     depth, blend = gpu.state.depth_test_get(), gpu.state.blend_get()

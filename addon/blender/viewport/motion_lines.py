@@ -1,5 +1,6 @@
-"""What happens to hair that is simulated, as coloured lines: where guides are longer or shorter
-than their style, where they touch or have entered colliders, and how dense the hair is by cells."""
+"""Coloured lines that show what happens to simulated hair: where guides are longer or shorter than
+in their style, where they touch or are inside colliders, how dense hair is in each cell; and masks.
+"""
 
 from __future__ import annotations
 
@@ -16,26 +17,26 @@ from ...dynamics.turn import rotation_from, sample
 from ..sessions.session import Session
 
 type Color = tuple[float, float, float, float]
-#: a fraction of the length, from which on segments have a colour
+#: relative changes of length, each with the colour of segments from that value on
 STRETCHES: tuple[tuple[float, Color], ...] = (
     (0.0, (0.25, 0.6, 0.3, 0.25)),
     (0.01, (1.0, 0.75, 0.1, 0.9)),
     (0.05, (1.0, 0.15, 0.1, 1.0)),
 )
-#: of points that touch, and of those that are inside
+#: colours of points that touch a collider, and of those inside one
 TOUCHING: Color = (0.2, 0.9, 0.6, 0.9)
 INSIDE: Color = (1.0, 0.15, 0.1, 1.0)
-#: how far from a collider a point touches it, in terms of its own distance; how long its line is,
-#: in terms of the hair's length
+#: distance at which a point touches a collider, relative to the distance that it keeps; length of
+#: its line, relative to the hair's length
 _NEAR, _TICK = 1.05, 0.03
-#: how dense hair is in a cell, in terms of the mean of all cells with hair at rest
+#: density of hair in a cell, relative to the mean of all cells with hair at rest
 DENSITIES: tuple[tuple[float, Color], ...] = (
     (0.0, (0.2, 0.4, 1.0, 0.35)),
     (0.5, (0.2, 0.9, 0.5, 0.6)),
     (1.5, (1.0, 0.75, 0.1, 0.8)),
     (3.0, (1.0, 0.15, 0.1, 1.0)),
 )
-#: what is painted, in the colours of Blender's weights
+#: mask values, in the colours of Blender's Weight Paint
 PAINTED: tuple[tuple[float, Color], ...] = (
     (0.0, (0.0, 0.0, 1.0, 0.8)),
     (0.125, (0.0, 0.5, 1.0, 0.8)),
@@ -46,14 +47,14 @@ PAINTED: tuple[tuple[float, Color], ...] = (
     (0.75, (1.0, 0.5, 0.0, 0.8)),
     (0.875, (1.0, 0.0, 0.0, 0.8)),
 )
-#: Squares are smaller than their cells by this, so that neighbours do not share a line.
+#: Inset of squares in their cells, as a fraction, so that neighbours do not share a line.
 _INSET = 0.06
 
 type Colored = Iterator[tuple[Color, Floats]]
 
 
 def stretch_lines(session: Session) -> Colored:
-    """Segments of all guides by how far they are from the lengths of their style."""
+    """Segments of all guides, coloured by their change of length from the style."""
     now, rest = session.solver.guides(), session.solver.motion.dynamics.rest.length.T
     segments = np.stack([now[:, :-1], now[:, 1:]], axis=2)
     length = np.linalg.norm(segments[:, :, 1] - segments[:, :, 0], axis=2)
@@ -63,8 +64,8 @@ def stretch_lines(session: Session) -> Colored:
 
 
 def contact_lines(session: Session) -> Colored:
-    """From points of guides that touch a collider, away from it; from those inside, to where they
-    would come out."""
+    """Lines from points of guides that touch a collider, away from it; and from those inside, to
+    its surface."""
     settings, guides = session.settings[DynamicsSettings], session.solver.guides()
     count, cv_count, _ = guides.shape
     size = session.solver.motion.dynamics.rest.size
@@ -81,8 +82,8 @@ def contact_lines(session: Session) -> Colored:
 
 
 def density_lines(session: Session) -> Colored:
-    """Two slices of the hair grid through the middle of the roots: cells with hair as squares, by
-    how dense it is."""
+    """Two slices of the hair grid through the middle of the roots: cells with hair as squares,
+    coloured by density."""
     rest, guides = session.solver.motion.dynamics.rest, session.solver.guides()
     if not len(guides):
         return
@@ -102,7 +103,7 @@ def density_lines(session: Session) -> Colored:
 
 
 def painted_lines(guides: Floats, painted: Floats | None) -> Colored:
-    """Segments of all guides by what is painted there; none where nothing is.
+    """Segments of all guides, coloured by the painted values; none without these.
 
     Args:
         painted: (cv_count or 1, guide_count).
@@ -116,7 +117,7 @@ def painted_lines(guides: Floats, painted: Floats | None) -> Colored:
 
 
 def _cells(places: Floats, mass: Floats) -> tuple[Floats, Ints]:
-    """How much hair there is in each cell that has any, (n,), and which cells these are, (n, 3).
+    """The mass of hair in each cell that has any, (n,), and the numbers of these cells, (n, 3).
 
     Args:
         places: (3, cv_count, guide_count) in cells. mass: (guide_count,).
@@ -128,7 +129,7 @@ def _cells(places: Floats, mass: Floats) -> tuple[Floats, Ints]:
 
 
 def _squares(cells: Ints, across: int) -> Floats:
-    """The outlines of cells in the plane across an axis, (n, 8, 3) in cells."""
+    """The outlines of cells in the plane perpendicular to an axis, (n, 8, 3) in cells."""
     one, other = (axis for axis in range(3) if axis != across)
     corner = np.array([[0, 0], [1, 0], [1, 0], [1, 1], [1, 1], [0, 1], [0, 1], [0, 0]], float)
     corner = _INSET + corner * (1.0 - 2.0 * _INSET)
@@ -142,7 +143,7 @@ def _squares(cells: Ints, across: int) -> Floats:
 def _classes(
     values: Floats, colors: tuple[tuple[float, Color], ...]
 ) -> Iterator[tuple[Color, Bools]]:
-    """Each colour, and where values are from its begin up to that of the next one."""
+    """Each colour, with a mask of the values from its threshold up to the next one."""
     ends = [begin for begin, _ in colors[1:]] + [np.inf]
     for (begin, color), end in zip(colors, ends, strict=True):
         yield color, (values >= begin) & (values < end)

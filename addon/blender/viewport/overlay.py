@@ -1,7 +1,7 @@
 """Strands in the 3D viewport, and their counts: drawn for all grooms, from snapshots only.
 
-`read_drawing` reads what is drawn of a groom, and in which views: as Blender shows it and its head.
-Drawing itself never reads a data-block: all it asks Blender for is which view is being drawn.
+`read_drawing` reads what is drawn of a groom, and in which views, by the visibility of hair and
+head in Blender. Drawing itself never reads a data-block: it only uses the context of the view.
 """
 
 from __future__ import annotations
@@ -58,17 +58,17 @@ from .views import (
 
 @dataclass(frozen=True)
 class Drawing:
-    """One groom as it is now.
+    """One groom as it is to be drawn.
 
-    is_made: whether there is hair yet.
-    seen_in: the view layers that show it; None is all.
+    is_made: whether its hair is made.
+    seen_in: the view layers that show it; None: all.
     hidden_in: addresses of the 3D views that do not show it.
-    head: what it grows on, world space; None where that is not drawn as a solid.
-    bare_in: of those that do not show its head, which hides nothing there.
-    card_counts: cards, triangles and vertices where it is shown as cards.
+    head: world space; None if it is not drawn as a solid.
+    bare_in: addresses of the 3D views that do not show its head, so that it hides nothing there.
+    card_counts: cards, triangles and vertices, if it is shown as cards.
     counts_of: the name under which its counts are written; empty: they are not.
-    note: what else is written, with overlays or without.
-    lines: of what acts on it.
+    note: text that is written even without overlays.
+    lines: its overlays.
     times: of its frames.
     """
 
@@ -87,13 +87,13 @@ class Drawing:
     times: FrameTimes = field(default_factory=FrameTimes)
 
 
-#: by which Blender knows our render engine
+#: identifier of our render engine
 ENGINE = "HAIRLOOM"
 
 
 @dataclass(eq=False)
 class Drawn:
-    """One groom that is drawn, and what draws it; without GPU until the first draw."""
+    """One groom that is drawn, with its passes; uses the GPU from the first draw on."""
 
     drawing: Drawing
     hair: GroomPass = field(default_factory=GroomPass)
@@ -101,12 +101,13 @@ class Drawn:
 
 
 class _Overlay:
-    """All that is drawn.
+    """The state of the overlay.
 
-    drawn: by session number of the hair. depth: of heads, where Blender has none.
+    drawn: the grooms, by session number of the hair. depth: of heads, for views in which Blender
+        draws no depth.
     handles: of the draw handlers, while there are any.
-    failure: why it has stopped drawing; empty while all is well.
-    layers: the view layers that windows showed when a view was drawn last.
+    failure: why drawing has stopped; empty while all is well.
+    layers: the view layers in windows when a view was last drawn.
     """
 
     def __init__(self) -> None:
@@ -123,10 +124,10 @@ _overlay = _Overlay()
 def read_drawing(
     session: Session, hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph, note: str = ""
 ) -> Drawing:
-    """What is drawn of this groom now.
+    """The drawing of this groom at the moment.
 
     Args:
-        note: is written into the views.
+        note: text to write into the views.
     """
     snapshot, head = as_shown(session.snapshot), None
     if not session.is_made:
@@ -159,7 +160,7 @@ def read_drawing(
 
 
 def show(uid: int, drawing: Drawing) -> None:
-    """Draw this groom from now on, in place of what was drawn for it before."""
+    """Draw this groom from now on; replaces its earlier drawing."""
     known = _overlay.drawn.get(uid)
     if known is None:
         _overlay.drawn[uid] = Drawn(drawing)
@@ -180,15 +181,15 @@ def show(uid: int, drawing: Drawing) -> None:
 
 
 def hide(uid: int) -> None:
-    """Not to be seen until it is shown again."""
+    """Hide this groom until it is shown again."""
     drawing = drawing_of(uid)
     if drawing is not None and drawing.is_visible:
         show(uid, replace(drawing, is_visible=False))
 
 
 def drop(uid: int) -> None:
-    """No longer draw this groom; with the last one the draw handlers go, and what is said of a
-    failure."""
+    """No longer draw this groom; with the last one, the draw handlers and the report of a failure
+    are removed."""
     _overlay.drawn.pop(uid, None)
     if not _overlay.drawn:
         _remove_handlers()
@@ -197,7 +198,7 @@ def drop(uid: int) -> None:
 
 
 def drawing_of(uid: int) -> Drawing | None:
-    """What is drawn of a groom."""
+    """The drawing of a groom, if it is drawn."""
     drawn = _overlay.drawn.get(uid)
     return None if drawn is None else drawn.drawing
 
@@ -263,7 +264,7 @@ def _draw_strands(context: Any) -> None:
 
 
 def _draw_body_shadows(camera: Camera, shown: Sequence[_Shown], sample: Any = None) -> None:
-    """Before all hair: they lie on what Blender has drawn.
+    """Draw the shadows on heads, before all hair, onto what Blender has drawn.
 
     Args:
         sample: as in BodyShadow.draw.
@@ -273,7 +274,7 @@ def _draw_body_shadows(camera: Camera, shown: Sequence[_Shown], sample: Any = No
 
 
 def _add_sample(view: View, camera: Camera, shown: Sequence[_Shown], samples: int) -> None:
-    """One sample of soft shadows more, before the view shows its picture."""
+    """Add a sample of soft shadows, before the view shows its picture."""
     centers = [each.snapshot.center for each in shown]
     lights = softening.lights_of_sample(shown[0].snapshot.lights, centers)
     name = softening.name_of(view)
@@ -301,7 +302,7 @@ def _add_sample(view: View, camera: Camera, shown: Sequence[_Shown], samples: in
 
 
 def _draw_depth(address: int, camera: Camera, shown: Sequence[_Shown]) -> None:
-    """Of what is known to be in the way of hair: the heads that it grows on, if they are shown."""
+    """Draw the depth of what hides hair: the heads that it grows on, if they are shown."""
     _, _, width, height = gpu.state.viewport_get()
     drawings = [each.drawing for each in shown if address not in each.drawing.bare_in]
     heads = [each.head for each in drawings if each.head is not None]
@@ -309,7 +310,7 @@ def _draw_depth(address: int, camera: Camera, shown: Sequence[_Shown]) -> None:
 
 
 def _draw_afresh(view: View, camera: Camera, shown: list[_Shown], marks: tuple[Any, ...]) -> None:
-    """All grooms into the view that is being drawn, and into its picture if that can be kept."""
+    """Draw all grooms into the current view, and into its picture if that can be kept."""
     forget_closed_views(each.hair.strands for each in _overlay.drawn.values())
     can_be_kept = all(each.can_be_kept for each in shown) and not gpu_memory.is_short()
     picture = view.picture if can_be_kept else None
@@ -319,7 +320,7 @@ def _draw_afresh(view: View, camera: Camera, shown: list[_Shown], marks: tuple[A
         picture.begin()
     is_moving = view.moves_to(marks)
     maps: dict[Hashable, OpacityMaps | None] = {}
-    if len(shown) > 1:  # hair that is alone asks for its maps when it is drawn
+    if len(shown) > 1:  # a single groom makes its maps when it is drawn
         for each in shown:
             with each.drawing.times.measured("drawing"):
                 maps[each.uid] = each.maps()
@@ -334,12 +335,12 @@ def _draw_afresh(view: View, camera: Camera, shown: list[_Shown], marks: tuple[A
 
 @dataclass(frozen=True, eq=False)
 class _Shown:
-    """One groom in the view that is being drawn.
+    """One groom in the current view.
 
-    snapshot: as it is seen and lit there. view: the name by which passes know the view.
-    shades_body: its shadow lies on the head.
-    is_turning: its lights are attached to the view, which moves.
-    sees_all: strands behind heads as well.
+    snapshot: as it is seen and lit there. view: the name under which passes keep its data.
+    shades_body: whether its shadow is drawn on the head.
+    is_turning: whether its lights are attached to the view, and the view moves.
+    sees_all: whether strands behind heads are drawn too.
     """
 
     uid: int
@@ -354,7 +355,7 @@ class _Shown:
 
     @property
     def marks(self) -> tuple[Any, ...]:
-        """All that its picture depends on, beside the view."""
+        """Everything that its picture depends on, beside the view."""
         snapshot = self.snapshot
         points, harmonics, display = snapshot.device_points, snapshot.harmonics, self.display
         return (
@@ -366,13 +367,14 @@ class _Shown:
 
     @property
     def can_be_kept(self) -> bool:
-        """Cards are drawn among strands, and the other ways write depth of their own."""
+        """Whether its picture can be kept: not with cards, which are drawn among strands, nor with
+        debug views and transparency methods that write depth."""
         snapshot = self.snapshot
         is_plain = snapshot.cards is None and snapshot.debug_view == "none"
         return is_plain and drawn_transparency(snapshot.strand_settings) == "layers"
 
     def maps(self) -> OpacityMaps | None:
-        """As of GroomPass."""
+        """See `GroomPass.maps`."""
         hair, snapshot = self.drawn.hair, self.snapshot
         return hair.maps(snapshot, view=self.view, is_turning=self.is_turning)
 
@@ -396,7 +398,7 @@ class _Shown:
         is_moving: bool,
         is_sample: bool = False,
     ) -> None:
-        """Its hair; strands go into the picture as well.
+        """Draw its hair; strands are drawn into the picture as well.
 
         Args:
             maps: of all hair in the view, by session number.
@@ -428,14 +430,14 @@ class _Shown:
 
 
 def _shown_now(context: Any, camera: Camera, *, has_turned: bool) -> Iterator[_Shown]:
-    """All grooms of the view that is being drawn; cards last, as they are blended."""
+    """All grooms in the current view; cards last, as they are blended."""
     space = context.space_data
     address, studio = space.as_pointer(), three_point_lights(camera.view)
     display = view_transform.display_of(space.shading, context.scene)
     found = sorted(shown_in(context), key=lambda each: each[1].snapshot.cards is not None)
     snapshots = _in_one_light([lit(each.snapshot, space.shading, studio) for _, each in found])
     for (uid, drawing), snapshot in zip(found, snapshots, strict=True):
-        # of a head that a clipping region cuts, what is before the hair may be gone
+        # a clipping region may have cut away the part of the head that hides hair
         is_open = is_seen_through(space.shading) or context.region_data.use_clip_planes
         sees_all = is_open or address in drawing.bare_in
         if sees_all:
@@ -445,7 +447,7 @@ def _shown_now(context: Any, camera: Camera, *, has_turned: bool) -> Iterator[_S
             _overlay.drawn[uid],
             drawing,
             snapshot,
-            # colours that stand for numbers are no light
+            # colours of debug views stand for numbers, so no view transform applies to them
             display if snapshot.debug_view == "none" else None,
             context.region_data.as_pointer(),
             shades_body=_shades_body(snapshot, space) and address not in drawing.bare_in,
@@ -455,8 +457,8 @@ def _shown_now(context: Any, camera: Camera, *, has_turned: bool) -> Iterator[_S
 
 
 def _in_one_light(snapshots: Sequence[Snapshot]) -> list[Snapshot]:
-    """By the same lights in the same order, since grooms ask each other's maps by a light's number.
-    Of more lights than shine in a view each groom knows those that are brightest at its own hair.
+    """Snapshots with the same lights in the same order, since grooms look up each other's maps by
+    the number of a light. Before, each groom may have other lights, the brightest at its own hair.
     """
     if all(each.lights == snapshots[0].lights for each in snapshots):
         return list(snapshots)
@@ -470,7 +472,7 @@ def _camera(view: Any) -> Camera:
 
 
 def _draw_debug_lines(context: Any) -> None:
-    """Through all that is in front of them, as Blender's own gizmos are."""
+    """Draw overlays in front of everything, as Blender draws its gizmos."""
     if context.space_data.overlay.show_overlays:
         eye = _camera(context.region_data).eye
         for _, drawing in shown_in(context):
@@ -479,7 +481,7 @@ def _draw_debug_lines(context: Any) -> None:
 
 
 def _draw_counts(context: Any) -> None:
-    """What was drawn of each groom just before, into the same view."""
+    """Write the counts of what was just drawn of each groom in the same view."""
     notes = [drawing.note for _, drawing in shown_in(context) if drawing.note]
     if not context.space_data.overlay.show_overlays:
         write_lines(context, notes)
@@ -503,24 +505,24 @@ def _counts_of(drawn: Drawn) -> str:
 
 
 def statistics_of(uid: int) -> Statistics:
-    """What was drawn of a groom in the last view; nothing before the first."""
+    """The counts of what was drawn of a groom in the last view; zeros before the first."""
     drawn = _overlay.drawn.get(uid)
     return Statistics() if drawn is None else drawn.hair.strands.statistics
 
 
 def notes_of(uid: int) -> tuple[str, ...]:
-    """What the artist should know of how a groom was drawn in the last view."""
+    """Notes for the artist on how a groom was drawn in the last view."""
     drawn = _overlay.drawn.get(uid)
     return () if drawn is None else drawn.hair.notes
 
 
 def drawn() -> frozenset[int]:
-    """Session numbers of the grooms that are drawn here, not by Blender."""
+    """Session numbers of the grooms that are drawn here instead of by Blender."""
     return frozenset(uid for uid, each in _overlay.drawn.items() if each.drawing.is_made)
 
 
 def expected() -> frozenset[int]:
-    """Session numbers of the grooms that are drawn here as soon as they are made."""
+    """Session numbers of the grooms that will be drawn here once they are made."""
     return frozenset(_overlay.drawn) - drawn()
 
 
@@ -544,8 +546,8 @@ def shown_in(context: Any) -> list[tuple[int, Drawing]]:
 
 
 def has_no_depths(context: Any) -> bool:
-    """Whether a view has no depths of what is in it: but for Solid and its like, Blender finds them
-    for overlays alone. Without these they are 0 everywhere, or 1, or of what was there before.
+    """Whether Blender draws no depth in a view. Except in Solid and similar views, it draws depth
+    for overlays alone; without these the depth is 0 or 1 everywhere, or that of an earlier draw.
     """
     shading, is_bare = context.space_data.shading, not context.space_data.overlay.show_overlays
     kind = shading.type
@@ -554,12 +556,12 @@ def has_no_depths(context: Any) -> bool:
 
 
 def is_seen_through(shading: Any) -> bool:
-    """Whether a view shows what is behind heads."""
+    """Whether a view shows objects behind heads."""
     return shading.type == "WIREFRAME" or (shading.type == "SOLID" and shading.show_xray)
 
 
 def _shades_body(snapshot: Snapshot, space: Any) -> bool:
-    """Whether hair's shadow lies on the head, which Blender has drawn in the same light."""
+    """Whether to draw hair's shadow on the head: Blender must have drawn that in the same light."""
     uses_lights, _ = uses_scene_light(space.shading)
     is_shown = bool(snapshot.casters) and not is_seen_through(space.shading)
     return snapshot.volume.on_body and uses_lights and bool(snapshot.lights) and is_shown
@@ -568,16 +570,16 @@ def _shades_body(snapshot: Snapshot, space: Any) -> bool:
 def lit[Shown: (Snapshot, SceneSnapshot)](
     shown: Shown, shading: Any, studio: tuple[Light, ...]
 ) -> Shown:
-    """By the scene's lights and world where Blender itself uses them; instead of the world by the
-    view's own picture of one, where Blender shows that, and elsewhere, as there, by a studio's
-    lights. A scene that has no light and a black world has these too, not black hair.
+    """The snapshot in the light that Blender uses in this view: the scene's lights, and the scene's
+    world or the view's own world picture. If all of these are black or unused, hair is lit by the
+    studio lights, so that it is not black.
     """
     used: tuple[bool, bool] = uses_scene_light(shading)
     scene: Snapshot | SceneSnapshot = shown
     own = Environment(scene.ambient, scene.harmonics, world_suns(scene.lights))
     world: Environment = own if used[1] else studio_environment(shading)
     known: tuple[Light, ...] = tuple(light for light in scene.lights if used[light.of_world])
-    # suns of the view's own picture come first, since no light of the scene may take their place
+    # suns of the view's world picture come first, so that scene lights cannot displace them
     lights = known if used[1] else (*world.suns, *known)
     if not lights and world.is_black:
         return replace(shown, lights=studio, ambient=Snapshot.ambient, harmonics=None)
@@ -592,11 +594,11 @@ def _fail(error: Exception) -> None:
 
 
 def _tell_failure() -> None:
-    """Outside of drawing, where the handler may be removed and the status text be set."""
+    """A timer for Blender: outside of drawing, handlers may be removed and the status text set."""
     _remove_handlers()
     if _overlay.failure:
         show_status(_overlay.failure.splitlines()[0])
-    bpy.context.scene.update_tag()  # Blender's own strands are to be seen again
+    bpy.context.scene.update_tag()  # so that Blender's own strands are shown again
     redraw_panels()
 
 
@@ -611,18 +613,18 @@ def _remove_handlers() -> None:
 
 
 def forget_layers() -> None:
-    """No view of ours is drawn any more."""
+    """Forget the view layers of windows, when views are no longer drawn."""
     _overlay.layers = frozenset()
     if bpy.app.timers.is_registered(_evaluate):
         bpy.app.timers.unregister(_evaluate)
 
 
 def look_at_layers() -> None:
-    """While a view is drawn: a view layer that is new in any window is evaluated after it.
+    """Called while a view is drawn: have a view layer that is new in any window evaluated soon.
 
-    Each view layer has its own evaluated copies, and nothing reports when a window begins to show
-    one: our strands are drawn there at once, but Blender's are among them until it evaluates
-    something.
+    Each view layer has its own evaluated copies, and Blender has no event for a window that begins
+    to show one. Our strands are drawn there at once, but Blender's own are not hidden until the
+    layer is evaluated.
     """
     windows = bpy.context.window_manager.windows
     now = frozenset(layer_key(each.scene, each.view_layer) for each in windows)

@@ -1,4 +1,4 @@
-"""Counts of what is drawn, as text in a corner of a 3D view, and a graph of its frames above."""
+"""Counts of what is drawn, as text in a corner of a 3D view, with a graph of frame times above."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ from ...render import gpu_objects
 from ...render.strand_pass import Statistics
 from ..sessions.measures import PARTS, FrameTimes
 
-#: In pixels at UI scale 1: from the edges, and from line to line as a factor of the letters' size.
+#: Distance from the edges [pixels at UI scale 1], and line spacing as a factor of the font size.
 _MARGIN, _LINE = 12.0, 1.5
 _OF_CARDS = ("cards", "triangles", "vertices")
 _FONT = 0  # Blender's own
-#: Of a graph: width and height at UI scale 1, the milliseconds that fit, at least, and the colours
-#: of the parts of a frame and of the line at 1/24 s.
+#: A graph: width and height [pixels at UI scale 1], its smallest range [ms], and the colours of the
+#: parts of a frame and of the line at 1/24 s.
 _WIDTH, _HEIGHT, _FULL = 180.0, 40.0, 50.0
 _COLORS = {"simulation": (0.3, 0.7, 1.0, 0.95), "drawing": (1.0, 0.65, 0.2, 0.95)}
 _RULE = (1.0, 1.0, 1.0, 0.25)
 
 
 def counts_line(name: str, guide_count: int, strand_count: int, drawn: Statistics) -> str:
-    """Such as "Hairloom Hair   guides 762   strands 4,095 of 4,857   pieces 61,425   vertices
-    131,040"."""
+    """A line such as "Hairloom Hair   guides 762   strands 4,095 of 4,857   pieces 61,425
+    vertices 131,040"."""
     counts = (
         f"guides {guide_count:,}",
         f"strands {drawn.strands:,} of {strand_count:,}",
@@ -37,7 +37,7 @@ def counts_line(name: str, guide_count: int, strand_count: int, drawn: Statistic
 
 
 def card_counts_line(name: str, guide_count: int, drawn: tuple[int, ...]) -> str:
-    """Such as "Hairloom Hair   guides 762   cards 800   triangles 9,600   vertices 13,200".
+    """A line such as "Hairloom Hair   guides 762   cards 800   triangles 9,600   vertices 13,200".
 
     Args:
         drawn: cards, triangles and vertices.
@@ -47,7 +47,7 @@ def card_counts_line(name: str, guide_count: int, drawn: tuple[int, ...]) -> str
 
 
 def write_lines(context: Any, lines: list[str]) -> None:
-    """Write into the view's lower left corner, where Blender itself writes nothing."""
+    """Write into the view's lower left corner, which Blender leaves free."""
     size, left, bottom = _corner(context)
     blf.size(_FONT, size)
     blf.color(_FONT, *context.preferences.themes[0].view_3d.space.text_hi, 1.0)
@@ -63,7 +63,7 @@ def write_lines(context: Any, lines: list[str]) -> None:
 
 
 def _corner(context: Any) -> tuple[float, float, float]:
-    """Of letters the size, and the left and bottom edge of what is written [pixels]."""
+    """Font size, and left and bottom edge of the text [pixels]."""
     system = context.preferences.system
     size = context.preferences.ui_styles[0].widget.points * system.ui_scale
     left, bottom = free_corner(context.area, context.region)
@@ -89,7 +89,7 @@ def draw_graphs(context: Any, times: list[FrameTimes], line_count: int) -> None:
 
 
 def graph_lines(history: list[float], full: float, corner: Floats, extent: Floats) -> Floats:
-    """Values from left to right as lines, (2n, 2) [pixels]; `full` reaches the top."""
+    """Values from left to right as lines, (2n, 2) [pixels]; the value `full` is at the top."""
     if len(history) < 2:
         return np.zeros((0, 2))
     along = np.linspace(0.0, 1.0, len(history))
@@ -113,8 +113,8 @@ def _draw(color: tuple[float, float, float, float], points: Floats) -> None:
 
 
 def free_corner(area: Any, region: Any) -> tuple[int, int]:
-    """The lower left corner (x, y) [pixels of the region] of what toolbars, shelves and the panel
-    of the last operation leave free where they lie over the view."""
+    """The lower left corner (x, y) [pixels of the region] of the area that toolbars, shelves and
+    the panel of the last operation leave free where they overlap the view."""
     left = bottom = 0
     for other in area.regions:
         if other.type == "WINDOW" or min(other.width, other.height) <= 1:

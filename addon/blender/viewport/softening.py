@@ -1,10 +1,9 @@
-"""Views at rest whose shadows become soft: one after the other, a sample with each redraw.
+"""Soft shadows in views at rest: one view after the other gets a sample with each redraw.
 
-A view that was drawn afresh and then stays as it is gets its samples by a timer: it asks for a
-redraw of that view alone, and the sample of this redraw asks for the next. So the window stays
-usable, and nothing is drawn once all samples are there. On the GPU all views have one SoftPicture,
-and each groom maps of its own for samples, so that those of the view's lights stay. Both are let go
-of with the last sample.
+When a view was drawn and then stays unchanged, a timer redraws it to add a sample, and each sample
+starts the timer for the next. So the window stays responsive, and drawing stops once all samples
+are there. On the GPU all views share one SoftPicture, and each groom has separate opacity maps for
+samples, so that those of the view's own lights stay. Both are freed after the last sample.
 """
 
 from __future__ import annotations
@@ -25,17 +24,17 @@ from ...shading.lights import Light
 from ..base.redraw import redraw_view, soon
 from .views import View, known_views
 
-#: [s] for which a view stays as it is before it gets samples; and how far apart draws of one that
-#: moves slowly may be: it is at rest after twice as long
+#: time [s] without a change before a view gets samples; and the longest time between draws of a
+#: view that moves slowly, which is at rest after twice the last interval
 _REST, _SLOW = 0.3, 1.0
-#: so few samples show one by one where lights are
+#: from this many samples on, their mean is shown; in fewer, single samples of lights are visible
 _FEW = 8
 
 
 class _Softening:
-    """What is under way.
+    """The state of sampling.
 
-    view: that gets samples. is_due: a timer has asked for one. passes: what draws them.
+    view: the view that gets samples. is_due: a timer has requested one. passes: those that draw it.
     """
 
     def __init__(self) -> None:
@@ -49,13 +48,13 @@ _softening = _Softening()
 
 
 def is_worth_it(lights: Sequence[Light], samples: int) -> bool:
-    """Whether shadows are to become soft: a light has a size, and a GPU draws."""
+    """Whether shadows can become soft: a light has a size, and the GPU is not software."""
     has_size = samples > 1 and lights_at(lights, 1, np.zeros(3)) != tuple(lights)
     return has_size and not is_software()
 
 
 def soften(view: View) -> None:
-    """A view was drawn afresh, and is to become soft once it rests."""
+    """Schedule samples for a view that was drawn, once it rests."""
     now = time.monotonic()
     pause, view.changed_at = now - view.changed_at, now
     view.wants_more = True
@@ -63,7 +62,7 @@ def soften(view: View) -> None:
 
 
 def harden(view: View) -> None:
-    """What a view shows is gone: it is not soft, and samples of it count no more."""
+    """Discard the samples of a view whose picture is no longer valid."""
     view.wants_more = view.is_soft = view.has_all = view.is_doubted = False
     view.fragments = ()
     if _softening.view is view:
@@ -71,20 +70,20 @@ def harden(view: View) -> None:
 
 
 def go_on(view: View) -> None:
-    """A view has shown its kept picture: if it waits for samples, a timer runs."""
+    """After a view has shown its kept picture, start the timer if it waits for samples."""
     if view.wants_more and not bpy.app.timers.is_registered(_ask):
         soon(_ask, 0.0)
 
 
 def forget() -> None:
-    """No view of ours is drawn any more."""
+    """Stop sampling, when views are no longer drawn."""
     _stop()
     if bpy.app.timers.is_registered(_ask):
         bpy.app.timers.unregister(_ask)
 
 
 def takes_sample(view: View) -> bool:
-    """Whether this redraw of a view does: it was asked to, and there is memory."""
+    """Whether this redraw of a view takes a sample: one was requested, and memory suffices."""
     if not _softening.is_due or _softening.view is not view:
         return False
     _softening.is_due = False
@@ -96,17 +95,17 @@ def takes_sample(view: View) -> bool:
 
 
 def sums() -> SoftPicture:
-    """To which the sample of this redraw is added."""
+    """The picture to which the sample of this redraw is added."""
     return _softening.picture
 
 
 def name_of(view: View) -> Hashable:
-    """By which passes know the view in the light of a sample."""
+    """The name under which passes keep data of the view in the light of a sample."""
     return "sample", view.address
 
 
 def lights_of_sample(lights: Sequence[Light], centers: Sequence[Floats]) -> tuple[Light, ...]:
-    """Those of the next sample.
+    """The lights of the next sample.
 
     Args:
         centers: of all grooms in the view.
@@ -115,8 +114,8 @@ def lights_of_sample(lights: Sequence[Light], centers: Sequence[Floats]) -> tupl
 
 
 def is_next_shown(view: View, samples: int) -> bool:
-    """Whether the view shows the mean once the next sample is added. One that is soft already keeps
-    its picture until all are.
+    """Whether the view shows the mean once the next sample is added. A view that has shown all
+    samples before keeps its picture until all new ones are added.
     """
     count = _softening.picture.count + 1
     return count >= samples or (count >= _FEW and not view.has_all)
@@ -125,11 +124,11 @@ def is_next_shown(view: View, samples: int) -> bool:
 def was_sampled(
     view: View, samples: int, passes: Sequence[StrandPass], fragments: tuple[int, ...]
 ) -> None:
-    """A sample was added.
+    """Record a sample that was added, and request the next.
 
     Args:
-        samples: how many there are to be. passes: what has drawn it.
-        fragments: how many each has drawn; if that has not changed, a soft view may stay as it is.
+        samples: number of samples in total. passes: those that have drawn it.
+        fragments: number that each has drawn; if unchanged, a view with all samples stays as it is.
     """
     _softening.passes = tuple(passes)
     count = _softening.picture.count
@@ -152,12 +151,12 @@ def _stop() -> None:
 
 
 def _ask() -> None:
-    """The view that has samples goes on, or else one that waits begins. What is to be drawn afresh
-    is so first, and asks then.
+    """A timer for Blender: request a sample for the current view, or else for one that waits. Views
+    that must be drawn again first are skipped; they request samples afterwards.
     """
     view = _softening.view
     if view is not None and _softening.is_due:
-        _leave(view)  # it was asked, and is drawn by others now
+        _leave(view)  # the requested redraw did not come: something else draws the view now
     waiting = (each for each in known_views() if each.wants_more and not each.is_again)
     view = _softening.view or next(waiting, None)
     if view is None:
@@ -169,6 +168,6 @@ def _ask() -> None:
 
 
 def _leave(view: View) -> None:
-    """It begins again when it is drawn again."""
+    """Stop sampling a view; it begins again when it is next drawn."""
     view.picture.forget()
     harden(view)

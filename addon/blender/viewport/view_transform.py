@@ -1,16 +1,16 @@
-"""The scene's view transform, for drawing over Blender's own picture of the same light.
+"""The scene's view transform, for drawing hair over a picture that Blender has drawn.
 
-What Blender 5.2 applies in a 3D view (measured in its window, and so it stands in
-DRW_viewport_colormanagement_set of its source):
+What Blender 5.2 applies in a 3D view (measured in its window, and equal to
+DRW_viewport_colormanagement_set in its source):
 
-    Wireframe, Solid                                        the transform "Standard", no more
-    Material Preview, Rendered, by the scene's light        all settings of the scene
-    the same, by neither the scene's lights nor its world   transform and look alone
-    Rendered by the engine Workbench                        all settings of the scene
+    Wireframe, Solid                                        the transform "Standard" alone
+    Material Preview, Rendered, with the scene's light      all settings of the scene
+    the same with neither the scene's lights nor its world  transform and look alone
+    Rendered with the engine Workbench                      all settings of the scene
 
-Blender itself tells what a transform does: it saves a picture of the colours of a table, in data
-of its own that no scene and no undo step ever sees. That takes some hundredths of a second and is
-done by a timer, once for each combination; drawing only looks up what is there.
+A transform is found by having Blender save a picture with the colours of a table, in temporary data
+that is outside of scenes and undo steps. That takes some hundredths of a second, and is done by a
+timer, once for each combination; drawing only looks up existing tables.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from ...render.display import Display, DisplayTable, table_radiances
 from ..base.redraw import redraw_views
 from ..scene.lights import uses_scene_light
 
-#: tables kept, 7 MB each; those of further view transforms are requested again
+#: number of cached tables, 7 MB each; dropped ones are made again when needed
 CAPACITY = 8
 #: white balance: temperature [K] and tint
 type WhiteBalance = tuple[float, float]
@@ -39,11 +39,11 @@ type WhiteBalance = tuple[float, float]
 
 @dataclass(frozen=True)
 class ColorView:
-    """What decides how colours are shown, but for exposure and gamma; equal ones need one table.
+    """Settings that determine how colours are shown, except exposure and gamma; the key of a table.
 
-    space: what scene-linear colours of this file mean.
-    curves: of RGB curves all that counts, see `_curves_of`; empty: none. Blender applies them
-        before the exposure, which then is in the table as well.
+    space: the scene-linear colour space of this file.
+    curves: the RGB curves, see `_curves_of`; empty: none. Blender applies them before the
+        exposure, which then is in the table too.
     """
 
     space: str = "Linear Rec.709"
@@ -56,8 +56,8 @@ class ColorView:
 
 
 class _Known:
-    """What Blender has been asked for: tables, the last used at the end; views that wait for
-    theirs, in order; and why a view cannot have one."""
+    """tables: made so far, the last used at the end. wanted: views that wait for their table, in
+    order. failed: why a view cannot have one."""
 
     def __init__(self) -> None:
         self.tables: OrderedDict[ColorView, DisplayTable] = OrderedDict()
@@ -69,11 +69,11 @@ _known = _Known()
 
 
 def display_of(shading: bpy.types.View3DShading, scene: bpy.types.Scene) -> Display | None:
-    """How a 3D view shows colours; None is the plain "Standard".
+    """How a 3D view shows colours; None: the plain "Standard".
 
-    Only reads, so it may be called while drawing. A transform that is not known yet is asked for,
-    and the views are drawn again once it is there; until then the last one stands in, so that
-    nothing flickers while a curve is dragged.
+    May be called while drawing, as it only looks tables up. A missing table is requested, and views
+    are drawn again once it is made; until then the last one is used, so that nothing flickers while
+    a curve is dragged.
     """
     view, gain, gamma = view_of(shading, scene)
     if (view, gain, gamma) == (ColorView(), 1.0, 1.0):
@@ -94,7 +94,7 @@ def display_of(shading: bpy.types.View3DShading, scene: bpy.types.Scene) -> Disp
 def view_of(
     shading: bpy.types.View3DShading, scene: bpy.types.Scene
 ) -> tuple[ColorView, float, float]:
-    """What this view applies: table, gain and gamma."""
+    """What this view applies: the key of its table, gain and gamma."""
     settings, space = scene.view_settings, bpy.data.colorspace.working_space
     device = scene.display_settings.display_device
     if shading.type not in ("MATERIAL", "RENDERED"):
@@ -115,7 +115,7 @@ def view_of(
 
 
 def prepare() -> None:
-    """Make ready what the open 3D views need, so that the first draw has it."""
+    """Make the tables of all open 3D views, before the first draw."""
     _known.failed.clear()
     for window in bpy.context.window_manager.windows:
         for area in window.screen.areas:
@@ -125,12 +125,12 @@ def prepare() -> None:
 
 
 def problem() -> str:
-    """Why colours are shown by the plain "Standard" although another is set; mostly empty."""
+    """Why colours are shown by the plain "Standard" although another is set; usually empty."""
     return next(iter(_known.failed.values()), "")
 
 
 def forget() -> None:
-    """Leave no table and no timer behind."""
+    """Drop all tables, and stop the timer."""
     _known.tables.clear()
     _known.wanted.clear()
     _known.failed.clear()
@@ -145,7 +145,7 @@ def _want(view: ColorView) -> None:
 
 
 def _make_wanted() -> None:
-    """A timer of Blender's: outside of drawing, where data may be made."""
+    """A timer for Blender: make tables outside of drawing, where data may be created."""
     if not _known.wanted:
         return
     for view in tuple(_known.wanted):
@@ -164,7 +164,7 @@ def _make_wanted() -> None:
 
 
 def shown_by_blender(view: ColorView, radiances: Floats) -> Floats:
-    """Code values of scene-linear colours (..., 3) in [0, 1], as Blender saves them; float32.
+    """Code values in [0, 1] of scene-linear colours (..., 3), as Blender saves them; float32.
 
     Raises:
         OSError, RuntimeError: no picture can be written to the folder for temporary files.
@@ -179,13 +179,13 @@ def shown_by_blender(view: ColorView, radiances: Floats) -> Floats:
 
 
 def _show(view: ColorView, pixels: Floats) -> Exception | None:
-    """Replace these colours, (count, 4), by what is shown of them.
+    """Replace these scene-linear colours, (count, 4), by their code values.
 
     Returns:
-        What has failed, without its traceback: that would hold data of Blender's that is freed by
-        then, and Blender crashes when Python's garbage collection comes across it.
+        The error, without its traceback: that would refer to data that Blender has freed by then,
+        and Blender crashes when Python's garbage collection finds it.
     """
-    # one row is at most as long as pictures may be
+    # the longest row that divides the colours and fits in a picture
     width = next(w for w in range(min(len(pixels), 8192), 0, -1) if len(pixels) % w == 0)
     with (
         tempfile.TemporaryDirectory(prefix="hairloom") as folder,
@@ -208,7 +208,7 @@ def _show(view: ColorView, pixels: Floats) -> Exception | None:
 
 
 def _scene_with(view: ColorView, data: bpy.types.BlendData) -> bpy.types.Scene:
-    """A scene that shows colours like this, and saves 16 bits a channel."""
+    """A scene with these view settings, which saves 16 bits per channel."""
     scene = data.scenes.new("Colors")
     scene.display_settings.display_device = view.device
     settings = scene.view_settings
@@ -227,7 +227,7 @@ def _scene_with(view: ColorView, data: bpy.types.BlendData) -> bpy.types.Scene:
 
 
 def _curves_of(mapping: bpy.types.CurveMapping) -> tuple[Any, ...]:
-    """Levels, tone and clipping of RGB curves, then the points of each: (x, y, handle)."""
+    """Levels, tone, extension and clipping of RGB curves; then points (x, y, handle) of each."""
     curves = tuple(
         tuple((*point.location, point.handle_type) for point in curve.points)
         for curve in mapping.curves
@@ -238,7 +238,7 @@ def _curves_of(mapping: bpy.types.CurveMapping) -> tuple[Any, ...]:
 
 
 def _put_curves(curves: tuple[Any, ...], mapping: bpy.types.CurveMapping) -> None:
-    """The other way round; new curves have two points."""
+    """Set RGB curves to the result of `_curves_of`; new curves have two points."""
     mapping.black_level, mapping.white_level, mapping.tone, mapping.extend = curves[:4]
     mapping.use_clip = False
     corners = curves[5]

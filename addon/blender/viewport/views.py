@@ -1,9 +1,9 @@
-"""The 3D views into which we draw: what is kept for each, and when one has to be drawn again.
+"""The 3D views into which we draw: what is kept for each, and when strands must be drawn again.
 
-A view in which nothing has changed shows its kept picture. What is in the way of strands in it may
-change unseen while an engine still compiles or samples: so, in views other than Solid and
-Wireframe, the last redraw of a row of them is followed by one that draws strands afresh. Where
-shadows are soft by then, it is one sample that tells whether they are still right.
+A view in which nothing has changed shows its kept picture. But what hides strands may change
+without an event, while an engine still compiles or samples. So, in views other than Solid and
+Wireframe, a series of redraws is followed by one that draws strands again. If shadows are soft by
+then, a single sample checks whether the picture is still right.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ from ...render.kept_picture import KeptPicture, are_same_marks
 from ...render.strand_pass import Statistics, StrandPass
 from ..base.redraw import redraw_views, soon
 
-#: what is in such views changes with the scene, the view and its switches alone
+#: types of views whose picture changes only with the scene, the view and its settings
 STEADY = ("SOLID", "WIREFRAME")
-#: [s] without a redraw until one is asked for that draws afresh, and until shadows no longer lag
+#: time [s] without a redraw until strands are drawn again, and until lagging shadows are
 _REST, _LAG = 0.5, 0.1
-#: redraws that make a row, and seconds without a draw after which one does
+#: redraws that make a series; time [s] since the last draw of strands after which a single one does
 _ROW, _LONG = 3, 5.0
 
 
@@ -33,16 +33,17 @@ _ROW, _LONG = 3, 5.0
 class View:
     """What is kept for a 3D view.
 
-    address: of its region's data. marks: what was drawn into it last, see KeptPicture.
-    counted: what its picture shows, by session number of the hair.
-    is_behind: its shadows lag behind its lights, or it was drawn without waiting for the GPU.
-    drawn_at: when its strands were drawn [s]. shown_again: how often its picture was since then.
-    is_again: so that its strands are to be drawn after it.
-    wants_more: samples of soft shadows, see softening.py. is_soft: its picture shows their mean,
-    with the shadow on heads; has_all: of all samples.
-    fragments: how many the last sample of each groom had; none before the first.
-    is_doubted: since samples began it may have come to hold something else before hair.
-    changed_at: when something else was drawn that is to become soft [s].
+    address: of its region's data. marks: of what was last drawn into it, see KeptPicture.
+    counted: counts of what its picture shows, by session number of the hair.
+    is_behind: whether its shadows lag behind its lights, or it was drawn without waiting for the
+        GPU.
+    drawn_at: when its strands were last drawn [s]. shown_again: how often its picture was shown
+        since then. is_again: whether its strands must be drawn again for that reason.
+    wants_more: whether it waits for samples of soft shadows, see softening.py. is_soft: whether its
+        picture shows their mean, with the shadow on heads. has_all: whether of all samples.
+    fragments: number in the last sample of each groom; none before the first.
+    is_doubted: whether something else may hide hair than when its samples began.
+    changed_at: when new contents were drawn that are to become soft [s].
     """
 
     address: int
@@ -62,18 +63,19 @@ class View:
     changed_at: float = 0.0
 
     def turns_to(self, camera: Camera) -> bool:
-        """Whether it was drawn before, from elsewhere."""
+        """Whether it was last drawn from another camera; stores this one."""
         before, self.seen_from = self.seen_from, camera.view.tobytes()
         return before not in (b"", self.seen_from)
 
     def moves_to(self, marks: tuple[Any, ...]) -> bool:
-        """Whether something else was drawn before."""
+        """Whether something else was last drawn; stores these marks."""
         before, self.marks = self.marks, marks
         return not are_same_marks(before, marks)
 
 
 class _Known:
-    """Views by address, how often any scene has changed, and names of switches by owners' kinds."""
+    """views: by address. switches: names of settings, by type of their owner. changes: number of
+    changes of any scene."""
 
     def __init__(self) -> None:
         self.views: dict[int, View] = {}
@@ -85,23 +87,23 @@ _known = _Known()
 
 
 def view_of(region_data: Any) -> View:
-    """What is kept for the view that is being drawn."""
+    """The kept data of the current view."""
     address = region_data.as_pointer()
     return _known.views.setdefault(address, View(address))
 
 
 def known_views() -> tuple[View, ...]:
-    """All that were drawn and are not closed."""
+    """All views that were drawn and are not closed."""
     return tuple(_known.views.values())
 
 
 def scene_changed() -> None:
-    """What is in the way of strands may be elsewhere; no picture holds any more."""
+    """Invalidate all pictures, as what hides strands may have changed."""
     _known.changes += 1
 
 
 def view_marks(context: Any, camera: Camera) -> tuple[Any, ...]:
-    """All that may change what is drawn of the scene into a view, and where."""
+    """Everything that may change what is drawn of the scene into a view, and where."""
     space, region_data = context.space_data, context.region_data
     clipped = tuple(map(tuple, region_data.clip_planes)) if region_data.use_clip_planes else ()
     return (
@@ -113,7 +115,7 @@ def view_marks(context: Any, camera: Camera) -> tuple[Any, ...]:
 
 
 def _switches(owner: Any) -> tuple[Any, ...]:
-    """All that can be set on it, as it is now."""
+    """The present values of all its settings."""
     kind = owner.bl_rna.identifier
     if kind not in _known.switches:
         kinds = ("BOOLEAN", "INT", "FLOAT", "ENUM")
@@ -128,7 +130,7 @@ def _plain(value: Any) -> Any:
 
 
 def forget_views() -> None:
-    """No view of ours is drawn any more."""
+    """Forget all views, when they are no longer drawn."""
     _known.views.clear()
     for timer in (_draw_afresh, _catch_up):
         if bpy.app.timers.is_registered(timer):
@@ -136,7 +138,7 @@ def forget_views() -> None:
 
 
 def forget_closed_views(passes: Iterable[StrandPass]) -> None:
-    """Let go of what was kept for views that no window shows any more."""
+    """Free what was kept for views that no window shows any more."""
     shown = frozenset(_addresses())
     if not shown >= _known.views.keys():
         _known.views = {at: view for at, view in _known.views.items() if at in shown}
@@ -153,7 +155,7 @@ def _addresses() -> Iterator[int]:
 
 
 def was_shown_again(view: View, shading: Any) -> None:
-    """A view has shown its kept picture."""
+    """Record that a view has shown its kept picture."""
     view.shown_again += 1
     is_row = view.shown_again >= _ROW or time.monotonic() - view.drawn_at > _LONG
     if shading.type not in STEADY and is_row:
@@ -162,7 +164,7 @@ def was_shown_again(view: View, shading: Any) -> None:
 
 
 def was_drawn(view: View) -> None:
-    """A view was drawn afresh."""
+    """Record that the strands of a view were drawn."""
     view.is_again, view.shown_again, view.drawn_at = False, 0, time.monotonic()
     if view.is_behind:
         soon(_catch_up, _LAG)
