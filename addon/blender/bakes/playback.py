@@ -300,8 +300,8 @@ def rendering(begins: bool) -> None:
 
 
 def needs_copies() -> bool:
-    """Whether to update the copies that renders and exporters read in each frame. The viewport
-    hides them, so they need no update while an animation plays or the playhead is dragged."""
+    """Whether to update the copies that renders and exporters read. Not while an animation plays
+    or the playhead is dragged in the viewport, which hides them."""
     return _known.is_rendering or bpy.app.background or not (is_played() or is_dragged())
 
 

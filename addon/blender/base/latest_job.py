@@ -23,7 +23,7 @@ from ...errors import HairloomError
 from .redraw import redraw_panels
 from .thread_work import ThreadWork
 
-#: [s] between two looks at a running job, and between those at one that waits for the main thread.
+#: [s] between checks of a running job, and of one that waits for the main thread.
 ARRIVAL_TIME, SERVING_PAUSE = 0.05, 0.01
 
 type Step = Callable[[], float | None]

@@ -1,4 +1,4 @@
-"""Background work in a thread, which hands steps to the main thread that only that may do."""
+"""Background work in a thread; the main thread takes the steps that only it may take."""
 
 from __future__ import annotations
 

@@ -335,7 +335,7 @@ def baked_atlas(
 
 
 def has_gpu() -> bool:
-    """Whether there is a GPU context; background mode tries to create one first."""
+    """Whether there is a GPU context; in background mode, one is created if possible."""
     try:
         ensure_gpu()
         gpu.platform.backend_type_get()

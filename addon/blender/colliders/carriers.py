@@ -21,7 +21,7 @@ from ...strands.affine import moved
 from ..base.objects import Body
 from ..scene.surfaces import read_positions
 
-#: Maximum number of vertices that a mesh is tracked by; more would not change the result.
+#: Approximate number of vertices that a mesh is tracked by; more would not change the result.
 _ENOUGH = 2000
 #: Rings of triangles around the roots that count as near them.
 _RINGS = 2

@@ -47,7 +47,7 @@ def field_of(
         work = _works.pop(key, None)
         if work is None:
             work = ThreadWork(lambda _: _made(surface, settings, key), "distance field")
-        _works[key] = work  # now the youngest
+        _works[key] = work  # last in the order of use
     if blocking:
         work.wait()
         trim()

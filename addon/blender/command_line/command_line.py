@@ -112,8 +112,8 @@ def _code(verb: Verb, options: argparse.Namespace, report: Report) -> int:
 
 
 def _reported(report: Report, path: str | None) -> bool:
-    """Write the report if requested, also before the work, lest an older one be taken for this
-    run's; returns whether that worked."""
+    """Write the report if requested, also before the work, so that an older one cannot be mistaken
+    for this run's; returns whether that worked."""
     if path is None:
         return True
     try:

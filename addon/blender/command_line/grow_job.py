@@ -15,7 +15,7 @@ from .verb import Verb
 
 
 def grow(job: Job) -> None:
-    """Grow hair curves on a mesh of a scene, with the settings that they are to have."""
+    """Grow hair curves on a mesh of a scene, with the given settings."""
     options, report = job.options, job.report
     (head,) = named_objects([options.head], lambda obj: bool(obj.type == "MESH"), "a mesh")
     with report.stage("grow"):

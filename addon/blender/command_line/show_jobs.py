@@ -12,7 +12,7 @@ from .verb import Verb
 
 
 def turntable(job: Job) -> None:
-    """Turn the groom once before the camera: a picture a frame, and a video of them."""
+    """Turn the groom once in front of the camera: a picture for each frame, and a video."""
     options, report = job.options, job.report
     chosen = TurntableSettings(
         frames=options.frames,

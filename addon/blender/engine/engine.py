@@ -85,7 +85,7 @@ class HAIRLOOM_RE_engine(bpy.types.RenderEngine):
             self.tag_redraw()
 
     def _attempt(self, action: Any, context: Any, depsgraph: Any) -> Any:
-        """Run an action; an error is reported once, and not at every redraw until a change."""
+        """Run an action; an error is reported once, not at every redraw, until an update."""
         if self.failure:
             return None
         try:

@@ -82,8 +82,8 @@ class _Made:
         others: Occluders,
         edits: CardEdits | None,
     ) -> BuiltCards:
-        """The groom's cards; the last ones are returned while settings, including colours, edits
-        and other hair are the same.
+        """The groom's cards; the last ones are returned while settings (colours too), edits and
+        other hair are the same.
 
         Cards of baked hair are built at rest, so they are not built again in frames where other
         hair has only moved.
@@ -121,8 +121,8 @@ class _Kept:
     def have(
         self, made_from: tuple[Any, ...], make: Callable[[], _Made], *, blocking: bool
     ) -> _Made | None:
-        """The last result, None if there is none. If blocking, it is built from these values; else
-        a job is started if they differ.
+        """The last result, None if there is none. If it is not of these values, it is built again:
+        at once if blocking, else by a job.
 
         Raises:
             HairloomError: hair cannot be built from these values.

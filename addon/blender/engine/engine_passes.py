@@ -42,7 +42,7 @@ SHADOW = RenderPass("Hair Shadow", "RGB", "COLOR", empty=1.0)
 SHAFTS = RenderPass("Hair Shafts", "RGB", "COLOR")
 #: prefix of the names of Cryptomatte passes
 CRYPTOMATTE = "CryptoObject"
-#: names of the passes that hold data of the nearest thing at the centre of each pixel
+#: names of the passes that hold data of the nearest surface or strand at each pixel's centre
 DATA = frozenset(each.name for each in (DEPTH, NORMAL, VECTOR, OBJECT_INDEX, STRAND_INDEX, TANGENT))
 #: settings of view layers -> the passes that they enable; Blender's own, and ours
 _ASKED = {

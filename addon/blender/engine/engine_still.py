@@ -229,7 +229,8 @@ class Still:
     def _add_data(
         self, wanted: dict[str, Any], frame: float, scene: SceneSnapshot, camera: Camera
     ) -> None:
-        """Write the passes of the nearest thing at each pixel's centre, at the exact frame."""
+        """Write the passes in DATA, of the nearest surface or strand at each pixel's centre, at the
+        exact frame."""
         drawing = self._target, self._size
         nearest = self._pass.nearest(scene, camera, *drawing)
         if self._behind is not None:
@@ -254,7 +255,8 @@ class Still:
     def _motion(
         self, nearest: Nearest, frame: float, scene: SceneSnapshot, camera: Camera
     ) -> Floats:
-        """The Vector pass: motion of the nearest thing from one frame before to one frame after."""
+        """The Vector pass: motion of the nearest surface or strand from the previous and to the
+        next frame."""
         moments = {}
         for step in (-1, 1):
             self._go_to(frame + step)

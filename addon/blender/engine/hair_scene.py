@@ -200,7 +200,7 @@ def on_render_begin(scene: bpy.types.Scene, *_: object) -> None:
 
 @persistent
 def on_frame_begin(scene: bpy.types.Scene, *_: object) -> None:
-    """Update the camera, which may change at any frame, and hide hair again if saving showed it."""
+    """Update the camera, which may change at any frame, and hide hair, which a save shows again."""
     _follow_camera(scene)
     if hair_scene_of(scene) is not None and is_needed(scene) and not problem_of(scene):
         hide_hair(scene)

@@ -9,7 +9,7 @@ from ..scene.built_in_head import HeadLook
 
 
 def head_parts(whole: MeshSnapshot, look: HeadLook) -> tuple[MeshSnapshot, ...]:
-    """A head's parts, which share its vertices, and the skin that soft shadows are computed on.
+    """A head's parts, which share its vertices and skin, so that soft shadows continue across them.
 
     Args:
         whole: the head with its normals and occlusion.

@@ -44,8 +44,8 @@ from .slices import shown_slices
 FIELD_OF_VIEW = np.radians(30.0)
 #: distance around the groom within which the head is shown, as a fraction of the groom's size
 HEAD_ROOM = 0.25
-#: for a close-up: its direction (degrees from the front, and z), and the fraction of the groom's
-#: size that it shows
+#: for a close-up: its direction (degrees from the front, and z), and the radius that it shows, as a
+#: fraction of the groom's size
 CLOSE_UP, CLOSE_REACH = (50.0, 0.3), 0.2
 #: margin around the points that the camera holds, as a factor
 MARGIN = 1.16
