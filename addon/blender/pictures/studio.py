@@ -276,7 +276,7 @@ class Studio:
         return frame_points(held, direction, FIELD_OF_VIEW, aspect, margin=MARGIN)
 
     def _camera(self, aspect: float) -> Camera:
-        """The camera that frames the groom at rest and the head near it."""
+        """The camera that frames the groom at rest and the head near it, with room for motion."""
         if aspect not in self._cameras:  # kept, as there may be a million points, in each frame
             held = self.held(self._rig.rest_pose, self._rig.strands.points)
             self._cameras[aspect] = self.framed(held, self.side.three_quarter, aspect)
