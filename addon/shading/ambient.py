@@ -2,8 +2,8 @@
 
 Also by direction, for light that is not the same from everywhere: see `openness_field`.
 
-The hair becomes a grid of extinction coefficients, light dies in it by Beer and Lambert's law,
-and the 26 directions to a cell's neighbours stand for all directions with the weights of
+The hair becomes a grid of extinction coefficients, light is attenuated in it by Beer and Lambert's
+law, and the 26 directions to a cell's neighbours represent all directions, with the weights of
 Lebedev's quadrature of degree 7 (Lebedev 1976). The optical depth along each direction is one
 running sum over the whole grid, so that the cost does not grow with the number of points.
 
@@ -30,14 +30,14 @@ type Step = tuple[int, int, int]
 _DIRECTION_WEIGHTS = {1: 1 / 21, 2: 4 / 105, 3: 9 / 280}
 
 
-#: Where light on the skin is measured, above it, so that it lies in the hair [cells].
+#: Height above the skin at which its light is measured, so that it lies in the hair [cells].
 _SKIN_CLEARANCE = 0.5
 
 
 @dataclass(frozen=True, eq=False)
 class HairCells:
-    """What light meets: the optical depth of hair across each cell, as wide as its strands are, and
-    of the body, None without one."""
+    """What blocks light: the optical depth across each cell of hair, at an extinction of 1, and of
+    the body, None without one."""
 
     grid: Grid
     hair: Floats
@@ -57,7 +57,7 @@ class HairCells:
         return cls(grid, hair, grid.part(of_body, whole))
 
     def depth(self, extinction: float) -> Floats:
-        """Of hair and body."""
+        """Optical depth of hair and body across each cell."""
         depth = self.hair * np.float32(extinction)
         return depth if self.body is None else np.maximum(depth, self.body)
 
@@ -68,7 +68,7 @@ def ambient_occlusion(
     body: Surface | None,
     settings: AmbientSettings,
 ) -> Floats:
-    """How open each point is, (n,) float32: 1 at the outside of the hair, 0 where no light comes.
+    """How open each point is, (n,) float32: 1 at the outside of the hair, 0 where no light arrives.
 
     Args:
         strands: the hair that shades, world space.
@@ -82,23 +82,23 @@ def ambient_occlusion(
 
 
 def sky_field(cells: HairCells, settings: AmbientSettings) -> Field:
-    """How open the sky is, one value a cell."""
+    """Openness to the sky, one value per cell."""
     open_sky = sky_openness(cells.depth(settings.extinction), settings.upper_fraction)
     return Field(cells.grid, open_sky[None])
 
 
 def occlusion_by(sky: Floats, settings: AmbientSettings) -> Floats:
-    """As `ambient_occlusion`, of points (n,) to which the sky is so open."""
+    """As `ambient_occlusion`, from the openness of points to the sky, (n,)."""
     seen = sky / np.float32(settings.ao_bias)
     found: Floats = (1.0 - settings.strength * (1.0 - np.minimum(seen, 1.0))).astype(np.float32)
     return found
 
 
 def openness_field(cells: HairCells, extinction: float) -> Field:
-    """The fraction of the light from each direction w that comes straight to each cell, as
+    """The fraction of the light from each direction w that reaches each cell unscattered, as
     q0 + q . w, 4 values: the mean over all directions, and a vector in world space.
 
-    Points lie on the light's side of their cells, as what is seen of hair does.
+    A point's own cell does not count: hair that is seen lies on the light's side of its cell.
     """
     steps, weights = zip(*sky_directions(0.0), strict=True)
     moments = np.array(weights) * with_mean(unit_steps(steps))
@@ -106,7 +106,8 @@ def openness_field(cells: HairCells, extinction: float) -> Field:
 
 
 def _body_depth(body: Surface, low: Floats, cell: float, shape: tuple[int, int, int]) -> Floats:
-    """See `body_depth`; of the numbers of a grid, since hair that is combed keeps its blocks."""
+    """`body_depth` by the numbers of a grid, a key for `Surface.latest`: combed hair keeps its
+    blocks."""
     return body_depth(body, Grid(low, cell, shape))
 
 
@@ -138,13 +139,13 @@ def unit_steps(steps: Sequence[Step]) -> Floats:
 
 
 def with_mean(directions: Floats) -> Floats:
-    """What sums light of directions, rows (3, n), to q0 and q of a mean and a vector, (4, n)."""
+    """Weights that sum light from directions, rows (3, n), to a mean q0 and a vector q, (4, n)."""
     return np.concatenate([np.ones((1, directions.shape[1])), 3.0 * directions])
 
 
 def summed_light(depth: Floats, steps: Sequence[Step], weights: Floats, own: float = 0.5) -> Floats:
-    """Weighted sums over some of the 26 directions of the part of light that comes from there to
-    each cell, (k, *depth.shape) float32.
+    """Weighted sums, over some of the 26 directions, of the fraction of light that reaches each
+    cell from there, (k, *depth.shape) float32.
 
     Args:
         weights: (k, step_count).
@@ -160,8 +161,8 @@ def summed_light(depth: Floats, steps: Sequence[Step], weights: Floats, own: flo
 
 def depth_towards(depth: Floats, steps: Sequence[Step], own: float = 0.5) -> Floats:
     """Optical depth from each cell out of the grid along some of the 26 directions,
-    (step_count, *grid) float32: a part of the own cell, from its centre half, then every cell on
-    the way, each crossed over the length of the step.
+    (step_count, *grid) float32: the fraction `own` of the cell itself, half from its centre, then
+    every cell on the way, each crossed over the length of the step.
 
     Args:
         depth: of cells, (step_count, *grid), or (1, *grid) where all directions have the same.
@@ -172,16 +173,16 @@ def depth_towards(depth: Floats, steps: Sequence[Step], own: float = 0.5) -> Flo
     return found
 
 
-#: Of a grid, all cells but along one axis.
+#: Index of one layer of a grid's cells.
 type Layer = tuple[int | slice, ...]
 
 
 def _layers(
     depth: Floats, steps: Sequence[Step], own: float
 ) -> Iterator[tuple[Ints, Layer, Floats]]:
-    """Numbers of some steps, a layer of cells across their longest axis, and what light along these
-    crosses to its cells, (k, cells, cells), see depth_towards: a layer after the other, which stay
-    in the cache.
+    """For each layer of cells: numbers of k steps, the layer across their longest axis, and the
+    optical depth along these steps from its cells, (k, cells, cells), see depth_towards. Layer by
+    layer, since layers stay in the cache.
     """
     along = np.abs(steps).argmax(axis=1)
     for axis, side in itertools.product(range(3), (-1, 1)):

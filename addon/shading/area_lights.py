@@ -1,19 +1,19 @@
-"""Area lights: what arrives from a shining panel, as one direction and one strength.
+"""Area lights: the light from a luminous panel, as one direction and one strength.
 
-A panel shines from one side, its radiance P / (pi A) the same from every point of it. What
-arrives at a point is the vector irradiance (Gershun 1939): the sum of all light times its
-direction. A matt surface that sees the whole panel gets exactly this vector's share along its
-normal. A strand is lit from all around, and light from many directions then counts for more: 1 %
-before a square twice its width away, 4 % at its width, 11 % at half and 23 % at a quarter of it.
-A surface whose horizon cuts the panel gets more as well.
+A panel shines from one side, with the same radiance P / (pi A) from every point. What arrives at a
+point is the vector irradiance (Gershun 1939): the sum of all light times its direction. A matt
+surface that sees the whole panel receives exactly the component of this vector along its normal. A
+strand is lit from all around and receives more, since the light comes from many directions: 1 %
+before a square twice its width away, 4 % at its width, 11 % at half and 23 % at a quarter of it. A
+surface whose horizon cuts the panel receives more as well.
 
 - A rectangle in closed form: Lambert 1760; Arvo 1995, "Applications of Irradiance Tensors".
 - A disk in closed form: the contour integral of Lambert's formula around a circle.
 - Ellipses, and panels of narrow spread, by a Gauss rule of 6 x 6 over the solid angle in which
-  light arrives, within 1 % (2 % a tenth of the size from the rim). It is parted into rows by angle
-  and each row by its sine: there equal steps are equal solid angles (Archimedes' cylinder).
-Spread is Cycles': slats before the panel let (tan h - tan theta) / (tan h - h) of the light
-through, with h half of the spread. Of a sheared object the sides are taken as across each other.
+  light arrives, within 1 % (2 % a tenth of the size from the rim). The panel is divided into rows
+  by angle and each row by the sine: equal steps are equal solid angles (Archimedes' cylinder).
+Spread as in Cycles: slats before the panel let (tan h - tan theta) / (tan h - h) of the light
+through, with h half of the spread. The sides of a sheared object are taken as perpendicular.
 """
 
 from __future__ import annotations
@@ -26,16 +26,16 @@ from ..arrays import Floats
 
 type Vector = tuple[float, float, float]
 
-#: a panel whose half diagonal, squared, is this of the squared distance, is four points (where it
-#: is narrow also against its spread); in lib_lights
+#: squared half diagonal over squared distance below which a panel is computed as four points (less
+#: for a narrow spread); in lib_lights
 FAR = 2.5e-3
-#: nearer to its plane than this [m] is behind a panel; in lib_lights
+#: points nearer to a panel's plane than this count as behind it [m]; in lib_lights
 MIN_HEIGHT = 1.0e-9
-#: sides no shorter than this [m], nor than this of the other side
+#: minimum length of a side [m], and as a fraction of the other side
 MIN_SIDE, MIN_ASPECT = 1.0e-7, 1.0e-3
-#: a spread of none is a beam of this [rad]
+#: minimum spread [rad]
 MIN_SPREAD = float(np.radians(1.0))
-#: the tangent of a spread of a half turn
+#: tangent for a spread of a half turn
 OPEN = 1.0e8
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(6)
@@ -45,7 +45,7 @@ _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(6)
 class Panel:
     """The shining side of an area light around its middle, in world space.
 
-    right, up, shines_along: unit vectors, right across each other.
+    right, up, shines_along: unit vectors, perpendicular to each other.
     half_width, half_height: [m], along right and up; of an ellipse its half axes.
     spread: full angle [rad], up to pi, into which it shines.
     """
@@ -60,7 +60,7 @@ class Panel:
 
     @property
     def half_sides(self) -> tuple[float, float]:
-        """Half width and half height [m], none of them nought."""
+        """Half width and half height [m], both above 0."""
         least = max(MIN_SIDE, MIN_ASPECT * max(self.half_width, self.half_height))
         return max(self.half_width, least), max(self.half_height, least)
 
@@ -70,24 +70,24 @@ class Panel:
 
     @property
     def tangent(self) -> float:
-        """Of half of the spread."""
+        """Tangent of half of the spread."""
         if self.is_open:
             return OPEN
         return float(np.tan(0.5 * max(self.spread, MIN_SPREAD)))
 
     @property
     def normalizer(self) -> float:
-        """By which the slats' shade is multiplied, so that the panel's power stays."""
+        """Factor on the light that the slats let through, which keeps the panel's power."""
         return 1.0 / (self.tangent - float(np.arctan(self.tangent)))
 
     @property
     def quarter_place(self) -> float:
-        """Where four points stand for the panel, as a fraction of its half sides."""
+        """Where the four points that replace a far panel lie, as a fraction of its half sides."""
         return 0.5 if self.is_round else float(np.sqrt(1.0 / 3.0))
 
     @property
     def form(self) -> str:
-        """Which way it is computed: "rectangle" or "disk" in closed form, else "grid"."""
+        """How it is computed: "rectangle" or "disk" in closed form, else "grid"."""
         width, height = self.half_sides
         if not self.is_open or (self.is_round and abs(width - height) > 1e-6 * width):
             return "grid"
@@ -95,7 +95,7 @@ class Panel:
 
 
 def vector_irradiance(panel: Panel, offsets: Floats) -> Floats:
-    """What arrives of one watt, (..., 3) [1/m^2], towards the panel; nought behind it.
+    """The vector irradiance of one watt, (..., 3) [1/m^2], towards the panel; 0 behind it.
 
     Args:
         offsets: (..., 3) from the panel's middle [m], world space.
@@ -115,10 +115,10 @@ def vector_irradiance(panel: Panel, offsets: Floats) -> Floats:
 
 
 def _four_points(panel: Panel, x: Floats, y: Floats, height: Floats) -> Floats:
-    """Of a panel so far away that the closed forms would lose themselves in rounding.
+    """Vector irradiance of a panel so far away that the closed forms would lose their precision.
 
-    Each of four points shines with a quarter of the power, P cos(theta) / (pi d^2); they lie so
-    that their spread along each axis is the panel's.
+    Each of four points shines with a quarter of the power, P cos(theta) / (pi d^2); their variance
+    along each axis is the panel's.
     """
     total = np.zeros((*x.shape, 3))
     a, b = np.array(panel.half_sides) * panel.quarter_place
@@ -131,12 +131,13 @@ def _four_points(panel: Panel, x: Floats, y: Floats, height: Floats) -> Floats:
 
 
 def _rectangle(panel: Panel, x: Floats, y: Floats, height: Floats) -> Floats:
-    """Half the sum over the edges of the angle that they fill times their plane's normal."""
+    """Half the sum, over the edges, of the angle that each subtends times the normal of its
+    plane."""
     a, b = panel.half_sides
     left, right, bottom, top = -a - x, a - x, -b - y, b - y
 
     def edge(across: Floats, start: Floats, end: Floats) -> Floats:
-        """The angle of an edge from start to end, over its line's distance."""
+        """The angle that an edge subtends from start to end, over the distance of its line."""
         distance = np.hypot(height, across)
         angle = np.arctan2((end - start) * distance, distance * distance + start * end)
         return angle / distance
@@ -155,13 +156,13 @@ def _rectangle(panel: Panel, x: Floats, y: Floats, height: Floats) -> Floats:
 
 
 def _disk(panel: Panel, x: Floats, y: Floats, height: Floats) -> Floats:
-    """By the distances to the rim's nearest and farthest points; p is that from the axis."""
+    """By the distances to the rim's nearest and farthest points; p is the distance to the axis."""
     radius = panel.half_sides[0]
     p = np.hypot(x, y)
     product = np.hypot(height, p - radius) * np.hypot(height, p + radius)
     total = radius * radius + p * p + height * height + product
     rest = radius * radius + height * height - p * p
-    # product + rest, both ways alike but for rounding
+    # product + rest: both forms are equal but for rounding
     facing = np.where(
         rest > 0.0, product + rest, 4.0 * (p * height) ** 2 / (product + np.abs(rest))
     )
@@ -171,7 +172,7 @@ def _disk(panel: Panel, x: Floats, y: Floats, height: Floats) -> Floats:
 
 
 def _grid(panel: Panel, x: Floats, y: Floats, height: Floats) -> Floats:
-    """Row by row over what of the panel lies in the cone into which it shines."""
+    """Row by row over the part of the panel that shines to the point within its spread."""
     a, b = panel.half_sides
     reach = height * panel.tangent
     first = np.arctan(np.maximum(-b - y, -reach) / height)
@@ -191,7 +192,8 @@ def _grid(panel: Panel, x: Floats, y: Floats, height: Floats) -> Floats:
 def _row(
     panel: Panel, height: Floats, v: Floats, distance: Floats, low: Floats, high: Floats
 ) -> Floats:
-    """The part of one row, from low to high, by the sine of the angle at the point."""
+    """The light of one row, from low to high, integrated over the sine of the angle at the
+    point."""
     first, last = low / np.hypot(distance, low), high / np.hypot(distance, high)
     half = np.maximum(0.5 * (last - first), 0.0)
     total = np.zeros((*v.shape, 3))
@@ -206,5 +208,5 @@ def _row(
 
 
 def _shade(panel: Panel, tangent: Floats) -> Floats:
-    """What the slats let through into a direction of this tangent to the panel's own."""
+    """What the slats let through, normalised, by the tangent of the angle to the panel's axis."""
     return np.maximum(panel.tangent - tangent, 0.0) * panel.normalizer

@@ -1,25 +1,25 @@
-"""Shafts of light from what is bright in the picture: the reference that the shaders are held to.
+"""Shafts of light from bright parts of the picture: the reference for the shaders.
 
-Nguyen and Donnelly 2005 (the Nalu demo's "God Rays", as in shafts.py): bright regions are taken
-from the picture, go to polar coordinates, are blurred along the radius, and come back. What stands
-before a bright thing covers it in the picture, so it cuts the shafts: hair by as much as it covers.
+Nguyen and Donnelly 2005 (the Nalu demo's "God Rays", as in shafts.py): bright regions of the
+picture are taken to polar coordinates, blurred along the radius, and taken back. Whatever covers a
+bright thing in the picture cuts its shafts, hair in proportion to its coverage.
 
-    S           what is bright: colour * a^2 / (a + knee * threshold) / luminance,
+    S           bright part: colour * a^2 / (a + knee * threshold) / luminance,
                 a = luminance - threshold
-    B_i(r, angle)  the mean of w_i * S on the way out from the middle of region i, of which
-                exp(-s / l) counts at a distance s back
+    B_i(r, angle)  the mean of w_i * S on the ray out from the middle of region i, weighted
+                by exp(-s / l) at a distance s back
     added       strength * tint * scale * sum of B_i
 
-A window, an emissive mesh and a sky have no lamp to be blurred away from, so each region has a
-middle of its own. The weights w_i, which add up to 1, are bilinear over a coarse lattice; the
-middle is where the mean shift (Fukunaga and Hostetler 1975) leads the bright part around each node
-of it. Parts of one window are led to one middle, two windows far apart to two. Middles follow light
-that moves.
+A window, an emissive mesh and a sky have no lamp from which to blur outwards, so each region has a
+middle of its own. The weights w_i add up to 1 and are bilinear over a coarse lattice. From the
+bright part around each node, the mean shift (Fukunaga and Hostetler 1975) climbs to a middle: parts
+of one window climb to the same middle, two windows far apart to two. Middles follow light that
+moves.
 
 scale is 1 as long as less than half of the picture is bright and falls to 0 where all of it is: a
 white world throws no shafts.
 
-Limitations: it goes by the picture alone, as shafts.py does.
+Limitation: only what is in the picture counts, as in shafts.py.
 """
 
 from __future__ import annotations
@@ -33,27 +33,28 @@ from .luminance import LUMINANCE
 from .shafts import PolarGrid, from_polar, radial_blur, to_polar
 from .shafts_settings import ShaftSettings
 
-#: how far above the threshold [thresholds] brightness counts half
+#: height above the threshold at which brightness counts half [thresholds]
 KNEE = 0.5
-#: luminance that counts at most, so that single pixels do not outshine all
+#: maximum luminance that counts, so that single pixels do not outshine all others
 BRIGHTEST = 20.0
 #: colours are cut off here, which keeps float32 from overflowing
 LARGEST = 1.0e6
 #: cells and spans of the lattice along the longer side of the picture
 CELLS, SPANS = 48, 4
-#: of the longer side: how far the mean shift looks, and middles that count as one
+#: reach of the mean shift, and distance below which middles are one, both of the longer side
 _REACH, _SAME = 0.2, 0.02
 _SHIFTS = 30
-#: middles at most; what is fainter joins the nearest
+#: maximum number of middles; fainter ones join the nearest
 MAX_REGIONS = 6
 
 
 @dataclass(frozen=True, eq=False)
 class BrightRegion:
-    """What is blurred away from one place.
+    """Bright part that is blurred outwards from one place.
 
     center: x, y [pixels].
-    weights: (rows, columns) of the lattice, how much of what is bright belongs to it at each node.
+    weights: (rows, columns) of the lattice, which fraction of the bright part belongs to it at each
+        node.
     """
 
     center: tuple[float, float]
@@ -62,7 +63,7 @@ class BrightRegion:
 
 @dataclass(frozen=True, eq=False)
 class BrightRegions:
-    """scale: factor on what is added."""
+    """All regions. scale: factor on the light that is added."""
 
     regions: tuple[BrightRegion, ...]
     scale: float
@@ -75,10 +76,10 @@ def wants_bright(settings: ShaftSettings) -> bool:
 
 
 def bright_part(colors: Floats, threshold: float) -> Floats:
-    """What is bright of scene-linear colours (..., 3+), and how surely it is (..., 4): wholly from
+    """The bright part of scene-linear colours (..., 3+), and how certain it is, (..., 4): 1 from
     the knee on.
 
-    What is no number counts as black.
+    Negative values and NaN count as black.
     """
     colors = np.asarray(colors, np.float64)[..., :3]
     colors = np.where(colors >= 0.0, np.minimum(colors, LARGEST), 0.0)
@@ -93,13 +94,13 @@ def bright_part(colors: Floats, threshold: float) -> Floats:
 
 
 def cell_side(width: int, height: int) -> int:
-    """Of the cells in which what is bright is counted [pixels]."""
+    """Side of the cells over which the bright part is summed [pixels]."""
     return -(-max(width, height) // CELLS)
 
 
 def bright_cells(bright: Floats) -> Floats:
-    """Sums over the cells of what `bright_part` gives of a picture, (rows, columns, 4): luminance,
-    that times x and y [pixels], and how surely it is bright.
+    """Sums over cells of a picture's `bright_part`, (rows, columns, 4): luminance, luminance times
+    x and times y [pixels], and certainty.
     """
     height, width = bright.shape[:2]
     side = cell_side(width, height)
@@ -113,12 +114,12 @@ def bright_cells(bright: Floats) -> Floats:
 
 
 def node_spacing(width: int, height: int) -> float:
-    """Between nodes of the lattice, the first of which is at the corner 0, 0 [pixels]."""
+    """Distance between nodes of the lattice [pixels]; the first node is at the corner 0, 0."""
     return max(width, height) / SPANS
 
 
 def bright_regions(cells: Floats, width: int, height: int) -> BrightRegions:
-    """The places that what is bright is blurred away from, from the sums of `bright_cells`."""
+    """The regions of the bright part, from the sums of `bright_cells`."""
     sums = np.asarray(cells, np.float64).reshape(-1, 4)
     scale = float(np.clip(2.0 * (1.0 - sums[:, 3].sum() / (width * height)), 0.0, 1.0))
     sums = sums[sums[:, 0] > 0.0]
@@ -158,7 +159,8 @@ def bright_regions(cells: Floats, width: int, height: int) -> BrightRegions:
 
 
 def _mean_shift(starts: Floats, places: Floats, light: Floats, reach: float) -> Floats:
-    """Where these places climb to, of light at places, blurred by a Gaussian."""
+    """Where the mean shift moves `starts`, in the light at `places` blurred by a Gaussian of
+    `reach`."""
     middles = starts
     for _ in range(_SHIFTS):
         away = ((middles[:, None] - places) ** 2).sum(axis=-1)
@@ -170,11 +172,11 @@ def _mean_shift(starts: Floats, places: Floats, light: Floats, reach: float) -> 
 def bright_shafts(
     picture: Floats, seen: Floats, length: float, settings: ShaftSettings
 ) -> tuple[Floats, BrightRegions]:
-    """A picture with the shafts that bright things throw, and where these are.
+    """A picture with the shafts of its bright things, and the regions of these.
 
     Args:
         picture: (height, width, 4) scene-linear, premultiplied.
-        seen: (height, width, 3+) what there is to be seen, with what lies behind the picture.
+        seen: (height, width, 3+) the picture over what lies behind it.
         length: of shafts [pixels].
     """
     height, width = picture.shape[:2]
@@ -191,7 +193,7 @@ def bright_shafts(
 
 
 def weights_on(grid: PolarGrid, region: BrightRegion, width: int, height: int) -> Floats:
-    """How much of what is bright belongs to a region, on the rays of a grid, (angles, radii, 1)."""
+    """Weights of a region on the rays of a grid, (angles, radii, 1)."""
     x, y = grid.places
     spacing = node_spacing(width, height)
     rows, columns = region.weights.shape

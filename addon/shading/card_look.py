@@ -1,7 +1,7 @@
-"""What a card makes of the models of strands: the reference.
+"""The strands' shading models on cards: the reference.
 
-Twin of gpu_shaders/lib_card.glsl: same names, same order. A card stands for many strands, so what
-differs from strand to strand is in its textures, and of its colours it has the mean.
+Twin of gpu_shaders/lib_card.glsl: same names, same order. A card represents many strands: what
+differs between strands is in its textures, and its colour is their mean.
 """
 
 from __future__ import annotations
@@ -15,18 +15,18 @@ from .marschner.pigment import COLOR_FACTOR
 from .settings import ShadingSettings
 from .volume.card_opacity import MEAN_TURN, MIN_FACING, turned_facing
 
-#: How dense a card is that faces the eye, in what it is on the mean of all turns: 2 / pi, the mean
-#: of |cos|; and a quarter more, for what is lost behind cards that are nearly clear and still write
-#: depth (measured, Sintel).
+#: Density of a card that faces the eye, relative to its mean over all turns about its strands: 2 /
+#: pi, the mean of |cos|, and a quarter more, because cards that are nearly transparent still write
+#: depth and hide what lies behind them (measured, Sintel).
 MEAN_FACING = 1.25 * MEAN_TURN
-#: both, by the names that sidecars have for them
+#: Both constants, by their names in sidecars.
 VIEW_COMPENSATED_ALPHA = {"mean_facing": MEAN_FACING, "min_facing": MIN_FACING}
-#: Darkest texel of a base texture of which an absorption is made.
+#: Minimum of a base texel that is converted to absorption.
 DARKEST = 1.0e-3
 
 
 def mapped_tangent(texel: Floats, tangent: Floats, normal: Floats, shift_noise: float) -> Floats:
-    """The way of a strand by a tangent map, (..., 3) unit vectors, see textures.HairTextures.
+    """Directions of strands from a tangent map, (..., 3) unit vectors, see textures.HairTextures.
 
     Args:
         texel: (..., 3) of the map.
@@ -41,7 +41,7 @@ def mapped_tangent(texel: Floats, tangent: Floats, normal: Floats, shift_noise: 
 
 
 def mapped_normal(texel: Floats, tangent: Floats, normal: Floats) -> Floats:
-    """The normal by a normal map, (..., 3) unit vectors, see textures.HairTextures.
+    """Normals from a normal map, (..., 3) unit vectors, see textures.HairTextures.
 
     Args:
         texel: (..., 3) of the map.
@@ -56,13 +56,14 @@ def mapped_normal(texel: Floats, tangent: Floats, normal: Floats) -> Floats:
 def view_compensated_alpha(
     alpha: Floats, across: Floats, tangent: Floats, to_eye: Floats
 ) -> Floats:
-    """What a card covers that is seen at a slant, (...).
+    """Alpha of a card that is seen at an angle, (...).
 
-    The slant narrows a card, but no strand: what it shows lies closer together. n layers of alpha
-    cover 1 - (1 - alpha)^n, and n goes with 1 / |cos| of the turn about the strands.
+    Turned about its strands, a card gets narrower, but its strands do not: they appear closer
+    together. n layers of alpha cover 1 - (1 - alpha)^n, with n proportional to 1 / |cos| of the
+    turn.
 
     Args:
-        alpha: (...) what it covers on the mean of all turns about its strands.
+        alpha: (...) mean over all turns about its strands.
         across: (..., 3) normal of its plane, of any length.
         tangent, to_eye: (..., 3) unit vectors.
     """
@@ -74,8 +75,8 @@ def view_compensated_alpha(
 def card_base(along: Floats, shading: ShadingSettings) -> Floats:
     """Mean colour of the strands at places of a card, (..., 3); `along` is 0 at the root.
 
-    Times the base texture it is what `strand_base` is for a strand. Of Kajiya-Kay alone: see
-    `drawn_strands.card_color`.
+    Times the base texture, it corresponds to `strand_base` of a strand. For Kajiya-Kay only;
+    `drawn_strands.card_color` serves both models.
     """
     even = np.full(np.shape(along), 0.5)
     colored = strand_base(along, even, even + 1.0, shading)
@@ -84,21 +85,22 @@ def card_base(along: Floats, shading: ShadingSettings) -> Floats:
 
 
 def plain_albedo(color: Floats) -> Floats:
-    """The albedo with which a plain surface sends back as much light as hair of this colour,
-    (..., 3).
+    """The albedo with which a plain surface reflects as much light as hair of this colour, (...,
+    3).
 
-    It knows no shadows between strands, so it would be too bright: the more, the brighter the hair.
-    Fitted to brown and blond hair on a head under three suns, see `bench engines`.
+    A plain surface has no shadows between strands: in the hair's colour it would be too bright,
+    most of all for bright hair. Fitted to brown and blond hair on a head under three suns, see
+    `bench engines`.
     """
     albedo: Floats = 1.1 * color / (1.0 + 2.0 * color)
     return albedo
 
 
 def own_absorption(absorption: Floats, base: Floats) -> Floats:
-    """The absorption of strands whose colour is `base` times that of the card's mean, (..., 3).
+    """The absorption of strands whose colour is `base` times the card's mean colour, (..., 3).
 
-    So the base texture colours what passes through a fibre, and no light that it reflects. The
-    inverse of marschner.look.strand_color; nothing is brighter than white.
+    With it the base texture colours light that passes through a fibre, not light that the fibre
+    reflects. Inverts marschner.look.strand_color; no colour exceeds white.
 
     Args:
         absorption: (..., 3) mean of the card, per radius.

@@ -7,10 +7,10 @@
     +---+---+        each with a border of one texel, so that linear filtering never meets a
                      neighbour: the border repeats the picture, or goes on with its edge
 
-Which level a pixel wants is for how far the place in the texture moves from pixel to pixel, as
-Williams 1983 has it ("Pyramidal parametrics"), and it is mixed of the two that are nearest. Alpha
-is averaged as it stands, because it is blended; all else by how much hair there is, see
-exchange/textures/mip_maps.py. Twin of gpu_shaders/lib_card_texture.glsl.
+A pixel's level follows from the step in the texture to the next pixel (Williams 1983, "Pyramidal
+parametrics"); the two nearest levels are blended. Alpha is averaged unweighted, because it is
+blended; the other channels are weighted by coverage, see exchange/textures/mip_maps.py. Twin of
+gpu_shaders/lib_card_texture.glsl.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ import numpy as np
 
 from ..arrays import Floats, Ints
 
-#: Levels that are kept: a texture may be drawn 32 times smaller than it is.
+#: Number of levels: a texture may be drawn 32 times smaller than it is.
 LEVELS = 6
-#: What slots are higher than their levels need, all of them together [texels].
+#: Height of all slots together beyond what their levels need [texels].
 SLACK = 3 << (LEVELS - 1)
 _BORDER = 1
 
@@ -32,9 +32,9 @@ def packed_levels(levels: Sequence[Floats], *, is_repeated: bool) -> Floats:
     """One texture of all levels, (height + SLACK, 3 / 2 width + 4, channels) float32.
 
     Args:
-        levels: LEVELS at most of (height, width, channels), each half the one before it, rounded
-            down, and 1 at least; where there are fewer, the last one stands for the rest.
-        is_repeated: the picture goes on with its other side, else with its edge.
+        levels: at most LEVELS of (height, width, channels), each half the one before, rounded down,
+            and at least 1; the last one is repeated where there are fewer.
+        is_repeated: whether borders wrap around; else they repeat the edge.
     """
     height, width, channels = levels[0].shape
     across = width + max(width // 2, 1) + 4 * _BORDER
@@ -50,12 +50,12 @@ def packed_levels(levels: Sequence[Floats], *, is_repeated: bool) -> Floats:
 
 
 def picture_size(width: int, height: int) -> tuple[int, int]:
-    """Width and height of level 0, of a packed texture's."""
+    """Width and height of level 0, from those of a packed texture."""
     return (2 * (width - 4 * _BORDER) + 1) // 3, height - SLACK
 
 
 def level_corner(size: tuple[int, int], level: int) -> tuple[int, int]:
-    """The lowest left texel of a level, column and row. size: (width, height) of level 0."""
+    """The lower left texel of a level, column and row. size: (width, height) of level 0."""
     if level == 0:
         return _BORDER, _BORDER
     slots = size[1] + SLACK
@@ -63,10 +63,11 @@ def level_corner(size: tuple[int, int], level: int) -> tuple[int, int]:
 
 
 def wanted_level(to_right: Floats, to_top: Floats, size: tuple[int, int]) -> Floats:
-    """The level at which a pixel is no larger than a texel, (...), a fraction between two.
+    """The level at which a pixel is no larger than a texel, (...); may lie between two levels.
 
     Args:
-        to_right, to_top: (..., 2) from pixel to pixel in the texture.
+        to_right, to_top: (..., 2) step in the texture to the pixel on the right, and to the one
+            above.
     """
     longest = np.maximum(
         *(((step * np.array(size)) ** 2).sum(axis=-1) for step in (to_right, to_top))
@@ -94,7 +95,7 @@ def card_texel(
     """What a packed texture (rows, columns, channels) holds at places (n, 2), (n, channels).
 
     Args:
-        level: (n,) see `wanted_level`. tiles: columns and rows; None is a picture that repeats.
+        level: (n,) see `wanted_level`. tiles: columns and rows; None: the picture repeats.
     """
     lower = np.floor(level).astype(int)
     part = (level - lower)[:, None]
@@ -105,7 +106,7 @@ def card_texel(
 
 
 def _in_level(packed: Floats, place: Floats, level: Ints, tiles: tuple[int, int] | None) -> Floats:
-    """Of one level each, filtered linearly."""
+    """The same from one level for each place, filtered linearly."""
     size = picture_size(packed.shape[1], packed.shape[0])
     at = np.empty((len(place), 2))
     for each in range(LEVELS):

@@ -1,19 +1,19 @@
-"""Dust on hair, and water in it: a look as it is drawn.
+"""Dust and water on hair: how they change a look.
 
-Water. A film lies around each strand and fills its cuticle. It reflects a part p of the light that
-comes out of the hair back into it, where it is absorbed again: colour c becomes
-c (1 - p) / (1 - p c) (Lekner and Dorf 1988, "Why some things are darker when wet", without what
-the film itself reflects). The film is smooth, so its highlight is narrow and does not lean as the
-scales do; and the scales under water bend light less.
+Water. A film covers each strand and fills its cuticle. It reflects a fraction p of the light that
+leaves the hair back into it, where it is absorbed again: colour c becomes c (1 - p) / (1 - p c)
+(Lekner and Dorf 1988, "Why some things are darker when wet", without the reflection of the film
+itself). The film is smooth, so its highlight is narrow and does not lean as the scales do, and the
+scales under water refract light less.
 
-Dust. Of the part that it covers one sees its colour, without highlights; what is left of these is
-wider. Water wets dust as it wets hair. Grey strands have no colour among the settings. So as many
-of them as dust covers become strands of a colour, of which dust is then so large a part that the
-mean over all strands is right.
+Dust. The covered fraction shows the dust's colour, without highlights; the remaining highlights are
+wider. Water wets dust as it wets hair. The settings have no colour for grey strands. So the
+fraction of grey strands that dust covers becomes coloured, and coloured strands get as much more
+dust as makes the mean over all strands right.
 
-Limitations: all of a groom is as wet and dusty. Grey strands go by the pigment of the others in
-Marschner's model: a little dust makes hair lighter of which nearly all is grey, and water darkens
-them by less than it should. In Kajiya-Kay water does not change them.
+Limitations: a groom is equally wet and dusty everywhere. In Marschner's model the colour of grey
+strands derives from the pigment of the others: a little dust lightens hair that is nearly all grey,
+and water darkens grey strands too little. In Kajiya-Kay water does not change grey strands.
 """
 
 from __future__ import annotations
@@ -28,27 +28,30 @@ from .settings import ShadingSettings
 
 #: Indices of refraction of hair and water.
 _HAIR, _WATER = 1.55, 1.333
-#: Of diffuse light, what a flat surface of water reflects from outside (Lekner and Dorf 1988).
+#: Fraction of diffuse light that flat water reflects from outside (Lekner and Dorf 1988).
 _FROM_OUTSIDE = 0.066
-#: And from within: by reciprocity the part that gets out is so much smaller.
+#: The same from within: by reciprocity, the fraction that gets out is smaller by the square of
+#: water's index.
 KEPT = 1.0 - (1.0 - _FROM_OUTSIDE) / _WATER**2
 #: Width of the highlight of a film, standard deviation of the half angle [rad].
 FILM_WIDTH = float(np.radians(2.0))
-#: By which a slope bends light that enters hair out of water, over hair out of air.
+#: Refraction at a tilted surface for light that enters hair from water, relative to air.
 _BENT = (_HAIR / _WATER - 1.0) / (_HAIR - 1.0)
 #: Exponent of Kajiya-Kay's highlights on a film.
 _FILM_GLOSS = 400.0
-#: How much wider dust makes what is left of highlights; of Kajiya-Kay's, widths go as the inverse
-#: square root of exponents.
+#: Widening of the remaining highlights under full dust; in Kajiya-Kay, widths are proportional to
+#: the inverse square root of exponents.
 _WIDER = 2.0
 
 
 def coated_color(color: Floats, look: ShadingSettings) -> Floats:
     """The colour of a mass of hair that is not grey, (..., 3) linear, with the look's dust and
-    water; NaN stays. Without any it is the same array.
+    water.
+
+    NaN stays NaN. Without dust and water, the same array.
 
     Args:
-        look: as it is drawn, of which dust has taken its grey strands, see `coated`.
+        look: with grey strands already reduced by dust, see `coated`.
     """
     if not is_coated(look):
         return color
@@ -60,8 +63,8 @@ def coated_color(color: Floats, look: ShadingSettings) -> Floats:
 
 
 def coated(look: ShadingSettings) -> ShadingSettings:
-    """The look in its dust and water, of which it still says how much there is. Colours of strands
-    are the matter of `coated_color`."""
+    """The look as its dust and water change it; their amounts stay set. Strands' own colours are up
+    to `coated_color`."""
     if not is_coated(look):
         return look
     water, clean = look.wetness, 1.0 - look.dust

@@ -3,8 +3,8 @@
     sigma = (pi / 4) 2 r (length of hair in a volume) / volume      [1/m]
 
 is the extinction of randomly oriented cylinders of radius r, pi / 4 the mean of the sine between
-hair and ray. The body is a shell that lets nothing through, three cells thick and one cell and a
-half below its surface, so that hair at its root is not shut in by the cell that it stands in.
+hair and ray. The body is an opaque shell, three cells thick with its middle two and a half cells
+below the surface, so that roots of hair do not lie in opaque cells.
 """
 
 from __future__ import annotations
@@ -21,19 +21,20 @@ from ..strands.vectors import dot_rows
 
 #: How far below the surface the middle of the body's shell lies [cells].
 _SHELL_DEPTH = 2.5
-#: Sizes that cells may have, in each doubling, and cells along the side of a block.
+#: Number of cell sizes in each doubling, and of cells along the side of a block.
 _SIZES, _BLOCK = 16, 16
-#: Along a typical hair there are at least this many cells, so that fur on a large body is not lost
-#: in one layer of them; but not where that makes more cells than this in all.
+#: Minimum number of cells along a typical hair, so that fur on a large body is not lost in one
+#: layer of cells; and the maximum number of all cells, which limits the former.
 _ALONG_HAIR, _MAX_CELLS = 6, 1_000_000
 #: Hair smaller than this gets cells as if it were that large [m].
 _SMALLEST_HAIR = 1.0e-9
-#: Nor may cells be smaller than this part of how far the hair is from the origin.
+#: Minimum of the hair's size, as a fraction of its distance from the origin, and of a cell's size,
+#: as a fraction of the hair's.
 _FINEST = 1.0e-9
 #: Optical depth of a cell of the body: exp(-30) is nothing.
 _OPAQUE = 30.0
-#: Segments that are cut up at once: numpy lets no other thread go on while it counts, so that more
-#: of them would stop the window.
+#: Segments that are cut up at once: numpy blocks other threads while it counts, so more would
+#: freeze the window.
 _AT_ONCE = 1 << 17
 #: Points looked up at once: they stay in the cache.
 _LOOK_UPS = 1 << 14
@@ -64,7 +65,7 @@ class Grid:
         return Grid.of_cells(first, last - first, self.cell)
 
     def part(self, values: Floats, whole: Grid) -> Floats:
-        """Of the values of a grid that holds this one, its own."""
+        """This grid's values out of those of a grid that contains it."""
         begin = self.first - whole.first
         x, y, z = map(slice, begin, begin + np.array(self.shape))
         return values[x, y, z]
@@ -83,18 +84,19 @@ class Field:
     values: Floats
 
     def at(self, points: Floats) -> Floats:
-        """At points (n, 3) [m], (k, n) float32, see `sample`."""
+        """Values at points (n, 3) [m], (k, n) float32, see `sample`."""
         return sample(self.values, self.grid.coordinates(points))
 
 
 def grid_around(strands: StrandSet, cell_count: int, most: int | None = None) -> Grid:
-    """Cells over all strands, with two empty ones on each side: `cell_count` at most without those
-    along the longest side, or more where hair is short, see `_ALONG_HAIR`.
+    """Cells over all strands, with two empty ones on each side: without these at most `cell_count`
+    along the longest side, or more for short hair, see `_ALONG_HAIR`.
 
-    They are cells of one of few lattices through the origin: hair that is combed keeps its own.
+    They belong to one of few lattices through the origin, so that hair keeps its cells while it is
+    combed.
 
     Args:
-        most: cells in all where hair is short; None: `_MAX_CELLS`.
+        most: maximum number of all cells for short hair; None: `_MAX_CELLS`.
     """
     low, high = (corner.astype(np.float64) for corner in strands.bounds())
     farthest = float(np.maximum(np.abs(low), np.abs(high)).max())
@@ -110,7 +112,7 @@ def grid_around(strands: StrandSet, cell_count: int, most: int | None = None) ->
 
 
 def _typical_reach(strands: StrandSet) -> float:
-    """From root to tip, in a straight line [m]."""
+    """Median distance from root to tip [m]."""
     ends = strands.points[strands.offsets[1:] - 1] - strands.roots
     return float(np.median(np.sqrt(np.einsum("ij,ij->i", ends, ends))))
 
@@ -128,10 +130,11 @@ def hair_depth(strands: StrandSet, grid: Grid) -> Floats:
 
 
 def _area_in_cells(strands: StrandSet, some: slice, none: Ints, grid: Grid) -> Floats:
-    """Seen area of the segments that begin at these CVs in each cell, (cell_count,) [m^2].
+    """Mean projected area, in each cell, of the segments that begin at these CVs, (cell_count,)
+    [m^2].
 
     Args:
-        none: which of these begin no segment, since they are tips.
+        none: numbers of those CVs that are tips and begin no segment.
     """
     # by axes, as numpy is slow at rows of three
     points = grid.coordinates(strands.points[some.start : some.stop + 1]).T + np.float32(0.5)
@@ -155,7 +158,7 @@ def _area_in_cells(strands: StrandSet, some: slice, none: Ints, grid: Grid) -> F
 def body_depth(body: Surface, grid: Grid) -> Floats:
     """Optical depth of the body across each cell: opaque on a shell below its surface, else 0.
 
-    Parts that are thinner than the shell is deep, such as ears, have none.
+    Parts thinner than the shell's depth, such as ears, have no shell.
     """
     depth = np.zeros(grid.shape, np.float32)
     shell, is_inside = _inset(body, grid)
@@ -169,7 +172,8 @@ def body_depth(body: Surface, grid: Grid) -> Floats:
 
 
 def _inset(body: Surface, grid: Grid) -> tuple[Floats, Bools]:
-    """The body's vertices moved to the middle of the shell, and which came out inside the body."""
+    """The body's vertices moved to the middle of the shell, and which of them lie inside the
+    body."""
     normals = body.vertex_normals()
     inward = _SHELL_DEPTH * grid.cell
     shell = body.positions.astype(np.float64) - inward * normals
@@ -178,7 +182,7 @@ def _inset(body: Surface, grid: Grid) -> tuple[Floats, Bools]:
     near = np.flatnonzero(((shell > low) & (shell < high)).all(axis=1))
     is_inside = np.ones(len(shell), bool)
     if len(near) and len(body.triangles):
-        # of those that lie in one cell and face the same way, one is asked for all
+        # one vertex is tested for all that lie in one cell and face the same way
         cells = np.floor(shell[near] / grid.cell).astype(np.int64)
         alike = np.concatenate([cells, normals[near] > 0.0], axis=1)
         _, asked, number = np.unique(alike, axis=0, return_index=True, return_inverse=True)
@@ -222,7 +226,7 @@ def sample(grids: Floats, coordinates: Floats) -> Floats:
 
 
 def _between(one: Floats, other: Floats, part: Floats) -> Floats:
-    """On the way from values to others, in place of the first."""
+    """Linear interpolation, written to `one`; overwrites `other` too."""
     other -= one
     other *= part
     one += other
@@ -230,7 +234,7 @@ def _between(one: Floats, other: Floats, part: Floats) -> Floats:
 
 
 def _flat_index(points: Floats, grid: Grid) -> Ints:
-    """Of the cells in which points (3, n) in cells from the low corner lie."""
+    """Flat indices of the cells that hold points (3, n), given in cells from the low corner."""
     x, y, z = points.astype(np.int32)
     for axis, count in zip((x, y, z), grid.shape, strict=True):
         np.clip(axis, 0, count - 1, out=axis)

@@ -1,4 +1,4 @@
-"""Strands as they are drawn, for those who bake them: how wide they are, and of which colour."""
+"""Width and colour with which strands are drawn, for baking."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from .strand_noise import strand_noise
 
 #: Channels of the strands' noise, as in gpu_shaders/lib_strand_light.glsl.
 _COLOR, _GREY = 2, 3
-#: What grey strands may be brighter than hair that is nearly black.
+#: Maximum factor on the mean colour: grey strands among hair that is nearly black.
 _MAX = 4.0
 _DARKEST = 1e-4
-#: Points whose colours stand for those of all, where a mean will do.
+#: Points whose colours represent those of all in a mean.
 _FEW = 16_000
 
 
@@ -39,18 +39,18 @@ def drawn_radius(radius: Floats, settings: StrandSettings, along: Floats | None 
 
 
 def drawn_color(color: Floats | None, shading: ShadingSettings) -> Floats | None:
-    """Strands' own colours where they are drawn in them; None where in the look's. Painted ones are
-    the strands' own, see `paint_flow.with_colors`."""
+    """Strands' own colours if they are drawn in these, None if in the look's. Painted colours count
+    as own, see `paint_flow.with_colors`."""
     return color if shading.color_source == "own" or shading.color_map else None
 
 
 def own_colors(color: Floats | None, group: Ints | None, shading: ShadingSettings) -> Floats | None:
-    """Strands' own colours as they are drawn, with those of brows and lashes that keep theirs;
-    None where all have the look's.
+    """Strands' own colours as drawn, with those of brows and lashes that stay natural; None if all
+    have the look's.
 
     Args:
         color: (..., 3) of strands or of their points; NaN or None where there are none.
-        group: (...,) of the same; None is no face hair.
+        group: (...,) of the same; None: no face hair.
     """
     own = drawn_color(color, shading)
     is_natural = natural_strands(group, shading)
@@ -83,7 +83,7 @@ def in_color(color: Floats | tuple[float, ...], shading: ShadingSettings) -> Sha
 
 
 def mean_look(color: Floats | None, shading: ShadingSettings) -> ShadingSettings:
-    """The look in the mean of the strands' own colours, where they are drawn in them.
+    """The look in the mean of the strands' own colours, if they are drawn in these.
 
     Args:
         color: (..., 3) of strands or of their points, as in Snapshot.
@@ -98,8 +98,8 @@ def mean_look(color: Floats | None, shading: ShadingSettings) -> ShadingSettings
 
 
 def brightest_look(color: Floats | None, shading: ShadingSettings) -> ShadingSettings:
-    """The look that an atlas of strands with their own colours is a factor of: of each channel the
-    brightest, so that no factor is lost above white; arguments as of `mean_look`.
+    """The look that the factors in an atlas of strands with own colours refer to: the maximum of
+    each channel, so that no factor is clipped above white; arguments as of `mean_look`.
     """
     own = drawn_color(color, shading)
     if own is None or not len(own):
@@ -114,8 +114,8 @@ def strand_variation(
     color: Floats | None = None,
     group: Ints | None = None,
 ) -> Floats:
-    """The colour of strands as a factor of the card's mean, (n, cv_count, 3), up to _MAX; where
-    they have their own, of the mean by `brightest_look`.
+    """Strand colours over the card's mean colour, (n, cv_count, 3), up to _MAX; for strands with
+    own colours, over the mean of `brightest_look`.
 
     Args:
         seed: (n,) what the noise of a strand depends on, as in Snapshot.
@@ -132,7 +132,7 @@ def strand_variation(
 def card_color(along: Floats, shading: ShadingSettings) -> Floats:
     """Mean colour of the strands at places of a card, (..., 3); `along` is 0 at the root.
 
-    Times the base texture it is what `strand_colors` is for a strand.
+    Times the base texture, it corresponds to `strand_colors` of a strand.
     """
     if shading.model != "marschner":
         return card_base(along, shading)
@@ -148,8 +148,8 @@ def strand_colors(
     color: Floats | None = None,
     group: Ints | None = None,
 ) -> Floats:
-    """The colour of hair at places of strands, (..., 3): of the look or their own, with the tint of
-    the tips, the strand's variation, and grey.
+    """Colours at places of strands, (..., 3): the look's or their own, with the tip tint, the
+    variation between strands, and grey strands.
 
     Args:
         seed: (...) what the noise of the strand depends on, as in Snapshot.

@@ -1,4 +1,4 @@
-"""Light from all around, as hair and meshes see it: a world's panorama in a few numbers.
+"""Light from all around, on hair and meshes: a world's panorama in a few numbers.
 
 A panorama is radiance [W/(m^2 sr)] over latitudes and longitudes, (rows, columns, 3), row 0 at the
 bottom, its middle towards +X and its left half towards +Y, as Blender's Environment Texture. It
@@ -7,12 +7,12 @@ becomes
   highlight and shadow;
 - ambient and harmonics: what remains, as spherical harmonics up to order 2, a quadratic polynomial
   of the direction (Ramamoorthi and Hanrahan 2001, "An Efficient Representation for Irradiance
-  Environment Maps"). Light that falls on a matt surface is that with each order damped.
+  Environment Maps"). The light on a matt surface is the same polynomial with each order damped.
 
-Marschner's hair is lit by a cube's eight corners, each of which stands for the light from an eighth
-of all directions, as by eight more lights; only that what is in their way comes from a grid
-(ambient.openness) and not from maps. Kajiya-Kay's is lit as a matt surface. Twin of
-gpu_shaders/lib_environment.glsl, and of `hair_ambient` in lib_hair_light.glsl.
+Marschner's hair is lit from the eight corners of a cube as by eight more lights, each for the light
+from an eighth of all directions; their occlusion comes from a grid (ambient.openness_field), not
+from maps. Kajiya-Kay's is lit as a matt surface. Twin of gpu_shaders/lib_environment.glsl, and of
+`hair_ambient` in lib_hair_light.glsl.
 """
 
 from __future__ import annotations
@@ -27,23 +27,24 @@ from ..arrays import Floats, Ints
 from .lights import Color, Light
 from .luminance import LUMINANCE
 
-#: pixels of the panorama from which suns and harmonics are found
+#: size of the reduced panorama, from which suns and harmonics are found [pixels]
 ROWS, COLUMNS = 128, 256
-#: what Lambert's cosine leaves of orders 1 and 2, over what it leaves of order 0
+#: damping of orders 1 and 2 by Lambert's cosine, relative to order 0
 MATT = (2.0 / 3.0, 1.0 / 4.0)
-#: what the mean over an eighth of all directions leaves of orders 1 and 2 at its middle
+#: damping of orders 1 and 2 by the mean over an eighth of all directions, at its middle
 EIGHTH = (0.5 * np.sqrt(3.0), 2.0 / np.pi)
-#: less of a direction's light than this does not count: that is seven strands
+#: minimum fraction of a direction's light that arrives: that is seven strands
 CLOSED = 1.0e-3
-#: over which angle [rad] light from an eighth of all directions blurs a highlight along the strand
+#: angle over which light from an eighth of all directions blurs a highlight along the strand [rad]
 CORNER_BLUR = np.pi / 8.0
-#: a lobe is brighter than this many times the mean around it; its radius; the fraction of all light
-#: that it has at least
+#: a lobe's minimum brightness over the mean around it; its radius [rad]; its minimum fraction of
+#: all light
 _BRIGHTER, _LOBE, _LOBE_LIGHT = 3.0, np.radians(25.0), 0.03
 _MAX_SUNS = 2
-#: the brightest pixels, each of which may be a lobe's middle, and how far around it light counts
+#: number of the brightest pixels, which may be a lobe's middle; radius of the light summed around
+#: each [rad]
 _CANDIDATES, _SMOOTH = 1024, np.radians(12.0)
-#: harmonics below this fraction of the light are none
+#: harmonics are left out if all are below this fraction of the ambient light
 _EVEN = 1e-3
 #: mean squares of the eight harmonics over all directions
 _SQUARES = np.array([1 / 3, 1 / 3, 1 / 3, 1 / 15, 1 / 15, 4 / 5, 1 / 15, 4 / 15])
@@ -51,10 +52,10 @@ _SQUARES = np.array([1 / 3, 1 / 3, 1 / 3, 1 / 15, 1 / 15, 4 / 5, 1 / 15, 4 / 15]
 
 @dataclass(frozen=True, eq=False)
 class Environment:
-    """ambient: mean radiance of what is no sun.
+    """ambient: mean radiance without the suns.
 
-    harmonics: (8, 3), how it differs by direction, see `harmonics_at`; None is not at all.
-    suns: directional lights in place of the brightest lobes.
+    harmonics: (8, 3), how radiance varies by direction, see `harmonics_at`; None: it does not.
+    suns: directional lights that replace the brightest lobes.
     """
 
     ambient: Color = (0.0, 0.0, 0.0)
@@ -67,7 +68,7 @@ class Environment:
 
 
 def world_suns(lights: tuple[Light, ...]) -> tuple[Light, ...]:
-    """Those among lights that are bright places of the world."""
+    """The lights that are bright lobes of the world."""
     return tuple(light for light in lights if light.of_world)
 
 
@@ -75,7 +76,7 @@ def environment_of(panorama: Floats, turn: Floats | None = None) -> Environment:
     """The environment of a panorama, of any size.
 
     Args:
-        turn: (3, 3) from the panorama's directions to those of the world; None is as it is.
+        turn: (3, 3) from the panorama's directions to those of the world; None: they are the same.
     """
     radiance = reduced(panorama)
     directions, weights = panorama_directions(*radiance.shape[:2])
@@ -107,10 +108,10 @@ def panorama_directions(rows: int, columns: int) -> tuple[Floats, Floats]:
 
 
 def reduced(panorama: Floats) -> Floats:
-    """A panorama of about ROWS x COLUMNS pixels at most, with the same light: no pixel is left out,
-    and large ones are cut up.
+    """A panorama of about ROWS x COLUMNS pixels at most, with the same light: every pixel counts,
+    and small panoramas have theirs divided.
 
-    A pixel that is not finite is black, as in Cycles, and one that is negative, too.
+    Pixels that are not finite are black, as in Cycles, and so are negative values.
     """
     for axis, count in enumerate((ROWS, COLUMNS)):
         panorama = np.repeat(panorama, max(count // panorama.shape[axis], 1), axis=axis)
@@ -121,13 +122,13 @@ def reduced(panorama: Floats) -> Floats:
 
 
 def _averaged(picture: Floats, most: int, weights: Floats) -> Floats:
-    """Weighted means of equal parts of the first axis, of which there are at most this many."""
+    """Weighted means of at most `most` equal parts of the first axis."""
     count = len(picture)
     edges = np.linspace(0.0, count, min(count, most) + 1)
     found = []
     for low, high in itertools.pairwise(edges):
         inside = np.arange(int(low), min(int(np.ceil(high - 1e-9)), count))
-        # of a pixel that lies in two parts each takes what is in it
+        # a pixel that lies in two parts counts in each by its overlap
         cover = np.minimum(inside + 1.0, high) - np.maximum(inside, low)
         cover = cover * weights[inside]
         found.append(np.tensordot(cover / cover.sum(), _lit(picture[inside]), 1))
@@ -148,7 +149,7 @@ def _without_suns(
     suns: list[Light] = []
     while len(suns) < _MAX_SUNS and whole > 0.0:
         bright = radiance @ LUMINANCE
-        # what is left of a lobe is no other sun
+        # the remainder of a lobe is not another sun
         for sun in suns:
             bright[directions @ np.array(sun.vector) > np.cos(2.0 * _LOBE)] = 0.0
         is_near = directions @ _brightest(bright * weights, directions) > np.cos(_LOBE)
@@ -159,7 +160,7 @@ def _without_suns(
         if flux.sum() < _LOBE_LIGHT * whole:
             break
         middle = flux @ directions
-        # of a disk, whose rays lie on average half as deep as its rim
+        # of a disk: 1 - cos is on average half of that at its rim
         depth = 1.0 - float(np.linalg.norm(middle)) / float(flux.sum())
         angle = 2.0 * float(np.arccos(np.clip(1.0 - 2.0 * depth, 0.0, 1.0)))
         light = Light.sun(-middle, weights @ taken, 1.0, angle)
@@ -169,7 +170,7 @@ def _without_suns(
 
 
 def _brightest(flux: Floats, directions: Floats) -> Floats:
-    """The direction around which most of the flux is."""
+    """The direction with the most flux around it."""
     strongest = np.argsort(flux)[-_CANDIDATES:]
     around = directions[strongest] @ directions[strongest].T > np.cos(_SMOOTH)
     middle: Floats = directions[strongest[(around @ flux[strongest]).argmax()]]
@@ -185,7 +186,7 @@ def harmonics_at(directions: Floats) -> Floats:
 def light_from(
     environment: Environment, directions: Floats, kept: tuple[float, float] = (1.0, 1.0)
 ) -> Floats:
-    """Radiance from directions (..., 3) without the suns', of which orders 1 and 2 are damped."""
+    """Radiance from directions (..., 3) without the suns, with orders 1 and 2 damped by `kept`."""
     ambient = np.broadcast_to(environment.ambient, np.shape(directions))
     if environment.harmonics is None:
         return ambient
@@ -194,27 +195,27 @@ def light_from(
 
 
 def matt_light(environment: Environment, normals: Floats) -> Floats:
-    """Irradiance over pi, on surfaces that face (..., 3), without the suns'."""
+    """Irradiance over pi on surfaces with normals (..., 3), without the suns."""
     return light_from(environment, normals, MATT)
 
 
 def corner_direction(corner: Ints) -> Floats:
-    """What stands for the light from an eighth of all directions, 0 to 7, (..., 3)."""
+    """The direction that represents an eighth of all directions, 0 to 7, (..., 3)."""
     sides = np.stack([corner & 1, (corner >> 1) & 1, corner >> 2], axis=-1)
     found: Floats = (2.0 * sides - 1.0) / np.sqrt(3.0)
     return found
 
 
 def corner_light(environment: Environment, corner: Ints) -> Floats:
-    """Its irradiance on what faces it, (..., 3)."""
+    """Irradiance from a corner on a surface that faces it, (..., 3)."""
     return 0.5 * np.pi * light_from(environment, corner_direction(corner), EIGHTH)
 
 
 def open_path(openness: Floats, towards: Floats) -> Floats:
-    """How many strands are between a place of hair and a direction, and beyond it, (..., 2).
+    """Number of strands between a place of hair and a direction, and beyond the place, (..., 2).
 
     Args:
-        openness: (..., 4), see ambient.openness. towards: (..., 3).
+        openness: (..., 4), see ambient.openness_field. towards: (..., 3).
     """
     mean, bent = openness[..., 0], np.sum(openness[..., 1:] * towards, axis=-1)
     both: Floats = np.stack([mean + bent, mean - bent], axis=-1)
@@ -224,12 +225,12 @@ def open_path(openness: Floats, towards: Floats) -> Floats:
 def hair_ambient(
     environment: Environment, openness: Floats, hair_light: Callable[[Floats, Floats], Floats]
 ) -> Floats:
-    """What Marschner's hair sends to the eye of the world's light without the suns', (..., 3).
+    """The world's light without the suns that Marschner's hair sends to the eye, (..., 3).
 
     Args:
-        openness: (..., 4), see ambient.openness.
-        hair_light: what hair sends of one light, (..., 3), times irradiance it is radiance; of the
-            direction towards the light (..., 3) and of `open_path` there (..., 2).
+        openness: (..., 4), see ambient.openness_field.
+        hair_light: light of one lamp that hair sends out, (..., 3), radiance over irradiance, by
+            the direction towards the lamp (..., 3) and `open_path` there (..., 2).
     """
     found = np.zeros((*openness.shape[:-1], 3))
     corners = np.arange(8)
@@ -242,7 +243,8 @@ def hair_ambient(
 
 
 def openness_by_occlusion(occlusion: Floats, away: Floats) -> Floats:
-    """Openness (..., 4) where only occlusion (...) is known: to where hair looks away, (..., 3)."""
+    """Openness (..., 4) where only occlusion (...) is known: towards `away`, outwards of the hair,
+    (..., 3)."""
     ahead = np.concatenate([np.ones((*away.shape[:-1], 1)), away], axis=-1)
     found: Floats = 0.5 * occlusion[..., None] * ahead
     return found

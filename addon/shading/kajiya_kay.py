@@ -7,9 +7,9 @@ References:
     Scheuermann 2004, "Practical Real-Time Hair Rendering and Shading".
 
 With T from root to tip, a positive shift moves the highlight to the TIP: T' = T + s N tilts the
-tangent outwards, and the place where T' is across the half vector lies further down the strand.
-(One source of ours, a translation of Scheuermann's slides, says root; the geometry and the slides
-themselves say tip, and a test holds it.)
+tangent outwards, and the place where T' is perpendicular to the half vector lies further down the
+strand. (A translation of Scheuermann's slides says root; the geometry and the slides themselves say
+tip, and a test checks it.)
 
 All directions are unit vectors in one space, (..., 3), and broadcast.
 """
@@ -24,7 +24,7 @@ from ..strands.vectors import dot, unit_or
 from .settings import ShadingSettings
 from .tint import tip_fraction
 
-#: of strands that have lost their colour; in lib_kajiya_kay
+#: colour of grey strands; in lib_kajiya_kay
 GREY_COLOR = (0.42, 0.42, 0.43)
 _SMALLEST = 1.0e-6
 
@@ -35,7 +35,7 @@ def strand_normal(point: Floats, tangent: Floats, center: Floats) -> Floats:
 
 
 def diffuse_bias(normal: Floats, to_light: Floats) -> Floats:
-    """max(0, 0.75 N.L + 0.25): light creeps around the hair, which is never quite opaque."""
+    """max(0, 0.75 N.L + 0.25): light wraps around the hair, which is not quite opaque."""
     return np.maximum(0.0, 0.75 * dot(normal, to_light) + 0.25)
 
 
@@ -45,7 +45,7 @@ def shifted_tangent(tangent: Floats, normal: Floats, shift: Floats | float) -> F
 
 
 def strand_specular(tangent: Floats, half_vector: Floats, exponent: float) -> Floats:
-    """smoothstep(-1, 0, T.H) sin(T, H)^p: a highlight where the strand is across H."""
+    """smoothstep(-1, 0, T.H) sin(T, H)^p: a highlight where the strand is perpendicular to H."""
     along = dot(tangent, half_vector)
     across_squared = np.maximum(0.0, 1.0 - along * along)
     rise = np.clip(along + 1.0, 0.0, 1.0)
@@ -63,7 +63,7 @@ def kajiya_kay(
 ) -> Floats:
     """(diffuse + specular) of one light, (..., 3) rgb.
 
-    Times irradiance / pi, base colour and occlusion it is radiance. Noises are in [0, 1].
+    Times irradiance / pi, base colour and occlusion, it is radiance. Noises are in [0, 1].
     """
     diffuse = diffuse_bias(normal, to_light)[..., None]
     half_vector = unit_or(to_light + to_eye, normal)
@@ -89,13 +89,14 @@ def strand_base(
 ) -> Floats:
     """The hair's colour at places of strands, (..., 3).
 
-    The base mixed to the tips', or grey, made darker or brighter by each strand's noise.
+    The base colour blended to the tips', or grey, with its brightness varied by each strand's
+    noise.
 
     Args:
         along: 0 at the root, 1 at the tip.
         color_noise, grey_noise: of each strand, in [0, 1]; strands of the lowest grey noise are
             grey.
-        root: (..., 3) the base; None is the look's.
+        root: (..., 3) the base colour; None: the look's.
     """
     base, tip = np.array(shading.base_color if root is None else root), np.array(shading.tip_color)
     color = base + (tip - base) * tip_fraction(along, shading)[..., None]

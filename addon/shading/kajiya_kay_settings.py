@@ -1,4 +1,4 @@
-"""The two highlights of Kajiya-Kay as Scheuermann has them; shading/settings.py holds the rest."""
+"""Settings of Kajiya-Kay's two highlights after Scheuermann; shading/settings.py holds the rest."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ _SOURCE = "Scheuermann 2004, hair shading"
 
 @dataclass(frozen=True, kw_only=True)
 class KajiyaKaySettings(Settings):
-    """Act in the model Kajiya-Kay alone."""
+    """Parameters of the model Kajiya-Kay."""
 
     primary_color: tuple[float, float, float] = color(
         (0.75, 0.88, 1.0),

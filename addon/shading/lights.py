@@ -1,16 +1,15 @@
-"""Lights as the renderer knows them, in Blender's own radiometric units.
+"""The renderer's lights, in Blender's own radiometric units.
 
 Irradiance E is the power that falls on a square metre facing the light. A matt surface of albedo
 a sends out the radiance a E cos / pi, which is what a pixel shows.
 - A sun's strength is E itself [W/m^2], the same everywhere.
 - A point light of power P [W] shines evenly into all directions: E = P / (4 pi d^2). With a radius
-  r it is a disk that faces whoever looks, E = P / (4 pi (d^2 + r^2)), or a ball, inside of which E
-  no longer grows; as Cycles has both.
-- A spot of power P is a point light of that power, of which only a cone is let through.
-- An area light of power P sends it out from one side of a panel, see area_lights.py.
-- The world is radiance [W/(m^2 sr)] by direction, see environment.py; of one that is even a matt
-  surface sends out a times it.
-Colours are scene-linear Rec.709. Shadows are no matter of the lights.
+  r it is a disk that faces the lit point, E = P / (4 pi (d^2 + r^2)), or a ball, inside of which E
+  no longer grows; both as in Cycles.
+- A spot of power P is a point light of that power, restricted to a cone. - An area light of power P
+sends it out from one side of a panel, see area_lights.py. - The world is radiance [W/(m^2 sr)] by
+direction, see environment.py; under an even one, a matt surface sends out a times its radiance.
+Colours are scene-linear Rec.709. Shadows are not part of the lights.
 """
 
 from __future__ import annotations
@@ -30,18 +29,18 @@ type Color = tuple[float, float, float]
 type Vector = tuple[float, float, float]
 
 LIGHT_CAPACITY = 8
-#: of orders 1 and 2, see environment.py
+#: number of harmonics of orders 1 and 2, see environment.py
 HARMONIC_COUNT = 8
-#: closer to a point light than this its irradiance no longer grows [m]; far below any hair
+#: distance from a point light below which its irradiance no longer grows [m]; far below any hair
 NEAREST_DISTANCE = 1.0e-6
 
-#: forms by the numbers under which lib_lights.glsl knows them
+#: forms, in the order of their numbers in lib_lights.glsl
 _FORMS = ("sun", "point", "spot", "rectangle", "disk", "grid", "round grid")
 
 
 @dataclass(frozen=True)
 class Cone:
-    """What a spot lets through, as Cycles has it: a smooth step of the angle's cosine.
+    """The cone of a spot, as in Cycles: a smooth step of the angle's cosine.
 
     axes: (3, 3) rows that turn a direction in world space into the spot's own axes, in which it
         shines along -z; a scaled object squeezes its cone.
@@ -55,7 +54,7 @@ class Cone:
 
     @property
     def widest(self) -> float:
-        """The farthest off its axis that it lets light through in the world [rad]."""
+        """The largest angle to its axis, in world space, at which it lets light through [rad]."""
         right, up, back = np.linalg.norm(np.array(self.axes, np.float64), axis=1)
         squeezed = back / max(min(right, up), 1e-30)
         return float(np.arctan(np.tan(0.5 * min(self.size, np.pi)) * squeezed))
@@ -75,14 +74,14 @@ class Light:
     kind: "sun", "point", "spot" or "area".
     vector: for a sun the unit direction towards it, for others their position [m].
     power: rgb; for a sun irradiance [W/m^2], for others radiant flux [W].
-    angle: that a sun fills [rad], 0 to pi; only its shadows and highlights are wider by it.
+    angle: of a sun's disk [rad], 0 to pi; widens its shadows and highlights only.
     radius: of a point or spot [m].
-    is_ball: a radius makes it a ball, not a disk that faces whoever looks.
+    is_ball: with a radius it is a ball, not a disk that faces the lit point.
     cone: of a spot.
     panel: of an area light.
-    casts_shadow: whether anything is in its way.
-    name: by which the artist knows it.
-    of_world: it is a bright place of the world, and shines where the world does.
+    casts_shadow: whether hair and meshes block it.
+    name: as the artist sees it.
+    of_world: it is a bright lobe of the world, and shines only where the world's light is used.
     """
 
     kind: Literal["sun", "point", "spot", "area"]
@@ -159,7 +158,7 @@ class Light:
 
     @property
     def softening(self) -> tuple[float, float]:
-        """What a radius adds to the squared distance, and the least that this may be [m^2]."""
+        """What a radius adds to the squared distance, and the minimum of the sum [m^2]."""
         squared = self.radius * self.radius
         nearest = NEAREST_DISTANCE * NEAREST_DISTANCE
         return (0.0, max(squared, nearest)) if self.is_ball else (squared, nearest)
@@ -173,10 +172,10 @@ def kinds_needed(lights: Sequence[Light]) -> int:
 
 
 def light_at(light: Light, points: Floats) -> tuple[Floats, Floats]:
-    """What comes from one light to points (..., 3): direction and irradiance, each (..., 3).
+    """Direction and irradiance of one light at points (..., 3), each (..., 3).
 
-    Unit vectors towards the light (to a panel, whence most light comes), and rgb on a surface
-    that faces it [W/m^2].
+    Unit vectors towards the light (to a panel, the mean direction of its light), and rgb on a
+    surface that faces it [W/m^2].
     """
     points = np.asarray(points)
     power = np.asarray(light.power, points.dtype)
@@ -200,17 +199,18 @@ def light_at(light: Light, points: Floats) -> tuple[Floats, Floats]:
 
 
 def light_irradiance(light: Light, points: Floats) -> Floats:
-    """The second of light_at."""
+    """The irradiance of `light_at` alone."""
     return light_at(light, points)[1]
 
 
 def _cone_fraction(cone: Cone, away: Floats, width: Floats) -> Floats:
-    """What a cone lets through towards the points from which the light is `away`, (..., 1).
+    """The fraction of light that a cone lets through, (..., 1); `away` points from places to the
+    light.
 
-    A light with a radius blurs the rim. Its own smooth step and the disk, seen at an angle whose
-    squared sine is `width` (..., 1), are two spreads whose squares add up (a disk's cross-section
-    has 5 / 4 the variance of a smooth step of its width); and the disk's points are on average
-    farther off the axis than its middle. Together within 1 % of the brightest.
+    A light with a radius blurs the rim. The variances of the cone's smooth step and of the disk,
+    seen at an angle whose squared sine is `width` (..., 1), add up (a disk's cross-section has 5 /
+    4 the variance of a smooth step of its width). The disk's points also lie, on average, farther
+    off the axis than its middle. The result is within 1 % of the maximum.
     """
     own = -away @ np.array(cone.axes, away.dtype).T
     x, y, ahead = own[..., :1], own[..., 1:2], -own[..., 2:]
@@ -254,7 +254,8 @@ _STUDIO = (
 
 
 def brightest(lights: Iterable[Light], place: Floats) -> tuple[Light, ...]:
-    """Those that are brightest at a place, (3,) [m], brightest first; as many as shaders know."""
+    """The lights that are brightest at a place, (3,) [m], brightest first; LIGHT_CAPACITY at
+    most."""
     at = np.asarray(place, np.float64)
     strengths = [(light, float(light_irradiance(light, at).sum())) for light in lights]
     in_order = sorted(strengths, key=lambda each: -each[1])
@@ -262,7 +263,8 @@ def brightest(lights: Iterable[Light], place: Floats) -> tuple[Light, ...]:
 
 
 def kept_lights(lights: Sequence[Light]) -> list[Light]:
-    """The lights that shaders know, in their order, which is that of `brightest`."""
+    """The lights that fit into the shaders' block: the first ones, so their order is
+    `brightest`'s."""
     return list(lights[:LIGHT_CAPACITY])
 
 

@@ -1,4 +1,4 @@
-"""What the artist sets about the shadows that meshes throw on meshes in a scene."""
+"""Settings of the shadows that meshes cast on meshes in a scene."""
 
 from __future__ import annotations
 

@@ -1,10 +1,10 @@
-"""What a surface reflects at its boundary: microfacets of the GGX distribution, of a dielectric.
+"""Reflection at the boundary of a dielectric, by microfacets of the GGX distribution.
 
 References: Walter et al. 2007, "Microfacet Models for Refraction through Rough Surfaces"; Heitz
 2014, "Understanding the Masking-Shadowing Function", with the height-correlated form of Smith;
-Karis 2014, "Physically Based Shading on Mobile", for the fraction of all light. As in Blender's
-Principled BSDF, the width of the lobe is the square of the roughness, and what is reflected is
-missing below.
+Karis 2014, "Physically Based Shading on Mobile", for the fraction of light from all around. As in
+Blender's Principled BSDF, the width of the lobe is the square of the roughness, and reflected light
+does not reach the layer below.
 
 Twin: gpu_shaders/lib_microfacet.glsl.
 """
@@ -15,7 +15,7 @@ import numpy as np
 
 from ..arrays import Floats
 
-#: a smoother surface would show lights without size as less than a pixel
+#: minimum roughness: smoother surfaces would show lights without size as less than a pixel
 MIN_ROUGHNESS = 0.08
 
 
@@ -24,8 +24,7 @@ def dielectric_fresnel(cosine: Floats, specular: float) -> Floats:
 
     Args:
         cosine: of the angle between light and normal, 0 to 1.
-        specular: that fraction where light falls straight in; it stands for the index of
-            refraction.
+        specular: that fraction at normal incidence, which determines the index of refraction.
     """
     root = np.sqrt(min(specular, 0.999))
     ior = (1.0 + root) / (1.0 - root)
@@ -63,7 +62,7 @@ def ggx_reflection(
 
 
 def reflected_fraction(seen: Floats, specular: float, roughness: float) -> Floats:
-    """About the fraction of all light from around that the boundary reflects to an eye.
+    """Approximate fraction of light from all around that the boundary reflects to the eye.
 
     Args:
         seen: cosine of the angle between eye and normal.

@@ -50,7 +50,7 @@ _HAS_COLOR = either(when("shading.model", "kajiya_kay"), when("shading.pigment",
 
 @dataclass(frozen=True, kw_only=True)
 class SharedSettings(Settings):
-    """Act in both models."""
+    """Parameters of both models."""
 
     model: str = choice(
         "marschner",
@@ -246,7 +246,7 @@ class SharedSettings(Settings):
 
 @dataclass(frozen=True, kw_only=True)
 class ShadingSettings(MarschnerSettings, KajiyaKaySettings, SharedSettings):
-    """How hair answers light: what both models share, then the parameters of each."""
+    """How hair scatters light: the parameters of both models, then those of each."""
 
     section = "shading"
     title = "Shading"
@@ -315,10 +315,10 @@ class StrandSettings(Settings):
 
     @property
     def min_width(self) -> float:
-        """What every strand covers at the root, however thin it is [pixels]."""
+        """Minimum width of strands at the root [pixels]; 0 with transparency."""
         return self.minimum_width if self.transparency == "none" else 0.0
 
     @property
     def as_drawn(self) -> StrandSettings:
-        """With the opacity that strands have: without transparency they hide all."""
+        """The settings with the opacity as drawn: 1 without transparency."""
         return replace(self, opacity=1.0) if self.transparency == "none" else self

@@ -1,22 +1,23 @@
-"""Shafts of light around the lights in view: the reference that the shaders are held to.
+"""Shafts of light around the lights in view: the reference for the shaders.
 
 Nguyen and Donnelly 2005 (Hair animation and rendering in the Nalu demo, GPU Gems 2, chapter 23,
-and the talk's "God Rays"): bright regions and what stands before them go to polar coordinates
-around the light, are blurred along the radius, and come back.
+and the talk's "God Rays"): bright regions and what stands before them are taken to polar
+coordinates around the light, blurred along the radius, and taken back.
 
-    V(r, angle)  what is open: 1 - coverage by what is nearer than the light
-    B(r, angle)  the mean of V on the way out from the light, of which exp(-s / l) counts at a
+    V(r, angle)  openness: 1 - coverage by what is nearer than the light
+    B(r, angle)  the mean of V on the ray out from the light, weighted by exp(-s / l) at a
                  distance s back, so a shaft fades by 1/e in l
     added        E / pi * strength * tint * exp(-r / (2 l)) * B
 
-r is the distance to the light on the screen, l the length of the settings there, E the irradiance
-that comes from the light to the eye. So beside the light haze is as bright as matt white that faces
-it, times the strength. Lengths are angles, so that a part of a picture is as it is in the whole.
+r is the distance to the light on the screen, l the length of the settings in the same unit, E the
+irradiance of the light at the eye. So beside the light, haze is as bright as a matt white surface
+that faces it, times the strength. Lengths are set as angles, so that a part of a picture looks as
+it does in the whole.
 
-Limitations: it goes by the picture alone. Nothing outside of it casts a shaft, and haze does not
-know how far away hair is. A light that is not in front of the viewer has no place on the screen and
-gives nothing; nor does any in an orthographic view, where light does not spread from a point.
-Shafts from what is bright in the picture are in bright_shafts.py.
+Limitations: only what is in the picture counts. Nothing outside of it casts a shaft, and the
+distance of hair does not change the haze. A light that is not in front of the viewer has no place
+on the screen and no haze; in an orthographic view no light has any, since light does not spread
+from a point there. Shafts from bright parts of the picture are in bright_shafts.py.
 """
 
 from __future__ import annotations
@@ -38,7 +39,7 @@ FAINTEST = 1.0e-4
 _FLAT_HEIGHT = 2.0 * np.arctan(0.36)
 #: length [pixels] up to which there are no shafts
 _SHORTEST = 1.0e-3
-#: rays on the way out from a light at most, and at least
+#: maximum and minimum number of rays out from a light
 _MAX_ANGLES, _MIN_ANGLES = 4096, 64
 
 
@@ -48,7 +49,7 @@ class LightOnScreen:
 
     center: x, y [pixels], the lower left corner of the picture is 0, 0; may lie outside.
     radiance: rgb of its haze, at the light.
-    depth: window depth (0 near, 1 far) behind which nothing stands before it.
+    depth: its window depth (0 near, 1 far); only what is nearer stands before it.
     length: of shafts [pixels].
     """
 
@@ -65,7 +66,7 @@ class PolarGrid:
     center: x, y [pixels].
     middle, span: angle of the middle ray, and between the first and the last [rad].
     nearest, farthest: distances at which rays begin and end [pixels].
-    angles, radii: rays, and texels on each; a texel's place is its middle.
+    angles, radii: number of rays, and of texels on each; a texel's place is its middle.
     """
 
     center: tuple[float, float]
@@ -88,8 +89,8 @@ class PolarGrid:
         """The grid around a place in or outside of a picture [pixels].
 
         Args:
-            radii: texels on a ray; 0: one a pixel.
-            max_angles: rays at most; up to there, one a pixel at the farthest corner.
+            radii: texels on a ray; 0: one per pixel.
+            max_angles: maximum number of rays; below it, one per pixel at the farthest corner.
         """
         x, y = center
         corners = np.array([[0, 0], [width, 0], [0, height], [width, height]]) - (x, y)
@@ -111,7 +112,7 @@ class PolarGrid:
 
     @property
     def step(self) -> float:
-        """Between texels of a ray [pixels]."""
+        """Distance between texels of a ray [pixels]."""
         return (self.farthest - self.nearest) / self.radii
 
     @property
@@ -126,7 +127,7 @@ class PolarGrid:
 def shaft_length(projection: Floats, height: int, length: float) -> float:
     """A length given as an angle of view, at the middle of the picture [pixels]."""
     is_perspective = projection[3, 3] == 0.0
-    # of a part of a picture the projection is so much larger
+    # the projection of a part of a picture is larger, as its height is smaller
     halves = projection[1, 1] if is_perspective else 1.0 / np.tan(0.5 * _FLAT_HEIGHT)
     return float(np.tan(length) * halves * height / 2.0)
 
@@ -143,9 +144,9 @@ def lights_on_screen(
     height: int,
     settings: ShaftSettings,
 ) -> list[LightOnScreen]:
-    """The lights whose haze is seen in a picture, the brightest first.
+    """The lights whose haze is visible in a picture, the brightest first.
 
-    A sun is where the directions to it meet, the others where they are.
+    A sun is at the vanishing point of its direction, other lights are at their positions.
 
     Args:
         view, projection: (4, 4) world to view to clip space, as in render.camera.
@@ -197,7 +198,7 @@ def light_shafts(
         alpha: (height, width) coverage by what was drawn.
         depth: (height, width) window depth of it; 1 where nothing is, or only thin hair, which is
             taken to stand before all lights.
-        samples: steps on the way out from a light.
+        samples: steps along each ray.
     """
     height, width = alpha.shape
     result = np.array(picture, np.float64)
@@ -216,7 +217,7 @@ def to_polar(picture: Floats, grid: PolarGrid, outside: float | None = None) -> 
     """A picture (height, width, n) as rays from a place, (angles, radii, n), bilinear.
 
     Args:
-        outside: what is beyond the picture's edges; None: as at the edge.
+        outside: the value beyond the picture's edges; None: that of the edge.
     """
     height, width = picture.shape[:2]
     x, y = grid.places
@@ -230,7 +231,7 @@ def to_polar(picture: Floats, grid: PolarGrid, outside: float | None = None) -> 
 def radial_blur(rays: Floats, grid: PolarGrid, length: float, before: float = 1.0) -> Floats:
     """Rays (angles, radii, n) blurred outwards.
 
-    Exact for values that stay the same all over a texel, at its end.
+    Exact at the end of each texel, for values that are constant over texels.
 
     Args:
         length: over which a value fades by 1/e [pixels].
@@ -248,7 +249,7 @@ def radial_blur(rays: Floats, grid: PolarGrid, length: float, before: float = 1.
 
 
 def from_polar(rays: Floats, grid: PolarGrid, width: int, height: int) -> Floats:
-    """The picture (height, width, n) that rays (angles, radii, n) stand for, bilinear."""
+    """The picture (height, width, n) of rays (angles, radii, n), bilinear."""
     away = _away(grid, width, height)
     row = (_angles_from(grid.middle, away) / grid.span + 0.5) * grid.angles - 0.5
     column = (_distances(grid, width, height) - grid.nearest) / grid.step - 0.5
@@ -273,7 +274,8 @@ def _angles_from(middle: float, away: Floats) -> Floats:
 
 
 def _bilinear(texels: Floats, x: Floats, y: Floats, *, wraps: bool) -> Floats:
-    """Values at places counted in texels; beyond the sides as there, or with rows going round."""
+    """Values at places in texels, bilinear; beyond the sides those of the edge, or rows wrap
+    around."""
     height, width = texels.shape[:2]
     left, lower = np.floor(x), np.floor(y)
     across, up = (x - left)[..., None], (y - lower)[..., None]

@@ -1,4 +1,4 @@
-"""What the artist sets about shafts of light."""
+"""Settings of shafts of light."""
 
 from __future__ import annotations
 

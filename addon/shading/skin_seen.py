@@ -1,17 +1,18 @@
-"""Light that comes to hair off the skin: what lies right beneath, and all that is seen farther off,
-such as the face beside which hair hangs.
+"""Light that hair receives off the skin: off the skin directly beneath, and off skin farther away,
+such as a face beside hair.
 
-Of far skin each point of hair has four numbers: how much light of a direction w comes to it, as
-q0 + q . w on average over all w (precomputed radiance transfer: Sloan, Kautz and Snyder 2002), with
-skin lit where it faces w. The hair becomes a coarse grid of optical depths, and skin the cells that
-its surface crosses. Light goes to these and back through the hair, cell by cell, in the 26
-directions of `ambient.sky_directions`. The four numbers are of hair whose strands take a part of
-what they meet; a depth says how much less or more other hair lets through.
+For far skin each point of hair has four numbers: how much of the light from a direction w reaches
+it off skin that is lit where it faces w, as q0 + q . w, fitted over all w (precomputed radiance
+transfer: Sloan, Kautz and Snyder 2002). The hair becomes a coarse grid of optical depths, and the
+skin the cells that its surface crosses. Light travels to these and back through the hair, cell by
+cell, in the 26 directions of `ambient.sky_directions`. The four numbers hold for strands that
+absorb the fraction PART of the light that they meet; a depth gives the factor for other hair.
 
-Hair of a cell lies in clumps, between which light passes: of a mean depth tau not exp(-tau) comes
-through but (1 + g tau)^(-1/g), the mean over depths of a gamma distribution with a variance of
-g tau. A g of 0.4 comes closest to Cycles, see docs/dev/shading.md: hair that hangs as a curtain has
-hardly any gaps, and cells that are thicker than it is show them where there are none.
+Hair within a cell lies in clumps, between which light passes: at a mean depth tau, the fraction
+that comes through is not exp(-tau) but (1 + g tau)^(-1/g), the mean over depths of a gamma
+distribution with a variance of g tau^2. A g of 0.4 comes closest to Cycles, see
+docs/dev/shading.md: a curtain of hair has hardly any gaps, but cells thicker than the curtain act
+as if it had.
 
 Limitation: no light goes from skin to skin.
 """
@@ -31,15 +32,15 @@ from .density_grid import Field, Grid, hair_depth, small_triangles
 
 #: Cells along the longest side of the grid.
 _CELLS = 44
-#: How far it reaches beyond the hair on each side, as a fraction of the hair's longest side.
+#: Margin of the grid around the hair on each side, as a fraction of the hair's longest side.
 _BEYOND = 0.25
-#: Variance of the optical depth of hair within a cell, over its mean.
+#: Variance of the optical depth of hair within a cell, over its squared mean.
 GAPS = 0.4
-#: Part of its light that hair takes where light through it is found: blond hair takes a third.
+#: Fraction of light that strands absorb in the four numbers: blond hair absorbs a third.
 PART = 0.25
-#: Less than this of light does not count.
+#: Minimum fraction of light that passes.
 _MIN_PASSED = 0.03
-#: A cell is skin that holds this part of a side's area of it.
+#: Minimum area of skin in a cell of skin, as a fraction of the area of a cell's side.
 _MIN_SKIN = 0.1
 _OPAQUE = 30.0
 #: Part of a cell that light crosses to its middle.
@@ -49,12 +50,13 @@ _SMALLEST = 1.0e-9
 
 @dataclass(frozen=True, eq=False)
 class SkinSeen:
-    """The skin that places of hair see, world space.
+    """The skin seen from places of hair, world space.
 
-    received: (..., 4), light off far skin through hair whose strands take PART: the mean over its
-        directions, and a vector. 1 is light from all around, off white skin that faces its light.
+    received: (..., 4), light off far skin through hair whose strands absorb PART: q0, the mean over
+        directions, and q. 1 is light off white skin all around that faces its light.
     depth: (...), optical, of the hair on the way, see `through_hair`.
-    beneath: (..., 3), the mean normal of the skin right beneath; its length says how much there is.
+    beneath: (..., 3), the mean normal of the skin directly beneath; its length is how much there
+        is.
     """
 
     received: Floats
@@ -63,7 +65,7 @@ class SkinSeen:
 
 
 def skin_seen(strands: StrandSet, points: Floats, skin: Surface, extinction: float) -> SkinSeen:
-    """What points (n, 3) among strands see, of the strands or of cards in their place.
+    """The skin seen from points (n, 3) among strands, of the strands or of cards that replace them.
 
     Args: see skin_field.
     """
@@ -73,11 +75,11 @@ def skin_seen(strands: StrandSet, points: Floats, skin: Surface, extinction: flo
 def skin_field(
     strands: StrandSet, skin: Surface, extinction: float, cell_count: int | None = None
 ) -> Field:
-    """What is seen of the skin, in values for `seen_by`.
+    """The field of values from which `seen_by` derives the skin seen.
 
     Args:
         strands: with the widths with which they are drawn.
-        extinction: how much more light a strand takes than its width does.
+        extinction: factor on the light that a strand's width blocks.
         cell_count: along the longest side; None: `_CELLS`.
     """
     grid = _grid_beyond(strands, cell_count or _CELLS)
@@ -85,13 +87,13 @@ def skin_field(
     cells_of_skin = skin.latest(_SkinCells.of, grid.low, grid.cell, grid.shape)
     sent = _sent(hair, cells_of_skin)
     cells = np.concatenate(_spread(hair, sent, cells_of_skin.normal, cells_of_skin.is_skin))
-    # those within the body know of nothing, and those beside fill them
+    # cells within the body hold no values; the sampling takes those of their neighbours
     known = ~cells_of_skin.is_inside
     return Field(grid, np.concatenate([cells * known, known[None]], dtype=np.float32))
 
 
 def seen_by(found: Floats) -> SkinSeen:
-    """What points see that have such values (k, n) of a `skin_field`."""
+    """The skin seen from points with these values (k, n) of a `skin_field`."""
     found = found[:-1] / np.maximum(found[-1], 1.0e-3)
     passed = np.clip(found[0] / np.maximum(found[4], _SMALLEST), _MIN_PASSED, 1.0)
     depth = (passed**-GAPS - 1.0) / (GAPS * PART)
@@ -99,25 +101,25 @@ def seen_by(found: Floats) -> SkinSeen:
 
 
 def through_hair(depth: Floats, taken: Floats) -> Floats:
-    """What hair with gaps lets through if strands take this part of the light that they meet, as a
-    factor of what it lets through where they take PART."""
+    """The light through hair with gaps whose strands absorb the fraction `taken` of what they meet,
+    over that through hair whose strands absorb PART."""
     result: Floats = ((1.0 + GAPS * depth * taken) / (1.0 + GAPS * depth * PART)) ** (-1.0 / GAPS)
     return result
 
 
 def plane_beneath(normal: Floats) -> SkinSeen:
-    """Skin right beneath alone, as of hair on a plane. normal: (..., 3)."""
+    """Skin directly beneath alone, as for hair on a plane. normal: (..., 3)."""
     count = normal.shape[:-1]
     return SkinSeen(np.zeros((*count, 4)), np.zeros(count), normal)
 
 
 def far_light(received: Floats, to_light: Floats) -> Floats:
-    """What of a light comes off far skin through hair that takes PART, (...): the part of that from
-    a light in the direction of `received`, with the rest from everywhere.
+    """The fraction of a light that arrives off far skin through hair that absorbs PART, (...): a
+    part that depends on the angle between the light and `received`, and an even rest.
     """
     mean, bent = received[..., 0], received[..., 1:]
     size = np.linalg.norm(bent, axis=-1)
-    # a cosine above 0 has 1/4 on average, and a vector of 1/2
+    # max(cosine, 0) has a mean of 1/4 and a vector of length 1/2
     even = np.maximum(1.0 - 0.5 * size / np.maximum(mean, 1.0e-6), 0.0)
     facing = np.maximum(np.sum(bent * to_light, axis=-1), 0.0) / np.maximum(size, 1.0e-6)
     result: Floats = mean * (even + (1.0 - even) * 4.0 * facing)
@@ -136,12 +138,12 @@ def _grid_beyond(strands: StrandSet, cell_count: int) -> Grid:
 
 @dataclass(frozen=True, eq=False)
 class _SkinCells:
-    """The skin in the cells of a grid, and the light that it sends back where there is no hair.
+    """The skin in the cells of a grid, and the light that it reflects without hair.
 
-    normal: (3, *shape), the mean of the skin in each cell. is_skin: which have any.
-    is_inside: which lie right below it.
-    facing: (26, skin_count), of each cell with skin, how much light of each direction it sends.
-    clear: (skin_count,), what of that gets away, in all.
+    normal: (3, *shape), the mean of the skin in each cell. is_skin: which cells hold any.
+    is_inside: which cells lie directly below it.
+    facing: (26, skin_count), light that each cell of skin reflects, by the light's direction.
+    clear: (skin_count,), the sum of what the body does not block of that.
     """
 
     normal: Floats
@@ -152,7 +154,7 @@ class _SkinCells:
 
     @classmethod
     def of(cls, skin: Surface, low: Floats, cell: float, shape: tuple[int, int, int]) -> _SkinCells:
-        """Of the numbers of a grid, which hair that is combed keeps."""
+        """From the numbers of a grid, which hair keeps while it is combed."""
         normal, is_skin = _skin_in(skin, Grid(low, cell, shape))
         is_inside = _inside(normal, is_skin)
         steps, weights = zip(*sky_directions(0.0), strict=True)
@@ -171,7 +173,7 @@ def _body(is_inside: Bools) -> Floats:
 
 
 def _through(depth: Floats, steps: Sequence[Step], chosen: Ints) -> Floats:
-    """What gets from some cells out of the grid along each step, (step_count, k)."""
+    """The transmittance from some cells out of the grid along each step, (step_count, k)."""
     towards = depth_towards(depth, steps, own=0.0)
     through: Floats = np.exp(-towards.reshape(len(steps), -1)[:, chosen])
     return through
@@ -195,7 +197,7 @@ def _skin_in(skin: Surface, grid: Grid) -> tuple[Floats, Bools]:
 
 
 def _inside(normal: Floats, is_skin: Bools) -> Bools:
-    """Which cells lie right below the skin: they see more of its back than of its front."""
+    """Which cells lie directly below the skin: they see more of its back than of its front."""
     back = np.zeros(is_skin.shape, np.float32)
     for step, weight in sky_directions(0.0):
         back += weight * _shifted(np.sign(np.tensordot(_unit(step), normal, 1)), step)
@@ -204,8 +206,8 @@ def _inside(normal: Floats, is_skin: Bools) -> Bools:
 
 
 def _sent(hair: Floats, skin: _SkinCells) -> Floats:
-    """What skin sends back of light from all around: as `SkinSeen.received`, and its mean without
-    any hair in the way, (5, *shape)."""
+    """Light from all around that skin reflects, (5, *shape): four numbers as in
+    `SkinSeen.received`, and the mean without any hair in the way."""
     steps, _ = zip(*sky_directions(0.0), strict=True)
     directions = unit_steps(steps).astype(np.float32)
     chosen = np.flatnonzero(skin.is_skin)
@@ -219,13 +221,13 @@ def _sent(hair: Floats, skin: _SkinCells) -> Floats:
 
 
 def _spread(hair: Floats, sent: Floats, normal: Floats, is_skin: Bools) -> tuple[Floats, Floats]:
-    """What comes to each cell off far skin, (5, *shape), and the mean normal of what lies right
-    beneath, (3, *shape).
+    """Light that reaches each cell off far skin, (5, *shape), and the mean normal of the skin
+    directly beneath, (3, *shape).
     """
     far, beneath = np.zeros_like(sent), np.zeros_like(normal)
     is_free = (~is_skin).astype(np.float32)
     for step, weight in sky_directions(0.0):
-        # of skin one sees what faces the way from which one comes
+        # only skin that faces back along the step is seen
         is_seen = is_skin & (np.tensordot(_unit(step), normal, 1) < 0.0)
         depth = _length(step) * _gappy(hair, step)
         through = np.stack([is_free * np.exp(-depth), is_free])
@@ -233,18 +235,18 @@ def _spread(hair: Floats, sent: Floats, normal: Floats, is_skin: Bools) -> tuple
         came -= _shifted(sent * is_seen, step)
         came[:4] *= np.exp(-_OWN * depth)
         far += np.float32(weight) * came * ~is_seen
-        # light from half of all directions is whole
+        # half of all directions count as 1
         front = normal * is_seen
         beneath += np.float32(2.0 * weight) * np.where(is_seen, front, _shifted(front, step))
     return far, beneath
 
 
 def _came(source: Floats, through: Floats, step: Step) -> Floats:
-    """What comes to each cell from those along a step: the source of the first, and what comes to
-    that and gets through.
+    """Light that reaches each cell from those along a step: the source of the next cell, and the
+    light that reaches that cell and gets through it.
 
     Args:
-        source: (5, *shape). through: (2, *shape), of the first four, and of the last.
+        source: (5, *shape). through: (2, *shape), transmittance of the first four, and of the last.
     """
     axis = int(np.argmax(np.abs(step)))
     others = [0, *(step[other] for other in range(3) if other != axis)]
@@ -263,7 +265,8 @@ def _came(source: Floats, through: Floats, step: Step) -> Floats:
 
 
 def _gappy(hair: Floats, step: Step) -> Floats:
-    """Optical depth per length of PART of the hair, with its gaps, for light along a step."""
+    """Optical depth per cell's length of hair with gaps that absorbs PART, for light along a
+    step."""
     gaps = np.float32(GAPS * _length(step))
     result: Floats = np.log1p(gaps * np.float32(PART) * hair) / gaps
     return result
@@ -279,7 +282,8 @@ def _unit(step: Step) -> Floats:
 
 
 def _shifted(values: Floats, step: Step) -> Floats:
-    """Of each cell (..., x, y, z) what the one a step farther has; 0 where there is none."""
+    """For each cell (..., x, y, z) the value of the cell one step farther; 0 where there is
+    none."""
     result = np.zeros_like(values)
     add_shifted(result, values, [0] * (values.ndim - 3) + list(step))
     return result

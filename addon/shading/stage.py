@@ -1,4 +1,4 @@
-"""The stage on which pictures without a scene are taken: three lights, and what is behind the hair.
+"""The stage for pictures without a scene: three lights and a backdrop.
 
 Everything is relative to the ball around what is shown, so that hair of any size looks the same.
 """
@@ -16,9 +16,9 @@ from .volume.light_frame import Ball
 
 #: radius of each light, in radii of the ball
 _LIGHT_RADIUS = 0.5
-#: what full warmth makes of white light, and of the light on the other side
+#: colour of the main light at full warmth, and of the other lights
 _WARM, _COOL = np.array([1.12, 0.98, 0.74]), np.array([0.84, 0.99, 1.22])
-#: how fast the backdrop darkens: it is nearly that of the edge in the corners
+#: falloff of the backdrop: in the corners it nearly has the colour of the edge
 _VIGNETTE = 3.2
 
 
@@ -30,8 +30,9 @@ def stage_lights(
     Args:
         view: (4, 4) world to view space, a rigid motion.
         ball: around what is shown.
-        is_mirrored: left is right, as where a face looks to the right of the picture. So the main
-            light falls on the side of the hair that is seen, broad lighting of a portrait.
+        is_mirrored: whether left and right are swapped, for a face that looks to the right of the
+            picture: the main light then falls on the visible side of the hair, broad lighting of a
+            portrait.
     """
     to_world = np.linalg.inv(np.asarray(view, np.float64))[:3, :3]
     radius, distance = _LIGHT_RADIUS * ball.radius, stage.distance * ball.radius
@@ -67,8 +68,8 @@ def _tint(warmth: float) -> Color:
 
 
 def backdrop(stage: StageSettings, width: int, height: int) -> Floats:
-    """What is behind the hair, (height, width, 3) scene-linear: the colour of its centre fades to
-    that of its edge, evenly to all sides.
+    """The backdrop behind the hair, (height, width, 3) scene-linear: the colour of its centre fades
+    to that of its edge, evenly to all sides.
     """
     y, x = np.indices((height, width), dtype=np.float64) + 0.5
     squared = (x - 0.5 * width) ** 2 + (y - 0.5 * height) ** 2

@@ -1,4 +1,4 @@
-"""What the artist sets about the stage on which pictures without a scene are taken."""
+"""Settings of the stage for pictures without a scene."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def _strength(default: float, label: str, description: str) -> Any:
 
 
 def _angle(default: float, label: str, description: str, most: float) -> Any:
-    """Of the view [degrees]."""
+    """A setting from -most to most; default and most in degrees."""
     span = float(np.radians(-most)), float(np.radians(most))
     return number(
         float(np.radians(default)),

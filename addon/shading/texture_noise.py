@@ -1,4 +1,4 @@
-"""Noise of hair textures: fast across the strands, slow along them, the same at opposite edges.
+"""Noise of hair textures: it varies fast across the strands and slowly along them, and tiles.
 
 A texture stands on its root: rows run along the hair, columns across it.
 """
@@ -17,12 +17,12 @@ _DRIFT_CELLS = (2, 3)
 
 
 def stretched_noise(random: np.random.Generator, drift: Floats, across: int, along: int) -> Floats:
-    """Noise that lies along drifting strands, (height, width), evenly spread over [0, 1].
+    """Noise that lies along drifting strands, (height, width), uniformly distributed over [0, 1].
 
     It tiles across and along where the drift does.
 
     Args:
-        drift: (height, width), how far each strand has been led astray, in widths of the texture.
+        drift: (height, width), how far each strand strays sideways, in widths of the texture.
         across, along: cells of the coarser of its two octaves.
     """
     noise = np.zeros(drift.shape)
@@ -37,8 +37,8 @@ def stretched_noise(random: np.random.Generator, drift: Floats, across: int, alo
 def strand_drift(random: np.random.Generator, shape: tuple[int, int], wander: float) -> Floats:
     """How far strands of one strip stray to the sides, (height, width), in widths of the strip.
 
-    0 at both sides, so that strips lie seamlessly side by side, and the same at root and tip. It
-    changes by less than 9.2 `wander` a width, so that up to 0.1 no two strands ever meet.
+    0 at both sides, so that strips tile side by side, and the same at root and tip. Across the
+    strip its slope is below 9.2 `wander`, so that no two strands meet up to a `wander` of 0.1.
     """
     sway = 2.0 * _value_noise(random, np.zeros(shape), *_DRIFT_CELLS) - 1.0
     across = (np.arange(shape[1]) + 0.5) / shape[1]
@@ -76,5 +76,5 @@ def _value_noise(random: np.random.Generator, drift: Floats, across: int, along:
 
 
 def smooth(t: Floats) -> Floats:
-    """0 to 1 with level ends."""
+    """Smooth step from 0 to 1, for t in [0, 1]."""
     return t * t * (3.0 - 2.0 * t)

@@ -4,13 +4,13 @@ A texture stands on its root: row 0 is v = 0, the root, and the last row is the 
 several variants side by side, each a column that tiles with itself across.
 
     base     stretched noise that the hair's colour is multiplied by
-    alpha    asks of each pixel whether the envelope of the strip (1 in the middle, 0 at the sides
-             and the tip) exceeds a stretched noise. Noise evenly spread over [0, 1] makes the mean
-             alpha follow the envelope and the middle fully opaque, as the four-pass drawing wants
-             it, and single strands survive towards the tip
+    alpha    1 where the envelope of the strip (1 in the middle, 0 at the sides and the tip)
+             exceeds a stretched noise. Noise distributed uniformly over [0, 1] makes the mean alpha
+             follow the envelope and the middle fully opaque, as drawing in four passes needs, and
+             leaves single strands towards the tip
     shift    how far each strand moves the highlights: s = shift + shift_noise (texture - 0.5)
     noise    breaks up the second highlight into sparkles
-    tangent  the way of the strands, which may replace the shift, see HairTextures
+    tangent  the direction of the strands, which may replace the shift, see HairTextures
 
 All of them follow the same strands, which wander a little to the sides.
 """
@@ -38,8 +38,8 @@ _CELLS_ALONG = 2
 class HairTextures:
     """The textures of hair cards, float32 in [0, 1], row 0 at the root; each of its own size.
 
-    base: (height, width, 3) linear, to be multiplied by the hair's colour; it goes on where alpha
-        is 0, so that no dark fringe appears. Of an atlas it may exceed 1.
+    base: (height, width, 3) linear, to be multiplied by the hair's colour; it continues where alpha
+        is 0, so that no dark fringe appears. In an atlas it may exceed 1.
     alpha: (height, width) straight coverage, 0 along both sides of each column.
     shift: (height, width) of the highlights, 0.5 is none; repeats in u and v.
     noise: (height, width) factor of the second highlight; repeats in u and v.
@@ -48,7 +48,7 @@ class HairTextures:
         strand runs along x side + y tangent + shift_noise z normal. Its x holds for texels that
         are square on the card.
     normal: (height, width, 3) normal n of the strands as 0.5 n + 0.5, in the axes of `tangent`;
-        None is that of the card everywhere.
+        None: the card's normal everywhere.
     """
 
     base: Floats
@@ -70,7 +70,7 @@ class HairTextures:
         return np.concatenate([base, alpha[..., None]], axis=-1)
 
     def with_pictures(self, pictures: Mapping[str, Floats]) -> HairTextures:
-        """The same with these instead of those of their names, see `picture_as`."""
+        """The textures with some replaced by pictures, by name, see `picture_as`."""
         return replace(self, **pictures)
 
 
@@ -78,8 +78,8 @@ class HairTextures:
 def hair_textures(settings: TextureSettings, columns: int) -> HairTextures:
     """Textures of `columns` strips of hair side by side, (height, columns * variant_width).
 
-    The last ones are kept, as cards are built again for settings that do not concern these; so
-    nobody may write to them.
+    The last results are cached, as cards are built again for settings that do not concern these; so
+    the arrays are read-only.
     """
     random = np.random.default_rng(settings.seed)
     shape = settings.height, settings.variant_width

@@ -1,4 +1,4 @@
-"""How far a strand has its tips' colour; both models ask this.
+"""The fraction of the tip colour along a strand, for both models.
 
 Twin of `tip_fraction` in gpu_shaders/lib_tint.glsl.
 """
@@ -10,12 +10,13 @@ import numpy as np
 from ..arrays import Floats
 from .settings import SharedSettings
 
-#: Where the change begins at or behind its end, it takes this fraction of the strand: a step.
+#: Minimum length of the change, as a fraction of the strand: a step if it begins at or behind its
+#: end.
 MIN_SPAN = 1.0e-4
 
 
 def tip_fraction(along: Floats, settings: SharedSettings) -> Floats:
-    """How much of the tips' colour a place has, (...), in [0, 1]; `along` is 0 to 1 from the root.
+    """The fraction of the tip colour at places, (...), in [0, 1]; `along` is 0 to 1 from the root.
 
     smoothstep(tint_start, tint_end, along) * tip_tint.
     """

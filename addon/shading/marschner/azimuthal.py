@@ -13,10 +13,10 @@ References:
     Marschner et al. 2003, section 5.2 and appendix A: N_p and the blurred caustics.
     d'Eon et al. 2011, section 4: the lobes as an energy balance.
 
-What we do otherwise: Marschner estimates a caustic's energy from its curvature and a largest
-width; here it is what the fade takes out, integrated over h where it has no pole. So a glint
-strength of 1 keeps the energy, per colour. An elliptic fibre takes from another index the form of
-TRT, but not its energy, which would not add up with R and TT any more.
+Differences: Marschner estimates a caustic's energy from its curvature and a largest width; here it
+is the energy that the fade removes, integrated over h, where there is no pole. So a glint strength
+of 1 keeps the energy, per colour. For an elliptic fibre, another index sets only the shape of TRT,
+not its energy, which would no longer add up with R and TT.
 
 All functions take arrays that broadcast: cos theta_d and phi in [rad].
 """
@@ -37,7 +37,7 @@ from .interface import (
     rest_energy,
 )
 
-#: cos 2 phi_h whose mean is that of a full turn (Gauss-Chebyshev, to degree 7)
+#: values of cos 2 phi_h that average over a full turn (Gauss-Chebyshev, to degree 7)
 _TWIST = tuple(np.cos((np.arange(4) + 0.5) * np.pi / 4.0))
 
 _LAPS = (-2.0 * np.pi, 0.0, 2.0 * np.pi)
@@ -92,14 +92,14 @@ def azimuthal_trt(
 def azimuthal_rest(cos_d: Floats, fibre: Fibre) -> Floats:
     """N_rest, (..., 3): all lobes after TRT, spread evenly over the circle.
 
-    Each is weaker than the one before by Fresnel's share and all look alike to the eye (d'Eon et
-    al. 2011, section 4; Chiang et al. 2016 lump them so).
+    Each is weaker than the one before by Fresnel's reflectance, and all look alike (d'Eon et al.
+    2011, section 4; Chiang et al. 2016 combine them too).
     """
     return rest_energy(cos_d, fibre.index_of_refraction, fibre.absorption) / (2.0 * np.pi)
 
 
 def elliptic_index(index: float, ratio: float, cos_double: float) -> Floats:
-    """The index with which TRT of an elliptic fibre is like that of a round one.
+    """The index with which a round fibre has the TRT of an elliptic one.
 
     Marschner et al. 2003, section 5.2.3, at cos 2 phi_h; not less than MIN_INDEX.
     """
@@ -174,8 +174,7 @@ def _bells(phi: Floats, caustic: Floats, width: float) -> tuple[Floats, Floats]:
 def _raw_trt(cos_d: Floats, phi: Floats, fibre: Fibre, index: Floats) -> Floats:
     """N_TRT with its poles, for phi in [0, pi]: the sum over the roots between turning points.
 
-    By symmetry, what the piece under -gamma_c sends to phi is what the piece
-    over gamma_c sends to -phi.
+    By symmetry, the piece below -gamma_c sends to phi what the piece above gamma_c sends to -phi.
     """
     cone, azimuth = np.broadcast_arrays(cos_d, phi)
     bravais = bravais_index(index, cone)
@@ -201,11 +200,11 @@ def _raw_trt(cos_d: Floats, phi: Floats, fibre: Fibre, index: Floats) -> Floats:
 def _root(
     target: Floats, top: tuple[Floats, Floats], end: tuple[Floats, Floats], bravais: Floats
 ) -> Floats:
-    """gamma between a turning point and the end of its piece at which trt_turn is the target.
+    """gamma, between a turning point and the end of its piece, at which trt_turn equals the target.
 
-    Newton's method from the parabola that has trt_turn's value and slope at the turning point and
-    its value at the end. (From index 2 up the turn falls from gamma = 0 on, with a slope.) Leaves
-    less than 2e-6 of turn.
+    Newton's method, from the parabola with trt_turn's value and slope at the turning point and its
+    value at the end. (From index 2 up the turn falls from gamma = 0 on, where its slope is not 0.)
+    The error in turn is below 2e-6.
 
     Args:
         top, end: gamma and turn of both.

@@ -12,9 +12,9 @@ theta_d = (theta_r - theta_i) / 2.
 The tilt. The scales open towards the tip, so their outer normals lean to the root by the tilt.
 Light across the fibre leaves R leaning to the root by 2 tilts, TT to the tip by 1 and TRT to the
 tip by 4 (Chiang et al. 2016; Marschner's table gives TRT 3, two-dimensional ray tracing 4.2 for
-an index of 1.55). What the eye sees is the opposite: it must stand where the ray goes, so on a
-head the HIGHLIGHT of R lies nearer to the tip and that of TRT nearer to the root. Offsets here
-speak of highlights, as those of Kajiya-Kay do: positive moves a highlight to the tip.
+an index of 1.55). The eye must stand where the ray goes, so it sees the opposite: on a head the
+HIGHLIGHT of R lies nearer to the tip and that of TRT nearer to the root. Offsets here refer to
+highlights, as in Kajiya-Kay: positive moves a highlight to the tip.
 """
 
 from __future__ import annotations
@@ -32,35 +32,35 @@ MIN_INDEX = 1.01
 #: Standard deviation of theta_h below which a lobe would be a spike, [rad]
 MIN_WIDTH = np.radians(0.5)
 
-#: A tilt or an offset towards the root; what an artist can set ends at 45 degrees, [rad]
+#: Minimum of tilts and offsets, towards the root, [rad]; the settings end at 45 degrees
 _MAX_TURNED = -1.0
 
 
 @dataclass(frozen=True, kw_only=True)
 class Fibre:
-    """What one kind of hair does to light; angles are in radians.
+    """How one kind of hair scatters light; angles are in radians.
 
     Args:
-        index_of_refraction: of the hair against what surrounds it, 1 or more.
-        absorption: red, green, blue, per fibre RADIUS, as Blender's Principled Hair has it:
-            light that crosses the axis keeps exp(-2 absorption).
+        index_of_refraction: of the hair relative to what surrounds it, 1 or more.
+        absorption: red, green, blue, per fibre RADIUS, as in Blender's Principled Hair: light that
+            crosses the axis keeps exp(-2 absorption).
         cuticle_tilt: angle of the scales.
         width_r, width_tt, width_trt: standard deviation of theta_h. A highlight's spread in
             theta_r is twice as wide. Widths under MIN_WIDTH count as that.
-        offset_r, offset_tt, offset_trt: moves a highlight towards the tip, in theta_h, beyond
-            what the tilt does.
-        strength_r, strength_tt, strength_trt, strength_higher: factor of a lobe; 1 is physical. The
-            rest is light reflected inside twice or more.
+        offset_r, offset_tt, offset_trt: moves a highlight towards the tip, in theta_h, in addition
+            to the tilt.
+        strength_r, strength_tt, strength_trt, strength_higher: factor of a lobe; 1 is physical.
+            `higher` is light reflected inside twice or more.
         eccentricity: one axis of the cross-section over the other, 1 for a round hair. It acts
             on TRT through a changed index only (Marschner section 5.2.3).
-        glint_width: w_c, standard deviation in phi of the blurred caustics of TRT; 0 leaves
-            them as they are, with no bounds.
+        glint_width: w_c, standard deviation in phi of the blurred caustics of TRT; 0 leaves them
+            sharp and unbounded.
         glint_strength: k_G; 1 gives back the energy that blurring takes out.
         glint_fade: Delta eta', how far beyond index 2, where caustics end, glints fade out.
         azimuthal_width: standard deviation in phi by which a rough surface spreads each lobe.
 
     Raises:
-        HairloomError: a value has no meaning.
+        HairloomError: a value is too small or not finite.
     """
 
     index_of_refraction: float = 1.55
@@ -105,7 +105,7 @@ class Fibre:
 
     @property
     def widths(self) -> tuple[float, float, float]:
-        """Of R, TT, TRT: standard deviations of theta_h that the lobes really have."""
+        """Of R, TT, TRT: standard deviations of theta_h, at least MIN_WIDTH."""
         least = float(MIN_WIDTH)
         return (max(self.width_r, least), max(self.width_tt, least), max(self.width_trt, least))
 
@@ -113,7 +113,7 @@ class Fibre:
     def highlight_shifts(self) -> tuple[float, float, float]:
         """Of R, TT, TRT: how far towards the tip a highlight lies; its lobe peaks at minus this.
 
-        In theta_h, so half of what theta_r turns: +1, -1/2 and -2 tilts, and the offsets.
+        In theta_h, so half of the change of theta_r: +1, -1/2 and -2 tilts, and the offsets.
         """
         tilt = self.cuticle_tilt
         return (

@@ -1,8 +1,8 @@
-"""The surface of the fibre: how much light each way through it keeps.
+"""The surface of the fibre: how much light each path through it keeps.
 
-In the plane across the fibre a slanted ray behaves as if it lay in it, but for other indices of
-refraction (Bravais; Marschner et al. 2003, appendix B). They are exact: with them Fresnel's
-formulas in the plane are those of the ray in space.
+In the plane across the fibre, the projection of a slanted ray refracts like a ray in that plane,
+but with other indices of refraction (Bravais; Marschner et al. 2003, appendix B). This is exact:
+with these indices, Fresnel's formulas in the plane are those of the ray in space.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from .fibre import MIN_INDEX
 #: cos theta_d below which a ray runs along the fibre and the effective index has no bounds
 MIN_COSINE = 1e-4
 
-#: What a passage loses at least, in a quotient: at grazing light, where nothing comes in, it is 0.
+#: Minimum loss of a passage, in a quotient: at grazing light, where nothing enters, it is 0.
 _MIN_LOSS = 1e-9
 
 
 def bravais_index(index: Floats | float, cos_d: Floats) -> Floats:
-    """eta' of a cone of cos theta_d; Snell's law in the plane, and light polarised across it."""
+    """eta' of a cone of cos theta_d, for Snell's law in the plane and light polarised across it."""
     index = np.maximum(index, MIN_INDEX)
     cosine = np.clip(cos_d, MIN_COSINE, 1.0)
     return np.sqrt(index**2 - 1.0 + cosine**2) / cosine
@@ -36,7 +36,7 @@ def refracted(gamma: Floats, bravais: Floats) -> Floats:
 def fresnel(gamma: Floats, index: Floats | float, bravais: Floats) -> Floats:
     """Reflected fraction of unpolarised light at gamma, from outside and from inside going out.
 
-    eta'' = index^2 / eta' stands for the index of the light polarised in the plane.
+    eta'' = index^2 / eta' is the index for light polarised in the plane.
     """
     cos_i = np.maximum(np.cos(gamma), 0.0)
     cos_t = np.cos(refracted(gamma, bravais))
@@ -53,7 +53,7 @@ def attenuation(
     index: Floats | float,
     absorption: tuple[float, float, float],
 ) -> Floats:
-    """A(p, h): what is left of light that meets the fibre at gamma = asin h, (..., 3).
+    """A(p, h): the fraction left of light that meets the fibre at gamma = asin h, (..., 3).
 
     Args:
         order: p, 0 for R, 1 for TT, 2 for TRT: passages through the inside.

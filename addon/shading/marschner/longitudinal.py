@@ -6,26 +6,26 @@ the eye, one for the solid angle. So M_p is normalised in this measure:
 
     integral of M_p(theta_i, theta_r) cos^2 theta_r / cos^2 theta_d dtheta_r = 1, for each theta_i.
 
-Marschner's Gaussian of theta_h is so for narrow lobes across the fibre only; it gains energy on
-one side at grazing light and loses it beyond the ends on the other. d'Eon et al. 2011 fix this
-with a kernel on the sphere, whose measure has one cosine; ours has two, which is the measure of
-the sphere in four dimensions. The same step there (von Mises-Fisher, concentration k) gives
+Marschner's Gaussian of theta_h fulfils this only for narrow lobes across the fibre; at grazing
+light it gains energy on one side and loses it beyond the ends on the other. d'Eon et al. 2011 fix
+this with a kernel on the sphere, whose measure has one cosine; ours has two, which is the measure
+of the sphere in four dimensions. The same step there (von Mises-Fisher, concentration k) gives
 
     M / cos^2 theta_d = k / (pi I1(k)) exp(-k sin_i sin_r) sinh(k cos_i cos_r) / (k cos_i cos_r),
 
-normalised exactly at every width and the same both ways round. With k = 1 / (2 width)^2 its
-narrow limit is Marschner's Gaussian: half of the unit Gaussian of theta_h, since theta_r runs
-twice as fast as theta_h.
+normalised exactly at every width, and reciprocal. With k = 1 / (2 width)^2 its narrow limit is
+Marschner's Gaussian: half of the unit Gaussian of theta_h, since theta_r changes twice as fast as
+theta_h.
 
 The tilt turns both directions by the shift, and the lobe is normalised in the measure of the
-turned directions. In the measure of the true ones it gains on one side and lacks on the other, by
-2 tan theta_i tan shift: no tilted lobe can be the same both ways round and keep all light at every
-angle, since S(a, b) = S(b, a) while the measure differs at a and b. (Spreading what lacks evenly,
-as Kelemen and Szirmay-Kalos 2001 do, shows as a haze over the head, so it stays lost.) Moreover
+turned directions. In the measure of the true ones it gains energy on one side and loses it on the
+other, by 2 tan theta_i tan shift: no tilted lobe can be reciprocal and keep all light at every
+angle, since S(a, b) = S(b, a) while the measure differs at a and b. (Spreading the loss evenly, as
+Kelemen and Szirmay-Kalos 2001 do, shows as a haze over the head, so it stays lost.) Moreover
 Fresnel's terms change within the width of a lobe at grazing light. So in a fibre each M_p is
-multiplied by balance_i balance_r, the same both ways round: what makes the lobes of a clear fibre
-sum to 1 at theta or at -theta, whichever is more (Sinkhorn and Knopp 1967), and so little that no
-theta sends out more than came in.
+multiplied by balance_i balance_r, which is reciprocal: the factor that makes the lobes of a clear
+fibre sum to 1 at theta or at -theta, whichever has more (Sinkhorn and Knopp 1967), limited so that
+no theta sends out more than came in.
 """
 
 from __future__ import annotations
@@ -45,13 +45,13 @@ _BALANCE_ROUNDS = 8
 
 @dataclass(frozen=True)
 class LongitudinalLobe:
-    """One M_p, ready to be asked.
+    """One M_p as a function.
 
     Args:
         concentration: k of the kernel.
-        shift: towards the tip, of the highlight, in theta_h, [rad].
+        shift: of the highlight towards the tip, in theta_h, [rad].
         factor: k e^k / (pi I1(k)).
-        balance: factor at theta from -pi/2 to pi/2 in even steps, each way; none is 1.
+        balance: factor at even steps of theta from -pi/2 to pi/2, for both directions; None: 1.
     """
 
     concentration: float
@@ -81,7 +81,7 @@ def longitudinal_lobe(width: float, shift: float) -> LongitudinalLobe:
 
 
 def longitudinal_lobes(fibre: Fibre) -> tuple[LongitudinalLobe, ...]:
-    """M_R, M_TT and M_TRT, which the rest has too, balanced with one another."""
+    """M_R, M_TT and M_TRT, balanced with one another; the rest has that of TRT."""
     pairs = zip(fibre.widths, fibre.highlight_shifts, strict=True)
     lobes = [longitudinal_lobe(width, shift) for width, shift in pairs]
     balance = _balance(lobes, fibre.index_of_refraction)
@@ -89,9 +89,9 @@ def longitudinal_lobes(fibre: Fibre) -> tuple[LongitudinalLobe, ...]:
 
 
 def _balance(lobes: list[LongitudinalLobe], index: float) -> Floats:
-    """Factor of all lobes, by even steps of theta, from what a clear fibre would send out.
+    """Factor of all lobes at even steps of theta, from what a clear fibre would send out.
 
-    The last line only lowers it. Without a tilt every theta then sends out all, to 1e-3.
+    The last line only lowers it. Without a tilt every theta then sends out all light, to 1e-3.
     """
     theta = np.linspace(-0.5 * np.pi, 0.5 * np.pi, _BALANCE_STEPS + 1)
     theta_r = 0.5 * (theta[1:] + theta[:-1])

@@ -1,4 +1,4 @@
-"""From the settings to a fibre, to each strand's absorption and to the light it sends out.
+"""Marschner's model by the settings: the fibre, each strand's absorption, the light it sends out.
 
 Twin of gpu_shaders/lib_marschner.glsl: same names, same order.
 """
@@ -15,13 +15,13 @@ from .fibre import Fibre, directions_to_angles
 from .pigment import COLOR_FACTOR, absorption_color, color_absorption, melanin_absorption
 from .tables import MarschnerTables, look_up
 
-#: Fraction of the pigment, evened out over the colours, that a grey strand still has: it is white,
-#: not glass.
+#: Fraction of the pigment, averaged over the colours, that a grey strand keeps: it is white, not
+#: glass.
 GREY_LEFT = 0.04
 
 
 def fibre_of(settings: ShadingSettings) -> Fibre:
-    """The fibre that the settings speak of; its absorption is that of the root."""
+    """The fibre of the settings, with the absorption at the root."""
     red, green, blue = (float(value) for value in root_absorption(settings))
     return Fibre(
         index_of_refraction=settings.index_of_refraction,
@@ -54,7 +54,7 @@ def pack_fibre(settings: ShadingSettings) -> Floats:
 
 
 def root_absorption(settings: ShadingSettings) -> Floats:
-    """Per radius, (3,), by what the artist chose as pigment."""
+    """Absorption at the root, (3,), per radius, by the settings' kind of pigment."""
     match settings.pigment:
         case "melanin":
             return melanin_absorption(settings.melanin, settings.redness)
@@ -65,7 +65,7 @@ def root_absorption(settings: ShadingSettings) -> Floats:
 
 
 def tip_absorption(settings: ShadingSettings) -> Floats:
-    """Per radius, (3,), of the tips' own colour."""
+    """Absorption of the tip colour, (3,), per radius."""
     return color_absorption(np.array(settings.tip_color))
 
 
@@ -81,7 +81,7 @@ def strand_absorption(
     Args:
         along: 0 at the root to 1 at the tip.
         color_noise, grey_noise: the strand's own, in [0, 1].
-        root: (..., 3) absorption without a tint; None is the look's.
+        root: (..., 3) absorption without a tint; None: the look's.
     """
     root = root_absorption(settings) if root is None else root
     tip = tip_absorption(settings)
@@ -93,17 +93,17 @@ def strand_absorption(
 
 
 def strand_color(absorption: Floats) -> Floats:
-    """Colour of a mass of such hair, (..., 3), for light that comes from strand to strand."""
+    """Colour of a mass of such hair, (..., 3), for light scattered between strands."""
     return absorption_color(absorption)
 
 
 def straight_light(
     normal: Floats, to_light: Floats, tau: Floats | float, shading: ShadingSettings
 ) -> Floats:
-    """The fraction of light that no strand is in the way of, (...): what passes tau strands.
+    """The fraction of light that no strand blocks, (...): exp(-tau) past tau strands.
 
-    Where tau is not known, which is when it is negative, by how much the hair's volume faces the
-    light: an approximation.
+    A negative tau is unknown: the fraction is then approximated by how much the hair's volume faces
+    the light.
     """
     facing = 1.0 + shading.volume_shadow * (diffuse_bias(normal, to_light) - 1.0)
     return np.where(np.asarray(tau) < 0.0, facing, np.exp(-np.maximum(tau, 0.0)))
@@ -153,8 +153,8 @@ def marschner_light(
     level: Floats | float = 0.0,
     tau: Floats | float = -1.0,
 ) -> Floats:
-    """What one light sends to the eye, (..., 3): times irradiance it is radiance, and times
-    occlusion where tau is not known.
+    """Light of one lamp that hair sends to the eye, (..., 3): times irradiance it is radiance, and
+    also times occlusion where tau is unknown.
 
     Args:
         tangent, normal, to_light, to_eye: unit vectors, (..., 3), in one space; the normal is that
@@ -162,7 +162,7 @@ def marschner_light(
         shift_noise, sparkle_noise: in [0, 1].
         absorption: per radius, (..., 3).
         level: see `look_up`.
-        tau: strands in the way of the light on average; negative: not known.
+        tau: mean number of strands that the light passes; negative: unknown.
     """
     angles = strand_angles(tangent, normal, to_light, to_eye, shift_noise, shading)
     scattered = single_scattering(tables, angles, sparkle_noise, absorption, shading, level)

@@ -1,4 +1,4 @@
-"""From what an artist knows, melanin or a colour, to the absorption inside the fibre.
+"""From melanin or a colour to the absorption inside the fibre.
 
 The formulas are those of Blender's Principled Hair (its manual gives them), so that the same
 numbers give the same hair in Cycles. Absorption is per fibre radius.
@@ -20,10 +20,10 @@ from ...arrays import Floats
 EUMELANIN = np.array([0.506, 0.841, 1.653])
 PHEOMELANIN = np.array([0.343, 0.733, 1.924])
 
-#: Blender's: the fraction of light-coloured hair that is left at melanin 1
+#: Blender's minimum of 1 - melanin
 MIN_LIGHTNESS = 1e-4
 
-#: Darkest colour: black itself would ask for absorption without bounds.
+#: Darkest colour: black itself would need infinite absorption.
 MIN_COLOR = 1e-4
 
 #: Chiang et al. 2016, section 4.2: coefficients of rising powers of the azimuthal roughness
@@ -46,7 +46,7 @@ def color_absorption(color: Floats, azimuthal_roughness: float = 0.3) -> Floats:
     """Absorption that gives a mass of hair this colour, (..., 3).
 
     Args:
-        color: linear rgb, (..., 3), taken into [MIN_COLOR, 1].
+        color: linear rgb, (..., 3), clamped to [MIN_COLOR, 1].
         azimuthal_roughness: Blender's radial roughness, in [0, 1].
     """
     logarithm = np.log(np.clip(color, MIN_COLOR, 1.0))
@@ -54,18 +54,18 @@ def color_absorption(color: Floats, azimuthal_roughness: float = 0.3) -> Floats:
 
 
 def absorption_color(absorption: Floats, azimuthal_roughness: float = 0.3) -> Floats:
-    """Colour of a mass of hair with this absorption, (..., 3): color_absorption turned round."""
+    """Colour of a mass of hair with this absorption, (..., 3): the inverse of color_absorption."""
     return np.exp(-np.sqrt(np.maximum(absorption, 0.0)) * _color_fit(azimuthal_roughness))
 
 
 def color_exponent(azimuthal_roughness: float) -> float:
-    """The power of a colour at Blender's usual roughness, 0.3, that is the colour of the same
-    absorption at another one."""
+    """The exponent that turns a colour at Blender's default roughness, 0.3, into the colour of the
+    same absorption at another roughness."""
     return _color_fit(azimuthal_roughness) / COLOR_FACTOR
 
 
 def roughness_widths(roughness: float) -> tuple[float, float, float]:
-    """Widths of R, TT, TRT for Blender's roughness in [0, 1], as Fibre has them, [rad].
+    """Widths of R, TT, TRT, as in Fibre, for Blender's roughness in [0, 1], [rad].
 
     Chiang et al. 2016, equation 7: the root of the variance in theta_r; theta_h has half of it.
     TT is half as wide as R and TRT twice.
@@ -78,5 +78,6 @@ def _color_fit(roughness: float) -> float:
     return sum(factor * roughness**power for power, factor in enumerate(_COLOR_FIT))
 
 
-#: By which a root of absorption is minus the logarithm of a colour, at Blender's usual roughness.
+#: Minus the logarithm of a colour over the square root of its absorption, at Blender's default
+#: roughness.
 COLOR_FACTOR = _color_fit(0.3)

@@ -1,4 +1,4 @@
-"""Blender's Principled Hair to our settings and back: each answers light as the other does.
+"""Conversion of Blender's Principled Hair to our settings and back, so that both look alike.
 
 References:
     Blender's manual, "Principled Hair BSDF", and Cycles, which it describes.
@@ -22,17 +22,17 @@ type Color = tuple[float, float, float]
 
 WHITE: Color = (1.0, 1.0, 1.0)
 
-#: standard deviation of the Gaussian nearest to a logistic, over the logistic's scale: of all their
-#: distribution functions come closest (Camilli 1994)
+#: standard deviation, over a logistic's scale, of the Gaussian whose distribution function is
+#: closest to the logistic's (Camilli 1994)
 _NEAREST_GAUSSIAN = 1.702
-#: Cycles blurs caustics by the width around alone; ours need a little [rad]
+#: Cycles blurs caustics by the azimuthal width alone; ours need a little more [rad]
 _GLINT_WIDTH = float(np.radians(2.0))
 #: Widths of TT and TRT that differ by more than this factor from one roughness are worth a note.
 _UNEVEN = 1.5
-#: Huang's model is taken where a highlight is at most this strong: in Cycles it is darker than ours
-#: by a third, so it is worth it only where Chiang's would be wrong by more.
+#: Strength of a highlight up to which Huang's model is chosen: in Cycles it is darker than ours by
+#: a third, so it is better only where Chiang's would be more wrong than that.
 _WEAK = 0.5
-#: Reflectances at right angles that an index of refraction may stand for
+#: Limits of the reflectance at normal incidence that is converted to an index of refraction
 _REFLECTANCES = 0.01, 0.25
 
 
@@ -41,8 +41,8 @@ class PrincipledHair:
     """The node's inputs, as Blender names them and with its defaults. offset is in radians.
 
     model: "CHIANG" or "HUANG". parametrization: "COLOR", "MELANIN" or "ABSORPTION".
-    reflection, transmission, secondary_reflection, aspect_ratio: of Huang's model alone.
-    radial_roughness, coat: of Chiang's alone.
+    reflection, transmission, secondary_reflection, aspect_ratio: only in Huang's model.
+    radial_roughness, coat: only in Chiang's.
     """
 
     model: str = "CHIANG"
@@ -66,7 +66,7 @@ class PrincipledHair:
 
     @property
     def around(self) -> float:
-        """Roughness around the fibre; Huang's model has but one roughness."""
+        """Azimuthal roughness; Huang's model has only one roughness."""
         roughness = self.radial_roughness if self.model == "CHIANG" else self.roughness
         return _between(roughness, 0.001, 1.0)
 
@@ -74,7 +74,7 @@ class PrincipledHair:
 def settings_from(
     hair: PrincipledHair, before: ShadingSettings | None = None
 ) -> tuple[ShadingSettings, tuple[str, ...]]:
-    """Settings of the model Marschner, and notes on what could not be taken over as it is.
+    """Settings of the model Marschner, and notes on what could not be converted exactly.
 
     Args:
         before: supplies what the node does not have: noise, sparkle, scattered light.
@@ -88,11 +88,11 @@ def settings_from(
 
 
 def hair_from(settings: ShadingSettings) -> tuple[PrincipledHair, tuple[str, ...]]:
-    """The node that answers light as a strand of this look does at its root, `settings_from` turned
-    round, and notes on what it has no input for.
+    """The node that looks like a strand of this look at its root, the inverse of `settings_from`,
+    and notes on what the node has no input for.
 
-    Noise, sparkle and what changes along a strand or between strands are no part of the node, but
-    for the variation of melanin.
+    Noise, sparkle and variation along or between strands are not part of the node, except the
+    variation of melanin.
     """
     notes: list[str] = []
     is_fibre = settings.model == "marschner"
@@ -113,7 +113,7 @@ def hair_from(settings: ShadingSettings) -> tuple[PrincipledHair, tuple[str, ...
 
 
 def _node_of_fibre(settings: ShadingSettings, notes: list[str]) -> dict[str, Any]:
-    """The inputs about the shape of the highlights; one roughness stands for three widths."""
+    """The inputs for the shape of the highlights; one roughness replaces three widths."""
     inner = 0.5 * (2.0 * settings.width_tt + 0.5 * settings.width_trt)
     if max(2.0 * settings.width_tt, 0.5 * settings.width_trt) > _UNEVEN * inner:
         notes.append("Rim Width and Second Width became one Roughness")
@@ -121,7 +121,7 @@ def _node_of_fibre(settings: ShadingSettings, notes: list[str]) -> dict[str, Any
         notes.append("the offsets of single highlights are left out: the node has one Offset")
     roughness = _roughness_of(inner)
     outer = _roughness_of(settings.width_r)
-    # glints are blurred around the fibre at least as much as all else
+    # glints have at least the azimuthal blur of all else
     around = max(settings.azimuthal_width, settings.glint_width)
     values: dict[str, Any] = {
         "roughness": roughness,
@@ -148,7 +148,7 @@ def _node_of_fibre(settings: ShadingSettings, notes: list[str]) -> dict[str, Any
 
 
 def _stronger(index: float, strength: float) -> float:
-    """The index of refraction that reflects `strength` times as much light at right angles.
+    """The index of refraction that reflects `strength` times as much light at normal incidence.
 
     Fresnel's reflectance there is ((n - 1) / (n + 1))^2.
     """
@@ -160,7 +160,8 @@ def _stronger(index: float, strength: float) -> float:
 
 
 def _node_of_highlights(settings: ShadingSettings, notes: list[str]) -> dict[str, Any]:
-    """The same of Kajiya-Kay's two highlights: cos^n of an angle is a Gaussian of 1 / sqrt(n)."""
+    """The same for Kajiya-Kay's two highlights: cos^n of an angle is nearly a Gaussian of 1 /
+    sqrt(n)."""
     notes.append("Kajiya-Kay is no model of a fibre: only colour, width and shift were taken over")
     first, second = (
         float(1.0 / np.sqrt(exponent))
@@ -175,12 +176,13 @@ def _node_of_highlights(settings: ShadingSettings, notes: list[str]) -> dict[str
 
 
 def _roughness_of(width: float) -> float:
-    """Blender's roughness whose R is so wide [rad]."""
+    """Blender's roughness at which R has this width [rad]."""
     return _inverse(lambda roughness: roughness_widths(roughness)[0], width)
 
 
 def _inverse(function: Callable[[float], float], value: float) -> float:
-    """Where in [0, 1] a rising function has this value; an end where it has it nowhere."""
+    """Where in [0, 1] a rising function has this value; an end of the range if it is out of
+    reach."""
     low, high = 0.0, 1.0
     for _ in range(40):
         middle = 0.5 * (low + high)
@@ -191,9 +193,9 @@ def _inverse(function: Callable[[float], float], value: float) -> float:
 def azimuthal_width(roughness: float) -> float:
     """Standard deviation around the fibre for Blender's radial roughness in [0, 1], [rad].
 
-    Of the Gaussian nearest to Chiang's logistic of s = sqrt(pi / 8) (0.265 b + 1.194 b^2 +
-    5.372 b^22), which is 1.702 times as wide (Camilli 1994). (It is trimmed to the circle there,
-    which counts only beyond 0.7.)
+    Of the Gaussian nearest to Chiang's logistic with the scale s = sqrt(pi / 8) (0.265 b + 1.194
+    b^2 + 5.372 b^22): 1.702 s (Camilli 1994). (Chiang trims the logistic to the circle, which
+    matters only beyond 0.7.)
     """
     scale = np.sqrt(np.pi / 8.0) * (
         0.265 * roughness + 1.194 * roughness**2 + 5.372 * roughness**22
@@ -202,7 +204,7 @@ def azimuthal_width(roughness: float) -> float:
 
 
 def _pigment(hair: PrincipledHair, notes: list[str]) -> dict[str, Any]:
-    """What colours the hair; with pigment and dye at once, both as one absorption."""
+    """The settings of colour; melanin and tint together become one absorption."""
     radial = hair.around
     variation = 0.0
     if hair.parametrization == "MELANIN":
@@ -222,7 +224,7 @@ def _pigment(hair: PrincipledHair, notes: list[str]) -> dict[str, Any]:
     else:
         absorption = color_absorption(np.array(hair.color), radial)
         pigment, values = "color", {}
-    # our colour goes by a radial roughness of 0.3: another one asks for another colour
+    # our colour assumes a radial roughness of 0.3: another roughness needs another colour
     color = tuple(absorption_color(absorption).tolist())
     return values | {
         "pigment": pigment,
@@ -233,7 +235,7 @@ def _pigment(hair: PrincipledHair, notes: list[str]) -> dict[str, Any]:
 
 
 def _shape(hair: PrincipledHair, notes: list[str]) -> dict[str, Any]:
-    """What light does at the fibre."""
+    """The settings of the fibre and its highlights."""
     roughness = _between(hair.roughness, 0.001, 1.0)
     coat = _between(hair.coat, 0.0, 1.0) if hair.model == "CHIANG" else 0.0
     width_r, width_tt, width_trt = roughness_widths(roughness)
@@ -266,7 +268,7 @@ def _shape(hair: PrincipledHair, notes: list[str]) -> dict[str, Any]:
 
 
 def _in_range(values: dict[str, Any], notes: list[str]) -> dict[str, Any]:
-    """All within what our settings may be; a note for each that was not."""
+    """The values clamped to the ranges of our settings, with a note for each that was outside."""
     kept = dict(values)
     for parameter in ShadingSettings.parameters():
         if parameter.name not in values or parameter.hard_range is None:

@@ -1,4 +1,4 @@
-"""S, what a fibre makes of light, as the tables approximate it: the reference.
+"""S, the scattering function of a fibre, without the approximation of the tables: the reference.
 
 Reference: Marschner et al. 2003, section 3.2: S = sum over the lobes of M_p N_p / cos^2 theta_d.
 """
@@ -13,7 +13,7 @@ from .fibre import Fibre
 from .interface import MIN_COSINE
 from .longitudinal import longitudinal_lobes
 
-#: Widest step between the places over which azimuthal_width takes its mean, [rad]
+#: Maximum step of the mean over azimuthal_width, [rad]
 _SPREAD_STEP = np.radians(1.0)
 _SPREAD_REACH = 4.5
 _AT_ONCE = 32
@@ -22,7 +22,7 @@ _AT_ONCE = 32
 def marschner(theta_i: Floats, theta_r: Floats, phi: Floats, fibre: Fibre) -> Floats:
     """S(theta_i, theta_r, phi), (..., 3), without tables.
 
-    Times irradiance across the light and cos theta_i it is radiance of the fibre.
+    Times irradiance across the light and cos theta_i, it is the fibre's radiance.
     """
     theta_i, theta_r = np.asarray(theta_i), np.asarray(theta_r)
     cos_d = np.cos(0.5 * (theta_r - theta_i))

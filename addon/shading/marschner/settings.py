@@ -17,7 +17,7 @@ _HAS_NO_SCATTERING = either(
 
 @dataclass(frozen=True, kw_only=True)
 class MarschnerSettings(Settings):
-    """Act in the model Marschner alone. Angles are in radians."""
+    """Parameters of the model Marschner. Angles are in radians."""
 
     index_of_refraction: float = number(
         1.55,

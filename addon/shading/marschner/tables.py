@@ -3,13 +3,13 @@
 Reference: Nguyen and Donnelly 2005, "Hair Animation and Rendering in the Nalu Demo", GPU Gems 2,
 chapter 23: one table for M_p and cos theta_d, one for N_p.
 
-Theirs hold the lobes of one hair colour. Ours hold those of a CLEAR fibre and how far their light
-has gone inside, l, [radii], with its variance v where several ways lead to one phi:
+Theirs hold the lobes of one hair colour. Ours hold those of a CLEAR fibre and the length of their
+light's path inside, l, [radii], with its variance v where several paths lead to one phi:
 
     N_p(absorption) = N_p(0) exp(-absorption l_p + absorption^2 v_p / 2),
 
-the first terms of the logarithm of a mean of exponentials. So colour, melanin, strands that differ,
-tips and strengths rebuild nothing; only the fibre's shape does.
+the first terms of the logarithm of a mean of exponentials. So changes of colour, melanin,
+variation, tips and strengths need no new tables; only those of the fibre's shape do.
 
 Layout, float32, bottom row first as the GPU has them:
     longitudinal (LEVELS, size, size, 4): column theta_i, row theta_r, each from -pi/2 to pi/2;
@@ -20,9 +20,9 @@ Layout, float32, bottom row first as the GPU has them:
 The first and last texels' CENTRES lie on the ends of an axis: u = ((size - 1) x + 0.5) / size; a
 level lies at w = (level + 0.5) / LEVELS.
 
-Two axes differ from the paper's cosines. Angles keep narrow lobes equally sharp everywhere, where
-the sines starve grazing light. By cos phi a texel next to phi = 0 would be as wide as a glint, and
-N_R would end in a root at phi = pi.
+Two axes are angles instead of the paper's cosines. Inclinations keep narrow lobes equally sharp
+everywhere, while sines would have few texels for grazing light. With cos phi, a texel next to phi =
+0 would be as wide as a glint, and N_R would fall like a square root at phi = pi.
 """
 
 from __future__ import annotations
@@ -37,22 +37,23 @@ from .fibre import Fibre
 from .interface import MIN_COSINE
 from .longitudinal import longitudinal_lobes
 
-#: While a slider moves, and at rest: texels along a side.
+#: Texels along a side, while a slider moves and at rest.
 PREVIEW_SIZE = 64
 DEFAULT_SIZE = 256
 
-#: Of the longitudinal table: means over 1, 2, 4, ... texels.
+#: Levels of the longitudinal table: means over 1, 2, 4, ... texels.
 LEVELS = 6
 
-#: The absorptions at which paths are fitted. Rays of TT are nearly alike, so the last one tells
-#: their length; those of the rest differ, and what is not absorbed at once matters most: the first.
+#: The absorptions at which paths are fitted. Rays of TT are nearly alike, so the largest absorption
+#: gives their length. Rays of the rest differ, and those that are absorbed least matter most: a
+#: small one gives it.
 _FITTED = (0.0, 0.1, 1.0)
 
-#: What a lobe has at least where its ways are asked for, and in a logarithm.
+#: Minimum of a lobe where its paths are defined, and in a logarithm.
 _MIN_LIT = 1e-12
 _MIN_LIGHT = 1e-100
 
-#: Keeps a quotient from 0 where all ways are equally long.
+#: Minimum variance in a quotient: it is 0 where all paths are equally long.
 _MIN_VARIANCE = 1e-6
 
 
@@ -96,7 +97,7 @@ def longitudinal_table(fibre: Fibre, size: int) -> Floats:
 
 
 def azimuthal_tables(fibre: Fibre, size: int) -> tuple[Floats, Floats]:
-    """N_p of the clear fibre and the lengths of their ways, by cos theta_d and phi."""
+    """N_p of the clear fibre and the lengths of their paths, by cos theta_d and phi."""
     axis = np.linspace(0.0, 1.0, size)
     cos_d, phi = axis[None, :], np.pi * axis[:, None]
     fibre, width = replace(fibre, absorption=_FITTED), fibre.azimuthal_width
@@ -130,7 +131,8 @@ def look_up(
         theta_i, theta_r, phi: [rad]; phi in [-pi, pi].
         absorption: per radius, (..., 3).
         strengths: of R, TT, TRT and the rest, (..., 4).
-        level: of the longitudinal table: log2 of the steps of theta_h, pi / (size - 1), in a pixel.
+        level: of the longitudinal table: log2 of the number of steps of theta_h, pi / (size - 1),
+            in a pixel.
     """
     along = trilinear(tables.longitudinal, theta_i / np.pi + 0.5, theta_r / np.pi + 0.5, level)
     cos_d, turn = along[..., 3], np.abs(phi) / np.pi
@@ -147,9 +149,9 @@ def table_level(angle: float, size: int) -> float:
 
 
 def kept_light(paths: Floats, absorption: Floats) -> Floats:
-    """What absorption leaves of R, TT, TRT and the rest, (..., 4, 3).
+    """The fractions of R, TT, TRT and the rest that absorption leaves, (..., 4, 3).
 
-    Where the fitted parabola would rise again, it stays at its lowest.
+    Where the fitted parabola would rise again, it stays at its minimum.
     """
     l_tt, l_trt, v_trt, l_rest = np.moveaxis(paths[..., None], -2, 0)
     reached = np.minimum(absorption, l_trt / np.maximum(v_trt, _MIN_VARIANCE))
@@ -196,9 +198,9 @@ def _path_and_variance(lobe: Floats) -> tuple[Floats, Floats]:
 
 
 def _evenly_on(path: Floats, lobe: Floats) -> Floats:
-    """Paths (size of phi, size of cos theta_d) that go on where their lobe has no light.
+    """Paths (size of phi, size of cos theta_d), continued to where their lobe has no light.
 
-    The texture is read between texels, so beside the light a path must not jump.
+    The texture is interpolated, so a path must not jump at the border of its lobe.
     """
     is_lit = lobe[..., 0] > _MIN_LIT
     last = np.maximum.accumulate(np.where(is_lit, np.arange(len(path))[:, None], -1), axis=0)
@@ -208,8 +210,9 @@ def _evenly_on(path: Floats, lobe: Floats) -> Floats:
 def _twice_as_blurred(table: Floats, level: int) -> Floats:
     """Means over twice as many texels along theta_h, the ends repeated.
 
-    Along theta_h both indices go on together. Two boxes of 2^level, side by side; the first is one
-    texel, and the box between texels' centres gives the outer two half of their weight.
+    Along theta_h both indices increase together. Each mean joins two boxes of 2^level texels, side
+    by side. At level 0 a box of two texels is centred on a texel, so that the outer texels have
+    half of their weight.
     """
     reach = max(1 << level, 2) >> 1
     padded = np.pad(table, [(reach, reach), (reach, reach), (0, 0)], mode="edge")
@@ -218,7 +221,7 @@ def _twice_as_blurred(table: Floats, level: int) -> Floats:
 
 
 def trilinear(table: Floats, x: Floats, y: Floats, level: Floats | float) -> Floats:
-    """A texture of levels, (levels, rows, columns, 4), between two of its levels."""
+    """A texture of levels, (levels, rows, columns, 4), interpolated between two levels."""
     place = np.clip(level, 0.0, len(table) - 1.0)
     below = np.minimum(np.floor(place).astype(np.int64), len(table) - 2)
     lower, upper = bilinear(table, x, y, below), bilinear(table, x, y, below + 1)
@@ -228,7 +231,7 @@ def trilinear(table: Floats, x: Floats, y: Floats, level: Floats | float) -> Flo
 def bilinear(table: Floats, x: Floats, y: Floats, *level: Ints) -> Floats:
     """A texture at x (columns) and y (rows) in [0, 1] between the centres of its end texels.
 
-    Of a texture of levels, the one asked for.
+    `level` selects one of a texture of levels.
     """
     rows, columns = table.shape[-3:-1]
     column, right = _between(x, columns)

@@ -11,17 +11,18 @@ import numpy as np
 
 from ...arrays import Bools, Floats, Ints
 
-#: [texels] a texel so far outside a triangle still counts as covered, so that none falls between
-#: two of them; so far inside two of them, they overlap
+#: [texels] a texel this far outside a triangle still counts as covered, so that none falls between
+#: two triangles; two triangles overlap if it lies this far inside both
 _TOLERANCE, _OVERLAP = 1e-3, 1e-6
-#: [texels] where a texel is asked, from its middle: edges of tidy maps run through middles
+#: [texels] offset from a texel's middle to where it is tested: edges of tidy maps run through
+#: middles
 _ASIDE = (0.0137, 0.0071)
 _REACH = _TOLERANCE + max(_ASIDE)
 #: [texels^2] smaller triangles have no place in the map
 _MIN_AREA = 1e-7
-#: [UV units] a map that is smaller is none
+#: [UV units] minimum extent of a map
 _MIN_EXTENT = 1e-9
-#: pairs of triangle and texel that are looked at together
+#: pairs of triangle and texel in one batch
 _PAIRS = 1_000_000
 
 
@@ -70,7 +71,7 @@ def covering(chart: Chart) -> tuple[Ints, Bools]:
         np.add.at(layers, texel[inside > _OVERLAP], 1)
         order = np.argsort(inside, kind="stable")
         order = order[inside[order] > -_TOLERANCE]
-        # the last one stays: the deepest inside
+        # the last write wins: the deepest inside
         order = order[inside[order] > depth[texel[order]]]
         depth[texel[order]], triangle[texel[order]] = inside[order], chosen[order]
     return triangle.reshape(chart.shape), (layers > 1).reshape(chart.shape)

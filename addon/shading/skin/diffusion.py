@@ -1,4 +1,4 @@
-"""Light that spreads along the skin, in the head's UV map: a blur that is even in the world.
+"""Diffusion of light along the skin, in the head's UV map: a blur of even width in world space.
 
 Reference: Green 2004, GPU Gems, chapter 16; D'Eon and Luebke 2007, GPU Gems 3, chapter 14.
 Twin of gpu_shaders/skin_blur.comp.glsl and lib_skin.glsl.
@@ -16,17 +16,17 @@ from .near_borders import along_border
 KERNEL_REACH, KERNEL_TAPS = 2.5, 24
 #: lights whose shadow one texture holds
 SKIN_LIGHTS = 4
-#: [texels] sides of a seam that are nearer to each other have the same texels
+#: [texels] two sides of a seam that are closer than this in the map share texels
 NARROW = 1.0
-#: below this fraction of known texels there is nothing to be said
+#: minimum fraction of known texels for a value
 MIN_KNOWN = 1e-6
 
 
 def blurred(values: Floats, layout: SkinLayout, softness: float, axis: int) -> Floats:
     """Values (rows, columns, channels), spread along rows (axis 0: along x) or columns (axis 1).
 
-    Each texel is the mean of those of its own island, by a Gaussian of its own width. What the map
-    skews is taken as if it did not, so that the width is right in the mean of both directions.
+    Each texel is the mean of texels of its own island, by a Gaussian of the texel's own width. Skew
+    of the map is ignored, so the width is right only in the mean of both directions.
 
     Args:
         softness: standard deviation [m].
@@ -55,15 +55,15 @@ def soft_shadow(
     """Values at places (n, 2) of islands (n,), (n, channels), the same on both sides of a seam; and
     the fraction of them that is known, (n,).
 
-    What the blur has left of a difference is taken half and half to both sides, less and less away
-    from the seam.
+    The difference that the blur leaves between the two sides is closed by half on each side, less
+    and less away from the seam.
     """
     found, known = looked_up(values, layout.island, place, island)
     seam = _seam_at(layout, place, island)
     if not (seam >= 0).any():
         return found, known
     ends = layout.seams[seam]
-    # at the tip of a slit a texel may know only the other side of the same island
+    # at the tip of a slit a texel may refer only to the other side of the same island
     is_same = layout.seam_islands[seam, 0] == layout.seam_islands[seam, 1]
     is_turned = is_same & (_distance(place, ends[..., 2:]) < _distance(place, ends[..., :2]))
     ends = np.where(is_turned[:, None, None], ends[..., [2, 3, 0, 1]], ends)
@@ -78,7 +78,7 @@ def soft_shadow(
     nearness = np.clip(1.0 - np.linalg.norm(place - on_seam[:, :2], axis=1) / CLOSING, 0.0, 1.0)
     fade = nearness * nearness * (3.0 - 2.0 * nearness)
     fade = np.where((seam >= 0) & (is_known > 0.0), fade, 0.0)
-    # where the two sides lie on the same texels both take what lies between them
+    # where both sides lie on the same texels, both read between them
     gap = on_seam[:, 2:] - on_seam[:, :2]
     is_narrow = is_same & (np.linalg.norm(gap, axis=1) < NARROW)
     between = place + 0.5 * fade[:, None] * np.where(is_narrow[:, None], gap, 0.0)
@@ -88,8 +88,8 @@ def soft_shadow(
 
 
 def corner_shifts(values: Floats, layout: SkinLayout) -> Floats:
-    """By how much the mean of all sides that meet at each seam's ends is more than the mean of its
-    own two, (seam_count, 2, channels): nought but where three or more seams meet.
+    """Mean of all sides that meet at each seam's ends, minus the mean of its own two, (seam_count,
+    2, channels); 0 unless three or more sides meet.
     """
     places, islands = layout.copies[:, :2], layout.copies[:, 2].astype(int)
     found, known = looked_up(values, layout.island, places, islands)
@@ -106,7 +106,8 @@ def corner_shifts(values: Floats, layout: SkinLayout) -> Floats:
 
 
 def _seam_at(layout: SkinLayout, place: Floats, island: Ints) -> Ints:
-    """The nearest of the seams that the texels around each place know; -1 where they know none."""
+    """The nearest of the seams that the texels around each place refer to; -1 where there is
+    none."""
     nearest, seam = np.full(len(place), np.inf), np.full(len(place), -1)
     for corner in range(4):
         row, column = _texel_around(layout.island.shape, place, corner)
@@ -129,8 +130,8 @@ def _distance(place: Floats, edge: Floats) -> Floats:
 def looked_up(
     values: Floats, texel_island: Ints, place: Floats, island: Ints
 ) -> tuple[Floats, Floats]:
-    """Values between texels at places (n, 2), of texels of these islands (n,) alone, (n, channels);
-    and the fraction of them, (n,).
+    """Values interpolated at places (n, 2), from texels of these islands (n,) alone, (n, channels);
+    and the weight of such texels, (n,).
     """
     fraction = place - 0.5 - np.floor(place - 0.5)
     total, known = np.zeros((len(place), values.shape[-1])), np.zeros(len(place))

@@ -12,15 +12,15 @@ from .chart import Chart, barycentric
 from .near_borders import along_border
 from .seams import Borders
 
-#: [texels] how far an island goes on where nothing lies across: for look-ups between texels
+#: [texels] how far an island continues where nothing lies across, for interpolation
 _RIM = 2.0
-#: [texels] a place may lie so far outside the triangle that it is said to lie in
+#: [texels] maximum distance of a place from the triangle that it is assigned to
 _SLACK = 1.0
 
 
 @dataclass(frozen=True, eq=False)
 class Gutter:
-    """Skin that places beyond borders show, (n, ...).
+    """Skin that is shown at places beyond borders, (n, ...).
 
     triangle, weights: of all three corners; is_shown: whether there is any.
     rim: weights of the nearest place on the border, in the border's own triangle.
@@ -89,7 +89,8 @@ def placed(chart: Chart, triangle: Ints, weights: Floats) -> Floats:
 def _unfolded(
     surface: Surface, chart: Chart, borders: Borders, border: Ints, points: Floats
 ) -> Floats:
-    """Where the triangle across the seam has a place in the map that lies beyond it in ours.
+    """Where, in the map of the triangle across the seam, a place lies that is beyond the seam in
+    ours.
 
     The two triangles are laid flat side by side, as large as they are in the world.
     """
@@ -97,7 +98,7 @@ def _unfolded(
     ends = borders.start[border], borders.end[border]
     along, height, aside = _shape(surface, own, *ends)
     start, edge, third = _corners(chart, own, *ends)
-    # what an own place is in metres along the edge, and away from the own triangle
+    # the place in metres along the edge, and away from the own triangle
     offset = points - start
     area = edge[:, 0] * third[:, 1] - edge[:, 1] * third[:, 0]
     by_third = (edge[:, 0] * offset[:, 1] - edge[:, 1] * offset[:, 0]) / area
@@ -114,7 +115,7 @@ def _unfolded(
 
 
 def _corners(chart: Chart, triangle: Ints, start: Ints, end: Ints) -> tuple[Floats, Floats, Floats]:
-    """An edge's start in the map, the way to its end, and the way to the third corner."""
+    """An edge's start in the map, and from there the vectors to its end and to the third corner."""
     place = chart.place
     first, third = place[triangle, start], place[triangle, 3 - start - end]
     return first, place[triangle, end] - first, third - first
@@ -123,8 +124,8 @@ def _corners(chart: Chart, triangle: Ints, start: Ints, end: Ints) -> tuple[Floa
 def _shape(
     surface: Surface, triangle: Ints, start: Ints, end: Ints
 ) -> tuple[Floats, Floats, Floats]:
-    """Length of an edge, height of the triangle above it, and how far along it its top stands, all
-    [m]; those without area as if they had a little.
+    """Length of an edge, height of the triangle above it, and position of the third corner along
+    it, all [m]; triangles without area count as if they had a little.
     """
     corners = surface.corners[triangle].astype(np.float64)
     number = np.arange(len(triangle))

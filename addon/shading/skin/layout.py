@@ -4,8 +4,8 @@ Reference: Green 2004, GPU Gems, chapter 16, "Real-Time Approximations to Subsur
 D'Eon and Luebke 2007, GPU Gems 3, chapter 14, for the stretch of the map.
 
     gutter | island       A texel in the gutter beside a seam shows the skin on the seam's other
-     x x x | + + +        side, as if the island there had been unfolded once more: so what is
-     x x x | + + +        blurred does not end at the seam. Where islands lie closer together than
+     x x x | + + +        side, as if the island there had been unfolded once more: so the
+     x x x | + + +        blur does not end at the seam. Where islands lie closer together than
      x x x | + + +        their gutters are wide, a gutter ends half way.
 
 A texel is blurred with texels of its own island, and of that island's gutter, alone.
@@ -28,7 +28,7 @@ from .seams import Borders, copies_of, find_borders
 GUTTER = 32
 #: [texels] how far from a seam its two sides begin to be blended
 CLOSING = 8.0
-#: [m a texel] no skin is mapped more finely
+#: [m per texel] minimum of the stretch
 _MIN_STRETCH = 1e-9
 
 
@@ -40,10 +40,11 @@ class SkinLayout:
     triangle, weights: the skin that it shows; weights of the second and third corner.
     stretch: [m] of skin that a texel is wide, and high.
     seam: number of the island's nearest seam; -1 where none is as near as CLOSING.
-    seams: (seam_count, 2, 4) each seam's start and end: x and y as its own island has them, and as
-        the one across; seam_islands: (seam_count, 2) the two islands.
+    seams: (seam_count, 2, 4) each seam's start and end: x and y in its own island, and in the one
+        across; seam_islands: (seam_count, 2) the two islands.
     copies: (n, 3) x, y and island of all places of the vertices at seams' ends; end_copies:
-        (seam_count, 2, 2) the first one of a start and of an end, and how many there are.
+        (seam_count, 2, 2) for its start and its end, the first row of `copies` and how many there
+        are.
     place: (triangle_count, 3, 2) of the corners; triangle_island: (triangle_count,).
     """
 
@@ -66,7 +67,7 @@ class SkinLayout:
 
 
 def skin_layout(surface: Surface, resolution: int) -> SkinLayout:
-    """The layout of a surface: depends on its triangles and UVs, and on its shape as it is now.
+    """The layout of a surface: depends on its triangles and UVs, and on its current shape.
 
     It is empty where there are no UVs.
 
@@ -153,10 +154,10 @@ def _copies(
 
 
 def _corner_stretch(surface: Surface, chart: Chart, triangle_island: Ints) -> Floats:
-    """[m] that a texel is wide and high at each corner, (triangle_count, 3, 2).
+    """Width and height of a texel at each corner [m], (triangle_count, 3, 2).
 
-    The mean of the triangles around a vertex, by their area in the map: as D'Eon and Luebke blur
-    it, since it jumps from triangle to triangle.
+    The mean of the triangles around a vertex, weighted by their area in the map, since the size
+    jumps from triangle to triangle (D'Eon and Luebke blur it).
     """
     found = np.ones((len(chart.place), 3, 2))
     mapped = np.flatnonzero(chart.is_mapped)

@@ -7,7 +7,7 @@ import numpy as np
 from ...arrays import Floats, Ints, number_in_piece
 from .seams import Borders
 
-#: [texels] along a border from one texel that the search starts from to the next
+#: [texels] step along a border between the seeds of the search
 _SEED_STEP = 0.5
 _NEIGHBOURS = tuple((x, y) for y in (-1, 0, 1) for x in (-1, 0, 1) if x or y)
 
@@ -17,11 +17,11 @@ def nearest_borders(
 ) -> Ints:
     """The number of the nearest border of each texel, (rows, columns), -1 where none is in reach.
 
-    A texel inside an island looks at that island's borders alone, one outside at all of them. The
+    For a texel inside an island only that island's borders count, outside all of them do. The
     search spreads from the borders, one ring of texels after the other.
 
     Args:
-        island: (rows, columns) of covered texels; -1 outside, -2 where nothing is to be found.
+        island: (rows, columns) of covered texels; -1 outside, -2 for texels to leave out.
         reach: [texels].
     """
     rows, columns = island.shape
@@ -42,7 +42,7 @@ def nearest_borders(
         is_own = (flat[texel] == -1) | (flat[texel] == of_border[border])
         is_better = is_own & (far <= reach) & (far < distance[texel] - 1e-9)
         texel, border, far = texel[is_better], border[is_better], far[is_better]
-        # the last one of a texel stays: the nearest, of these the first
+        # the last write to a texel wins: its nearest border, of equal ones the first
         order = np.lexsort([-border, -far])
         distance[texel[order]], nearest[texel[order]] = far[order], border[order]
         ring = np.unique(texel)
@@ -68,7 +68,7 @@ def _distance(points: Floats, start: Floats, end: Floats) -> Floats:
 
 
 def _seeds(start: Floats, end: Floats, columns: int, rows: int) -> tuple[Ints, Ints]:
-    """Texels along each border, and whose they are."""
+    """Texels along each border, and the border of each."""
     count = np.ceil(np.linalg.norm(end - start, axis=1) / _SEED_STEP).astype(int) + 1
     border = np.repeat(np.arange(len(start)), count)
     number = number_in_piece(count)

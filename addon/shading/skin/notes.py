@@ -1,4 +1,4 @@
-"""What the artist should know about a head's UVs, where its shadow is to be soft."""
+"""Notes for the artist on a head's UVs, where its shadow should be soft."""
 
 from __future__ import annotations
 
@@ -7,16 +7,16 @@ from ..volume.settings import VolumeSettings
 from .chart import chart_of, covering
 from .settings import SkinSettings
 
-#: texels along the longer side of a map that is only looked through for overlaps
+#: texels along the longer side of a map that is only checked for overlaps, and its margin
 _RESOLUTION, _MARGIN = 256, 2
-#: a fraction of overlapping texels that nobody sees
+#: fraction of overlapping texels that is not reported
 _FEW = 0.002
 
 
 def skin_notes(
     head: Surface | None, settings: SkinSettings, volume: VolumeSettings
 ) -> tuple[str, ...]:
-    """Where the shadow on a head keeps its hard edges though it is to be soft, and why."""
+    """Where the shadow on a head keeps hard edges though it should be soft, and why."""
     is_wanted = settings.soft_shadow and settings.softness and volume.shadows != "none"
     return () if head is None or not is_wanted else uv_notes(head)
 

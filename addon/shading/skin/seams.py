@@ -15,9 +15,9 @@ _SAME_PLACE = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class Borders:
-    """Edges where an island of the map ends, each as its island sees it.
+    """Edges where an island of the map ends, each from the side of its island.
 
-    triangle, start, end: (n,) whose edge it is, and which of its corners.
+    triangle, start, end: (n,) the edge's triangle, and which of its corners are the edge's ends.
     other, other_start, other_end: the same for the triangle across the seam, corner by corner;
         other is -1 where the mesh itself ends, or where more than two triangles meet.
     """
@@ -104,7 +104,7 @@ def _partners(key: Ints) -> Ints:
 
 
 def _connected(edges: Ints, count: int) -> Ints:
-    """The least number that is connected to each of `count` things, (count,)."""
+    """The lowest number that is connected to each of `count` things, (count,)."""
     label = np.arange(count)
     while len(edges):
         least = label[edges].min(axis=1)

@@ -1,4 +1,4 @@
-"""What the artist sets about the shadow of hair on skin."""
+"""Settings of the shadow of hair on skin."""
 
 from __future__ import annotations
 

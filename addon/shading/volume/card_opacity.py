@@ -1,15 +1,15 @@
-"""How much hair a card stands for in opacity maps.
+"""Optical depth of hair cards in opacity maps.
 
-Strands that cover a place at random, tau times over, leave exp(-tau) of it open (Poisson). A card
-whose texture covers alpha of a place leaves 1 - alpha open, so it stands for -log(1 - alpha)
-strands, one behind the other. That is more than a groom has, because cards are opaque where they
-stand for few strands too, so cards of a groom count by a thickness at which all of them together
-throw as much shadow as its strands.
+Strands that lie at random and cover a place tau times over leave exp(-tau) of it open (Poisson). A
+card whose texture covers alpha of a place leaves 1 - alpha open, so it counts as -log(1 - alpha)
+strands, one behind the other. That is more than a groom has, because cards are opaque even where
+they represent few strands. So a groom's cards are scaled by a thickness at which all of them
+together cast as much shadow as its strands.
 
-Cards of baked strands have view-compensated alpha and count as strands do from all sides: turned
-about its strands a card gets narrower, they do not. And its strands fill a depth: the one that is
-seen lies near the front of it, so light from the front meets few of the others before it, and light
-from behind most of them.
+Cards of baked strands have view-compensated alpha and block light as strands do from all sides:
+turned about its strands, a card gets narrower, but its strands do not. These strands also fill a
+depth: the visible one lies near the front, so light from the front passes few of the others before
+it, and light from behind most of them.
 
 Twin of gpu_shaders/lib_card_opacity.glsl and lib_card_shadows.glsl.
 """
@@ -26,21 +26,21 @@ from ...strands.arc_length import along, steps
 from ...strands.triangles import areas_of
 from ..settings import StrandSettings
 
-#: a card lets at least as much light through as this leaves: four strands are as good as a wall
+#: highest alpha a card counts with: it blocks as much light as four strands
 MAX_ALPHA = 0.98
 #: mean of |cos| over all turns of a card about its strands
 MEAN_TURN = 2.0 / np.pi
-#: where a card is nearly on edge, it counts as this far turned to the eye, or to the light
+#: minimum |cos| of the turn of a card, when it is nearly on edge to the eye or to the light
 MIN_FACING = 0.1
-#: how much of an upright piece's length a layer of shells shows, squared
+#: fraction of an upright piece's length that a layer of shells shows, squared
 UPRIGHT_SHOWN = 0.5
-#: of fewer strands than that any may be the one that is seen, and more are as good as a wall [1]
+#: range to which the number of strands on a ray of the eye is clamped [1]
 MIN_SEEN, MAX_SEEN = 0.05, 60.0
 #: depth of strands below which they lie in a plane [m]
 MIN_DEPTH = 1.0e-5
-#: how fast what is before a strand changes with the side that light comes from, over |cos|
+#: slope, over |cos|, of the blend between light from the front and from behind
 SIDEDNESS = 2.0
-#: counts of strands are at least this part of them apart
+#: minimum relative difference between counts of strands, whose difference is a divisor
 APART = 1.0e-3
 
 
@@ -50,7 +50,7 @@ def card_optical_depth(alpha: Floats) -> Floats:
 
 
 def turned_facing(across: Floats, tangent: Floats, direction: Floats) -> Floats:
-    """|cos| of the turn about its strands by which a card faces a direction, (...).
+    """|cos| of a card's turn, about its strands, away from facing a direction, (...).
 
     Args:
         across: (..., 3) normal of its plane, of any length.
@@ -63,11 +63,11 @@ def turned_facing(across: Floats, tangent: Floats, direction: Floats) -> Floats:
 
 
 def layer_facing(across: Floats, tangent: Floats, direction: Floats) -> Floats:
-    """How much denser a layer of shells is as it was baked than from a direction, (...).
+    """Optical depth of a layer of shells as baked, over that from a direction, (...).
 
-    A slab of hair, in which strands run along the tangent, covers sin(tangent, direction) / |cos|
-    of the slant; baked it covers what is seen from straight above, and of upright strands a part
-    of their length. Arguments of `turned_facing`, but the tangent may stand out of the plane.
+    A slab of hair whose strands run along the tangent covers sin(tangent, direction) / |cos| of the
+    slant. As baked, it covers what is seen from straight above, and a part of the length of upright
+    strands. Arguments of `turned_facing`, but the tangent may stand out of the plane.
     """
     front = across / np.maximum(np.linalg.norm(across, axis=-1, keepdims=True), 1.0e-30)
     upright = np.sum(tangent * front, axis=-1)
@@ -79,19 +79,18 @@ def layer_facing(across: Floats, tangent: Floats, direction: Floats) -> Floats:
 
 
 def view_compensated_depth(across: Floats, tangent: Floats, direction: Floats) -> Floats:
-    """Factor of the tau that light from a direction meets in a card of view-compensated alpha,
-    (...): its mean over all turns of the card, times |cos|, is that of a flat card; arguments of
-    `turned_facing`."""
+    """Factor on tau, for light from a direction, of a card of view-compensated alpha, (...): times
+    |cos|, its mean over all turns is that of a flat card. Arguments of `turned_facing`."""
     factor: Floats = MEAN_TURN / np.maximum(turned_facing(across, tangent, direction), MIN_FACING)
     return factor
 
 
 def seen_depth(seen: Floats) -> Floats:
-    """How far behind the front of a card's strands lies the one that is seen on the mean, (...), as
-    a fraction of their depth: an eye meets the first of strands at random.
+    """Mean depth of the visible strand behind the front of a card's strands, (...), as a fraction
+    of their depth: the eye meets the first of strands that lie at random.
 
     Args:
-        seen: how many strands of the card an eye meets, tau.
+        seen: number of the card's strands on a ray of the eye, tau.
     """
     few = np.clip(seen, MIN_SEEN, MAX_SEEN)
     depth: Floats = 1.0 / few - 1.0 / np.expm1(few)
@@ -99,17 +98,19 @@ def seen_depth(seen: Floats) -> Floats:
 
 
 def own_strands(seen: Floats, own: Floats, near: Floats, front: Floats) -> tuple[Floats, Floats]:
-    """tau of the other strands of a card before the one that is seen, and beyond it, (...) each.
+    """tau of a card's other strands between the light and the visible one, and beyond it, (...)
+    each.
 
-    Eye and light come different ways, so what is clear to the one is as full as the rest to the
-    other. The strand that is seen has a depth s with p(s) = seen exp(-seen s) / (1 - exp(-seen)).
-    The light that comes to it is the integral of p(s) exp(-own max(s - near, 0)), and from behind
-    of p(s) exp(-own max(1 - s - near, 0)).
+    Eye and light look along different rays, so what is clear for the eye is as full as the rest for
+    the light. The visible strand lies at a depth s with the density p(s) = seen exp(-seen s) / (1 -
+    exp(-seen)). The light that reaches it is the integral of p(s) exp(-own max(s - near, 0)) from
+    the front, and of p(s) exp(-own max(1 - s - near, 0)) from behind.
 
     Args:
-        seen, own: how many strands of the card an eye meets, and the light, tau.
-        near: how near to the one that is seen they do not count, as a fraction of their depth.
-        front: 1 where light comes from the eye's side of the card, 0 where from behind.
+        seen, own: number of the card's strands on a ray of the eye, and of the light, tau.
+        near: distance from the visible strand within which others do not count, as a fraction of
+            their depth.
+        front: 1 for light from the eye's side of the card, 0 for light from behind.
     """
     a, b = np.clip(seen, MIN_SEEN, MAX_SEEN), np.clip(own, 0.0, MAX_SEEN)
     b = np.where(np.abs(b - a) < APART * a, (1.0 + APART) * a, b)
@@ -123,12 +124,13 @@ def own_strands(seen: Floats, own: Floats, near: Floats, front: Floats) -> tuple
 
 
 def own_tips(own: Floats, tau: Floats, front: Floats) -> tuple[Floats, Floats]:
-    """The same of short hair, of which one sees a tip, with the others beside it.
+    """The same for short hair, of which a tip is visible, with the others beside it.
 
-    Where tau strands lie at random and one at least, it has tau / (1 - exp(-tau)) - 1 beside it.
+    Among strands that lie at random, tau on average and at least one, a strand has tau / (1 -
+    exp(-tau)) - 1 others beside it.
 
     Args:
-        own: how much of the card light meets. tau: of the card.
+        own: tau of the card for the light. tau: of the card.
         front: fraction of its other strands that the light meets later.
     """
     few = np.maximum(tau, MIN_SEEN)
@@ -140,8 +142,8 @@ def own_tips(own: Floats, tau: Floats, front: Floats) -> tuple[Floats, Floats]:
 class StrandArea:
     """Areas of all strands [m^2], the sums of their lengths times widths.
 
-    whole: as wide as they are everywhere. weighted: each place counts by how far it is from the
-        root, 0 to 1.
+    whole: with their own widths. weighted: each place weighted by its position from the root, 0 to
+        1.
     """
 
     whole: float
@@ -157,7 +159,8 @@ class StrandArea:
         return cls(float(area.sum()), float((area * middle).sum()))
 
     def shadow_area(self, strands: StrandSettings) -> float:
-        """What they take of light from everywhere [m^2]: pi / 4 of their area, as cylinders."""
+        """Area that blocks light from everywhere [m^2]: pi / 4 of the strands' area, as
+        cylinders."""
         tapered = self.whole + (strands.tip_width - 1.0) * self.weighted
         return 0.25 * np.pi * strands.fullness * strands.as_drawn.opacity * tapered
 
@@ -166,16 +169,17 @@ class StrandArea:
 _PLACES = (np.array([[4, 1, 1], [1, 4, 1], [1, 1, 4], [2, 2, 2]]) / 6.0).astype(np.float32)
 
 
-#: Of a layer of shells, which shows pieces of strands and no locks (measured: the short coat).
+#: `lit_level` of layers of shells, which show pieces of strands and no clumps (measured: the short
+#: coat).
 SHELL_LIT_LEVEL = 2
-#: Levels by which a light's map is coarser than an atlas, about; and texels across a tile at least.
+#: Levels by which a light's map is coarser than an atlas, roughly; minimum of texels across a tile.
 _COARSER, _ACROSS = 3, 8
 
 
 def lit_level(shape: tuple[int, ...], columns: int, rows: int) -> int:
     """The level of a card's alpha from which its tau is taken for any light.
 
-    It is the same everywhere: of a coarser level, in which strands and gaps are mixed, tau is less.
+    The same one everywhere, because tau is lower in coarser levels, which mix strands and gaps.
 
     Args:
         shape: of the alpha, (height, width). columns, rows: of its tiles.
@@ -187,8 +191,8 @@ def lit_level(shape: tuple[int, ...], columns: int, rows: int) -> int:
 def card_shadow_area(
     positions: Floats, triangles: Ints, uv: Floats, alpha: Floats, level: int = 0
 ) -> float:
-    """What cards of thickness 1 would take of light from everywhere [m^2]: half of their area,
-    as flat things, times tau.
+    """Area of cards of thickness 1 that blocks light from everywhere [m^2]: half of their area, as
+    they are flat, times tau.
 
     Args:
         positions: (vertex_count, 3) [m]. uv: (vertex_count, 2). alpha: (height, width).
@@ -204,7 +208,7 @@ def card_shadow_area(
 
 
 def _coarser(alpha: Floats, axis: int, level: int) -> Floats:
-    """A level along an axis, as mip maps have it."""
+    """A mip level along one axis."""
     starts = np.arange(0, alpha.shape[axis], 1 << level)
     texels = np.diff(np.append(starts, alpha.shape[axis]))
     sums = np.add.reduceat(alpha, starts, axis=axis, dtype=np.float32)

@@ -1,23 +1,23 @@
-"""Dual scattering: light that reaches a strand from others, on its way in and from behind.
+"""Dual scattering: light that reaches a strand through others and back from others behind it.
 
 Reference: Zinke, Yuksel, Weber and Keyser 2008, "Dual Scattering Approximation for Fast Multiple
-Scattering in Hair". Light comes to a place straight, or forward through the n strands between it
-and the light; and what it lights there are the place itself and the strands around, which send a
-part of it back and forth.
+Scattering in Hair". Light reaches a place straight, or scattered forward by the n strands between
+it and the light. There it lights the place itself and the strands around, which send a part of it
+back and forth.
 
-What we do otherwise:
-    How many strands lie between is not a whole number but a mean, tau of the opacity maps. Strands
-        that lie at random are met as often as Poisson has it, so the mean of a_f^n is
+Differences:
+    The number of strands between is not a whole number but a mean, tau of the opacity maps. For
+        strands that lie at random it is distributed after Poisson, so the mean of a_f^n is
         exp(-tau (1 - a_f)), of which exp(-tau) has met none: no threshold, and no jump.
-    What returns out of the hair behind is summed to the end, not to its third term, and for as many
-        strands as there are: deep white hair gives all light back, a thin layer what it can.
-    Lobes around the fibre are held by two numbers each, what they send on and what they send back,
-        in place of tables of every azimuth: light from half a circle blurs the rest away.
-    Behind the hair lies skin: what passes all strands comes back off it, see off_the_skin. Of blond
-        hair as thick as a groom's strands make it, that is nearly half of the light. Skin farther
-        away lights hair too, see off_far_skin.
+    Light that returns from the hair behind is summed over all orders, not only three, and for the
+        actual number of strands: deep white hair returns all light, a thin layer less.
+    Each azimuthal lobe is stored as two numbers, the light that it sends on and back, instead of
+        tables of every azimuth: light from half a circle blurs the rest away.
+    Skin behind the hair reflects light that passes all strands, see off_the_skin. In blond hair of
+        a groom's density that is nearly half of the light. Skin farther away lights hair too, see
+        off_far_skin.
 
-Colours are absorption, so that a strand's own colour may differ from root to tip: see `fractions`.
+Colours are given as absorption, so that they may vary along a strand: see `fractions`.
 """
 
 from __future__ import annotations
@@ -40,26 +40,25 @@ from ..marschner.tables import MarschnerTables, bilinear, kept_light
 from ..settings import ShadingSettings
 from ..skin_seen import SkinSeen, far_light, plane_beneath, through_hair
 
-#: strands that are taken to lie behind a place where nothing is known of it
+#: number of strands behind a place where it is unknown
 UNKNOWN_BEYOND = 4.0
 #: Texels of the table of fractions: cos theta_d from 0 to 1, and absorption from 0 to infinity.
 FRACTIONS_SIZE = 32
 #: Absorption in the middle of that axis.
 MIDPOINT = 0.5
-#: fraction that hair may send on at most, so that sums have bounds
+#: maximum fraction of light that hair sends on, so that sums converge
 _MAX = 0.999
 _MAX_KEPT = 0.9999
 _SMALLEST = 1e-6
-#: even light passes as much as light that is this many times as slanted as light straight up
-#: (Elsasser 1942)
+#: even light is attenuated as on a path this many times as long as straight up (Elsasser 1942)
 _DIFFUSIVITY = 1.66
-#: what is taken for no light at all where a fraction of light is given instead of tau
+#: minimum of a fraction of light that is converted to tau
 _MIN_LIGHT = 1e-3
 
 
 @dataclass(frozen=True)
 class Fractions:
-    """What a fibre sends on and back, by lobe: R, TT, TRT and the rest.
+    """Light that a fibre sends on and back, by lobe: R, TT, TRT and the rest.
 
     forward, backward: (FRACTIONS_SIZE, FRACTIONS_SIZE, 4) float32; row by absorption, see
         absorption_place; column by cos theta_d; fractions of the light on the fibre.
@@ -70,10 +69,10 @@ class Fractions:
 
 
 def fractions(tables: MarschnerTables, size: int = FRACTIONS_SIZE) -> Fractions:
-    """From the lobes around the fibre, for all absorptions.
+    """The fractions of the azimuthal lobes, for all absorptions.
 
-    Light that comes from anywhere in half a circle, and leaves by phi, goes on into the other half
-    with the fraction |phi| / pi (Zinke et al. 2008, equation 6, for azimuths).
+    Of light that comes from anywhere in half a circle and turns by phi, the fraction |phi| / pi
+    goes on into the other half (Zinke et al. 2008, equation 6, for azimuths).
     """
     rows = np.linspace(0, len(tables.azimuthal) - 1, 2 * size).round().astype(int)
     columns = np.linspace(0, len(tables.azimuthal) - 1, size).round().astype(int)
@@ -97,7 +96,7 @@ def absorption_place(absorption: Floats) -> Floats:
 
 
 def place_absorption(place: Floats | float) -> Floats:
-    """The absorption at a place of the table; its end stands for all that is black."""
+    """The absorption at a place of the table; its end is that of black hair."""
     inside = np.minimum(place, 1.0 - 1e-3)
     return np.asarray(MIDPOINT * inside / (1.0 - inside))
 
@@ -114,8 +113,8 @@ def fractions_at(table: Floats, cos_d: Floats, absorption: Floats) -> Floats:
 def mean_forward(table: Floats, shading: ShadingSettings) -> Floats:
     """The fraction of light that a strand of this hair sends on, by colour, (3,).
 
-    Over strands that lie any way, which meet light at theta as often as cos theta, and are then
-    cos theta as broad; from root to tip, grey ones as many as there are.
+    The mean over strands of all directions, which meet light at theta with a frequency and a
+    breadth of cos theta each; from root to tip; with grey strands by their fraction.
 
     Args:
         table: `forward` of Fractions.
@@ -134,7 +133,7 @@ def mean_forward(table: Floats, shading: ShadingSettings) -> Floats:
 
 
 def passed(tau: Floats, a_forward: Floats) -> tuple[Floats, Floats]:
-    """What passes tau strands on average: straight, and sent on by one of them or more.
+    """Light that passes tau strands on average: straight, and sent on by one of them or more.
 
     Poisson: the chance to meet none is exp(-tau), the mean of a_f^n is exp(-tau (1 - a_f)).
     """
@@ -143,11 +142,11 @@ def passed(tau: Floats, a_forward: Floats) -> tuple[Floats, Floats]:
 
 
 def returned(a_forward: Floats, a_backward: Floats, count: Floats | float = np.inf) -> Floats:
-    """What a number of strands, one behind the other, gives back of the light on the first.
+    """The fraction of light that `count` strands, one behind the other, return.
 
-    A layer over deep hair gives the deep hair again: R = a_b + a_f^2 R / (1 - a_b R), with any
-    number of turns between the two. From one layer to the next the light keeps
-    g = a_f / (1 - a_b R), so that a stack of n gives R (1 - g^2n) / (1 - R^2 g^2n) (Stokes 1862).
+    Endlessly deep hair returns R, with one more layer on top too: R = a_b + a_f^2 R / (1 - a_b R),
+    for any number of turns between the two. From one layer to the next the light keeps g = a_f / (1
+    - a_b R), so that a stack of n returns R (1 - g^2n) / (1 - R^2 g^2n) (Stokes 1862).
     """
     a_forward = np.clip(a_forward, 0.0, np.maximum(_MAX_KEPT - a_backward, 0.0))
     middle = 1.0 + a_backward**2 - a_forward**2
@@ -162,7 +161,7 @@ def returned(a_forward: Floats, a_backward: Floats, count: Floats | float = np.i
 def returned_shape(
     forward: Floats, backward: Floats, fibre: Fibre
 ) -> tuple[Floats, Floats, Floats]:
-    """Width and shift of theta_h in what returns, and the width that one passage on adds.
+    """Width and shift in theta_h of returned light, and the width that one passage on adds.
 
     Args:
         forward, backward: by lobe, (..., 4).
@@ -197,7 +196,7 @@ def returned_shape(
 def spread_around(forward: Floats, backward: Floats, phi: Floats) -> Floats:
     """N of a lobe for light that comes from half a circle around its direction, (...).
 
-    A raised cosine on each side: a lobe blurred over half a circle has hardly more to it.
+    A raised cosine on each side: a lobe blurred over half a circle has hardly more detail.
     """
     cosine = np.cos(phi)
     return (forward * (1.0 - cosine) + backward * (1.0 + cosine)) / (2.0 * np.pi)
@@ -223,7 +222,7 @@ def dual_scattering(
     fibre: Fibre,
     density: float,
 ) -> Floats:
-    """S of a strand among others, (..., 3): times irradiance and cos theta_i it is radiance.
+    """S of a strand among others, (..., 3): times irradiance and cos theta_i, it is radiance.
 
     Args:
         single: S of the strand alone, (..., 3).
@@ -263,13 +262,13 @@ def off_the_skin(
     facing: Floats,
     skin: Floats,
 ) -> Floats:
-    """What comes off the skin behind the hair and from a strand to the eye, (..., 3): times
-    irradiance it is radiance.
+    """Light off the skin behind the hair that a strand sends to the eye, (..., 3): times
+    irradiance, it is radiance.
 
-    The skin is Lambert's, and light and hair lie over it as over a plane. Light reaches it through
-    tau + beyond strands, which in the light's slant direction are 1 / facing times as many as
-    straight up; comes back evenly, and goes to and fro between skin and hair. A strand sends a_f of
-    what lights it from behind to an eye on the light's side, and a_b to one on the other.
+    The skin is a Lambertian plane, with the hair above it. Light reaches it through tau + beyond
+    strands, which are 1 / facing times as many along the slanted ray as straight up; is reflected
+    evenly; and goes to and fro between skin and hair. Of light from behind, a strand sends a_f to
+    an eye on the light's side, and a_b to an eye on the other side.
 
     Args:
         forward, backward: fractions at this theta_d by colour and lobe, (..., 3, 4).
@@ -297,11 +296,11 @@ def off_far_skin(
     seen: SkinSeen,
     skin: Floats,
 ) -> Floats:
-    """What comes off skin farther away and from a strand to the eye, (..., 3): times irradiance it
-    is radiance.
+    """Light off skin farther away that a strand sends to the eye, (..., 3): times irradiance, it is
+    radiance.
 
-    As `off_the_skin`, from as much of half of all directions as is skin. On its way light is sent
-    to and fro by strands, so that it is less by sqrt((1 - a_f)^2 - a_b^2) at each (Kubelka and Munk
+    As `off_the_skin`, from the part of half of all directions that is skin. On the way strands send
+    light to and fro, so that each attenuates it by sqrt((1 - a_f)^2 - a_b^2) (Kubelka and Munk
     1931).
 
     Args:
@@ -334,16 +333,15 @@ def scattering_light(
     beyond: Floats | float = UNKNOWN_BEYOND,
     seen: SkinSeen | None = None,
 ) -> Floats:
-    """What one light sends to the eye from a strand among others, (..., 3).
+    """Light of one lamp that a strand among others sends to the eye, (..., 3).
 
-    As look.marschner_light, of which it has all but the colour that replaces light from strand
-    to strand.
+    As look.marschner_light, without the colour that approximates light from strand to strand.
 
     Args:
         density: d_f and d_b of Zinke et al. 2008.
         skin: (3,), albedo of what lies behind the hair.
-        seen: what skin the strand sees; None is what lies right beneath, and the volume's normal
-            stands for its own.
+        seen: skin seen from the strand; None: skin directly beneath alone, with the volume's
+            normal.
     """
     angles = strand_angles(tangent, normal, to_light, to_eye, shift_noise, shading)
     single = single_scattering(tables, angles, sparkle_noise, absorption, shading, level)

@@ -1,16 +1,16 @@
 """The space of one light's map: its picture of the hair, and the depth along its rays.
 
-A map covers the hair's bounding sphere. Of a sun it is a square as wide as the sphere; of a light
-at a place it is the picture of a camera there. Depth runs evenly from 0 at the near end of the
-sphere to 1 at its far end, so that layers are equally thick whatever the light.
+A map covers the hair's bounding sphere. For a sun it is a square as wide as the sphere, for a light
+at a place the picture of a camera there. Depth runs evenly from 0 at the near end of the sphere to
+1 at its far end, so that layers are equally thick whatever the light.
 
-A light may stand within the sphere, as a lamp close to long hair does. Its map then opens as wide
-as a flat picture can, a point's towards the middle of the hair, a spot's and a panel's the way they
-shine; depth begins at the light. Hair beside and behind it gets no shadow. Only a point light
-amidst the hair has no map at all.
+A light may stand within the sphere, such as a lamp close to long hair. Its map then has the widest
+angle that a flat picture can have: a point light's looks towards the middle of the hair, a spot's
+and a panel's along the beam. Depth begins at the light, and hair beside and behind the light gets
+no shadow. Only a point light amidst the hair has no map at all.
 
-The frame depends on light and hair alone, not on the camera. Its centre
-and size move in steps, so that hair which sways does not make the map's texels swim.
+The frame depends on light and hair alone, not on the camera. Its centre and size move in steps, so
+that the map's texels do not swim while hair sways.
 """
 
 from __future__ import annotations
@@ -27,16 +27,16 @@ from ..lights import Light
 _ROOM = 1.02
 #: a tangent that is shorter in a map than this, in fractions of its side, points along the light
 SEEN_FROM_ITS_END = 1e-20
-#: [m] hair smaller than this, which has no extent, gets a map as if it were so large
+#: [m] minimum radius of the sphere, for hair without extent
 MIN_RADIUS = 1e-9
-#: a map opens no wider than this to each side [rad]: beyond, few texels hold most of the picture
+#: maximum half angle of a map [rad]: beyond it, few texels would hold most of the picture
 WIDEST = float(np.radians(75.0))
 #: a point light nearer to the middle of the hair than this, in radii, has hair all around it
 _AMIDST = 0.25
-#: a light within the sphere that has less of it ahead, in radii, shines away from it
+#: a light within the sphere with less of it ahead than this, in radii, shines away from it
 _MIN_AHEAD = 0.05
-#: Sizes of the sphere come in such steps, and its centre in such fractions of its radius. A power
-#: of the step is ten, so that hair in another unit gets the same map.
+#: Factor between sizes of the sphere, and steps of its centre as a fraction of its radius. Ten is a
+#: power of the factor, so that hair in another unit gets the same map.
 _SIZE_STEP, _PLACE_STEP = 10.0 ** (1.0 / 47.0), 1.0 / 64.0
 
 
@@ -87,10 +87,10 @@ class LightFrame:
         return np.linalg.norm(projected, axis=-1) * breadth
 
     def strand_breadth(self, points: Floats, along: Floats) -> Floats:
-        """How broad a strand of the width 1 m is, as a fraction of the map's side, (...).
+        """Width in the map of a strand that is 1 m wide, as a fraction of the map's side, (...).
 
-        The light sees its width across its own ray: towards the rim of a wide map, which lies
-        aslant there, it gets broader the more, the less the strand runs towards the middle.
+        The width is across the light's ray, to which a wide map lies aslant at its rim: strands
+        appear wider there, the more so the less they run towards the middle.
 
         Args:
             points: (..., 3) [m], ahead of the light. along: (..., 3) its tangent.
@@ -98,15 +98,15 @@ class LightFrame:
         return self._seen(points, along)[1]
 
     def _seen(self, points: Floats, along: Floats) -> tuple[Floats, Floats]:
-        """The way along a strand in the map, (..., 2), and its breadth, (...)."""
+        """A strand's tangent projected to the map, (..., 2), and its width there, (...)."""
         homogeneous = np.concatenate([points, np.ones_like(points[..., :1])], axis=-1)
         clip = homogeneous @ self.to_map.T
         w = clip[..., 3, None, None]
-        # how places change with the point
+        # derivative of the place by the point
         turn = (self.to_map[:2, :3] - clip[..., :2, None] / w * self.to_map[3, :3]) / (2.0 * w)
         projected = np.einsum("...ij,...j->...i", turn, along)
         length = np.linalg.norm(projected, axis=-1, keepdims=True)
-        # a strand along the ray is as broad whichever way it is seen
+        # a strand along the ray is equally wide in all directions of the map
         is_seen = length > SEEN_FROM_ITS_END
         unit = np.where(is_seen, projected, [1.0, 0.0]) / np.where(is_seen, length, 1.0)
         across = np.stack([-unit[..., 1], unit[..., 0]], axis=-1)
@@ -121,7 +121,7 @@ def ball_around(points: Floats) -> Ball:
 
 
 def reach_of(points: Floats, offsets: Ints) -> float:
-    """How far from the middle of all roots hair can get as long as it keeps its length, [m].
+    """Maximum distance of hair from the middle of all roots, as long as it keeps its length, [m].
 
     Args:
         points, offsets: as in StrandSet [m].
@@ -134,7 +134,7 @@ def reach_of(points: Floats, offsets: Ints) -> float:
 def stepped_ball(center: Floats, radius: float) -> Ball:
     """A sphere that holds this one; its centre and size move in steps."""
     radius = max(radius, MIN_RADIUS) * _ROOM
-    # a step up: the centre may move by half a step along each axis, and it still holds all
+    # larger, to hold all though rounding moves the centre by up to half a step along each axis
     stepped = radius * (1.0 + np.sqrt(3.0) * _PLACE_STEP)
     stepped = float(_SIZE_STEP ** np.ceil(np.log(stepped) / np.log(_SIZE_STEP)))
     step = stepped * _PLACE_STEP
@@ -174,7 +174,7 @@ def is_within(light: Light, ball: Ball) -> bool:
 
 
 def shines_along(light: Light) -> Floats | None:
-    """Unit vector of the middle of a light's beam; None of a point, which has none."""
+    """Unit vector along the middle of a light's beam; None for a point, which has none."""
     if light.panel is not None:
         return np.asarray(light.panel.shines_along, np.float64)
     if light.cone is None:
@@ -186,7 +186,7 @@ def shines_along(light: Light) -> Floats | None:
 
 
 def frame_of_sun(towards: Floats, ball: Ball) -> LightFrame:
-    """Of a light that shines from one direction, towards which `towards` (3,) points."""
+    """The frame of a sun, towards which `towards` (3,) points."""
     right, up, towards = _axes(towards)
     to_map = np.eye(4)
     to_map[:2, :3] = right / ball.radius, up / ball.radius
@@ -197,11 +197,11 @@ def frame_of_sun(towards: Floats, ball: Ball) -> LightFrame:
 
 
 def frame_at(towards: Floats, eye: Floats, tangent: float, ends: tuple[float, float]) -> LightFrame:
-    """Of a light at the place `eye` that looks against `towards`, each (3,).
+    """The frame of a light at the place `eye` that looks against `towards`, each (3,).
 
     Args:
-        tangent: of half the angle under which it sees.
-        ends: where depth is 0 and 1, from the light on [m].
+        tangent: of half the angle of view.
+        ends: distances from the light at which depth is 0 and 1 [m].
     """
     right, up, towards = _axes(towards)
     near, far = ends
@@ -215,7 +215,7 @@ def frame_at(towards: Floats, eye: Floats, tangent: float, ends: tuple[float, fl
 
 
 def _axes(towards: Floats) -> tuple[Floats, Floats, Floats]:
-    """Right, up and the direction itself; they turn smoothly with it but at one pole."""
+    """Right, up and the direction itself; they turn smoothly with it but near +Z and -Z."""
     towards = towards / np.linalg.norm(towards)
     pole = np.array([0.0, 1.0, 0.0]) if abs(towards[2]) > 0.999 else np.array([0.0, 0.0, 1.0])
     right = np.cross(pole, towards)

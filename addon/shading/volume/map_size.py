@@ -1,14 +1,14 @@
-"""How large opacity maps are: what GPU and memory allow of what is asked for.
+"""Size of opacity maps: that of the settings, as far as GPU and memory allow.
 
 A map has as many texels a side as the settings say, as long as that fits: many lights with many
-layers at the largest resolution would be gigabytes, which are allocated before anything is drawn.
-What does not fit is drawn with fewer texels: blurred, and as dark as it should be.
+layers at the largest resolution would take gigabytes, allocated before anything is drawn. Maps that
+do not fit get fewer texels: they are blurred, but as dark as they should be.
 
-Strands that stand for many hairs get no finer map than the hairs' own evenness allows. In texels
-finer than strands are apart, light would pass between them, where the hairs are for which they
-stand: by Jensen's inequality the mean of exp(-tau) grows with the unevenness of tau. A look-up is a
-tent of two texels, so that texels of half the spacing blend over one spacing. Meshes keep the full
-number of texels, since their edges are sharp.
+Strands that represent many hairs get a map coarse enough to be as even as these hairs. In texels
+finer than the strands' spacing, light would pass between strands, where the represented hairs are:
+by Jensen's inequality the mean of exp(-tau) grows with the unevenness of tau. A look-up is a tent
+of two texels, so texels of half the spacing blend over one spacing. Meshes keep the full number of
+texels, since their edges are sharp.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ import numpy as np
 from .opacity import layer_ends
 from .settings import VolumeSettings
 
-#: texels of a map along one of where its deep layers start
+#: texels of a map along the side of a block in which its deep layers have one start
 START_TEXELS = 4
 #: colour slots that a framebuffer has
 MAX_SLOTS = 6
-#: sums of four layers in float32; the depth of the first mesh; first and last hair in every block,
-#: and the planes through them
+#: bytes of sums of four layers in float32; of the depth of the first mesh; of first and last hair
+#: in every block, and the planes through them
 _LAYERS_BYTES, _MESH_BYTES, _SPAN_BYTES = 16, 4, 8 + 32
-#: texels across the spacing of strands that stand for more than themselves, and across all hair
+#: texels across the spacing of strands that represent several hairs; minimum across all hair
 _TEXELS_APART, _FEWEST_TEXELS = 2.0, 16
 #: [texels] of a texture on every GPU that Blender supports
 _LARGEST_SIDE = 16384
@@ -35,11 +35,11 @@ _LARGEST_SIDE = 16384
 
 @dataclass(frozen=True)
 class MapSize:
-    """Of all maps of a groom.
+    """Size of all maps of a groom.
 
     side: texels along a side of a map, whole blocks of START_TEXELS.
     slots: textures of four layers that are drawn into at once.
-    passes: how often, and layers of each of these arrays that one map takes.
+    passes: how often they are drawn, which is also the number of array layers that one map takes.
     map_count: maps, one a light.
     mesh_side: texels along a side of the depths of meshes.
     """
@@ -58,7 +58,7 @@ class MapSize:
 
     @property
     def bytes(self) -> int:
-        """On the GPU."""
+        """Memory on the GPU."""
         # one texture alone would not be an array
         arrays = max(self.map_count * self.passes, 2) * self.slots * _LAYERS_BYTES
         meshes = max(self.map_count, 2) * _MESH_BYTES
@@ -87,7 +87,7 @@ def fitted_size(
     """
     size = asked_size(settings, map_count)
     per_texel = size.bytes / size.side**2
-    # `starts` has the maps above one another
+    # the texture `starts` holds the maps above one another
     side = min(size.side, largest_side, int(np.sqrt(room / per_texel)))
     if size.is_deep:
         side = min(side, largest_side * START_TEXELS // size.map_count)
@@ -96,7 +96,7 @@ def fitted_size(
 
 
 def even_size(size: MapSize, spacing: float, radius: float) -> MapSize:
-    """With no more texels for hair than show it as even as it is.
+    """The size with texels coarse enough that hair looks as even as it is.
 
     Args:
         spacing: of strands whose hairs fill the space between them; 0: none do. radius: of the ball
@@ -110,7 +110,7 @@ def even_size(size: MapSize, spacing: float, radius: float) -> MapSize:
 
 
 def size_note(settings: VolumeSettings, map_count: int, room: int, drawn: MapSize) -> str:
-    """What the artist is to know where maps are smaller than asked for, else empty.
+    """A note for the artist if maps are smaller than the settings say, else empty.
 
     Args:
         map_count, room: as of `fitted_size`, which gave `drawn`.

@@ -1,13 +1,13 @@
 """How a light sees all meshes of a scene, for the map of their depths.
 
-An opacity map covers the hair alone. Meshes throw shadows on meshes everywhere, so each light has
-maps of its own for them, one or more frames of light_frame.py: a sun's is a square over all meshes,
-a spot's its cone, and of others the cone that holds all meshes; a light amidst them looks along the
-sides of a cube.
+An opacity map covers the hair alone. Meshes cast shadows on meshes everywhere, so each light has
+maps of its own for them, one or more frames of light_frame.py: a sun has a square over all meshes,
+a spot its cone, other lights the cone that holds all meshes, and a light amidst them the sides of a
+cube.
 
-A ground is large and would take most texels. What is flat throws no shadow on itself, and what else
-lies in its shadow is seen by the light anyway: so the largest flat mesh counts for nothing when the
-frames are laid. Still it is drawn, as far as it lies in them.
+A ground is large and would take most texels. A flat mesh casts no shadow on itself, and other
+meshes in its shadow lie in the frames anyway. So the frames leave out the largest flat mesh, but it
+is drawn as far as it lies in them.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ from .light_frame import Ball, LightFrame, frame_at, frame_of_sun, shines_along,
 
 #: frames of all lights together, at most: each light amidst meshes sees them in the sides of a cube
 MESH_FRAME_CAPACITY = 6 * LIGHT_CAPACITY
-#: one frame opens no wider than this to each side [rad]; what is wider takes the sides of a cube
+#: maximum half angle of one frame [rad]; wider views take the sides of a cube
 _WIDEST = float(np.radians(55.0))
 #: tangent of half the angle of a cube's side, with room for the filter at its border
 _SIDE = 1.02
-#: a mesh is flat whose vertices are as near to a plane, as a fraction of its size
+#: maximum distance of a flat mesh's vertices from its plane, as a fraction of its size
 _FLAT = 1e-5
-#: vertices that are asked before all are
+#: vertices that are tested before all are
 _FEW = 64
 
 
@@ -55,13 +55,13 @@ class Extent:
 
 
 def extent_of(surface: Surface) -> Extent:
-    """Of a mesh with vertices."""
+    """The extent of a mesh with vertices."""
     low, high = surface.bounds()
     return Extent(low, high, _is_flat(surface.positions, float(np.linalg.norm(high - low))))
 
 
 def ball_of_casters(extents: Sequence[Extent]) -> Ball | None:
-    """Around all meshes between which shadows may fall; None where none can."""
+    """The ball around all meshes between which shadows may fall; None where none can."""
     flat = max((each for each in extents if each.is_flat), key=lambda e: e.size, default=None)
     counted = [each for each in extents if each is not flat]
     if not counted:
@@ -72,11 +72,11 @@ def ball_of_casters(extents: Sequence[Extent]) -> Ball | None:
 
 
 def mesh_frames(light: Light, ball: Ball) -> tuple[LightFrame, ...]:
-    """The frames in which a light sees all meshes; none of a light that throws no shadow, or
-    shines past them.
+    """The frames in which a light sees all meshes; none for a light that casts no shadow, or shines
+    past them.
 
     Args:
-        ball: around the meshes. A place beyond it is as far away as its end.
+        ball: around the meshes. Places beyond it have the depth of its far end.
     """
     if not light.casts_shadow:
         return ()
@@ -100,7 +100,7 @@ def mesh_frames(light: Light, ball: Ball) -> tuple[LightFrame, ...]:
 
 
 def _is_flat(positions: Floats, size: float) -> bool:
-    """Whether all vertices lie in one plane, of which the farthest three tell."""
+    """Whether all vertices lie in the plane through three that are far apart."""
     for places in (positions[:_FEW], positions):
         offset = places - places[0].astype(np.float64)
         first = offset[np.argmax((offset**2).sum(axis=1))]
@@ -113,7 +113,7 @@ def _is_flat(positions: Floats, size: float) -> bool:
 
 
 def _cone_tangent(light: Light) -> float:
-    """Of half the angle of a spot's cone; endless of all else."""
+    """Tangent of half the angle of a spot's cone; infinite for all else."""
     return np.inf if light.cone is None else max(float(np.tan(light.cone.widest)), 1e-3)
 
 

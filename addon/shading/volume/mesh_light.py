@@ -1,11 +1,11 @@
-"""How much of a light meshes let through to a place of a mesh, by the map of their depths.
+"""The fraction of a light that meshes let through to a place of a mesh, by the map of their depths.
 
-The fraction of a disk around the place that sees the light (percentage closer filtering; Reeves,
-Salesin and Cook 1987). Its taps lie on Vogel's spiral, so that an edge in any direction meets them
-one after the other, and each is the mean of four texels: edges have no steps. The disk is a
-fraction of the map, as wide at any resolution. Each texel is compared with the depth of the plane
-of the place's own triangle there: a slope does not shade itself, and edges stay where they are.
-Each sample of a picture asks texels shifted by up to one.
+It is the fraction of a disk around the place that sees the light (percentage closer filtering;
+Reeves, Salesin and Cook 1987). The taps lie on Vogel's spiral, so that an edge in any direction
+meets them one after the other, and each is the mean of four texels: edges have no steps. The disk
+is a fraction of the map, equally wide at any resolution. Each texel is compared with the depth,
+there, of the plane of the place's own triangle: slopes do not shade themselves, and edges stay
+where they are. Each sample of a picture shifts the texels by up to one.
 
 Reference of gpu_shaders/lib_mesh_shadows.glsl.
 """
@@ -24,7 +24,7 @@ MESH_TAPS, MESH_BLUR = 16, 0.003
 MESH_BIAS = 0.5
 #: the steepest slope that is followed, as a tangent
 STEEPEST = 20.0
-#: a slope that is seen from its edge, as a cosine
+#: minimum cosine of a slope that is seen from its edge
 EDGE_ON = 1.0e-3
 
 
@@ -63,12 +63,12 @@ def mesh_light(
 
 
 def disk_radius(size: int) -> float:
-    """Of the disk, in texels of a map of this side."""
+    """Radius of the disk, in texels of a map of this side."""
     return max(MESH_BLUR * size, 1.0)
 
 
 def disk_taps() -> Floats:
-    """Places in the unit disk, (MESH_TAPS, 2), each of which stands for as much of it."""
+    """Places in the unit disk, (MESH_TAPS, 2), each of which represents an equal part of it."""
     number = np.arange(MESH_TAPS)
     away, angle = np.sqrt((number + 0.5) / MESH_TAPS), GOLDEN_ANGLE * number
     return np.stack([away * np.cos(angle), away * np.sin(angle)], axis=1)

@@ -1,21 +1,21 @@
 """Opacity maps: how much hair lies between a light and a place.
 
-A texel holds, for each of some layers, how much of its area the strands between the light and the
-far end of that layer cover, each counted for itself: that is the optical depth tau, and behind it
-exp(-extinction tau) of the light is left (Beer and Lambert).
+A texel holds, for each layer, the fraction of its area that the strands between the light and the
+far end of that layer cover, summed over all strands though they overlap: the optical depth tau.
+Behind it, exp(-extinction tau) of the light is left (Beer and Lambert).
 
-There are two ways to lay the layers, both given by where they end:
+Layers are placed by one of two methods, given by where they end:
     slices  evenly through the ball around the hair (Kim and Neumann 2001; Nguyen and Donnelly
             2005 draw 16 of them in one pass);
-    deep    from the first hair that light meets in each texel on, the layers thicker from one to
-            the next (Yuksel and Keyser 2008): they follow the hair, so that it does not band.
-            Theirs are as thick everywhere; ours share out what lies up to the last hair, so that
-            few of them serve a thin fringe and a whole head alike.
+    deep    from the first hair that light meets in each texel on, each layer thicker than the one
+            before (Yuksel and Keyser 2008): they follow the hair, so that it shows no bands. In the
+            paper they are equally thick everywhere; ours divide the range up to the last hair, so
+            that few layers suffice for a thin fringe and a whole head alike.
 Slices are deep layers that start at 0 and end at 1 everywhere, so that one shader draws both.
 
-First and last hair are known for blocks of texels. From block to block they go on as planes: with
-one depth a block, hair that light grazes would be lit on one side of it and dark on the other. What
-a mesh hides from the light is in no layer, so that the hair before a head has all of them.
+First and last hair are stored for blocks of texels, as a plane each: with one depth per block, hair
+that light grazes would be lit on one side of a block and dark on the other. Hair that a mesh hides
+from the light is in no layer, so that the hair before a head has all of them.
 
 All depths are those of light_frame.py, 0 to 1 through the ball. Between the ends of two layers
 tau is taken as linear. Reference of gpu_shaders/lib_opacity.glsl.
@@ -32,10 +32,10 @@ from ...arrays import Bools, Floats, Ints, piece_starts
 from .light_frame import LightFrame
 from .settings import VolumeSettings
 
-#: deep layers together are at least so thick
+#: minimum thickness of all deep layers together
 MIN_THICKNESS = 1.0 / 1024.0
-#: meshes this close in front do not count, whatever the bias of strands: a facet that light grazes
-#: is as much deeper on one side of a texel than on the other
+#: meshes this close in front do not count, whatever the bias of strands: the depth of a facet that
+#: light grazes varies this much across a texel
 MIN_MESH_BIAS = 0.01
 #: fraction of a map's side over which the shadows of meshes on meshes fade to its border
 MAP_BORDER = 0.06
@@ -54,7 +54,7 @@ def layer_ends(settings: VolumeSettings) -> Floats:
 
 
 def adds_to(depth: Floats, ends: Floats) -> Bools:
-    """The layers whose sums a strand at this fraction of their depth is part of, (..., n)."""
+    """The layers whose sums include a strand at this fraction of their depth, (..., n)."""
     return depth[..., None] <= ends
 
 
@@ -66,9 +66,9 @@ def layers_passed(depth: Floats, ends: Floats) -> Floats:
 
 
 def layer_weights(depth: Floats, ends: Floats) -> Floats:
-    """By what the layers' sums are to be multiplied for tau at this depth, (..., n).
+    """Weights of the layers' sums that add up to tau at this depth, (..., n).
 
-    Each layer's share in what is passed, less the next one's: tau is one dot product.
+    The fraction of each layer that is passed, minus the next one's: tau is one dot product.
     """
     passed = layers_passed(depth, ends)
     passed[..., :-1] -= passed[..., 1:]
@@ -78,7 +78,7 @@ def layer_weights(depth: Floats, ends: Floats) -> Floats:
 def transmittance(
     optical_depth: Floats, extinction: float, forward: Floats | float = 0.0
 ) -> Floats:
-    """Light that is left, with what strands send on: this fraction of all that they take.
+    """Fraction of light left, with the fraction `forward` of what strands block and send on.
 
     See passed() in dual.py: straight light and light sent on, in one.
     """
@@ -89,9 +89,9 @@ def transmittance(
 class LayerSpans:
     """Where deep layers start, and how thick they are together: planes over blocks of texels.
 
-    start, thickness: (side, side, 3) in the middle of a block, and how much it changes from one
-        texel to the next one on the right, and to the one above.
-    block: texels along a side of one.
+    start, thickness: (side, side, 3) in the middle of a block, and the change per texel to the
+        right, and upwards.
+    block: texels along the side of a block.
     """
 
     start: Floats
@@ -103,8 +103,8 @@ class LayerSpans:
         """From the first hair to the last one.
 
         Args:
-            first, last: (side, side) depth of it in each block; where there is none, first lies
-                behind last, and layers start at 1 and are 1 thick.
+            first, last: (side, side) depth of these in each block; without hair, first lies behind
+                last, and layers start at 1 and are 1 thick.
         """
         is_bare = last < first
         planes = (_plane(np.where(is_bare, np.nan, each), block) for each in (first, last))
@@ -116,8 +116,8 @@ class LayerSpans:
         """Where the layers of texels start and how thick they are at a place, (...) each.
 
         Args:
-            row, column: (...) of the texels. place: (..., 2) column and row in texels, in them or
-                near: planes go on beyond their blocks.
+            row, column: (...) of the texels. place: (..., 2) column and row in texels, in these or
+                near: planes extend beyond their blocks.
         """
         row, column = row // self.block, column // self.block
         aside = place - (np.stack([column, row], axis=-1) + 0.5) * self.block
@@ -128,7 +128,7 @@ class LayerSpans:
         return start, np.maximum(thickness, MIN_THICKNESS)
 
     def fraction(self, row: Ints, column: Ints, place: Floats, depth: Floats) -> Floats:
-        """At which fraction of the layers of texels a depth at a place lies, see `at`."""
+        """A depth at a place, as a fraction of the layers of texels, see `at`."""
         start, thickness = self.at(row, column, place)
         return (depth - start) / thickness
 
@@ -136,9 +136,9 @@ class LayerSpans:
 def _plane(depth: Floats, block: int) -> Floats:
     """See LayerSpans, (side, side, 3). depth: (side, side), nan where there is no hair.
 
-    From block to block it changes as it does on that side where it does so less, and not at all
-    towards a block that has no hair, or where it is the first or the last of its neighbours: a lock
-    before the others is no slope (van Leer 1979, the minmod limiter).
+    Along each axis, the slope is the smaller of the changes to the two neighbouring blocks. It is 0
+    beside a block without hair, and where a block is nearer or farther than both neighbours: a
+    clump before the others is no slope (van Leer 1979, the minmod limiter).
     """
     planes = [depth]
     for axis in (1, 0):
@@ -159,10 +159,11 @@ def look_up(
     depth: Floats,
     bias: float,
 ) -> tuple[Floats, Floats, Floats]:
-    """What light meets on its way, blended between the four texels around each place of a map.
+    """Hair and meshes on the light's way, interpolated between the four texels around each place of
+    a map.
 
-    Beyond a place each texel is asked up to its own first mesh. Of slices the GPU asks all four up
-    to the nearest of these, at once.
+    Beyond a place each texel counts up to its own first mesh. With slices, the GPU counts all four
+    up to the nearest of these, in one look-up.
 
     Args:
         layers: (resolution, resolution, n) sums, row by row.
@@ -175,7 +176,7 @@ def look_up(
 
     Returns:
         tau up to each place, tau from there on to the first mesh, and the fraction of the light
-        that no mesh is in the way of; each (m,).
+        that no mesh blocks; each (m,).
     """
     resolution = len(layers)
     inside = np.minimum(depth, 1.0) - bias
@@ -211,9 +212,9 @@ def _corners(places: Floats, side: int) -> Iterator[tuple[Ints, Ints, Floats]]:
 
 
 def within_map(places: Floats) -> Floats:
-    """How much of the shadows of meshes counts on meshes, which reach beyond a map, (...).
+    """Weight of the shadows of meshes on meshes, which reach beyond a map, (...).
 
-    1 in its middle, 0 at its border: there shadows would end at a line.
+    1 inside, 0 at the map's border, so that shadows do not end at a line.
 
     Args:
         places: (..., 2) in 0..1, and beyond.
@@ -223,10 +224,10 @@ def within_map(places: Floats) -> Floats:
 
 
 def own_depth(half_width: Floats) -> Floats:
-    """tau of a strand itself at its middle line, of what a map holds there, (...).
+    """The part of the map's tau at a strand's middle line that is the strand itself, (...).
 
-    Maps hold it as at least a texel wide, and a look-up blends over a texel to each side of it: the
-    integral of that tent over its width. A strand is not in its own way, nor behind itself.
+    A strand does not shade itself. Maps draw it at least a texel wide, and a look-up blends over a
+    texel to each side: the integral of that tent over the strand's width.
 
     Args:
         half_width: in texels.
@@ -237,13 +238,13 @@ def own_depth(half_width: Floats) -> Floats:
 
 
 def own_fraction(depth: Floats, bias: float, ends: Floats) -> Floats:
-    """How much of a strand or a card counts towards tau at itself, (...).
+    """The fraction of a strand or a card that counts in tau at its own place, (...).
 
-    It is part of the sum of the layer in which it lies, and tau grows evenly through that.
+    It is in the sum of its layer, and tau grows linearly through that.
 
     Args:
-        depth, bias: of it behind the start of the layers, (...), and how close in front of
-            it nothing counts, in fractions of how thick they are together.
+        depth, bias: its depth behind the start of the layers, (...), and the distance in front of
+            it within which nothing counts, in fractions of their total thickness.
         ends: of the layers, (n,).
     """
     layer = np.minimum(np.searchsorted(ends, depth), len(ends) - 1)
@@ -276,8 +277,8 @@ class Coverage:
         return summed[upto] - summed[before]
 
     def spans(self, block: int = 1) -> LayerSpans:
-        """Where deep layers start and end: at the first and the last piece in blocks of as many
-        texels each way.
+        """Where deep layers start and end: at the first and the last piece in blocks of `block`
+        texels along each side.
         """
         side = self.resolution // block
         row, column = np.divmod(self.texel, self.resolution)
@@ -291,7 +292,7 @@ class Coverage:
         """What a map holds, (resolution^2, layer_count)."""
         row, column = np.divmod(self.texel, self.resolution)
         behind = np.minimum(spans.fraction(row, column, self.place, self.depth), 1.0)
-        # of the layers that a piece adds to, the first; the others have it by summing up
+        # a piece is added to the first layer that it counts in; cumsum adds it to the others
         first = self.texel * len(ends) + np.searchsorted(ends, behind)
         held = np.bincount(first, self.covered, self.resolution**2 * len(ends))
         return np.cumsum(held.reshape(-1, len(ends)), axis=1)
@@ -307,7 +308,7 @@ def coverage(
     Args:
         strands: (strand_count, cv_count, 3) [m], world space, straight between their CVs.
         radius: (strand_count, cv_count) [m].
-        opacity: how much a strand hides in its full width.
+        opacity: of a strand over its full width.
     """
     start, end = strands[:, :-1].reshape(-1, 3), strands[:, 1:].reshape(-1, 3)
     thick = (radius[:, :-1] + radius[:, 1:]).ravel()

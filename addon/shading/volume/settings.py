@@ -1,4 +1,4 @@
-"""What the artist sets about light that dies, and light that spreads, between strands."""
+"""Settings of the shadows of strands and of scattering between them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which lights throw shadows of hair, and what the artist should know about them."""
+"""Which lights cast shadows of hair, and warnings about them for the artist."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _HARD_EXTINCTION = 100.0
 def shadow_frames(
     lights: Sequence[Light], ball: Ball, settings: VolumeSettings
 ) -> list[LightFrame | None]:
-    """The frame of each light's map; None of those that throw no shadow."""
+    """The frame of each light's map; None for lights that cast no shadow."""
     frames: list[LightFrame | None] = [None] * len(lights)
     if settings.shadows != "none":
         casting = [index for index, light in enumerate(lights) if light.casts_shadow]
@@ -32,7 +32,7 @@ def shadow_frames(
 def shadow_warnings(
     lights: Sequence[Light], ball: Ball, settings: VolumeSettings
 ) -> tuple[str, ...]:
-    """What keeps hair from throwing the shadows that one may expect, each with its remedy.
+    """Reasons why hair does not cast the shadows that one may expect, each with its remedy.
 
     Args:
         ball: around all hair.
@@ -78,7 +78,7 @@ def _setting_warnings(ball: Ball, settings: VolumeSettings) -> Iterator[str]:
 
 
 def _light_warnings(light: Light, ball: Ball) -> Iterator[str]:
-    """Of a light that has, or could have, a map."""
+    """Warnings about a light that has, or could have, a map."""
     name = light.name or f"A {light.kind} light"
     if _misses(light, ball):
         yield (
@@ -118,14 +118,14 @@ def _misses(light: Light, ball: Ball) -> bool:
 
 
 def _strengths(lights: Sequence[Light], ball: Ball) -> Floats:
-    """Light of each at the middle of the hair, (light_count,)."""
+    """Irradiance of each light at the middle of the hair, summed over rgb, (light_count,)."""
     return np.array([float(light_irradiance(light, ball.center).sum()) for light in lights])
 
 
 def _asked(
     lights: Sequence[Light], ball: Ball, settings: VolumeSettings
 ) -> Iterator[tuple[int, LightFrame | None]]:
-    """The strongest lights, until as many have a map as may have one."""
+    """The strongest lights, with their frames, until `max_lights` of them have a map."""
     strengths, left = _strengths(lights, ball), settings.max_lights
     for index in sorted(range(len(lights)), key=lambda index: -strengths[index]):
         if left == 0:

@@ -1,4 +1,4 @@
-"""Strands that hide only a fraction of what lies behind them: of a pixel, and one over another.
+"""Strands that cover only a fraction of a pixel, and strands blended over one another.
 
     covered   a strip over a unit square, exactly: F(d + h) - F(d - h) with d its middle line's
               distance from the centre, h half its width, and F the fraction of the square below a
@@ -6,11 +6,11 @@
     over      C = sum of a_i T_i c_i from near to far, T_i = product of (1 - a_j) of all before it
               (Porter and Duff 1984)
 
-Many thin strands may lie in a pixel, far more than can be shaded. `layer_fractions` chooses those
-that stand for all of them, by how much of the light is theirs; were it the nearest, small pictures
-would show the outermost strands alone, which are lit more. They are chosen as in VarOpt (Cohen et
-al. 2009), where single items that weigh much stay as they are and others share out the rest, but
-evenly along the way of light, not at random. So strands that have not moved are drawn as before.
+A pixel may hold far more thin strands than can be shaded. `layer_fractions` chooses those that
+represent all of them, by their weight in the pixel: the nearest alone would be the outermost
+strands in small pictures, which are lit more. They are chosen as in VarOpt (Cohen et al. 2009):
+heavy items keep their weights, and a sample divides the weight of the rest; but the sample is
+evenly spaced along the ray, not random, so that strands that have not moved are drawn as before.
 
 Twin of lib_coverage.glsl and of strand_layers_order.comp.glsl.
 """
@@ -23,10 +23,10 @@ from ...arrays import Floats
 
 #: Layers of a pixel that are shaded, at most.
 LAYERS = 8
-#: while a view turns with its lights
+#: The same while a view turns with its lights.
 TURNING_LAYERS = 3
 #: Layers are shaded until no more than this fraction of the pixel's light comes from behind them,
-#: where that are not more of them.
+#: as long as there are no more than LAYERS.
 UNSEEN_FRACTION = 0.03
 
 
@@ -63,15 +63,15 @@ def layer_fractions(
     layers: int = LAYERS,
     unseen_fraction: float = UNSEEN_FRACTION,
 ) -> Floats:
-    """The light of each layer that is shaded, (pixel_count, n): their sum is what all cover.
+    """Weights of the layers that are shaded, (pixel_count, n), which add up to the coverage of all.
 
-    The nearest are, until hardly any light comes from behind them; where these are too many, a
-    sample of all represents the others.
+    The nearest are shaded, until hardly any light comes from behind them; where these are too many,
+    a sample of all layers is.
 
     Args:
         depths: (pixel_count, n), in any order; ties go by alpha.
         alphas: (pixel_count, n), 0 where there is no layer.
-        layers: how many are shaded, at most; n of them and an unseen_fraction of 0 are exact.
+        layers: maximum number that is shaded; exact with n and an unseen_fraction of 0.
     """
     order = np.lexsort((alphas, depths, alphas == 0.0), axis=-1)
     alphas = np.take_along_axis(alphas, order, axis=-1)
@@ -90,7 +90,7 @@ def layer_fractions(
 
 
 def _chosen(weights: Floats, covered: Floats, layers: int) -> Floats:
-    """What layers stand for that are chosen of all, (pixel_count, n).
+    """Weights of a sample of all layers, (pixel_count, n); 0 for layers that are not in it.
 
     Args:
         weights: (pixel_count, n) of the light, nearest first. covered: (pixel_count, 1), their sum.
