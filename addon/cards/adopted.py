@@ -1,11 +1,11 @@
-"""Cards that an artist has made, as any mesh of triangles with UVs, become a `CardMesh`.
+"""An artist's own cards, any mesh of triangles with UVs, as a `CardMesh`.
 
-A card is a connected piece. Its triangles, positions and UVs stay as they are; found are the way
-from root to tip, tangents along it, and which side faces away from the head. Vertices on a seam of
-the UVs become several, which does not divide a card.
+A card is a connected piece. Its triangles, positions and UVs stay as they are; this module finds
+the direction from root to tip, the tangents, and which side faces away from the head. Vertices on a
+seam of the UVs are split, which does not divide a card.
 
-Limitations: a card whose UVs are cut across, one island the roots and another the tips, counts its
-way from 0 to 1 in each island.
+Limitation: in a card whose UVs are cut across, one island for the roots and another for the tips,
+`along` runs from 0 to 1 in each island.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ from .card_mesh import CardMesh
 from .sort import connected_components
 from .uv_directions import UvAxes, UvDirection, coordinate_gradients, island_bounds, uv_axes
 
-#: A triangle of less than this fraction of the square of its longest edge has no area.
+#: A triangle whose area is below this fraction of its squared longest edge counts as without area.
 _FLAT = 1.0e-7
-#: A card looks away from the head, or towards it, when its mean cosine is at least this.
+#: Minimum mean cosine of a card that faces away from the head, or towards it.
 _MIN_FACING = 0.25
-#: the normal where nothing says another, and vectors too short to say it
+#: The normal where no other is known, and the length below which vectors have no direction.
 _DOWN, _SHORTEST = (0.0, 0.0, -1.0), 1.0e-20
 
 
@@ -60,13 +60,13 @@ def adopt_cards(
 
     Args:
         source: with UVs, in the space of the head.
-        head: what the hair grows from; without one the higher ends of cards are their roots.
+        head: the surface that hair grows on; without one the higher ends of cards are their roots.
         group: (vertex_count,) of the source's vertices; a card belongs to that of most of them.
-        direction: where the UVs of all cards lead from root to tip, or to find it out.
+        direction: in which the UVs of all cards run from root to tip; "auto" finds it.
         place: names the mesh in messages.
 
     Raises:
-        HairloomError: no triangles, or no UVs.
+        HairloomError: the mesh has no triangles, or no UVs.
     """
     _check(source, place)
     assert source.corner_uv is not None
@@ -126,7 +126,7 @@ class _Away:
 
 
 def _away_from(positions: Floats, head: Surface | None) -> _Away:
-    """Without a head from the middle, and nothing is nearer to it than anything else."""
+    """Without a head, directions are from the middle of all vertices, and distances are 0."""
     if head is None or not len(head.triangles):
         middle = 0.5 * (positions.min(axis=0) + positions.max(axis=0))
         outward = positions - middle
@@ -136,12 +136,12 @@ def _away_from(positions: Floats, head: Surface | None) -> _Away:
 
 
 def _facing(source: Surface, card: Ints, away: Floats) -> tuple[Floats, Bools, Bools]:
-    """Normals away from the head, and which triangles must turn for that.
+    """Normals away from the head, and which triangles must be flipped for that.
 
-    A card turns as a whole; where its own triangles disagree, each turns by itself.
+    A card is flipped as a whole; if its own triangles disagree, each is flipped by itself.
 
     Returns:
-        ((vertex_count, 3) unit, (triangle_count,) turned, (card_count,) whose triangles disagree).
+        ((vertex_count, 3) unit normals, (triangle_count,) is flipped, (card_count,) is mixed).
     """
     a, b, c = np.moveaxis(source.corners.astype(np.float64), 1, 0)
     outward = np.cross(b - a, c - a)
@@ -157,8 +157,8 @@ def _facing(source: Surface, card: Ints, away: Floats) -> tuple[Floats, Bools, B
 
 
 def _looks_inwards(centers: Floats, outward: Floats, ahead: Floats, card: Ints) -> Bools:
-    """Cards that look towards the head; of those that look to all sides, such as closed locks,
-    those that look towards their own middle: whose volume is negative. (card_count,)
+    """Cards that face the head, (card_count,). Of cards that face all sides, such as closed tubes,
+    those that face their own middle: their volume is negative.
     """
     area = np.linalg.norm(outward, axis=1)
     total = np.maximum(np.bincount(card, area), 1e-30)
@@ -194,7 +194,8 @@ def _along(uv: Floats, island: Ints, axes: UvAxes) -> Floats:
 def _tangents(
     corners: Floats, uv: Floats, triangles: Ints, along: Floats, island: Ints, axes: UvAxes
 ) -> Floats:
-    """Unit vectors along the way, (vertex_count, 3); from root to tip where UVs do not tell."""
+    """Unit vectors along the cards, (vertex_count, 3), by the UVs; by the positions of root and tip
+    where UVs give no direction."""
     gradients = coordinate_gradients(corners, uv[triangles])
     chosen = np.take_along_axis(gradients, axes.axis[island][:, None, None], axis=1)[:, 0]
     chosen *= np.where(axes.is_down[island], -1.0, 1.0)[:, None]
@@ -265,7 +266,7 @@ def _shape_notes(source: Surface, card: Ints, is_mixed: Bools) -> Iterator[str]:
 
 
 def _crowded(triangles: Ints, card: Ints) -> int:
-    """Cards with an edge of more than two triangles."""
+    """Number of cards with an edge of more than two triangles."""
     edges = np.concatenate([triangles[:, (0, 1)], triangles[:, (1, 2)], triangles[:, (2, 0)]])
     _, number, uses = np.unique(
         np.sort(edges, axis=1), axis=0, return_inverse=True, return_counts=True
@@ -274,7 +275,7 @@ def _crowded(triangles: Ints, card: Ints) -> int:
 
 
 def _doubled(source: Surface, card: Ints) -> int:
-    """Cards whose corners all lie where those of a card before them lie."""
+    """Number of cards whose corners all lie where those of an earlier card lie."""
     seen, found = set(), 0
     order = np.argsort(card, kind="stable")
     starts = np.searchsorted(card[order], np.arange(1, int(card.max()) + 1))

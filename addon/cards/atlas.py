@@ -1,9 +1,9 @@
 """Which strands each tile of the atlas shows, and which tile each card.
 
 Cards that look alike share a tile: k-medoids (Park and Jun 2009, here with the member nearest to
-the mean as the medoid) over what a card is in its own frame. The strands of the medoid are those
-that are baked. Hair of two groups shares no tile, nor do single strands with tufts, as long as
-there are tiles enough for that.
+the mean as the medoid) over features of cards in their own frames. The strands of the medoid are
+baked. Hair of two groups shares no tile, nor do single strands and bundles, as long as there are
+enough tiles.
 """
 
 from __future__ import annotations
@@ -20,24 +20,24 @@ from .atlas_settings import SIZES, AtlasSettings
 from .clusters import shared_out
 from .strip import CardFrames, Strips
 
-#: Tiles that brows, and that lashes have at least, where cards share them: of one or two an eye
-#: sees the pattern.
+#: Minimum number of tiles that cards of brows, and of lashes, share: with one or two, the
+#: repetition is visible.
 _FACE_TILES = 6
-#: How many strands a tile holds at most, as a factor of its width in pixels.
+#: Maximum number of strands in a tile, as a factor of its width in pixels.
 _MAX_STRANDS = 2
-#: How far a card may be widened or narrowed so that it covers as much as its own strands.
+#: Range of the factor by which a card is widened to cover as much as its own strands.
 _WIDTH_RANGE = (0.5, 2.0)
-#: A way aside that counts like another card being twice as wide: the sine of its angle.
+#: Sine of the angle between strands and card that counts as much as a factor of two in width.
 _WAVE = 0.2
-#: How much more roots on one side of a card lie ahead than on the other, as a slope, that counts as
-#: much: on the other side of a parting it is the other side.
+#: Slope of the line through a card's roots that counts as much; its sign differs between the two
+#: sides of a parting.
 _SKEW = 0.5
-#: A difference of colour that counts as much, to the eye: of square roots of linear colours.
+#: Difference of perceived colour that counts as much: of square roots of linear colours.
 _HUE = 0.15
-#: Beyond all colours, where a strand has none of its own.
+#: Value beyond all colours, for strands without one of their own.
 _NO_COLOR = 4.0
-#: What an automatic atlas gives a tile: texels to the width of the median strand; how much longer
-#: than wide texels are, since hair runs along them; the fewest texels, across and along.
+#: Tiles of an automatic atlas: texels across the median strand; length of a texel over its width,
+#: since hair runs along it; minimum texels across and along.
 _STRAND_TEXELS, _TEXEL_LENGTH, _MIN_TEXELS = 1.5, 2.0, (8.0, 48.0)
 _ROUNDS = 12
 _TINY = 1e-12
@@ -45,16 +45,16 @@ _TINY = 1e-12
 
 @dataclass(frozen=True)
 class AtlasPlan:
-    """All that the bake needs beside the strands' points and radii.
+    """What the bake needs beside the strands' points and radii.
 
     grid: how the atlas is divided. size: its width and height [pixels].
-    tile: (card_count,) of each card; crossed cards have that of their pair.
-    width_factor: (card_count,) by which a card is to be widened so that it covers as much with its
-        tile's strands as it would with its own; 1 where they are its own.
+    tile: (card_count,) of each card; crossed cards share that of their pair.
+    width_factor: (card_count,) factor on a card's width, with which it covers as much by its tile's
+        strands as by its own; 1 where the tile shows its own.
     strips: the strip of each tile that is used, tiles 0, 1, 2 ...; at CV resolution.
     strands: which strands are baked, tile after tile; offsets: (used tiles + 1,) where each begins.
     thickness: (used tiles,) factor of the radii, larger where a tile cannot hold all its strands.
-    notes: what the artist should know.
+    notes: for the artist.
     """
 
     grid: AtlasGrid
@@ -91,7 +91,7 @@ def plan_atlas(
         radius: (strand_count, cv_count) [m], as strands are drawn.
         cluster: (strand_count,) the card of each strand, from 0 without gaps.
         group: (strand_count,).
-        color: (strand_count, cv_count, 3) that strands are drawn in; None is the look's.
+        color: (strand_count, cv_count, 3) that strands are drawn in; None: the look's.
 
     Raises:
         HairloomError: the atlas is too small for its tiles, or no strand has a width.
@@ -121,7 +121,7 @@ def plan_atlas(
         strips=chosen,
         strands=strands,
         offsets=offsets,
-        # brows and lashes are seen face to face
+        # cards of brows and lashes face the viewer
         thickness=crowding * np.where(is_face[medoid], 1.0, settings.strand_width),
         notes=notes,
     )
@@ -142,7 +142,7 @@ def check_width(radius: Floats) -> None:
 def _wanted_texels(
     strips: Strips, radius: Floats, cluster: Ints, settings: AtlasSettings
 ) -> tuple[float, float]:
-    """What a tile needs so that the usual strand is wide enough, across and along [texels]."""
+    """Size of a tile, across and along, at which the median strand is wide enough [texels]."""
     width = np.maximum(strips.width.mean(axis=1), _TINY)
     strand = settings.strand_width * 2.0 * radius.mean(axis=1) / width[cluster]
     across = max(_STRAND_TEXELS / max(float(np.median(strand)), _TINY), _MIN_TEXELS[0])
@@ -153,7 +153,7 @@ def _wanted_texels(
 
 @dataclass(frozen=True)
 class _CardShapes:
-    """What cards are like.
+    """Shapes of cards.
 
     strand_count: (n,).
     covered: (n, row_count) fraction of each row that its strands cover.
@@ -172,7 +172,7 @@ def _card_shapes(strips: Strips, grid: Floats, radius: Floats, cluster: Ints) ->
     count = np.bincount(cluster, minlength=card_count)
     width = np.maximum(strips.width, _TINY)
     fill = sums_by(cluster, 2.0 * radius, card_count) / width
-    # n strands anywhere across, each of which covers fill / n of the width
+    # n strands at random places across, each of which covers fill / n of the width
     covered = 1.0 - (1.0 - np.clip(fill / count[:, None], 0.0, 1.0)) ** count[:, None]
     spacing = np.gradient(strips.frames.center, axis=1)
     spacing = np.linalg.norm(spacing, axis=-1)
@@ -185,14 +185,14 @@ def _card_shapes(strips: Strips, grid: Floats, radius: Floats, cluster: Ints) ->
 
 
 def _card_colors(color: Floats, cluster: Ints, card_count: int) -> Floats:
-    """What tells the colours of cards apart, (card_count, 9): the means at root, middle and tip."""
+    """Colour features of cards, (card_count, 9): the means at root, middle and tip."""
     stations = color[:, [0, color.shape[1] // 2, -1]].reshape(len(color), -1)
     seen = np.sqrt(np.nan_to_num(stations, nan=_NO_COLOR))
     return means_by(cluster, seen, card_count) / _HUE
 
 
 def _asides(frames: CardFrames, grid: Floats, cluster: Ints) -> Floats:
-    """The sine of the angle between each strand and its strip, (strand_count,), on the mean."""
+    """Mean sine of the angle between each strand and its strip, (strand_count,)."""
     step = np.diff(grid, axis=1)
     ahead = np.einsum("sri,sri->sr", step, frames.tangent[cluster, :-1])
     length = np.linalg.norm(step, axis=-1)
@@ -202,8 +202,8 @@ def _asides(frames: CardFrames, grid: Floats, cluster: Ints) -> Floats:
 
 
 def _skews(frames: CardFrames, grid: Floats, cluster: Ints) -> Floats:
-    """How much further along the card roots lie the further aside they do, (card_count,): the slope
-    of the line through them, within [-1, 1].
+    """Slope of the line through each card's roots, along over across the card, (card_count,) in
+    [-1, 1].
     """
     away = grid[:, 0] - frames.center[cluster, 0]
     aside = np.einsum("si,si->s", away, frames.side[cluster, 0])
@@ -240,7 +240,7 @@ def _shared_tiles(
     parts = shared_out(min(tile_count, len(kind)), sizes)
     faces = np.bincount(kind, is_face) > 0.0
     parts = np.maximum(parts, np.where(faces, np.minimum(_FACE_TILES, sizes), 1))
-    while parts.sum() > tile_count:  # each kind has one at least
+    while parts.sum() > tile_count:  # each kind keeps at least one
         parts[parts.argmax()] -= 1
     tile = np.zeros(len(kind), np.int32)
     shown = np.zeros(0, np.int64)
@@ -253,7 +253,7 @@ def _shared_tiles(
 
 
 def medoids(features: Floats, count: int, random: np.random.Generator) -> tuple[Ints, Ints]:
-    """The group of each, (n,), and the member that stands for each group, (count,)."""
+    """The group of each, (n,), and the member that represents each group, (count,)."""
     if count >= len(features):
         return np.arange(len(features)), np.arange(len(features))
     medoid = _far_apart(features, count, random)
@@ -293,7 +293,8 @@ def _gaps(features: Floats, medoids: Floats) -> Floats:
 def _baked_strands(
     cluster: Ints, medoid: Ints, settings: AtlasSettings, random: np.random.Generator
 ) -> tuple[Ints, Ints, Floats]:
-    """Strands, tile after tile, where each tile begins, and for how many each of its stands."""
+    """Strands, tile after tile; where each tile begins; and how many strands each baked one
+    represents."""
     order = np.argsort(cluster, kind="stable")
     ends = np.cumsum(np.bincount(cluster))
     most = max(int(_MAX_STRANDS * settings.side / settings.columns), 1)
@@ -328,7 +329,7 @@ def _cap_note(crowding: Floats) -> tuple[str, ...]:
 def _size_notes(
     strips: Strips, grid: Floats, radius: Floats, offsets: Ints, settings: AtlasSettings
 ) -> tuple[str, ...]:
-    """What is smaller than a pixel of the atlas."""
+    """Notes on strands thinner or shorter than a pixel of the atlas."""
     tile = np.repeat(np.arange(len(strips)), np.diff(offsets))
     across, along = settings.inner_tile
     spacing = np.linalg.norm(np.diff(strips.frames.center, axis=1), axis=-1).sum(axis=1)

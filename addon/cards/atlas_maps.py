@@ -1,9 +1,8 @@
 """`AtlasMaps`, the pictures of an atlas, and how the texels between hairs are filled.
 
-They are filled so that filtering and mip maps never mix in anything but hair, or another tile.
-Between two hairs of a row values are interpolated; beyond the outermost hair they continue. A row
-without hair takes the nearest row of its tile that has some. Hair runs along a tile, so rows find
-what is near.
+They are filled so that filtering and mip maps mix in hair of the same tile only. Between two hairs
+of a row values are interpolated; beyond the outermost hair they continue. A row without hair copies
+the nearest row of its tile that has some. Hair runs along a tile, so what is near lies in the row.
 """
 
 from __future__ import annotations
@@ -20,21 +19,21 @@ from .atlas_grid import AtlasGrid
 
 @dataclass(frozen=True, eq=False)
 class AtlasMaps:
-    """Maps of one size, float32 in [0, 1], row 0 the lowest; what they say of hair goes on where
-    alpha is 0, see `dilated`.
+    """Maps of one size, float32 in [0, 1], row 0 the lowest; values of hair continue where alpha is
+    0, see `dilated`.
 
     Directions d are 0.5 d + 0.5 in the card's own frame: x across the card, along u; y along the
     card from root to tip; z away from the head.
 
     alpha: (h, w) fraction of the texel that strands cover.
-    base: (h, w, 3) linear; times `base_gain` it is what the hair's colour is multiplied by.
+    base: (h, w, 3) linear; times `base_gain` it is the factor on the hair's colour.
     normal: (h, w, 3) of the strands, which are round.
-    tangent: (h, w, 3) way of the strands.
+    tangent: (h, w, 3) direction of the strands.
     depth: (h, w) 0.5 in the card's plane, larger further outside; 0 and 1 are half a card's mean
-        width behind and before it.
+        width behind and in front of it.
     along: (h, w) from 0 at the strand's root to 1 at its tip.
     strand_id: (h, w) a random number for each strand, that of the outermost one in the texel.
-    occlusion: (h, w) 1 open, 0 shut in, by the strands of the tile.
+    occlusion: (h, w) 1 open, 0 occluded, by the strands of the tile.
     """
 
     alpha: Floats
@@ -55,7 +54,7 @@ class AtlasMaps:
 
 #: The maps by name.
 MAPS = tuple(field.name for field in fields(AtlasMaps) if field.name != "base_gain")
-#: What stands in tiles without hair.
+#: Values in tiles without hair.
 _EMPTY: dict[str, float | tuple[float, ...]] = {
     "base": 1.0,
     "normal": (0.5, 0.5, 1.0),
@@ -68,7 +67,7 @@ _EMPTY: dict[str, float | tuple[float, ...]] = {
 
 
 def dilated(maps: AtlasMaps, grid: AtlasGrid) -> AtlasMaps:
-    """The same maps, going on where alpha is 0; alpha stays as it is."""
+    """The maps with values continued where alpha is 0; alpha stays as it is."""
     left, right, fraction = hair_beside(maps.alpha > 0.0, grid)
     is_free = maps.alpha == 0.0
     left, right, fraction = left[is_free], right[is_free], fraction[is_free]
@@ -85,7 +84,7 @@ def dilated(maps: AtlasMaps, grid: AtlasGrid) -> AtlasMaps:
 
 def _between(name: str, texels: Floats, left: Ints, right: Ints, fraction: Floats) -> Floats:
     """Values between two texels, (n, ...)."""
-    if name == "strand_id":  # a number between two is a third strand's
+    if name == "strand_id":  # a mean of two IDs would be a third strand's
         return texels[np.where(fraction < 0.5, left, right)]
     mixed = texels[left]
     mixed += (texels[right] - mixed) * fraction.reshape(-1, *[1] * (texels.ndim - 1))
@@ -97,13 +96,14 @@ def _between(name: str, texels: Floats, left: Ints, right: Ints, fraction: Float
 
 
 def tile_edges(size: int, count: int) -> Ints:
-    """Where tiles begin, and the end of the last, (count + 1,) [pixels]: a texel is of the tile
-    in which its middle lies."""
+    """Where tiles begin, and the end of the last, (count + 1,) [pixels]: a texel belongs to the
+    tile that holds its middle."""
     return np.ceil(np.arange(count + 1) * (size / count) - 0.5).astype(np.int64)
 
 
 def hair_beside(is_hair: Bools, grid: AtlasGrid) -> tuple[Ints, Ints, Floats]:
-    """The two texels, as row * width + column, that each lies between, and how near to the second.
+    """The two texels of hair that each texel lies between, as row * width + column, and the weight
+    of the second.
 
     Both are the texel itself where it has hair, and -1 in tiles without hair.
     """
@@ -124,7 +124,7 @@ def hair_beside(is_hair: Bools, grid: AtlasGrid) -> tuple[Ints, Ints, Floats]:
 
 
 def _beside_in_rows(is_hair: Bools) -> tuple[Ints, Floats]:
-    """The columns of the hair on both sides, (2, rows, columns), and how near to the second."""
+    """The columns of the hair on both sides, (2, rows, columns), and the weight of the second."""
     count = is_hair.shape[1]
     column = np.arange(count)
     left = np.maximum.accumulate(np.where(is_hair, column, -1), axis=1)

@@ -8,11 +8,11 @@ from ..errors import HairloomError
 from ..params import Settings, choice, integer, number, when
 from .atlas_grid import AtlasGrid
 
-#: Sizes that engines take: powers of two, so that each mip map halves it.
+#: Sizes that engines accept: powers of two, so that each mip map halves them.
 SIZES = (128, 256, 512, 1024, 2048, 4096)
-#: The largest that an automatic atlas has.
+#: Maximum size of an automatic atlas.
 _AUTOMATIC_MAX = 2048
-#: What a tile must have left between its padding, across and along [pixels].
+#: Minimum size of a tile between its padding, across and along [pixels].
 MIN_TILE = (4, 8)
 
 
@@ -98,11 +98,11 @@ class AtlasSettings(Settings):
     )
 
     def fitted(self, tile_count: int, across: float, along: float) -> AtlasSettings:
-        """Where the size is automatic, the smallest that has this many tiles, or as many as the
-        settings allow, of these pixels each; else the same settings.
+        """With an automatic size, the smallest atlas that holds this many tiles, or as many as the
+        settings allow, of this size each; else the same settings.
 
         Args:
-            across, along: what a tile should have between its padding [pixels].
+            across, along: wanted size of a tile between its padding [pixels].
         """
         if self.size != "auto":
             return self
@@ -123,7 +123,7 @@ class AtlasSettings(Settings):
 
     @property
     def inner_tile(self) -> tuple[float, float]:
-        """What a tile has between its padding, across and along [pixels]; may be negative."""
+        """Size of a tile between its padding, across and along [pixels]; may be negative."""
         parts = (self.columns, self.rows)
         across, along = (self.side / count - 2.0 * self.padding for count in parts)
         return across, along
@@ -133,8 +133,8 @@ class AtlasSettings(Settings):
         """The tiles.
 
         Raises:
-            HairloomError: the padding leaves too little of a tile; it says how large the atlas
-                would have to be.
+            HairloomError: the padding leaves too little of a tile; the message gives the size that
+                the atlas needs.
         """
         if any(there < least for there, least in zip(self.inner_tile, MIN_TILE, strict=True)):
             raise self._too_small()

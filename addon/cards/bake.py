@@ -1,14 +1,14 @@
-"""The atlas from strands that were laid flat: the reference, sample by sample.
+"""The atlas of strands that were laid flat, sample by sample: the reference.
 
-Twin of gpu_shaders/lib_atlas.glsl and of what render/atlas_pass.py does with it. Of each texel
-SAMPLES x SAMPLES places are looked at; each shows the outermost strand there. The texel's alpha is
-the fraction of the samples that show one, and its maps are the means over those.
+Twin of gpu_shaders/lib_atlas.glsl and of what render/atlas_pass.py does with it. Each texel has
+SAMPLES x SAMPLES samples, each of which shows the outermost strand at its place. The texel's alpha
+is the fraction of its samples that show a strand; its other maps are the means over those.
 
 Each row of samples lies a quarter of a sample further left than the one below, so that a texel's
-are all at different places across: hair runs along a tile, and upright samples would stand in line
-with it. A GPU draws that by leaning everything to the right.
+samples are all at different places across: hair runs along a tile, and samples above one another
+would line up with it. A GPU gets the same by shearing everything to the right.
 
-Slow, a loop over the triangles of all strands; for machines without a GPU too.
+Slow, as it loops over the triangles of all strands; also serves machines without a GPU.
 """
 
 from __future__ import annotations
@@ -26,21 +26,21 @@ from .bake_strands import FlatStrands
 
 #: Samples of a texel across, and along.
 SAMPLES = 4
-#: Steps of the R2 sequence (Roberts 2018) in x and y, and from strand to strand, of 2^24.
+#: Steps of the R2 sequence (Roberts 2018) in x and y, and from strand to strand, in units of 2^-24.
 SPARSE_STEPS = (12664745, 9560333, 10368890)
 SPARSE_RANGE = 1 << 24
-#: Samples that are held at a time.
+#: Maximum number of samples in memory at a time.
 _MAX_SAMPLES = 1 << 20
-#: Texels across that are made at a time, so that leaning samples fit a texture.
+#: Maximum texels across a block, so that sheared samples fit into a texture.
 _MAX_ACROSS = 2048
 _EDGES = np.array([[-1.0], [1.0]])
 _TINY = 1e-12
 
 
 def min_one_sample(flat: FlatStrands, size: int) -> tuple[Floats, Floats]:
-    """Half widths of ribbons a sample wide at least, and the fraction of their samples that counts.
+    """Half widths of ribbons at least a sample wide, and the fraction of their samples that counts.
 
-    So a strand thinner than a sample still covers as much as it is wide, see `is_counted`.
+    A strand thinner than a sample thus still covers as much as its width, see `is_counted`.
 
     Args:
         size: of the atlas [pixels].
@@ -56,7 +56,7 @@ def min_one_sample(flat: FlatStrands, size: int) -> tuple[Floats, Floats]:
     across = np.where(length > _TINY, across / np.maximum(length, _TINY), 0.0)
     fraction = np.clip(across / 0.5, 0.0, 1.0)
     is_thin = fraction < 1.0
-    # what has no width at all lies across its way
+    # a ribbon without width is widened across its direction
     turned = np.stack([direction[..., 1], -direction[..., 0]], axis=-1)
     turned = 0.5 * turned / np.maximum(length, _TINY)[..., None]
     wide = np.where(is_thin[..., None], turned, half) / side
@@ -64,7 +64,7 @@ def min_one_sample(flat: FlatStrands, size: int) -> tuple[Floats, Floats]:
 
 
 def is_counted(column: Ints, row: Ints, strand: int, fraction: Floats) -> Bools:
-    """Whether a sample of a widened ribbon counts: this fraction of them does, evenly spread."""
+    """Whether a sample of a widened ribbon counts: `fraction` of them do, evenly spread."""
     x, y, z = SPARSE_STEPS
     place = (column * x + row * y + strand * z) % SPARSE_RANGE
     counted: Bools = place < fraction * SPARSE_RANGE
@@ -76,7 +76,7 @@ def fibre_normal(tangent: Floats, side: Floats) -> Floats:
 
     Args:
         tangent: (..., 3) unit vectors in the card's frame.
-        side: (...) where across the strand, from -1 to 1.
+        side: (...) place across the strand, from -1 to 1.
     """
     right = np.stack([tangent[..., 1], -tangent[..., 0], np.zeros_like(side)], axis=-1)
     right = unit_or(right, (1.0, 0.0, 0.0))
@@ -88,7 +88,7 @@ def fibre_normal(tangent: Floats, side: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class Block:
-    """A part of the atlas that is made at a time: its lowest left texel and its size [pixels]."""
+    """A part of the atlas that is made at once: its lower left texel and its size [pixels]."""
 
     left: int
     low: int
@@ -97,16 +97,17 @@ class Block:
 
     @property
     def samples_across(self) -> int:
-        """Columns of samples; the uppermost row leans a sample a texel further than the lowest."""
+        """Columns of samples; the shear moves the top row right by one sample per texel of
+        height."""
         return SAMPLES * self.width + self.height
 
     def leaning(self, place: Floats, size: int) -> Floats:
-        """Where places of the atlas, (..., 2) in 0 to 1, are among the samples, (..., 2)."""
+        """Places of the atlas, (..., 2) in 0 to 1, in sheared samples, (..., 2)."""
         x, y = np.moveaxis((place * size - (self.left, self.low)) * SAMPLES, -1, 0)
         return np.stack([x + y / SAMPLES - 0.5, y], axis=-1)
 
     def reached(self, flat: FlatStrands, half: Floats, size: int) -> Ints:
-        """The strands that may lie in it."""
+        """The strands that may lie in the block."""
         reach = np.abs(half)
         low = (flat.place - reach).min(axis=1) * size
         high = (flat.place + reach).max(axis=1) * size
@@ -116,7 +117,7 @@ class Block:
 
 
 def blocks_of(size: int) -> list[Block]:
-    """The blocks of an atlas, all of one size but for those at the top."""
+    """The blocks of an atlas, all of one size except those at the top."""
     width = min(size, _MAX_ACROSS)
     height = max(min(_MAX_SAMPLES // (width * SAMPLES**2), size), 1)
     starts = range(0, size, height), range(0, size, width)
@@ -138,7 +139,7 @@ def sampled_maps(flat: FlatStrands, size: int) -> AtlasMaps:
 def _sampled_block(
     flat: FlatStrands, half: Floats, fraction: Floats, size: int, block: Block
 ) -> dict[str, Any]:
-    """The maps of its texels."""
+    """The maps of a block's texels."""
     shape = block.height * SAMPLES, block.samples_across
     nearest = np.full(shape, -np.inf, np.float32)
     values = np.zeros((*shape, 10), np.float32)  # along, id, depth, occlusion, tangent, base
@@ -150,7 +151,7 @@ def _sampled_block(
             seen = weights @ _vertex_values(flat, fraction, strand, vertices)
             place = column + block.left * SAMPLES, row + block.low * SAMPLES
             counts = is_counted(*place, int(strand), seen[:, 0])
-            # the later one of two that lie equally far outside shows
+            # of two that lie equally far outside, the later one shows
             counts &= seen[:, 4] >= nearest[row, column]
             row, column, seen = row[counts], column[counts], seen[counts]
             nearest[row, column] = seen[:, 4]
@@ -161,7 +162,7 @@ def _sampled_block(
 
 
 def _upright(image: Floats, block: Block) -> Floats:
-    """What leant to the right, (rows, samples across, ...), again as wide as the block."""
+    """Sheared samples, (rows, samples across, ...), moved back to the block's width."""
     row = np.arange(block.height * SAMPLES)[:, None]
     return image[row, row // SAMPLES + np.arange(block.width * SAMPLES)]
 
@@ -172,7 +173,7 @@ def _samples(corners: Floats, shape: tuple[int, int]) -> Iterator[tuple[Ints, In
 
     Args:
         corners: (2 * station_count, 2) left and right, station after station [samples].
-        shape: rows and columns of samples that there are.
+        shape: rows and columns of all samples.
     """
     lowest = np.minimum(np.minimum(corners[:-2], corners[1:-1]), corners[2:])
     highest = np.maximum(np.maximum(corners[:-2], corners[1:-1]), corners[2:])
@@ -205,7 +206,7 @@ def _vertex_values(flat: FlatStrands, fraction: Floats, strand: int, vertices: I
 
 
 def _filtered(nearest: Floats, values: Floats, normal: Floats) -> dict[str, Any]:
-    """Texels of their samples, by the names of the maps."""
+    """Texels from their samples, by the names of the maps."""
     rows, columns = nearest.shape[0] // SAMPLES, nearest.shape[1] // SAMPLES
     shape = (rows, SAMPLES, columns, SAMPLES)
     count = np.isfinite(nearest).reshape(shape).sum(axis=(1, 3))

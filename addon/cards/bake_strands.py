@@ -1,8 +1,8 @@
 """The strands of an atlas laid flat into its tiles.
 
-A strip has its rows where the strands have their CVs. So CV r of a strand lies at row r, moved on
-by as much as it is ahead of that row along the strip; across it lies as far aside as it is along
-the strip's side. What stands out of the strip's plane is its depth.
+A strip has one row per CV of the strands. CV r of a strand lies at row r, moved along the strip by
+its offset from that row; across the strip it lies at its offset along the row's side. Its height
+over the strip's plane is its depth.
 """
 
 from __future__ import annotations
@@ -15,14 +15,15 @@ from ..arrays import Floats
 from ..strands.vectors import unit_or
 from .atlas import AtlasPlan
 
-#: Part of a card's width in which strands in front of another take light from it.
+#: Part of a card's width within which strands occlude those behind them.
 _NEAR = 0.25
-#: Part of a card's width, from its middle, in which strands stay where they are in any case.
+#: Part of a card's width, from its middle, in which strands are never moved.
 _KEPT = 0.35
-#: Strands that begin later than their card, by up to this fraction of its length, begin sooner by
-#: this part of it: where no other card lies over the first ones, along a parting, skin would show.
+#: Strands that begin behind their card's begin, by up to this fraction of its length, are extended
+#: to begin sooner, by this part of the gap: along a parting, where no other card covers the roots,
+#: skin would show.
 _BEHIND, _SOONER = 0.06, 0.7
-#: Stations in place of each segment, so that bends are round.
+#: Stations that replace each segment, so that bends are smooth.
 PIECES = 4
 _TINY = 1e-12
 
@@ -32,7 +33,7 @@ class FlatStrands:
     """Ribbons on the atlas, straight from station to station, all float32; tile after tile.
 
     place: (n, station_count, 2) in the atlas, 0 to 1.
-    half: (n, station_count, 2) from there to the right edge.
+    half: (n, station_count, 2) from `place` to the right edge.
     along: (n, station_count) from 0 at the strand's root to 1 at its tip.
     depth: (n, station_count) 0 to 1 as in AtlasMaps.
     tangent: (n, station_count, 3) unit vectors in the card's frame.
@@ -57,7 +58,7 @@ class FlatStrands:
 
 
 def strand_ids(count: int) -> Floats:
-    """A number of its own for each strand, evenly between 0 and 1 and at random, (count,)."""
+    """A distinct number for each strand, evenly spaced in 0 to 1 in random order, (count,)."""
     ids: Floats = (np.random.default_rng(0).permutation(count) + 0.5) / count
     return ids
 
@@ -115,7 +116,8 @@ def flat_strands(
 
 
 def _half_width(across: Floats, along: Floats, thick: Floats, shape: Floats) -> Floats:
-    """From a ribbon's middle to its edge, across the strand as the card shows it, (n, stations, 2).
+    """From a ribbon's middle to its edge, perpendicular to the strand on the card, (n, stations,
+    2).
 
     Args:
         across, along: place in the tile. thick: radius in widths of the card.
@@ -129,7 +131,7 @@ def _half_width(across: Floats, along: Floats, thick: Floats, shape: Floats) -> 
 
 
 def _finer(values: Floats) -> Floats:
-    """PIECES stations in place of each segment, (n, stations, channels): Catmull and Rom 1974."""
+    """PIECES stations per segment, (n, stations, channels), by Catmull and Rom 1974."""
     ends = 2.0 * values[:, [0, -1]] - values[:, [1, -2]]
     wide = np.concatenate([ends[:, :1], values, ends[:, 1:]], axis=1)
     p0, p1, p2, p3 = (wide[:, i : wide.shape[1] - 3 + i, None] for i in range(4))
@@ -141,14 +143,14 @@ def _finer(values: Floats) -> Floats:
 
 
 def _within(along: Floats) -> Floats:
-    """Strands that begin before the strip or end behind it squeezed into it, each as a whole."""
+    """Strands that begin before the strip or end behind it, scaled into it, each as a whole."""
     low = np.minimum(along.min(axis=1, keepdims=True), 0.0)
     high = np.maximum(along.max(axis=1, keepdims=True), 1.0)
     return (along - low) / (high - low)
 
 
 def _sooner(along: Floats) -> Floats:
-    """Strands that begin a little behind their card's begin, stretched towards it."""
+    """Strands that begin a little behind their card's begin, extended towards it."""
     root = along[:, :1]
     start = root - _SOONER * np.minimum(root, _BEHIND)
     stretched: Floats = start + (along - root) * (1.0 - start) / np.maximum(1.0 - root, _TINY)
@@ -156,9 +158,10 @@ def _sooner(along: Floats) -> Floats:
 
 
 def _squeezed(across: Floats, half: Floats, plan: AtlasPlan) -> Floats:
-    """Places across from -0.5 to 0.5: where strands reach further out, all beyond _KEPT give way.
+    """Places across in -0.5 to 0.5: where strands reach further out, those beyond _KEPT are
+    compressed.
 
-    So nothing is cut off, and each strand keeps its neighbours.
+    Thus nothing is cut off, and each strand keeps its neighbours.
     """
     far = np.maximum.reduceat(np.abs(across) + half, plan.offsets[:-1], axis=0)
     far = np.maximum(far, 0.5)[plan.tile_of_strand]
@@ -183,9 +186,10 @@ def _shades(plan: AtlasPlan, base: Floats | None, shape: tuple[int, ...]) -> tup
 
 
 def _occlusion(plan: AtlasPlan, across: Floats, radius: Floats, outside: Floats) -> Floats:
-    """exp(-tau), tau the strands before each CV that light from the front meets at random.
+    """exp(-tau), with tau the mean number of strands that light from the front meets before each
+    CV.
 
-    Those of the same row within _NEAR of the card's width count, by the fraction of it that they
+    Strands of the same row within _NEAR of the card's width count, by the fraction of it that they
     cover.
 
     Args:

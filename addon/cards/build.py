@@ -34,11 +34,11 @@ from .steps import map_progress
 from .strip import Strips, UncutCards, guide_strips, scattered_tiles, strip_mesh
 from .taken_over import taken_over
 
-#: Directions from which coarser levels are looked at to be sorted.
+#: Number of views from which coarser levels are sorted.
 _COARSER_VIEWS = 16
-#: Views in which it is counted how often the order is wrong.
+#: Number of views in which the order is checked.
 _CHECKED_VIEWS = 8
-#: The fraction of wrong pixels from which on a note is worth it: fewer are hard to see.
+#: Fraction of wrong pixels above which there is a note: fewer are hard to see.
 _WRONG_ENOUGH = 0.1
 #: Each card represents about this many strands; there are at most this many cards.
 _STRANDS_PER_CARD, _MAX_CARDS = 12, 600
@@ -46,16 +46,16 @@ _STRANDS_PER_CARD, _MAX_CARDS = 12, 600
 
 @dataclass(frozen=True)
 class CardGroom:
-    """What cards are made from.
+    """The hair that cards are made from.
 
-    strands: uniform, one at least.
-    number: (strand_count,) of each in the groom, on which its colour depends.
-    guides: (guide_count,) which of them are guides.
+    strands: uniform, at least one.
+    number: (strand_count,) of each strand in the groom, on which its colour depends.
+    guides: (guide_count,) which strands are guides.
     radius: (strand_count, cv_count) [m], as strands are drawn.
     root_normal: (strand_count, 3) unit normals of the head under the roots.
     head: in the space of the strands, or None.
     occlusion: (strand_count, cv_count) ambient occlusion of the strands, which their cards take
-        over; None lets rays find that of the cards.
+        over; None: rays find that of the cards.
     light: (strand_count, cv_count, k) of the strands, see `taken_over.taken_over`, or None.
     """
 
@@ -73,20 +73,21 @@ class CardGroom:
 class CardBuild:
     """Cards of a groom, ready to be drawn and written.
 
-    levels: finest first; all show the same atlas, and a card has the same number in each. The order
-        of triangles is that in which front faces are drawn.
+    levels: finest first; all show the same atlas, and a card has the same number in each. Triangles
+        are in the order in which front faces are drawn.
     backs: the triangles of each level once more, in the order in which back faces are drawn.
-    errors: of each level [m], see `levels.CardLevel`: how far it is from the strands' own way.
-    plan: what is to be baked into the atlas; None where its tiles are made at random.
-    shell_layers: how many layers shells have; 0: they are cards.
-    wrong_fraction: of the pixels of the finest level those that are drawn in a wrong order, see
+    errors: of each level [m], see `levels.CardLevel`: its distance from the cards at full
+        resolution.
+    plan: what is baked into the atlas; None: its tiles are procedural.
+    shell_layers: number of layers of shells; 0: these are cards.
+    wrong_fraction: fraction of the finest level's pixels that are drawn in a wrong order, see
         `order_check.wrong_fraction`.
-    order_notes: where that is much, what can be done.
-    shape_notes: where cards are other ones than the settings ask for.
-    light, depth: of each vertex of the finest level, see `taken_over.TakenOver`; None where that
-        of the strands is not known.
-    made: what was made, on record, world space; None where nothing is kept of it.
-    edits: how many cards are as the artist left them; edit_notes: what is doubtful of these.
+    order_notes: remedies where that is much.
+    shape_notes: where cards differ from the settings.
+    light, depth: of each vertex of the finest level, see `taken_over.TakenOver`; None where those
+        of the strands are unknown.
+    made: the record of the cards, world space; None for shells.
+    edits: how many cards are as the artist left them; edit_notes: doubts about these.
     """
 
     levels: tuple[CardMesh, ...]
@@ -109,12 +110,12 @@ class CardBuild:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What the artist should know."""
+        """All notes for the artist."""
         of_atlas = () if self.plan is None else self.plan.notes
         return (*self.shape_notes, *self.edit_notes, *of_atlas, *self.order_notes)
 
 
-#: Gives the alpha of the atlas, (height, width), or None for opaque cards; may bake it from the
+#: Returns the alpha of the atlas, (height, width), or None for opaque cards; may bake it from the
 #: plan of this build, whose cards have no occlusion and order yet.
 type AlphaOf = Callable[[CardBuild], Floats | None]
 
@@ -131,8 +132,8 @@ def card_steps(
     """Build the cards; each step names what comes next, and the result is returned.
 
     Args:
-        others: cards of other grooms, which shade these, world space.
-        edits: what the artist has changed of cards that were made before, which is kept.
+        others: cards of other grooms, which occlude these, world space.
+        edits: the artist's changes of earlier cards, which are kept.
 
     Raises:
         HairloomError: the atlas is too small for its tiles, or there is nothing to bake into it.
@@ -198,7 +199,7 @@ def _shell_steps(
     alpha_of: AlphaOf,
     others: Sequence[CardOccluder],
 ) -> Generator[str, None, CardBuild]:
-    """The same of shells, whose order is known."""
+    """The same for shells, whose order is known."""
     yield "Shells from strands"
     assert groom.head is not None
     made = build_shells(
@@ -257,8 +258,8 @@ def _light_steps(
     occlusion: CardOcclusionSettings,
     kept: KeptCards | None,
 ) -> Generator[float, None, CardBuild]:
-    """The build with the light that its finest level takes over of the strands, and their occlusion
-    times what rays find of other grooms.
+    """The build with the light that its finest level takes over from the strands, and their
+    occlusion times that by other grooms, which rays find.
 
     Args:
         card: see `card_of_strand`.
@@ -271,7 +272,7 @@ def _light_steps(
         own = [CardOccluder(mesh, alpha), *others]
         found = yield from occlusion_steps(mesh, own, bodies, occlusion)
         return _with_finest(build, mesh.with_occlusion(found))
-    # cards of the artist's own stand beside the strands of the nearest one
+    # the artist's own cards use the strands of the nearest made card
     on_strands = mesh if kept is None else replace(mesh, card=kept.model[mesh.card])
     taken = taken_over(on_strands, groom.strands.grid, groom.occlusion, groom.light, card)
     shown: Floats = (1.0 - occlusion.strength * (1.0 - taken.occlusion)).astype(np.float32)
@@ -286,8 +287,8 @@ def _with_finest(build: CardBuild, mesh: CardMesh) -> CardBuild:
 
 
 def card_of_strand(groom: CardGroom, settings: CardSettings) -> Ints:
-    """The card that stands for each strand, (strand_count,). Crossed cards come again after all
-    others, in the same order."""
+    """The card that represents each strand, (strand_count,). Second cards of crossed pairs follow
+    after all others, in the same order."""
     grid, group = groom.strands.grid, groom.strands.group
     if settings.source == "guides":
         return cluster_of_guides(grid, group, groom.guides)
@@ -297,7 +298,7 @@ def card_of_strand(groom: CardGroom, settings: CardSettings) -> Ints:
 def _orders(
     levels: Sequence[CardMesh], head: Surface | None, settings: CardSettings, alpha: Floats | None
 ) -> Generator[str, None, list[CardOrders]]:
-    """Of each level; coarser ones are looked at from fewer sides."""
+    """The orders of each level; coarser ones are sorted from fewer views."""
     by = cast("SortBy", settings.order_by)
     orders = []
     for number, mesh in enumerate(levels):
@@ -311,7 +312,7 @@ def _orders(
 def _reported[Result](
     name: str, steps: Generator[float, None, Result]
 ) -> Generator[str, None, Result]:
-    """What is done, and how much of it."""
+    """Progress messages: the step's name, then its percentage."""
     yield name
     return (yield from map_progress(steps, lambda fraction: f"{name}, {100.0 * fraction:.0f} %"))
 
@@ -319,7 +320,8 @@ def _reported[Result](
 def uncut_cards(
     groom: CardGroom, settings: CardSettings, atlas: AtlasSettings, cluster: Ints
 ) -> tuple[UncutCards, AtlasPlan | None]:
-    """The strips of all cards, with their groups, layers and tiles; and what the tiles show.
+    """The strips of all cards, with their groups, layers and tiles; and the plan of the atlas, if
+    baked.
 
     Args:
         cluster: see `card_of_strand`.
@@ -330,13 +332,13 @@ def uncut_cards(
     first: Ints = found
     if settings.source == "guides":
         first = guides
-        is_baked &= len(grid) > len(guides)  # guides alone stand for tufts that nobody has made
+        is_baked &= len(grid) > len(guides)  # guides alone represent bundles without strands
         count = count if is_baked else np.ones_like(count)
         rows = replace(settings, segment_count=grid.shape[1] - 1) if is_baked else settings
         strips = guide_strips(grid[guides], groom.root_normal[guides], rows)
     else:
         strips = fit_strips(grid, radius, cluster, groom.root_normal, settings)
-    # crossed cards come after all others, and stand for the same strands
+    # second cards of crossed pairs follow after all others, and represent the same strands
     owner = np.resize(np.arange(len(first)), len(strips))
     cards = _by_chance(strips, count[owner], strands.group[first][owner], settings)
     cards = _looking_out(cards, groom)
@@ -351,7 +353,7 @@ def uncut_cards(
 
 
 def _looking_out(cards: UncutCards, groom: CardGroom) -> UncutCards:
-    """With normals away from the middle of all roots, as strands have them."""
+    """The cards with normals away from the middle of all roots, as strands have."""
     return replace(cards, center=groom.strands.roots.mean(axis=0, dtype=np.float64))
 
 
@@ -360,9 +362,9 @@ def _by_chance(
 ) -> UncutCards:
     """Cards with random tiles."""
     layer = card_layers(strips, settings.layers)
-    # loose strands lie on everything, as artists lay them
+    # single strands lie outermost, as artists place them
     is_loose = (strand_count == 1) & (strand_count.max() > 1)
-    # and there is nothing above brows and lashes
+    # and so do brows and lashes
     is_outermost = is_loose | is_face_hair(group)
     layer = np.where(is_outermost, settings.layers - 1, layer).astype(np.int32)
     atlas = AtlasGrid(columns=settings.atlas_columns)
@@ -382,7 +384,8 @@ def _wider(strips: Strips, factor: Floats) -> Strips:
 
 
 def with_occlusion_of(finest: CardMesh, level: CardMesh) -> CardMesh:
-    """A coarser level, each vertex with the occlusion of the nearest of its card in the atlas."""
+    """A coarser level, with each vertex's occlusion from the vertex of its card that is nearest in
+    the atlas."""
     owner = card_of_vertex(finest)
     vertices = np.argsort(owner, kind="stable")
     count = np.bincount(owner, minlength=len(finest.group))
@@ -390,7 +393,7 @@ def with_occlusion_of(finest: CardMesh, level: CardMesh) -> CardMesh:
     mine = card_of_vertex(level)
     step = np.arange(int(count.max(initial=0)))
     candidate = vertices[start[mine, None] + np.minimum(step, count[mine, None] - 1)]
-    # along and across count the same, however a tile is shaped
+    # along and across count equally, whatever the shape of a tile
     tiles = np.array([finest.atlas.columns, finest.atlas.rows])
     gap = (finest.uv[candidate] - level.uv[:, None]) * tiles
     nearest = np.einsum("vci,vci->vc", gap, gap).argmin(axis=1)
@@ -398,14 +401,14 @@ def with_occlusion_of(finest: CardMesh, level: CardMesh) -> CardMesh:
 
 
 def strand_occluder(groom: CardGroom) -> CardOccluder:
-    """Strands as cards that only shade others, for grooms of which no cards were made.
+    """Strands as cards that only occlude others, for grooms without cards.
 
-    They lie along clusters of the strands, each row as dense as the strands in it.
+    The cards follow clusters of strands, each row as dense as the strands in it.
 
-    Strands take pi / 4 of their area of light from everywhere, cards half of theirs times tau
-    (Cauchy, see shading/volume/card_opacity.py). So a row that is w wide and holds strands of
-    radius r has  tau = pi / 2 sum 2 r / w.  Nothing is baked, sorted or shaded: it takes a second
-    where cards take a minute. A row of texels is a row of all cards, and a column a card.
+    Strands block light from everywhere with pi / 4 of their area, cards with half of theirs times
+    tau (Cauchy, see shading/volume/card_opacity.py). So a row that is w wide and holds strands of
+    radius r has tau = pi / 2 sum 2 r / w. Nothing is baked, sorted or shaded: it takes a second
+    where cards take a minute. A row of texels is a row of all cards, a column of texels one card.
     """
     strands, radius = groom.strands, groom.radius
     count = min(max(strands.strand_count // _STRANDS_PER_CARD, 1), _MAX_CARDS)

@@ -1,4 +1,4 @@
-"""`CardMesh`: the triangles of all hair cards in the order in which they are to be drawn."""
+"""`CardMesh`: the triangles of all hair cards in the order in which they are drawn."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .atlas_grid import AtlasGrid
 #: A vector shorter than this has no direction.
 _SMALLEST = 1.0e-12
 
-#: What a mesh knows of each vertex, and of each card.
+#: Attributes of each vertex, and of each card.
 OF_VERTICES = ("positions", "uv", "along", "normal", "tangent", "occlusion")
 OF_CARDS = ("group", "layer", "tile")
 
@@ -36,7 +36,7 @@ class CardMesh:
     along: (vertex_count,) float32 from 0 at the root to 1 at the tip.
     normal: (vertex_count, 3) float32 unit vectors, away from the head.
     tangent: (vertex_count, 3) float32 unit vectors from root to tip.
-    occlusion: (vertex_count,) float32, ambient occlusion from 0, shut in, to 1, open.
+    occlusion: (vertex_count,) float32, ambient occlusion from 0, occluded, to 1, open.
     card: (triangle_count,) int32, which card a triangle belongs to. Cards keep their numbers when
         others are left out.
     group, layer, tile: (highest card number + 1 or more,) int32 of each card: its group of hair,
@@ -44,7 +44,7 @@ class CardMesh:
     atlas: how the texture is divided into tiles.
 
     Raises:
-        HairloomError: shapes that do not fit, an index out of range, values not finite.
+        HairloomError: shapes that do not match, an index out of range, values that are not finite.
     """
 
     positions: Floats
@@ -74,7 +74,7 @@ class CardMesh:
         self._check_cards()
 
     def _check_cards(self) -> None:
-        """What is known of each card is there for all of them."""
+        """Check that attributes of cards exist for all of them; empty ones become 0."""
         needed = int(self.card.max()) + 1 if len(self.card) else 0
         for name in OF_CARDS:
             value = np.ascontiguousarray(getattr(self, name), np.int32)
@@ -86,8 +86,8 @@ class CardMesh:
 
     @property
     def axes(self) -> tuple[Floats, Floats, Floats]:
-        """At each vertex: along the card, its normal, and across both. The first is at a right
-        angle to the normal, which the tangent need not be. As in card.vert.glsl.
+        """At each vertex: along the card, its normal, and across both. The first is perpendicular
+        to the normal, unlike the tangent. As in card.vert.glsl.
         """
         across = np.cross(self.tangent, self.normal)
         length = np.linalg.norm(across, axis=1, keepdims=True)
@@ -105,7 +105,7 @@ class CardMesh:
         return self.positions.min(axis=0), self.positions.max(axis=0)
 
     def without_loose(self) -> CardMesh:
-        """The same mesh without vertices that no triangle has."""
+        """The same mesh without vertices that no triangle uses."""
         used = np.unique(self.triangles)
         vertices: dict[str, Any] = {name: getattr(self, name)[used] for name in OF_VERTICES}
         triangles = np.searchsorted(used, self.triangles)
@@ -119,7 +119,8 @@ class CardMesh:
 def joined(meshes: Sequence[CardMesh]) -> CardMesh:
     """All triangles in one mesh, one mesh after the other; card numbers stay as they are.
 
-    What is known of cards, and the atlas, are those of the first mesh, and hold for all numbers.
+    The attributes of cards, and the atlas, are those of the first mesh, and must hold for all
+    numbers.
     """
     starts = np.cumsum([0, *(len(mesh.positions) for mesh in meshes[:-1])])
     triangles = [mesh.triangles + start for mesh, start in zip(meshes, starts, strict=True)]

@@ -1,4 +1,4 @@
-"""Strands as cards take them: equally many points, evenly spaced, one at each row of a card."""
+"""Strands for cards: equally many points, evenly spaced, one at each row of a card."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ from ..arrays import Ints
 from ..strands import StrandSet
 from ..strands.resample import evenly_spaced, resample
 
-#: Where strands have points as they need them, cards have at least as many rows,
+#: Where strands have as many points as they need, cards have at least this many rows,
 _FEWEST = 16
-#: and as many as this fraction of the strands needs points,
+#: and enough of them for this fraction of the strands,
 _SERVED = 0.9
 #: unless all strands had more points than this together.
 _MAX_POINTS = 4_000_000
 
 
 def card_strands(strands: StrandSet) -> StrandSet:
-    """The same strands with one point count, evenly; those that are so already as they are."""
+    """The same strands with one point count, evenly spaced; unchanged if they are so already."""
     if not strands.is_uniform:
         return resample(strands, row_count(strands.point_counts))
     if strands.uneven_along is None:

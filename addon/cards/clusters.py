@@ -1,11 +1,11 @@
 """Which strands become one card: those that lie together from the root to the tip.
 
-k-means (Lloyd 1982) with seeds far from each other (k-means++; Arthur and Vassilvitskii 2007). Two
-strands are as far apart as their points at a few stations are, so that root and shape count in one
-unit, metres.
+k-means (Lloyd 1982) with seeds far from each other (k-means++; Arthur and Vassilvitskii 2007). The
+distance of two strands is that of their points at a few stations, so that root and shape count in
+one unit, metres.
 
-Along a parting and a hairline no other card lies over the roots of the first ones. There cards hold
-fewer strands, as artists lay narrow cards along a parting.
+Along a parting and a hairline no other card covers the roots of the outermost ones. Cards there
+hold fewer strands, as artists place narrow cards along a parting.
 """
 
 from __future__ import annotations
@@ -20,25 +20,25 @@ from .strip import mean_spacing
 
 #: Places along a strand that are compared.
 _STATIONS = 6
-#: How much more than another place the root counts: cards shall not reach over a parting.
+#: Weight of the root over other places: cards should not reach over a parting.
 _ROOT_WEIGHT = 2.0
-#: A card of brows or lashes holds no more strands than this, however few cards there are in all:
-#: their roots lie all over the brow, and are seen. But each has no more cards than this.
+#: Maximum number of strands of a card of brows or lashes, however few cards there are in all: their
+#: roots lie all over the brow, and are seen. And maximum number of cards of each of these groups.
 _FACE_STRANDS, _MAX_FACE_CARDS = 8, 100
-#: A card at a rim has this many times fewer strands than others, but no more than this fraction of
-#: all cards lies there, nor of all strands.
+#: Cards at a rim have this many times fewer strands than others, but at most this fraction of all
+#: cards, and of all strands, lies there.
 _RIM_FINER, _MAX_AT_RIM = 4.0, 0.4
-#: How far behind a root hair is looked for, in sides of the square that an average card's roots
-#: fill; and how much nearer it must be found, as a fraction of that.
+#: How far behind a root the search for hair is centred, in sides of the square that an average
+#: card's roots fill; and within which fraction of that distance hair must lie.
 _RIM_DEPTH, _RIM_FREE = 0.5, 0.7
-#: The part of a strand by which it is judged which way it lies.
+#: The part of a strand, from its root, that gives the direction in which it lies.
 _BEGIN = 0.2
-#: Hair that leans out of the upright by less than this sine lies over no roots.
+#: Hair that leans away from the upright by less than this sine covers no roots.
 _LEANING = 1.0 / 3.0
-#: Strands that the means are found from; the others only join the nearest.
+#: Maximum number of strands that the means are found from; others only join the nearest.
 _MAX_LEARNT = 20_000
 _ROUNDS = 12
-#: Strands that are compared with all means at once.
+#: Strands in one batch that is compared with all means.
 _CHUNK = 2048
 
 
@@ -49,13 +49,13 @@ def cluster_strands(
 
     No cluster holds strands of two groups. Each group gets clusters in proportion to its strands,
     but at least one, and brows and lashes one for every eight: there may be more than `count`, but
-    never more than strands.
+    not more than strands.
 
     Args:
         grid: (strand_count, cv_count, 3) [m], root first.
         group: (strand_count,).
         count: clusters wanted.
-        seed: another one gives other clusters.
+        seed: of the random start.
         root_normal: (strand_count, 3) unit normals of the head under the roots; None: clusters are
             as large at partings and hairlines as elsewhere.
     """
@@ -77,7 +77,7 @@ def cluster_strands(
 
 
 def _parts(grid: Floats, root_normal: Floats | None, wanted: int) -> list[tuple[Ints, int]]:
-    """Strands of one group, at its rim and elsewhere, each with the clusters that it gets."""
+    """Strands of one group, at its rim and elsewhere, each part with its number of clusters."""
     everywhere: list[tuple[Ints, int]] = [(np.arange(len(grid)), wanted)]
     if root_normal is None or wanted < 2:
         return everywhere
@@ -93,11 +93,11 @@ def _parts(grid: Floats, root_normal: Floats | None, wanted: int) -> list[tuple[
 
 
 def at_rim(grid: Floats, root_normal: Floats, strands_per_card: float) -> Bools:
-    """Which strands no other hair lies over at the root, (strand_count,): along partings and
+    """Which strands have roots that no other hair covers, (strand_count,): along partings and
     hairlines.
 
-    A little behind their roots, against the way that they lie, there is either no root, or one
-    whose hair lies the other way.
+    A little behind their roots, opposite to the direction in which they lie, there is either no
+    root, or one whose hair lies the other way.
 
     Args:
         grid: (strand_count, cv_count, 3) [m], root first.
@@ -109,7 +109,7 @@ def at_rim(grid: Floats, root_normal: Floats, strands_per_card: float) -> Bools:
     flat = direction - root_normal * np.einsum("si,si->s", direction, root_normal)[:, None]
     lies = np.linalg.norm(flat, axis=1) > _LEANING * np.linalg.norm(direction, axis=1)
     flat = unit(flat)
-    # the nearest of points at random is half as far as they are apart in a square grid
+    # the nearest of random points is half as far as the spacing of a square grid
     behind = _RIM_DEPTH * strands_per_card**0.5 * 2.0 * mean_spacing(root)
     nearest, away = (found[:, 0] for found in nearest_points(root - behind * flat, root, 1))
     is_over = (away < _RIM_FREE * behind) & (np.einsum("si,si->s", flat, flat[nearest]) > 0.0)
@@ -120,7 +120,8 @@ def at_rim(grid: Floats, root_normal: Floats, strands_per_card: float) -> Bools:
 def cluster_of_guides(grid: Floats, group: Ints, guides: Ints) -> Ints:
     """The guide that each strand lies along, (strand_count,) int32 places in `guides`.
 
-    It is the nearest one of the strand's own group, where that has guides; a guide's is itself.
+    It is the nearest guide of the strand's own group, if that has guides; a guide belongs to
+    itself.
 
     Args:
         grid: (strand_count, cv_count, 3) [m], root first.
@@ -163,13 +164,13 @@ def _k_means(features: Floats, count: int, random: np.random.Generator) -> Ints:
     for _ in range(_ROUNDS):
         label, gap = _nearest(learnt, means)
         sizes = np.bincount(label, minlength=count)
-        # a mean that has lost all its strands goes to the strand that lies worst
+        # a mean that has lost all its strands moves to the strand farthest from its mean
         lost = np.flatnonzero(sizes == 0)
         worst = np.argsort(-gap, kind="stable")[: len(lost)]
         means = means_by(label, learnt, count).astype(np.float32)
         means[lost] = learnt[worst]
     label, _ = _nearest(features, means)
-    # strands that are the same may differ by a rounding in the distances, where means coincide
+    # where means coincide, rounding of distances could put equal strands into different clusters
     _, first, same = np.unique(features, axis=0, return_index=True, return_inverse=True)
     return np.unique(label[first][same], return_inverse=True)[1].astype(np.int32)
 

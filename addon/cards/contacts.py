@@ -1,13 +1,13 @@
-"""Cards that ride, led out of colliders as strands are: their spines, then the arms of their rows.
+"""Riding cards, led out of colliders like strands: first their spines, then the arms of their rows.
 
-A spine is a strand, so it is led as one, and every row goes along as it is. Where a vertex of a row
-is in a collider all the same, its arm is led out, the way from the spine to it: a strand of two
-points, whose root stays on the spine. So a card keeps its length and its width. It bends along its
-spine where it lies against something round, as a lock of hair does.
+A spine is led out as a strand, and every row moves along rigidly. If a vertex of a row is still in
+a collider, its arm is led out, the vector from the spine to it: a strand of two points, whose root
+stays on the spine. So a card keeps its length and its width. It bends along its spine where it lies
+against something round, as a clump of hair does.
 
-What was in a collider when the motion began may stay as deep as it was where its root carries it,
-see `refine.lead_out`. Unlike strands, cards know nothing of the frame before: those of a bake are
-made in any order.
+A point that was in a collider when the motion began may stay as deep as it was where its root
+carries it, see `refine.lead_out`. Unlike strands, cards do not depend on the frame before: those of
+a bake are made in any order.
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ from ..refine.lead_out import DEEP, Clearance, clearance_at, lead_out
 from ..refine.ride import minimal_rotation, turn_change
 from ..strands.vectors import dot_rows
 
-#: An arm that is shorter than this part of the distance that is kept leads nowhere.
+#: Arms shorter than this part of the distance that is kept are not led out.
 _SHORTEST_ARM = 0.5
 _TINY = np.float32(1.0e-30)
 
 
 @dataclass(frozen=True, eq=False)
 class CardClearance:
-    """How far cards stay from colliders where their roots carry them.
+    """Distances of cards from colliders where their roots carry them.
 
     spines: of all spines. vertices: of all vertices.
     """
@@ -48,23 +48,23 @@ class CardClearance:
         colliders: tuple[PosedCollider, ...],
         kept: float,
     ) -> CardClearance:
-        """That of a motion which begins now.
+        """The clearance of a motion that begins now.
 
         Args:
             spines, vertices: (row_count, 3) and (vertex_count, 3) world [m], where roots carry
                 them.
-            row: (vertex_count,), which row each vertex lies in.
+            row: (vertex_count,) the row of each vertex.
             offsets: (n + 1,), the spine of card c is spines[offsets[c]:offsets[c + 1]].
             kept: [m].
         """
         distance, _ = signed_distance(vertices, colliders, kept)
         deep = (distance < -DEEP * kept).nonzero()[0]
-        # in its grid, a collider is thicker there, and does not tell which way is out
+        # the collider's grid is thicker there than its mesh, and gives no direction out of it
         is_thicker = mesh_distance(vertices[deep], colliders) > distance[deep] + DEEP * kept
         beside = deep[is_thicker]
         distance[beside] = -np.inf
         of_spines = clearance_at(spines, offsets, colliders, kept)
-        # a row turns as the ways to both rows beside it do
+        # a row turns with the segments to both rows beside it
         rows = np.minimum(row[beside] + 1, offsets[1:][_owners(row[beside], offsets)] - 1)
         of_vertices = Clearance(kept, distance, np.zeros(len(vertices), np.int32))
         return cls(of_spines.holding(rows, offsets), of_vertices)
@@ -72,16 +72,16 @@ class CardClearance:
 
 @dataclass(frozen=True, eq=False)
 class CardContacts:
-    """What the cards of one moment are led out of."""
+    """The colliders of one moment, and the distances that cards keep from them."""
 
     colliders: tuple[PosedCollider, ...]
     clearance: CardClearance
 
     def lead_spines(self, spines: Floats, carried: Floats, offsets: Ints) -> None:
-        """In place.
+        """Lead spines out, in place.
 
         Args:
-            spines, carried: (row_count, 3) world [m], where they ride, and where roots carry them.
+            spines, carried: (row_count, 3) world [m], as they ride, and where roots carry them.
         """
         self._lead(spines, carried, offsets, self.clearance.spines)
 
@@ -93,14 +93,14 @@ class CardContacts:
         arms: Floats,
         away: Floats,
     ) -> None:
-        """In place.
+        """Lead the vertices' arms out, in place.
 
         Args:
-            positions: (vertex_count, 3) world [m]. directions: unit vectors of these, which turn
+            positions: (vertex_count, 3) world [m]. directions: unit vectors at these, which turn
                 with their arms.
-            middles: (vertex_count, 3), of their rows.
-            arms: (vertex_count, 3), from there, as their roots turn them.
-            away: (vertex_count,) [m], how far the middles are from where roots carry them.
+            middles: (vertex_count, 3) of their rows.
+            arms: (vertex_count, 3) from the middles, as the roots turn them.
+            away: (vertex_count,) [m] distance of the middles from where roots carry them.
         """
         vertices = self.clearance.vertices
         near = nearer_than(positions, poses_now(self.colliders), vertices.reach)[0]
@@ -115,7 +115,7 @@ class CardContacts:
             for tips in (positions[near], roots + arms[near])
         )
         distance = np.full((len(near), 2), -np.inf, np.float32)
-        # how far the row has gone as a whole counts too
+        # the motion of the row as a whole counts too
         distance[:, 1] = vertices.points[near] + away[near]
         clearance = Clearance(vertices.kept, distance.ravel(), np.zeros(len(near), np.int32))
         led = self._lead(points, carried, offsets, clearance)
