@@ -1,4 +1,4 @@
-"""The sections about hair cards: those of the scene, and what they are made and drawn by."""
+"""Panel sections about hair cards: the cards in the scene, and settings to make and draw them."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def draw_cards(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
     draw_preset_row(layout, hair, "cards")
     draw_section(layout, hair.data.hairloom, "card_drawing")
     session = previews.session_of(hair)
-    # two lines in any state, so that what is below keeps its place
+    # two lines in any state, so that the layout below keeps its place
     lines = ["", ""] if session is None else [*session.cards.lines, "", ""][:2]
     if draw_card_progress(layout, session):
         del lines[0]
@@ -32,8 +32,8 @@ def draw_strips(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
 
 
 def draw_card_texture(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
-    """The atlas that is baked, or the texture that is made; of that one a baked atlas has only what
-    breaks up the highlights."""
+    """Settings of a baked atlas or of the generated texture. With a baked atlas, those of the
+    texture only break up the highlights."""
     groom = hair.data.hairloom
     draw_section(layout, groom, "atlas")
     if groom.atlas.source == "baked":

@@ -1,4 +1,4 @@
-"""Drawing the parameters of a section in a panel, as their declarations say."""
+"""Draws the parameters of a section in a panel, by their declarations."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from ..params import Parameter
 #: Draws one section of the panels of a groom.
 type Draw = Callable[[bpy.types.UILayout, bpy.types.Object], None]
 
-#: How much of a row its label has, as in all of Blender's panels, which leave room for a dot at the
-#: end; and of the rest a slider that a mask stands beside.
+#: Fraction of a row for its label, as in Blender's own panels, which leave room for a dot at the
+#: end; and fraction of the rest for a slider with a mask beside it.
 _LABEL, _BESIDE_MASK = 0.37, 0.5
 #: positions of a curve's five values
 _PLACES = ("Root", "Quarter", "Middle", "Three Quarters", "Tip")
@@ -28,10 +28,10 @@ def draw_section(
     *,
     leave_out: Collection[str] = (),
 ) -> None:
-    """Draw what one panel shows of a section; what does not act now is greyed out.
+    """Draw the parameters of a section that belong to a panel; those without effect are greyed out.
 
     Args:
-        sections: the properties that hold it, such as `hair.data.hairloom`.
+        sections: the properties that hold the section, such as `hair.data.hairloom`.
         leave_out: parameters that are drawn elsewhere, such as in the header.
     """
     group, column = getattr(sections, section), layout.column()
@@ -61,7 +61,7 @@ def draw_section(
 def _draw_painted(
     layout: bpy.types.UILayout, group: Any, parameter: Parameter, mask: Parameter
 ) -> None:
-    """A slider and its mask side by side, with the label where all labels are."""
+    """A slider and its mask side by side, with the label aligned to all labels."""
     row = layout.split(factor=_LABEL)
     row.use_property_split = False
     label = row.row()
@@ -75,11 +75,11 @@ def _draw_painted(
 def draw_idle(
     layout: bpy.types.UILayout, group: Any, name: str, lack: str, *, is_own: bool = True
 ) -> None:
-    """A field that does not act now, as high as if it did: it says why, and can be set all the
-    same.
+    """A field without effect at the moment, as high as usual: it shows why, and can still be set.
 
     Args:
-        is_own: False: it shows what holds instead, and is not to be set here.
+        lack: the reason.
+        is_own: False: the field shows the value that applies instead, and cannot be set.
     """
     layout.active = False
     layout.enabled = is_own
@@ -105,13 +105,13 @@ def draw_button(
     anywhere: bool = False,
     **how: Any,
 ) -> Any:
-    """A button that says on its face why it is greyed out, not only to a mouse that waits.
+    """A button that shows in its label, not only in its tooltip, why it is greyed out.
 
     Args:
         operator: such as "hairloom.settle".
-        idle: its text where it can do nothing; in other modes it says that these are why.
-        anywhere: it is for all modes.
-        how: as `UILayout.operator` takes it.
+        idle: label if its poll fails; outside Object Mode the label is "Object Mode Only".
+        anywhere: whether it works in all modes, so that the mode is not the reason.
+        how: arguments for `UILayout.operator`.
     """
     if not getattr(bpy.ops.hairloom, operator.partition(".")[2]).poll():
         is_mode = bpy.context.mode != "OBJECT" and not anywhere
@@ -124,7 +124,7 @@ def draw_button(
 
 
 def draw_overlays(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
-    """What may be drawn over the view as lines, three in a row; and beside the last one its map."""
+    """Switches of the overlays, three in a row, with the painted map beside the last one."""
     column = layout.column(align=True)
     for first in range(0, len(OVERLAYS), 3):
         row = column.row(align=True)

@@ -1,4 +1,4 @@
-"""Panels of the render engine Hairloom, and Blender's own panels that work with it."""
+"""Panels of the render engine Hairloom, and the use of Blender's own panels with it."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from .drawing import draw_idle
 from .help import WithHelp
 from .messages import draw_message
 
-#: panels for every engine that does not bring its own
+#: panels of Blender for all engines whose settings have no effect here
 _UNFIT = frozenset({"VIEWLAYER_PT_filter", "RENDER_PT_freestyle"})
-#: EEVEE's panels whose settings mean the same here
+#: EEVEE's panels whose settings have the same effect here
 _FIT = frozenset(
     {
         "EEVEE_MATERIAL_PT_context_material",
@@ -122,7 +122,7 @@ class HAIRLOOM_PT_hair_scene(WithHelp, bpy.types.Panel):
         layout.use_property_split = True
         layout.use_property_decorate = False
         column = layout.column()
-        # of the preview, whoever renders
+        # a setting of the preview, so it applies with any engine
         column.prop(settings.picture, "viewport_samples")
         column = layout.column()
         column.active = settings.use_hair_scene
@@ -140,7 +140,7 @@ class HAIRLOOM_PT_hair_scene(WithHelp, bpy.types.Panel):
 
 
 class _PassesPanel(WithHelp):
-    """What both panels of passes have in common."""
+    """What both panels of passes share."""
 
     helped = "passes"
     bl_space_type = "PROPERTIES"
@@ -213,7 +213,7 @@ def unregister() -> None:
 
 
 def _panels_of_blender() -> list[type[Any]]:
-    """Those that ask which engine renders."""
+    """Blender's panels that are limited to certain engines."""
     all_panels = (each for each in _panels(bpy.types.Panel) if each not in CLASSES)
     return [each for each in all_panels if hasattr(each, "COMPAT_ENGINES")]
 

@@ -1,7 +1,7 @@
-"""Handles in the 3D view for what is easier to show than to type: the wind that the overlay *Wind*
-draws, and the size of Empties that hold hair as ties or collide with it.
+"""Gizmos in the 3D view: for the wind, while the overlay *Wind* is shown; and for the size of
+Empties that are hair ties or colliders.
 
-Blender itself moves those Empties and the curves of partings, and drags the strength of force
+Blender's own tools move those Empties and the curves of partings, and set the strength of force
 fields.
 """
 
@@ -22,14 +22,14 @@ from ..blender.scene.fin_modifier import has_fins
 from ..blender.sessions.fins import fins_in
 from ..blender.viewport.debug_lines import COLORS, wind_length
 
-#: radius of a ring, in terms of Blender's size of gizmos
+#: radius of a ring, relative to Blender's size of gizmos
 RING = 1.3
-#: an arrow's head or a box in the same terms; lines in pixels
+#: size of an arrow's head or a box, likewise; width of lines [pixels]
 _HANDLE, _LINE = 1.2, 2.0
 
 
 class _OfActive:
-    """Base of handles of the active object, before bpy.types.GizmoGroup: seen where Blender shows
+    """Base of gizmos of the active object, before bpy.types.GizmoGroup: shown when Blender shows
     its own."""
 
     bl_space_type = "VIEW_3D"
@@ -64,20 +64,20 @@ class HAIRLOOM_GGT_wind(_OfActive, bpy.types.GizmoGroup):
             _prepare(dial, COLORS["wind"])
 
     def refresh(self, context: bpy.types.Context) -> None:
-        """The hair that is active now."""
+        """Bind the gizmos to the active hair."""
         hair = context.active_object
         for name, dial in self.turns.items():
             dial.target_set_prop("offset", hair.hairloom.dynamics, name)
         self.speed.target_set_handler("offset", get=_arrow_length, set=_set_arrow_length)
 
     def draw_prepare(self, context: bpy.types.Context) -> None:
-        """Where the hair is now."""
+        """Move the gizmos to the hair."""
         session = previews.session_of(context.active_object)
         assert session is not None, "poll has looked"
         wind = context.active_object.hairloom.dynamics
         place = Matrix.Translation(session.snapshot.root_center.tolist())
         turned = Euler((0.0, 0.0, wind.wind_direction)).to_matrix().to_4x4()
-        # Blender counts a dial's angle clockwise around its z: these point down, and to the side
+        # Blender counts a dial's angle clockwise around its z, so these point down and to the side
         down, aside = (Euler((x, 0.0, 0.0)).to_matrix().to_4x4() for x in (np.pi, -np.pi / 2.0))
         along = turned @ Euler((0.0, np.pi / 2.0 - wind.wind_elevation, 0.0)).to_matrix().to_4x4()
         self.speed.matrix_basis = place @ along
@@ -101,11 +101,11 @@ class HAIRLOOM_GGT_empty_size(_OfActive, bpy.types.GizmoGroup):
         self.size = _arrow(self, "BOX", COLORS["colliders"])
 
     def refresh(self, _context: bpy.types.Context) -> None:
-        """The Empty that is active now."""
+        """Bind the gizmo to the active Empty."""
         self.size.target_set_handler("offset", get=_size, set=_set_size)
 
     def draw_prepare(self, context: bpy.types.Context) -> None:
-        """Where the Empty is now."""
+        """Move the gizmo to the Empty."""
         empty = context.active_object
         axis = _size_axis(empty).normalized()
         turned = Vector((0.0, 0.0, 1.0)).rotation_difference(axis).to_matrix().to_4x4()
@@ -113,13 +113,13 @@ class HAIRLOOM_GGT_empty_size(_OfActive, bpy.types.GizmoGroup):
 
 
 def _simulated_in(layer: bpy.types.ViewLayer) -> list[bpy.types.Object]:
-    """What Empties may hold or stop."""
+    """Hair and fins, which Empties may hold or collide with."""
     hair = [obj for obj in objects_in(layer) if obj.type == "CURVES"]
     return hair + fins_in(layer) if has_fins() else hair
 
 
 def _arrow(group: bpy.types.GizmoGroup, style: str, color: tuple[float, ...]) -> bpy.types.Gizmo:
-    """A handle that is dragged along its z axis, without a stem."""
+    """A handle without a stem that is dragged along its z axis."""
     arrow = group.gizmos.new("GIZMO_GT_arrow_3d")
     arrow.draw_style, arrow.length, arrow.use_draw_value = style, 0.0, True
     arrow.scale_basis = _HANDLE
@@ -134,7 +134,7 @@ def _prepare(gizmo: bpy.types.Gizmo, color: tuple[float, ...]) -> None:
 
 
 def _arrow_length() -> float:
-    """As the overlay draws the wind [m]."""
+    """Length of the overlay's arrow for the wind [m]."""
     hair = bpy.context.active_object
     return float(hair.hairloom.dynamics.wind_speed * _length_per_speed(hair))
 
@@ -151,12 +151,12 @@ def _length_per_speed(hair: bpy.types.Object) -> float:
 
 
 def _size_axis(empty: bpy.types.Object) -> Vector:
-    """World space, as long as the Empty's display size of 1."""
+    """The Empty's axis along which its size is dragged; world space, for a display size of 1."""
     return empty.matrix_world.col[sized_axis(empty)].to_3d()
 
 
 def _size() -> float:
-    """The distance of its border from its middle [m]."""
+    """The distance of the active Empty's border from its middle [m]."""
     empty = bpy.context.active_object
     return float(empty.empty_display_size * _size_axis(empty).length)
 

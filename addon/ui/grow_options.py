@@ -1,4 +1,4 @@
-"""What operators that grow hair have in common, as scripts call them."""
+"""Properties that all operators which grow hair share, for scripts."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def names_of_weights(_operator: Any, context: bpy.types.Context, typed: str) -> 
     return maps_meant(ground_mesh(context), typed)
 
 
-#: for the `__annotations__` of an operator
+#: part of the `__annotations__` of such an operator
 GROW_PROPERTIES: dict[str, Any] = {
     **operator_properties("grow"),
     "density_group": StringProperty(
@@ -35,5 +35,5 @@ GROW_PROPERTIES: dict[str, Any] = {
 
 
 def draw_where_settings_are(layout: bpy.types.UILayout) -> None:
-    """Adjust Last Operation is gone at the next click, so that nothing is set there."""
+    """A hint instead of settings in Adjust Last Operation, which closes at the next click."""
     layout.label(text="Length, count and more: Hairloom > Grow", icon="INFO")

@@ -1,8 +1,7 @@
 """Help: the page of the documentation about a panel, a setting or a button.
 
-The pages come with the extension. Blender asks the manual map for F1, and for *Online Manual* in
-the menu of a right click, with a name such as `bpy.types.HAIRLOOM_PG_dynamics.gravity`, in small
-letters.
+The pages come with the extension. For F1, and for *Online Manual* in the context menu, Blender
+searches the manual map for a name such as `bpy.types.HAIRLOOM_PG_dynamics.gravity`, in lower case.
 """
 
 from __future__ import annotations
@@ -18,11 +17,10 @@ from ..parameters import ALL_SETTINGS
 from .reports import reporting
 
 _ROOT = Path(__file__).resolve().parents[2]
-#: made for the zip; a clone has the sources
+#: pages built into the extension's zip; a clone only has their sources
 HELP, _SOURCES = _ROOT / "help", _ROOT / "docs"
 
-#: section of the panels, or of the settings, which name theirs -> page of docs, and the heading
-#: on it
+#: section of the panels or of the settings -> page of docs, with the heading on it
 PAGES = {section: settings.help_page for section, settings in ALL_SETTINGS.items()} | {
     "": "user_guide#the-sidebar",
     "look": "shading#look-settings",
@@ -45,7 +43,7 @@ PAGES = {section: settings.help_page for section, settings in ALL_SETTINGS.items
     "hair_scene": "engine#hair-over-eevee-and-cycles",
     "passes": "engine#passes",
 }
-#: part of an operator's name -> a section, or a page; the first that fits counts
+#: part of an operator's name -> page; the first that matches counts
 _OPERATORS = (
     ("export_cards", "cards_export"),
     ("export_", "strands_export"),
@@ -77,7 +75,7 @@ _FALLBACK = "user_guide"
 
 
 def address(page: str) -> str:
-    """Where a page lies, such as "cards#limits"; in a clone that is its source."""
+    """The URL of a page such as "cards#limits"; in a clone, that of its source."""
     name, _, heading = page.partition("#")
     if not HELP.is_dir():
         return (_SOURCES / f"{name}.md").as_uri()
@@ -86,12 +84,12 @@ def address(page: str) -> str:
 
 
 def page_of(section: str) -> str:
-    """The page about a section of the panels; that of its first word where it has none itself."""
+    """The page about a section of the panels, or else that of the first word of its name."""
     return PAGES.get(section) or PAGES.get(section.partition("_")[0], _FALLBACK)
 
 
 def manual_map() -> tuple[str, tuple[tuple[str, str], ...]]:
-    """For `bpy.utils.register_manual_map`."""
+    """The result for `bpy.utils.register_manual_map`."""
     groups = (
         (f"bpy.types.hairloom_pg_{section}.*", address(page))
         for section, page in PAGES.items()
@@ -133,9 +131,9 @@ def draw_help(layout: bpy.types.UILayout, section: str) -> None:
 
 
 class WithHelp:
-    """Base of a panel, before bpy.types.Panel: it has a question mark in its header.
+    """Base of a panel with a question mark in its header, before bpy.types.Panel.
 
-    helped: the section that its page is about.
+    helped: the section whose page it opens.
     """
 
     helped = ""

@@ -22,18 +22,18 @@ from ..blender.base.redraw import redraw_panels, show_status
 from ..blender.base.thread_work import ThreadWork
 from .reports import reporting, waiting
 
-#: Length [s] of a slice of work between two looks at the keyboard.
+#: Length [s] of a slice of work between two checks of the keyboard.
 _SPELL = 0.1
-#: Time [s] between two slices, and between two looks at a thread if there is no window.
+#: Time [s] between two slices, and between two checks of a thread if there is no window.
 _PAUSE = 0.01
 
 
 class Progress(NamedTuple):
-    """How far the work has come.
+    """Progress of the work.
 
-    fraction: of all work, 0 to 1; None where it is unknown.
-    is_idle: there is nothing to do just now, since a thread works.
-    is_committed: it is too late to cancel it; it ends in a moment.
+    fraction: of all work, 0 to 1; None: unknown.
+    is_idle: whether there is nothing to do here at the moment, as a thread works.
+    is_committed: whether it is too late to cancel the work; it will end soon.
     """
 
     text: str
@@ -50,7 +50,7 @@ class LongWork:
 
     `steps` does the work and reports it. An operator's poll starts with `is_free`.
 
-    unharmed: what is true after Esc, for the report.
+    unharmed: the state after Esc, for the report.
     """
 
     unharmed = "nothing has changed"
@@ -67,19 +67,18 @@ class LongWork:
         raise NotImplementedError
 
     def follow(self, context: bpy.types.Context) -> None:
-        """What comes in the window once the work has ended and other work may begin: a popup that
-        offers some."""
+        """Called in a window once the work has ended, for example to open a popup."""
 
     def is_pressed(self: Any) -> bool:
-        """Whether a button or a menu has begun it, in a window. Adjust Last Operation has not:
-        Blender does not keep a repeated operator, so it cannot run modally."""
+        """Whether a button or a menu has started it, in a window. Adjust Last Operation does not
+        count: Blender does not keep a repeated operator, so it cannot run modally."""
         how = self.options
         is_repeated = how.is_repeat or how.is_repeat_last
         return not bpy.app.background and how.is_invoke and not is_repeated
 
     @classmethod
     def is_free(cls: Any) -> bool:
-        """For `poll`: whether no other long operator runs; the greyed button says which does."""
+        """For `poll`: whether no other long operator runs; the greyed-out button names it."""
         return is_free(cls)
 
     @reporting
@@ -134,12 +133,14 @@ class LongWork:
         return {"RUNNING_MODAL"}
 
     def cancel(self, _context: bpy.types.Context) -> None:
-        """Blender ends the operator: a file is loaded or its window closed."""
+        """Called when Blender ends the operator: a file is loaded or its window closed."""
         stop()
 
 
 class _Running:
-    """The work that runs in the window; Blender does not notify an operator of being disabled.
+    """The work that runs in the window.
+
+    Kept outside of the operator, as Blender does not notify an operator of being disabled.
 
     progress: as last reported.
     """
@@ -169,7 +170,7 @@ class _Running:
     def end(self) -> None:
         """Remove the timer, the handlers and the text."""
         event_handlers.remove(_HANDLERS)
-        manager = bpy.context.window_manager  # another than before, when a file is loaded
+        manager = bpy.context.window_manager  # a new one after a file was loaded
         manager.event_timer_remove(self._timer)
         if self._has_cursor:
             manager.progress_end()
@@ -178,11 +179,11 @@ class _Running:
 
 
 def status(label: str, progress: Progress) -> str:
-    """What the status bar says."""
+    """The text in the status bar."""
     return f"{label}: {progress.text}" + ("" if progress.is_committed else ". Esc: cancel")
 
 
-@persistent  # it goes when the work ends, which may be after a file is loaded
+@persistent  # removed when the work ends, which may be after a file is loaded
 def _on_undo(*_: Any) -> None:
     """Keys cannot undo during the work, but scripts can; its references would then be invalid."""
     stop()
@@ -216,7 +217,7 @@ def _is_cancellable() -> bool:
 
 
 def draw_esc(row: bpy.types.UILayout) -> None:
-    """The key that cancels what runs; room for it once it is too late for that."""
+    """An icon of the key that cancels the work; a blank once it is too late."""
     row.label(text="", icon="EVENT_ESC" if _is_cancellable() else "BLANK1")
 
 
@@ -235,14 +236,14 @@ def draw_progress(layout: bpy.types.UILayout, operator: type[LongWork]) -> bool:
 
 
 def counted(steps: Generator[int], total: int, things: str) -> Steps[None]:
-    """Work that reports how many things are done; things: their name, such as "frames"."""
+    """Work that yields how many things are done. things: their name, such as "frames"."""
     with closing(steps):
         for done in steps:
             yield Progress(f"{done:,} of {total:,} {things}", done / total)
 
 
 def as_progress[Result](steps: Generator[float, None, Result]) -> Steps[Result]:
-    """Work that reports the fraction that is done."""
+    """Work that yields the fraction that is done."""
     with closing(steps):
         while True:
             try:
@@ -254,7 +255,7 @@ def as_progress[Result](steps: Generator[float, None, Result]) -> Steps[Result]:
 
 
 def threaded[Result](work: ThreadWork[Result]) -> Steps[Result]:
-    """Work in a thread, which reports its progress; closing the generator abandons it."""
+    """Work in a thread, which reports its progress; closing the generator abandons the work."""
     try:
         while not work.run_main_thread_steps():
             is_idle = not work.wants_main_thread
@@ -265,7 +266,8 @@ def threaded[Result](work: ThreadWork[Result]) -> Steps[Result]:
 
 
 def in_parts[Result](parts: Parts[Result]) -> Steps[Result]:
-    """Work whose parts threads do; closing the generator closes it, and abandons the part."""
+    """Work whose parts run in threads; closing the generator closes the work and abandons the
+    running part."""
     with closing(parts):
         step = partial(next, parts)
         while True:
@@ -274,10 +276,10 @@ def in_parts[Result](parts: Parts[Result]) -> Steps[Result]:
             except StopIteration as end:
                 result: Result = end.value
                 return result
-            yield Progress(part.title)  # once at least, however soon it is done
+            yield Progress(part.title)  # at least once, even for a short part
             try:
                 made = yield from threaded(_beside(part))
-            except Exception as error:  # it belongs where the work waits for the part
+            except Exception as error:  # raised where the work waits for the part
                 step = partial(parts.throw, error)
             else:
                 step = partial(parts.send, made)

@@ -1,4 +1,4 @@
-"""Hairloom in Blender's own menus, its pie menu, and shortcuts that artists can assign."""
+"""Hairloom's entries in Blender's menus, its pie menu, and shortcuts that artists can assign."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from .operators_strand_import import draw_imports
 from .selection import active_mesh, chosen_hair
 
 _PIE = "HAIRLOOM_MT_pie"
-#: operator, its settings: offered in the keymap of the 3D view, without keys
+#: (operator, settings) of shortcuts that are offered in the keymap of the 3D view, without keys
 SHORTCUTS: tuple[tuple[str, dict[str, str]], ...] = (
     ("wm.call_menu_pie", {"name": _PIE}),
     ("hairloom.preview", {}),
@@ -90,7 +90,7 @@ class HAIRLOOM_MT_pie(bpy.types.Menu):
         pie, active = self.layout.menu_pie(), context.active_object
         pie.operator("hairloom.preview", icon="HIDE_OFF")
         pie.operator("hairloom.play", icon="PLAY")
-        if active is not None and active.type == "CURVES":  # others have no such mode to name
+        if active is not None and active.type == "CURVES":  # other types lack this mode
             comb = pie.operator("object.mode_set", text="Comb", icon="SCULPTMODE_HLT")
             comb.mode, comb.toggle = "SCULPT_CURVES", True
         else:
@@ -125,7 +125,7 @@ def _draw_object(self: Any, context: bpy.types.Context) -> None:
 
 
 def _draw_overlays(self: Any, context: bpy.types.Context) -> None:
-    """What lies over the view: of the selected hair, below Blender's own of objects."""
+    """Overlays of the selected hair, below Blender's own overlays of objects."""
     hair = chosen_hair(context)
     if not hair:
         return
@@ -151,7 +151,7 @@ MENUS: tuple[tuple[str, Callable[[Any, bpy.types.Context], None]], ...] = (
 
 
 def draw_shortcuts(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
-    """The suggested shortcuts, each with the field that takes a key."""
+    """The suggested shortcuts, each with a field to assign a key."""
     keys = context.window_manager.keyconfigs.user
     keymap = None if keys is None else keys.keymaps.get(_KEYMAP)
     if keymap is not None:
@@ -177,7 +177,7 @@ def register() -> None:
     for menu, entry in MENUS:
         getattr(bpy.types, menu).append(entry)
     keys = bpy.context.window_manager.keyconfigs.addon
-    if keys is None:  # there are none without a window
+    if keys is None:  # without a window
         return
     keymap = keys.keymaps.new(name=_KEYMAP, space_type="VIEW_3D")
     for operator, settings in SHORTCUTS:

@@ -9,7 +9,7 @@ import bpy
 
 #: width of a letter in pixels at UI scale 1, for breaking lines
 _LETTER_WIDTH = 7.0
-#: letters that the edges of a panel take
+#: width of a panel's margins, in letters
 _EDGES = 6
 
 
@@ -32,9 +32,9 @@ def draw_lines(
     """Draw a text as lines.
 
     Args:
-        room: letters for which there is room even if the text is shorter, so that what is below
-            keeps its place.
-        width: of a popup, in pixels at UI scale 1; 0: that of the region.
+        room: number of letters to reserve lines for, even if the text is shorter, so that the
+            layout below keeps its place.
+        width: of a popup, in pixels at UI scale 1; 0: the width of the region.
     """
     region = context.region.width / context.preferences.system.ui_scale
     letters = max(int((width or region) / _LETTER_WIDTH) - _EDGES, 16)

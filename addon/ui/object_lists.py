@@ -1,6 +1,6 @@
 """Lists of objects that act on hair: its ties, partings, strokes and trim shapes.
 
-Each is as high for one as for thirty, scrolls, and finds names.
+A list has the same height for one object as for thirty, scrolls, and can be searched by name.
 """
 
 from __future__ import annotations
@@ -15,14 +15,15 @@ ROWS = 3
 
 
 class _Kind(NamedTuple):
-    """icon: of a row. remove: what takes an object out. named: its property that names it."""
+    """One kind of list. icon: of a row. remove: operator that removes an object from the list.
+    named: property of that operator with the object's name."""
 
     icon: str
     remove: str
     named: str
 
 
-#: setting of the hair that names the collection -> what its list has
+#: setting of the hair that names the collection -> its kind of list
 KINDS = {
     "tie_collection": _Kind("MESH_CIRCLE", "hairloom.remove_hair_tie", "tie"),
     "parting_collection": _Kind("CURVE_DATA", "hairloom.remove_parting", "line"),
@@ -51,7 +52,7 @@ class HAIRLOOM_UL_objects(bpy.types.UIList):
 
 
 class HAIRLOOM_PG_list_rows(bpy.types.PropertyGroup):
-    """Which row of each list is the active one, which no file keeps."""
+    """The active row of each list; not saved in files."""
 
     __annotations__ = {
         setting: IntProperty(name="Row", description="Row that was clicked last")
@@ -60,7 +61,7 @@ class HAIRLOOM_PG_list_rows(bpy.types.PropertyGroup):
 
 
 def draw_objects(layout: bpy.types.UILayout, hair: bpy.types.Object, setting: str) -> None:
-    """The collection that this setting names, and what is in it."""
+    """The field of a setting that names a collection, and the list of its objects."""
     column = layout.column()
     column.prop(hair.hairloom, setting)
     collection = getattr(hair.hairloom, setting)
@@ -77,7 +78,7 @@ CLASSES: tuple[type[Any], ...] = (HAIRLOOM_UL_objects, HAIRLOOM_PG_list_rows)
 
 
 def register() -> None:
-    """After CLASSES are registered."""
+    """Add the rows to the window manager; CLASSES must be registered."""
     bpy.types.WindowManager.hairloom_list_rows = PointerProperty(
         type=HAIRLOOM_PG_list_rows, name="Rows", description="Active rows of the lists"
     )

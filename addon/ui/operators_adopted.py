@@ -136,7 +136,7 @@ def _can_sort(operator: type[Any], context: bpy.types.Context) -> bool:
 
 
 def _likely_head(obj: bpy.types.Object, context: bpy.types.Context) -> bpy.types.Object | None:
-    """Its parent, else the other selected mesh, if there is one."""
+    """The parent mesh, else the only other selected mesh; None: there is neither."""
     if obj.parent is not None and obj.parent.type == "MESH":
         return obj.parent
     others = [one for one in context.selected_objects if one.type == "MESH" and one != obj]

@@ -92,8 +92,8 @@ def has_bake(obj: bpy.types.Object) -> bool:
 
 
 def draw_bake(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
-    """Draw the bake settings of hair or a fin, the buttons, and what is on disk: as many lines in
-    any state."""
+    """Draw the bake settings of hair or a fin, the buttons, and the bake on disk, with the same
+    number of lines in any state."""
     bake = obj.hairloom.bake
     layout.prop(bake, "folder")
     layout.prop(bake, "use_own_range")
@@ -131,7 +131,7 @@ def _draw_state(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
             text=f"Frames {facts.first} to {facts.last} at {facts.frame_rate:g} fps, {computed}",
             icon="CHECKMARK",
         )
-    if obj.type == "CURVES":  # of cloth nothing is measured
+    if obj.type == "CURVES":  # cloth is not measured
         figures = None if facts is None else facts.figures
         draw_figures(layout.column(align=True), table_of(figures))
     known = previews.bake_of(obj)
@@ -152,7 +152,8 @@ class _FinBake(WithHelp):
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout  # type: ignore[attr-defined]
-        layout.prop(context.object.hairloom.bake, "follows")  # beside a split it would be cut off
+        # before the property split, which would cut off its label
+        layout.prop(context.object.hairloom.bake, "follows")
         layout.use_property_split = True
         layout.use_property_decorate = False
         draw_bake(layout, context.object)

@@ -221,7 +221,7 @@ class HAIRLOOM_MT_card_edits(bpy.types.Menu):
 
 
 def draw_card_edits(layout: bpy.types.UILayout) -> None:
-    """The tools in the panel: greyed where they cannot act."""
+    """Draw the tools in the panel, greyed out if their poll fails."""
     layout.label(text="By Hand")
     column = layout.column(align=True)
     row = column.row(align=True)
@@ -233,7 +233,7 @@ def draw_card_edits(layout: bpy.types.UILayout) -> None:
 
 
 def draw_menu(self: Any, context: bpy.types.Context) -> None:
-    """In the menus of Edit Mode, where cards are edited."""
+    """An entry in the menus of Edit Mode, if cards are being edited."""
     if edited_cards(context):
         self.layout.separator()
         self.layout.menu(_MENU, icon="MESH_GRID")

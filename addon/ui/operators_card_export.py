@@ -1,4 +1,4 @@
-"""Hair cards out: the File menu's operator, which a collection's exporters use too."""
+"""Export of hair cards: the operator in the File menu, which a collection's exporters use too."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class HAIRLOOM_OT_export_cards(LongWork, ExportHelper, bpy.types.Operator):
     bl_label = "Export Hair Cards"
     bl_options = {"PRESET"}
     unharmed = "nothing was written"
-    #: of bakes, while the file browser is open
+    #: notes on stale bakes, for the file browser
     stale: tuple[str, ...] = ()
 
     filter_glob: StringProperty(
@@ -80,14 +80,14 @@ class HAIRLOOM_OT_export_cards(LongWork, ExportHelper, bpy.types.Operator):
 
     @property
     def filename_ext(self) -> str:
-        """What Blender puts behind a name; one of the format's own stays."""
+        """The suffix that Blender appends to a name; one that fits the format is kept."""
         (chosen,) = (each for each in FORMATS if each.name == self.format)
         suffix = Path(self.filepath).suffix.lower()
         return suffix if suffix in chosen.suffixes else chosen.suffixes[0]
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        # a collection's exporter has its own hair, and no selection
+        # a collection's exporter has its own hair, so it needs no selection
         return cls.is_free() and (bool(bpy.data.hair_curves) or needs_hair(cls, context))
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
@@ -126,7 +126,7 @@ class HAIRLOOM_OT_export_cards(LongWork, ExportHelper, bpy.types.Operator):
         )
 
     def _output(self, path: Path, hair_name: str) -> CardOutput:
-        """How it is written; a suffix that is known counts."""
+        """The output of a card file; a known suffix overrides the chosen format."""
         is_known = path.suffix.lower() in SUFFIXES
         settings = settings_of(self, CardExportSettings)
         return CardOutput(None if is_known else self.format, file_stem(hair_name), settings)
@@ -167,8 +167,8 @@ class HAIRLOOM_OT_export_cards(LongWork, ExportHelper, bpy.types.Operator):
             self._draw_motion(layout, context)
 
     def _draw_place(self, layout: bpy.types.UILayout) -> None:
-        """Whether the files have a folder of their own. The file browser asks before it replaces a
-        file of the name that it shows; of one in that folder it knows nothing."""
+        """The option for a folder of its own, and whether that would replace a file: the file
+        browser only warns about a file of the name that it shows, not about one in that folder."""
         layout.prop(self, "own_folder")
         if self.own_folder:
             path = in_own_folder(Path(bpy.path.abspath(self.filepath)))
@@ -198,7 +198,7 @@ class HAIRLOOM_OT_export_cards(LongWork, ExportHelper, bpy.types.Operator):
 
 
 def _stale(hair: list[bpy.types.Object], depsgraph: bpy.types.Depsgraph) -> tuple[str, ...]:
-    """What is out of date in its bake; one that cannot be read is reported when it is written."""
+    """Notes on stale bakes; a bake that cannot be read is reported when the file is written."""
     try:
         found = [(each, playback.cache_of(each)) for each in hair]
         stale = [stale_notes(each, cache, depsgraph) for each, cache in found if cache is not None]
@@ -228,7 +228,7 @@ class HAIRLOOM_FH_cards(bpy.types.FileHandler):
 
     @classmethod
     def poll_drop(cls, _context: bpy.types.Context) -> bool:
-        return False  # it reads nothing
+        return False  # it only exports
 
 
 def _refuse(place: str, remedy: str) -> Any:

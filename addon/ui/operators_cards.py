@@ -1,4 +1,4 @@
-"""Make Cards: the cards of the selected hair as objects in the scene, and what they are made of."""
+"""Make Cards: the cards of the selected hair as objects in the scene, and their counts."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from .long_work import LongWork, Progress, Steps, draw_progress, threaded
 from .reports import tell
 from .selection import chosen_hair, in_object_mode, needs_hair
 
-#: levels of detail that a panel has room for: as many as there may be
+#: number of levels of detail in a panel: the most that there may be
 _MAX_LEVELS = next(
     int(each.hard_range[1])
     for each in CardSettings.parameters()
@@ -64,7 +64,7 @@ class HAIRLOOM_OT_discard_card_edits(LongWork, bpy.types.Operator):
         hair = chosen_hair(context)[0]
         try:
             edits, _ = groom_edits(hair, context.evaluated_depsgraph_get())
-        except HairloomError:  # cards that can no longer be read are what is discarded
+        except HairloomError:  # cards that cannot be read can still be discarded
             lost = "All edits"
         else:
             if edits is None:
@@ -107,7 +107,7 @@ def _built(
 
 
 def draw_made_cards(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
-    """The button, and what there is: as many lines before as after."""
+    """Draw the button and the counts of the cards, with as many lines before as after."""
     objects = card_objects(hair)
     if not draw_progress(layout, HAIRLOOM_OT_make_cards):
         text = "Make Cards Again" if objects else "Make Cards"
@@ -124,8 +124,8 @@ def draw_made_cards(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
 
 
 def _draw_levels(column: bpy.types.UILayout, objects: Sequence[bpy.types.Object]) -> None:
-    """A switch for each level of detail that there may be: how many triangles it has, and whether
-    it is seen."""
+    """Draw a visibility switch for each level of detail that there may be, with its number of
+    triangles."""
     row = column.row(align=True)
     for number in range(_MAX_LEVELS):
         if number < len(objects):
@@ -136,7 +136,7 @@ def _draw_levels(column: bpy.types.UILayout, objects: Sequence[bpy.types.Object]
 
 
 def _short(count: int) -> str:
-    """A number that is four letters wide at most, such as "37k"."""
+    """A number in at most four characters, such as "37k"."""
     return f"{count:,}" if count < 1000 else f"{count / 1000.0:.0f}k"
 
 

@@ -101,7 +101,7 @@ class HAIRLOOM_OT_remove_spheres(bpy.types.Operator):
 
 
 def draw_colliders(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
-    """Draw what hair curves, or a fin, collide with."""
+    """Draw the colliders of hair curves or of a fin."""
     column = layout.column()
     column.prop(hair.hairloom, "collider")
     column.prop(hair.hairloom, "collider_collection")
@@ -142,7 +142,7 @@ def _mesh(context: bpy.types.Context) -> bpy.types.Object | None:
 
 
 def _has_mesh(operator: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
-    """For `poll`: whether there is one; the greyed-out button says what to do."""
+    """For `poll`: whether there is such a mesh; the greyed-out button says what to do."""
     if not in_object_mode(operator, context):
         return False
     if _mesh(context) is not None:

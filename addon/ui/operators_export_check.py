@@ -1,4 +1,4 @@
-"""Check for Export: what an engine will see of the hair, in a popup or beside a file's options."""
+"""Check for Export: what an engine will see of the hair, in a popup or with the export options."""
 
 from __future__ import annotations
 
@@ -19,35 +19,35 @@ from .messages import draw_lines
 from .reports import tell, waiting
 from .selection import chosen_hair, needs_hair
 
-#: of the file browser or popup that is open
+#: the check of the file browser or popup that is open
 _check: ExportCheck | None = None
 
 
 def begin(of: ExportCheck) -> None:
-    """A file browser or popup opens for this hair."""
+    """Set the check, when a file browser or popup opens."""
     global _check
     _check = of
 
 
 def end(of: ExportCheck | None = None) -> None:
-    """It is closed: let go of the hair that was read, unless another one has opened since."""
+    """Drop the check when its dialog closes, unless another one has opened since."""
     global _check
     if of is None or of is _check:
         _check = None
 
 
 def made() -> tuple[MadeRig, ...]:
-    """Hair that was made ready, by the dialog that is open and by previews."""
+    """Rigs that were made by the open dialog and by previews."""
     return (*(() if _check is None else _check.made), *made_rigs().values())
 
 
 def count() -> int:
-    """Of how many hairs it is; 0 where none is open."""
+    """The number of hair objects in the open dialog; 0 without one."""
     return 0 if _check is None else len(_check.hair)
 
 
 def refresh(context: bpy.types.Context, kind: StrandFormat, settings: StrandExportSettings) -> bool:
-    """Check for a format and what is asked of it; whether anything may be new."""
+    """Check for a format and settings; returns whether the result may have changed."""
     if _check is None:
         return False
     with waiting(context):
@@ -55,7 +55,7 @@ def refresh(context: bpy.types.Context, kind: StrandFormat, settings: StrandExpo
 
 
 def draw_motion(layout: bpy.types.UILayout, context: bpy.types.Context, *, use_bake: bool) -> None:
-    """What moves the hair over frames; nothing where no browser is open."""
+    """Draw what moves the hair over frames; nothing if no dialog is open."""
     if _check is not None:
         column = layout.column(align=True)
         for line in _check.motion_lines(use_bake=use_bake):
@@ -63,12 +63,12 @@ def draw_motion(layout: bpy.types.UILayout, context: bpy.types.Context, *, use_b
 
 
 def writable(objects: Any) -> list[bpy.types.Object]:
-    """Hair, but no copy that shows a bake in renders."""
+    """The hair among these objects, except copies that show a bake in renders."""
     return [obj for obj in objects if obj.type == "CURVES" and bakeable(obj)]
 
 
 def draw(layout: bpy.types.UILayout, context: bpy.types.Context, panel: str) -> None:
-    """What the engine will see, below the options; nothing where no browser is open."""
+    """Draw what the engine will see, below the options; nothing if no dialog is open."""
     if _check is None:
         return
     header, body = layout.panel(panel)
@@ -85,19 +85,19 @@ def draw(layout: bpy.types.UILayout, context: bpy.types.Context, panel: str) -> 
 
 
 def _choice(engine: str) -> tuple[StrandFormat, StrandExportSettings]:
-    """What "format engine" means."""
+    """The format and settings for an item of `_engines`."""
     name, _, layout = engine.partition(" ")
     (kind,) = (each for each in STRAND_FORMATS if each.name == name)
     return kind, StrandExportSettings(engine=layout) if layout else StrandExportSettings()
 
 
 def _look(operator: Any, context: bpy.types.Context) -> None:
-    """Look at the hair as the chosen engine will."""
+    """Check the hair for the chosen engine."""
     refresh(context, *_choice(operator.engine))
 
 
 def _engines() -> list[tuple[str, str, str]]:
-    """Each engine by each format that knows it; "format engine" or "format"."""
+    """Enum items for each engine in each format, named "format engine" or "format"."""
     return [
         (f"{kind.name} {layout.name}", f"{layout.title}, {kind.title}", layout.about)
         if "engine" in kind.options
@@ -152,7 +152,7 @@ class HAIRLOOM_OT_show_export_check(bpy.types.Operator):
     __annotations__ = {"engine": EnumProperty(**_ENGINE, update=_look)}
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
-        """A popup that only shows; what it offers is the export itself."""
+        """Open a popup that shows the check, with a button for the export itself."""
         self.own = _check
         _look(self, context)
         return context.window_manager.invoke_popup(self, width=440)

@@ -122,7 +122,6 @@ class HAIRLOOM_OT_fin_reset(bpy.types.Operator):
         return {"FINISHED"}
 
 
-#: section of a fin -> its parameters
 def draw_fin(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
     """Draw the buttons and settings of a mesh that is, or may become, a fin."""
     if fin_modifier(obj) is None:
@@ -160,7 +159,7 @@ def _draw_buttons(row: bpy.types.UILayout, session: Simulated | None) -> None:
 
 
 def draw_switch(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
-    """Draw whether the fin moves, in the header of its panel."""
+    """Draw the switch of the fin's simulation, in the header of its panel."""
     if fin_modifier(obj) is not None:
         layout.prop(obj.hairloom.fin, "enabled", text="")
 
@@ -213,7 +212,8 @@ class HAIRLOOM_PT_sidebar_fin(WithHelp, bpy.types.Panel):
 
 
 def _can_change(operator: type[Any], context: bpy.types.Context) -> bool:
-    """For `poll`: whether the active mesh can get or lose modifiers; the button says why not."""
+    """For `poll`: whether modifiers of the active mesh can be added or removed; the greyed-out
+    button says why not."""
     obj = active_mesh(context)
     if obj is None:
         operator.poll_message_set("Select a mesh")

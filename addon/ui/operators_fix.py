@@ -1,4 +1,4 @@
-"""The buttons beside warnings: each fixes a problem of the active hair."""
+"""Buttons beside warnings: each fixes a problem of the active hair."""
 
 from __future__ import annotations
 
@@ -186,7 +186,7 @@ def _can_fix(operator: type[Any], context: bpy.types.Context) -> bool:
 
 
 def _is_shown(operator: type[Any], context: bpy.types.Context) -> bool:
-    """Whether Blender's own operators can do it, which work on what is selected."""
+    """Whether the hair can be selected, as Blender's own operators work on the selection."""
     if not _can_fix(operator, context):
         return False
     if chosen_hair(context)[0].visible_get():

@@ -109,7 +109,7 @@ class HAIRLOOM_OT_take_flow_back(TakesBack, bpy.types.Operator):
 
 
 def draw_flow(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
-    """Draw what the hair is combed along."""
+    """Draw the strokes of the hair, and the buttons to comb along them."""
     column = layout.column()
     draw_objects(column, hair, SETTING)
     draw_button(column, "hairloom.add_stroke", icon="CURVE_PATH")

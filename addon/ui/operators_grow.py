@@ -1,4 +1,4 @@
-"""Grow Hair, Grow Again, and the panel of what hair grows by."""
+"""Grow Hair, Grow Again, and the panel with the settings of growth."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from .long_work import LongWork, Steps, draw_progress, in_parts
 from .messages import draw_message
 from .selection import chosen_hair, ground_mesh, in_object_mode, make_active, needs_hair, once_each
 
-#: More names than these are only counted.
+#: Most names that are listed; more are only counted.
 _NAMED = 2
 
 
@@ -67,7 +67,7 @@ class HAIRLOOM_OT_grow_again(LongWork, bpy.types.Operator):
 
 
 def draw_grow(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
-    """Whether the hair follows its settings, what it would lose by growing again, and these."""
+    """Draw whether hair follows its settings, what growing again would lose, and the settings."""
     curves = hair.data
     lost = losses(curves)
     lines = layout.column(align=True)
@@ -94,7 +94,7 @@ def _state(curves: bpy.types.Curves, lost: tuple[str, ...]) -> str:
 
 
 def _listed(lost: tuple[str, ...]) -> str:
-    """A few names, or how many there are: a line has room for no more."""
+    """The names, or the number of them if they would not fit in a line."""
     if len(lost) > _NAMED:
         return f"{lost[0]}, {len(lost) - 1} attributes"
     return ", ".join(lost) or "nothing"

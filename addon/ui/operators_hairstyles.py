@@ -29,9 +29,9 @@ from .operators_start import beginning
 from .preferences import preferences
 from .selection import chosen_hair, ground_mesh, in_object_mode, make_active, once_each
 
-#: pictures: how many side by side, how large, and the width of the page at UI scale 1
+#: pictures per row, their scale, and the width of the page at UI scale 1
 _ACROSS, _PICTURE_SCALE, _WIDTH = 4, 5.0, 440
-#: types of objects beside which a new head is all there is to look at
+#: types of objects without visible geometry, which do not count as contents of a scene
 _UNSEEN = frozenset(("CAMERA", "EMPTY", "LIGHT", "LIGHT_PROBE", "SPEAKER"))
 
 
@@ -103,8 +103,8 @@ class HAIRLOOM_OT_add_hairstyle(LongWork, bpy.types.Operator):
         yield from beginning(self, context, grooms, plays=self.plays)
 
     def _head(self, context: bpy.types.Context) -> bpy.types.Object | None:
-        """The head that is meant: the active one, or that of the active hair, else the first
-        built-in one of the view layer; None without any."""
+        """The head to use: the active one, or that of the active hair, else the first built-in one
+        in the view layer; None: there is none."""
         active = ground_mesh(context)
         if active is not None:
             if is_bust(active) or may_be_head(active):
@@ -114,13 +114,13 @@ class HAIRLOOM_OT_add_hairstyle(LongWork, bpy.types.Operator):
 
 
 def _is_empty(context: bpy.types.Context) -> bool:
-    """Whether the view layer has nothing that one looks at."""
+    """Whether the view layer has no object with visible geometry."""
     return all(obj.type in _UNSEEN for obj in objects_in(context.view_layer))
 
 
 def _look_at(objects: list[bpy.types.Object], context: bpy.types.Context) -> None:
-    """Select these, and bring them near in the 3D view that is in use: a head is a dot in the view
-    of a new file. A view through a camera stays."""
+    """Select these objects and frame them in the current 3D view, as a head is a dot in the view of
+    a new file. A view through a camera stays."""
     area = context.area
     if area is None or area.type != "VIEW_3D":
         return

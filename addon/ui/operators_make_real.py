@@ -1,4 +1,4 @@
-"""Make Real: all hair as Blender's own."""
+"""Make Real: all drawn hair as Blender's own hair curves."""
 
 from __future__ import annotations
 

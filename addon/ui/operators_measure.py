@@ -14,7 +14,7 @@ from .drawing import draw_button
 from .reports import reporting
 from .selection import chosen_hair, needs_hair
 
-#: Fraction of a table's width that names have.
+#: Fraction of a table's width for the names.
 _NAMES = 0.34
 
 
@@ -48,7 +48,7 @@ def _simulated(hair: Iterable[bpy.types.Object]) -> Iterable[Session]:
 
 
 def draw_measure(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
-    """Draw the button, and what was measured last; greyed out once the hair has moved on."""
+    """Draw the button and the last measurement, greyed out once the hair has moved on."""
     session = previews.session_of(hair)
     is_old = session is not None and session.figures and not session.are_figures_current
     text = "Measure Again: Hair Has Moved" if is_old else None
@@ -61,7 +61,7 @@ def draw_measure(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
 
 
 def draw_figures(column: bpy.types.UILayout, table: Iterable[Sequence[str]]) -> None:
-    """Draw what was measured, see `table_of`."""
+    """Draw a measurement as a table, see `table_of`."""
     for name, *values in table:
         row = column.split(factor=_NAMES)
         row.label(text=name)

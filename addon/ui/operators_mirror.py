@@ -37,7 +37,7 @@ class HAIRLOOM_OT_mirror_hair(LongWork, bpy.types.Operator):
 
 
 def draw_mirror(layout: bpy.types.UILayout) -> None:
-    """Draw a button for each side."""
+    """Draw a button for each direction."""
     if draw_progress(layout, HAIRLOOM_OT_mirror_hair):
         return
     row = layout.row(align=True)

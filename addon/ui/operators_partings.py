@@ -90,7 +90,7 @@ class HAIRLOOM_OT_comb_parting(LongWork, bpy.types.Operator):
 
 
 def draw_partings(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
-    """Draw what parts the hair."""
+    """Draw the partings of the hair, and the buttons to add one and to comb."""
     column = layout.column()
     draw_objects(column, hair, "parting_collection")
     draw_button(column, "hairloom.add_parting", icon="CURVE_DATA")

@@ -29,7 +29,7 @@ from .preset_chooser import KIND
 from .reports import reporting
 from .selection import chosen_hair, needs_hair
 
-#: of preset files
+#: suffix of preset files
 _SUFFIX = ".json"
 
 
@@ -55,7 +55,7 @@ class HAIRLOOM_OT_apply_preset(bpy.types.Operator):
 
 
 def _apply(all_settings: Iterable[Any], context: bpy.types.Context) -> None:
-    """Put a preset onto the selected hair, whose material follows if it is one of ours."""
+    """Apply a preset to the selected hair, and to its material if that is one of ours."""
     for hair in chosen_hair(context):
         for settings in all_settings:
             apply(settings, hair)

@@ -26,9 +26,9 @@ from .long_work import running
 from .reports import reporting, tell, waiting
 from .selection import chosen_hair, needs_hair
 
-#: Rate of ticks [1/s], so that a frame is delayed by a fraction of its length only.
+#: Rate of ticks [1/s]; high, so that a frame is delayed only by a fraction of its length.
 TICKS_PER_SECOND = 120.0
-#: The key of `latest_job.watch` by which ticks are known.
+#: The key of the ticks in `latest_job.watch`.
 TICKS = "play"
 STATUS = "Hairloom plays. Move the head or the sliders. Esc: stop, the hair returns to its style"
 PAUSED = "Hairloom is paused: press Resume in its panel. Esc: stop"
@@ -88,7 +88,7 @@ class HAIRLOOM_OT_cancel_build(bpy.types.Operator):
 
 
 def _is_being_made(hair: bpy.types.Object) -> bool:
-    """Whether something is on its way that can be done without."""
+    """Whether hair or cards are being made that can be cancelled."""
     session = previews.session_of(hair)
     return session is not None and (not session.is_made or session.cards.is_pending)
 
@@ -218,27 +218,27 @@ def start_ticking() -> None:
 
 
 def stop_ticking() -> None:
-    """Take no step any more, and remove the text in the status bar."""
+    """Stop the clock, and remove the text in the status bar."""
     if is_watched(TICKS):
         unwatch(TICKS)
         show_status(None)
 
 
 class _Ticks:
-    """Play's clocks, one for each scene, and what the status bar says of it."""
+    """Play's clocks, one for each scene, and its text in the status bar."""
 
     def __init__(self) -> None:
         self._clocks: dict[int, FrameClock] = {}
         self._said = ""
 
     def tick(self) -> float | None:
-        """Simulate the scenes' frames that are due, in one step: the head has moved only once."""
+        """Simulate the due frames of each scene in one step, as its head has moved only once."""
         if not previews.is_playing():
             show_status(None)
             return None
         self.tell()
         now, windows = time.perf_counter(), previews.windows_of_play()
-        # a scene that is shown again goes on from there
+        # the clock of a scene that was hidden for a while starts at this moment
         self._clocks = {uid: self._clocks.get(uid) or FrameClock(now) for uid in windows}
         for uid, window in windows.items():
             if previews.is_paused() or is_suspended():
@@ -252,7 +252,7 @@ class _Ticks:
         return 1.0 / TICKS_PER_SECOND
 
     def tell(self) -> None:
-        if running():  # the bar is another's until it ends, and then empty
+        if running():  # a long operator uses the status bar, and empties it at its end
             self._said = ""
             return
         text = PAUSED if previews.is_paused() else STATUS
@@ -266,7 +266,7 @@ class _Ticks:
 def start_preview(
     operator: bpy.types.Operator, context: bpy.types.Context, hair: list[bpy.types.Object]
 ) -> None:
-    """Preview what is not yet previewed, and report what was read."""
+    """Preview those that are not previewed yet, and report what was read."""
     depsgraph = context.evaluated_depsgraph_get()
     for each in hair:
         if previews.session_of(each) is None:
@@ -297,9 +297,9 @@ CLASSES = (
 
 
 def register() -> None:
-    """Esc stops hair that plays. While none does, it is whatever it was."""
+    """Let Esc stop hair that plays; while none does, the key works as usual."""
     keys = bpy.context.window_manager.keyconfigs.addon
-    if keys is not None:  # there are none without a window
+    if keys is not None:  # None without a window
         keymap = keys.keymaps.new(name="Window")
         keymap.keymap_items.new(HAIRLOOM_OT_stop.bl_idname, "ESC", "PRESS")
 

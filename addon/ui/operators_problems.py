@@ -1,4 +1,4 @@
-"""Problems: what is wrong with the selected hair in full, as a popup that moves nothing."""
+"""Problems: the full list of problems of the selected hair, in a popup that shifts no panel."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from .reports import reporting
 from .selection import chosen_hair, needs_hair
 from .state import draw_problems, problems_of
 
-#: of the popup, in pixels at UI scale 1
+#: width of the popup, in pixels at UI scale 1
 _WIDTH = 360
 
 
@@ -30,7 +30,7 @@ class HAIRLOOM_OT_show_problems(bpy.types.Operator):
 
     @reporting
     def execute(self, context: bpy.types.Context) -> set[str]:
-        """For scripts: all of them as reports."""
+        """For scripts: report all problems."""
         hair = chosen_hair(context)[0]
         for problem in problems_of(hair, previews.session_of(hair)):
             report(self, "WARNING", problem.text)

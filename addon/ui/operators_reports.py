@@ -1,4 +1,4 @@
-"""Reports: what Hairloom's operators have reported, to be read again and copied."""
+"""Reports: what Hairloom's operators have reported, to read again and to copy."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import bpy
 from ..blender.base.outcome import past_reports, report
 from .messages import draw_lines
 
-#: of the popup, in pixels at UI scale 1
+#: width of the popup, in pixels at UI scale 1
 _WIDTH = 480
 _ICONS = {"INFO": "INFO", "WARNING": "ERROR", "ERROR": "CANCEL"}
 

@@ -1,4 +1,4 @@
-"""The self-test's buttons in the Preferences."""
+"""Buttons of the self-test in the Preferences."""
 
 from __future__ import annotations
 

@@ -53,7 +53,7 @@ class HAIRLOOM_OT_back_to_combed(TakesBack, bpy.types.Operator):
 
 
 def draw_settle(layout: bpy.types.UILayout) -> None:
-    """Draw the buttons, or how far the hair has fallen."""
+    """Draw the buttons, or the progress of settling."""
     if draw_progress(layout, HAIRLOOM_OT_settle):
         return
     row = layout.row(align=True)

@@ -1,4 +1,4 @@
-"""Show Opacity Map and Show Skin Shadow: what the maps of shadows hold, in an Image Editor."""
+"""Show Opacity Map and Show Skin Shadow: the maps of hair's shadows in an Image Editor."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class HAIRLOOM_OT_show_skin_shadow(bpy.types.Operator):
 
 
 def _needs_preview(operator: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
-    """For `poll`: whether hair is previewed; says so on the greyed-out button."""
+    """For `poll`: whether hair is previewed; if not, the greyed-out button says so."""
     if not needs_hair(operator, context):
         return False
     if previews.session_of(chosen_hair(context)[0]) is None:
@@ -71,7 +71,7 @@ def _previewed(context: bpy.types.Context) -> Session:
 
 
 def _show(context: bpy.types.Context, image: bpy.types.Image) -> None:
-    """In an open Image Editor, else in a new window."""
+    """Show a picture in an open Image Editor, else in a new window."""
     windows = context.window_manager.windows
     areas = [area for window in windows for area in window.screen.areas]
     editor = next((area for area in areas if area.type == "IMAGE_EDITOR"), None)

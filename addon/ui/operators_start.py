@@ -1,4 +1,4 @@
-"""The first five minutes: a groom on a mesh, on Blender's hair, or in a sample scene, shaded and
+"""Operators to start with: a groom on a mesh, from Blender's hair, or in a sample scene, shaded and
 moving at once.
 """
 
@@ -212,8 +212,8 @@ class HAIRLOOM_OT_show_settings(bpy.types.Operator):
 
 def _show_data(editor: bpy.types.SpaceProperties) -> None:
     for tab in ("DATA", "OBJECT"):
-        # it has no such tab while it is pinned to something else, or where nothing was active when
-        # it was last drawn
+        # the editor lacks the tab while it is pinned to something else, or if nothing was active
+        # when it was last drawn
         with suppress(TypeError):
             editor.context = tab
             return
@@ -226,7 +226,7 @@ def begin(
     *,
     plays: bool,
 ) -> None:
-    """As `beginning`, all at once."""
+    """`beginning` in one go."""
     for _ in beginning(operator, context, grooms, plays=plays):
         pass
 
@@ -238,10 +238,10 @@ def beginning(
     *,
     plays: bool,
 ) -> Steps[None]:
-    """Select, preview and, in a window, play.
+    """Select and preview grooms and, in a window, play them.
 
-    The grooms are there by now and are to be undone in one step, so that an error is reported here,
-    and it is too late to cancel.
+    The grooms exist by now and must be undone in one step, so errors are reported here instead of
+    raised, and the work can no longer be cancelled.
     """
     chosen = preferences(context)
     for hair in grooms:

@@ -1,4 +1,4 @@
-"""Strands out: the File menu's operators, which a collection's exporters use too."""
+"""Export of strands: operators in the File menu, which a collection's exporters use too."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from .strand_export import MovingExport, StrandExportOperator, option_properties
 
 
 def _operator(kind: StrandFormat) -> type[Any]:
-    """What writes a format, with the options that it goes by."""
+    """The operator that writes a format, with the options of that."""
     bases = (StrandExportOperator, bpy.types.Operator)
     name = f"HAIRLOOM_OT_export_{kind.name}"
     glob = ";".join(f"*{suffix}" for suffix in kind.suffixes)
@@ -30,7 +30,7 @@ def _operator(kind: StrandFormat) -> type[Any]:
 
 
 def _handler(operator: type[Any]) -> type[bpy.types.FileHandler]:
-    """For the exporters of a collection; it reads nothing."""
+    """The file handler of a format for the exporters of a collection; it does not import."""
     name, kind = operator.__name__.replace("_OT_", "_FH_"), operator.kind
     return type(
         name,
@@ -50,7 +50,7 @@ _OPERATORS = tuple(map(_operator, STRAND_FORMATS))
 
 
 def draw_strand_exports(layout: bpy.types.UILayout) -> None:
-    """For the File menu."""
+    """Entries for the File menu."""
     for operator in _OPERATORS:
         layout.operator(operator.bl_idname, text=operator.kind.entry)
 

@@ -1,7 +1,7 @@
-"""Strands of files in: File > Import, and files that are dropped into the viewport.
+"""Import of strands: File > Import, and files that are dropped into the viewport.
 
-In the window a thread reads them, and Esc cancels it. All files come into the scene in one step at
-the end.
+In a window, a thread reads the files, and Esc cancels it. All files are added to the scene in one
+step at the end.
 """
 
 from __future__ import annotations
@@ -108,7 +108,7 @@ class HAIRLOOM_OT_import_strands(LongWork, ImportHelper, bpy.types.Operator):
         return cls.is_free() and in_object_mode(cls, context)
 
     def steps(self, context: bpy.types.Context) -> Steps[None]:
-        """Where a file cannot be used, the others still come in."""
+        """Import the files; if one cannot be used, the others are still imported."""
         head = active_mesh(context) if self.onto_mesh else None
         ground = head and read_ground(head, context.evaluated_depsgraph_get(), self.head_scale)
         choices = StrandImport(
@@ -128,7 +128,7 @@ class HAIRLOOM_OT_import_strands(LongWork, ImportHelper, bpy.types.Operator):
                 imported += hair
                 tell(self, outcome)
             elif each is found[-1] and not imported:
-                raise each  # nothing came in, so there is nothing to undo
+                raise each  # nothing was imported, so there is nothing to undo
             else:
                 report(self, "ERROR", each)
         make_active(context, imported[::-1])
@@ -143,7 +143,7 @@ class HAIRLOOM_OT_import_strands(LongWork, ImportHelper, bpy.types.Operator):
         layout.prop(self, "up")
         layout.prop(self, "scale")
         layout.prop(self, "guides")
-        mesh = ground_mesh(context)  # while it is adjusted what came in is active
+        mesh = ground_mesh(context)  # in Adjust Last Operation, the imported hair is active
         if mesh is None:
             draw_idle(layout.row(), self, "onto_mesh", "no mesh is active")
         else:
@@ -155,7 +155,7 @@ class HAIRLOOM_OT_import_strands(LongWork, ImportHelper, bpy.types.Operator):
             row.prop(self, "head_scale")
 
     def _paths(self) -> list[Path]:
-        """Several files chosen or dropped, else the one of `filepath`."""
+        """The files that were chosen or dropped, else the one in `filepath`."""
         named = [Path(self.directory) / file.name for file in self.files if file.name]
         return named or [Path(self.filepath)]
 
@@ -174,7 +174,7 @@ class HAIRLOOM_FH_strands(bpy.types.FileHandler):
 
 
 def draw_imports(layout: bpy.types.UILayout) -> None:
-    """The entries of File > Import, one a format."""
+    """The entries of File > Import, one per format."""
     for title, suffixes in FILE_KINDS:
         text = f"Hairloom {title} ({'/'.join(suffixes)})"
         entry = layout.operator("hairloom.import_strands", text=text)

@@ -1,4 +1,4 @@
-"""Hair ties: Add Hair Tie and Remove Hair Tie, and what holds hair in the panels."""
+"""Hair ties: Add Hair Tie and Remove Hair Tie, and the panel of ties and held tips."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class HAIRLOOM_OT_add_hair_tie(bpy.types.Operator):
         if not rings:
             rings = [ties.new_ring(hair, context)]
         depsgraph = context.evaluated_depsgraph_get()
-        holds = [ties.held_by(hair, ring, depsgraph) for ring in rings]  # or they are no ties
+        holds = [ties.held_by(hair, ring, depsgraph) for ring in rings]  # raises if one is no tie
         ties.add_ties(hair, rings, context.scene)
         for ring, (held, count) in zip(rings, holds, strict=True):
             level = "INFO" if held else "WARNING"
@@ -64,7 +64,7 @@ class HAIRLOOM_OT_remove_hair_tie(bpy.types.Operator):
 
 
 def draw_ties(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
-    """Draw what holds hair beside its roots."""
+    """Draw ties and held tips, which hold hair beside its roots."""
     draw_objects(layout, hair, "tie_collection")
     layout.operator("hairloom.add_hair_tie", icon="MESH_CIRCLE")
     layout.column().prop(hair.hairloom, "tip_surface")

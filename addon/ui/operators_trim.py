@@ -1,4 +1,4 @@
-"""Trim to Shape, Take Trim Back and what hair is trimmed to, and their buttons."""
+"""Trim to Shape, Remove Trim Shape and Take Trim Back, and their panel."""
 
 from __future__ import annotations
 
@@ -89,14 +89,13 @@ class HAIRLOOM_OT_take_trim_back(TakesBack, bpy.types.Operator):
 
 
 def _chosen(hair: bpy.types.Object, context: bpy.types.Context) -> list[bpy.types.Object]:
-    """What is selected to trim this hair: without hair beside it, a mesh is selected for its
-    own sake."""
+    """Selected objects that are meant to trim this hair; none unless the hair is selected too."""
     chosen = context.selected_objects
     return [obj for obj in chosen if may_trim(obj, hair)] if hair in chosen else []
 
 
 def draw_trim(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
-    """Draw what the hair is trimmed to."""
+    """Draw the trim shapes of the hair, and the buttons."""
     column = layout.column()
     draw_objects(column, hair, SETTING)
     if draw_progress(column, HAIRLOOM_OT_trim_to_shape):

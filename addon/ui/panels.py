@@ -1,4 +1,4 @@
-"""Panels: what is done to hair in the sidebar, all of its settings in Properties > Data."""
+"""Panels: tools for hair in the sidebar, and all of its settings in Properties > Data."""
 
 from __future__ import annotations
 
@@ -30,13 +30,13 @@ from .state import NAMES, draw_notice, draw_problems_row, draw_state
 
 
 def _hair(context: bpy.types.Context) -> bpy.types.Object | None:
-    """The hair that the panels are about."""
+    """The hair that the panels show."""
     hair = chosen_hair(context)
     return hair[0] if hair else None
 
 
 def draw_preview(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
-    """Buttons, counts, and what the artist should know."""
+    """Draw the buttons of the preview, counts, problems and overlays."""
     hair = _hair(context)
     session = previews.session_of(hair)
     column = layout.column(align=True)
@@ -80,7 +80,7 @@ def draw_preview(layout: bpy.types.UILayout, context: bpy.types.Context) -> None
 
 
 def draw_start(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
-    """How to get some hair."""
+    """Draw the buttons that add the first hair."""
     column = layout.column(align=True)
     column.scale_y = 1.3
     if not draw_progress(column, HAIRLOOM_OT_add_groom):
@@ -100,7 +100,7 @@ def draw_start(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
 
 
 def draw_more(layout: bpy.types.UILayout) -> None:
-    """How to get more hair on the same head, such as a hairstyle to its brows."""
+    """Draw the buttons that add more hair to the same head, such as a hairstyle to its brows."""
     row = layout.row(align=True)
     if any(draw_progress(row, each) for each in (HAIRLOOM_OT_add_groom, HAIRLOOM_OT_add_hairstyle)):
         return

@@ -18,9 +18,9 @@ from ..blender.setup.self_test import last_report
 from .menus import draw_shortcuts
 from .messages import draw_message
 
-#: the package that Blender knows, above this one
+#: the extension's package by Blender's name, above this one
 ROOT_PACKAGE = __package__.rpartition(".addon")[0]
-#: titles of presets
+#: default presets of new grooms, by title
 LOOK, DYNAMICS = "Brown", "Breeze"
 
 
@@ -32,7 +32,7 @@ def _motions(_owner: Any, _context: bpy.types.Context, typed: str) -> list[str]:
     return [name for name in titles("dynamics") if typed.lower() in name.lower()]
 
 
-#: what a new groom has; for the `__annotations__` of the page, and of operators that make one
+#: choices for a new groom; in the `__annotations__` of the page, and of operators that make one
 NEW_GROOM: dict[str, Any] = {
     "look": StringProperty(
         name="Look",
@@ -62,7 +62,7 @@ def _choose_gpu(page: Any, _context: Any) -> None:
     redraw_views()
 
 
-#: of this machine; not what new grooms have
+#: settings of this machine, as opposed to defaults of new grooms
 _MACHINE: dict[str, Any] = {
     "image_atomics": EnumProperty(
         name="Image Atomics",
@@ -129,7 +129,7 @@ class HAIRLOOM_AP_preferences(bpy.types.AddonPreferences):
 
 
 def draw_machine(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
-    """The GPU, and what the last self-test found."""
+    """Draw the GPU, and the results of the last self-test."""
     used = gpu_in_use()
     for name, value in used.items():
         layout.label(text=f"{name.capitalize()}: {value or 'none'}")
@@ -148,7 +148,7 @@ def draw_machine(layout: bpy.types.UILayout, context: bpy.types.Context) -> None
 
 
 def preferences(context: bpy.types.Context) -> Any:
-    """The artist's preferences; the defaults where Hairloom is not installed as an extension."""
+    """The artist's preferences; defaults if Hairloom is not installed as an extension."""
     entry = context.preferences.addons.get(ROOT_PACKAGE)
     if entry is not None and entry.preferences is not None:
         return entry.preferences
@@ -166,21 +166,21 @@ def chosen_presets(chosen: Any) -> tuple[str, ...]:
     """The presets of a new groom, by name.
 
     Args:
-        chosen: preferences, or an operator with NEW_GROOM: presets by their title or name.
+        chosen: preferences, or an operator with NEW_GROOM; presets are given by title or name.
     """
     typed = {"shading": chosen.look, "dynamics": chosen.motion}
     return tuple(titles(section).get(text, text) for section, text in typed.items() if text)
 
 
 def register() -> None:
-    """Take over what an artist has chosen for this machine."""
+    """Apply the saved settings of this machine."""
     entry = bpy.context.preferences.addons.get(ROOT_PACKAGE)
     if entry is not None and entry.preferences is not None:
         _choose_gpu(entry.preferences, None)
 
 
 def unregister() -> None:
-    """What is chosen counts as long as there is a page to choose it on."""
+    """Restore the defaults, as the page to change the settings is gone."""
     gpu_choices.choose()
 
 

@@ -1,5 +1,5 @@
-"""Presets in the panels: the picture of the one that the hair has, which opens those of all others,
-and the buttons that step through them, save and delete."""
+"""Presets in the panels: the picture of the hair's present preset, which opens a choice of all, and
+buttons that step through them, save and delete."""
 
 from __future__ import annotations
 
@@ -14,31 +14,31 @@ from ..blender.scene.principled import has_principled_hair
 from .messages import draw_message
 from .selection import chosen_hair
 
-#: section -> what its presets are called, and what they are about
+#: section -> name of its presets, and a description
 KINDS: dict[str, tuple[str, str]] = {
     "shading": ("Looks", "Colour and shine of the strands"),
     "dynamics": ("Dynamics", "How the hair moves"),
     "volume": ("Shadows", "Shadow quality, from fast to fine"),
     "cards": ("Cards", "Number and detail of cards, and their atlas"),
 }
-#: for the operators that are about presets of one kind
+#: property of operators for presets of one kind
 KIND = EnumProperty(
     name="Kind",
     description="Section that the presets belong to",
     items=[(section, *texts) for section, texts in KINDS.items()],
     options={"SKIP_SAVE"},
 )
-#: size of the picture in the panel, and of those to choose from
+#: scale of the picture in the panel, and of those in the popup
 _SCALE, _POPUP_SCALE = 3.0, 5.0
-#: of hair that has none of the presets, and its number; presets count from 1
+#: enum item for hair that matches no preset; its number is 0, presets count from 1
 _CUSTOM = ("CUSTOM", "Custom", "Settings that match no preset", "OPTIONS", 0)
 
 
 def draw_preset_row(
     layout: bpy.types.UILayout, hair: bpy.types.Object, section: str = "shading"
 ) -> None:
-    """Draw the picture of its preset and the buttons; for looks also those from and to a
-    material."""
+    """Draw the picture of the hair's preset and the buttons; for looks also those that convert from
+    and to a material."""
     entries, warnings = _entries(section)
     now = _number(hair, entries)
     row = layout.row(align=True)
@@ -71,15 +71,15 @@ def draw_preset_row(
 
 
 def _entries(section: str) -> tuple[tuple[Entry, ...], tuple[str, ...]]:
-    """All presets of a section, and what is wrong with files among the artist's own."""
+    """All presets of a section, and warnings about files among the artist's own."""
     entries, warnings = own(section)
     return (*shipped(section), *entries), warnings
 
 
 def _number(hair: bpy.types.Object, entries: tuple[Entry, ...]) -> int:
-    """Which of these presets the hair has, counted from 1; 0 for none.
+    """The number of the preset that the hair's settings match, counted from 1; 0: none.
 
-    Hair without colours of its own has those of its look, whichever is asked for.
+    `color_source` is ignored on hair without colours of its own, where it has no effect.
     """
     ignored = () if COLOR_ATTRIBUTE in hair.data.attributes else ("color_source",)
     found = preset_of(hair, entries, ignored)
@@ -87,9 +87,9 @@ def _number(hair: bpy.types.Object, entries: tuple[Entry, ...]) -> int:
 
 
 def _choice(section: str) -> Any:
-    """A property that is the preset of the hair that the panels are about; to set it applies
-    another one."""
-    shown: list[tuple[str, str, str, str | int, int]] = []  # Blender keeps no texts of its own
+    """A property that is the preset of the hair in the panels; setting it applies another one."""
+    # Blender does not copy the texts of items, so that they must be kept here
+    shown: list[tuple[str, str, str, str | int, int]] = []
 
     def items(_choices: Any, _context: bpy.types.Context | None) -> Any:
         entries, _ = _entries(section)
@@ -117,7 +117,7 @@ def _choice(section: str) -> Any:
 
 
 class HAIRLOOM_PG_presets(bpy.types.PropertyGroup):
-    """The presets of the selected hair, of which the scene itself keeps only settings."""
+    """The presets of the selected hair; the scene itself stores only settings, not which preset."""
 
     __annotations__ = {section: _choice(section) for section in KINDS}
 
@@ -126,7 +126,7 @@ CLASSES: tuple[type[Any], ...] = (HAIRLOOM_PG_presets,)
 
 
 def register() -> None:
-    """After CLASSES are registered."""
+    """Add the presets to the window manager; CLASSES must be registered."""
     bpy.types.WindowManager.hairloom_presets = PointerProperty(
         type=HAIRLOOM_PG_presets, name="Presets", description="Presets of the selected hair"
     )

@@ -1,4 +1,4 @@
-"""Operator reports."""
+"""Reports of operators, and the wait cursor."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def tell(operator: bpy.types.Operator, outcome: Outcome) -> None:
 
 @contextmanager
 def waiting(context: bpy.types.Context) -> Iterator[None]:
-    """The wait cursor, for work that takes a second or more."""
+    """Show the wait cursor, for work that takes a second or more."""
     window = context.window
     if window is None or bpy.app.background:
         yield

@@ -1,4 +1,4 @@
-"""The sections of the panels: the settings of the selected hair, and what belongs to them."""
+"""The sections of the panels: the settings of the selected hair, with their tools."""
 
 from __future__ import annotations
 
@@ -30,9 +30,9 @@ from .operators_ties import draw_ties
 from .operators_trim import draw_trim
 from .preset_chooser import draw_preset_row
 
-#: letters that are kept free for what the preview says of strands, guides or children
+#: letters reserved for a line of the preview about strands, guides or children
 _LINE = 140
-#: name, label, what draws it
+#: name, label, function that draws it
 type Section = tuple[str, str, Draw]
 
 
@@ -51,7 +51,7 @@ _OWNERS: dict[Owner, Callable[[bpy.types.Object], Any]] = {
 
 
 def _panel(section: str, panel: str = "") -> Draw:
-    """Draws what is declared for a panel and nothing else."""
+    """A function that draws the parameters declared for a panel and nothing else."""
     settings = ALL_SETTINGS[section]
     owner, switch = _OWNERS[settings.owner], {settings.header_toggle}
 
@@ -64,7 +64,7 @@ def _panel(section: str, panel: str = "") -> Draw:
 
 
 def _with_declared(sections: Iterable[Section]) -> tuple[Section, ...]:
-    """With those that only show what they declare."""
+    """These sections, with those inserted that only draw declared parameters."""
     found = list(sections)
     for name, settings in ALL_SETTINGS.items():
         if settings.panel_after:
@@ -88,14 +88,14 @@ def draw_look(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
 
 
 def _said(hair: bpy.types.Object, what: Callable[[Any], str]) -> str:
-    """What the preview says of its strands; empty before they are made."""
+    """A line of the preview about its strands; empty before they are made."""
     session = previews.session_of(hair)
     text = "" if session is None or not session.is_made else what(session.rig)
     return f"{text}." if text else ""
 
 
 def draw_strands(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
-    """What is said of widths and guides, their settings, and Blender's hair nodes."""
+    """Lines about widths and guides, their settings, and the menu of Blender's hair nodes."""
     column = layout.column(align=True)
     for text in (
         _said(hair, lambda rig: rig.widths.line),
@@ -106,7 +106,7 @@ def draw_strands(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
     draw_section(layout, hair.data.hairloom, "strands")
     layout.label(text=ALL_SETTINGS["ambient"].title)
     draw_section(layout, hair.data.hairloom, "ambient")
-    if bpy.context.object == hair:  # Blender's menu is about the active object
+    if bpy.context.object == hair:  # Blender's menu acts on the active object
         layout.menu("OBJECT_MT_modifier_add", text="Add Modifier", icon="MODIFIER")
 
 
@@ -134,7 +134,7 @@ def draw_medium(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
 
 
 def draw_children(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
-    """What the preview has; where there are none, only how to get some."""
+    """A line about the preview's children and their settings; without children, only the method."""
     groom = hair.data.hairloom
     if groom.children.method == "auto":
         text = _said(hair, lambda rig: rig.children_line)
@@ -174,7 +174,7 @@ def draw_export(layout: bpy.types.UILayout, hair: bpy.types.Object) -> None:
     draw_button(layout, "hairloom.show_reports", idle, anywhere=True, icon="TEXT")
 
 
-#: those below Look that have nothing to show in another model
+#: panels below Look whose settings only act in the model Marschner
 _MARSCHNER_PANELS = ("Rim Light", "Fibre")
 SECTIONS = _with_declared(
     (
@@ -189,7 +189,7 @@ SECTIONS = _with_declared(
         ("export", "Export", draw_export),
     )
 )
-#: those that the sidebar has too: what is done to the hair, not what it is
+#: sections that the sidebar has too: tools for hair, not its properties
 SESSION_SECTIONS = frozenset(
     {"look", "grow", "dynamics", "ties", "bake", "show", "cards", "export"}
 )
@@ -201,14 +201,14 @@ def _switch(section: str) -> tuple[Callable[[bpy.types.Object], Any], str]:
     return lambda hair: getattr(owner(hair), section), settings.header_toggle
 
 
-#: section that is on or off -> what holds the property of the checkbox in its header, its name
+#: section with a checkbox in its header -> owner of the checkbox's property, and its name
 SWITCHES: dict[str, tuple[Callable[[bpy.types.Object], Any], str]] = {
     **{name: _switch(name) for name, each in ALL_SETTINGS.items() if each.header_toggle},
     "shadows": (_groom, "use_shadows"),
     "children": (_groom, "use_children"),
     "cards": (_groom, "use_cards"),
 }
-#: section -> those below it
+#: section -> sections below it
 SUB_SECTIONS: dict[str, tuple[Section, ...]] = {
     "look": tuple(
         (f"look_{panel.split()[0].lower()}", panel, _look_panel(panel))

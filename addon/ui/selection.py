@@ -15,9 +15,9 @@ from ..errors import HairloomError
 def chosen_hair(context: bpy.types.Context) -> list[bpy.types.Object]:
     """The hair that buttons and panels apply to, the active first.
 
-    In a pinned Properties editor that is the hair it shows. Else these are the selected hair
-    curves; else the hair whose cards are selected; else the hair on
-    selected meshes, as when the head is being moved; else previewed hair.
+    In a pinned Properties editor this is the hair that it shows. Otherwise these are the selected
+    hair curves; else the hair whose cards are selected; else the hair on selected meshes, as when
+    the head is being moved; else previewed hair.
     """
     pinned = pinned_hair(context)
     if pinned is not None:
@@ -41,7 +41,7 @@ def pinned_hair(context: bpy.types.Context) -> bpy.types.Object | None:
 
 
 def once_each(grooms: Iterable[bpy.types.Object]) -> list[bpy.types.Object]:
-    """Of linked duplicates, which share their curves, the first: a tool changes these once."""
+    """The first of each set of linked duplicates: a tool must change shared curves only once."""
     firsts: dict[bpy.types.ID, bpy.types.Object] = {}
     for hair in grooms:
         firsts.setdefault(hair.data, hair)
@@ -57,7 +57,7 @@ def _made_into(objects: list[bpy.types.Object]) -> list[bpy.types.Object]:
 def _grown_on(meshes: list[bpy.types.Object], context: bpy.types.Context) -> list[bpy.types.Object]:
     everything = objects_in(context.view_layer)
     hair = [obj for obj in everything if obj.type == "CURVES" and head_of(obj) in meshes]
-    # such as that which hair was made real from
+    # hidden hair, such as the original after Make Real, only counts if there is no other
     return [obj for obj in hair if not is_hidden(obj, context.view_layer)] or hair
 
 
@@ -67,7 +67,7 @@ def _previewed() -> list[bpy.types.Object]:
 
 
 def active_mesh(context: bpy.types.Context) -> bpy.types.Object | None:
-    """The active object if it is a mesh, and selected."""
+    """The active object, if it is a mesh and selected."""
     active = context.active_object
     is_mesh = active is not None and active.type == "MESH" and active.select_get()
     return active if is_mesh else None
@@ -76,8 +76,8 @@ def active_mesh(context: bpy.types.Context) -> bpy.types.Object | None:
 def ground_mesh(context: bpy.types.Context) -> bpy.types.Object | None:
     """The mesh to grow hair on: the active one, or the active hair's.
 
-    Newly grown hair is active, and Blender offers Adjust Last Operation only if the operator could
-    run again with that.
+    The latter because newly grown hair is active, and Blender offers Adjust Last Operation only if
+    the operator could run again in that state.
     """
     active = context.active_object
     if active is not None and active.type == "CURVES" and active.select_get():
@@ -102,7 +102,7 @@ def needs_hair(operator: type[bpy.types.Operator], context: bpy.types.Context) -
 
 
 def make_active(context: bpy.types.Context, objects: list[bpy.types.Object]) -> None:
-    """Select these alone; the last is active.
+    """Select these objects alone; the last becomes active.
 
     Raises:
         HairloomError: one is not in this view layer, such as hair previewed in another scene.

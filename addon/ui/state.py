@@ -1,4 +1,4 @@
-"""Where the artist looks first: what moves the hair, how much of it there is, and what is wrong."""
+"""The state of hair at the top of the panels: what moves it, counts, and problems."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ from .long_work import draw_esc, running
 from .messages import draw_lines, draw_message
 
 _MEGABYTE = 1 << 20
-#: of a line for the name of what it says
+#: fraction of a line for the name of its value
 NAMES = 0.36
-#: where there is no number yet
+#: text for a missing value
 _NONE = "-"
 
 
 @dataclass(frozen=True)
 class Problem:
-    """What is wrong, or worth knowing. operator, button: what fixes it, if one can."""
+    """A problem, or something worth knowing. operator, button: those that fix it, if any."""
 
     text: str
     operator: str = ""
@@ -37,8 +37,8 @@ class Problem:
 
 
 def draw_state(layout: bpy.types.UILayout, session: Session | None) -> None:
-    """What moves the hair, counts, memory and times: as many lines in any state, each short, or
-    what is below would move away from under the mouse."""
+    """Draw what moves the hair, counts, memory and times, with the same number of short lines in
+    any state, so that buttons below do not move away from under the mouse."""
     lines = layout.column(align=True)
     for name, text in (("State", _state(session)), *_figures(session)):
         parts = lines.split(factor=NAMES)
@@ -75,7 +75,7 @@ def _being_made(stage: str) -> str:
 
 
 def draw_card_progress(layout: bpy.types.UILayout, session: Session | None) -> bool:
-    """What is done of cards that are being built, with a button that cancels it; False where none
+    """Draw the stage of cards that are being built, with a button to cancel; returns whether any
     are."""
     if session is None or not session.cards.is_pending:
         return False
@@ -86,7 +86,7 @@ def draw_card_progress(layout: bpy.types.UILayout, session: Session | None) -> b
 
 
 def _figures(session: Session | None) -> Iterator[tuple[str, str]]:
-    """Name and value of each, of hair that is not there too."""
+    """Name and value of each figure, also for hair that is not made."""
     rig = None if session is None or not session.is_made else session.rig
     shown: tuple[str, ...] = (_NONE, _NONE)
     if session is not None and rig is not None:
@@ -102,7 +102,7 @@ def _figures(session: Session | None) -> Iterator[tuple[str, str]]:
 
 
 def _shown(session: Session) -> tuple[str, str]:
-    """What is drawn, and what that consists of."""
+    """The number of drawn strands or cards, and of their vertices or triangles."""
     if session.snapshot.cards is not None:
         cards, triangles, _ = session.cards.counts
         return f"{cards:,} cards", f"{triangles:,} triangles"
@@ -117,7 +117,7 @@ def _milliseconds(spent: float | None) -> str:
 
 
 def problems_of(hair: bpy.types.Object, session: Session | None) -> tuple[Problem, ...]:
-    """What is wrong, worst first, then what else the artist should know."""
+    """The problems, worst first, then other notes for the artist."""
     ended = [Problem(registry.notice())] if registry.notice() else []
     issues = issues_of(hair, session)
     found = [*ended, *(Problem(one.text, one.operator, one.button) for one in issues)]
@@ -139,8 +139,8 @@ def problems_of(hair: bpy.types.Object, session: Session | None) -> tuple[Proble
 def draw_problems_row(
     layout: bpy.types.UILayout, hair: bpy.types.Object, session: Session | None
 ) -> None:
-    """One row in any state: how many problems there are, which a click shows, and the button that
-    fixes the worst."""
+    """Draw one row in any state: the number of problems, as a button that shows them, and the
+    button that fixes the worst."""
     problems, row = problems_of(hair, session), layout.row(align=True)
     if not problems:
         row.label(text="No problems", icon="CHECKMARK")
@@ -159,7 +159,7 @@ def draw_problems(
     session: Session | None,
     width: float,
 ) -> None:
-    """All of them in full, each with its button; width: of the popup, see `draw_lines`."""
+    """Draw all problems in full, each with its button. width: of the popup, see `draw_lines`."""
     for one in problems_of(hair, session):
         box = layout.box().column(align=True)
         draw_lines(box, context, one.text, "ERROR", width=width)
@@ -168,6 +168,6 @@ def draw_problems(
 
 
 def draw_notice(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
-    """Why a preview has ended by itself, if one has, where there is no hair."""
+    """Draw why a preview has ended by itself, if one has; for panels without hair."""
     if registry.notice():
         draw_message(layout, context, registry.notice(), "ERROR")

@@ -1,4 +1,4 @@
-"""What the operators that write strands share: options, and motion in steps."""
+"""What the operators that export strands share: options, and writing motion in steps."""
 
 from __future__ import annotations
 
@@ -39,17 +39,17 @@ _FRAMES = (
     ("scene", "Scene Range", "All frames of the scene"),
     ("own", "Frames", "A range of frames"),
 )
-#: the dialog's own options in the panels, before those of the settings
+#: panel -> options of the dialog itself, drawn before those of the settings
 _OF_DIALOG = {"Include": ("several",), "Animation": ("frames", "first", "last")}
 
 
 def option_properties(kind: StrandFormat) -> dict[str, Any]:
-    """For the `__annotations__` of the operator that writes a format."""
+    """The options in the `__annotations__` of the operator that writes a format."""
     return property_annotations(_as_in(kind, each) for each in _options(kind))
 
 
 def _as_in(kind: StrandFormat, option: Parameter) -> Parameter:
-    """An option with what is usual in the format: its engines, or else its axis and unit."""
+    """An option with a format's defaults and choices: its engines, or else its axis and unit."""
     if option.name == "engine":
         engines = tuple((each.name, each.title, each.about) for each in kind.layouts)
         return replace(option, default=engines[0][0], choices=engines)
@@ -66,7 +66,7 @@ def _options(kind: StrandFormat) -> list[Parameter]:
 
 
 class StrandExportOperator(LongWork, ExportHelper):
-    """What all formats share. Motion is written in steps, which Esc cancels."""
+    """Base of the export operators of all formats. Motion is written in steps; Esc cancels."""
 
     bl_options: ClassVar[set[str]] = {"PRESET"}
     unharmed = "the file is as it was before"
@@ -86,7 +86,7 @@ class StrandExportOperator(LongWork, ExportHelper):
 
     @property
     def filename_ext(self) -> str:
-        """What Blender puts behind a name; one of the format's own stays."""
+        """The suffix that Blender appends to a name; one that fits the format is kept."""
         suffix, known = Path(self.filepath).suffix.lower(), self.kind.suffixes
         return suffix if suffix in known else known[0]
 
@@ -94,7 +94,7 @@ class StrandExportOperator(LongWork, ExportHelper):
     def poll(cls: Any, context: bpy.types.Context) -> bool:
         if not cls.is_free():
             return False
-        # a collection's exporter has its own hair, and no selection
+        # a collection's exporter has its own hair, so it needs no selection
         return bool(bpy.data.hair_curves) or needs_hair(cls, context)
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
@@ -107,7 +107,7 @@ class StrandExportOperator(LongWork, ExportHelper):
         return super().invoke(context, event)
 
     def check(self, context: bpy.types.Context) -> bool:
-        """Blender calls it when an option has changed."""
+        """Called by Blender when an option has changed."""
         changed = super().check(context)
         return self._refresh(context) or changed
 
@@ -133,7 +133,7 @@ class StrandExportOperator(LongWork, ExportHelper):
     def _plans(
         self, context: bpy.types.Context, known: tuple[MadeRig, ...]
     ) -> list[tuple[Path, StrandExport]]:
-        """What is written where: one file of all hair, or a file of each."""
+        """The files to write, with their contents: one for all hair, or one for each."""
         hair, path = self._hair(context), Path(bpy.path.abspath(self.filepath))
         parts = [hair] if self.several == "one" else [[each] for each in hair]
         depsgraph = context.evaluated_depsgraph_get()
@@ -202,7 +202,7 @@ class StrandExportOperator(LongWork, ExportHelper):
         return own + [each.name for each in _options(self.kind) if each.panel == panel]
 
     def _draw_option(self: Any, layout: bpy.types.UILayout, name: str) -> None:
-        """An option, unless it says nothing just now."""
+        """Draw an option, unless it has no effect with the present choices."""
         if name in ("first", "last") and self.frames != "own":
             return
         if name == "use_bake" and self.frames == "still":
@@ -213,7 +213,7 @@ class StrandExportOperator(LongWork, ExportHelper):
 
 
 class MovingExport:
-    """Formats that hold motion."""
+    """Options of formats that hold motion."""
 
     frames: EnumProperty(name="Frames", description="Frames to write", items=_FRAMES)
     first: IntProperty(name="First", description="First frame", default=1)
@@ -221,7 +221,7 @@ class MovingExport:
 
 
 def _in_motion(path: Path, plan: StrandExport) -> Steps[Outcome]:
-    """Frames are read here, in the main thread, and written in another one."""
+    """Read frames here, in the main thread, while another thread writes them."""
     total = plan.frame_count
     yield Progress(f"0 of {total:,} frames", 0.0)
     with closing(plan.positions()) as positions:

@@ -1,4 +1,4 @@
-"""Buttons that take a tool back: hair gets the shape that was kept before."""
+"""Buttons that undo a tool: hair gets the shape back that was kept before it."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from .selection import chosen_hair, in_object_mode, needs_hair
 class TakesBack:
     """Base of an operator, before bpy.types.Operator.
 
-    shape: what was kept. idle: what a greyed button says.
-    before: what the hair is again, for the report.
+    shape: the kept shape. idle: text of a greyed-out button.
+    before: what the tool had done to the hair, for the report "as it was before it ...".
     """
 
     shape: KeptShape

@@ -1,9 +1,9 @@
 """Translations of the interface, one file per language.
 
-translations/template.json holds texts, {context: {text: ""}}: all of registered classes, and those
-that stand in the code of panels and menus as they are; tools/make_docs.py writes it. Texts with
-numbers or names in them, and reports, stay English. To add a language, copy it, for example to
-translations/de_DE.json, and fill in texts.
+translations/template.json holds texts, {context: {text: ""}}: those of registered classes, and
+literal texts in the code of panels and menus; tools/make_docs.py writes it. Texts with inserted
+numbers or names, and reports, stay English. To add a language, copy the template, for example to
+translations/de_DE.json, and fill in the texts.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from .preferences import ROOT_PACKAGE
 FOLDER = Path(__file__).resolve().parents[2] / "translations"
 TEMPLATE = "template"
 
-#: what draws -> the context in which Blender looks up its texts, if that is not "*"; the first of
-#: its arguments that is a text
+#: function that draws a text -> the context in which Blender looks it up, and the index of the
+#: first argument that is a text; for all others the context is "*"
 _DRAWN = {"operator": ("Operator", 1), "draw_button": ("Operator", 2), "draw_idle": ("*", 3)}
 #: keywords that are texts
 _TEXTS = ("text", "heading", "idle")
@@ -41,7 +41,7 @@ def tables() -> dict[str, Table]:
 
 
 def table_of(content: dict[str, dict[str, str]]) -> Table:
-    """In Blender's form; texts without a translation stay English."""
+    """A file's translations in Blender's form; texts without one stay English."""
     return {
         (context, text): translated
         for context, texts in content.items()
@@ -66,7 +66,7 @@ def texts(classes: Iterable[type[Any]]) -> dict[str, dict[str, str]]:
 
 
 def _drawn() -> set[tuple[str, str]]:
-    """What the code of this room draws as it stands there."""
+    """The literal texts that code in this room draws."""
     found: set[tuple[str, str]] = set()
     for file in Path(__file__).parent.rglob("*.py"):
         for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
@@ -80,7 +80,7 @@ def _drawn() -> set[tuple[str, str]]:
 
 
 def _constants(text: ast.expr) -> set[str]:
-    """The text, or either of two."""
+    """The text of a literal, or both texts of a conditional expression."""
     if isinstance(text, ast.IfExp):
         return _constants(text.body) | _constants(text.orelse)
     value = text.value if isinstance(text, ast.Constant) else ""
@@ -105,7 +105,7 @@ def _of_properties(rna: Any) -> set[tuple[str, str]]:
 
 
 def _bases(rna: Any) -> list[Any]:
-    """Blender's own types below a class of ours, whose texts Blender translates itself."""
+    """The base types of our class that are Blender's own, whose texts Blender translates itself."""
     return [] if rna.base is None else [rna.base, *_bases(rna.base)]
 
 
