@@ -269,7 +269,7 @@ def test_alpha_comes_from_the_material(shells, sphere, evaluated):
     assert (clear >= opaque - 1e-6).all() and clear.mean() > opaque.mean() + 0.1
     clear_material(shells)
     (note,) = sort_mesh(shells, evaluated(), SortOptions(head=sphere, occlusion=QUICK)).notes
-    assert "several pictures" in note and "'Clear' counted" in note
+    assert "several alpha pictures" in note and "'Clear' was used" in note
 
 
 def test_the_order_goes_by_what_the_material_lets_see(shells, sphere, evaluated):

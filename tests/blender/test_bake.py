@@ -401,7 +401,7 @@ def test_a_bake_that_cannot_take_its_place_is_kept(swinging, tmp_path, monkeypat
 
     with monkeypatch.context() as windows:
         windows.setattr(moving.os, "replace", held)
-        with pytest.raises(HairloomError, match="cannot take the place") as raised:
+        with pytest.raises(HairloomError, match="cannot replace") as raised:
             bake(hair)
     assert frames_in(folder) == shown and Cache(folder).frame(LAST)
     (kept,) = (path for path in folder.glob("frames-*") if path != shown)
@@ -484,7 +484,7 @@ def test_of_several_bakes_all_are_replaced_or_none(swinging, tmp_path, monkeypat
 
     with monkeypatch.context() as windows:
         windows.setattr(moving.os, "replace", held)
-        with pytest.raises(HairloomError, match="cannot take the place"):
+        with pytest.raises(HairloomError, match="cannot replace"):
             bake(hair, twin)
     assert [frames_in(tmp_path / name) for name in ("bake", "twin")] == shown
     assert all(Cache(tmp_path / name).frame(LAST) for name in ("bake", "twin"))

@@ -228,7 +228,7 @@ def test_a_picture_of_another_bake_is_not_skipped(file, tmp_path, capfd):
     [
         (["--groom", "Hair"], "it has no bake"),
         (["--bake", "nowhere"], "there is no bake"),
-        (["--groom", "Sphere"], "this is no hair object"),
+        (["--groom", "Sphere"], "this is not a hair object"),
         ([], "it has no bake"),  # the only hair of the scene
     ],
 )

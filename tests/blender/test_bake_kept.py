@@ -65,7 +65,7 @@ def test_a_copy_shows_no_bake_of_other_strands(hair, new_hair, sphere, tmp_path,
     list(Bake.of([other], bpy.context.scene, folder=tmp_path / "bake").steps())
     playback.forget()
     bpy.context.scene.frame_set(2)
-    assert "not those of the bake" in capsys.readouterr().out
+    assert "do not match the bake" in capsys.readouterr().out
     assert [tuple(point.vector) for point in copy.data.position_data] == shown
 
 

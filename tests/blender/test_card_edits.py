@@ -295,7 +295,7 @@ def test_without_the_record_cards_are_made_anew_with_a_word(hair, capfd, record)
     else:
         obj.data[RECORD] = record
     make(hair)
-    assert "it holds no record of what was made" in capfd.readouterr().out
+    assert "it has no record of its cards" in capfd.readouterr().out
     assert edits(hair) is None
 
 

@@ -158,7 +158,7 @@ def test_the_command_line_takes_pictures(write: Any, tmp_path: Path, gpu_context
 @pytest.mark.parametrize(
     ("argument", "named"),
     [
-        ("shift", "names no texture"),
+        ("shift", "does not name a texture"),
         ("gloss=a.png", "gloss"),
         ("shift=nowhere.png", "nowhere.png"),
         ("shift=broken.png", "broken.png"),

@@ -116,7 +116,7 @@ def test_a_page_beside_another_format_is_refused(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert cards(tmp_path / "hair.obj", "--page") == 1
-    assert "a web page shows a GLB" in capsys.readouterr().err
+    assert "a web page needs a GLB" in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []
 
 

@@ -112,7 +112,7 @@ def test_motion_of_a_grooms_file_is_left_out_with_a_note(
     notes = run(*source, output="out.usdc")["notes"]
     assert any(note.startswith("in.usdc: it moves, and only its first frame") for note in notes)
     run(*source, "--frames", "1", "3", output="out.usdc", code=1)
-    assert "import brings the motion" in capsys.readouterr().err
+    assert "use the verb import" in capsys.readouterr().err
 
 
 def test_a_check_writes_nothing(

@@ -101,7 +101,7 @@ def test_noise_changes_from_frame_to_frame_and_by_its_seed(owner):
     ("kind", "values", "message"),
     [
         ("CHARGE", {}, "no charge"),
-        ("LENNARDJ", {}, "particles that have a size"),
+        ("LENNARDJ", {}, "particles with a size"),
         ("BOID", {}, "only boids"),
         ("GUIDE", {}, "along a curve"),
         ("TEXTURE", {}, "texture"),

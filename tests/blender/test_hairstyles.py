@@ -314,7 +314,7 @@ def test_nodes_that_are_replaced_renamed_or_not_there(
     for group in list(bpy.data.node_groups):
         bpy.data.node_groups.remove(group)
     monkeypatch.setattr(hair_nodes, "library_path", lambda: tmp_path / "none.blend")
-    refused(style, head, "came without its hair nodes")
+    refused(style, head, "built without its hair nodes")
 
 
 @pytest.mark.portable
@@ -339,7 +339,7 @@ def test_the_command_line_draws_and_saves_a_style(tmp_path: Path, capsys) -> Non
     assert picture.is_file()
     again = ["render", "--style", "buzz_cut", "--groom", "Hair", "--output", str(picture)]
     assert run(again) == 1
-    assert "not from both" in capsys.readouterr().err
+    assert "not both" in capsys.readouterr().err
 
 
 @pytest.mark.slow

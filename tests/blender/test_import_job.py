@@ -124,8 +124,8 @@ def test_guides_can_be_apart_on_a_head_of_the_scene(tmp_path: Path, sphere: Any)
 @pytest.mark.parametrize(
     ("head", "problem"),
     [
-        ("Nobody", "Nobody: this does not name a mesh"),
-        ("Camera", "Camera: this does not name a mesh"),
+        ("Nobody", "Nobody: this is not a mesh"),
+        ("Camera", "Camera: this is not a mesh"),
         ("none.obj", "none.obj: there is no such file"),
     ],
 )
@@ -162,7 +162,7 @@ def test_a_head_of_several_meshes_is_one(tmp_path: Path) -> None:
     assert command_line.run(arguments) == 0
     told = json.loads(report.read_text())
     assert told["head"] == "head"
-    assert "head.fbx: its 2 meshes (eye, head) are one, head" in told["notes"]
+    assert "head.fbx: its 2 meshes (eye, head) were joined into head" in told["notes"]
     (hair,) = grooms_of(scene).values()
     joined = hair.data.surface
     assert joined.name == told["head"] and len(joined.data.uv_layers) == 1
@@ -270,4 +270,4 @@ def test_a_name_that_is_neither_an_object_nor_a_file_is_told(
 ) -> None:
     arguments = ["render", "--groom", "Hair.017", "--head", str(head)]
     assert command_line.run([*arguments, "--output", str(tmp_path / "a.png")]) == 1
-    assert "Hair.017: this names neither a hair curves object" in capfd.readouterr().err
+    assert "Hair.017: this is neither a hair curves object" in capfd.readouterr().err

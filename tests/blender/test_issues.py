@@ -185,7 +185,7 @@ def test_instances_that_the_preview_leaves_out_are_told(new_hair, sphere):
     assert diagnostics.instances_note(hair) == ""
     inner.objects.link(hair)
     bpy.context.view_layer.update()
-    assert "no hair in the preview" in diagnostics.instances_note(hair)
+    assert "not in the preview" in diagnostics.instances_note(hair)
     twin.instance_type = "NONE"
     bpy.context.view_layer.update()
     assert diagnostics.instances_note(hair) == ""
@@ -208,7 +208,7 @@ def test_instances_by_geometry_nodes_are_told_too(what, new_hair, sphere):
         collection.objects.link(hair)
         info.inputs["Collection"].default_value = collection
     bpy.context.view_layer.update()
-    assert "no hair in the preview" in diagnostics.instances_note(hair)
+    assert "not in the preview" in diagnostics.instances_note(hair)
     many.hide_viewport = True
     bpy.context.view_layer.update()
     assert diagnostics.instances_note(hair) == ""

@@ -16,7 +16,7 @@ pytestmark = pytest.mark.skipif(
 )
 
 HIDDEN = ("__EGL_VENDOR_LIBRARY_FILENAMES", "VK_DRIVER_FILES", "LIBGL_DRIVERS_PATH")
-REFUSAL = "there is no GPU here, and no software driver in place of one"
+REFUSAL = "there is neither a GPU nor a software driver here"
 ENGINE = """
 bpy.context.scene.render.engine = "HAIRLOOM"
 try:

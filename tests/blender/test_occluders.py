@@ -265,7 +265,7 @@ def test_hair_that_cannot_be_made_ready_is_told_of_by_the_cards(shaded, hair, ev
         each.vector = each.vector * 1000.0
     strands.data.update_tag()
     follow(evaluated)
-    assert any("It shades nothing" in note for note in session.cards.warnings)
+    assert any("It occludes nothing" in note for note in session.cards.warnings)
 
 
 def test_own_cards_and_coarser_levels_and_other_meshes_are_left_out(hair, sphere):

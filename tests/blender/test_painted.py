@@ -176,7 +176,7 @@ def test_a_map_that_breaks_stays_as_it_was_last(hair: Any, sphere: Any, evaluate
     sphere.data.update_tag()
     catch_up(evaluated)
     (warning,) = session.warnings
-    assert warning.startswith("Head: ") and "'Top'" in warning and "as it was last" in warning
+    assert warning.startswith("Head: ") and "'Top'" in warning and "last state is used" in warning
     assert ".." not in warning
     np.testing.assert_array_equal(factors(session)["gravity"], before)
     dynamics.gravity_mask = "Gone"

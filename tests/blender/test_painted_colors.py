@@ -457,7 +457,7 @@ def test_what_cannot_be_used_is_said_and_hair_keeps_its_colour(
     session = started(hair, evaluated)
     (warning,) = (each for each in session.warnings if "UVs, so exported" not in each)
     assert warning.startswith("Head: ") and says in warning and remedy in warning
-    assert warning.endswith("Until then it has the look's colour")
+    assert warning.endswith("Until then the look's colour is used")
     assert shown(session).color is None
     request = ExportRequest(guides=False, color=False)
     assert still_hair(hair, evaluated(), request).groom.color is None
@@ -467,5 +467,5 @@ def test_hair_without_a_surface_says_so(new_hair: Any, evaluated: Any) -> None:
     hair = new_hair()
     hair.data.hairloom.shading.color_map = MAP
     session = started(hair, evaluated)
-    assert any("lies on a surface, and it has none" in each for each in session.warnings)
+    assert any("needs a surface, and it has none" in each for each in session.warnings)
     assert shown(session).color is None

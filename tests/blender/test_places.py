@@ -28,7 +28,10 @@ REFUSED = [
     ([*RENDER, "--output", "wig.blend"], PNG),
     ([*RENDER, "--output", "kept"], PNG),
     ([*RENDER, "--output", "a.png", "--slices", "hair.tfx"], "--slices writes a .png file"),
-    ([*RENDER, "--output", "a.png", "--sheet", "./a.png"], "two results would go into this file"),
+    (
+        [*RENDER, "--output", "a.png", "--sheet", "./a.png"],
+        "two results would be written to this file",
+    ),
     ([*RENDER, "--output", "a.png", "--report", "wig.blend"], "--report writes a .json file"),
     ([*RENDER, "--output", "hair.tfx/a.png"], "hair.tfx is no folder"),
     ([*RENDER, "--output", "kept.png"], "a folder has this name"),
@@ -119,7 +122,8 @@ def test_a_scene_that_is_saved_over_itself_is_kept_as_the_version_before(folder:
 
 
 @pytest.mark.parametrize(
-    ("content", "said"), [(b"hair", "this is no Blender file"), (None, "Blender cannot open this")]
+    ("content", "said"),
+    [(b"hair", "this is not a Blender file"), (None, "Blender cannot open this")],
 )
 def test_what_is_no_scene_is_said_in_a_few_words(
     content: bytes | None, said: str, folder: Path, capsys: pytest.CaptureFixture[str]

@@ -149,7 +149,7 @@ def test_a_preset_file_is_applied_and_kept(
     [
         ("{", "cannot be read"),
         ('{"hairloom": 1, "section": "shading", "values": {"model": "plaid"}}', "plaid"),
-        ((presets.PRESET_FOLDER / "stage" / "plain.json").read_text(), "keeps no 'stage'"),
+        ((presets.PRESET_FOLDER / "stage" / "plain.json").read_text(), "has no 'stage'"),
     ],
 )
 def test_what_is_no_preset_of_hair_is_refused_and_not_kept(
@@ -309,7 +309,7 @@ def test_a_title_that_is_too_long_or_of_many_lines_fits_a_menu(own_folder: Path)
 def test_only_own_presets_can_be_deleted(own_folder: Path, tmp_path: Path, name: str) -> None:
     secret = tmp_path.parent / "secret.json"
     secret.write_text("{}")
-    with pytest.raises(HairloomError, match="no such preset of your own"):
+    with pytest.raises(HairloomError, match="you have no preset of this name"):
         presets.delete_own(name)
     assert secret.is_file()
 

@@ -100,7 +100,7 @@ def test_of_several_materials_the_active_one_counts_and_that_is_said(hair: Any) 
     hair.active_material_index = 0
     settings, (note,) = look(hair)
     assert settings.base_color[0] > settings.base_color[1]
-    assert note == "of several materials it has the look of the active one, Hair"
+    assert note == "it has several materials; the look was taken from the active one, Hair"
 
 
 @pytest.mark.parametrize("way", ["mixed", "in a group"])

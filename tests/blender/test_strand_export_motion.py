@@ -209,7 +209,7 @@ def test_curves_that_come_and_go_are_told_and_leave_nothing(new_hair: Any, tmp_p
         frames=range(1, 4),
     )
     hair.data.remove_curves(indices=[0])
-    with pytest.raises(HairloomError, match=r"in frame 1 it has other curves"):
+    with pytest.raises(HairloomError, match=r"in frame 1 its curves have changed"):
         plan.write(tmp_path / "a.usdc")
     assert list(tmp_path.iterdir()) == []
 

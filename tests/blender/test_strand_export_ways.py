@@ -86,7 +86,7 @@ def test_bones_are_left_out_where_they_are_not_wanted_or_not_there(
 @pytest.mark.parametrize(
     ("renamed", "sentence"),
     [
-        (("skull",), "strands, which go with jaw. Weight the head there"),
+        (("skull",), "strands, so they follow jaw. Weight the head there"),
         (("skull", "jaw"), "Head: no bone of Rig moves it, so no .tfxbone was written"),
     ],
     ids=["head", "all"],

@@ -329,7 +329,7 @@ def test_of_several_uv_maps_the_one_that_counts_is_named(tmp_path, head, told):
     bpy.context.view_layer.objects.active = head
     head.select_set(True)
     (hair,) = imported(write(tmp_path / "hair.abc", hairdo()))
-    assert "Head: of its 2 UV maps hair and its shadow take the active one, 'Lightmap'" in told()
+    assert "2 UV maps, and hair and its shadow use the active one, 'Lightmap'" in told()
     assert hair.data.surface_uv_map == "Lightmap"
 
 

@@ -152,9 +152,7 @@ def test_the_report_counts_what_is_trimmed_left_and_outside(hair, tmp_path, caps
     run = ["run", "trim_to_shape", "--scene", scene, "--object", shape.name, "--object", name]
     assert command_line.run([*run, "--output", output]) == 0
     count, out = int((inside[:, 0] & ~inside[:, 1]).sum()), int((~inside[:, 0]).sum())
-    said = (
-        f"{name}: {count} curves trimmed, {60 - count} left as they are, {out} of them with roots"
-    )
+    said = f"{name}: {count} curves trimmed, {60 - count} left unchanged, {out} of them with roots"
     assert said in capsys.readouterr().out
     assert 0 < count < 60 - out
 

@@ -317,7 +317,7 @@ def test_a_gpu_without_memory_is_a_message(
         sizes = ["--frames", "2", "--width", "32", "--height", "32", "--samples", "1"]
         assert command_line.run(["turntable", *GROWN, *sizes, "--output", str(tmp_path)]) == 1
         text = capfd.readouterr().err
-    assert "the GPU refuses what drawing needs" in text and "smaller pictures" in text
+    assert "the GPU cannot provide what drawing needs" in text and "smaller pictures" in text
     assert "Traceback" not in text and list(tmp_path.iterdir()) == []
 
 

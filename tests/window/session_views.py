@@ -158,7 +158,7 @@ def instances_are_told():
     scene.collection.objects.link(twin)
     (after,) = yield from pictures("instance")
     assert changed(before, after) > HAIR, "Blender does not draw the instance"
-    assert "no hair in the preview" in note(hair())
+    assert "not in the preview" in note(hair())
     bpy.data.objects.remove(twin)
     assert note(hair()) == ""
 

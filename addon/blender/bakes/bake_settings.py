@@ -88,7 +88,7 @@ def choose_folder(obj: bpy.types.Object) -> Path:
     folder = folder_of(obj)
     if folder is None:
         raise HairloomError(
-            "the file has not been saved, so there is no place beside it",
+            "the file has not been saved, so the bake has no folder beside it",
             place=obj.name,
             remedy="Save the file, or choose a cache folder with a full path",
         )

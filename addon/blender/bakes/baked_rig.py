@@ -95,7 +95,7 @@ class BakedRig:
         """
         if not self.fits(frame):
             raise HairloomError(
-                "a frame is of another groom than the bake", place="bake", remedy="Bake again"
+                "a frame belongs to another groom than the bake", place="bake", remedy="Bake again"
             )
         rig, pose = self.styled(frame), self.pose(frame)
         return motion_flow.strands_at(rig, pose, frame["guides"], led_in(frame))

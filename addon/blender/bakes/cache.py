@@ -143,10 +143,10 @@ class CacheWriter:
             write_bytes_atomic(current, _text(self._content, self._frames.name))
         except (OSError, HairloomError) as error:
             raise HairloomError(
-                "the bake is done but cannot take the place of the one before",
+                "the bake is done, but cannot replace the previous one",
                 place=str(self.folder),
-                remedy=f"Choose {self._frames} as the folder of the bake, "
-                "or close other programs that use this one and bake again",
+                remedy=f"Choose {self._frames} as the folder of the bake, or close other programs "
+                "that use this folder and bake again",
             ) from error
         self._is_published = True
 
@@ -250,7 +250,7 @@ class Cache:
         path = self._frame_folder / name
         arrays = _read_arrays(path)
         if _layout_of(arrays) != self._layout:
-            raise _damaged(path, "its arrays are not those of the other frames")
+            raise _damaged(path, "its arrays differ from those of the other frames")
         return arrays
 
     @classmethod
@@ -394,12 +394,12 @@ def _read_facts(path: Path) -> dict[str, Any]:
             remedy="Bake first, or choose the folder of a bake",
         ) from error
     except UnicodeDecodeError as error:
-        raise _damaged(path, "it is no text") from error
+        raise _damaged(path, "it is not text") from error
     except (OSError, ValueError, RecursionError) as error:
         raise _damaged(path, str(error)) from error
     version = content.get("version") if isinstance(content, dict) else None
     if not isinstance(version, int):
-        raise _damaged(path, "it names no version")
+        raise _damaged(path, "it has no version")
     if version > VERSION:
         raise HairloomError(
             f"this bake was made by a newer Hairloom (version {version} of the format)",
@@ -418,7 +418,7 @@ def _read_facts(path: Path) -> dict[str, Any]:
 def _check(facts: Facts) -> None:
     """Raise ValueError or TypeError for facts that no bake can have."""
     if not (isinstance(facts.first, int) and isinstance(facts.last, int)):
-        raise TypeError("its frames are no whole numbers")
+        raise TypeError("its frames are not whole numbers")
     texts = (
         facts.owner,
         facts.file,
@@ -428,11 +428,11 @@ def _check(facts: Facts) -> None:
         *facts.frame_hashes,
     )
     if not all(isinstance(text, str) for text in texts):
-        raise TypeError("names and hashes are no texts")
+        raise TypeError("names or hashes are not text")
     if len(facts.frame_hashes) != facts.frame_count:
         raise ValueError("frames are missing")
     if not (math.isfinite(facts.frame_rate) and facts.frame_rate > 0.0):
-        raise ValueError("the frame rate is no positive number")
+        raise ValueError("the frame rate is not a positive number")
 
 
 def _read_arrays(path: Path) -> Arrays:

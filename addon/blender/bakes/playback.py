@@ -91,9 +91,9 @@ def cache_if_baked(obj: bpy.types.Object) -> Cache | None:
     cache, folder = cache_of(obj), folder_of(obj)
     if cache is None and folder is not None and obj.hairloom.bake.owner:
         raise HairloomError(
-            f"it was baked, and its bake is not in {folder}",
+            f"it was baked, but its bake is not in {folder}",
             place=obj.name,
-            remedy="Bring that folder here, bake again, or export strands without Use Bake "
+            remedy="Restore that folder, bake again, or export strands without Use Bake "
             "(--no-use-bake)",
         )
     return cache
@@ -257,7 +257,7 @@ def _write(curves: bpy.types.Curves, folder: Path, scene: bpy.types.Scene) -> No
     is_same = curves.hairloom.baked_rig in ("", cache.facts.rig_hash)
     if len(curves.position_data) != len(points) or not is_same:
         raise HairloomError(
-            "these curves are not those of the bake", place=curves.name, remedy="Bake again"
+            "these curves do not match the bake", place=curves.name, remedy="Bake again"
         )
     put_points(curves, points)
 
@@ -333,5 +333,5 @@ def check_frames(name: str, frames: range, cache: Cache) -> None:
         raise HairloomError(
             f"its bake holds frames {first} to {last}, not {wanted}",
             place=name,
-            remedy=f"Bake that too, or choose from {first} to {last}",
+            remedy=f"Bake those too, or choose frames from {first} to {last}",
         )

@@ -48,7 +48,7 @@ def stale_notes(
         return ()
     return (
         f"{hair.name}: its bake is out of date ({', '.join(changed)}), and its motion is written "
-        "as it was baked. Bake again to write it as it is now.",
+        "as it was baked. Bake again to write the current motion.",
     )
 
 

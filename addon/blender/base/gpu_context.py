@@ -73,7 +73,7 @@ def ensure_gpu() -> None:
         return
     if not gpu_in_use()["backend"] and not can_draw():
         raise HairloomError(
-            "there is no GPU here, and no software driver in place of one",
+            "there is neither a GPU nor a software driver here",
             place="render",
             remedy="Install Mesa's drivers (libegl1, libgl1-mesa-dri) or render on another machine",
         )
@@ -106,7 +106,7 @@ def gpu_refusals() -> Iterator[None]:
         if not str(error).startswith(_REFUSAL):
             raise
         raise HairloomError(
-            f"the GPU refuses what drawing needs ({error})",
+            f"the GPU cannot provide what drawing needs ({error})",
             place="render",
             remedy="Close other programs that use the GPU, or choose smaller pictures and textures",
         ) from error

@@ -49,7 +49,7 @@ def write_texture(
         return
     if path.suffix.lower() != ".png":
         raise HairloomError(
-            f"without OpenImageIO textures are not written as '{path.suffix}'",
+            f"without OpenImageIO textures cannot be written as '{path.suffix}'",
             place=str(path),
             remedy="Choose PNG, or use an official build of Blender",
         )

@@ -142,7 +142,7 @@ def check_shape_editable(obj: bpy.types.Object) -> None:
     if not is_shape_editable(obj):
         kind = "curves" if obj.type == "CURVES" else "mesh"
         raise HairloomError(
-            f"it overrides the settings of another file, whose {kind} it cannot change",
+            f"it is a library override, which cannot change the {kind} of the other file",
             place=obj.name,
             remedy="Make object and data local in Blender (Object > Relations > Make Local)",
         )
@@ -157,9 +157,9 @@ def check_curves_editable(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph
     check_shape_editable(hair)
     if not np.linalg.cond(matrix_of(hair, depsgraph)[:3, :3]) < _FLAT:
         raise HairloomError(
-            "it, or what it is a child of, is scaled to 0 along an axis",
+            "it or one of its parents is scaled to 0 along an axis",
             place=hair.name,
-            remedy="Set another Scale in the Object properties",
+            remedy="Correct Scale in the Object properties",
         )
 
 

@@ -197,8 +197,8 @@ def missing_weights(
         problem = f"it has neither a vertex group nor an attribute named '{name}'"
     else:
         problem = (
-            f"its attribute '{name}' is {attribute.data_type} on {attribute.domain}, "
-            "which is no number or colour of points, corners or faces"
+            f"its attribute '{name}' is {attribute.data_type} on {attribute.domain}, not a number "
+            "or colour on points, corners or faces"
         )
     there = ", ".join(weight_names(obj)[:8])
     paint = "Paint one (Weight Paint), or leave the field empty"

@@ -187,9 +187,9 @@ def _check_names(obj: bpy.types.Object) -> None:
     taken += [f"attribute {name}" for name in CARD_ATTRIBUTES if name in mesh.attributes]
     if taken:
         raise HairloomError(
-            f"it has the {taken[0]} already, which ambient occlusion would replace",
+            f"it already has the {taken[0]}, which ambient occlusion would replace",
             place=mesh.name,
-            remedy="Rename or delete that, or turn Ambient Occlusion off",
+            remedy="Rename or delete it, or turn Ambient Occlusion off",
         )
 
 
@@ -201,7 +201,7 @@ def _read_faces(
     with evaluated_mesh(obj, depsgraph, obj.name) as bent:
         if np.array_equal(_corners(bent), _corners(obj.data)):
             return (*_triangles(bent, matrix), [])
-    note = "Modifiers that add or remove faces were left out, because they come after the order"
+    note = "Modifiers that add or remove faces were ignored, because they run after the sorting"
     return (*_triangles(obj.data, matrix), [note])
 
 
@@ -271,7 +271,10 @@ def _write_occlusion(
     for name, values in zip(CARD_ATTRIBUTES, (openness, along), strict=True):
         set_attribute(mesh, name, "POINT", _at_source(values, vertex, len(mesh.vertices)))
     if not set_uv_map(mesh, OCCLUSION_LAYER, np.stack([openness, along], axis=1)[corner]):
-        return ["It has as many UV maps as a mesh can have, so occlusion is an attribute only"]
+        return [
+            "It already has the maximum number of UV maps, so occlusion is stored as an attribute "
+            "only"
+        ]
     mesh.update_tag()
     return []
 

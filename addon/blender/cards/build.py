@@ -120,8 +120,8 @@ def read_inputs(
             frame, head = depsgraph.scene.frame_current, head_of(hair)
             assert head is not None
             notes += (
-                f"{hair.name}: {head.name} is posed in frame {frame}. The cards are those of the"
-                " rest pose, in which engines bind skeletons.",
+                f"{hair.name}: {head.name} is posed in frame {frame}. The cards are made in the "
+                "rest pose, in which engines bind skeletons.",
             )
     else:
         triangle_count = None if rig.head is None else len(rig.head.triangles)

@@ -62,8 +62,8 @@ def groom_edits(
         if not len(obj.data.polygons) or obj.hairloom.card_object.shell_layers:
             return None, ()
         return None, (
-            f"{obj.name}: it holds no record of what was made, so edits cannot be recognised and "
-            "all its cards are made again.",
+            f"{obj.name}: it has no record of its cards as they were made, so edits cannot be "
+            "detected and all its cards are made again.",
         )
     surface, made = read_pieces(obj.data)
     matrix = matrix_of(hair, depsgraph)
@@ -145,7 +145,7 @@ def _tile_layer(mesh: bpy.types.Mesh) -> bpy.types.MeshUVLoopLayer:
     own = [layer for layer in mesh.uv_layers if layer.name != OCCLUSION_LAYER]
     if not own:
         raise HairloomError(
-            "it has lost its UV map, so nobody can tell what its cards show",
+            "it has lost its UV map, so it is unknown what its cards show",
             place=mesh.name,
             remedy=f"Undo, or give it a UV map called {TILE_LAYER}, or press Discard Edits",
         )

@@ -208,7 +208,7 @@ def _check_neighbours(path: Path) -> None:
     other = other_owner(path) or alike_beside(path)
     if other:
         raise HairloomError(
-            f"{other} is in this folder, and files beside both would have the same names",
+            f"{other} is in this folder, and its companion files would have the same names",
             place=str(path),
             remedy="Export under another name, or into another folder",
         )
@@ -224,7 +224,7 @@ def check_no_input(path: Path, pictures: Iterable[Path]) -> None:
         is_beside = os.path.realpath(picture.parent) == os.path.realpath(path.parent)
         if is_beside and picture.name.startswith(f"{path.stem}_"):
             raise HairloomError(
-                f"the cards are made from {picture.name}, which their own textures may replace",
+                f"the cards use {picture.name}, which the written textures could replace",
                 place=str(path),
                 remedy="Export under another name, or into another folder",
             )
@@ -584,8 +584,8 @@ def _motion_line(written: WrittenCards) -> str:
     length = motion["error"]["hair_length"]
     if motion["kind"] == "texture":
         return (
-            f"; motion textures of {motion['width']} x {motion['height']} texels, which round by "
-            f"{motion['error']['worst'] / length * 100.0:.2g}% of the hair's length at most"
+            f"; motion textures of {motion['width']} x {motion['height']} texels, rounded by at "
+            f"most {motion['error']['worst'] / length * 100.0:.2g}% of the hair's length"
         )
     by = ", moved by springs" if motion["kind"] == "springs" else ""
     usual, most, worst = (

@@ -142,14 +142,14 @@ def add_along_curves(
 def _record_of(obj: bpy.types.Object) -> MadeCards:
     if obj.hairloom.card_object.shell_layers:
         raise HairloomError(
-            "it holds shells, which have no cards to work on",
+            "it holds shells, which have no cards to edit",
             place=obj.name,
             remedy="Set Kind to Cards and press Make Cards Again",
         )
     record = read_record(obj.data)
     if record is None:
         raise HairloomError(
-            "it holds no record of its atlas", place=obj.name, remedy="Press Make Cards Again"
+            "it has no record of its atlas", place=obj.name, remedy="Press Make Cards Again"
         )
     return record
 

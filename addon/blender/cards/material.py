@@ -111,16 +111,16 @@ def alpha_of(
     images = [chosen] if chosen is not None else alpha_images(obj)
     image = images[0] if images else None
     if image is None:
-        problem = "No material has a picture for its alpha"
-        return None, [f"{problem}, so cards counted as covered all over"]
+        problem = "No material has an alpha picture"
+        return None, [f"{problem}, so cards were treated as opaque"]
     place = f"Image '{image.name}'"
     try:
         picture = read_image(image, is_color=False, place=place)
-        others = "Its materials have several pictures for their alpha"
-        notes = [f"{others}: that of image '{image.name}' counted for all"] if images[1:] else []
+        others = "Its materials have several alpha pictures"
+        notes = [f"{others}: image '{image.name}' was used for all"] if images[1:] else []
         return picture_as("alpha", picture, place=place), notes
     except HairloomError as error:
-        return None, [f"{error} Until then cards counted as covered all over"]
+        return None, [f"{error} Until then cards are treated as opaque"]
 
 
 def alpha_images(obj: bpy.types.Object) -> list[bpy.types.Image]:

@@ -72,7 +72,9 @@ def check_motion(
     """
     if len(motion.frames) < _FEWEST_FRAMES:
         raise HairloomError(
-            "one frame is no motion", place="frame range", remedy="Choose two frames or more"
+            "motion needs more than one frame",
+            place="frame range",
+            remedy="Choose two frames or more",
         )
     if settings.motion in ("joints", "springs") and file_format != GLB:
         raise HairloomError(
@@ -82,7 +84,7 @@ def check_motion(
         )
     if file_format == OBJ:
         raise HairloomError(
-            "OBJ has no place for motion", place="motion", remedy="Choose glTF, FBX or USD"
+            "OBJ cannot store motion", place="motion", remedy="Choose glTF, FBX or USD"
         )
 
 
@@ -167,7 +169,7 @@ class JointMotion:
         return (
             f"Joints are off by {self.relative_error:.1%} of the hair's length (root mean square; "
             f"the worst by {self.error.worst / self.tracks.hair_length:.1%}), more than the "
-            f"{wanted:.1%} that are asked for. Allow more chains, or joints in each.",
+            f"{wanted:.1%} allowed. Allow more chains, or more joints in each.",
         )
 
     @property
@@ -240,9 +242,9 @@ def spring_motion_steps(
     most = rig.error.most / tracks.hair_length
     if most > SPRING_ERROR:
         notes += (
-            f"Springs are off by up to {most:.0%} of the hair's length (99% of all vertices): an "
-            "engine moves this hair otherwise than the bake. Allow more spring joints, or choose "
-            "joints.",
+            f"Springs are off by up to {most:.0%} of the hair's length (99% of all vertices): "
+            "engines will move this hair differently from the bake. Allow more spring joints, or "
+            "choose joints.",
         )
     return SpringMotion(tracks, skeleton, notes)
 
@@ -251,11 +253,11 @@ def _head_balls(head: Surface | None, place: str) -> tuple[Balls, tuple[str, ...
     """The balls that springs stay out of, and a note if there are none."""
     nothing = Balls.of(np.empty((0, 3)), np.empty(0))
     if head is None:
-        return nothing, ("Hair without a head has nothing that springs keep out of.",)
+        return nothing, ("This hair has no head, so its springs collide with nothing.",)
     try:
         fit = fit_spheres(head, SphereFitSettings(sphere_count=HEAD_BALLS), place=place)
     except HairloomError as error:
-        return nothing, (f"{error} Until then springs keep out of nothing.",)
+        return nothing, (f"{error} Until then springs collide with nothing.",)
     return Balls.of(fit.centers, fit.radii), ()
 
 

@@ -97,7 +97,7 @@ def _check_replaceable(obj: bpy.types.Object) -> None:
         )
     if obj.data.shape_keys is not None:
         raise HairloomError(
-            "it has shape keys, which would put new cards where the old ones were",
+            "it has shape keys, which would move new cards to the places of the old ones",
             place=obj.name,
             remedy="Apply or delete them (Object Data > Shape Keys > Apply All, Delete All)",
         )

@@ -172,7 +172,7 @@ def _read_strands(
 
 
 def _shades_nothing(error: HairloomError) -> str:
-    return f"It shades nothing: {error}"
+    return f"It occludes nothing: {error}"
 
 
 def _alike(one: tuple[object, ...], other: tuple[object, ...]) -> bool:

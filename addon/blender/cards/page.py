@@ -24,8 +24,8 @@ from .page_head import PageHead
 from .textures import look_tables, png_of
 
 PAGE_AT_REST = (
-    "The web page shows the hair at rest, since it plays no vertex textures and no springs. "
-    "Choose Joints for one that moves."
+    "The web page shows the hair at rest, since it cannot play vertex textures or springs. Choose "
+    "Joints for a page with motion."
 )
 #: Texture -> its title, in the order on the page.
 _TITLES = {
@@ -46,9 +46,9 @@ def check_page(settings: CardExportSettings, file_format: CardFormat, place: str
     """
     if settings.page and file_format != GLB:
         raise HairloomError(
-            f"a web page shows a GLB, and this is {file_format.title}",
+            f"a web page needs a GLB, and this is {file_format.title}",
             place=place,
-            remedy="Write a .glb, or leave Web Page off",
+            remedy="Write a .glb, or turn Web Page off",
         )
 
 

@@ -38,7 +38,7 @@ def chosen_pictures(group: Any) -> tuple[dict[str, Floats], tuple[str, ...]]:
             picture = read_image(image, is_color=name == "base", place=place)
             pictures[name] = picture_as(name, picture, place=place)
         except HairloomError as error:
-            warnings.append(f"{error} Until then the generated {name} texture takes its place.")
+            warnings.append(f"{error} Until then the generated {name} texture is used.")
     return pictures, tuple(warnings)
 
 
@@ -60,7 +60,7 @@ def named_pictures(arguments: list[str]) -> dict[str, Floats]:
         name, _, file = argument.partition("=")
         if name not in TEXTURES or not file:
             raise HairloomError(
-                f"'{argument}' names no texture and file",
+                f"'{argument}' does not name a texture and a file",
                 place="--texture",
                 remedy=f"Write NAME=FILE with one of {', '.join(TEXTURES)}",
             )

@@ -212,7 +212,7 @@ def _mesh_notes(surface: Surface, name: str) -> Iterator[str]:
     edges = edges_of(surface)
     if edges.open_count:
         yield (
-            f"{name}: {_edges(edges.open_count)} with one face alone. Hair collides with it as if "
+            f"{name}: {_edges(edges.open_count)} with only one face. Hair collides with it as if "
             "its holes were closed (Mesh > Clean Up > Fill Holes closes them)."
         )
     if edges.crowded_count:
@@ -222,8 +222,8 @@ def _mesh_notes(surface: Surface, name: str) -> Iterator[str]:
         )
     if edges.opposed_count:
         yield (
-            f"{name}: at {_edges(edges.opposed_count)} faces look to different sides, so hair may "
-            "get into it there. Turn them outwards (Mesh > Normals > Recalculate Outside)."
+            f"{name}: at {_edges(edges.opposed_count)} the faces point to opposite sides, so hair "
+            "may get into it there. Turn them outwards (Mesh > Normals > Recalculate Outside)."
         )
 
 

@@ -197,7 +197,7 @@ class Holding:
         positions = read_positions(obj, depsgraph, place=obj.name)
         if positions.shape != holds.surface.positions.shape:
             raise HairloomError(
-                "its mesh has other vertices now, so it holds no tips",
+                "its mesh now has a different number of vertices, so it holds no tips",
                 place=obj.name,
                 remedy="Press Preview again",
             )

@@ -45,7 +45,7 @@ def _check_saved_with(objects: list[bpy.types.Object]) -> None:
             raise HairloomError(
                 "it is linked from another file, so the saved scene would not play its bake",
                 place=obj.name,
-                remedy=f"{OVERRIDE}, or save no scene and export with --bake FOLDER",
+                remedy=f"{OVERRIDE}, or do not save the scene and export with --bake FOLDER",
             )
 
 
@@ -133,21 +133,22 @@ def _tell(objects: list[bpy.types.Object], report: Report) -> None:
 def _add_options(parser: argparse.ArgumentParser) -> None:
     what = parser.add_argument_group("what to bake")
     add_object_option(
-        what, "hair curves or cloth; can be given again (default: all that are to be simulated)"
+        what,
+        "hair curves or cloth to bake; can be repeated (default: all that are set to be simulated)",
     )
-    add_frames_option(what, "(default: those of the objects, else of the scene)")
+    add_frames_option(what, "frames to bake (default: those of the objects, else of the scene)")
     what.add_argument(
-        "--delete", action="store_true", help="delete their bakes from disk, in place of baking"
+        "--delete", action="store_true", help="delete the bakes from disk instead of baking"
     )
     saving = parser.add_mutually_exclusive_group()
     saving.add_argument(
-        "--save", action="store_true", help="save over the scene, so that it plays what was baked"
+        "--save", action="store_true", help="overwrite the scene file with one that plays the bakes"
     )
     saving.add_argument(
         "--save-as",
         type=Path,
         metavar="FILE.blend",
-        help="save another scene that plays what was baked",
+        help="write a new scene file that plays the bakes",
     )
 
 
@@ -155,7 +156,8 @@ BAKE = Verb(
     "bake",
     bake,
     _add_options,
-    output="folder for the bake, of several objects one below it each (default: their own)",
+    output="folder for the bake; several objects get a subfolder each (default: the objects' own "
+    "folders)",
     writes_folder=True,
     needs_output=False,
     takes_hair=False,

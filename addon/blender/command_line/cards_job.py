@@ -118,7 +118,7 @@ def _moving(job: Job, settings: CardExportSettings) -> tuple[Rig, GuideMotion | 
         return motion.rig, motion
     if options.bake is not None or frames is not None:
         raise HairloomError(
-            "a bake and frames are for cards in motion",
+            "a bake and frames are only used for cards in motion",
             place="--frames" if options.bake is None else "--bake",
             remedy="Add --motion joints, springs or texture",
         )
@@ -130,7 +130,7 @@ def _check_idle_options(job: Job, settings: CardExportSettings) -> None:
     for name in () if settings.page else ("page_texture", "page_head"):
         if getattr(job.options, name) is not None:
             raise HairloomError(
-                "it means nothing here: no web page is written",
+                "it has no effect, because no web page is written",
                 place="--" + name.replace("_", "-"),
                 remedy="Leave it out, or add --page",
             )
@@ -139,7 +139,7 @@ def _check_idle_options(job: Job, settings: CardExportSettings) -> None:
         if getattr(job.options, name) is not None and name not in OF_MOTION[motion]:
             users = [each for each, names in OF_MOTION.items() if name in names]
             raise HairloomError(
-                f"it means nothing with --motion {motion}",
+                f"it has no effect with --motion {motion}",
                 place="--" + name.replace("_", "-"),
                 remedy=f"Leave it out, or add --motion {' or '.join(users)}",
             )
@@ -151,19 +151,19 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
     files.add_argument(
         "--format",
         choices=[each.name for each in FORMATS],
-        help="of the file (default: by its suffix)",
+        help="file format (default: by the suffix of --output)",
     )
     files.add_argument(
-        "--levels", type=int, metavar="N", help="levels of detail (default: those of cards.levels)"
+        "--levels", type=int, metavar="N", help="number of levels of detail (default: cards.levels)"
     )
     files.add_argument(
         "--discard-edits",
         action="store_true",
-        help="leave out what was edited on the cards in the scene",
+        help="ignore edits made to the cards in the scene",
     )
     add_parameter_options(files, CardExportSettings)
     add_bake_option(files)
-    add_frames_option(files, "of the motion (default: all)")
+    add_frames_option(files, "frames of the motion (default: all)")
 
 
 CARDS = Verb(

@@ -142,7 +142,7 @@ def _run(verb: Verb, options: argparse.Namespace, report: Report) -> None:
         if not reason:
             report.facts |= stamp.reported
             report.end("skipped")
-            print(f"Nothing to do: {options.output} is there, of the same inputs and options")
+            print(f"Nothing to do: {options.output} exists, made from the same inputs and options")
             return
         print(f"to be done: {reason}", flush=True)
     verb.flow(_job(verb, options, report))
@@ -206,7 +206,7 @@ def _styled(options: argparse.Namespace, report: Report) -> str:
     """
     if options.groom:
         raise HairloomError(
-            "hair comes from a hairstyle or from a groom, not from both",
+            "give either a hairstyle or a groom, not both",
             place="--style",
             remedy="Leave out --groom",
         )

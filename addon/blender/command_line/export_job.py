@@ -80,7 +80,7 @@ def _check_layout(kind: StrandFormat, settings: StrandExportSettings) -> None:
     except HairloomError as error:
         option = "--" + error.place.replace("_", "-")
         is_choice = error.place == "engine"  # the format has this option, but not this value
-        problem = error.problem if is_choice else f"it is no option of {kind.title}"
+        problem = error.problem if is_choice else f"it is not an option of {kind.title}"
         raise HairloomError(problem, place=option, remedy=error.remedy) from error
 
 
@@ -121,7 +121,7 @@ def _check_baked(plan: StrandExport) -> None:
             raise HairloomError(
                 "it has no bake",
                 place=part.out.groom.name,
-                remedy="Bake it, or leave out --use-bake to write Blender's own animation of it",
+                remedy="Bake it, or omit --use-bake to write the motion of Blender's own animation",
             )
 
 
@@ -133,10 +133,10 @@ def _of_rig(
     if job.options.bake is None:
         if frames is not None:
             raise HairloomError(
-                "of this hair only one frame is read",
+                "only one frame of this hair is read",
                 place="--frames",
-                remedy="Give a bake with --bake, or hair of the scene with --object. "
-                "The verb import brings the motion of a groom's file into a scene",
+                remedy="Give a bake with --bake, or hair of the scene with --object. To bring the "
+                "motion of a groom file into a scene, use the verb import",
             )
         rig, inputs = read_rig(job)
         own = _groom(rig, inputs)
@@ -197,15 +197,16 @@ def _tell_check(facts: dict[str, Any], form: str) -> None:
 
 def add_export_options(parser: argparse.ArgumentParser) -> None:
     """Add the artist's export settings, and options for frames."""
-    add_moment_options(parser, "; of the scene, for --object or all of --scene")
+    add_moment_options(parser, "; for --object, or all hair of --scene, a frame of the scene")
     hair = parser.add_argument_group("hair of the scene")
     add_object_option(
         hair,
-        "hair curves; can be given again, and goes into the same file (default: all of --scene)",
+        "hair curves to export; can be repeated to write several into one file (default: all hair "
+        "of --scene)",
     )
     add_frames_option(
         hair,
-        "write the motion over these frames (Alembic, USD): of the bake of --object, or of --bake",
+        "write the motion in these frames, of --object or of --bake (Alembic and USD only)",
     )
     add_max_frames_option(hair)
     file = parser.add_argument_group("the file")
@@ -219,7 +220,7 @@ def add_export_options(parser: argparse.ArgumentParser) -> None:
         nargs="?",
         const="text",
         choices=("text", "json"),
-        help="say what the engine will see, and write nothing",
+        help="report what the engine will receive, and write nothing",
     )
     add_parameter_options(file, StrandExportSettings)
 

@@ -45,7 +45,7 @@ def grow(job: Job) -> None:
 def _add_options(parser: argparse.ArgumentParser) -> None:
     what = parser.add_argument_group("what to grow")
     what.add_argument("--head", required=True, metavar="NAME", help="mesh that the hair grows from")
-    what.add_argument("--name", help="of the new object (default: after the mesh)")
+    what.add_argument("--name", help="name of the new object (default: named after the mesh)")
     what.add_argument(
         "--fit",
         action="store_true",
@@ -56,19 +56,20 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         "--density-group",
         default="",
         metavar="NAME",
-        help="vertex group or attribute of the mesh: how densely hair grows",
+        help="vertex group or attribute of the mesh with the density of the hair",
     )
     what.add_argument(
         "--length-group",
         default="",
         metavar="NAME",
-        help="the same for how long hair grows, as a fraction of grow.length",
+        help="vertex group or attribute with the length of the hair, as a fraction of grow.length",
     )
     what.add_argument(
         "--children-density",
         default="",
         metavar="NAME",
-        help="the same for how densely children grow (--set children.method=multi)",
+        help="vertex group or attribute with the density of the children (with --set "
+        "children.method=multi)",
     )
 
 

@@ -33,7 +33,7 @@ def import_grooms(job: Job) -> None:
             raise HairloomError(
                 f"strands would be {dropped_phrase(outcome.dropped)}",
                 place=str(path),
-                remedy="Fix the groom, or leave out --strict",
+                remedy="Fix the groom, or omit --strict",
             )
         tell_notes(list(outcome.warnings), report)
         print(
@@ -74,32 +74,32 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
     )
     what.add_argument(
         "--head",
-        help="mesh that the hair is bound to: of the scene, or a file such as head.obj, whose "
-        "meshes become one",
+        help="mesh to bind the hair to: an object of the scene, or a file such as head.obj, whose "
+        "meshes are joined",
     )
     what.add_argument(
-        "--groom-up", choices=("Y", "Z"), help="up in the files (default: as they say)"
+        "--groom-up",
+        choices=("Y", "Z"),
+        help="up axis of the files (default: as stored in each file)",
     )
     what.add_argument(
         "--groom-scale",
         type=float,
         default=1.0,
         metavar="FACTOR",
-        help="what lengths are multiplied by, beside what the files say of their unit",
+        help="factor on all lengths, in addition to the unit stored in each file",
     )
     add_head_scale_option(
-        what, "what the head is multiplied by, about the scene's origin (default: 1)"
+        what, "factor on the size of the head, about the scene's origin (default: 1)"
     )
     what.add_argument(
         "--guides",
         choices=GUIDES,
         default=GUIDES[0],
-        help="guides beside strands: leave them out, apart as hair curves of their own, or among "
-        "the strands (default: leave)",
+        help="how to import guides: leave them out, apart as a separate hair object, or among the "
+        "strands (default: leave)",
     )
-    what.add_argument(
-        "--strict", action="store_true", help="fail when a single strand must be dropped"
-    )
+    what.add_argument("--strict", action="store_true", help="fail if any strand has to be dropped")
 
 
 IMPORT = Verb(

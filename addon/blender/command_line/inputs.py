@@ -167,9 +167,9 @@ def _read_head(name: str | None, sources: Sources) -> tuple[Surface | None, tupl
         head, said = _read_mesh(name, sources)
         if sources.skin != _SKIN and not is_our_bust(head):
             raise HairloomError(
-                "only the built-in head has another skin",
+                "only the built-in head has skin tones",
                 place="--skin",
-                remedy=f"Leave it out: {name} is drawn in its own materials",
+                remedy=f"Omit it: {name} is drawn with its own materials",
             )
         return head, said
     if sources.groom is None:
@@ -215,7 +215,7 @@ def _weights(group: str, head_name: str | None) -> Floats | None:
         raise HairloomError(
             "only a mesh object of the open scene has vertex groups",
             place=group,
-            remedy="Name one with --head OBJECT, or leave the group out",
+            remedy="Name one with --head OBJECT, or omit the group",
         )
     return read_map(head, bpy.context.evaluated_depsgraph_get(), group)
 
@@ -278,7 +278,7 @@ def _size_notes(
 
 def _unknown(source: str, kind: str, example: str) -> HairloomError:
     return HairloomError(
-        f"this names neither a {kind} object of the open scene nor {example}",
+        f"this is neither a {kind} object of the open scene nor {example}",
         place=source,
         remedy="Check the name",
     )

@@ -27,53 +27,64 @@ def add_hair_options(parser: argparse.ArgumentParser) -> None:
     """Add options for the hair that a verb works on, see inputs.Sources."""
     sources = parser.add_argument_group("what to work on (files, or objects of the scene)")
     files = ", ".join(SUFFIXES)
-    sources.add_argument("--groom", help=f"hair curves or a file, {files} (default: grown here)")
+    sources.add_argument(
+        "--groom",
+        help=f"hair curves of the scene, or a groom file ({files}; "
+        "default: hair grown on the head)",
+    )
     sources.add_argument(
         "--style",
         choices=[entry.name for entry in hairstyles()],
         metavar="NAME",
-        help="a hairstyle on the built-in head or on --head, with its own settings: "
+        help="hairstyle with its settings, on the built-in head or on --head: "
         + ", ".join(entry.name for entry in hairstyles()),
     )
-    sources.add_argument("--head", help="mesh that the hair grows from (default: built in)")
-    sources.add_argument("--collider", help="closed mesh that hair stays out of (default: head)")
+    sources.add_argument(
+        "--head", help="mesh that the hair grows from (default: the built-in head)"
+    )
+    sources.add_argument(
+        "--collider", help="closed mesh that the hair collides with (default: the head)"
+    )
     sources.add_argument(
         "--groom-scale",
         type=float,
         default=1.0,
         metavar="FACTOR",
-        help="scale a groom file (default: 1)",
+        help="scale of a groom file (default: 1)",
     )
     sources.add_argument(
-        "--groom-up", choices=("Y", "Z"), help="up in a groom file (default: as the file says)"
+        "--groom-up",
+        choices=("Y", "Z"),
+        help="up axis of a groom file (default: as stored in the file)",
     )
-    add_head_scale_option(sources, "scale the files of head and collider (default: 1)")
+    add_head_scale_option(sources, "scale of the files of head and collider (default: 1)")
     sources.add_argument(
         "--density-group",
         default="",
         metavar="NAME",
-        help="vertex group or attribute of the head: how densely hair grows",
+        help="vertex group or attribute of the head with the density of the hair",
     )
     sources.add_argument(
         "--length-group",
         default="",
         metavar="NAME",
-        help="the same for how long hair grows, as a fraction of grow.length",
+        help="vertex group or attribute with the length of the hair, as a fraction of grow.length",
     )
     sources.add_argument(
         "--children-density",
         default="",
         metavar="NAME",
-        help="the same for how densely children grow (--set children.method=multi)",
+        help="vertex group or attribute with the density of the children (with --set "
+        "children.method=multi)",
     )
     sources.add_argument(
         "--skin",
         choices=tuple(TONES),
         default="light",
-        help="of the built-in head (default: light)",
+        help="skin tone of the built-in head (default: light)",
     )
     sources.add_argument(
-        "--strict", action="store_true", help="fail when a single strand must be dropped"
+        "--strict", action="store_true", help="fail if any strand has to be dropped"
     )
 
 
@@ -83,7 +94,7 @@ def add_head_scale_option(parser: Any, about: str) -> None:
 
 def add_scene_option(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "--scene", metavar="FILE.blend", help="scene to open first (default: the open one)"
+        "--scene", metavar="FILE.blend", help="scene file to open first (default: the open scene)"
     )
 
 
@@ -97,7 +108,7 @@ def add_output_option(
 
 def add_save_option(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "--save", action="store_true", help="save over the scene, in place of --output"
+        "--save", action="store_true", help="overwrite the scene file, instead of giving --output"
     )
 
 
@@ -115,7 +126,7 @@ def add_max_frames_option(parser: Any) -> None:
         "--max-frames",
         type=int,
         metavar="COUNT",
-        help="at most this many frames from FIRST on: a task of a farm",
+        help="write at most this many frames, from FIRST on, as for a task of a render farm",
     )
 
 
@@ -127,9 +138,9 @@ def frames_of_option(given: list[int] | None, max_frames: int | None = None) -> 
     """
     if max_frames is not None and (max_frames < 1 or given is None):
         raise HairloomError(
-            f"{max_frames} frames cannot be used" if given else "there are no frames to take from",
+            f"{max_frames} frames cannot be used" if given else "it needs --frames",
             place="--max-frames",
-            remedy="Give --frames FIRST LAST, and 1 or more",
+            remedy="Give --frames FIRST LAST, and a count of 1 or more",
         )
     if given is None:
         return None
@@ -145,8 +156,8 @@ def add_bake_option(parser: Any) -> None:
         nargs="?",
         const="",
         metavar="FOLDER",
-        help="the motion of a bake: the folder that 'simulate' or 'bake' has written (without a "
-        "folder: of the hair object --groom)",
+        help="use the motion of a bake: a folder written by 'simulate' or 'bake' (without FOLDER: "
+        "the bake of the hair object --groom)",
     )
 
 
@@ -169,10 +180,10 @@ def add_moment_options(parser: argparse.ArgumentParser, beside: str = "") -> Non
 def add_picture_options(parser: argparse.ArgumentParser, width: int, height: int) -> None:
     """Add options for the size of a picture [pixels], its samples and its stage."""
     picture = parser.add_argument_group("the picture")
-    samples = "samples of a pixel along each side, each lit by other points of the lights"
+    samples = "samples per pixel along each side, each lit from different points of the lights"
     for name, default, what in (
-        ("--width", width, "pixels across"),
-        ("--height", height, "pixels down"),
+        ("--width", width, "width in pixels"),
+        ("--height", height, "height in pixels"),
         ("--samples", 2, samples),
     ):
         about = f"{what} (default: {default})"
@@ -180,8 +191,8 @@ def add_picture_options(parser: argparse.ArgumentParser, width: int, height: int
     picture.add_argument(
         "--stage",
         metavar="NAME",
-        help=f"lights, backdrop and film, over presets: {', '.join(_stages())}, or a preset file; "
-        "--set stage.key=6 changes a part (default: studio)",
+        help=f"lights, backdrop and film, overriding presets: {', '.join(_stages())}, or a preset "
+        "file; --set stage.key=6 changes a single setting (default: studio)",
     )
 
 
@@ -198,19 +209,19 @@ def add_motion_options(parser: argparse.ArgumentParser) -> None:
         type=float,
         default=2.0,
         metavar="COUNT",
-        help="length of the head's shake (default: 2)",
+        help="duration of the head shake (default: 2)",
     )
     motion.add_argument(
         "--frame-rate",
         type=float,
         default=60.0,
         metavar="COUNT",
-        help="frames a second (default: 60)",
+        help="frames per second (default: 60)",
     )
     motion.add_argument(
         "--animated",
         action="store_true",
-        help="follow the scene's animation over its frame range, in place of the shake",
+        help="follow the scene's animation over its frame range, instead of the head shake",
     )
 
 
@@ -220,8 +231,8 @@ def add_texture_option(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="NAME=FILE",
-        help="a picture in place of a generated texture of the cards: base, alpha, shift, "
-        "noise or tangent; can be given again",
+        help="picture to use instead of a generated texture of the cards: base, alpha, shift, "
+        "noise or tangent; can be repeated",
     )
 
 
@@ -233,15 +244,15 @@ def add_settings_options(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="NAME",
-        help="a preset such as looks/blond or dynamics/soft, or a preset file; can be given again",
+        help="preset such as looks/blond or dynamics/soft, or a preset file; can be repeated",
     )
     settings.add_argument(
         "--set",
         action="append",
         default=[],
         metavar="SECTION.NAME=VALUE",
-        help="change a parameter, such as dynamics.damping=2 (docs/parameters.md lists them); "
-        "can be given again, and goes over presets",
+        help="set a parameter, such as dynamics.damping=2 (see docs/parameters.md); can be "
+        "repeated, and overrides presets",
     )
 
 
@@ -280,21 +291,21 @@ def add_farm_options(parser: argparse.ArgumentParser, *, can_skip: bool) -> None
     job.add_argument(
         "--report",
         metavar="FILE.json",
-        help="write a JSON report to this file: what was done, or why it could not be",
+        help="write a JSON report to this file: what was done, or why the job failed",
     )
     job.add_argument(
         "--progress",
         choices=STYLES,
         default="lines",
-        help="how progress is reported: to a reader (default), or to a farm that runs Open Job "
+        help="format of progress lines: for people (default), or for farms that run Open Job "
         "Descriptions",
     )
     if can_skip:
         job.add_argument(
             "--skip-existing",
             action="store_true",
-            help="do nothing when the output is there, whole and of the same inputs and options; "
-            "keeps OUTPUT.done.json beside it",
+            help="do nothing if the output exists, complete and made from the same inputs and "
+            "options; keeps OUTPUT.done.json beside it",
         )
 
 

@@ -77,8 +77,8 @@ def read_hair(job: Job) -> Inputs:
     if groom is not None and groom.motion is not None and not takes_motion:
         name = Path(inputs.groom_name).name
         notes.append(
-            f"{name}: it moves, and only its first frame is read. The verb import brings its "
-            "motion into a scene."
+            f"{name}: it moves, and only its first frame is read. To bring its motion into a "
+            "scene, use the verb import."
         )
     tell_notes(notes, report)
     report.facts["dropped"] = inputs.dropped
@@ -183,7 +183,7 @@ def tell_drops(job: Job, dropped: Mapping[str, int], place: str) -> None:
         raise HairloomError(
             f"strands would be dropped: {reasons}",
             place=place,
-            remedy="Fix the groom, or leave out --strict",
+            remedy="Fix the groom, or omit --strict",
         )
     print(f"hairloom: {place}: dropped strands: {reasons}", flush=True)
 
@@ -226,7 +226,7 @@ def motion_of(job: Job, frames: range | None = None) -> BakedGuides:
         hair = job.hair
         if hair is None:
             raise HairloomError(
-                "this is no hair object",
+                "this is not a hair object",
                 place=f"--groom {job.sources.groom or ''}".strip(),
                 remedy="Name the baked hair of the scene with --groom, or a folder with --bake",
             )

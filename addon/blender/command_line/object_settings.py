@@ -36,7 +36,9 @@ def named_objects(
         obj = bpy.context.view_layer.objects.get(name)
         if obj is None or not is_wanted(obj):
             raise HairloomError(
-                f"this does not name {what} of the open scene", place=name, remedy="Check the name"
+                f"this is not {what} of the open scene",
+                place=name,
+                remedy="Check the name",
             )
         found.append(obj)
     return found
@@ -88,7 +90,7 @@ def all_of_scene(
     taken, left_out = without_hidden(found, bpy.context.evaluated_depsgraph_get())
     if left_out and not taken:
         raise HairloomError(
-            f"nothing of this scene can be taken ({'; '.join(left_out)})",
+            f"nothing in this scene can be used ({'; '.join(left_out)})",
             place="--scene",
             remedy=f"Show it in Blender, or name it with {option}",
         )
@@ -116,9 +118,9 @@ def _instances_any(obj: bpy.types.Object, is_wanted: Callable[[bpy.types.Object]
 def _only_instanced(instances: list[bpy.types.Object]) -> HairloomError:
     is_linked = any(obj.instance_collection.library is not None for obj in instances)
     return HairloomError(
-        "its hair or cloth is an instance, and only objects of the scene are taken",
+        "its hair or cloth is an instance, and only objects of the scene can be used",
         place=", ".join(obj.name for obj in instances),
-        remedy=OVERRIDE if is_linked else "Link its collection into the scene in its place",
+        remedy=OVERRIDE if is_linked else "Link its collection into the scene instead",
     )
 
 
@@ -170,9 +172,9 @@ def _check_growth(obj: bpy.types.Object) -> None:
         problem = f"growing again would lose: {', '.join(losses(obj.data))}"
     if problem:
         raise HairloomError(
-            f"the hair does not follow these settings of growth ({problem})",
+            f"the hair cannot be grown with these settings ({problem})",
             place=obj.name,
-            remedy="Leave out --set grow, or press `run grow_again` with it",
+            remedy="Omit --set grow, or use `run grow_again` with it",
         )
 
 
@@ -202,7 +204,7 @@ def _no_settings(objects: list[bpy.types.Object], section: str) -> HairloomError
     return HairloomError(
         f"it has no settings of '{section}'{whose.get(owner, '')}",
         place=names,
-        remedy="Name the hair curves with --object" if owner in whose else "Leave them out",
+        remedy="Name the hair curves with --object" if owner in whose else "Omit them",
     )
 
 

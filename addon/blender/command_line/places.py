@@ -63,7 +63,7 @@ def check_not_read(path: Path, options: argparse.Namespace) -> None:
     is_scene = path.suffix == ".blend" and _is_same(path, getattr(options, "scene", None))
     if not is_scene and any(_is_same(path, each) for each in named_inputs(options)):
         raise HairloomError(
-            "the job reads this and would write over it",
+            "the job reads this file and would overwrite it",
             place=str(path),
             remedy="Give the result another name, or another folder",
         )
@@ -96,7 +96,7 @@ def _check_file(path: Path, name: str, suffix: str, options: argparse.Namespace)
     others = [each for each in _OUTPUTS if each != name and getattr(options, each, None)]
     if any(_is_same(path, getattr(options, each)) for each in others):
         raise HairloomError(
-            "two results would go into this file", place=str(path), remedy=f"Change {option}"
+            "two results would be written to this file", place=str(path), remedy=f"Change {option}"
         )
 
 

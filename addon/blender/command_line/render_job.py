@@ -128,20 +128,20 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
     more.add_argument(
         "--look-from-material",
         action="store_true",
-        help="start from the Principled Hair of the material of --groom, a hair object",
+        help="start from the Principled Hair BSDF in the material of the hair object --groom",
     )
     more.add_argument(
         "--slices",
         metavar="FILE.png",
-        help="write the layers of the lights' shadow maps side by side too",
+        help="also write the layers of the lights' shadow maps, side by side",
     )
     more.add_argument(
         "--skin-shadow",
         metavar="FILE.png",
-        help="write the soft shadow on the head too, laid out as the head's UV map",
+        help="also write the soft shadow on the head, laid out as the head's UV map",
     )
     more.add_argument(
-        "--sheet", metavar="FILE.png", help="write a contact sheet of the bake to this file too"
+        "--sheet", metavar="FILE.png", help="also write a contact sheet of the bake to this file"
     )
 
 

@@ -112,7 +112,7 @@ def _check_nothing_asked(options: argparse.Namespace) -> None:
         raise HairloomError(
             "there is nothing to do",
             place="run",
-            remedy="Name an operator, which `run` alone lists, or give --preset or --set",
+            remedy="Name an operator (`run` alone lists them), or give --preset or --set",
         )
 
 
@@ -251,7 +251,7 @@ def _change_settings(job: Job, assignments: list[str]) -> None:
     chosen = [obj for obj in bpy.context.selected_objects if obj.type in {"CURVES", "MESH"}]
     if not chosen:
         raise HairloomError(
-            "there is nothing whose settings could change",
+            "there is no object whose settings could be changed",
             place="--object",
             remedy="Name hair curves or a mesh of the scene",
         )
@@ -290,29 +290,29 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         "operator",
         nargs="?",
         metavar="OPERATOR",
-        help=f"one of {', '.join(OPERATORS)} (default: change settings alone; without settings, "
+        help=f"one of {', '.join(OPERATORS)} (default: only change settings; without settings, "
         "list the operators and their properties)",
     )
     add_save_option(parser)
     add_object_option(
         parser,
-        "what it works on; can be given again, the last one is active (default: what was "
-        "selected when the scene was saved)",
+        "object to work on; can be repeated, the last one is active (default: the selection saved "
+        "in the scene)",
     )
     parser.add_argument(
         "--preset",
         action="append",
         default=[],
         metavar="NAME",
-        help="a preset such as looks/blond, or a preset file, for the objects; can be given again",
+        help="preset for the objects, such as looks/blond, or a preset file; can be repeated",
     )
     parser.add_argument(
         "--set",
         action="append",
         default=[],
         metavar="NAME=VALUE",
-        help="a property of the operator, such as sphere_count=8, or a setting of the objects, "
-        "such as dynamics.damping=2 (docs/parameters.md lists them); can be given again",
+        help="property of the operator, such as sphere_count=8, or setting of the objects, such "
+        "as dynamics.damping=2 (see docs/parameters.md); can be repeated",
     )
 
 

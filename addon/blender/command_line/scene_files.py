@@ -44,11 +44,11 @@ def open_scene(path: Path) -> None:
         why = str(error).strip().rpartition(": ")[2]
         problem = f"Blender cannot open this file ({why})"
         if "format is not supported" in why:
-            problem = "this is no Blender file"
+            problem = "this is not a Blender file"
         raise HairloomError(
             problem,
             place=str(path),
-            remedy="Give a .blend file that is whole, of this Blender or an older one",
+            remedy="Give an undamaged .blend file of this or an older version of Blender",
         ) from error
 
 
@@ -63,7 +63,7 @@ def check_saving(output: Path | None, *, over: bool) -> None:
     """
     if over == (output is not None):
         raise HairloomError(
-            "it is said twice where it goes" if over else "it is not said where it goes",
+            "both --output and --save are given" if over else "no output is given",
             place="the changed scene",
             remedy="Give --output FILE.blend, or --save to save over the scene",
         )
@@ -73,7 +73,7 @@ def check_saving(output: Path | None, *, over: bool) -> None:
         )
     if output is not None and output.suffix != ".blend":
         raise HairloomError(
-            "a scene's file name ends in .blend", place=str(output), remedy="Add .blend"
+            "the file name of a scene must end in .blend", place=str(output), remedy="Add .blend"
         )
     check_place(Path(bpy.data.filepath) if output is None else output)
 

@@ -48,7 +48,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--benchmark",
         metavar="FILE",
-        help="also measure how fast frames are here, which takes minutes without a GPU, and write "
+        help="also measure frame times on this machine (takes minutes without a GPU), and write "
         "device, driver and milliseconds as JSON",
     )
 

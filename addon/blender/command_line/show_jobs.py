@@ -70,30 +70,30 @@ def _add_turntable_options(parser: argparse.ArgumentParser) -> None:
         type=int,
         default=48,
         metavar="COUNT",
-        help="pictures in a whole turn (default: 48)",
+        help="number of pictures in a full turn (default: 48)",
     )
     turn.add_argument(
         "--frame-rate",
         type=float,
         default=24.0,
         metavar="COUNT",
-        help="of the video, frames a second (default: 24)",
+        help="frames per second of the video (default: 24)",
     )
     turn.add_argument(
         "--lights",
         choices=[name for name, _, _ in LIGHTS],
         default="camera",
-        help="whether lights turn with the camera (default) or stay on the groom",
+        help="whether lights turn with the camera (default) or stay with the groom",
     )
-    turn.add_argument("--transparent", action="store_true", help="without a backdrop")
-    turn.add_argument("--no-video", action="store_true", help="pictures only")
+    turn.add_argument("--transparent", action="store_true", help="render without a backdrop")
+    turn.add_argument("--no-video", action="store_true", help="write pictures only")
 
 
 def _add_sheet_options(parser: argparse.ArgumentParser) -> None:
     add_moment_options(parser)
     add_picture_options(parser, 480, 480)
     parser.add_argument(
-        "--looks", action="store_true", help="in all looks that ship, in place of all sides"
+        "--looks", action="store_true", help="show all shipped looks instead of all sides"
     )
 
 
@@ -109,7 +109,7 @@ SHEET = Verb(
     "sheet",
     sheet,
     _add_sheet_options,
-    output="picture to write (.png); --width and --height are of each picture in it",
+    output="picture to write (.png); --width and --height apply to each picture in it",
     suffix=".png",
     operators=("contact_sheet",),
 )

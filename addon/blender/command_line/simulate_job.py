@@ -140,9 +140,9 @@ def _hair_of_open_scene(job: Job, inputs: Inputs) -> bpy.types.Object:
     """The hair object that --groom names; else a new one on the head, with the strands."""
     if inputs.head_object is None:
         raise HairloomError(
-            "only an object of the scene is animated",
+            "only an object of the scene can be animated",
             place="--animated",
-            remedy="Name the head's object with --head, or leave out --animated",
+            remedy="Name the head's object with --head, or omit --animated",
         )
     head, scene = bpy.data.objects[inputs.head_object], bpy.context.scene
     hair = job.hair

@@ -52,13 +52,13 @@ class Stamp:
         output = getattr(options, "output", None)
         if output is None:
             raise HairloomError(
-                "without an output nobody can tell whether it is there",
+                "it needs an output to look for",
                 place="--skip-existing",
                 remedy="Name it with --output",
             )
         if getattr(options, "save", False):
             raise HairloomError(
-                "saving over the scene changes what the job is made from",
+                "overwriting the scene changes the job's own input",
                 place="--skip-existing",
                 remedy="Save another file: --save-as, or --output",
             )
@@ -84,8 +84,8 @@ class Stamp:
         except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
             return f"{self.path.name} cannot be read"
         if asked != self._asked:
-            return "it is asked for otherwise than before"
-        return f"{changed[0]} is not as it was" if changed else ""
+            return "the options have changed"
+        return f"{changed[0]} has changed" if changed else ""
 
     def write(self, report: Report) -> None:
         """Write the stamp after the job, with all files that were read and written.

@@ -205,8 +205,8 @@ class SceneReader:
         """A groom; None with a warning if it cannot be drawn, or None until it is built."""
         if hair.type != "CURVES":
             warnings.append(
-                f"{hair.name}: hair that modifiers make on an object of another kind is not "
-                "drawn. Use hair curves."
+                f"{hair.name}: hair that modifiers create on other types of objects is not drawn. "
+                "Use hair curves."
             )
             return None
         known, uid = self._grooms.get(key), engine_hair.owner_of(hair).session_uid

@@ -52,8 +52,8 @@ _SHOWN_EVERY = 1.0
 
 
 _UNSEEN = (
-    "Light Shafts: bright things throw none, since the picture of the engine could not be read. "
-    "Turn Stereoscopy off, and render the scene that the hair belongs to."
+    "Light Shafts: bright things cast none, since the engine's picture could not be read. Turn "
+    "Stereoscopy off, and render the scene that the hair belongs to."
 )
 
 

@@ -50,7 +50,7 @@ def _developed(colors: Floats, stage: StageSettings) -> Floats:
         ) from error
     except (OSError, RuntimeError) as error:
         raise HairloomError(
-            "colours cannot be put down in the folder for temporary files",
+            "colours cannot be written to the folder for temporary files",
             place=tempfile.gettempdir(),
             remedy="Free some space there, and check that you may write to it",
         ) from error

@@ -74,7 +74,7 @@ def issues_of(hair: bpy.types.Object, session: Session | None) -> tuple[Issue, .
         text = f"{count} not on {head.name}, and would float"
         found.append(Issue(text, "hairloom.snap_roots", "Snap to Surface"))
     if is_unevenly_scaled(hair):
-        text = "Its object is scaled unevenly, so strands are as wide as the mean of the scales"
+        text = "Its object is scaled unevenly, so strand widths use the mean of the scales"
         found.append(Issue(text, "hairloom.apply_scale", "Apply Scale"))
     if is_copy_gone(hair):
         text = "Renders hide it: the copy that showed its bake was deleted"
@@ -94,7 +94,7 @@ def instances_note(hair: bpy.types.Object) -> str:
         return ""
     looked_at = itertools.islice(layer.depsgraph.object_instances, _MAX_INSTANCES)
     if any(each.is_instance and each.object.original == hair for each in looked_at):
-        return "Instances of it have no hair in the preview; they have it in renders"
+        return "Instances of it have hair in renders, but not in the preview"
     return ""
 
 
@@ -105,7 +105,7 @@ def unfelt_note(session: Session) -> str:
     names = [obj.name for obj in near if previews.session_of(obj) is None]
     if not names:
         return ""
-    return f"{', '.join(names)}: near, but not previewed; Play does not feel it, a bake does"
+    return f"{', '.join(names)}: near, but not previewed; Play ignores it, bakes do not"
 
 
 def _may_instance(obj: bpy.types.Object) -> bool:

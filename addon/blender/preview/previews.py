@@ -462,7 +462,7 @@ def finish(session: Session, depsgraph: bpy.types.Depsgraph) -> None:
         raise HairloomError(
             "it is in another scene, or its collection is hidden",
             place=session.name,
-            remedy="Show these, or select other hair",
+            remedy="Show it, or select other hair",
         )
     while session.is_pending and previews.get(session.uid) is preview:
         take = partial(_take_made, preview, session, depsgraph)

@@ -81,7 +81,7 @@ def own(section: str) -> tuple[tuple[Entry, ...], tuple[str, ...]]:
             preset = _read(path, stat.st_mtime_ns, stat.st_size)
         except (HairloomError, OSError, RecursionError) as error:
             why = error.problem if isinstance(error, HairloomError) else error
-            warnings.append(f"{path.name} is no preset: {why}")
+            warnings.append(f"{path.name} is not a preset: {why}")
             continue
         if preset.settings.section == section:
             title = _as_title(preset.title) or path.stem
@@ -191,14 +191,16 @@ def delete_own(name: str) -> None:
     """
     path = _own_path(name)
     if path is None:
-        raise HairloomError("there is no such preset of your own", place=name, remedy=_KNOWN_OWN)
+        raise HairloomError("you have no preset of this name", place=name, remedy=_KNOWN_OWN)
     previews.forget(path)
     try:
         path.unlink()
         path.with_suffix(".png").unlink(missing_ok=True)
     except OSError as error:
         raise HairloomError(
-            f"it cannot be deleted ({error.strerror})", place=str(path), remedy="Delete it yourself"
+            f"it cannot be deleted ({error.strerror})",
+            place=str(path),
+            remedy="Delete the file yourself",
         ) from error
 
 
@@ -252,7 +254,7 @@ def apply(settings: Settings, hair: bpy.types.Object) -> None:
             return
     kept = [name for name in ALL_SETTINGS if any(hasattr(owner, name) for owner in owners)]
     raise HairloomError(
-        f"a groom keeps no '{settings.section}' settings",
+        f"a groom has no '{settings.section}' settings",
         place="preset",
         remedy=f"Choose a preset of {', '.join(kept)}",
     )

@@ -69,8 +69,8 @@ def unmoved_by(hair: bpy.types.Object) -> list[str]:
     if skin is None or armature is None:
         return []
     return [
-        f"{skin.name}: no bone of {armature.name} moves it, so no .tfxbone was written. Give "
-        "vertex groups the names of their bones."
+        f"{skin.name}: no bone of {armature.name} moves it, so no .tfxbone was written. Name "
+        "vertex groups after their bones."
     ]
 
 

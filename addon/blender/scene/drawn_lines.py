@@ -37,7 +37,7 @@ def pieces_of(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Floats:
     """
     if obj.type not in LINE_TYPES:
         raise HairloomError(
-            f"it is a {obj.type.lower()} object, which is no line on a surface",
+            f"it is a {obj.type.lower()} object, not a line on a surface",
             place=obj.name,
             remedy="Draw a curve on the surface (Add > Curve > Bezier, then the Draw tool)",
         )
@@ -45,7 +45,7 @@ def pieces_of(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Floats:
     with as_mesh(obj, depsgraph) as mesh:
         if mesh is not None and len(mesh.polygons):
             raise HairloomError(
-                "it has faces, so it is no line",
+                "it has faces, so it is not a line",
                 place=obj.name,
                 remedy="Set its bevel and extrusion to 0, or delete its faces and keep the line",
             )
@@ -61,7 +61,7 @@ def pieces_of(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Floats:
     pieces = pieces[(pieces[:, 0] != pieces[:, 1]).any(axis=1)]
     if not len(pieces):
         raise HairloomError(
-            "it has no length, so no hair goes by it",
+            "it has no length, so it cannot guide hair",
             place=obj.name,
             remedy="Draw a line of two points or more",
         )
@@ -138,7 +138,7 @@ def new_line(hair: bpy.types.Object, name: str, context: bpy.types.Context) -> b
             points.append(place)
     if len(points) < 2:
         raise HairloomError(
-            "nothing of its surface is below its middle line, so no line can be drawn there",
+            "its surface has no faces below the middle line, so no line can be placed there",
             place=head.name,
             remedy="Draw a curve on the surface, and select it beside the hair",
         )

@@ -121,8 +121,8 @@ def read_carried(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Float
         )
     if not np.array_equal(order[:count], np.arange(count)):
         raise HairloomError(
-            f"a modifier below {NAME} gives the vertices another order"
-            f"{_suspects(obj, above=False)}",
+            f"a modifier below {NAME} changes the order of the "
+            f"vertices{_suspects(obj, above=False)}",
             place=obj.name,
             remedy="Turn it off while simulating, or apply it",
         )

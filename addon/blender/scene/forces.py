@@ -33,10 +33,10 @@ _KINDS = {
 _EXCLUDED = {
     "BOID": "only boids feel it",
     "CHARGE": "hair has no charge",
-    "GUIDE": "it leads particles along a curve, and is no force",
-    "LENNARDJ": "it acts between particles that have a size",
-    "TEXTURE": "a texture cannot be asked at every point of the hair",
-    "FLUID_FLOW": "a fluid cannot be asked at every point of the hair",
+    "GUIDE": "it guides particles along a curve, and is not a force",
+    "LENNARDJ": "it acts only between particles with a size",
+    "TEXTURE": "a texture cannot be evaluated at each point of the hair",
+    "FLUID_FLOW": "a fluid cannot be evaluated at each point of the hair",
 }
 _SHAPES = {"POINT": "point", "LINE": "line", "PLANE": "plane", "POINTS": "points"}
 #: Most vertices of a mesh with the shape Every Point.
@@ -77,9 +77,7 @@ def force_fields_of(
         elif field.apply_to_location:
             found += _read(obj, field, depsgraph.scene.frame_current)
             if abs(field.strength) > _STRONGEST:
-                notes.append(
-                    f"{obj.name}: its strength is more than hair can follow. Lower Strength."
-                )
+                notes.append(f"{obj.name}: it is too strong for hair to follow. Lower Strength.")
     if not found:
         return NO_FIELDS, tuple(notes)
     is_turbulent = any(one.kind == "turbulence" for one in found)

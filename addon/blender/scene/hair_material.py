@@ -165,7 +165,7 @@ def _write(
         is_changed = shading.tip_tint > 0.0 or shading.grey_fraction > 0.0
         if is_changed and not are_final:
             notes += (
-                "Tip Tint and Grey Strands are left out where strands have colours of their own",
+                "Tip Tint and Grey Strands are left out for strands with colours of their own",
             )
     elif _differs(shading, hair):
         node.parametrization = "ABSORPTION"

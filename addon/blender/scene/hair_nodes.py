@@ -70,9 +70,9 @@ def _from_library(nodes: str) -> bpy.types.NodeTree:
     path = library_path()
     if not path.is_file():
         raise HairloomError(
-            f"this Blender came without its hair nodes, so there is no '{nodes}'",
+            f"this Blender was built without its hair nodes, so '{nodes}' is missing",
             place=str(path),
-            remedy="Install Blender from blender.org, which brings them",
+            remedy="Install Blender from blender.org, which includes them",
         )
     with bpy.data.libraries.load(str(path), link=False) as (there, wanted):
         wanted.node_groups = [nodes] if nodes in there.node_groups else []

@@ -73,7 +73,7 @@ class KeptShape:
         kept = read_attribute(curves, self.attribute, "POINT", 3)
         if kept is None:
             raise HairloomError(
-                "there is no shape to go back to",
+                "there is no earlier shape to restore",
                 place=hair.name,
                 remedy=f"Press {self.tool} first",
             )

@@ -123,7 +123,7 @@ class Canvas:
             known = self.good.get(name)
             if known is None or not self._fits(known):
                 return None, str(error)
-            return known, f"{error} Until then it is used as it was last"
+            return known, f"{error} Until then its last state is used"
         self.good[name] = mask
         return mask, ""
 
@@ -170,10 +170,10 @@ class Canvas:
                 corners = at_corners(mesh, *weights_on(surface, mesh, name))
         if len(corners) != len(head.triangles):
             raise HairloomError(
-                f"the mask '{name}' lies on {len(corners):,} triangles, the hair was made on "
+                f"the mask '{name}' covers {len(corners):,} triangles, but the hair was made on "
                 f"{len(head.triangles):,}, so it is not used",
                 place=surface.name,
-                remedy="Turn modifiers on that change the mesh before the hair is shown",
+                remedy="Turn on the modifiers that change the mesh, then show the hair",
             )
         if np.linalg.det(np.array(evaluated.matrix_world)) < 0.0:
             corners = corners[:, ::-1]  # as triangles are, see `Surface.transformed`
@@ -227,7 +227,7 @@ class Canvas:
         is_known = self.kept.max(initial=-1) < len(counts)
         if not (is_known and np.array_equal(counts[self.kept], strands.point_counts)):
             raise HairloomError(
-                f"the mask '{name}' lies on other curves than those that are shown",
+                f"the mask '{name}' belongs to other curves than those shown",
                 place=self.hair.name,
                 remedy="Wait until the hair is made again",
             )
@@ -314,7 +314,7 @@ def usable_image(
         )
     if image.source == "TILED" and len(image.tiles) > 1:
         raise HairloomError(
-            f"the image '{name}' has several tiles, and hair has one for all of its surface",
+            f"the image '{name}' has several tiles, but hair uses one for its whole surface",
             place=place,
             remedy=f"Use an image of one tile, or paint {instead}",
         )

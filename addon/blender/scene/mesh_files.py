@@ -69,7 +69,12 @@ def import_mesh_file(path: Path, scale: float = 1.0) -> tuple[bpy.types.Object, 
     notes: tuple[str, ...] = ()
     if len(meshes) > 1:
         _join(mesh, meshes)
-        notes = (f"{path.name}: its {len(names)} meshes ({', '.join(names)}) are one, {mesh.name}",)
+        notes = (
+            (
+                f"{path.name}: its {len(names)} meshes ({', '.join(names)}) were joined into "
+                f"{mesh.name}"
+            ),
+        )
     if scale != 1.0:
         scale_object(mesh, scale)
     return mesh, notes

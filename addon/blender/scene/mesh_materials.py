@@ -175,7 +175,7 @@ class _Reader:
         try:
             picture = read_image(image, is_color=is_color, place=f"Image '{image.name}'")
         except HairloomError as error:
-            self.notes.append(f"{self._name}: {error} Until then a plain value takes its place.")
+            self.notes.append(f"{self._name}: {error} Until then a plain value is used.")
             return None
         if kind == "opaque":
             picture[..., 3] = 1.0
@@ -186,8 +186,8 @@ class _Reader:
 
     def _leave_out(self, what: str, known: str) -> None:
         self.notes.append(
-            f"{self._name}: {what} comes from nodes that are not read; its own value was taken. "
-            f"Read are values, and {known}."
+            f"{self._name}: {what} comes from unsupported nodes, so its own value was used. "
+            f"Supported are values, and {known}."
         )
 
 

@@ -55,9 +55,10 @@ def take_out(
     obj = None if collection is None else collection.objects.get(name)
     if obj is None or not takes_objects(collection):
         raise HairloomError(
-            f"it is not in a collection of {kind.lower()} of this file itself",
+            f"it is not in a local collection of {kind.lower()}",
             place=name or hair.name,
-            remedy="Name one of its objects, or take it out of the collection that it is in",
+            remedy="Name an object of that collection, or remove it from the collection that it "
+            "is in",
         )
     if len(obj.users_collection) == 1:
         scene.collection.objects.link(obj)

@@ -46,7 +46,7 @@ def read_colors(
     try:
         found = painted_colors(head_of(hair), name, depsgraph, triangle_count, place=hair.name)
     except HairloomError as error:
-        return None, (f"{error}. Until then it has the look's colour",)
+        return None, (f"{error}. Until then the look's colour is used",)
     return found, ()
 
 
@@ -69,7 +69,7 @@ def painted_colors(
     """
     if surface is None or triangle_count is None:
         raise HairloomError(
-            f"the colour map '{name}' lies on a surface, and it has none",
+            f"the colour map '{name}' needs a surface, and it has none",
             place=place,
             remedy="Set Surface in its Data properties, or clear Colour Map",
         )
@@ -81,10 +81,10 @@ def painted_colors(
         raise _missing(surface, name)
     if there != triangle_count:
         raise HairloomError(
-            f"the colour map '{name}' lies on {there:,} triangles, the hair was made on "
+            f"the colour map '{name}' covers {there:,} triangles, but the hair was made on "
             f"{triangle_count:,}",
             place=surface.name,
-            remedy="Turn modifiers on that change the mesh before the hair is shown",
+            remedy="Turn on the modifiers that change the mesh, then show the hair",
         )
     if np.linalg.det(np.array(surface.evaluated_get(depsgraph).matrix_world)) < 0.0:
         return found.mirrored()  # as triangles are, see `Surface.transformed`
@@ -151,7 +151,7 @@ def _meaning(image: bpy.types.Image, place: str) -> Callable[[Floats], Floats]:
         return partial(_whole, has_opacity=has_opacity)
     if space != "sRGB" and space not in _LINEAR:
         raise HairloomError(
-            f"the image '{image.name}' is in the colour space '{space}', which hair does not know",
+            f"the image '{image.name}' is in the colour space '{space}', which is not supported",
             place=place,
             remedy="Set its Color Space to sRGB (Image Editor > Sidebar > Image)",
         )

@@ -34,7 +34,7 @@ def read_pose(
     if len(positions) != vertex_count:
         raise HairloomError(
             f"its mesh now has {len(positions):,} vertices instead of {vertex_count or 0:,}, so "
-            "the hair has lost its hold",
+            "the hair is no longer attached",
             place=obj.name,
             remedy="Press Preview again",
         )

@@ -62,7 +62,9 @@ def look_from_material(
     values, notes = _values(node)
     settings, more = settings_from(PrincipledHair(**values), before)
     if len({slot.material for slot in hair.material_slots} - {None}) > 1:
-        more += (f"of several materials it has the look of the active one, {material.name}",)
+        more += (
+            f"it has several materials; the look was taken from the active one, {material.name}",
+        )
     return settings, (*notes, *more)
 
 
@@ -77,7 +79,7 @@ def look_from_named(name: str | None, before: Settings) -> tuple[ShadingSettings
         raise HairloomError(
             "there is no hair object of this name",
             place=f"--groom {name or ''}",
-            remedy="Open a scene and name its hair curves by --groom",
+            remedy="Open a scene and name its hair curves with --groom",
         )
     assert isinstance(before, ShadingSettings)
     return look_from_material(hair, bpy.context.evaluated_depsgraph_get(), before)
@@ -126,7 +128,7 @@ def _values(node: bpy.types.Node) -> tuple[dict[str, Any], tuple[str, ...]]:
         value = _constant(socket)
         if value is None:
             value = socket.default_value
-            notes.append(f"{socket.name} comes from other nodes: its own value was taken")
+            notes.append(f"{socket.name} comes from other nodes, so its own value was used")
         is_color = socket.type in ("RGBA", "VECTOR")
         values[INPUTS[socket.name]] = tuple(value)[:3] if is_color else float(value)
     return values, tuple(notes)

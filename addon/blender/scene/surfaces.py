@@ -74,7 +74,7 @@ def read_surface(
             raise HairloomError(
                 "this mesh has no UVs, so hair cannot be placed on its texture",
                 place=place,
-                remedy="Unwrap it (Edit Mode, UV > Unwrap), or leave out --strict",
+                remedy="Unwrap it (Edit Mode, UV > Unwrap), or omit --strict",
             )
         surface = Surface(_positions(mesh), triangles, corner_uv)
     return _read.kept(surface.transformed(np.array(obj.evaluated_get(depsgraph).matrix_world)))
@@ -138,8 +138,9 @@ def uv_map_note(obj: bpy.types.Object) -> str:
     if len(maps) < 2:
         return ""
     return (
-        f"{obj.name}: of its {len(maps)} UV maps hair and its shadow take the active one, "
-        f"'{maps.active.name}'. Make another one active (Data > UV Maps) if that is not the skin's."
+        f"{obj.name}: it has {len(maps)} UV maps, and hair and its shadow use the active one, "
+        f"'{maps.active.name}'. Make another one active (Data > UV Maps) if that is not the "
+        "skin's."
     )
 
 

@@ -87,7 +87,7 @@ def _plane_of(empty: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Plane:
     size = float(np.linalg.norm(normal))
     if not (np.isfinite(matrix).all() and size > 0.0):
         raise HairloomError(
-            "it has no size, so its plane faces nowhere",
+            "it has no size, so its plane has no direction",
             place=empty.name,
             remedy="Set its scale to 1 (Object > Clear > Scale)",
         )

@@ -344,12 +344,12 @@ def _rendered(folder: Path, name: str, plain: tuple[float, float, float]) -> _Re
         if done.returncode == 0:
             return _Read(environment_of(_rgb(read_texture(panorama, is_color=True))))
         lines = done.stderr.decode(errors="replace").strip().splitlines()
-        why = lines[-1] if lines else f"it ended with {done.returncode}"
+        why = lines[-1] if lines else f"it exited with code {done.returncode}"
     except (OSError, TimeoutExpired, HairloomError) as error:
         why = str(error)
     note = (
         f"World '{name}': another Blender could not render its nodes ({why}), so its plain colour "
-        "lights hair. Use an Environment Texture, a Mapping and a Background alone."
+        "lights hair. Use only an Environment Texture, a Mapping and a Background."
     )
     return _Read(Environment(plain), note)
 

@@ -61,7 +61,7 @@ def carried_motion(rig: Rig, motion: Motion, pose: Pose, guides: Floats) -> Moti
     wanted = rig.guide_grid.shape
     if guides.shape != wanted:
         raise HairloomError(
-            f"it holds guides of shape {guides.shape}, this groom has {wanted}",
+            f"it holds guides of shape {guides.shape}, but this groom has {wanted}",
             place="bake",
             remedy="Bake again",
         )

@@ -40,7 +40,7 @@ def surface_to_comb_on(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -
     head = head_of(hair)
     if head is None:
         raise HairloomError(
-            "it has no surface, which it is combed by",
+            "it has no surface to comb it along",
             place=hair.name,
             remedy="Set Surface in its Data properties",
         )

@@ -178,7 +178,8 @@ class FinSession:
         obj, position = self._found(), np.asarray(frame["position"], np.float32)
         if position.shape != (len(obj.data.vertices), 3):
             raise HairloomError(
-                f"its bake has {len(position):,} vertices, the mesh {len(obj.data.vertices):,}",
+                f"its bake has {len(position):,} vertices, but the mesh has "
+                f"{len(obj.data.vertices):,}",
                 place=self.name,
                 remedy="Bake again",
             )
@@ -221,7 +222,7 @@ class FinSession:
         check_usable(obj, self.body.handle)
         if self.state is not None and not np.array_equal(corners_of(obj.data), self._corners):
             raise HairloomError(
-                "its faces or vertices are others than before, so the cloth has lost them",
+                "its faces or vertices have changed, so the cloth cannot go on",
                 place=obj.name,
                 remedy="Play again",
             )

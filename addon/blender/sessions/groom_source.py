@@ -465,9 +465,9 @@ def _misfit(name: str, now: StrandSet, known: StrandSet, depsgraph: bpy.types.De
         f" {known.strand_count:,} with {known.point_count:,}"
     )
     return (
-        f"{name}: in frame {depsgraph.scene.frame_current} it has {counts}, so its style stays that"
-        " of the last frame that fits. Let modifiers and caches keep the number of curves and"
-        " points, or turn Animated Style off"
+        f"{name}: in frame {depsgraph.scene.frame_current} it has {counts}, so its style stays "
+        "that of the last frame that matches. Keep the number of curves and points constant in "
+        "modifiers and caches, or turn Animated Style off"
     )
 
 

@@ -77,7 +77,7 @@ def mirror_hair(
     middle = int((side == 0).sum())
     result = f"{hair.name}: {len(source):,} curves mirrored, {len(replaced):,} replaced"
     if middle:
-        result += f", {middle:,} in the middle left as they are"
+        result += f", {middle:,} in the middle left unchanged"
     return Outcome(result, own.dropped)
 
 

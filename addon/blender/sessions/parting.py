@@ -34,5 +34,5 @@ def comb_parting(
     done = yield from comb(
         hair, surface, depsgraph, lambda bound: combed_away(bound, partings, surface, settings)
     )
-    result = f"{hair.name}: {done.changed:,} of {done.all:,} curves lean from its partings"
+    result = f"{hair.name}: {done.changed:,} of {done.all:,} curves lean away from its partings"
     return Outcome(result, done.dropped, unusable)

@@ -729,7 +729,7 @@ class Session:
         baked = BakedRig(self.groom.rig, self._source.rests)
         if not baked.fits(frame):
             raise HairloomError(
-                "its bake is of another groom, or of other guides",
+                "its bake belongs to another groom, or to other guides",
                 place=self.name,
                 remedy="Bake again, or delete the bake",
             )

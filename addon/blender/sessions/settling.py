@@ -104,7 +104,7 @@ def _stored(
     lost = int((~is_out).sum())
     if lost:
         are = "1 curve is" if lost == 1 else f"{lost:,} curves are"
-        warnings += (f"{hair.name}: {are} still in the surface. Comb out what is there.",)
+        warnings += (f"{hair.name}: {are} still in the surface. Comb the curves there outwards.",)
     tips = own.strands.offsets[1:] - 1
     moved_by = np.linalg.norm(settled.points[tips] - own.strands.points[tips], axis=1)
     result = (

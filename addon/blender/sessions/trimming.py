@@ -28,7 +28,7 @@ def trim_to_shapes(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Pa
     if not shapes:
         reason = " ".join(unusable)
         raise HairloomError(
-            f"it has nothing to be trimmed to{f' ({reason})' if reason else ''}",
+            f"it has no trim shape{f' ({reason})' if reason else ''}",
             place=hair.name,
             remedy="Select a closed mesh, a flat one or an Empty beside the hair",
         )
@@ -40,7 +40,7 @@ def trim_to_shapes(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Pa
     BEFORE_TRIM.seal(hair)
     trimmed_count = int(cut.is_trimmed.sum())
     left, outside = len(cut.is_trimmed) - trimmed_count, int(cut.is_outside.sum())
-    result = f"{hair.name}: {trimmed_count:,} curves trimmed, {left:,} left as they are"
+    result = f"{hair.name}: {trimmed_count:,} curves trimmed, {left:,} left unchanged"
     if outside:
         result += f", {outside:,} of them with roots outside"
     return Outcome(result, own.dropped, unusable)

@@ -167,9 +167,9 @@ def read_foreign_head(head: bpy.types.Object, depsgraph: bpy.types.Depsgraph) ->
         return ReadHead(head.name, surface, built_in, own_positions(head, depsgraph), {})
     if not may_be_head(head):
         raise HairloomError(
-            f"a mesh of {len(head.data.vertices)} vertices is no head",
+            f"a mesh of {len(head.data.vertices)} vertices is not a head",
             place=head.name,
-            remedy="Select a head, or nothing to add one; fur and Add Hair take any mesh",
+            remedy="Select a head, or nothing to add one; fur and Add Hair accept any mesh",
         )
     there = landmarks_of(head)
     guessed = [name for name, empty in there.items() if _is_as_guessed(empty)]

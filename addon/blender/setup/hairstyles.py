@@ -357,8 +357,8 @@ def _on_foreign(
         lost = len(guides.group) - strands.strand_count
         if lost > _NOTED_LOSS * len(guides.group):
             warnings.append(
-                f"{name}: {lost:,} of {len(guides.group):,} guides were left out, since the mesh "
-                "or its vertex group has no place for them"
+                f"{name}: {lost:,} of {len(guides.group):,} guides were left out, since they have "
+                "no place on the mesh or its vertex group"
             )
         size = foreign.scale
         factor = size if not 1.0 / REAL <= size <= REAL else 1.0
@@ -397,8 +397,8 @@ def _leave_out_inside(hair: bpy.types.Object, growth: _Growth) -> tuple[str, ...
     made = read_curves(hair, bpy.context.evaluated_depsgraph_get())
     if made.dropped or made.strands.strand_count != len(hair.data.curves):
         return (
-            f"{hair.name}: its modifiers change how many curves there are, so that curves which "
-            "they bring into the head could not be left out. Turn those off and press Fit Again",
+            f"{hair.name}: its modifiers change the number of curves, so curves that they push "
+            "into the head could not be left out. Turn those modifiers off and press Fit Again",
         )
     inside = np.flatnonzero(are_inside(made.strands, growth.solid, _DEEP * growth.size))
     if 0 < len(inside) < made.strands.strand_count:

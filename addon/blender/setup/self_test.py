@@ -128,7 +128,7 @@ def _atomics() -> Check:
     name, problem = "Image atomics", capabilities().atomics_problem
     if problem:
         return Check(name, "absent", f"{problem}; strands are drawn as Hashed")
-    return Check(name, "passed", "as many as there should be")
+    return Check(name, "passed", "all fragments were counted")
 
 
 def _looks() -> dict[str, tuple[ShadingSettings, VolumeSettings]]:
@@ -195,7 +195,7 @@ def _files() -> str:
             raise RuntimeError("the picture that was written is empty")
     apart = float(np.abs(read.points - strands.points).max())
     if apart > 1.0e-5:
-        raise RuntimeError(f"a groom came back {apart:.2g} m off")
+        raise RuntimeError(f"a groom was read back {apart:.2g} m off")
     return "a groom and a picture written, the groom read again"
 
 

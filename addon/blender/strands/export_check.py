@@ -127,7 +127,7 @@ class ExportCheck:
         try:
             cache = playback.cache_if_baked(hair) if use_bake else None
             if cache is None:
-                return ("no bake, " if use_bake else "") + "as modifiers and animation move it"
+                return ("no bake, " if use_bake else "") + "moved by modifiers and animation"
         except HairloomError as error:
             return error.problem
         facts = cache.facts

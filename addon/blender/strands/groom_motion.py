@@ -145,8 +145,8 @@ def moving_hair(
     notes: tuple[str, ...] = ()
     if use_bake:
         notes = (
-            f"{hair.name}: it has no bake, so it moves as Blender's own animation and modifiers "
-            "move it. Bake it to write Hairloom's motion.",
+            f"{hair.name}: it has no bake, so the motion of Blender's own animation and modifiers "
+            "is written. Bake it to write Hairloom's motion.",
         )
     return moving, notes
 
@@ -164,7 +164,7 @@ def common_rate(parts: Sequence[Moving]) -> float:
         raise HairloomError(
             f"this hair has different frame rates, {listed}",
             place=names,
-            remedy="Bake all of it at the scene's rate, or write a file each",
+            remedy="Bake all of it at the scene's rate, or write a separate file for each",
         )
     return rates.pop()
 
@@ -227,7 +227,7 @@ def _children_motion(
 
 def _other_curves(handle: Handle, frame: int) -> HairloomError:
     return HairloomError(
-        f"in frame {frame} it has other curves than before, and a file holds the same in all",
+        f"in frame {frame} its curves have changed, and a file needs the same curves in all frames",
         place=handle.name,
         remedy="Turn off the modifier that adds or removes curves, or write fewer frames",
     )

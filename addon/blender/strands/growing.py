@@ -96,8 +96,8 @@ def _grown_again(hair: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Part
     for obj in (head, hair):
         if not _is_evaluated(obj, depsgraph):
             raise HairloomError(
-                "it is disabled in viewports or excluded from the view layer, so that nothing says "
-                "where it is now",
+                "it is disabled in viewports or excluded from the view layer, so its current "
+                "position is unknown",
                 place=obj.name,
                 remedy="Enable it in the Outliner, then press Grow Again",
             )

@@ -227,8 +227,8 @@ def _bones(
     if without and bones:
         names = ", ".join(without)
         return None, (
-            f"{names}: no bone moves its head, so no .tfxbone was written. Write it to a file of "
-            "its own.",
+            f"{names}: no bone moves its head, so no .tfxbone was written. Write it to a separate "
+            "file.",
         )
     return (joined_bones(bones) if bones else None), tuple(notes)
 
@@ -237,8 +237,8 @@ def _loose(hair: bpy.types.Object, bones: BoneWeights) -> list[str]:
     if not bones.loose_count:
         return []
     return [
-        f"{hair.name}: no bone moves the roots of {bones.loose_count} strands, which go with "
-        f"{bones.names[0]}. Weight the head there, and give vertex groups the names of their bones."
+        f"{hair.name}: no bone moves the roots of {bones.loose_count} strands, so they follow "
+        f"{bones.names[0]}. Weight the head there, and name vertex groups after their bones."
     ]
 
 

@@ -154,7 +154,7 @@ def _make_wanted() -> None:
         except Exception as error:
             traceback.print_exc()
             _known.failed[view] = (
-                f"View transform {view.transform} cannot be read ({error}), hair is shown by "
+                f"View transform {view.transform} cannot be read ({error}), so hair is shown with "
                 "Standard. Stop the preview and start it again."
             )
         del _known.wanted[view]
