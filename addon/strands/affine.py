@@ -1,4 +1,4 @@
-"""Moving many points by one matrix."""
+"""Affine motions of many points."""
 
 from __future__ import annotations
 
@@ -6,15 +6,15 @@ import numpy as np
 
 from ..arrays import Floats
 
-_BLOCK = 8192  # points that are moved at once, so that they stay in the cache
+_BLOCK = 8192  # points moved at once, so that they stay in the cache
 
 
 def moved(points: Floats, matrix: Floats) -> Floats:
-    """Points (n, 3) moved by an affine (4, 4) matrix, float32; the same array for no motion.
+    """Points (n, 3) moved by an affine (4, 4) matrix, float32; the same array for the identity.
 
-    Not by `@`: BLAS spreads so thin a product over threads that wait for each other, and takes
-    anything from 2 to 300 ms for 1.6 million points on a busy machine; this takes 13. Points that
-    are not finite stay so.
+    Does not use `@`: BLAS splits such a thin product over threads that wait for each other, and
+    takes anything from 2 to 300 ms for 1.6 million points on a busy machine; this takes 13 ms.
+    Points that are not finite stay so.
     """
     if np.array_equal(matrix, np.eye(4)):
         return points
@@ -32,12 +32,12 @@ def moved(points: Floats, matrix: Floats) -> Floats:
 
 
 def mean_scale(matrix: Floats) -> float:
-    """How much longer things get on average: the cube root of the change of volume."""
+    """The mean scale of an affine matrix: the cube root of its change of volume."""
     return float(abs(np.linalg.det(np.asarray(matrix, np.float64)[:3, :3])) ** (1.0 / 3.0))
 
 
 def turned_about(middle: Floats, angle: float) -> Floats:
-    """A turn by an angle [rad] about the vertical through a point (3,), (4, 4)."""
+    """The (4, 4) rotation by an angle [rad] about the vertical axis through a point (3,)."""
     cosine, sine = np.cos(angle), np.sin(angle)
     turn = np.eye(4)
     turn[:2, :2] = [[cosine, -sine], [sine, cosine]]

@@ -1,4 +1,4 @@
-"""Lengths along strands of any point counts, point by point."""
+"""Arc lengths along strands, point by point; point counts may differ."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ import numpy as np
 
 from ..arrays import Floats, Ints
 
-#: Points that lie nearer than this to where evenly spaced ones are count as such, in lengths.
+#: Points off by less than this fraction of the strand's length count as evenly spaced.
 _EVEN = 0.02
-#: Points looked at at once: they stay in the cache.
+#: Points processed at once, so that they stay in the cache.
 _AT_ONCE = 16_384
-#: Parts of a power of two by which a typical length counts.
+#: `typical` rounds the mantissa of the median to multiples of 1 / _TYPICAL.
 _TYPICAL = 512
 
 
@@ -18,12 +18,12 @@ def steps(points: Floats, offsets: Ints) -> Floats:
     """The length of the segment that ends at each point, (point_count,) float64 [m]; 0 at roots.
 
     Args:
-        points: (point_count, 3) [m], strand after strand, root first.
+        points: (point_count, 3) [m], strand by strand, root first.
         offsets: (strand_count + 1,), strand s is points[offsets[s]:offsets[s + 1]].
     """
     length = np.zeros(len(points))
     for first in range(0, len(points) - 1, _AT_ONCE):
-        # by axes, as numpy is slow at rows of three
+        # one row per axis: numpy is slow on rows of three
         rows = np.ascontiguousarray(points[first : first + _AT_ONCE + 1].T, np.float64)
         step = rows[:, 1:] - rows[:, :-1]
         step *= step
@@ -36,7 +36,7 @@ def steps(points: Floats, offsets: Ints) -> Floats:
 
 
 def lengths(points: Floats, offsets: Ints) -> Floats:
-    """Arc length of each strand, (strand_count,) float32 [m]; arguments as of `steps`."""
+    """Arc length of each strand, (strand_count,) float32 [m]; arguments as for `steps`."""
     if len(offsets) < 2:
         return np.zeros(0, np.float32)
     total: Floats = np.add.reduceat(steps(points, offsets), offsets[:-1])
@@ -44,15 +44,19 @@ def lengths(points: Floats, offsets: Ints) -> Floats:
 
 
 def typical(length: Floats) -> float:
-    """The median of lengths (n,) by its first binary digits: a brush that touches some strands does
-    not change what is measured by it everywhere else."""
+    """The median of lengths (n,), rounded to its first binary digits.
+
+    Rounded so that combing a few strands does not change the unit that all others are measured in.
+    """
     mantissa, exponent = np.frexp(np.median(length))
     return float(np.ldexp(np.round(mantissa * _TYPICAL), exponent)) / _TYPICAL
 
 
 def reached(points: Floats, offsets: Ints) -> Floats:
-    """The distance from the root along its strand at each point, (point_count,) float64 [m]; that
-    of one strand does not depend on others, nor by rounding. Arguments as of `steps`.
+    """The distance of each point from its root, along the strand, (point_count,) float64 [m].
+
+    The values of a strand do not depend on other strands, not even by rounding. Arguments as for
+    `steps`.
     """
     length, counts = steps(points, offsets), np.diff(offsets)
     if len(counts) and (counts == counts[0]).all():
@@ -64,14 +68,15 @@ def reached(points: Floats, offsets: Ints) -> Floats:
 
 
 def along(points: Floats, offsets: Ints) -> Floats:
-    """The fraction of its strand's length at which each point lies, (point_count,) float64; by the
-    points' numbers where a strand has no length. Arguments as of `steps`.
+    """The fraction of its strand's length at which each point lies, (point_count,) float64.
+
+    Where a strand has no length, its points are spaced evenly. Arguments as for `steps`.
     """
     return along_of(reached(points, offsets), offsets)
 
 
 def along_of(length: Floats, offsets: Ints) -> Floats:
-    """`along` of what was `reached`."""
+    """`along`, computed from the result of `reached`."""
     whole = np.repeat(length[offsets[1:] - 1], np.diff(offsets))
     fraction = np.divide(length, whole, out=even(offsets), where=whole > 0.0)
     fraction[offsets[1:] - 1] = 1.0
@@ -79,7 +84,7 @@ def along_of(length: Floats, offsets: Ints) -> Floats:
 
 
 def uneven_along(points: Floats, offsets: Ints) -> Floats | None:
-    """`along` as float32; None where points are about evenly spaced, as resampling spaces them."""
+    """`along` as float32; None if all points are about evenly spaced, as after resampling."""
     fraction = along(points, offsets)
     if np.abs(fraction - even(offsets)).max(initial=0.0) < _EVEN:
         return None
@@ -87,22 +92,22 @@ def uneven_along(points: Floats, offsets: Ints) -> Floats | None:
 
 
 def even(offsets: Ints) -> Floats:
-    """What `along` is for evenly spaced points, (point_count,) float64."""
+    """`along` for evenly spaced points, (point_count,) float64."""
     counts = np.diff(offsets)
     number = np.arange(offsets[-1]) - np.repeat(offsets[:-1], counts)
     return number / np.repeat(np.maximum(counts - 1, 1), counts)
 
 
 def first_as_far(along: Floats, offsets: Ints, wanted: Floats) -> Ints:
-    """The first point of each strand that is as far along it as wanted, (strand_count, n).
+    """The first point of each strand at or past each wanted arc length, (strand_count, n).
 
     Args:
-        along: see `reached`. wanted: (strand_count, n) [m], no farther than its tip.
+        along: see `reached`. wanted: (strand_count, n) [m], no farther than the tip.
     """
     number = np.arange(len(wanted))
     length = np.maximum(along[offsets[1:] - 1], np.finfo(np.float64).tiny)
-    # ascending over all strands, so that one search serves them all; as the number of a strand
-    # takes of its digits, it may find the point before or after
+    # keys ascend over all strands, so that one search does for all; a large strand number costs
+    # digits of the fraction, so the search may be off by one point, which the end corrects
     every = along / np.repeat(length, np.diff(offsets)) + 2.0 * np.repeat(number, np.diff(offsets))
     asked = wanted / length[:, None] + 2.0 * number[:, None]
     right = np.searchsorted(every, asked.ravel(), side="left").reshape(wanted.shape)

@@ -1,7 +1,7 @@
-"""Strands of about one point count side by side, so that numpy moves many points at once.
+"""Blocks of strands with similar point counts, so that numpy processes many points at once.
 
-The points of one number lie side by side, as planes (3, count, n): what belongs to a strand is
-never repeated for its points.
+A block's points are stored as planes (3, count, n), point number by point number, so that values of
+a strand broadcast over its points without being repeated.
 """
 
 from __future__ import annotations
@@ -13,18 +13,18 @@ import numpy as np
 
 from ..arrays import Floats, Ints
 
-#: Points of a block, so that they stay in the processor's cache, and by how many times as many
-#: points as another a strand beside it may have.
+#: Points of a block, so that they stay in the processor's cache, and the largest ratio between the
+#: point counts of a block's strands.
 _POINTS, _PADDING = 16384, 1.2
 
 
 @dataclass(frozen=True, eq=False)
 class Block:
-    """Strands that are moved together.
+    """Strands that are processed together.
 
-    strands: which; all of them have `count` points, or fewer.
-    points: (n, count) theirs, where a strand that has fewer repeats its tip; a slice where all have
-        as many and lie side by side.
+    strands: (n,) indices; each strand has at most `count` points.
+    points: (n, count) indices of their points, a shorter strand's padded with its tip; a slice if
+        all strands have `count` points and are contiguous.
     """
 
     strands: Ints | slice
@@ -41,22 +41,22 @@ class Block:
         return cls(strands, count, offsets[strands, None] + number)
 
     def planes(self, values: Floats) -> Floats:
-        """Values (point_count, ...) of its points, (..., count, n)."""
+        """The block's part of values (point_count, ...) as planes, (..., count, n)."""
         taken = values[self.points]
         return np.ascontiguousarray(taken.reshape(-1, self.count, *values.shape[1:]).T)
 
     def put(self, values: Floats, planes: Floats) -> None:
-        """Write these, in place."""
+        """Write planes (..., count, n) into values (point_count, ...), in place."""
         if isinstance(self.points, slice):
             rows = values[self.points].reshape(-1, self.count, len(planes))
-            for axis, plane in enumerate(planes):  # twice as fast as all at once
+            for axis, plane in enumerate(planes):  # twice as fast as one assignment
                 rows[..., axis] = plane.T
         else:
             values[self.points] = planes.T
 
 
 def blocks_of(offsets: Ints) -> Iterator[Block]:
-    """All strands; strand s is points offsets[s]:offsets[s + 1], at least one."""
+    """All strands in blocks; strand s is points offsets[s]:offsets[s + 1], at least one."""
     counts = np.diff(offsets)
     order = np.argsort(counts, kind="stable")
     sizes, first = counts[order], 0

@@ -10,23 +10,25 @@ from ..arrays import Floats, Ints
 
 
 def on_curve(grid: Floats, left: Ints, t: Floats) -> Floats:
-    """Points of the curves through these CVs, which go on straight at their ends, (n, k, 3).
+    """Points of the curves through these CVs, (n, k, 3).
+
+    The neighbours that the end segments lack are extrapolated straight.
 
     Args:
-        grid: (n, cv_count, 3). left: (n, k) segments. t: (n, k) places in them, 0 to 1.
+        grid: (n, cv_count, 3). left: (n, k) segments. t: (n, k) parameters in them, 0 to 1.
     """
     ends = [2.0 * grid[:, :1] - grid[:, 1:2], grid, 2.0 * grid[:, -1:] - grid[:, -2:-1]]
     extended = np.concatenate(ends, axis=1)
     number = left + np.arange(len(grid))[:, None] * extended.shape[1]
     result = np.empty((*number.shape, 3), grid.dtype)
-    for axis in range(3):  # one by one, as numpy is slow at rows of three
+    for axis in range(3):  # one by one: numpy is slow on rows of three
         along = np.ascontiguousarray(extended[..., axis])
         result[..., axis] = between([along.take(number + step) for step in range(4)], t)
     return result
 
 
 def between(points: Sequence[Floats], t: Floats) -> Floats:
-    """Where the curve is from the second of four points, at t = 0, to the third, at 1."""
+    """The curve between the second of four points, at t = 0, and the third, at t = 1."""
     p0, p1, p2, p3 = points
     m1, m2 = 0.5 * (p2 - p0), 0.5 * (p3 - p1)  # the tangents
     chord = p2 - p1
@@ -46,15 +48,14 @@ def slope_between(points: Sequence[Floats], t: Floats) -> Floats:
 
 
 def evenly_on_curve(grid: Floats, count: int) -> Floats:
-    """The same curves by `count` points each, which are as many parts of a segment apart, (n,
-    count, 3); first and last point stay."""
+    """The curves sampled at `count` even parameters each, (n, count, 3); both ends stay."""
     left, t = even_places(grid.shape[1], count)
     shape = len(grid), count
     return on_curve(grid, np.broadcast_to(left, shape), np.broadcast_to(t, shape))
 
 
 def even_places(cv_count: int, count: int) -> tuple[Ints, Floats]:
-    """Where these points lie: segment (count,), and place in it (count,) float32 from 0 to 1."""
+    """The even parameters: segment (count,), and t in it (count,) float32 from 0 to 1."""
     place = np.linspace(0.0, cv_count - 1.0, count)
     left = np.minimum(place.astype(np.int64), cv_count - 2)
     return left, (place - left).astype(np.float32)

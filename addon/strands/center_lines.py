@@ -1,11 +1,11 @@
-"""Centre lines: strands of few CVs that go where the strand goes, without its curls.
+"""Centre lines: strands of few CVs that follow the path of the strand without its curls.
 
-Resampling a curl by CVs that are farther apart than half a winding takes points of it at random. A
-centre line is the mean of the strand around each CV instead: weighted by a tent that reaches to
-the CVs beside it, which lets through what the CVs can show and takes away what they cannot.
+Resampling a curl with CVs more than half a turn apart aliases. A centre line therefore takes the
+mean of the strand around each CV, weighted by a tent that reaches to the neighbouring CVs: a low
+pass that removes what the CVs cannot represent.
 
-A strand is straight between its points, so the mean is exact: with G'' = P along the strand, that
-around s is (G(s - h) - 2 G(s) + G(s + h)) / h^2, for tents that reach h to both sides.
+A strand is straight between its points, so the mean is exact: with G'' = P along the strand, the
+mean around s is (G(s - h) - 2 G(s) + G(s + h)) / h^2 for a tent of half-width h.
 """
 
 from __future__ import annotations
@@ -19,18 +19,19 @@ from .arc_length import first_as_far
 from .resample import evenly_spaced
 from .strand_set import StrandSet
 
-#: A strand that loses less of its length by resampling has no curls that its CVs cannot show.
+#: A strand that resampling shortens by less than this fraction has no curls that its CVs miss.
 _FAITHFUL = 0.02
-#: No segment gets room for more than this: one whose curls cancel out would have it for anything.
+#: Largest `curl_room` of a segment: where curls cancel out, it would have no limit.
 _WIDEST = 20.0
-#: Points averaged at once: they stay in the cache.
+#: Points averaged at once, so that they stay in the cache.
 _CHUNK = 32_768
 
 
 def center_lines(strands: StrandSet, cv_count: int) -> StrandSet:
-    """The same strands with `cv_count` CVs each, at equal fractions of their lengths, also where
-    they have this many points: strands ride by these fractions. Roots and tips stay where they are.
-    Strands that CVs can follow are merely resampled.
+    """The centre lines of strands: `cv_count` CVs each, at equal fractions of their lengths.
+
+    Strands that already have `cv_count` points are respaced too, because riding relies on these
+    fractions. Roots and tips stay where they are. Strands without curls are merely resampled.
     """
     lines = evenly_spaced(strands, cv_count)
     if cv_count < 3:
@@ -49,11 +50,11 @@ def center_lines(strands: StrandSet, cv_count: int) -> StrandSet:
 
 
 def curl_room(length: Floats, lines: Floats) -> Floats | None:
-    """By which fraction of its length each segment of centre lines could be drawn out until its
-    curls are straight, (n, cv_count - 1) float32; None where no strand is curled.
+    """How far each segment of centre lines can be drawn out until its curls are straight, as a
+    fraction of its length, (n, cv_count - 1) float32; None if no strand is curled.
 
     Args:
-        length: (n,) [m] of the strands, evenly along which the CVs lie.
+        length: (n,) [m] of the strands; the CVs lie evenly along them.
         lines: (n, cv_count, 3) [m].
     """
     segment = np.linalg.norm(np.diff(lines, axis=1), axis=2)
@@ -65,8 +66,8 @@ def curl_room(length: Floats, lines: Floats) -> Floats | None:
 
 
 def _means(grid: Floats, cv_count: int) -> Floats:
-    """Of strands (n, count, 3) around their inner CVs, (n, cv_count - 2, 3)."""
-    # by axes, as numpy is slow at rows of three
+    """The tent-weighted means of strands (n, count, 3) at their inner CVs, (n, cv_count - 2, 3)."""
+    # one row per axis: numpy is slow on rows of three
     place = np.ascontiguousarray(grid.transpose(2, 0, 1), np.float64)
     root = place[:, :, :1].copy()
     place -= root
@@ -78,7 +79,7 @@ def _means(grid: Floats, cv_count: int) -> Floats:
     left = first_as_far(reached.ravel(), offsets, wanted) - 1
     left = np.maximum(left, offsets[:-1, None])
     inside = wanted - reached.take(left)
-    # of the segment in which each CV lies
+    # the segment in which each CV lies
     segment = left - np.arange(len(grid))[:, None]
     slope = 1.0 / np.maximum(length.take(segment), np.finfo(np.float64).tiny)
     means = np.empty((len(grid), cv_count - 2, 3))
@@ -95,7 +96,7 @@ def _means(grid: Floats, cv_count: int) -> Floats:
 
 
 def _summed(parts: Floats) -> Floats:
-    """What parts (n, k) come to before each of them, and in all, (n, k + 1)."""
+    """Running sums of parts (n, k), from 0 to the total, (n, k + 1)."""
     total = np.zeros((len(parts), parts.shape[1] + 1))
     np.cumsum(parts, axis=1, out=total[:, 1:])
     return total

@@ -1,4 +1,4 @@
-"""From untrusted curves to a `StrandSet`: what cannot be used is dropped, counted and named."""
+"""From untrusted curves to a `StrandSet`: unusable curves are dropped and counted by reason."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from ..arrays import Bools, Floats, Ints
 from .colors import usable_colors
 from .strand_set import DEFAULT_RADIUS, StrandSet
 
-#: A strand shorter than this has no direction in float32, in terms of how far from the origin
-#: it is.
+#: Shortest usable strand as a fraction of its distance from the origin: below it float32 resolves
+#: no direction.
 SHORTEST_STRAND = 1.0e-6
-#: A radius that is larger than the median of all by this factor is a broken number.
+#: A radius larger than the median by this factor is a broken number.
 _STRAY = 100.0
-#: A tip that ends in a point is as wide as this part of the median of all: no width is no fibre.
+#: Radius given to pointed tips, as a fraction of the median: a fibre needs some width.
 _POINTED = 1.0e-3
-#: A point farther from the origin is a broken number, of hair of any size [m].
+#: A coordinate beyond this is a broken number, whatever the size of the hair [m].
 FARTHEST_POINT = 1.0e6
 
 
@@ -48,13 +48,14 @@ def clean(
     Args:
         points: (point_count, 3) [m].
         offsets: (curve_count + 1,), ascending from 0 to point_count.
-        radius: (point_count,) [m]; 0 where a strand ends in a point becomes very small. A median
-            replaces those that are no radii, see `are_widths`, and 0.04 mm where there is none.
+        radius: (point_count,) [m]; 0 at a pointed tip becomes a very small radius. Values that are
+            no radii, see `are_widths`, become the median of the others, or 0.04 mm if there are
+            none.
         group: (curve_count,); absent: one group, 0.
         root_uv: (curve_count, 2); values that are not finite become 0.
         color: (point_count, 3) scene-linear; see `usable_colors`.
         seed: (curve_count,); see `StrandSet`.
-        unfit: reason -> (curve_count,) which curves cannot be used for it, whatever their points.
+        unfit: reason -> (curve_count,) curves to drop for this reason, whatever their points.
     """
     points = np.asarray(points, np.float32).reshape(-1, 3)
     offsets = np.asarray(offsets, np.int64)
@@ -99,10 +100,10 @@ def clean(
 
 
 def _are_sound(points: Floats, offsets: Ints, radius: Floats, root_uv: Floats | None) -> bool:
-    """Whether certainly nothing is to be dropped or replaced, which is the rule; False may err."""
+    """Whether nothing needs to be dropped or replaced, as is usual; False may be a false alarm."""
     if len(offsets) < 2 or np.diff(offsets).min() < 2:
         return False
-    # a sum of squares is finite, or below a limit, only if every one of them is
+    # a sum of squares is finite, or below a limit, only if each of the squares is
     if not np.vdot(points, points) < FARTHEST_POINT**2 or np.min(radius) <= 0.0:
         return False
     if np.max(radius) > _STRAY * np.min(radius):
@@ -121,7 +122,7 @@ def _any_per_curve(flags: Bools, offsets: Ints) -> Bools:
 
 
 def _no_length(points: Floats, offsets: Ints) -> Bools:
-    """Whether a curve's box has no extent; a curve of finite points then has no length either."""
+    """Which curves have boxes without extent; if their points are finite, they have no length."""
     box, away = np.zeros((2, len(offsets) - 1, 3), np.float32)
     filled = np.flatnonzero(np.diff(offsets) > 0)
     if len(filled):
@@ -143,8 +144,10 @@ def _usable_radius(radius: Floats | None, offsets: Ints) -> Floats:
 
 
 def are_widths(radius: Floats, offsets: Ints) -> Bools:
-    """Which of these can be radii or widths of one groom: those that are finite, positive, and not
-    far larger than the others, and 0 in a strand that has others, which is pointed there.
+    """Which values can be radii or widths of one groom, (point_count,).
+
+    They are finite, positive and not far larger than the others. 0 is a width as well if the strand
+    has other widths: it is pointed there.
 
     Args:
         radius: (point_count,). offsets: (strand_count + 1,), see `clean`.
@@ -157,7 +160,7 @@ def are_widths(radius: Floats, offsets: Ints) -> Bools:
 
 
 def _middle(values: Floats) -> Floats:
-    """The median, or of two the larger one."""
+    """The median; the larger of the two middle values if their number is even."""
     half = len(values) // 2
     middle: Floats = np.partition(values, half)[half]
     return middle

@@ -1,9 +1,9 @@
-"""The closest point of a triangle mesh, exact, for many points at once.
+"""The closest point on a triangle mesh, exact, for many points at once.
 
-Points that lie together share the search (`point_clusters`): the distance to a triangle changes by
-no more than a point is moved. So a triangle that is farther from the middle of a cluster than the
-nearest one by more than twice the cluster's radius is nearest to none of its points, and is left
-out for all at once.
+Points that lie close together share the search (`point_clusters`): moving a point changes its
+distance to a triangle by no more than the point moves. So a triangle that is farther from the
+middle of a cluster than the nearest triangle, by more than twice the cluster's radius, is nearest
+to none of the cluster's points and is skipped for all of them.
 """
 
 from __future__ import annotations
@@ -24,19 +24,19 @@ from .triangle_tree import TriangleTree, build_tree
 
 #: Points searched at once: their pairs with boxes stay in the processor's cache.
 _CHUNK = 1024
-#: Pairs of points and boxes held at once; more than this halves the chunk.
+#: Maximum number of pairs of points and boxes in memory; beyond it, the chunk is halved.
 _PAIR_LIMIT = 2_000_000
-#: Pairs of points and their cluster's triangles looked at at once.
+#: Pairs of points and their cluster's triangles measured at once.
 _PAIRS = 1 << 16
-#: Clusters save work where they have this many points on average, and no more triangles than this.
+#: Clusters pay off from this many points each on average, and up to this many candidate triangles.
 _WORTHWHILE, _CROWDED = 3, 512
-#: A hair more than a distance, so that rounding leaves nothing out.
+#: Factor of distances that makes up for rounding, so that no triangle is missed.
 _HAIR = 1.0 + 1.0e-9
 
 
 @dataclass(frozen=True)
 class ClosestPoints:
-    """One answer a point, in the space of the surface.
+    """The closest point to each query point, in the space of the surface.
 
     point: (point_count, 3) float64 [m].
     triangle: (point_count,) int32, index into the surface's triangles.
@@ -52,7 +52,7 @@ class ClosestPoints:
 
 @dataclass
 class _Best:
-    """The nearest triangles so far: squared distance and index, one a point."""
+    """The nearest triangle of each point so far: squared distance and index, (point_count,)."""
 
     distance: Floats
     triangle: Ints
@@ -60,10 +60,10 @@ class _Best:
 
 @dataclass(frozen=True)
 class _Candidates:
-    """Triangles that may be nearest to a point of a cluster, cluster after cluster.
+    """Triangles that may be nearest to a point of a cluster, cluster by cluster.
 
-    away: distance of each from the cluster's middle.
-    first, count: of each cluster.
+    away: distance of each triangle from the cluster's middle.
+    first, count: each cluster's first candidate, and number of them, (cluster_count,).
     """
 
     triangle: Ints
@@ -75,9 +75,9 @@ class _Candidates:
 class ClosestPointSearch:
     """A surface prepared for many calls of `closest`.
 
-    center: (3,) float64 [m], of its box.
-    corners: (triangle_count, 3, 3) float64 [m], from the center on.
-    tree: of these.
+    center: (3,) float64 [m], of the surface's box.
+    corners: (triangle_count, 3, 3) float64 [m], relative to `center`.
+    tree: over these triangles.
 
     Raises:
         HairloomError: the surface has no triangles.
@@ -103,19 +103,21 @@ class ClosestPointSearch:
         """The closest point of the surface to each of the finite points (point_count, 3).
 
         Args:
-            reach: [m]; where the surface is farther than this, the answer is some point of it
-                that is farther than this as well. Much faster where few points are near.
+            reach: [m]; for points farther from the surface than this, the result is an arbitrary
+                point of it, also beyond reach. Much faster if few points are within reach.
         """
         local = np.asarray(points, np.float64).reshape(-1, 3) - self.center
         return self._measured(local, self._nearest(local, reach))
 
     def nearest(self, points: Floats, reach: float) -> Ints:
-        """The triangle alone, (point_count,), searched for each point by itself: it depends on no
-        other points, not even where two triangles are as near."""
+        """The nearest triangle only, (point_count,), searched without clusters.
+
+        So the result does not depend on the other points, even if two triangles are equally near.
+        """
         return self._search_all(np.asarray(points, np.float64) - self.center, reach)
 
     def closest_on(self, points: Floats, triangle: Ints) -> ClosestPoints:
-        """The closest point of the triangle that is named for each point (point_count, 3)."""
+        """The closest point to each point (point_count, 3) on its given triangle (point_count,)."""
         return self._measured(np.asarray(points, np.float64) - self.center, triangle)
 
     def _measured(self, local: Floats, triangle: Ints) -> ClosestPoints:
@@ -127,7 +129,7 @@ class ClosestPointSearch:
         )
 
     def _nearest(self, points: Floats, reach: float) -> Ints:
-        """The nearest triangle of each point, by clusters where that saves work."""
+        """The nearest triangle of each point, using clusters if that saves work."""
         if len(points) < _WORTHWHILE:
             return self._search_all(points, reach)
         clusters = clustered(points, self._size)
@@ -145,21 +147,21 @@ class ClosestPointSearch:
         return found
 
     def _search_all(self, points: Floats, reach: float) -> Ints:
-        """The nearest triangle of each point, each for itself."""
+        """The nearest triangle of each point, without clusters, in several threads."""
         chunks = (points[i : i + _CHUNK] for i in range(0, len(points), _CHUNK))
         found = side_by_side(lambda chunk: self._search(chunk, reach), chunks)
         return np.concatenate([np.zeros(0, np.int64), *found])
 
     def _search(self, points: Floats, reach: float) -> Ints:
-        """A good guess, then all that could be nearer."""
+        """The nearest triangle of each point: a first guess, then all leaves that may be nearer."""
         triangles = self.tree.leaf_triangles
         leaf = triangles[self.tree.nearest_leaf(points)]
         best = _Best(np.full(len(points), np.inf), leaf[:, 0].astype(np.int64))
         self._improve(best, points, *_each(np.arange(len(points)), leaf))
-        # a hair more than the reach, so that a point just within it is found
+        # slightly more than the reach, so that rounding loses no point at its edge
         within = np.minimum(best.distance, reach * reach * _HAIR)
         for point, leaf, gap in self._near_leaves(points, within):
-            # the nearest box first: what it holds leaves few of the others
+            # the nearest box first: its triangles rule out most of the others
             nearest = _first_least(point, gap)
             self._improve(best, points, *_each(point[nearest], triangles[leaf[nearest]]))
             is_near = gap < best.distance[point]
@@ -170,7 +172,7 @@ class ClosestPointSearch:
     def _near_leaves(
         self, points: Floats, squared_within: Floats
     ) -> Iterator[tuple[Ints, Ints, Floats]]:
-        """Pairs of point and leaf that may be so near, ascending by point, some at a time, and the
+        """Chunks of the pairs of a point and a leaf within reach, ascending by point, and the
         squared distance to the leaf's box."""
         limit = _PAIR_LIMIT if len(points) > 1 else sys.maxsize
         found = self.tree.leaves_within(points, squared_within, limit)
@@ -183,7 +185,7 @@ class ClosestPointSearch:
             yield point + half, leaf, gap
 
     def _candidates(self, clusters: PointClusters, nearest: Ints, reach: float) -> _Candidates:
-        """For each cluster, but for the triangle that is nearest to its middle."""
+        """The candidates of each cluster, without the triangle that is nearest to its middle."""
         middle, radius = clusters.middle, clusters.radius
         away = np.sqrt(self._forms.squared_distance(middle, nearest))
         within = np.minimum(away + 2.0 * radius, reach + radius) * _HAIR
@@ -209,7 +211,12 @@ class ClosestPointSearch:
         candidates: _Candidates,
         reach: float,
     ) -> Ints:
-        """The nearest triangle of these of the points in the order of the clusters."""
+        """The nearest triangle of each chosen point, searched among its cluster's candidates.
+
+        Args:
+            chosen: indices into the points in the order of the clusters.
+            nearest: (cluster_count,), the triangle nearest to each cluster's middle.
+        """
         found: list[Ints] = [np.zeros(0, np.int64)]
         for piece in _pieces(candidates.count[clusters.cluster[chosen]]):
             part = chosen[piece]
@@ -226,7 +233,7 @@ class ClosestPointSearch:
         return np.concatenate(found)
 
     def _improve(self, best: _Best, points: Floats, point: Ints, triangle: Ints) -> None:
-        """Let the best know of these pairs of point and triangle, ascending by point."""
+        """Update the best with these pairs of point and triangle, ascending by point."""
         is_near = self._is_near(best, points, point, triangle)
         point, triangle = point[is_near], triangle[is_near]
         if not len(point):
@@ -239,7 +246,7 @@ class ClosestPointSearch:
         best.triangle[point[is_best]] = triangle[is_best]
 
     def _is_near(self, best: _Best, points: Floats, point: Ints, triangle: Ints) -> Bools:
-        """Which pairs are worth measuring: those whose triangle's box is nearer than the best."""
+        """Which pairs are worth measuring: the triangle's box is no farther than the best."""
         gap = np.zeros(len(point))
         for axis in range(3):
             here = points[:, axis].take(point)
@@ -253,7 +260,7 @@ class ClosestPointSearch:
 
 
 def search_of(surface: Surface) -> ClosestPointSearch:
-    """The search through this very surface, made once.
+    """The search through this surface, built once and cached on it.
 
     Raises:
         HairloomError: the surface has no triangles.
@@ -262,7 +269,7 @@ def search_of(surface: Surface) -> ClosestPointSearch:
 
 
 def closest_point(points: Floats, surface: Surface) -> ClosestPoints:
-    """The closest point of a surface to each point (point_count, 3), both in one space.
+    """The closest point of a surface to each point (point_count, 3), both in the same space.
 
     Raises:
         HairloomError: the surface has no triangles.
@@ -271,7 +278,7 @@ def closest_point(points: Floats, surface: Surface) -> ClosestPoints:
 
 
 def _first_least(point: Ints, value: Floats) -> Ints:
-    """Where each of the points, ascending, has its least value for the first time."""
+    """The row of the first minimum value of each point; rows ascend by point."""
     first = np.flatnonzero(np.diff(point, prepend=-1))
     if not len(first):
         return first
@@ -286,7 +293,7 @@ def _each(point: Ints, triangles: Ints) -> tuple[Ints, Ints]:
 
 
 def _pieces(pair_counts: Ints) -> Iterator[slice]:
-    """Points in a row that have about _PAIRS pairs together, at least one each."""
+    """Slices of consecutive points that add up to about _PAIRS pairs, at least one point each."""
     ends = np.cumsum(pair_counts)
     start = 0
     while start < len(ends):

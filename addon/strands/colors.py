@@ -1,6 +1,7 @@
-"""The hair's own colours: which can be used, and what strands have that have none.
+"""The hair's own colours: which are usable, and how missing ones are stored.
 
-A strand has a colour all along or none at all, which is NaN, and is then drawn in the look's.
+A strand has a colour at all of its points or at none. Without one its colours are NaN, and it is
+drawn in the look's colour.
 """
 
 from __future__ import annotations
@@ -14,11 +15,11 @@ from .strand_set import StrandSet
 
 
 def usable_colors(color: Floats, offsets: Ints) -> Floats:
-    """The same, but NaN all along each strand with one that is negative or not finite.
+    """The colours, but NaN along each strand that has one negative or not finite value.
 
     Args:
         color: (point_count, 3) scene-linear.
-        offsets: (strand_count + 1,), as of a StrandSet.
+        offsets: (strand_count + 1,), as in `StrandSet`.
     """
     color = np.asarray(color, np.float32).reshape(-1, 3)
     if not color.size or (color.min() >= 0.0 and np.isfinite(np.vdot(color, color))):
@@ -32,7 +33,7 @@ def usable_colors(color: Floats, offsets: Ints) -> Floats:
 
 
 def joined_colors(parts: Sequence[StrandSet]) -> Floats | None:
-    """The colours of several sets, one after the other; None where none has any."""
+    """The colours of several sets, concatenated; None if no set has colours."""
     if all(part.color is None for part in parts):
         return None
     none = np.float32(np.nan)
@@ -42,7 +43,7 @@ def joined_colors(parts: Sequence[StrandSet]) -> Floats | None:
 
 
 def color_notes(place: str, strands: StrandSet) -> tuple[str, ...]:
-    """A warning where some strands of coloured hair have no colour; place names the hair."""
+    """A warning if some strands of coloured hair have no colour; `place` names the hair."""
     if strands.color is None:
         return ()
     count = int(np.isnan(strands.color[strands.offsets[:-1], 0]).sum())

@@ -11,17 +11,18 @@ from .surface import Surface
 from .triangle_tree import TriangleTree, build_tree
 from .triangles import area_vectors
 
-#: Segments looked at together, and pairs of them with boxes held at once.
+#: Segments processed at once, and the maximum number of their pairs with boxes.
 _CHUNK, _PAIR_LIMIT = 1 << 14, 100_000
-#: A hair more than half a segment, so that rounding leaves nothing out.
+#: Factor of the squared reach that makes up for rounding, so that no triangle is missed.
 _HAIR = 1.0 + 1.0e-6
-#: A line begins on the surface where it passes it within this part of its first segment.
+#: A crossing within this fraction of a line's first segment means that it begins on the surface.
 _AT_START = 1.0e-4
 
 
 def first_crossings(lines: Floats, surface: Surface) -> Floats:
-    """Where each line first passes through the surface, (n,) in segments from its start; infinite
-    where it does not. A line that begins on the surface is no crossing there.
+    """Where each line first passes through the surface, (n,), in segments from its start.
+
+    Infinite where it does not. The start of a line that begins on the surface is no crossing.
 
     Args:
         lines: (n, count, 3) points, in the space of the surface, which has triangles.
@@ -46,7 +47,7 @@ def first_crossings(lines: Floats, surface: Surface) -> Floats:
 def _near(
     tree: TriangleTree, start: Floats, end: Floats, some: Ints
 ) -> Iterator[tuple[Ints, Ints]]:
-    """Pairs of segment and triangle that may meet, some at a time."""
+    """Chunks of the pairs of segment and triangle that may meet."""
     middle, half = 0.5 * (start[some] + end[some]), 0.5 * (end[some] - start[some])
     within = np.einsum("ij,ij->i", half, half) * _HAIR + 1.0e-30
     found = tree.leaves_within(middle, within, _PAIR_LIMIT)
@@ -60,12 +61,12 @@ def _near(
 
 
 def _places(start: Floats, end: Floats, corners: Floats) -> Floats:
-    """How far along its segment each triangle is passed, (n,) from 0 to 1, pair by pair; infinite
-    where it is not.
+    """Where each segment passes through its triangle, (n,) from 0 to 1, pair by pair; infinite
+    where it does not.
 
-    A segment passes a triangle if its ends are on both sides of the plane, and it goes past all
-    three edges on one side (the signs of three volumes). A volume changes its sign alone, bit for
-    bit, with the direction of the edge, so none slips through between two triangles.
+    It does if its ends lie on different sides of the plane and its line passes all three edges on
+    the same side (the signs of three volumes). Reversing an edge negates its volume exactly, bit
+    for bit, so that no segment slips through between two triangles.
     """
     a, b, c = np.moveaxis(corners - start[:, None], 1, 0)
     step = end - start

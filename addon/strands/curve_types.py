@@ -1,9 +1,9 @@
 """Curves of other types than Catmull-Rom: from control points to the points that Blender draws.
 
-Strands are smooth curves through their points, as Catmull-Rom curves are. So those of other types
-get points on the curve: Bezier curves and NURBS where Blender evaluates them, polygons more where
-their corners are sharp. Handles lie beside each point of a Bezier curve; knots of NURBS are those
-of Blender's modes, see its `curve_nurbs.cc`.
+Strands are smooth curves through their points, like Catmull-Rom curves. So curves of other types
+are replaced by points on them: Bezier curves and NURBS by the points that Blender evaluates,
+polygons by more points where their corners are sharp. Knots of NURBS follow Blender's modes, see
+its `curve_nurbs.cc`.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from ..arrays import Bools, Floats, Ints
 
 
 class CurveType(IntEnum):
-    """Blender's numbers."""
+    """The type of a curve, numbered as in Blender."""
 
     CATMULL_ROM = 0
     POLY = 1
@@ -26,7 +26,7 @@ class CurveType(IntEnum):
 
 
 class Knots(IntEnum):
-    """Where the knots of a NURBS curve lie; Blender's numbers."""
+    """Where the knots of a NURBS curve lie; numbered as in Blender."""
 
     NORMAL = 0
     ENDPOINT = 1
@@ -35,23 +35,26 @@ class Knots(IntEnum):
     CUSTOM = 4
 
 
-#: A smooth curve leaves a corner by this part of its pieces times how far directions differ there.
+#: How far a smooth curve strays from a polygon at a corner, over the length of a piece times the
+#: difference of the unit directions there.
 _ROUNDING = 2.0 / 27.0
-#: A polygon may be rounded by this part of its length. Blender's Resample Curve makes polygons of
-#: all curves, and those of hair stay as they are.
+#: A polygon may be rounded by this fraction of its length, which leaves hair curves as they are
+#: after Blender's Resample Curve, which makes polygons of all curves.
 _ROUNDED = 2.0e-3
-#: Pieces that a segment of a polygon gets at most.
+#: Maximum number of pieces that a segment of a polygon is cut into.
 _MAX_PIECES = 64
 
 
 @dataclass(frozen=True, eq=False)
 class CurveShapes:
-    """What curves are beside their points.
+    """What determines curves beside their control points.
 
-    kind: (curve_count,) of `CurveType`. knots: of `Knots`. order: NURBS', one more than the degree.
+    kind: (curve_count,) of `CurveType`.
     resolution: (curve_count,) pieces of each segment of a Bezier or NURBS curve.
-    weight: (point_count,) NURBS'.
-    left, right: (point_count, 3) handles, in the space of the points.
+    order: (curve_count,), NURBS only, one more than the degree.
+    knots: (curve_count,) of `Knots`.
+    weight: (point_count,), NURBS only.
+    left, right: (point_count, 3) Bezier handles, in the space of the points.
     """
 
     kind: Ints
@@ -65,11 +68,11 @@ class CurveShapes:
 
 @dataclass(frozen=True, eq=False)
 class _Alike:
-    """Some curves that are evaluated by the same matrix.
+    """Curves that are evaluated by the same matrix.
 
-    inner: (n, count) their control points. outer: (n, samples) their points.
-    mix: (samples, count) how values at control points are blended.
-    weight: (n, count) by which they are multiplied first; None: by 1.
+    inner: (n, count) indices of control points. outer: (n, samples) indices of evaluated points.
+    mix: (samples, count) the weights of the control points' values at each sample.
+    weight: (n, count) NURBS weights of the control points; None: all 1.
     """
 
     inner: Ints
@@ -88,7 +91,10 @@ class _Alike:
 
 @dataclass(frozen=True, eq=False)
 class DrawnCurves:
-    """points: (point_count, 3) on the curves. offsets: (curve_count + 1,), where each begins."""
+    """Evaluated curves.
+
+    points: (point_count, 3) on the curves. offsets: (curve_count + 1,), where each curve begins.
+    """
 
     points: Floats
     offsets: Ints
@@ -107,7 +113,8 @@ def drawn_curves(points: Floats, offsets: Ints, shapes: CurveShapes) -> DrawnCur
     """Open curves as Blender draws them.
 
     Args:
-        points: (point_count, 3) control points. offsets: (curve_count + 1,), where each begins.
+        points: (point_count, 3) control points. offsets: (curve_count + 1,), where each curve
+            begins.
     """
     counts = np.diff(offsets)
     is_nurbs = (shapes.kind == CurveType.NURBS) & _have_knots(counts, shapes)
@@ -139,15 +146,15 @@ def drawn_curves(points: Floats, offsets: Ints, shapes: CurveShapes) -> DrawnCur
 
 
 def _have_knots(counts: Ints, shapes: CurveShapes) -> Bools:
-    """Which NURBS curves have enough points; Blender draws others through their points."""
+    """Which NURBS curves have enough points; Blender draws the others as polygons."""
     order = shapes.order
     needs_more = shapes.knots == Knots.BEZIER
     return (order >= 2) & (counts >= order + needs_more)
 
 
 def _pieces(points: Floats, offsets: Ints) -> Ints:
-    """Into how many pieces each segment of a polygon goes, (curve_count,), so that a smooth curve
-    through their ends rounds its corners by no more than _ROUNDED of its length."""
+    """The number of pieces that each segment of a polygon is cut into, (curve_count,), so that a
+    smooth curve through their ends rounds corners by no more than _ROUNDED of its length."""
     counts, found = np.diff(offsets), np.ones(len(offsets) - 1, np.int64)
     for count in np.unique(counts[counts > 2]).tolist():
         chosen = np.flatnonzero(counts == count)
@@ -163,7 +170,7 @@ def _pieces(points: Floats, offsets: Ints) -> Ints:
 
 
 def _mix(kind: int, count: int, pieces: int, order: int, knots: int) -> Floats:
-    """How curves of `count` control points blend values at these, (samples, count)."""
+    """The weights of `count` control points at each sample of a curve, (samples, count)."""
     if kind == CurveType.NURBS:
         return _nurbs(count, pieces, order, knots)
     if count < 2:
@@ -177,7 +184,7 @@ def _mix(kind: int, count: int, pieces: int, order: int, knots: int) -> Floats:
 
 
 def _bezier(points: Floats, shapes: CurveShapes, inner: Ints, pieces: int) -> Floats:
-    """(n, samples, 3) on Bezier curves with these control points (n, count)."""
+    """Points (n, samples, 3) on Bezier curves with these control points (n, count)."""
     u = np.linspace(0.0, 1.0, pieces + 1)[:-1, None]
     v = 1.0 - u
     corners = (
@@ -196,12 +203,12 @@ def _bezier(points: Floats, shapes: CurveShapes, inner: Ints, pieces: int) -> Fl
 
 
 def _nurbs(count: int, pieces: int, order: int, mode: int) -> Floats:
-    """B-spline basis functions (samples, count), `pieces` times between knots that differ."""
+    """B-spline basis functions (samples, count), with `pieces` samples per non-empty knot span."""
     knots = _knot_places(count, order, mode)
     ends = np.unique(knots[order - 1 : count + 1])
     inside = ends[:-1, None] + np.diff(ends)[:, None] * np.arange(pieces) / pieces
     place = np.append(inside.ravel(), ends[-1])
-    # of the last sample the span before it, as Cox and de Boor's are open at their ends
+    # the last sample belongs to the span before it: Cox and de Boor's spans exclude their ends
     span = np.searchsorted(knots, place, side="right") - 1
     span[-1] = np.searchsorted(knots, ends[-1], side="left") - 1
     basis = np.zeros((len(place), len(knots) - 1))
@@ -215,7 +222,7 @@ def _nurbs(count: int, pieces: int, order: int, mode: int) -> Floats:
 
 
 def _knot_places(count: int, order: int, mode: int) -> Floats:
-    """The knots of an open curve, (count + order,), in Blender's modes."""
+    """The knots of an open curve, (count + order,), in one of Blender's modes."""
     is_bezier = mode in (Knots.BEZIER, Knots.ENDPOINT_BEZIER)
     reaches_ends = mode in (Knots.ENDPOINT, Knots.ENDPOINT_BEZIER)
     repeated = order - 1 if is_bezier else 1

@@ -1,4 +1,4 @@
-"""Brows and lashes among the groups of strands, wherever the strands come from."""
+"""The group numbers of brows and lashes, wherever the strands come from."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from ..arrays import Bools, Ints
 
-#: numbers of groups that files hardly use for anything else
+#: group numbers that files are unlikely to use otherwise
 BROWS, LASHES = 9001, 9002
 
 

@@ -1,4 +1,4 @@
-"""Directions along strands: unit tangents, and frames that do not twist."""
+"""Directions along strands: unit tangents, and normals that do not twist."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import numpy as np
 from ..arrays import Floats, Ints
 from .vectors import dot_rows, unit_or
 
-#: Of a normal, squared; and what is no longer than this has no direction [m].
+#: Shortest usable normal before it is normalized, squared; shortest vector with a direction [m].
 _SMALLEST, _SHORTEST = 1.0e-6, np.float32(1.0e-6)
 
 
@@ -29,8 +29,8 @@ def tangents(grid: Floats) -> Floats:
 
 
 def strand_tangents(points: Floats, offsets: Ints) -> Floats:
-    """Unit tangents from root to tip, rows (3, point_count) as the points are, of strands that lie
-    one after the other."""
+    """Unit tangents from root to tip of concatenated strands; points and result are rows
+    (3, point_count)."""
     edge = np.zeros_like(points)
     np.subtract(points[:, 1:], points[:, :-1], out=edge[:, :-1])
     edge[:, offsets[1:] - 1] = 0.0
@@ -40,7 +40,7 @@ def strand_tangents(points: Floats, offsets: Ints) -> Floats:
 
 
 def tangents_at(points: Floats, offsets: Ints, chosen: Ints) -> Floats:
-    """`strand_tangents` of points (point_count, 3), rows (3, k) at some of them (k,)."""
+    """`strand_tangents` at the chosen ones (k,) of the points (point_count, 3), rows (3, k)."""
     strand = np.searchsorted(offsets, chosen, side="right") - 1
     after = points.take(np.minimum(chosen + 1, offsets[strand + 1] - 1), axis=0)
     after -= points.take(np.maximum(chosen - 1, offsets[strand]), axis=0)
@@ -85,7 +85,7 @@ def volume_normals(point: Floats, tangent: Floats, center: Floats) -> Floats:
 
 
 def volume_normal_rows(away: Floats, tangent: Floats) -> Floats:
-    """`volume_normals` of rows (3, n), `away` from the centre."""
+    """`volume_normals` as rows (3, n), where `away` is the vector from the centre."""
     outward = _unit_or_up(away)
     across: Floats = outward - tangent * dot_rows(outward, tangent)
     squared = dot_rows(across, across)
@@ -100,7 +100,7 @@ def volume_normal_rows(away: Floats, tangent: Floats) -> Floats:
 
 
 def _unit_or_up(rows: Floats) -> Floats:
-    """Rows (3, n) of length 1; what has no length points up."""
+    """Vectors in rows (3, n), scaled to length 1; (0, 0, 1) for those without length."""
     length = np.sqrt(dot_rows(rows, rows))
     found: Floats = rows / np.maximum(length, _SHORTEST)
     is_short = length <= _SHORTEST
@@ -110,7 +110,8 @@ def _unit_or_up(rows: Floats) -> Floats:
 
 
 def _perpendicular(vector: Floats, tangent: Floats) -> Floats:
-    """The unit part of `vector` across `tangent`; any perpendicular one where they are parallel."""
+    """The unit vector along the part of `vector` across `tangent`; any perpendicular if they are
+    parallel."""
     across = vector - tangent * np.sum(vector * tangent, axis=-1, keepdims=True)
     length = np.linalg.norm(across, axis=-1, keepdims=True)
     least = np.abs(tangent).argmin(axis=-1)

@@ -12,7 +12,7 @@ from .strand_set import StrandSet
 
 
 def joined(one: StrandSet, other: StrandSet) -> StrandSet:
-    """Both, one after the other; what only one of them knows of its roots is left out."""
+    """Both, concatenated; root data that only one of them has is dropped."""
     both: dict[str, Any] = {}
     for name in ("points", "radius", "group", "root_uv", "root_triangle", "root_barycentric"):
         parts = [getattr(one, name), getattr(other, name)]

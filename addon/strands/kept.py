@@ -1,8 +1,7 @@
-"""What was found or made last, so that only what is other now is found or made again.
+"""A cache of the last results, so that only what has changed is computed again.
 
-An artist combs or paints a part of the hair, and the rest is as it was. What is kept is compared
-bit for bit and used only where the answer is the same to the last bit, so that nobody can tell it
-from one that was made from nothing.
+An artist combs or paints a part of the hair, and the rest stays as it was. Inputs are compared bit
+for bit, and a kept result is used only where it equals a new one to the last bit.
 """
 
 from __future__ import annotations
@@ -18,21 +17,21 @@ from ..arrays import Floats, Ints
 from .nearest import nearest_points
 from .side_by_side import even_parts, side_by_side
 
-#: What the numbers of a row are multiplied by to find it: odd, so that rows that differ in one
-#: number alone never look alike.
+#: Factors of the hash of a row: odd, so that rows that differ in a single number have different
+#: hashes.
 _FACTORS = np.random.default_rng(7).integers(0, 1 << 63, 1 << 13, np.uint64) * 2 + 1
 
-#: A thread has at least this many rows to make something of.
+#: Minimum number of rows per thread.
 _OF_THREAD = 2048
 
 type Rows = tuple[Any, ...]
 
 
 class Kept:
-    """Each thing by its name, as it was made last.
+    """The last result of each named computation.
 
     Args:
-        forgets: whether nothing is kept.
+        forgets: whether every result is computed from scratch and none is kept.
     """
 
     def __init__(self, *, forgets: bool = False) -> None:
@@ -43,14 +42,15 @@ class Kept:
     def rows(
         self, name: str, fixed: tuple[Any, ...], rows: Rows, make: Callable[[Ints], Rows]
     ) -> Rows:
-        """What `make` makes of all rows, by asking it for those alone that are new: others may have
-        been anywhere among the last ones.
+        """The result of `make` for all rows, which is called only for new rows.
+
+        A row is found again wherever it was among the last ones.
 
         Args:
-            fixed: all else that it depends on, which is compared.
-            rows: arrays (n, ...) of which each row of the answer depends on the same row alone.
-            make: arrays (k, ...) of some rows (k,), which are not to be changed afterwards; is
-                called from several threads.
+            fixed: everything else that the result depends on, compared with the last call's.
+            rows: input arrays (n, ...); row i of the result may depend on row i of these only.
+            make: returns arrays (k, ...) for row indices (k,); called from several threads. Its
+                result must not be changed afterwards.
         """
         if self._forgets:
             return _made(make, np.arange(len(rows[0])))
@@ -64,7 +64,7 @@ class Kept:
         return made
 
     def nearest(self, name: str, places: Floats, among: Floats, count: int) -> tuple[Ints, Floats]:
-        """`nearest_points`, by asking for places alone whose nearest points may be others now."""
+        """`nearest_points`, searched only for the places whose nearest points may have changed."""
         if self._forgets:
             return nearest_points(places, among, count)
         last = self._nearest.get(name)
@@ -76,20 +76,22 @@ class Kept:
         return index.copy(), distance.copy()
 
 
-#: Keeps nothing.
 NOTHING_KEPT = Kept(forgets=True)
 
 
 @dataclass(frozen=True, eq=False)
 class _MadeRows:
-    """bits: (n, width) uint32, all of the rows. made: arrays (n, ...) of these."""
+    """The last call of `Kept.rows`.
+
+    fixed: see there. bits: (n, width) uint32, the input rows. made: the result, arrays (n, ...).
+    """
 
     fixed: tuple[Any, ...]
     bits: Ints
     made: Rows
 
     def made_of(self, bits: Ints, make: Callable[[Ints], Rows]) -> Rows:
-        """What was made of these rows, and what is made now of those that are new."""
+        """The result for these rows: the kept one for known rows, computed for new ones."""
         found = _found(bits, self.bits)
         missing = np.flatnonzero(found < 0)
         if not len(missing) and np.array_equal(found, np.arange(len(self.bits))):
@@ -103,7 +105,7 @@ class _MadeRows:
 
 @dataclass(frozen=True, eq=False)
 class _Nearest:
-    """What was asked for, and the answer."""
+    """The last call of `Kept.nearest`, and its result."""
 
     places: Floats
     among: Floats
@@ -112,8 +114,8 @@ class _Nearest:
     distance: Floats
 
     def again(self, places: Floats, among: Floats) -> tuple[Ints, Floats]:
-        """The answer for these: asked for again where a place or one of its nearest points is new
-        or gone, and where a new point is as near as these."""
+        """The result for these, searched again where the place is new, where one of its nearest
+        points is gone, and where a new point is at least as near as the last of them."""
         place, point = _found(_bits(places), _bits(self.places)), _back(among, self.among)
         if point is None:
             return nearest_points(places, among, self.count)
@@ -133,7 +135,7 @@ class _Nearest:
 
 
 def _made(make: Callable[[Ints], Rows], rows: Ints) -> Rows:
-    """What is made of these rows, in several threads."""
+    """The result of `make` for these rows, computed in several threads."""
     parts = side_by_side(lambda some: make(rows[some]), even_parts(len(rows), _OF_THREAD))
     if len(parts) == 1:
         return parts[0]
@@ -141,13 +143,16 @@ def _made(make: Callable[[Ints], Rows], rows: Ints) -> Rows:
 
 
 def same_rows(rows: Any, among: Any) -> Ints:
-    """Where rows (n, ...) are among others (m, ...), bit by bit, (n,); -1: nowhere."""
+    """The index of each row (n, ...) among others (m, ...), compared bit by bit, (n,); -1: none."""
     return _found(_bits(rows), _bits(among))
 
 
 def _back(among: Floats, before: Floats) -> Ints | None:
-    """Which of the points (n, 3) each of those before (m, 3) is, (m,); -1: none. None where points
-    coincide, or have changed their order, so that of two as near as each other the other counts."""
+    """The index among the points (n, 3) of each earlier point (m, 3), (m,); -1: none.
+
+    None if points coincide or have changed their order: then ties between equally near points may
+    be resolved differently.
+    """
     found = _found(_bits(among), _bits(before))
     known = np.flatnonzero(found >= 0)
     if (np.diff(found[known]) <= 0).any():
@@ -158,7 +163,7 @@ def _back(among: Floats, before: Floats) -> Ints | None:
 
 
 def _found(bits: Ints, among: Ints) -> Ints:
-    """Where rows (n, width) are among others (m, width), (n,); -1: nowhere."""
+    """The index of each row (n, width) among others (m, width), (n,); -1: none."""
     found = np.full(len(bits), -1)
     if bits.shape == among.shape:
         is_same = (bits == among).all(axis=1)
@@ -176,7 +181,7 @@ def _found(bits: Ints, among: Ints) -> Ints:
 
 
 def _bits(values: Any) -> Ints:
-    """Of an array (n, ...), (n, width) uint32."""
+    """The bits of an array (n, ...) as rows (n, width) uint32."""
     rows = np.ascontiguousarray(values)
     bits: Ints = rows.reshape(len(rows), math.prod(rows.shape[1:])).view(np.uint32)
     return bits

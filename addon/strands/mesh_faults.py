@@ -1,4 +1,4 @@
-"""Where a mesh is no closed surface: its edges tell."""
+"""Faults that keep a mesh from being a closed surface, found by its edges."""
 
 from __future__ import annotations
 
@@ -13,10 +13,11 @@ from .surface import Surface
 
 @dataclass(frozen=True, eq=False)
 class Edges:
-    """The edges between different places.
+    """The edges of a welded mesh, without those of no length.
 
-    uses: (edge_count,) how many triangles have each. turns: of these, how many more pass it one
-        way than the other; 0 where neighbours look to the same side.
+    uses: (edge_count,) number of triangles at each edge.
+    turns: (edge_count,) how many more of these traverse it in one direction than in the other; 0
+        if neighbours face the same side.
     """
 
     uses: Ints
@@ -24,22 +25,22 @@ class Edges:
 
     @property
     def are_closed(self) -> bool:
-        """Whether there is an inside: each edge is passed as often one way as the other."""
+        """Whether the mesh has an inside: all edges are traversed equally often both ways."""
         return not self.turns.any()
 
     @cached_property
     def open_count(self) -> int:
-        """Of one triangle alone."""
+        """Number of edges with a single triangle."""
         return int((self.uses == 1).sum())
 
     @cached_property
     def crowded_count(self) -> int:
-        """Of more than two triangles."""
+        """Number of edges with more than two triangles."""
         return int((self.uses > 2).sum())
 
     @cached_property
     def opposed_count(self) -> int:
-        """Of two triangles that look to different sides."""
+        """Number of edges between two triangles that face different sides."""
         return int(((self.uses == 2) & (self.turns != 0)).sum())
 
 

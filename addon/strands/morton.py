@@ -1,4 +1,4 @@
-"""Points in an order in which neighbours in space are mostly neighbours too (Morton 1966)."""
+"""The Morton order of points, which keeps most neighbours in space close together (Morton 1966)."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ _BITS = 10
 
 
 def morton_code(points: Floats) -> Ints:
-    """The place of each point (n, 3) on a curve through the cells of their box, (n,) int64: the
-    interleaved bits of its coordinates."""
+    """The Morton code of each point (n, 3) in a grid over their box, (n,) int64: the interleaved
+    bits of its cell's coordinates."""
     code = np.zeros(len(points), np.int64)
     if not len(points):
         return code

@@ -1,4 +1,4 @@
-"""The nearest of some points, exact, for very many places at once."""
+"""Exact nearest points, for very many places at once."""
 
 from __future__ import annotations
 
@@ -9,17 +9,18 @@ from .side_by_side import THREADS, side_by_side
 
 #: Distances measured at once: few enough for the cache, many enough for numpy.
 _TABLE = 65_536
-#: So few are measured sooner than points are left out.
+#: Up to this many distances, measuring all is faster than ruling out points first.
 _FEW = 4096
-#: Places of which a part goes to another thread.
+#: From more places than this on, they are split over threads.
 _MANY = 1024
 
 
 def nearest_points(places: Floats, among: Floats, count: int) -> tuple[Ints, Floats]:
-    """The nearest points of each place, nearest first; of those as near the first one.
+    """The `count` nearest points of each place, nearest first; ties go to the lower index.
 
-    Places are halved until few points can be the nearest of any of them: none that is farther from
-    their middle than the last answer for the middle, and their extent twice.
+    Places are halved until few points can be among the nearest of any place in a half. A point is
+    ruled out if it is farther from the middle of the places' box than the middle's `count`-th
+    nearest point plus the diagonal of the box.
 
     Args:
         places: (n, 3) [m].
@@ -27,13 +28,13 @@ def nearest_points(places: Floats, among: Floats, count: int) -> tuple[Ints, Flo
 
     Returns:
         index: (n, min(count, m)) into `among`.
-        distance: (n, min(count, m)) float64 [m], a place's own not depending on other places.
+        distance: (n, min(count, m)) float64 [m]; independent of the other places.
     """
     kept = min(count, len(among))
     index = np.zeros((len(places), kept), np.int64)
     distance = np.zeros((len(places), kept))
-    # as they are, so that an answer does not depend on what else is asked, nor by rounding; by
-    # axes, as numpy is slow at rows of three
+    # not relative to a common centre, so that a result does not depend on other places, not even
+    # by rounding; one row per axis, as numpy is slow on rows of three
     place, point = (
         np.ascontiguousarray(np.asarray(each).T, np.float64) for each in (places, among)
     )
@@ -45,9 +46,9 @@ def nearest_points(places: Floats, among: Floats, count: int) -> tuple[Ints, Flo
 
 
 def _search(own: Ints, place: Floats, point: Floats, index: Ints, distance: Floats) -> None:
-    """The answer for some places, see `nearest_points`, in rows."""
+    """Write the results of places `own` into `index` and `distance`; points are rows (3, n)."""
     kept = index.shape[1]
-    # memory that is asked for again takes as long as what is done in it
+    # allocated once: allocation would take as long as the work itself
     memory = np.empty((2, max(_TABLE, point.shape[1])))
     parts = [(own, np.arange(point.shape[1]), point)]
     while parts:
@@ -70,7 +71,7 @@ def _search(own: Ints, place: Floats, point: Floats, index: Ints, distance: Floa
 
 
 def _halves(own: Ints, here: Floats) -> tuple[Ints, Ints]:
-    """Some places, which lie here, (3, n), in two halves along their longest side."""
+    """Places `own` at positions `here` (3, n), halved along the longest side of their box."""
     along = here[np.ptp(here, axis=1).argmax()]
     halves = own[along.argpartition(len(own) // 2)]
     middle = (len(halves) + 1) // 2
@@ -78,7 +79,7 @@ def _halves(own: Ints, here: Floats) -> tuple[Ints, Ints]:
 
 
 def _squared(places: Floats, points: Floats, memory: Floats) -> Floats:
-    """Squared distances of places (3, n) to points (3, m), (n, m), in this memory."""
+    """Squared distances of places (3, n) to points (3, m), (n, m), stored in `memory`."""
     shape = places.shape[1], points.shape[1]
     gap, squared = (each[: shape[0] * shape[1]].reshape(shape) for each in memory)
     for axis in range(3):
@@ -91,7 +92,7 @@ def _squared(places: Floats, points: Floats, memory: Floats) -> Floats:
 
 
 def _possible(there: Floats, kept: int, center: Floats, half: Floats, memory: Floats) -> Ints:
-    """Which of some points (3, n) may be among the `kept` nearest of any place in this box."""
+    """Which points `there` (3, n) may be among the `kept` nearest of any place in this box."""
     squared = _squared(center[:, None], there, memory)[0]
     nearest = np.sqrt(np.partition(squared, kept - 1)[kept - 1])
     reach = (nearest + 2.0 * np.sqrt((half**2).sum())) * (1.0 + 1e-9) + 1e-300

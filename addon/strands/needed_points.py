@@ -1,4 +1,4 @@
-"""As many points as each strand needs, so that its shape stays what it is."""
+"""Each strand gets as many points as it needs to keep its shape."""
 
 from __future__ import annotations
 
@@ -12,36 +12,37 @@ from .kept import NOTHING_KEPT, Kept
 from .resample import positions_at, resample
 from .strand_set import StrandSet
 
-#: Points that a strand may have, at most: 20 turns of a coil lose LOST by 410.
+#: Maximum number of points of a strand: with 410, 20 turns of a coil lose LOST.
 MAX_POINTS = 512
-#: Of its length a strand may lose this.
+#: Fraction of its length that a strand may lose.
 LOST = 0.005
-#: A strand may stray by this part of the hair's median length: 0.2 mm of 25 cm.
+#: Fraction of the hair's median length that a strand may stray by: 0.2 mm for 25 cm.
 STRAY = 8.0e-4
-#: Each count that is tried is larger than the one before by about this factor.
+#: Approximate ratio between successive counts to try.
 _STEP = 1.25
-#: Points tried at once: they stay in the cache.
+#: Points tested at once, so that they stay in the cache.
 _CHUNK = 100_000
 
 
 def with_own_points(strands: StrandSet, least: int) -> StrandSet:
-    """The same strands with all of their points, whatever their shape needs now: they may move.
+    """The same strands with all of their points, which they may need once they move.
 
-    One of fewer than `least` gets more between them, one of more than MAX_POINTS has that many.
+    A strand of fewer than `least` points gets more in between; one of more than MAX_POINTS is
+    resampled to that many.
     """
     own = strands.point_counts
     return with_points(strands, np.clip(own, least, MAX_POINTS), own > MAX_POINTS)
 
 
 def with_needed_points(strands: StrandSet, least: int, kept: Kept = NOTHING_KEPT) -> StrandSet:
-    """The same strands with fewer points where these do, and more where there are few.
+    """The same strands with no more points than their shapes need, and at least `least` each.
 
     A strand is resampled evenly to as few points as it takes to lose at most LOST of its length and
-    to stray by at most STRAY of the median length of all. Where that is no fewer than its own, it
-    keeps its own, and one of fewer than `least` gets more between them.
+    to stray by at most STRAY of the median length of all. If that is no fewer than it has, it keeps
+    its own points; with fewer than `least` of them it gets more in between.
 
     Args:
-        kept: of the strands that were asked about last, if they are of one point count.
+        kept: results of the last call, used if all strands have the same point count.
     """
     own = strands.point_counts
     if not strands.strand_count or (own == least).all():
@@ -59,8 +60,8 @@ def with_needed_points(strands: StrandSet, least: int, kept: Kept = NOTHING_KEPT
 
 
 def with_points(strands: StrandSet, counts: Ints, is_even: Bools) -> StrandSet:
-    """The same strands with these point counts, (strand_count,): evenly along them, or their own
-    points and more between them."""
+    """The same strands with these point counts, (strand_count,): resampled evenly where `is_even`,
+    elsewhere their own points and more in between."""
     if np.array_equal(counts, strands.point_counts) and not is_even.any():
         return strands
     offsets = np.concatenate([[0], np.cumsum(counts)])
@@ -83,13 +84,13 @@ def with_points(strands: StrandSet, counts: Ints, is_even: Bools) -> StrandSet:
 def _needed(strands: StrandSet, least: int, stray: float) -> tuple[Ints, Bools]:
     """How many points each strand gets, and whether evenly, (strand_count,) each.
 
-    The least of all strands is tried first, as it suffices for most, then the next below its own,
-    then what lies halfway between what was too few and what was enough.
+    A strand tries the lowest count first, which is enough for most; then the next one below its
+    own; then it bisects between what was too few and what was enough.
     """
     own = strands.point_counts
     along = reached(strands.points, strands.offsets)
     counts = np.array(_counts(least))
-    # of each strand the counts that are left to try, from and up to; the last is its own
+    # range of the counts that each strand has left to try; `last` stands for its own points
     low = np.zeros(len(own), np.int64)
     last = np.where(own == least, 0, np.maximum(counts.searchsorted(own), 1))
     high = last.copy()
@@ -100,7 +101,7 @@ def _needed(strands: StrandSet, least: int, stray: float) -> tuple[Ints, Bools]:
             suffices = _suffice(strands, along, some, int(counts[number]), stray)
             high[some[suffices]] = number
             low[some[~suffices]] = number + 1
-        # curls need about as many as they have: that one fewer is too few spares all between
+        # curls need about as many as they have: if the count below is too few, no other is tried
         is_first = (low == 1) & (high == last) & (tried == 0)
         tried = np.where(is_first, high - 1, (low + high) // 2)
     is_even = low < last
@@ -110,7 +111,7 @@ def _needed(strands: StrandSet, least: int, stray: float) -> tuple[Ints, Bools]:
 
 
 def _suffice(strands: StrandSet, along: Floats, some: Ints, count: int, stray: float) -> Bools:
-    """Whether some of the strands are the same by `count` even points, (n,)."""
+    """Whether `count` even points keep the shape of each of some strands, (n,)."""
     size = max(_CHUNK // max(int(strands.point_counts[some].max()), count), 1)
     parts = [some[start : start + size] for start in range(0, len(some), size)]
     found = [_Lines.of(strands, along, part).suffice(count, stray) for part in parts]
@@ -127,7 +128,11 @@ def _counts(least: int) -> list[int]:
 
 @dataclass(frozen=True)
 class _Lines:
-    """Some strands. axes: (3, point_count) [m]. along: (point_count,), see `arc_length.reached`."""
+    """Some strands.
+
+    axes: (3, point_count) [m], the points. along: (point_count,) [m], see `arc_length.reached`.
+    offsets: (strand_count + 1,).
+    """
 
     axes: Floats
     along: Floats
@@ -136,7 +141,7 @@ class _Lines:
     @classmethod
     def of(cls, strands: StrandSet, along: Floats, some: Ints) -> _Lines:
         offsets, points = _rows(strands.offsets, some)
-        # by axes, as numpy is slow at rows of three
+        # one row per axis: numpy is slow on rows of three
         axes = np.ascontiguousarray(strands.points.take(points, axis=0).T)
         return cls(axes, along.take(points), offsets)
 
@@ -145,7 +150,7 @@ class _Lines:
         return _Lines(self.axes.take(points, axis=1), self.along.take(points), offsets)
 
     def suffice(self, count: int, stray: float) -> Bools:
-        """Whether each strand is the same by `count` even points."""
+        """Whether `count` even points keep the shape of each strand, (strand_count,)."""
         length = self.along[self.offsets[1:] - 1]
         left, weight = positions_at(self.along, self.offsets, count)
         before = 1.0 - weight
@@ -153,17 +158,21 @@ class _Lines:
         steps = (np.diff(axis.astype(np.float64), axis=1) for axis in even)
         total = np.sqrt(sum(step * step for step in steps)).sum(axis=1)
         suffices = np.asarray(total >= (1.0 - LOST) * length)
-        long = np.flatnonzero(suffices)  # of others it does not matter where they go
+        long = np.flatnonzero(suffices)  # the others fail anyway
         if len(long):
             lines = self if len(long) == len(length) else self.take(long)
             suffices[long] = lines._farthest([axis[long] for axis in even]) <= stray * stray
         return suffices
 
     def _farthest(self, even: list[Floats]) -> Floats:
-        """How far points are at most from even ones (strand_count, count), three axes of them,
-        squared, (strand_count,)."""
+        """The largest squared distance of each strand's points from the line through the even ones,
+        (strand_count,).
+
+        Args:
+            even: x, y and z of the even points, (strand_count, count) each.
+        """
         count = even[0].shape[1]
-        # each point against the place as far along the even ones: no nearer than the nearest
+        # measured to the place at the same fraction, which is no nearer than the closest place
         place = along_of(self.along, self.offsets)
         place *= count - 1
         before = np.minimum(place.astype(np.int64), count - 2)
@@ -186,15 +195,14 @@ class _Lines:
 
 
 def _rows(offsets: Ints, some: Ints) -> tuple[Ints, Ints]:
-    """Where some of the strands begin and end on their own, and which points they have."""
+    """The offsets of some of the strands on their own, and the indices of their points."""
     counts = np.diff(offsets)[some]
     own = np.concatenate([[0], np.cumsum(counts)])
     return own, np.arange(own[-1]) + np.repeat(offsets[:-1][some] - own[:-1], counts)
 
 
 def _refined(strands: StrandSet, count: int) -> StrandSet:
-    """With `count` points, their own among them: the others lie between these, most of them where
-    they are far apart."""
+    """The strands with `count` points: their own and more in between, most in long segments."""
     if (strands.point_counts == count).all():
         return strands
     left = np.empty((strands.strand_count, count), np.int64)
@@ -226,7 +234,7 @@ def _refined(strands: StrandSet, count: int) -> StrandSet:
 
 
 def _pieces(length: Floats, count: int) -> Ints:
-    """How many pieces each segment gets, (n, segments): at least one each, and by length."""
+    """How many of `count` pieces each segment gets, (n, segments): by length, at least one each."""
     segments = length.shape[1]
     wanted = length / np.maximum(length.sum(axis=1, keepdims=True), 1.0e-30) * (count - segments)
     pieces = wanted.astype(np.int64)

@@ -1,4 +1,4 @@
-"""Points gathered by the cells of a grid, so that what is found for a cell's middle serves all."""
+"""Points grouped by the cells of a grid, so that a result for a cell's middle helps all of them."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from ..arrays import Floats, Ints
 
-#: Cells along each axis at most, so that three indices fit into 63 bits.
+#: Maximum number of cells along each axis, so that three indices fit into 63 bits.
 _MAX_CELLS = 1 << 20
 
 
@@ -16,11 +16,11 @@ _MAX_CELLS = 1 << 20
 class PointClusters:
     """Points in the order of their cells.
 
-    order: (point_count,) indices of the points, cluster after cluster.
-    cluster: (point_count,) of each point in that order, ascending.
-    middle: (cluster_count, 3), the mean of the points.
-    away: (point_count,) distance of each point in that order from its middle.
-    radius: (cluster_count,), the largest of these.
+    order: (point_count,) indices of the points, cluster by cluster.
+    cluster: (point_count,) the cluster of each point in that order, ascending.
+    middle: (cluster_count, 3), the mean of a cluster's points.
+    away: (point_count,) distance of each point in that order from its cluster's middle.
+    radius: (cluster_count,), the largest of these distances.
     """
 
     order: Ints
@@ -31,8 +31,8 @@ class PointClusters:
 
 
 def clustered(points: Floats, size: float) -> PointClusters:
-    """Gather points (point_count, 3), at least one, by cells of this size, or larger ones where
-    the points reach too far."""
+    """Group points (point_count, 3), at least one, by cells of this size, or of a larger one if the
+    points would need more than _MAX_CELLS along an axis."""
     low, high = points.min(axis=0), points.max(axis=0)
     size = max(size, float((high - low).max()) / _MAX_CELLS)
     cell = ((points - low) / size if size > 0.0 else np.zeros_like(points)).astype(np.int64)

@@ -1,6 +1,6 @@
-"""How the roots of strands have moved since rest, and what that adds to what they carry.
+"""How the roots of strands have moved since rest, and the displacement that carries points along.
 
-Vectors lie as planes here, (3, n), so that a motion is not repeated for each point.
+Vectors are stored as planes, (3, n), so that a motion broadcasts over the points of its strand.
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ from ..arrays import Floats, Ints
 class RootMotions:
     """Affine motions, one for each of n strands, or a single one for all of them.
 
-    turn: (3, 3, n) float32, what turning adds to a vector, as a matrix: zero for no turn.
-    shift: (3, n) float32 [m], of the origin.
-    origin: (3, n) float32 [m], the place at rest that does not turn.
+    turn: (3, 3, n) float32, the linear part minus the identity: zero for no turn.
+    shift: (3, n) float32 [m], the displacement of the origin.
+    origin: (3, n) float32 [m], the point at rest that the motion turns about.
     """
 
     turn: Floats
@@ -27,16 +27,16 @@ class RootMotions:
 
     @classmethod
     def of_matrix(cls, matrix: Floats) -> RootMotions:
-        """The single one of a (4, 4) matrix."""
+        """The single motion of a (4, 4) matrix."""
         turn = (matrix[:3, :3] - np.eye(3))[..., None].astype(np.float32)
         return cls(turn, matrix[:3, 3:].astype(np.float32), np.zeros((3, 1), np.float32))
 
     def change(self, rows: Floats, strands: Ints | slice) -> Floats:
-        """What moving with their roots adds to points at rest.
+        """The displacement of points at rest when they move with their roots, shaped like `rows`.
 
         Args:
-            rows: (3, n) one point of each strand, or (3, m, n) m of each.
-            strands: (n,) which.
+            rows: (3, n) one point of each strand, or (3, m, n) m points of each.
+            strands: (n,) the strand of each column.
         """
         of = self.of(strands, rows.ndim)
         local = rows - of.origin
@@ -47,17 +47,17 @@ class RootMotions:
         return result
 
     def carried(self, points: Floats, index: Ints, strands: Ints) -> Floats:
-        """Where some points (point_count, 3) of strands at rest are carried, (n, 3).
+        """Where some of the points (point_count, 3) at rest are carried to, (n, 3).
 
         Args:
-            index: (n,), which points.
-            strands: (n,), which strand each belongs to.
+            index: (n,), the points to carry.
+            strands: (n,), the strand that each belongs to.
         """
         rest = points.take(index, axis=0)
         return rest + self.change(np.ascontiguousarray(rest.T), strands).T
 
     def of(self, strands: Ints | slice, dimensions: int = 2) -> RootMotions:
-        """Those of some strands, for arrays of two or three dimensions."""
+        """The motions of some strands, shaped to broadcast over arrays of 2 or 3 dimensions."""
         found = []
         for values in (self.turn, self.shift, self.origin):
             if values.shape[-1] > 1:

@@ -1,6 +1,6 @@
-"""Strands as roots on a UV map, each with its shape in the frame of its root.
+"""Strands stored as roots on a UV map, each with its shape in the frame of its root.
 
-So they grow on any mesh that has the same map, wherever it stands, however it is turned or posed.
+So they can grow on any mesh with the same UV map, in any place, orientation and pose.
 """
 
 from __future__ import annotations
@@ -16,16 +16,18 @@ from .strand_set import DEFAULT_RADIUS, StrandSet
 from .surface import Surface
 from .vectors import unit, unit_or
 
-#: A root further from every triangle of the map than this, in UV, is on none of them.
+#: A root farther than this from every triangle of the UV map, in UV, lies on none of them.
 _OFF_THE_MAP = 0.01
 
 
 @dataclass(frozen=True, eq=False)
 class RootedShapes:
-    """root_uv: (strand_count, 2) float32.
+    """Strands that are independent of the mesh they grow on.
+
+    root_uv: (strand_count, 2) float32.
     offsets: (strand_count + 1,) int32, as in `StrandSet`.
-    shape: (point_count, 3) float32 [m], from the root, which is 0: along the direction in which U
-        grows on the surface, along the one across, and along the normal.
+    shape: (point_count, 3) float32 [m], positions relative to the root, in its frame: x in the
+        direction in which U grows on the surface, y across it on the surface, z along the normal.
     group: (strand_count,) int32.
     """
 
@@ -48,13 +50,13 @@ class RootedShapes:
         return cls(uv.astype(np.float32), strands.offsets, shape.astype(np.float32), strands.group)
 
     def on(self, surface: Surface, scale: float = 1.0) -> StrandSet:
-        """Strands on this surface, bound to it and in its space; their widths are yet to be found.
+        """Strands on this surface, bound to it and in its space, without widths of their own.
 
         Args:
-            scale: how much larger they are.
+            scale: factor of their size.
 
         Raises:
-            HairloomError: the surface has no UVs, or its map has nothing at a root.
+            HairloomError: the surface has no UVs, or its UV map has no face at a root.
         """
         triangle, barycentric = _at(self.root_uv, surface)
         origin, frame = _frames(surface, triangle, barycentric)
@@ -73,7 +75,7 @@ class RootedShapes:
 
 
 def _at(uv: Floats, surface: Surface) -> tuple[Ints, Floats]:
-    """The triangle (n,) and barycentric coordinates (n, 3) at each place of the UV map."""
+    """The triangle (n,) and barycentric coordinates (n, 3) at each UV coordinate (n, 2)."""
     if surface.corner_uv is None:
         raise HairloomError(
             "this mesh has no UVs", place="head", remedy="Use the built-in head with its UV map"
@@ -91,7 +93,7 @@ def _at(uv: Floats, surface: Surface) -> tuple[Ints, Floats]:
 
 
 def _search_of_map(surface: Surface) -> ClosestPointSearch:
-    """Through the surface's UV map, in a plane."""
+    """A search through the surface's UV map, as a mesh in the plane z = 0."""
     assert surface.corner_uv is not None
     flat = np.zeros((3 * len(surface.triangles), 3), np.float32)
     flat[:, :2] = surface.corner_uv.reshape(-1, 2)
@@ -99,7 +101,8 @@ def _search_of_map(surface: Surface) -> ClosestPointSearch:
 
 
 def _frames(surface: Surface, triangle: Ints, barycentric: Floats) -> tuple[Floats, Floats]:
-    """Where roots are (n, 3), and their frames (n, 3, 3): along U, across and normal in columns."""
+    """The positions of roots (n, 3), and their frames (n, 3, 3): along U, across and normal as
+    columns."""
     assert surface.corner_uv is not None
     corners = surface.corners[triangle].astype(np.float64)
     origin = np.einsum("nk,nkj->nj", barycentric, corners)
@@ -109,7 +112,8 @@ def _frames(surface: Surface, triangle: Ints, barycentric: Floats) -> tuple[Floa
     normal = unit_or(np.einsum("nk,nkj->nj", barycentric, normals), unit(flat_normal))
     uv = surface.corner_uv[triangle].astype(np.float64)
     span = uv[:, 1:] - uv[:, :1]
-    # dP/du up to its length: the edges mixed so that V does not change, to the map's own side
+    # dP/du up to its length: the mix of edges that leaves V constant, towards growing U even where
+    # the map is mirrored
     area = span[:, 0, 0] * span[:, 1, 1] - span[:, 1, 0] * span[:, 0, 1]
     growing = edges[:, 0] * span[:, 1, 1:] - edges[:, 1] * span[:, 0, 1:]
     growing *= np.where(area < 0.0, -1.0, 1.0)[:, None]

@@ -1,4 +1,4 @@
-"""Work in several threads: numpy lets the others go on while it counts."""
+"""Work in several threads: numpy releases the interpreter lock while it computes."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ THREADS = min(4, os.cpu_count() or 1)
 
 
 def side_by_side[T, R](make: Callable[[T], R], parts: Iterable[T]) -> list[R]:
-    """What `make` makes of each part, in the order of these; it may not depend on other parts."""
+    """The results of `make` for each part, in order, computed in parallel; calls must be
+    independent."""
     waiting = list(parts)
     if len(waiting) < 2 or THREADS < 2:
         return [make(part) for part in waiting]
@@ -20,7 +21,8 @@ def side_by_side[T, R](make: Callable[[T], R], parts: Iterable[T]) -> list[R]:
 
 
 def even_parts(count: int, least: int) -> list[slice]:
-    """One part of `count` rows for each thread, none with fewer than `least` if there are more."""
+    """`count` rows split into at most one slice per thread, of at least `least` rows each if there
+    are several."""
     number = max(min(THREADS, count // least), 1)
     bounds = [count * i // number for i in range(number + 1)]
     return [slice(*ends) for ends in pairwise(bounds)]

@@ -1,4 +1,4 @@
-"""`StrandSet`, the one model of hair: a ragged array of points, and what each strand carries."""
+"""`StrandSet`, the one model of hair: a ragged array of points, and attributes of strands."""
 
 from __future__ import annotations
 
@@ -14,28 +14,28 @@ from ..errors import HairloomError
 from .affine import mean_scale, moved
 from .arc_length import lengths, uneven_along
 
-#: Of hair whose width nobody knows, until it is found (`groom.widths`).
+#: Radius of hair without widths of its own, until `groom.widths` finds one.
 DEFAULT_RADIUS = 4.0e-5  # [m], half of 0.08 mm, a typical human hair
 
-#: Points of each strand that its root decides about: the second gives the root's direction.
+#: Points of each strand that move with its root: the second gives the root's direction.
 ROOT_POINTS = 2
 
 
 @dataclass(frozen=True)
 class StrandSet:
-    """Strands from root to tip in one space (said by whoever made it), checked when made.
+    """Strands from root to tip in one space (documented by its maker), validated on creation.
 
-    points: (point_count, 3) float32 [m], strand after strand, root first.
+    points: (point_count, 3) float32 [m], strand by strand, root first.
     offsets: (strand_count + 1,) int32, strand s is points[offsets[s]:offsets[s + 1]].
     radius: (point_count,) float32 [m].
     group: (strand_count,) int32.
     root_uv: (strand_count, 2) float32, or None where no UVs are known.
     root_triangle: (strand_count,) int32, or None when unbound.
     root_barycentric: (strand_count, 3) float32, or None when unbound.
-    color: (point_count, 3) float32 scene-linear, the hair's own; None where it has none, NaN all
-        along strands that have none.
-    seed: (strand_count,) int32, what the noise of a strand depends on; 0 is its number, as is None.
-    has_widths: whether the radii are the groom's own; else they are `DEFAULT_RADIUS`.
+    color: (point_count, 3) float32 scene-linear, the hair's own; NaN at all points of strands that
+        have none; None if no strand has any.
+    seed: (strand_count,) int32, seeds the noise of each strand; 0 or None: by the strand's index.
+    has_widths: whether the radii are the groom's own; otherwise they are `DEFAULT_RADIUS`.
 
     Raises:
         HairloomError: shapes that do not fit, a strand of fewer than two points, values that
@@ -131,7 +131,7 @@ class StrandSet:
         """Lowest and highest corner of all points, each (3,) [m]; zeros for an empty set."""
         if not self.point_count:
             return np.zeros(3, np.float32), np.zeros(3, np.float32)
-        axes = self.points.T  # one by one, as numpy is slow at rows of three
+        axes = self.points.T  # one by one: numpy is slow on rows of three
         low, high = [axis.min() for axis in axes], [axis.max() for axis in axes]
         return np.array(low), np.array(high)
 
@@ -141,8 +141,8 @@ class StrandSet:
 
     @cached_property
     def uneven_along(self) -> Floats | None:
-        """How far along its strand each point lies, (point_count,); None where points are evenly
-        spaced, see `arc_length.uneven_along`."""
+        """The fraction of its strand's length at each point, (point_count,); None if points are
+        evenly spaced, see `arc_length.uneven_along`."""
         return uneven_along(self.points, self.offsets)
 
     def take(self, strands: Ints) -> StrandSet:
@@ -156,7 +156,7 @@ class StrandSet:
             for name in _PER_STRAND
         }
         return StrandSet(
-            # numpy takes rows in a third of the time in which it indexes them
+            # take is three times as fast as indexing
             self.points.take(picked, axis=0),
             offsets,
             self.radius.take(picked),
@@ -175,7 +175,7 @@ class StrandSet:
         return replace(self, points=moved(self.points, matrix), radius=radius)
 
     def strands(self) -> Iterator[Floats]:
-        """Each strand's points, for slow references and tests."""
+        """The points of each strand, for slow reference implementations and tests."""
         for start, end in zip(self.offsets[:-1], self.offsets[1:], strict=True):
             yield self.points[start:end]
 

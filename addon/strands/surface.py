@@ -1,4 +1,4 @@
-"""`Surface`: the triangle mesh that hair grows from, rests on or collides with."""
+"""`Surface`: a triangle mesh that hair grows from, rests on or collides with."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from .triangles import area_vectors
 from .vectors import unit
 from .weld import same_places
 
-#: Vertices at one place share a normal where their own are within 41 degrees of it (cosine): those
-#: of a box that is cut apart at its edges stay 45 degrees and more away.
+#: Coincident vertices share a normal if their own is within 41 degrees of it (cosine). Normals of a
+#: box that is split at its edges are at least 45 degrees away, so its edges stay hard.
 _SMOOTH = 0.75
 
 
 @dataclass(frozen=True)
 class Surface:
-    """Triangles in one space (said by whoever made it), checked when made.
+    """Triangles in one space (documented by its maker), validated on creation.
 
     positions: (vertex_count, 3) float32 [m].
     triangles: (triangle_count, 3) int32, counter-clockwise seen from outside.
@@ -62,26 +62,28 @@ class Surface:
         return unit(area_vectors(self.corners))
 
     def welded_triangles(self) -> Ints:
-        """The triangles by numbers of places: vertices at one place have the same one."""
+        """The triangles with coincident vertices merged, as numbers of places, like `triangles`."""
         triangles: Ints = self.once(_places)[self.triangles]
         return triangles
 
     def vertex_normals(self) -> Floats:
         """Unit normals, (vertex_count, 3), weighted by angle (Thuermer and Wuethrich 1998).
 
-        Vertices at one place share theirs, so that seams of UVs are not seen, but where they face
-        apart, as at hard edges and on sheets with two sides.
+        Coincident vertices share theirs, so that UV seams do not show, except where they face
+        different ways, as at hard edges and on two-sided sheets.
         """
         return self.once(_vertex_normals)
 
     def bounds(self) -> tuple[Floats, Floats]:
         """Lowest and highest corner, each (3,) [m]."""
-        rows = np.ascontiguousarray(self.positions.T)  # which numpy compares much sooner
+        rows = np.ascontiguousarray(self.positions.T)  # numpy is slow on rows of three
         return rows.min(axis=1), rows.max(axis=1)
 
     def once[T](self, make: Callable[[Surface], T]) -> T:
-        """What `make` makes of this very surface, made once and kept as long as the surface: many
-        search one head."""
+        """The result of `make` for this surface, computed once and cached as long as it lives.
+
+        Many callers search the same head.
+        """
         kept: dict[Callable[[Surface], Any], Any] = vars(self).setdefault("_made_once", {})
         if make not in kept:
             kept[make] = make(self)
@@ -94,8 +96,10 @@ class Surface:
         *arguments: Rest.args,
         **named: Rest.kwargs,
     ) -> T:
-        """What `make` makes of this very surface and of arguments, numbers and arrays, kept until
-        others come: hair that is combed keeps its roots."""
+        """The result of `make` for this surface and arguments, cached until these change.
+
+        Arguments are numbers and arrays, compared by value: hair that is combed keeps its roots.
+        """
         kept: dict[Any, tuple[tuple[Any, ...], Any]] = vars(self).setdefault("_made_last", {})
         given = (*arguments, *named.values())
         known = kept.get(make)
@@ -105,7 +109,7 @@ class Surface:
         return found
 
     def transformed(self, matrix: Floats) -> Surface:
-        """Moved by an affine (4, 4) matrix; a mirroring one turns the triangles over."""
+        """Moved by an affine (4, 4) matrix; a mirroring one reverses the triangles' winding."""
         positions = moved(self.positions, matrix)
         if np.linalg.det(np.asarray(matrix, np.float64)[:3, :3]) >= 0.0:
             return replace(self, positions=positions)
@@ -114,7 +118,7 @@ class Surface:
 
 
 def _vertex_normals(surface: Surface) -> Floats:
-    """See `Surface.vertex_normals`: many ask for them, of one head."""
+    """See `Surface.vertex_normals`."""
     corners, normals = surface.corners, surface.triangle_normals()
     total = np.zeros_like(surface.positions)
     for corner in range(3):
@@ -128,7 +132,8 @@ def _vertex_normals(surface: Surface) -> Floats:
 
 
 def _shared(surface: Surface, total: Floats) -> Floats:
-    """Unit normals, (vertex_count, 3), of sums of normals around each vertex."""
+    """Unit normals, (vertex_count, 3), from the sums of normals around each vertex, shared between
+    coincident vertices where smooth."""
     own, place = unit(total), surface.once(_places)
     count = int(place.max(initial=-1)) + 1
     if count == len(own):
@@ -141,7 +146,7 @@ def _shared(surface: Surface, total: Floats) -> Floats:
 
 
 def _places(surface: Surface) -> Ints:
-    """A number for each vertex, the same for those at one place, (vertex_count,)."""
+    """A number for each vertex, the same for coincident ones, (vertex_count,)."""
     return same_places(surface.positions)
 
 

@@ -2,9 +2,8 @@
 
 The squared distance to a triangle is a quadratic form in its barycentric coordinates; its minimum
 lies inside or on one of the three edges (Ericson, Real-Time Collision Detection 2005, section
-5.1.5). Taking the least of those four candidates, instead of Ericson's region tests, needs no
-division by the area, so that slivers, doubled corners and single points are answered like any
-triangle.
+5.1.5). Taking the minimum of these four candidates, instead of Ericson's region tests, needs no
+division by the area, so that slivers, duplicate corners and single points need no special case.
 """
 
 from __future__ import annotations
@@ -13,9 +12,9 @@ import numpy as np
 
 from ..arrays import Floats, Ints
 
-#: Pairs measured at once: this many stay in the processor's cache.
+#: Pairs measured at once, so that they stay in the processor's cache.
 _AT_ONCE = 1 << 14
-#: A triangle whose area^2 is below this part of its edges' product has no inside, only edges.
+#: A triangle whose 4 area^2 is below this fraction of |ab|^2 |ac|^2 is treated as its edges alone.
 _FLAT = 1.0e-12
 
 
@@ -32,20 +31,20 @@ class TriangleForms:
         bb, bc, cc = ((one * two).sum(axis=1) for one, two in ((ab, ab), (ab, ac), (ac, ac)))
         determinant = bb * cc - bc * bc
         determinant[determinant <= _FLAT * bb * cc] = 0.0
-        #: rows, so that each is read in one sweep: a, ab, ac, ab.ab, ab.ac, ac.ac, determinant or 0
+        #: as rows, read in one pass: a, ab, ac, ab.ab, ab.ac, ac.ac, determinant (0 where flat)
         self._rows = np.concatenate([a.T, ab.T, ac.T, [bb, bc, cc, determinant]])
 
     def squared_distance(self, points: Floats, triangle: Ints) -> Floats:
-        """From each of the points (n, 3) to the triangle of this index, (n,)."""
+        """Squared distance from each of the points (n, 3) to its triangle (n,), (n,)."""
         return self._measured(points, triangle)[0]
 
     def closest(self, points: Floats, triangle: Ints) -> Floats:
-        """Barycentric coordinates of the closest point of the triangle to each point, (n, 3)."""
+        """Barycentric coordinates of each point's closest point on its triangle (n,), (n, 3)."""
         _, v, w = self._measured(points, triangle)
         return np.stack([1.0 - v - w, v, w], axis=1)
 
     def _measured(self, points: Floats, triangle: Ints) -> Floats:
-        """Squared distance, v and w, (3, n)."""
+        """Squared distance, and barycentric coordinates v and w of the closest point, (3, n)."""
         found = np.empty((3, len(triangle)))
         for start in range(0, len(triangle), _AT_ONCE):
             part = slice(start, start + _AT_ONCE)
@@ -62,7 +61,7 @@ class TriangleForms:
 def _minimum(
     d1: Floats, d2: Floats, bb: Floats, bc: Floats, cc: Floats, determinant: Floats
 ) -> tuple[Floats, Floats]:
-    """Where v^2 bb + 2 v w bc + w^2 cc - 2 v d1 - 2 w d2 is least over the triangle."""
+    """The v and w that minimize v^2 bb + 2 v w bc + w^2 cc - 2 v d1 - 2 w d2 over the triangle."""
     v = _divided(cc * d1 - bc * d2, determinant)
     w = _divided(bb * d2 - bc * d1, determinant)
     outside = np.flatnonzero(~((determinant > 0.0) & (v >= 0.0) & (w >= 0.0) & (v + w <= 1.0)))
@@ -71,7 +70,7 @@ def _minimum(
 
 
 def _on_edges(d1: Floats, d2: Floats, bb: Floats, bc: Floats, cc: Floats) -> tuple[Floats, Floats]:
-    """The same, on the edges alone."""
+    """The same, over the edges only."""
     on_ab = np.clip(_divided(d1, bb), 0.0, 1.0)
     on_ac = np.clip(_divided(d2, cc), 0.0, 1.0)
     on_bc = np.clip(_divided(d2 - d1 + bb - bc, bb - 2.0 * bc + cc), 0.0, 1.0)

@@ -1,7 +1,7 @@
-"""A balanced tree of boxes over the triangles of a surface: which ones can be nearest to a point.
+"""A balanced tree of boxes over the triangles of a surface, to search those near a point.
 
-Built and walked level by level, so that numpy does the work for all points at once. A node of
-level n is a box around its fraction of the triangles; node i has the children 2 i and 2 i + 1.
+Built and traversed level by level, so that numpy processes all points at once. A node of level n is
+the box around 1 / 2^n of the triangles; node i has the children 2 i and 2 i + 1.
 """
 
 from __future__ import annotations
@@ -16,15 +16,17 @@ from .vectors import dot_rows
 
 #: Triangles in a leaf; fewer cost more box tests, more cost more exact tests.
 LEAF_SIZE = 4
-#: How much more the distance to a box counts than that to its middle; 2 to 8 find nearer leaves
-#: than either alone.
+#: Weight of the distance to a box relative to that of the distance to its middle, both squared; 2
+#: to 8 find nearer leaves than either distance alone.
 _BOX_WEIGHT = 4.0
 
 
 @dataclass(frozen=True)
 class TriangleTree:
-    """levels: for each level (low, high), each (3, 2^level) float64, corners of the boxes.
-    leaf_triangles: (leaf_count, LEAF_SIZE) indices; the last leaves may repeat a triangle.
+    """The boxes, and the triangles of its leaves.
+
+    levels: for each level (low, high), each (3, 2^level) float64, corners of the boxes.
+    leaf_triangles: (leaf_count, LEAF_SIZE) indices; the last triangle may occur several times.
     """
 
     levels: tuple[tuple[Floats, Floats], ...]
@@ -33,10 +35,10 @@ class TriangleTree:
     def nearest_leaf(self, points: Floats) -> Ints:
         """The leaf reached by always entering the nearer child, (point_count,): a first guess.
 
-        Boxes of children overlap, and a point in both is at distance 0 from both: so the distance
-        to the middle of a box counts beside that to the box.
+        Boxes of children overlap, and a point in both is at distance 0 from both. So the distance
+        to the middle of a box is added to the distance to the box.
         """
-        # by axes, as numpy is slow at rows of three
+        # one row per axis: numpy is slow on rows of three
         place, node = np.ascontiguousarray(points.T), np.zeros(len(points), np.int64)
         for low, high in self.levels[1:]:
             middle = (low + high) / 2.0
@@ -54,7 +56,7 @@ class TriangleTree:
         """All (point, leaf) pairs whose box is nearer than the point's reach, ascending by point,
         and the squared distance of each.
 
-        None where that takes more than `limit` pairs at once: ask again with fewer points.
+        None if this takes more than `limit` pairs at once: call again with fewer points.
         """
         place = np.ascontiguousarray(points.T)
         point, node = np.arange(len(points)), np.zeros(len(points), np.int64)
@@ -89,7 +91,7 @@ def build_tree(corners: Floats) -> TriangleTree:
 
 
 def _median_order(centers: Floats, order: Ints, depth: int) -> Ints:
-    """`order` sorted so that the two halves of every node lie on two sides of its median."""
+    """`order` sorted so that the two halves of every node lie on either side of its median."""
     for level in range(depth):
         nodes = order.reshape(1 << level, -1)
         inside = centers[nodes]
@@ -105,7 +107,7 @@ def _chosen(columns: Ints, *tables: Floats) -> Iterator[Floats]:
 
 
 def _squared_distance(points: Floats, low: Floats, high: Floats) -> Floats:
-    """From points to boxes, pair by pair, (n,), of columns (3, n)."""
+    """The squared distance of points to boxes, pair by pair, (n,); columns (3, n)."""
     outside = low - points
     points = points - high
     np.maximum(outside, points, out=outside)

@@ -1,7 +1,7 @@
 """Unit vectors, dot and cross products.
 
-Those of *rows* take (3, n): x, y and z each lie in a row, as in the loops of dynamics and of cards
-that move, where that is several times faster.
+Functions of *rows* take (3, n), with x, y and z in a row each. That is several times faster in the
+loops of the dynamics and of moving cards.
 """
 
 from __future__ import annotations
@@ -12,12 +12,12 @@ import numpy as np
 
 from ..arrays import Floats
 
-#: From one point of an even spiral to the next [rad].
+#: Angle between successive points of an even spiral [rad].
 GOLDEN_ANGLE = float(np.pi * (3.0 - np.sqrt(5.0)))
 
 
 def triple(values: Iterable[float]) -> tuple[float, float, float]:
-    """Three numbers as plain ones of Python."""
+    """Three numbers as Python floats."""
     x, y, z = (float(value) for value in values)
     return x, y, z
 
@@ -37,7 +37,7 @@ def unit_or(
 
 
 def even_directions(count: int) -> Floats:
-    """Unit vectors evenly over the sphere, (count, 3), from its top on a spiral (Fibonacci)."""
+    """Unit vectors spread evenly over the sphere, (count, 3): a Fibonacci spiral from its top."""
     number = np.arange(count)
     height = 1.0 - (2.0 * number + 1.0) / count
     angle, across = GOLDEN_ANGLE * number, np.sqrt(1.0 - height * height)
@@ -45,14 +45,14 @@ def even_directions(count: int) -> Floats:
 
 
 def both_across(along: Floats) -> tuple[Floats, Floats]:
-    """Two unit vectors (3,) across a unit vector and across each other."""
+    """Two unit vectors (3,) perpendicular to a unit vector and to each other."""
     side = np.cross(along, np.eye(3)[np.abs(along).argmin()])
     side /= np.linalg.norm(side)
     return side, np.cross(along, side)
 
 
 def dot(one: Floats, two: Floats) -> Floats:
-    """Of vectors (..., 3)."""
+    """Dot products of vectors (..., 3)."""
     return np.asarray(np.einsum("...i,...i->...", one, two))
 
 
@@ -63,7 +63,7 @@ def unit_rows(rows: Floats) -> Floats:
 
 
 def dot_rows(one: Floats, two: Floats) -> Floats:
-    """Of rows (3, ...)."""
+    """Dot products of rows (3, ...)."""
     product = one * two
     total: Floats = product[0]
     total += product[1]

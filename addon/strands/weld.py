@@ -1,4 +1,4 @@
-"""Vertices at one place count as one: files split them along seams of UVs and of normals."""
+"""Merging coincident vertices, which files split along seams of UVs and normals."""
 
 from __future__ import annotations
 
@@ -19,5 +19,5 @@ def same_places(positions: Floats) -> Ints:
     number = np.asarray(number).reshape(-1)
     if np.array_equal(positions[first[number]], positions):
         return number
-    # two places have one key, which sorting by all three coordinates cannot have
+    # two places have the same key: sort by all three coordinates instead
     return np.asarray(np.unique(positions, axis=0, return_inverse=True)[1]).reshape(-1)
