@@ -1,9 +1,9 @@
 """Parameters, each declared once.
 
-A room's `settings.py` declares a `Settings` subclass. From that one declaration come the
-checked value object (here), the Blender property (`blender.properties.properties`), the GLSL struct
-and its bytes (`params.glsl`), the preset check (`params.preset`) and the row in the docs
-(`params.docs`).
+A room's `settings.py` declares a `Settings` subclass. The checked value object (here), the Blender
+properties (`blender.properties.properties`), the GLSL struct and its bytes (`params.glsl`), the
+preset check (`params.preset`) and the table in the docs (`params.docs`) all derive from that one
+declaration.
 """
 
 from .field import (

@@ -1,7 +1,7 @@
 """A parameter along the strand: five values from root to tip, joined by a smooth curve.
 
 Monotone cubic interpolation (Fritsch and Carlson 1980, SIAM J. Numer. Anal. 17, 238): between two
-values the curve never leaves their range, so that an artist gets no stiffness below zero.
+values the curve stays within their range, so that no stiffness falls below zero.
 """
 
 from __future__ import annotations
@@ -10,14 +10,14 @@ import numpy as np
 
 from ..arrays import Floats
 
-#: Places of the values, 0 at the root and 1 at the tip.
+#: Where the values lie, from 0 at the root to 1 at the tip.
 PLACES = (0.0, 0.25, 0.5, 0.75, 1.0)
 
 type Curve = tuple[float, ...]
 
 
 def along(curve: Curve, place: Floats) -> Floats:
-    """The curve's values float64 at these places (n,), 0 at the root and 1 at the tip."""
+    """The curve's values at these places (n,), 0 at the root and 1 at the tip, (n,) float64."""
     knots, values = np.array(PLACES), np.asarray(curve, np.float64)
     step = np.diff(knots)
     secant = np.diff(values) / step

@@ -21,7 +21,7 @@ _UNIT_SYMBOLS = {
 
 
 def table(settings: type[Settings]) -> str:
-    """A Markdown section: heading and one row a parameter."""
+    """A Markdown section: a heading, and a table with a row for each parameter."""
     rows = [
         f"## {settings.title} (`{settings.section}`)",
         "",
@@ -47,7 +47,7 @@ def _row(parameter: Parameter) -> str:
 
 
 def _unit(parameter: Parameter) -> str:
-    """A factor that may lie beyond 0 to 1 has none: its range says so."""
+    """The unit's symbol; none for a factor whose range exceeds 0 to 1."""
     low, high = parameter.hard_range or (0.0, 1.0)
     if parameter.unit == "factor" and not 0.0 <= low <= high <= 1.0:
         return ""
@@ -55,7 +55,7 @@ def _unit(parameter: Parameter) -> str:
 
 
 def _allowed(parameter: Parameter) -> str:
-    """As `code`: what a preset and the command line take; what panels say stands beside it."""
+    """Allowed values, as presets and the command line take them (`code`); choices with labels."""
     if parameter.kind == "choice":
         return "; ".join(f"`{identifier}` {label}" for identifier, label, _ in parameter.choices)
     if parameter.kind == "toggle":

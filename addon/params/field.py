@@ -18,7 +18,7 @@ from ..errors import HairloomError
 from .curve import PLACES, Curve
 
 Kind = Literal["number", "integer", "toggle", "color", "choice", "curve", "mask", "map"]
-#: Kinds that name what an artist has painted.
+#: Kinds whose value is the name of painted data.
 NAMING: tuple[Kind, ...] = ("mask", "map")
 #: length [m], angle [rad], time [s], rate [1/s], speed [m/s], factor [0..1], acceleration [m/s^2]
 Unit = Literal[
@@ -34,21 +34,23 @@ Unit = Literal[
     "pixels",
 ]
 Range = tuple[float, float]
-#: What keeps a set of parameters: the groom (Blender's Curves), the character (the Object), the
-#: scene, or nothing: a job's are those of one operator or one call of a verb.
+#: Where a set of parameters is stored: on the groom (Blender's Curves), the character (the Object)
+#: or the scene; or nowhere, as a job's, which last for one operator or one call of a verb.
 Owner = Literal["groom", "character", "scene", "job"]
-#: What holds all sections of the same owner: a property group, or anything like it.
+#: Holds all sections of one owner as attributes: a property group, or anything like it.
 Sections = Any
 
 _METADATA_KEY = "parameter"
-#: A name that is as much like one that was mistyped, from 0 to 1, may be the one that was meant.
+#: Similarity to a mistyped name, from 0 to 1, from which on a name is suggested instead.
 _NEAR = 0.5
 
 
 @dataclass(frozen=True)
 class Condition:
-    """Whether something holds of settings; and, where it does not, what a field that waits for it
-    says on its face, such as "needs Clump"."""
+    """A condition on settings.
+
+    `lack` is the text that a field shows while its condition does not hold, such as "needs Clump".
+    """
 
     holds: Callable[[Sections], bool]
     lack: Callable[[Sections], str]
@@ -59,16 +61,16 @@ class Condition:
 
 @dataclass(frozen=True)
 class Parameter:
-    """One parameter: everything that Blender, GLSL, presets and the docs need to know of it.
+    """One parameter: everything that Blender, GLSL, presets and the docs need of it.
 
-    `soft_range` is what a slider offers, `hard_range` what a value may be; both inclusive.
-    `source` names the paper or equation, or says "Hairloom".
-    `panel` is the panel below that of the section in which it is drawn; none: in that one itself.
-    It is drawn where `shown_when` holds, and greyed out where `active_when` does not, which says
-    why.
-    `is_painted`: a mask may multiply it, which follows it by itself, see `Settings`.
+    `soft_range` is the range of a slider, `hard_range` that of valid values; both inclusive.
+    `source` names the paper or equation, or is "Hairloom".
+    `panel` is the sub-panel of its section that it is drawn in; empty: the section's own panel.
+    It is drawn where `shown_when` holds, and greyed out, with the reason, where `active_when` does
+    not hold.
+    `is_painted`: a mask may multiply it; `Settings` declares the mask's parameter after it.
     `is_animatable`: keyframes and drivers may change it.
-    `of` is the parameter beside which a mask is drawn, and which it multiplies.
+    `of`, for a mask: the parameter that it multiplies and is drawn beside.
     """
 
     name: str
@@ -89,7 +91,11 @@ class Parameter:
     of: str = ""
 
     def checked(self, value: Any, place: str) -> Any:
-        """The value in its canonical type, or HairloomError naming the value and its range."""
+        """The value in its canonical type.
+
+        Raises:
+            HairloomError: the value is not allowed; names it and its range.
+        """
         try:
             return self._canonical(value)
         except (TypeError, ValueError, OverflowError) as error:
@@ -160,7 +166,7 @@ def _finite(value: Any) -> float:
 
 @dataclass(frozen=True, kw_only=True)
 class Settings:
-    """Base of every room's parameter set: frozen, and checked against its declarations when made.
+    """Base of every room's parameter set: frozen, and checked against its declarations on creation.
 
     Raises:
         HairloomError: a value is outside its hard range or of the wrong kind.
@@ -169,22 +175,22 @@ class Settings:
     #: short name, as in preset files, property groups and the docs
     section: ClassVar[str] = ""
     title: ClassVar[str] = ""
-    #: of the docs about it, and the heading there, such as cards#limits
+    #: its page in the docs, and the heading there, such as cards#limits
     help_page: ClassVar[str] = ""
     owner: ClassVar[Owner] = "job"
-    #: below that of the section, in order
+    #: sub-panels of the section's panel, in order
     panels: ClassVar[tuple[str, ...]] = ()
-    #: the panel after which its own stands, if that shows nothing but what is declared here
+    #: the panel that its own follows, if that shows nothing but what is declared here
     panel_after: ClassVar[str] = ""
-    #: what its panel says above all settings
+    #: the text that its panel shows above all settings
     said_above: ClassVar[str] = ""
     #: the toggle in the header of its panel
     header_toggle: ClassVar[str] = ""
-    #: whether keyframes and drivers may change any
+    #: whether keyframes and drivers may change any of its parameters
     is_animatable: ClassVar[bool] = True
 
     def __init_subclass__(cls) -> None:
-        """Each parameter that may be painted is followed by the one that names its mask."""
+        """Declare, after each parameter that may be painted, the parameter that names its mask."""
         super().__init_subclass__()
         declared: dict[str, Any] = {}
         for name, kind in get_annotations(cls).items():
@@ -204,7 +210,7 @@ class Settings:
     @classmethod
     @cache
     def parameters(cls) -> tuple[Parameter, ...]:
-        """The declarations in the order in which they stand in the class."""
+        """The declarations, in the order of the class."""
         keyed = {} if cls.is_animatable else {"is_animatable": False}
         return tuple(
             dataclasses.replace(field.metadata[_METADATA_KEY], name=field.name, **keyed)
@@ -212,13 +218,13 @@ class Settings:
         )
 
     def multiplied(self, **factors: float) -> Self:
-        """The same with these numbers times their factors, as far as their hard ranges reach."""
+        """The same with these numbers multiplied by factors, clamped to their hard ranges."""
         return self.clipped(
             **{name: getattr(self, name) * factor for name, factor in factors.items()}
         )
 
     def clipped(self, **values: float) -> Self:
-        """The same with these numbers, as far as their hard ranges reach."""
+        """The same with these numbers, clamped to their hard ranges."""
         limits = {p.name: p.hard_range or (-math.inf, math.inf) for p in self.parameters()}
         return dataclasses.replace(
             self,
@@ -229,25 +235,27 @@ class Settings:
         )
 
     def painted(self, name: str, factor: Floats) -> Floats:
-        """A number where it is painted: times a factor, as far as its hard range reaches."""
+        """A number multiplied by painted factors, clamped to its hard range."""
         (parameter,) = (each for each in self.parameters() if each.name == name)
         return np.clip(getattr(self, name) * factor, *(parameter.hard_range or (None, None)))
 
     def with_masks_of(self, other: Self) -> Self:
-        """The same with the masks and maps of others where these name none: what is painted on one
-        head is not the matter of a preset."""
+        """The same, with masks and maps of the other settings where these name none.
+
+        What is painted on a particular head is not part of a preset.
+        """
         names = [each.name for each in self.parameters() if each.kind in NAMING]
         return dataclasses.replace(
             self, **{name: getattr(self, name) or getattr(other, name) for name in names}
         )
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain data, as presets and reports hold it."""
+        """Plain data, as stored in presets and reports."""
         return dataclasses.asdict(self)
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any], place: str) -> Self:
-        """Settings from plain data; names that are missing keep their default.
+        """Settings from plain data; missing names keep their defaults.
 
         Raises:
             HairloomError: a name is unknown, or a value is outside its hard range.
@@ -266,7 +274,8 @@ class Settings:
 
 
 def when(parameter: str, *values: Any, lack: str = "") -> Condition:
-    """Whether a parameter, as "section.name", has one of these values; without any: it is not 0."""
+    """The condition that a parameter, as "section.name", has one of these values; without values:
+    that it is not 0, empty or false."""
     section, _, name = parameter.partition(".")
 
     def holds(sections: Sections) -> bool:
@@ -284,12 +293,12 @@ def both(one: Condition, other: Condition) -> Condition:
 
 
 def either(one: Condition, other: Condition) -> Condition:
-    """Where neither holds, the first says what is lacking."""
+    """The condition that one of two holds; if neither does, the first one's `lack` is shown."""
     return Condition(lambda sections: one(sections) or other(sections), one.lack)
 
 
 class _Drawn(TypedDict, total=False):
-    """Where and when a parameter is drawn, and what may change it, see `Parameter`."""
+    """Where and when a parameter is drawn, and what may change it; see `Parameter`."""
 
     panel: str
     shown_when: Condition
@@ -409,8 +418,7 @@ def curve(
 def color_map(
     *, label: str, description: str, source: str = "Hairloom", **drawn: Unpack[_Drawn]
 ) -> Any:
-    """Declare the name of colours that are painted: they take the place of a colour, where a mask
-    multiplies a number."""
+    """Declare the name of painted colours, which replace a colour as a mask multiplies a number."""
     return _declare(Parameter("", "map", "", label, description, source, **drawn))
 
 

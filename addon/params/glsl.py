@@ -14,14 +14,14 @@ _SCALAR_TYPES = {"number": "float", "integer": "int", "toggle": "int", "choice":
 
 
 def struct_source(settings: type[Settings], struct_name: str) -> str:
-    """GLSL declaration of the struct, one member a parameter, in declaration order."""
+    """GLSL declaration of the struct, one member per parameter, in declaration order."""
     _check_kinds(settings)
     members = [f"  {_SCALAR_TYPES.get(p.kind, 'vec3')} {p.name};" for p in _members(settings)]
     return "\n".join([f"struct {struct_name} {{", *members, "};", ""])
 
 
 def struct_values(settings: Settings) -> np.ndarray:
-    """The values as std140 bytes, (n,) float32; integers are stored by their bit pattern."""
+    """The values in std140 layout, (n,) float32; integers are stored as their bit patterns."""
     _check_kinds(type(settings))
     words: list[float | np.int32] = []
     for parameter in _members(type(settings)):
@@ -43,13 +43,12 @@ def struct_values(settings: Settings) -> np.ndarray:
 
 
 def _members(settings: type[Settings]) -> list[Parameter]:
-    """All but the names of painted colours, which strands have in place of the struct's."""
+    """All parameters but the names of colour maps: the mapped colours are stored with strands."""
     return [each for each in settings.parameters() if each.kind != "map"]
 
 
 def _check_kinds(settings: type[Settings]) -> None:
-    """A curve has no place in a struct: whoever needs one evaluates it into a texture. Nor has the
-    name of a mask."""
+    """Assert that no parameter is a curve, which shaders read from a texture, or a mask's name."""
     others = [p.name for p in settings.parameters() if p.kind in ("curve", "mask")]
     assert not others, f"{settings.section}: {', '.join(others)}"
 

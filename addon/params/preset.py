@@ -1,8 +1,8 @@
-"""Presets: JSON data with a version and a source, checked and never executed.
+"""Presets: JSON data with a version and a source, validated and never executed.
 
 {"hairloom": 1, "section": "shading", "title": "...", "source": "...", "values": {...},
  "also": {"shafts": {...}}}
-`also` is for presets that are about more than one section; most have none.
+`also` is for presets of more than one section; most have none.
 """
 
 from __future__ import annotations
@@ -17,10 +17,11 @@ from ..errors import HairloomError
 from .field import Settings
 
 PRESET_VERSION = 1
-#: A preset has some thousand bytes; JSON may take twenty times its size in memory.
+#: Largest preset file [bytes]: a preset has some thousand, and JSON may take twenty times its size
+#: in memory.
 LARGEST_PRESET = 1 << 16
 
-#: version n -> the step that makes it version n + 1; one entry for each version that ever shipped
+#: version n -> the step that converts it to version n + 1; an entry for each version ever released
 MIGRATIONS: dict[int, Callable[[dict[str, Any]], dict[str, Any]]] = {}
 
 
@@ -28,8 +29,8 @@ MIGRATIONS: dict[int, Callable[[dict[str, Any]], dict[str, Any]]] = {}
 class Preset[S: Settings]:
     """A named set of values, and where they come from.
 
-    settings: of its own section, under which it is found.
-    also: of other sections, which go with it.
+    settings: values of its main section, under which it is listed.
+    also: values of other sections, applied together with it.
     """
 
     title: str
@@ -39,15 +40,16 @@ class Preset[S: Settings]:
 
     @property
     def all(self) -> tuple[Settings, ...]:
-        """All that it sets, a section each."""
+        """All settings of the preset, one for each section."""
         return (self.settings, *self.also)
 
 
 def read_any_preset(path: Path, kinds: Mapping[str, type[Settings]]) -> Preset[Any]:
-    """Read and check a preset of any of these sections.
+    """Read and validate a preset of any of these sections.
 
     Raises:
-        HairloomError: not JSON, of a newer version, of none of these sections, or with a bad value.
+        HairloomError: too large, not JSON, of a newer version, of none of these sections, or with a
+            bad value.
     """
     data = _content(path)
     section = data.get("section") if isinstance(data, dict) else None
@@ -63,7 +65,7 @@ def read_any_preset(path: Path, kinds: Mapping[str, type[Settings]]) -> Preset[A
 
 
 def _also(data: Any, kinds: Mapping[str, type[Settings]], place: str) -> tuple[Settings, ...]:
-    """The settings of other sections that a preset brings along."""
+    """A preset's settings of other sections."""
     unknown = [data] if not isinstance(data, Mapping) else sorted(set(data) - set(kinds))
     if unknown or not all(isinstance(values, Mapping) for values in data.values()):
         raise HairloomError(
@@ -86,7 +88,7 @@ def _content(path: Path) -> Any:
 
 
 def _checked[S: Settings](data: Any, settings: type[S], place: str) -> Preset[S]:
-    """Check plain data against the declarations; older versions are migrated step by step."""
+    """A preset from plain data, checked against the declarations; older versions are migrated."""
     if not isinstance(data, dict) or not isinstance(data.get("values"), Mapping):
         raise HairloomError(
             "this is not a Hairloom preset", place=place, remedy="Choose a preset saved by Hairloom"
@@ -110,7 +112,11 @@ def preset_as_dict(preset: Preset[Any]) -> dict[str, Any]:
 
 
 def migrated(data: dict[str, Any], place: str) -> dict[str, Any]:
-    """The same preset in the present version."""
+    """The same preset in the current version.
+
+    Raises:
+        HairloomError: a newer version, or one that was never released.
+    """
     version = data.get("hairloom")
     if not isinstance(version, int) or isinstance(version, bool) or version > PRESET_VERSION:
         raise HairloomError(

@@ -1,4 +1,4 @@
-"""Settings of any number of sections as one value: frozen, comparable, and typed by their class."""
+"""Settings of any number of sections as one value: immutable, comparable, typed by their class."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ from .field import Settings
 
 
 class SettingsMap:
-    """At most one of each `Settings` class; of a class that is not in it, its defaults.
+    """At most one value of each `Settings` class; classes that are not in it have their defaults.
 
-    `settings[ShadingSettings]` is a ShadingSettings. Maps are equal if they give equal settings of
+    `settings[ShadingSettings]` is a ShadingSettings. Maps are equal if they give equal settings for
     every class.
     """
 
     __slots__ = ("_values",)
 
     def __init__(self, *settings: Settings) -> None:
-        # defaults are left out, so that maps that say the same hold the same
+        # defaults are left out, so that equal maps store the same values
         self._values = {type(one): one for one in settings if one != _default(type(one))}  # type: ignore[arg-type]
 
     def __getitem__[S: Settings](self, kind: type[S]) -> S:
@@ -26,12 +26,12 @@ class SettingsMap:
         return cast(S, _default(kind) if found is None else found)  # type: ignore[arg-type]
 
     def with_settings(self, *settings: Settings) -> SettingsMap:
-        """The same but for these."""
+        """The same map with these settings replaced."""
         kept = (one for kind, one in self._values.items() if kind not in map(type, settings))
         return SettingsMap(*kept, *settings)
 
     def only(self, *kinds: type[Settings]) -> SettingsMap:
-        """The settings of these classes alone."""
+        """The map with the settings of these classes only."""
         return SettingsMap(*(self[kind] for kind in kinds))
 
     def __eq__(self, other: object) -> bool:
@@ -46,5 +46,5 @@ class SettingsMap:
 
 @cache
 def _default(kind: Any) -> Any:
-    """Made and checked once, as some are asked for in each frame."""
+    """The default settings of a class, cached because some are needed in each frame."""
     return kind()
