@@ -1,7 +1,7 @@
 """Strands that the head hides are not drawn.
 
-A ball inside the head hides from the eye what lies behind the plane of its horizon and within the
-cone of lines that touch it; from infinitely far, within the cylinder:
+A ball inside the head hides from the eye everything that lies behind the plane of its horizon and
+within the cone of its tangents; in an orthographic view, within a cylinder:
 
                      .-'''-.
     eye    _ _ - - - |  c   | - - _        a strand is left out when all control points
@@ -9,12 +9,12 @@ cone of lines that touch it; from infinitely far, within the cylinder:
              - - _ _ |      | _ - -
                    horizon-'
 
-That region is convex, so a Bezier curve whose control points lie in it, and every chord of it, lies
-in it wholly, and each of its points has the ball, and thus the head around it, before it.
+That region is convex, so it contains a Bezier curve, and every chord of it, if it contains the
+control points. Then each point of the curve is hidden by the ball, and so by the head around it.
 
-Limits: a head that is clipped away in front, or transparent, hides nothing; then culling must be
-off. Balls that reach before the near plane are not taken. Through a hole, such as the socket of an
-eye that is not there, one looks into the head and misses hair that has come through its back.
+Limits: a head that is transparent, or clipped by the near plane, hides nothing, so culling must be
+off. Balls that reach in front of the near plane are not used. Through a hole, such as an eye socket
+without an eye, hair that has come through the back of the head would be visible, but is culled.
 """
 
 from __future__ import annotations
@@ -30,23 +30,23 @@ from ..strands.triangles import area_vectors, areas_of
 from .detail import PictureView
 from .smooth import bezier
 
-#: Strands looked at at once, so that they stay in the processor's cache.
+#: Strands processed at once, so that they stay in the processor's cache.
 _CHUNK = 1024
-#: Places along each axis of the surface's box where a ball may begin to grow.
+#: Number of places along each axis of the surface's box where a ball may start to grow.
 _PLACES = 12
-#: Points on the surface that tell those places how far it is.
+#: Samples of the surface from which the distance of those places is estimated.
 _SAMPLES = 512
-#: Steps with which a ball moves away from the surface, and how much shorter each is.
+#: Number of steps by which a ball moves away from the surface, and the factor of each next step.
 _STEPS, _SHORTER = 8, 0.65
-#: A ball must stand out of the others by this part of the largest one's radius.
+#: A ball must protrude from the others by this fraction of the largest one's radius.
 _MIN_NEWS = 0.2
-#: A ball is shrunk to this part, so that it is well inside.
+#: Balls are shrunk by this factor, so that they are well inside the mesh.
 INNER_PART = 0.95
 
 
 @dataclass(frozen=True)
 class Shades:
-    """The regions behind some balls: p with s = (p - origin) . axis is in one of them where
+    """The regions hidden by some balls. A point p, with s = (p - origin) . axis, is in one if
 
         s >= nearest  and  |p - origin - s axis|^2 <= width + slope s^2
 
@@ -63,16 +63,17 @@ class Shades:
 
 
 def shades_of(spheres: Floats, view: PictureView, half_width: float, radius: float) -> Shades:
-    """What balls hide in one view, at most as many as there are balls.
+    """The regions that occluder spheres hide in one view; spheres of no use are left out.
 
     Args:
-        spheres: (k, 4) xyz centre and w radius [m, world] of occluder spheres.
-        half_width: of what is drawn, at most [pixels].
-        radius: of the strands, at most [m].
+        spheres: (k, 4) xyz centre and w radius [m, world].
+        half_width: the largest half width that a strand is drawn with [pixels].
+        radius: the largest radius of the strands [m].
     """
     balls = np.asarray(spheres, np.float64).reshape(-1, 4)
     eye = np.linalg.inv(np.asarray(view.view, np.float64))
-    scale = np.abs(np.diag(view.projection)[:2]) * view.half_size  # [pixels] for a metre, or slope
+    # [pixels] per metre; in perspective per unit of slope
+    scale = np.abs(np.diag(view.projection)[:2]) * view.half_size
     if view.projection[3, 3] == 0.0:
         away = balls[:, :3] - eye[:3, 3]
         distance = np.linalg.norm(away, axis=1)
@@ -95,7 +96,7 @@ def shades_of(spheres: Floats, view: PictureView, half_width: float, radius: flo
 
 
 def hidden(points: Floats, shades: Shades) -> Bools:
-    """Which strands lie wholly in one of the regions, (strand_count,).
+    """Which strands lie entirely within one of the regions, (strand_count,).
 
     Args:
         points: (strand_count, cv_count, 3) [m], world space.
@@ -116,11 +117,11 @@ def hidden(points: Floats, shades: Shades) -> Bools:
 def faces_away(root: Floats, center: Floats, eye: Floats) -> Bools:
     """Which strands grow on the far side of the head, (strand_count,).
 
-    Their roots look, from the middle of all, away from the eye.
+    Seen from the middle of all roots, their roots lie in a direction away from the eye.
 
     Args:
         root: (strand_count, 3) [m, world].
-        center: (3,) [m], the middle of all roots.
+        center: (3,) [m, world], the middle of all roots.
         eye: (4,), homogeneous, as Camera.eye.
     """
     to_eye = eye[:3] - eye[3] * root
@@ -128,14 +129,15 @@ def faces_away(root: Floats, center: Floats, eye: Floats) -> Bools:
 
 
 def occluder_spheres_of(surface: Surface, count: int = 8, roots: Floats | None = None) -> Floats:
-    """The largest balls inside a mesh that differ, largest first, (k <= count, 4) float32.
+    """The largest balls inside a mesh that differ from each other, (k <= count, 4) float32.
 
-    xyz centre, w radius [m], in the space of the surface. Holes count as closed by a flat cap, so
-    a ball never stands out of one; a line through a ball still crosses the mesh, unless it comes in
-    by one hole and leaves by another. A mesh without an inside gives no balls.
+    xyz centre, w radius [m], in the space of the surface; the largest first. Holes count as closed
+    by caps, so that no ball protrudes from one; a line through a ball still crosses the mesh unless
+    it enters by one hole and leaves by another. A mesh without an inside gives no balls.
 
     Args:
-        roots: (n, 3), same space; only balls about where they are, so none in feet and hands.
+        roots: (n, 3), same space; only the region around them is searched, so that there are no
+            balls in feet and hands.
     """
     surface = surface.once(_capped)
     if not len(surface.triangles):
@@ -149,7 +151,8 @@ def occluder_spheres_of(surface: Surface, count: int = 8, roots: Floats | None =
 
 
 def moved_spheres(spheres: Floats, matrix: Floats) -> Floats:
-    """Spheres (k, 4) moved by an affine (4, 4) matrix, within the ellipsoids that they become."""
+    """Spheres (k, 4) moved by an affine (4, 4) matrix, shrunk to fit into the ellipsoids that the
+    matrix makes of them."""
     matrix = np.asarray(matrix, np.float64)
     centers = spheres[:, :3] @ matrix[:3, :3].T + matrix[:3, 3]
     min_scale = np.linalg.svd(matrix[:3, :3], compute_uv=False).min()
@@ -157,7 +160,7 @@ def moved_spheres(spheres: Floats, matrix: Floats) -> Floats:
 
 
 def _box(surface: Surface, roots: Floats | None) -> tuple[Floats, Floats]:
-    """Where balls are looked for, two corners: the roots and half their size around them."""
+    """The box to search for balls, two corners: that of the roots, grown by half its size."""
     low, high = surface.bounds()
     if roots is None or not len(roots):
         return low, high
@@ -167,7 +170,7 @@ def _box(surface: Surface, roots: Floats | None) -> tuple[Floats, Floats]:
 
 
 def _first_places(surface: Surface, low: Floats, high: Floats, count: int) -> Floats:
-    """Places (n <= count, 3) in a box for about the largest balls, by some of the triangles."""
+    """Places (n <= count, 3) in a box for roughly the largest balls, estimated by samples."""
     fractions = (np.arange(_PLACES) + 0.5) / _PLACES
     cells = np.stack(np.meshgrid(fractions, fractions, fractions, indexing="ij"), axis=-1).reshape(
         -1, 3
@@ -183,7 +186,7 @@ def _first_places(surface: Surface, low: Floats, high: Floats, count: int) -> Fl
 
 
 def _samples(surface: Surface) -> tuple[Floats, Floats]:
-    """Triangles spread evenly over the surface: middles and normals, (n <= _SAMPLES, 3) each."""
+    """Middles and normals of triangles spread evenly over the surface, (n <= _SAMPLES, 3) each."""
     corners = surface.corners.astype(np.float64)
     area = areas_of(corners).cumsum()
     chosen = np.searchsorted(area, area[-1] * (np.arange(_SAMPLES) + 0.5) / _SAMPLES)
@@ -192,7 +195,8 @@ def _samples(surface: Surface) -> tuple[Floats, Floats]:
 
 
 def _grown(centers: Floats, surface: Surface, step: float) -> tuple[Floats, Floats]:
-    """Balls after steps away from the surface, each where it was largest: centres and radii."""
+    """Balls grown by moving away from the surface: centres (n, 3) and radii (n,), each where it was
+    largest."""
     search = search_of(surface)
     best, largest = centers, np.zeros(len(centers))
     for _ in range(_STEPS):
@@ -219,7 +223,7 @@ def _winding(centers: Floats, surface: Surface) -> Floats:
 
 def _capped(surface: Surface) -> Surface:
     """The mesh with each hole closed by triangles from its edges to its middle."""
-    # vertices in one place are one, so that a seam is no hole
+    # merge coincident vertices, so that a seam is no hole
     positions, vertex = np.unique(surface.positions, axis=0, return_inverse=True)
     triangles = vertex.ravel()[surface.triangles]
     edges = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=-1).reshape(-1, 2)
@@ -234,7 +238,7 @@ def _capped(surface: Surface) -> Surface:
 
 
 def _connected(edges: Ints, vertex_count: int) -> Ints:
-    """For each vertex the least vertex that edges (n, 2) join it to, (vertex_count,)."""
+    """The lowest vertex that each vertex is connected to by edges (n, 2), (vertex_count,)."""
     label = np.arange(vertex_count)
     while True:
         least = label.copy()
@@ -247,7 +251,7 @@ def _connected(edges: Ints, vertex_count: int) -> Ints:
 
 
 def _different(balls: Floats, count: int) -> Floats:
-    """The largest ball, then always the one that stands out most, (n <= count, 4)."""
+    """The largest ball, then repeatedly the one that protrudes most from those, (n <= count, 4)."""
     chosen: list[int] = []
     news = balls[:, 3].copy()
     while len(chosen) < min(count, len(balls)):

@@ -2,34 +2,34 @@
 
 Three modes (`DetailSettings.mode`):
 
-adaptive: as few pieces as keep the drawn line within `error` pixels of the curve. A curve b(t)
-    cut into n pieces even in t is nowhere farther from its chord, at the same t, than by
-    d <= 0.75 max(|D1|, |D2|) / n^2, D1 = b0 - 2 b1 + b2 and D2 = b1 - 2 b2 + b3 (Wang 1984). What
-    that is in pixels follows from clip coordinates, in which the curve is a cubic Bezier as well:
-    with xy / w of the curve less that of the chord point l,
+adaptive: as few pieces as keep the drawn line within `error` pixels of the curve. If a curve b(t)
+    is cut into n pieces even in t, its distance d from the chord at the same t is bounded by
+    d <= 0.75 max(|D1|, |D2|) / n^2, D1 = b0 - 2 b1 + b2 and D2 = b1 - 2 b2 + b3 (Wang 1984). The
+    same in pixels follows from clip coordinates, in which the curve is a cubic Bezier as well: the
+    difference in xy / w between the curve l + d and the chord point l is
 
         (l.xy + d.xy) / (l.w + d.w) - l.xy / l.w  =  (d.xy - (l.xy / l.w) d.w) / (l.w + d.w)
 
-    The control points b_j hold curve and chord between them, so l.w + d.w is no less than the
-    least b_j.w, and l.xy / l.w is a mean of the slopes b_j.xy / b_j.w. Hence with
+    Curve and chord lie in the convex hull of the control points b_j, so l.w + d.w is no less than
+    the smallest b_j.w, and l.xy / l.w is a mean of the slopes b_j.xy / b_j.w. Hence with
 
         M = max over j, k of |half_size (D_k.xy - (b_j.xy / b_j.w) D_k.w)| / min over j of b_j.w
 
     in pixels, n = ceil(sqrt(0.75 M / error)) keeps the error, for perspective and orthographic
-    (w = 1) projections alike. One piece is enough already where 0.75 M <= error with the thirds
+    (w = 1) projections alike. A single piece is enough if 0.75 M <= error with the thirds
     (2 D1 + D2) / 3 and (D1 + 2 D2) / 3 in place of D1 and D2, because b(t) - l(t) is
-    -t (1 - t) ((1 - t) (2 D1 + D2) + t (D1 + 2 D2)). Where a control point lies at or behind the
-    eye there is no such bound: as many pieces as allowed.
-heuristic: of Rapp and Spielmann, by the segment's size in the picture and the larger angle to the
-    segments beside it.
+    -t (1 - t) ((1 - t) (2 D1 + D2) + t (D1 + 2 D2)). If a control point lies at or behind the eye
+    there is no such bound, and the segment gets the maximum number of pieces.
+heuristic: by Rapp and Spielmann, from the segment's size in the picture and the larger angle to
+    its neighbours.
 fixed: the same number everywhere.
 
-In the first two a segment that is certainly outside of the picture is one piece: all control
-points, and so the curve and its chord, lie beyond one of the six planes. Neighbours share their
-ends, whatever their factors, so there are no cracks.
+In the first two modes a segment that is certainly outside of the picture is one piece: all control
+points, and so the curve and its chord, lie beyond one of the six planes. Neighbours share their end
+points, whatever their factors, so there are no cracks.
 
-The same formulas are in gpu_shaders/lib_detail.glsl. Both work in float32, where a factor that
-lies on the edge between two may fall either way; that is less than 0.001 pixels of error.
+Twin of gpu_shaders/lib_detail.glsl. Both work in float32, where a factor at the limit between two
+numbers may be rounded either way; that makes less than 0.001 pixels of error.
 """
 
 from __future__ import annotations
@@ -41,19 +41,20 @@ import numpy as np
 from ..arrays import Bools, Floats, Ints
 from .settings import DetailSettings
 
-#: The side planes stand this much farther out, for the width of what is drawn (0.1: 5 % of it).
+#: The side planes are moved out by this factor of w, for the width of strands (0.1: by 5 % of the
+#: picture).
 MARGIN = 0.1
-#: A control point nearer to the plane of the eye is taken to lie in it [m].
+#: A control point nearer to the plane of the eye than this counts as lying in it [m].
 NEAREST = 1.0e-6
-#: The angle between two segments from which the heuristic gives all the pieces of a size [rad].
+#: The angle between segments from which on the heuristic no longer reduces the pieces [rad].
 FULL_ANGLE = np.float32(np.pi / 4.0)
-#: Strands looked at at once, so that they stay in the processor's cache.
+#: Strands processed at once, so that they stay in the processor's cache.
 _CHUNK = 1024
 
 
 @dataclass(frozen=True)
 class PictureView:
-    """What is seen from where, and how large.
+    """A camera, and the size of its picture.
 
     view: (4, 4) world to view space. projection: (4, 4) view to clip space, OpenGL's convention.
     width, height: of the picture [pixels].
@@ -71,13 +72,13 @@ class PictureView:
 
     @property
     def half_size(self) -> tuple[float, float]:
-        """Pixels from the middle of the picture to its edges, across and up."""
+        """Half the width and height of the picture [pixels]."""
         return self.width / 2.0, self.height / 2.0
 
 
 def detail_factors(points: Floats, view: PictureView, settings: DetailSettings) -> Ints:
-    """Pieces of each segment, (strand_count, cv_count - 1) int32 from 1 on, to max_subdivisions
-    where the number is not fixed.
+    """Pieces of each segment, (strand_count, cv_count - 1) int32: at least 1 and, unless the mode
+    is "fixed", at most `max_subdivisions`.
 
     Args:
         points: (strand_count, cv_count, 3) [m], world space.
@@ -86,7 +87,7 @@ def detail_factors(points: Floats, view: PictureView, settings: DetailSettings) 
     if settings.mode == "fixed":
         return np.full((len(points), segment_count), settings.subdivisions, np.int32)
     factors = np.empty((len(points), segment_count), np.int32)
-    with np.errstate(all="ignore"):  # points that are not finite end in one piece or in the most
+    with np.errstate(all="ignore"):  # points that are not finite give 1 or the maximum
         for start in range(0, len(points), _CHUNK):
             cvs = _extended(np.asarray(points[start : start + _CHUNK], np.float32))
             factors[start : start + _CHUNK] = _factors(cvs, view, settings)
@@ -94,7 +95,8 @@ def detail_factors(points: Floats, view: PictureView, settings: DetailSettings) 
 
 
 def stations(factors: Ints) -> Ints:
-    """The first station of each segment and, last, the pieces of the strand, (S, C) int32.
+    """The first station of each segment and, last, the number of pieces, (strand_count, cv_count)
+    int32.
 
     A strand of n pieces has the stations 0 to n. Station s lies in the segment i with
     stations[i] <= s < stations[i + 1], at u = (s - stations[i]) / factors[i]; station n is the tip.
@@ -105,7 +107,7 @@ def stations(factors: Ints) -> Ints:
 
 
 def _factors(cvs: Floats, view: PictureView, settings: DetailSettings) -> Ints:
-    """Of CVs (3, n, cv_count + 2) float32 with one more at either end, (n, cv_count - 1) int32."""
+    """The factors (n, cv_count - 1) int32 of CVs (3, n, cv_count + 2) float32, see `_extended`."""
     clip = _clip(cvs, view.view_projection.astype(np.float32))
     half_size = np.array(view.half_size, np.float32)[:, None, None]
     control = _bezier(clip)
@@ -119,7 +121,7 @@ def _factors(cvs: Floats, view: PictureView, settings: DetailSettings) -> Ints:
 
 
 def wang_pieces(control: tuple[Floats, ...], half_size: Floats, error: np.float32) -> Floats:
-    """The least n that Wang's bound allows, not yet limited, (...) float32.
+    """The smallest n that Wang's bound allows, not yet limited, (...) float32.
 
     Args:
         control: b0, b1, b2, b3 in clip space, (4, ...) each.
@@ -152,7 +154,7 @@ def heuristic_pieces(cvs: Floats, clip: Floats, half_size: Floats, length: np.fl
     """ceil(size / length * min(angle / 45 degrees, 1)), not yet limited, (n, C - 1) float32.
 
     Args:
-        cvs: (3, n, C + 2) [m], with one more at either end. clip: the same in clip space, (4, ...).
+        cvs: (3, n, C + 2) [m], see `_extended`. clip: the same in clip space, (4, ...).
         half_size: (2, ...) [pixels].
         length: of a piece [pixels].
     """
@@ -178,7 +180,7 @@ def is_outside(control: tuple[Floats, ...]) -> Bools:
 
 
 def _extended(points: Floats) -> Floats:
-    """CVs (n, C, 3) as (3, n, C + 2), with one more at either end, straight on."""
+    """CVs (n, C, 3) as (3, n, C + 2), extrapolated straight by one at both ends."""
     cvs = np.moveaxis(points, 2, 0)
     before = 2.0 * cvs[:, :, :1] - cvs[:, :, 1:2]
     after = 2.0 * cvs[:, :, -1:] - cvs[:, :, -2:-1]
@@ -192,18 +194,18 @@ def _clip(cvs: Floats, matrix: Floats) -> Floats:
 
 
 def _bezier(cvs: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-    """Control points (4, n, C - 1) of each segment, of CVs (4, n, C + 2), as smooth.bezier."""
+    """Control points (4, n, C - 1) of each segment from CVs (4, n, C + 2), as `smooth.bezier`."""
     p0, p1, p2, p3 = cvs[..., :-3], cvs[..., 1:-2], cvs[..., 2:-1], cvs[..., 3:]
     sixth = np.float32(1.0 / 6.0)
     return p1, p1 + (p2 - p0) * sixth, p2 - (p3 - p1) * sixth, p2
 
 
 def _angle(one: Floats, two: Floats) -> Floats:
-    """Between vectors (3, ...), in [0, pi]; 0 where one has no length. (Kahan 2006)"""
+    """The angle between vectors (3, ...), in [0, pi]; 0 if one has no length (Kahan 2006)."""
     along = (one * two).sum(axis=0)
     return np.arctan2(_length(np.cross(one, two, axis=0)), along)
 
 
 def _length(vectors: Floats) -> Floats:
-    """Of vectors (n, ...) along their first axis."""
+    """The length of vectors (n, ...) along their first axis."""
     return np.sqrt((vectors * vectors).sum(axis=0))

@@ -1,10 +1,11 @@
-"""Strands that follow their guides are brought to where ties and surfaces hold them.
+"""Strands that follow their guides are moved to where ties and surfaces hold them.
 
-A guide is held exactly; a strand between guides passes its tie a little beside its own place. So
-from root to tip each hold moves the two points beside it there, as the dynamics does: evenly more
-on the way from the root, or from the hold before, and all beyond as a whole. On that way the
-segments get back their lengths, with both ends where they are (FABRIK; Aristidou and Lasenby 2011).
-What a tie would tear off goes as far as the strand is long.
+A guide is held exactly, but a strand between guides passes its tie a little off its own place. So,
+from root to tip, each hold moves the two points beside it to their places, as the dynamics does.
+The points from the root, or from the previous hold, up to there move by a linearly growing
+displacement, those beyond the hold as a whole. The former segments then get back their lengths with
+both ends fixed (FABRIK; Aristidou and Lasenby 2011). A hold that is out of reach moves the strand
+only as far as its length allows.
 """
 
 from __future__ import annotations
@@ -16,9 +17,9 @@ import numpy as np
 from ..arrays import Bools, Floats, Ints, number_in_piece
 from ..strands.strand_set import ROOT_POINTS
 
-#: Sweeps to and fro that give a strand its lengths back.
+#: Number of sweeps back and forth that restore a strand's lengths.
 SWEEPS = 4
-#: A strand nearer to where it is held than this part of its length is there already.
+#: A strand that is off its hold by less than this fraction of its length is not moved.
 NEAR = 1.0e-5
 _TINY = 1.0e-12
 
@@ -37,12 +38,12 @@ class Holds(Protocol):
 
 
 def hold(points: Floats, rest: Floats, offsets: Ints, holds: Holds, anchors: Floats) -> None:
-    """Bring strands (point_count, 3) world [m] to where they are held, in place.
+    """Move strands (point_count, 3) world [m] to where they are held, in place.
 
     Args:
         rest: the same at rest, with the lengths to keep.
         offsets: (strand_count + 1,), strand s is points offsets[s]:offsets[s + 1].
-        holds: those of one strand are one after the other, from root to tip.
+        holds: sorted by strand, and from root to tip within each.
         anchors: (anchor_count, 4, 4), from world at rest to world now, all finite.
     """
     counts = np.diff(offsets)
@@ -62,7 +63,8 @@ def hold(points: Floats, rest: Floats, offsets: Ints, holds: Holds, anchors: Flo
 
 
 def _held(some: Floats, rest: Floats, before: Ints, first: Ints, matrix: Floats) -> Floats:
-    """Strands (n, cv_count, 3) brought to one hold each: their points `first` and the next one."""
+    """Strands (n, cv_count, 3) moved to one hold each, which holds their points `first` and the
+    next one."""
     cv, after = np.arange(some.shape[1]), np.minimum(first + 1, some.shape[1] - 1)
     length = np.linalg.norm(np.diff(rest, axis=1), axis=2)
     here, there = _point(some, first), _point(some, after)
@@ -91,7 +93,7 @@ def _held(some: Floats, rest: Floats, before: Ints, first: Ints, matrix: Floats)
 
 
 def _sweep(some: Floats, length: Floats, before: Ints, first: Ints, is_off: Bools) -> None:
-    """Once from each hold towards the root and back, in place."""
+    """One sweep from each hold towards the root and back, in place."""
     cvs = range(1, some.shape[1] - 1)
     for step in (-1, 1):
         for cv in cvs[::step]:

@@ -1,22 +1,23 @@
 """Strands that ride on guides are led out of colliders; every segment keeps its length.
 
 Guides stay out of colliders, but a strand between two guides that part around a head would go
-through it. From root to tip, a point that is too near to a collider goes straight out, then back
-along its segment to the length that this had, and so on until both hold. Where they do not, as
-behind an ear, the segment turns towards the nearest direction that leads out, as far as it must.
-What comes after it goes along, in its shape. What was in a collider when the motion began may stay
-as deep as it was where its root carries it, and comes out by as much as it moves away from there.
+through it. From root to tip, a point that is too near to a collider moves straight out, then along
+its segment until this has its length again, and so on until both hold. If that fails, as behind an
+ear, the segment turns, as far as it must, towards the nearest direction that leads out. The rest of
+the strand moves along without changing its shape. A point that was in a collider when the motion
+began may stay as deep as it was while it is where its root carries it; as it moves away from there,
+it must come out by the same distance.
 
-Hair behind an ear may lie in the grid of a mesh, whose cells are thicker than the ear, though
-outside of the mesh itself. There the grid does not tell which way is out, so a strand goes with its
-root up to its last such point, and only what comes after that rides. A strand that nothing leads
-out is as its root carries it.
+Hair behind an ear may be inside a mesh according to the mesh's distance field, whose cells are
+thicker than the ear, although it is outside of the mesh itself. There the field does not show the
+way out, so such a strand moves with its root up to its last such point and rides only beyond it. A
+strand that nothing leads out is placed as its root carries it.
 
-Where a strand rides straight into a collider, all ways out are as near, and which one it takes
+If a strand rides straight into a collider, all directions out are equally near, and the choice
 would change from frame to frame. So it starts from how it was bent in the frame before, see
-`Leans`, and turns back from there to where it rides within a fraction of a second.
+`Leans`, and turns back to where it rides within a fraction of a second.
 
-The twin on the GPU is gpu_shaders/lead_out.comp.glsl.
+Twin of gpu_shaders/lead_out.comp.glsl.
 """
 
 from __future__ import annotations
@@ -37,43 +38,44 @@ from ..dynamics.colliders.signed_distance import (
 )
 from ..strands.vectors import even_directions, unit
 
-#: How often a point goes straight out and back to its length, at most.
+#: Maximum number of times that a point moves straight out and back to its segment's length.
 SWEEPS = 2
-#: The square of the sine between a segment and the way out counts as this at least there.
+#: Lower limit of the squared sine of the angle between a segment and the way out in that move.
 STEEPEST = 0.5
 #: How much nearer than it should be a point may come before its strand is led out, as a fraction
-#: of the distance that is kept.
+#: of `Clearance.kept`.
 SLACK = 0.05
-#: A point that lacks more than this of its segment is not moved straight out: from deep inside of a
-#: collider the way out changes its side.
+#: A point that has to move by more than this fraction of its segment is not moved straight out:
+#: deep inside of a collider the way out may switch to another side.
 DEEPEST = 0.5
-#: How many directions are tried for a segment that this does not lead out, and how often the turn
-#: to the one that does is halved.
+#: Number of directions tried for a segment that moving straight out does not lead out, and how
+#: often the turn towards the chosen one is bisected.
 TRIES, HALVINGS = 64, 5
-#: A point that is deeper than this in a grid, as a fraction of the distance that is kept, is looked
-#: for in the mesh itself.
+#: A point deeper than this in a distance field, as a fraction of `Clearance.kept`, is tested with
+#: the mesh itself.
 DEEP = 0.5
-#: A strand that is stuck all the same, as in a fold, is led from its root again, farther out by
-#: this much of its mean segment; how often it is led at most.
+#: A strand that is still stuck, as in a fold, is led again from its root, farther out by this
+#: fraction of its mean segment; maximum number of attempts.
 MARGIN, ATTEMPTS = 0.5, 3
-#: How quickly segments turn back to where they ride once nothing leads them out [1/s], in radians.
+#: How quickly segments turn back to where they ride once nothing leads them out [rad/s].
 TURNING_BACK = 20.0
-#: A strand of which no segment leans by more than this is where it rides.
+#: A strand whose segments all lean by no more than this counts as where it rides.
 UPRIGHT = 1.0e-3
-#: How many points of a strand are looked at together, for the first one that is too near.
+#: How many points of a strand are tested at once for the first one that is too near.
 _AHEAD = np.arange(5)
 _TINY = 1.0e-30
 
-#: Where roots carry points (n,) of all, which belong to the strands (n,): (n, 3) world [m].
+#: Where roots carry points: indices (n,) of points and of their strands (n,) to (n, 3) world [m].
 type Carry = Callable[[Ints, Ints], Floats]
 
 
 @dataclass(frozen=True, eq=False)
 class HeldParts:
-    """Strands that go with their roots up to some of their points.
+    """Strands of which a first part moves rigidly with the root.
 
-    strands: (n,) which. index, owners: (k,) these points, and the strand that each belongs to.
-    every, along: (m,) all points of these strands, and with which of the k each goes.
+    strands: (n,) their indices.
+    index, owners: (k,) the points of these parts, and the strand that each belongs to.
+    every, along: (m,) all points of these strands, and which of the k points each moves with.
     """
 
     strands: Ints
@@ -85,7 +87,7 @@ class HeldParts:
     @classmethod
     def of(cls, held: Ints, offsets: Ints) -> HeldParts:
         """Args:
-        held: of all strands, see `Clearance`.
+        held: (strand_count,), see `Clearance`.
         """
         strands = held.nonzero()[0]
         counts, last = np.diff(offsets)[strands], held[strands]
@@ -97,13 +99,13 @@ class HeldParts:
 
 @dataclass(frozen=True, eq=False)
 class Clearance:
-    """How far strands stay from colliders where their roots carry them.
+    """The distance that strands keep from colliders while they are where their roots carry them.
 
-    kept: [m], the distance of a point that was at least so far away when the motion began.
-    points: (point_count,) float32 [m], that of each: `kept`, or less if it was nearer when the
-        motion began; -inf where it goes with its root.
-    held: (strand_count,) int32, up to which of its points each strand goes with its root, since
-        that lies in a grid but not in its mesh; 0: only the root.
+    kept: [m], the distance of points that were at least this far away when the motion began.
+    points: (point_count,) float32 [m], the distance of each point: `kept`, or less if it was nearer
+        when the motion began; -inf where it moves with its root.
+    held: (strand_count,) int32, the last point of each strand that moves with its root, because it
+        is inside a distance field but outside the mesh; 0: only the root.
     """
 
     kept: float
@@ -112,13 +114,13 @@ class Clearance:
     _held_parts: HeldParts | None = None
 
     def holding(self, points: Ints, offsets: Ints) -> Clearance:
-        """The same where strands go with their roots up to these points (n,) at least."""
+        """The same, with strands moving with their roots at least up to these points (n,)."""
         held, owner = self.held.copy(), _owners(points, offsets)
         np.maximum.at(held, owner, (points - offsets[owner]).astype(np.int32))
         return Clearance(self.kept, _free_up_to(held, self.points, offsets), held)
 
     def held_parts(self, offsets: Ints) -> HeldParts:
-        """Of all strands, which never have other points: found once."""
+        """The held parts of all strands; computed once, for the first `offsets`."""
         if self._held_parts is None:
             object.__setattr__(self, "_held_parts", HeldParts.of(self.held, offsets))
         assert self._held_parts is not None
@@ -126,7 +128,8 @@ class Clearance:
 
     @cached_property
     def reach(self) -> Floats:
-        """How near each point must be to be too near, (point_count,) float32 [m]."""
+        """The distance below which each point may be too near, (point_count,) float32 [m]; -inf
+        where it moves with its root."""
         most = np.float32((1.0 - SLACK) * self.kept)
         return np.where(self.points == -np.inf, np.float32(-np.inf), most)
 
@@ -136,8 +139,8 @@ class Leans:
     """How leading out has bent strands in one frame, for the next one.
 
     strands: (n,) ascending, those that are not where they ride.
-    values: (m, 3) float32, of all their points, one strand after the other: what was added to the
-        direction of length 1 of the segment that ends there, world axes.
+    values: (m, 3) float32, for all of their points, strand by strand: the change of the unit
+        direction of the segment that ends there, world axes.
     """
 
     strands: Ints
@@ -146,11 +149,11 @@ class Leans:
     @classmethod
     def between(cls, strands: Ints, ridden: Floats, led: Floats, offsets: Ints) -> Leans:
         """Args:
-        strands: (n,). ridden, led: (m, 3) where they ride, and where they were led to.
+        strands: (n,). ridden, led: (m, 3) their points where they ride, and where they were led to.
         """
         counts = np.diff(offsets)[strands]
         begins = piece_starts(counts)
-        values = _steps(led - ridden, begins)  # over lengths, which both have in common
+        values = _steps(led - ridden, begins)  # over lengths, which are the same in both
         values /= np.maximum(_size(_steps(ridden, begins)), np.float32(_TINY))[:, None]
         return cls(strands, values)._where(_size(values) > UPRIGHT, counts)
 
@@ -163,14 +166,18 @@ class Leans:
         return Leans(left.strands, left.values * kept[:, None])
 
     def _where(self, is_bent: Bools, counts: Ints) -> Leans:
-        """Those of strands of these point counts (n,) with any point that is bent (m,)."""
+        """The leans of strands that have a bent segment.
+
+        Args:
+            is_bent: (m,). counts: (n,) point counts of the strands.
+        """
         if not len(self.strands):
             return self
         chosen = np.logical_or.reduceat(is_bent, piece_starts(counts))
         return Leans(self.strands[chosen], self.values[np.repeat(chosen, counts)])
 
     def bend(self, points: Floats, offsets: Ints) -> None:
-        """All strands (point_count, 3) by them, in place; segments keep their lengths."""
+        """Bend strands, in place; segments keep their lengths. points: (point_count, 3), of all."""
         if not len(self.strands):
             return
         counts, index = np.diff(offsets)[self.strands], points_of(self.strands, offsets)
@@ -192,7 +199,7 @@ class LedOut:
     """Strands that were led out of colliders in one frame.
 
     strands: (n,) int32, ascending.
-    points: (m, 3) float32 world [m], all points of these, one strand after the other.
+    points: (m, 3) float32 world [m], all of their points, strand by strand.
     leans: how they were bent, where that is known.
     """
 
@@ -202,18 +209,18 @@ class LedOut:
 
     @classmethod
     def of(cls, strands: Ints, points: Floats, offsets: Ints, leans: Leans = NO_LEANS) -> LedOut:
-        """These of all strands, (point_count, 3)."""
+        """Take these strands from the points of all, (point_count, 3)."""
         return cls(strands.astype(np.int32), points[points_of(strands, offsets)], leans)
 
     def fits(self, offsets: Ints) -> bool:
-        """Whether it is of strands with these points."""
+        """Whether strands and point counts match these offsets."""
         count = len(offsets) - 1
         if len(self.strands) and not 0 <= self.strands.min() <= self.strands.max() < count:
             return False
         return self.points.shape == (int(np.diff(offsets)[self.strands].sum()), 3)
 
     def put(self, points: Floats, offsets: Ints) -> None:
-        """Into the points of all strands, (point_count, 3), in place."""
+        """Write into the points of all strands, (point_count, 3), in place."""
         points[points_of(self.strands, offsets)] = self.points
 
 
@@ -223,12 +230,12 @@ NOT_LED = LedOut(np.zeros(0, np.int32), np.zeros((0, 3), np.float32))
 def clearance_at(
     points: Floats, offsets: Ints, colliders: Sequence[PosedCollider], kept: float
 ) -> Clearance:
-    """That of a motion which begins now.
+    """The clearance of a motion that begins now.
 
     Args:
-        points: (point_count, 3) world [m], strand after strand, where their roots carry them.
+        points: (point_count, 3) world [m], strand by strand, where their roots carry them.
         offsets: (strand_count + 1,), strand s is points[offsets[s]:offsets[s + 1]].
-        colliders: taken where they stand at their frame's end.
+        colliders: used in their poses at the frame's end.
         kept: [m].
     """
     distance, _ = signed_distance(points, colliders, kept)
@@ -238,7 +245,7 @@ def clearance_at(
 
 
 def _free_up_to(held: Ints, distance: Floats, offsets: Ints) -> Floats:
-    """The distances (point_count,), but -inf of each strand's points up to `held`."""
+    """The distances (point_count,), but -inf for each strand's points up to `held`."""
     number = np.arange(len(distance)) - np.repeat(offsets[:-1], np.diff(offsets))
     is_held = number <= np.repeat(held, np.diff(offsets))
     return np.where(is_held, np.float32(-np.inf), distance)
@@ -247,7 +254,8 @@ def _free_up_to(held: Ints, distance: Floats, offsets: Ints) -> Floats:
 def beside_meshes(
     points: Floats, distance: Floats, colliders: Sequence[PosedCollider], kept: float
 ) -> Ints:
-    """Which points (n, 3) of these distances (n,) lie deep in a grid, but not in its mesh, (m,)."""
+    """Which points (n, 3), at these distances (n,), lie deep inside a distance field but outside
+    its mesh, (m,)."""
     deep = (distance < -DEEP * kept).nonzero()[0]
     chosen: Ints = deep[are_outside_meshes(points[deep], colliders)]
     return chosen
@@ -264,12 +272,13 @@ def lead_out(
     """Lead strands out of colliders, in place.
 
     Args:
-        carry: where their roots carry points.
-        points, offsets, colliders: as of `clearance_at`.
-        leans: what is left of those of the frame before.
+        points: (point_count, 3) world [m], where strands ride.
+        carry: where roots carry points.
+        offsets, colliders: see `clearance_at`.
+        leans: those of the frame before, after `Leans.after`.
 
     Returns:
-        (n,) the strands that are not where they ride, ascending; and how they are bent.
+        The strands (n,) that are not where they ride, ascending; and how strands are bent.
     """
     poses, kept = poses_now(colliders), clearance.kept
     held = _hold(points, carry, offsets, clearance)
@@ -292,18 +301,18 @@ def lead_out(
         near = _Near.of(strands, found, points, carry, offsets, clearance)
         points[near.index], is_lost = _led(near, kept, poses)
         lost = np.searchsorted(every, near.index[is_lost])
-        ridden[lost] = points[every[lost]]  # which way they were bent is no matter
+        ridden[lost] = points[every[lost]]  # so that they have no lean
     return np.union1d(held, bent), Leans.between(bent, ridden, points.take(every, axis=0), offsets)
 
 
 def _owners(index: Ints, offsets: Ints) -> Ints:
-    """Which strands points belong to."""
+    """The strands that points belong to."""
     return np.searchsorted(offsets, index, side="right") - 1
 
 
 def _hold(points: Floats, carry: Carry, offsets: Ints, clearance: Clearance) -> Ints:
-    """Bring what goes with its root there, in place, and along what comes after it, in its shape;
-    and which strands (n,) have such a part."""
+    """Move the held parts of strands with their roots, in place, and translate the rest of these
+    strands along; returns the strands (n,)."""
     held = clearance.held_parts(offsets)
     shift = carry(held.index, held.owners) - points.take(held.index, axis=0)
     points[held.every] += shift.take(held.along, axis=0)
@@ -311,14 +320,14 @@ def _hold(points: Floats, carry: Carry, offsets: Ints, clearance: Clearance) -> 
 
 
 def _steps(points: Floats, begins: Ints) -> Floats:
-    """From the point before to each, (n, 3); 0 where strands begin."""
+    """The vector from the previous point to each, (n, 3); 0 where strands begin."""
     steps = np.diff(points, axis=0, prepend=points[:1])
     steps[begins] = 0.0
     return steps
 
 
 def points_of(strands: Ints, offsets: Ints) -> Ints:
-    """The indices of all points of some strands, one strand after the other."""
+    """The indices of all points of some strands, strand by strand."""
     counts = np.diff(offsets)[strands]
     begins = piece_starts(counts)
     index: Ints = np.arange(counts.sum()) + np.repeat(offsets[:-1][strands] - begins, counts)
@@ -327,18 +336,20 @@ def points_of(strands: Ints, offsets: Ints) -> Ints:
 
 @cache
 def directions() -> Floats:
-    """What is tried, (TRIES, 3)."""
+    """The directions that are tried, unit vectors (TRIES, 3)."""
     return even_directions(TRIES)
 
 
 @dataclass(frozen=True, eq=False)
 class _Near:
-    """Strands that are too near, one after the other.
+    """Strands that are too near, and all of their points, strand by strand.
 
-    begins, ends: (n,) their points among these. firsts: (n,) the first of each that is too near.
-    found: its distance (n,) [m] and way out (n, 3); None where these are to be asked for.
-    index: (m,) which points these are of all. points, carried: (m, 3) where they ride, and where
-    their roots carry them. wanted: (m,) [m].
+    begins, ends: (n,) where each strand begins and ends among the m points.
+    firsts: (n,) the first point of each, among the m, that is too near.
+    found: its distance (n,) [m] and way out (n, 3); None if these still have to be queried.
+    index: (m,) the points' indices among all.
+    points, carried: (m, 3) where they ride, and where their roots carry them.
+    wanted: (m,) [m], the distance from colliders that each should have.
     """
 
     begins: Ints
@@ -360,7 +371,7 @@ class _Near:
         offsets: Ints,
         clearance: Clearance,
     ) -> _Near:
-        """Those of all strands (point_count, 3).
+        """Take these strands from the points of all, (point_count, 3).
 
         Args:
             found: the first point of each that is too near, its distance and its way out.
@@ -381,7 +392,7 @@ class _Near:
         )
 
     def part(self, chosen: Ints) -> _Near:
-        """Some of the strands, from their roots on."""
+        """Some of the strands, to be led from their roots on."""
         offsets = np.append(self.begins, self.ends[-1:])
         index, counts = points_of(chosen, offsets), np.diff(offsets)[chosen]
         ends = np.cumsum(counts)
@@ -399,18 +410,19 @@ class _Near:
 
     @property
     def mean_segments(self) -> Floats:
-        """(n,) [m]."""
+        """The mean segment length of each strand, (n,) [m]."""
         length = _size(_steps(self.points, self.begins))
         return np.add.reduceat(length, self.begins) / (self.ends - self.begins - 1)
 
 
 def _led(near: _Near, kept: float, poses: Sequence[Pose]) -> tuple[Floats, Bools]:
-    """Where they are led to, (m, 3), and which points nothing leads out, (m,)."""
+    """Where the points are led to, (m, 3), and which belong to strands that nothing leads out,
+    (m,)."""
     count = len(near.begins)
     led, lack = _led_by(near, np.zeros(count), np.full(count, SLACK * kept), kept, poses)
     stuck = np.flatnonzero(lack > SLACK * kept)
     if len(stuck):
-        # all further attempts at once; the first that succeeds counts, or the last
+        # all further attempts at once: use the first that succeeds, or the last
         tries = np.tile(stuck, ATTEMPTS - 1)
         number = np.repeat(np.arange(1, ATTEMPTS), len(stuck))
         again = near.part(tries)
@@ -430,10 +442,12 @@ def _led(near: _Near, kept: float, poses: Sequence[Pose]) -> tuple[Floats, Bools
 def _led_by(
     near: _Near, farther: Floats, given_up: Floats, kept: float, poses: Sequence[Pose]
 ) -> tuple[Floats, Floats]:
-    """Strands led out farther than they must be, by (n,) [m]; and by how much any point of each is
-    nearer than it must be, (n,) [m].
+    """One attempt: where the points are led to, (m, 3), and the largest remaining lack of distance
+    of each strand, (n,) [m].
 
-    A strand of which any is nearer by more than `given_up` (n,) [m] is led no further.
+    Args:
+        farther: (n,) [m] beyond the wanted distance that strands are led out.
+        given_up: (n,) [m], a strand that lacks more than this is led no further.
     """
     walk = _Walk.of(near, farther, SLACK * kept, poses)
     every = np.arange(len(farther))
@@ -442,7 +456,7 @@ def _led_by(
         waiting = walk.push(every, walk.goal[near.firsts] - near.found[0], near.found[1])
     going = walk.underway(every, given_up)
     while len(going) + len(waiting):
-        if len(waiting) > len(going):  # a turn asks much: as many strands at once as can be
+        if len(waiting) > len(going):  # turns are expensive: many strands at once
             walk.turn(waiting)
             going, waiting = np.append(going, walk.underway(waiting, given_up)), waiting[:0]
         else:
@@ -453,16 +467,17 @@ def _led_by(
 
 @dataclass(frozen=True, eq=False)
 class _Walk:
-    """Strands on their way from root to tip, each at its own point and attempt, in place.
+    """Strands being led out from root to tip, each at its own point and sweep; changed in place.
 
-    goal: (m,) [m], how far each point of `near` shall be, but for `slack` [m]. lengths: (m,) [m],
-        of segments.
-    at: (n,) the point that each strand is at. sweep: (n,) how often that went straight out; 0:
-        it may not have to. is_waiting: (n,) for a turn.
-    shift: (n, 3) what the last point that was led moves all that come after it by, until the next
-        one that is; own_shift: the same of the point that it is at.
-    shifts, is_led: of points, (m, 3) and (m,).
-    farther, worst: see `_led_by`.
+    goal: (m,) [m], the distance that each point of `near` should have; `slack` [m] less will do.
+    lengths: (m,) [m], of the segments that end at the points.
+    at: (n,) each strand's current point, among the m.
+    sweep: (n,) how often it has moved straight out; 0: perhaps it need not.
+    is_waiting: (n,) whether the strand waits for its segment to be turned.
+    shift: (n, 3) displacement of the last point that was led, and of the points after it until the
+        next one that is. own_shift: (n, 3) displacement of the current point.
+    shifts, is_led: (m, 3) and (m,), displacement of the points that were led, and which these are.
+    farther: see `_led_by`. worst: (n,) [m], the largest lack so far.
     """
 
     near: _Near
@@ -503,15 +518,17 @@ class _Walk:
         )
 
     def underway(self, some: Ints, given_up: Floats) -> Ints:
-        """Those of some strands that are neither at their tips, nor given up, nor waiting."""
+        """Those of some strands that are neither finished, nor given up, nor waiting."""
         is_going = self.at[some] < self.near.ends[some]
         is_going &= (self.worst[some] <= given_up[some]) & ~self.is_waiting[some]
         return some[is_going]
 
     def step(self, going: Ints) -> Ints:
-        """Move some strands on, by one question to the colliders for all of them: of the points
-        that they are at, and of the next ones, as if these were out. Which of them (k,) go out
-        only if their segments turn."""
+        """Advance some strands with one distance query for all of them.
+
+        It covers each strand's current point and the next ones, as if the current one were out.
+        Returns the strands (k,) whose segments have to turn.
+        """
         index = self.at.take(going)[:, None] + _AHEAD
         np.minimum(index, self.near.ends.take(going)[:, None] - 1, out=index)
         places = self.near.points.take(index, axis=0)
@@ -529,8 +546,11 @@ class _Walk:
         return self.push(going.compress(is_found), lack.take(found), outward.take(found, axis=0))
 
     def push(self, some: Ints, lack: Floats, outward: Floats) -> Ints:
-        """Straight out with some strands' points, which lack this (k,) [m] along their ways out
-        (k, 3), but for those that this will not bring out: which these are."""
+        """Move the current points of some strands straight out, by what they lack (k,) [m] along
+        their ways out (k, 3).
+
+        Returns the strands that this would not lead out; these wait for a turn.
+        """
         is_tried = self.sweep.take(some) == SWEEPS
         is_tried |= lack > DEEPEST * self.lengths.take(self.at.take(some))
         is_going = ~is_tried
@@ -542,7 +562,7 @@ class _Walk:
         return stuck
 
     def turn(self, some: Ints) -> None:
-        """Turn the segments of some strands until they are out."""
+        """Turn the current segments of some strands until their ends are out, and go on."""
         point = self.at[some]
         start, arm, length = self._arms(some, point)
         end, lack = _turned_out(
@@ -565,8 +585,8 @@ class _Walk:
         return self.near.points + self.shifts[last]
 
     def _arms(self, some: Ints, point: Ints) -> tuple[Floats, Floats, Floats]:
-        """The segments that end at some strands' points: where they begin, the way from there to
-        where the points are now, (k, 3) each, and their lengths (k,) [m]."""
+        """The segments that end at some strands' points: their starts, the vectors from there to
+        where the points are now, (k, 3) each, and the lengths to keep, (k,) [m]."""
         start = self.near.points.take(point - 1, axis=0)
         start += self.shift.take(some, axis=0)
         arm = self.near.points.take(point, axis=0)
@@ -575,7 +595,7 @@ class _Walk:
         return start, arm, self.lengths.take(point)
 
     def _go_out(self, some: Ints, lack: Floats, outward: Floats) -> None:
-        """Straight out by what some strands lack (k,) [m], and back to the length."""
+        """Move straight out by what some strands lack (k,) [m], and back to the segment length."""
         point = self.at.take(some)
         start, arm, length = self._arms(some, point)
         arm += outward * _going_out(arm, outward, length, lack)[:, None]
@@ -585,7 +605,8 @@ class _Walk:
         self.sweep[some] += 1
 
     def _go_on(self, some: Ints, count: Ints) -> None:
-        """Some strands go on by some points each (k,): where they are is where they are led to."""
+        """Advance some strands by `count` points each (k,), and record where their current points
+        were led to."""
         is_out = count > 0
         is_led = is_out & (self.sweep.take(some) > 0)
         led = some.compress(is_led)
@@ -597,8 +618,8 @@ class _Walk:
 
 
 def _going_out(arm: Floats, outward: Floats, length: Floats, lack: Floats) -> Floats:
-    """How far [m] the ends of segments (n, 3) go straight out, so that they are out by `lack` [m]
-    when they are back at their length: that takes on what is along the segment."""
+    """How far [m] the ends of segments (n, 3) move straight out, so that `lack` [m] remains of it
+    once the segments are back at their lengths, which removes the component along them."""
     along = np.einsum("ij,ij->i", arm, outward) / np.maximum(length, _TINY)
     return lack / np.maximum(1.0 - along * along, STEEPEST)
 
@@ -611,21 +632,21 @@ def _turned_out(
     wanted: Floats,
     poses: Sequence[Pose],
 ) -> tuple[Floats, Floats]:
-    """The ends (n, 3) of segments that are turned until they are out, and by how much [m] each is
-    nearer than `wanted` all the same.
+    """The ends (n, 3) of segments turned until they are out, and what each still lacks of `wanted`,
+    (n,) [m].
 
     Args:
-        toward: (n, 3) unit vectors, where roots carry segments: tried as well, since that does not
-            jump from frame to frame.
+        toward: (n, 3) unit directions in which roots carry the segments, tried as well since they
+            do not jump from frame to frame.
     """
     rows = np.arange(len(arm))
     tried = np.concatenate([toward[None], np.repeat(directions()[:, None], len(arm), axis=1)])
     distance, _ = distance_of_few((start + length[:, None] * tried).reshape(-1, 3), poses)
     lack = np.maximum(wanted - distance.reshape(len(tried), -1), 0.0)
     arm = arm / np.maximum(length, _TINY)[:, None]
-    # the nearest that leads out; if none does, the one that lacks least
+    # the nearest direction that leads out; if none does, the one with the smallest lack
     found = np.where(lack > 0.0, -2.0 - lack, np.einsum("tni,ni->tn", tried, arm)).argmax(axis=0)
-    # all turns that halving might come to, at once: the least one that leads out
+    # query all turns that the bisection might reach at once, then find the smallest that leads out
     parts = np.arange(1, (1 << HALVINGS) + 1)[:, None, None] / (1 << HALVINGS)
     arms = arm + parts * (tried[found, rows] - arm)
     ends = start + arms * (length / np.maximum(_size(arms), _TINY))[..., None]
@@ -640,11 +661,11 @@ def _turned_out(
 
 
 def _at_length(start: Floats | float, arm: Floats, length: Floats) -> Floats:
-    """The points (n, 3) this far [m] from others, in the direction of `arm`."""
+    """The points (n, 3) at this distance [m] from `start`, in the direction of `arm`."""
     return start + arm * (length / np.maximum(_size(arm), _TINY))[:, None]
 
 
 def _size(vectors: Floats) -> Floats:
-    """Of vectors (..., 3)."""
+    """The lengths of vectors (..., 3)."""
     result: Floats = np.sqrt(np.einsum("...j,...j->...", vectors, vectors))
     return result

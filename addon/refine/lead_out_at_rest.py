@@ -1,5 +1,8 @@
-"""Children that were mixed from strands on both sides of an ear go through it, and fur through the
-folds of its mesh: such are led out once, at rest, as moving strands are."""
+"""Leading strands out of the head once, at rest, in the same way as moving strands.
+
+For children interpolated between strands on both sides of an ear, which go through it, and for fur
+in the folds of its mesh.
+"""
 
 from __future__ import annotations
 
@@ -18,21 +21,25 @@ from ..strands.arc_length import reached
 from ..strands.closest_point import search_of
 from .lead_out import Clearance, beside_meshes, lead_out
 
-#: How far a point keeps from the head at most, as a part of its distance along the strand.
+#: Maximum distance that a point keeps from the head, as a fraction of its distance from the root
+#: along the strand.
 LIFT = 0.3
-#: What is deeper in the head afterwards, as a part of the distance that is kept, is inside.
+#: A point counts as inside if it is still deeper in the head than this fraction of the distance
+#: that strands keep.
 DEEP = 0.5
 
 
 def led_out_at_rest(
     strands: StrandSet, head: DistanceField, length: float
 ) -> tuple[StrandSet, Bools]:
-    """Strands outside of the head that they grow on, and which (strand_count,) are: a few of them,
-    as in a fold, nothing leads out.
+    """Strands led out of the head that they grow on, and which are outside, (strand_count,).
+
+    Nothing leads out a few strands, as in a fold.
 
     Args:
         strands: in the space of the head.
-        length: the hair's [m]; they keep as far from the head as moving hair does by default.
+        length: the hair's length [m]. Strands keep the distance from the head that moving hair of
+            this length keeps by default.
     """
     kept = DynamicsSettings().radius_root * length
     posed = (PosedCollider(head, np.eye(4), np.eye(4)),)
@@ -54,10 +61,10 @@ def led_out_at_rest(
 def are_inside(
     strands: StrandSet, head: DistanceField, deep: float, outside: Ints | None = None
 ) -> Bools:
-    """Which strands (strand_count,) have a point in the head itself that is deeper than this.
+    """Which strands (strand_count,) have a point deeper than `deep` [m] in the head's mesh.
 
     Args:
-        outside: points that are known not to be in it; None: none is.
+        outside: indices of points known to be outside; None: none.
     """
     posed = (PosedCollider(head, np.eye(4), np.eye(4)),)
     distance, _ = signed_distance(strands.points, posed, deep)
@@ -70,12 +77,12 @@ def are_inside(
 
 
 def _as_they_are(points: Floats, index: Ints, _: Ints) -> Floats:
-    """At rest, roots carry points to where they are."""
+    """`Carry` at rest: roots carry points to where they are."""
     return points[index]
 
 
 def _inside(points: Floats, head: DistanceField, distance: Floats, deep: float) -> Ints:
-    """The points (n,) that are deeper in the head itself than `deep`, not only in its grid."""
+    """The points (n,) that are deeper than `deep` in the head's mesh, not only in its field."""
     near = np.flatnonzero(distance < min(UNCOVERED * head.cell - deep, 0.0))
     if head.surface is None or not len(near):
         return near

@@ -1,16 +1,16 @@
-"""Strands that ride on their guides: each turns as these do, and keeps its shape and its length.
+"""Strands that ride on their guides: they turn like their guides, and keep shape and length.
 
-Each segment of a guide has turned since rest by the least rotation that takes on from that of the
-segment before it: no twist is added on the way from root to tip (Bishop 1975), and where a guide
-does not bend, nothing turns. A segment of a strand takes on the rotations of its three guides, as
-far from the root as it is itself, blended as quaternions. Its own segments, turned so and put
-together from the root on, are the strand; where guides leave their roots, so does its root. So
-lengths are kept whatever the guides do, strands of guides that turn rigidly turn rigidly, and a
-coil stays this coil on a guide that bends. Where a curled guide is drawn out, see `curls`.
+The rotation of a guide's segment since rest is that of the segment before it, followed by the
+smallest rotation that completes it: so no twist is added from root to tip (Bishop 1975), and where
+a guide does not bend, nothing turns. A segment of a strand takes the rotations of its three guides
+at the same distance from the root, blended as quaternions. The strand is its own segments, turned
+like this and joined from the root on; if guides leave their roots, the strand's root follows. So
+lengths are kept whatever the guides do, strands whose guides turn rigidly turn rigidly, and a coil
+keeps its shape on a guide that bends. For curled guides that are drawn out, see `curls`.
 
-Vectors lie as planes here, (3, n), and quaternions as (4, n), xyz and w last: that is several times
-as fast. Strands of about one point count are moved together, with the points of one number side by
-side, (3, point_count, strand_count): then nothing has to be repeated for each point.
+Vectors are stored as planes, (3, n), and quaternions as (4, n), w last: that is several times as
+fast. Strands of similar point counts are moved together as (3, point_count, strand_count), so that
+values of a strand broadcast over its points.
 """
 
 from __future__ import annotations
@@ -30,17 +30,21 @@ from ..strands.root_motions import RootMotions
 from ..strands.vectors import cross_rows, dot_rows
 from .curls import drawn_out, guide_axes
 
-#: Segments shorter than this [m] have no direction, so they turn as the one before them.
+#: Segments shorter than this [m] have no direction, so they turn like the one before them.
 SHORTEST = 1.0e-12
-#: Below this a quaternion that turns one direction into another is that of a full reversal.
+#: A rotation between two directions is a full reversal if w of its quaternion, before it is
+#: normalized, is smaller than this.
 REVERSED = 1.0e-6
-#: Quaternions whose real parts are larger turn by less than a right angle, so no two of them point
-#: to different sides, nor do their blends.
+#: Quaternions with a larger real part turn by less than a right angle, so that any two of them, and
+#: their blends, lie in the same hemisphere.
 SMALL = 0.7072
 
 
 class Weights(Protocol):
-    """guide: (strand_count, 3), indices into the guides. weight: (strand_count, 3), sum 1."""
+    """The guides of each strand.
+
+    guide: (strand_count, 3), indices into the guides. weight: (strand_count, 3), sum 1.
+    """
 
     @property
     def guide(self) -> Ints: ...
@@ -55,13 +59,12 @@ class Riders:
 
     offsets: (strand_count + 1,), strand s is points offsets[s]:offsets[s + 1].
     weights: of all strands.
-    blocks: all strands, those of about as many points beside each other, and where these ride.
+    blocks: all strands, grouped by similar point counts, and where they ride.
     reach: (strand_count,) float32, the length of each centre line as a fraction of its strand's.
     segments_per_meter: (guide_count,) float32 [1/m], of each guide.
-    gives: (guide_count, cv_count - 1), which segments of guides are curls, which may be drawn out;
+    gives: (guide_count, cv_count - 1), which segments of guides are curls that may be drawn out;
         None: none.
-    are_lines: whether these strands are centre lines themselves, which get as much longer as their
-        guides do.
+    are_lines: whether these strands are centre lines themselves, which stretch as their guides do.
     """
 
     offsets: Ints
@@ -85,7 +88,7 @@ class Riders:
         """
         lengths = np.linalg.norm(np.diff(guides, axis=1), axis=2).sum(axis=1, dtype=np.float64)
         per_meter = (guides.shape[1] - 1) / np.maximum(lengths, SHORTEST)
-        # a curl is as far along its guide as its own centre line has come
+        # a curl advances along its guide as fast as its own centre line does
         reach = center_lines(strands, guides.shape[1]).lengths()
         reach /= np.maximum(strands.lengths(), np.float32(SHORTEST))
         stations = _middles(strands.points, strands.offsets)
@@ -101,12 +104,12 @@ class Riders:
 
 @dataclass(frozen=True, eq=False)
 class Seats:
-    """Where the segments of the strands of a block ride on their guides, as if the segments of all
-    guides lay one after the other.
+    """Where the segments of a block's strands ride on their guides.
 
-    guide, weight: (3, n), which guides of each strand, and by how much.
-    before, fraction: (3, count - 1, n), the guide's segment whose middle is last before the place
-        that a segment takes its rotation from, and how far that is on the way to the next one's.
+    guide, weight: (3, n), the guides of each strand, and their weights.
+    before, fraction: (3, count - 1, n), the last guide segment whose middle is before the place
+        where the strand's segment rides, numbered over all guides, and how far that place is on the
+        way to the middle of the next one.
     """
 
     guide: Ints
@@ -134,13 +137,13 @@ class Seats:
         return cls(guide, weight, before, place)
 
     def each(self) -> Iterator[tuple[Floats, Ints, Floats]]:
-        """Weight (n,), `before` and `fraction` (count - 1, n), one guide after the other."""
+        """Weight (n,), `before` and `fraction` (count - 1, n), for each of the three guides."""
         return zip(self.weight, self.before, self.fraction, strict=True)
 
 
 def _middles(points: Floats, offsets: Ints) -> Floats:
-    """Distance along its strand [m] of the middle of the segment that begins at each point,
-    (point_count,) float32; that of the tip means nothing.
+    """Distance from the root along the strand [m] of the middle of the segment that begins at each
+    point, (point_count,) float32; values of tips are meaningless.
     """
     ends = steps(points, offsets)
     reached = np.cumsum(ends)
@@ -158,13 +161,13 @@ def ride(
 ) -> Floats:
     """Strands turned with their guides, (point_count, 3) float32, all in one space [m].
 
-    Guides at rest leave every strand bit for bit where its root carries it.
+    Guides at rest leave every strand, bit for bit, where its root carries it.
 
     Args:
         points: (point_count, 3), strands at rest.
-        guide_rest: (guide_count, cv_count, 3), guides carried by their own roots to now.
+        guide_rest: (guide_count, cv_count, 3), guides carried by their own roots.
         guide_now: (guide_count, cv_count, 3), guides as simulated.
-        motions: of the strands' roots to now; None: they have not moved, or `points` have already.
+        motions: of the strands' roots since rest; None: none, or already applied to `points`.
     """
     points = np.asarray(points, np.float32)
     moved = np.empty_like(points)
@@ -178,7 +181,7 @@ def ride(
     have_left = bool(shifts.any())
     for block, seats in riders.blocks:
         rest = block.planes(points)
-        if motions is not None:  # to the bit as `groom.roots.follow` does
+        if motions is not None:  # the same, bit for bit, as `groom.roots.follow`
             rest += motions.change(rest, block.strands)
         change, edge = np.empty_like(rest), rest[:, 1:] - rest[:, :-1]
         change[:, 0] = 0.0
@@ -204,13 +207,13 @@ def guide_turns(rest: Floats, now: Floats) -> Floats:
 
 
 def turns_along(before: Floats, after: Floats) -> Floats:
-    """The same of directions one after the other, (3, m, n) unit vectors or 0: (4, m, n)."""
+    """The turns of successive directions, (4, m, n), from (3, m, n) unit vectors, or 0 for none."""
     has_none = ~(before.any(axis=0) & after.any(axis=0))
     turns = np.empty((4, *before.shape[1:]), np.float32)
     turn = np.zeros((4, before.shape[2]), np.float32)
     turn[3] = 1.0
     for number in range(before.shape[1]):
-        # further: from where the turns before have brought this direction to where it is
+        # the smallest rotation from where the previous turn brings this direction to where it is
         here = before[:, number] + turn_change(turn, before[:, number])
         turn = _product(minimal_rotation(here, after[:, number], has_none[number]), turn)
         turns[:, number] = turn
@@ -218,10 +221,10 @@ def turns_along(before: Floats, after: Floats) -> Floats:
 
 
 def minimal_rotation(one: Floats, other: Floats, has_none: Bools) -> Floats:
-    """The quaternions (4, n) of the least rotations from unit vectors to others, (3, n) each; the
-    identity where either has no direction, (n,).
+    """The quaternions (4, n) of the smallest rotations between unit vectors (3, n); the identity
+    where `has_none` (n,): one of them has no direction.
     """
-    # by the difference, so that there is exactly no rotation where there is none
+    # from the difference, so that equal vectors give exactly the identity
     change = other - one
     turn = np.empty((4, one.shape[1]), np.float32)
     turn[:3] = cross_rows(one, change)
@@ -240,7 +243,7 @@ def minimal_rotation(one: Floats, other: Floats, has_none: Bools) -> Floats:
 
 
 def turn_change(turn: Floats, vector: Floats) -> Floats:
-    """What quaternions (4, n) of any length add to vectors (3, n) by turning them."""
+    """The change of vectors (3, n) by the rotations of quaternions (4, n) of any length."""
     axis, real = turn[:3], turn[3]
     across = cross_rows(axis, vector)
     change = cross_rows(axis, across)
@@ -251,7 +254,7 @@ def turn_change(turn: Floats, vector: Floats) -> Floats:
 
 
 def _directions(grid: Floats) -> Floats:
-    """Unit vectors along the segments, (3, cv_count - 1, guide_count) float32; 0 without length."""
+    """Unit vectors along segments, (3, cv_count - 1, guide_count) float32; 0 for no length."""
     edge = np.ascontiguousarray(np.diff(grid, axis=1).transpose(2, 1, 0), np.float32)
     length = np.sqrt(dot_rows(edge, edge))
     is_short = length < SHORTEST
@@ -261,7 +264,7 @@ def _directions(grid: Floats) -> Floats:
 
 
 def _dot(one: Floats, other: Floats) -> Floats:
-    """Of quaternions (4, ...)."""
+    """Dot products of quaternions (4, ...)."""
     return np.asarray(np.einsum("i...,i...->...", one, other))
 
 
@@ -275,8 +278,8 @@ def _product(left: Floats, right: Floats) -> Floats:
 
 
 def _with_steps(values: Floats) -> Floats:
-    """Values of segments (guide_count, segment_count, 4), and behind them what takes each to that
-    of the next segment, (guide_count, segment_count, 8)."""
+    """Values of segments (guide_count, segment_count, 4), followed by the difference to the next
+    segment's, (guide_count, segment_count, 8)."""
     table = np.zeros((*values.shape[:2], 8), np.float32)
     table[..., :4] = values
     table[:, :-1, 4:] = table[:, 1:, :4] - table[:, :-1, :4]
@@ -291,7 +294,7 @@ def _turned(
     wide: Ints,
     axes: Floats | None,
 ) -> Floats:
-    """What turning and drawing out add to segments (3, count - 1, n); takes `edge` for it.
+    """The change of segments (3, count - 1, n) by turning and drawing out; may overwrite `edge`.
 
     Args:
         wide: which of the strands have a guide that turns by a right angle or more.
@@ -308,12 +311,12 @@ def _turned(
         if blend is None:
             blend = turn
             continue
-        if len(wide):  # of two quaternions of one rotation the nearer
+        if len(wide):  # q and -q are the same rotation: choose the nearer
             some = turn[..., wide]
             turn[..., wide] = some * np.copysign(np.float32(1.0), _dot(some, blend[..., wide]))
         blend += turn
     assert blend is not None
-    if len(wide):  # opposite turns that leave nothing
+    if len(wide):  # opposite turns that cancel out become the identity
         some = blend[..., wide]
         blend[3][:, wide] += _dot(some, some) < REVERSED
     if axis is None or not axis[3].any():
@@ -325,7 +328,7 @@ def _turned(
 
 
 def _between(table: Floats, before: Ints, fraction: Floats) -> Floats:
-    """Values (4, ...) on the way from some rows of a table to the next ones, see `_with_steps`."""
+    """Values (4, ...) interpolated between rows of a table and the next ones, see `_with_steps`."""
     rows = table.reshape(-1, 8).take(before.ravel(), axis=0, mode="clip")
     near: Floats = np.ascontiguousarray(rows.T).reshape(8, *before.shape)
     value = near[4:]
@@ -335,7 +338,7 @@ def _between(table: Floats, before: Ints, fraction: Floats) -> Floats:
 
 
 def _sum(change: Floats) -> None:
-    """Sums along the second axis of (3, count, n), in place."""
+    """Running sums along the second axis of (3, count, n), in place."""
     if change.shape[1] > change.shape[2]:
         np.cumsum(change, axis=1, out=change)
         return

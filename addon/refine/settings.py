@@ -1,4 +1,4 @@
-"""What the artist sets about detail: how finely strands are divided, and how many are drawn."""
+"""Settings of detail: how finely strands are subdivided, and how many are drawn."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _WANG = "Wang 1984, subdivision depth of Bezier curves"
 
 @dataclass(frozen=True, kw_only=True)
 class DetailSettings(Settings):
-    """How finely each segment of a strand is divided in the picture, and what is left out."""
+    """How finely each segment of a strand is subdivided in the picture, and which are not drawn."""
 
     section = "detail"
     title = "Detail"

@@ -1,11 +1,11 @@
-"""The smooth curve of a strand: one cubic Bezier a segment, through all of its CVs.
+"""The smooth curve of a strand: one cubic Bezier per segment, through all of its CVs.
 
-The tangent at a CV is half the way from its neighbour before to its neighbour after (Catmull and
-Rom 1974, the uniform form), so for a segment from p1 to p2 with the neighbours p0 and p3:
+The tangent at a CV is half the vector from its previous to its next neighbour (Catmull and Rom
+1974, the uniform form), so for a segment from p1 to p2 with the neighbours p0 and p3:
 
     b0 = p1    b1 = p1 + (p2 - p0) / 6    b2 = p2 - (p3 - p1) / 6    b3 = p2
 
-Beyond its ends a strand goes on straight. Segments share their ends and the tangents there.
+Beyond its ends a strand is extrapolated straight. Segments share end points and tangents there.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from ..arrays import Floats, Ints
 
 
 def extended(grid: Floats) -> Floats:
-    """The CVs with one more before the root and one after the tip, straight on.
+    """The CVs, extrapolated straight by one before the root and one after the tip.
 
     (strand_count, cv_count, 3) becomes (strand_count, cv_count + 2, 3); at least two CVs.
     """
@@ -33,7 +33,7 @@ def bezier(grid: Floats) -> Floats:
 
 
 def points_at(grid: Floats, strand: Ints, segment: Ints, u: Floats) -> Floats:
-    """Points of the curves, (n, 3), each of one strand, in one segment, u in [0, 1] along it."""
+    """Points of the curves, (n, 3), given the strand, segment and parameter u in [0, 1] of each."""
     last = grid.shape[1] - 1
     rows = basis_weights(np.asarray(u))
     result = np.zeros((len(rows), 3), np.result_type(grid, np.float32))
@@ -45,7 +45,7 @@ def points_at(grid: Floats, strand: Ints, segment: Ints, u: Floats) -> Floats:
 
 
 def basis_weights(u: Floats) -> Floats:
-    """What p0, p1, p2 and p3 weigh at u in [0, 1], (n, 4), sum 1."""
+    """The weights of p0, p1, p2 and p3 at u in [0, 1], (n, 4), sum 1."""
     v = 1.0 - u
     return np.stack(
         [

@@ -1,25 +1,25 @@
 """Fewer and wider strands where the groom is small in the picture.
 
-Each strand has a rank in [0, 1) once and for all. The strands whose rank is below the fraction are
-drawn; the last fifth of them grows thin before it is gone, so that nothing pops. All others are
+Each strand has a constant rank in [0, 1). Strands whose rank is below the drawn fraction are drawn;
+the last fifth of them gets thinner before it disappears, so that nothing pops. The others are
 widened so that the groom covers as much of the picture as before.
 
-How much wider: the width is made up after the least width in pixels, because far hair is as wide as
-that, whatever its radius. But n times fewer strands must not be n times wider where they lie over
-each other many times, and wide strands stand out over the outline. With s the fraction, f the
-factor of the width, L the layers of hair (what all strands cover side by side, over the area of the
-groom), and q what half a strand's width all around adds to that area, the groom covers
+Widening applies after the minimum width in pixels, because distant hair has that width whatever its
+radius. But a factor of 1 / s would be too much where strands overlap many times, and because wide
+strands protrude beyond the outline. With s the fraction, f the factor of the width, L the layers of
+hair (the area of all strands side by side, over the area of the groom), and q the relative growth
+of the groom's area by half a strand's width all around, the groom covers
 
     c(s, f) = s f L / (s f L + 1) (1 + f q)
 
-of its area: a layer count that is distributed exponentially over the groom, as it about is, leaves
+of its area: layer counts are roughly exponentially distributed over the groom, which leaves
 1 / (L + 1) uncovered. c(s, f) = c(1, 1) is a quadratic equation for f. For a sparse groom of thin
 strands f is 1 / s.
 
-Error, measured with down to an eighth of the strands and grooms of 150 to 30 pixels: what the groom
-covers in all stays within 2.2 % of what all strands cover for 11,400 and 2,000 strands combed by
-hand; grown and curled ones are off by 3 % in most views and by 5.6 % at worst, 30 pixels high; 500
-strands by 6.6 %. Widths made up by 1 / s would be off by up to 40 %.
+Measured error, with down to an eighth of the strands, of grooms 150 to 30 pixels high: the covered
+area stays within 2.2 % of that of all strands for 11,400 and 2,000 strands combed by hand; for
+grown and curled ones it is off by 3 % in most views and by 5.6 % at worst, 30 pixels high; for 500
+strands by 6.6 %. A factor of 1 / s would be off by up to 40 %.
 """
 
 from __future__ import annotations
@@ -33,17 +33,17 @@ from ..strands.morton import morton_code
 from .detail import NEAREST, PictureView
 from .settings import DetailSettings
 
-#: From this fraction on every strand is drawn and as wide as it is.
+#: From this fraction on every strand is drawn in its own width.
 WHOLE = 1.25
-#: A fraction below is taken to be this, which is no strand or one.
+#: Lower limit of fractions; no or one strand is left.
 SMALLEST_FRACTION = 1.0e-6
-#: How fast a strand gets its width once the fraction exceeds its rank: all of it at rank * WHOLE.
+#: How fast a strand gains width once the fraction exceeds its rank: it is complete at rank * WHOLE.
 FADE = WHOLE / (WHOLE - 1.0)
 
 
 @dataclass(frozen=True)
 class Thinning:
-    """What of a groom is drawn. fraction: see `drawn_fraction`. widening: factor of the width."""
+    """How a groom is thinned. fraction: see `drawn_fraction`. widening: factor of the width."""
 
     fraction: float = WHOLE
     widening: float = 1.0
@@ -57,16 +57,16 @@ def thinning(
     view: PictureView,
     settings: DetailSettings,
 ) -> Thinning:
-    """How a groom is thinned out in one view.
+    """How a groom is thinned in one view.
 
     Args:
         bounds: lowest and highest corner of all strands, each (3,) [m], world space.
         total_length: of all strands together [m].
         radius: of a strand [m].
-        minimum_width: strands are drawn no thinner [pixels].
+        minimum_width: with which strands are drawn [pixels].
     """
     size = groom_size(bounds, view)
-    larger = int(np.argmax(size))  # brows and lashes are near though they are not high
+    larger = int(np.argmax(size))  # brows and lashes are wide but not high
     fraction = drawn_fraction(size[larger], settings)
     if fraction >= WHOLE:
         return Thinning()
@@ -92,10 +92,10 @@ def groom_size(bounds: tuple[Floats, Floats], view: PictureView) -> tuple[float,
 
 
 def drawn_fraction(size_px: float, settings: DetailSettings) -> float:
-    """Strands of a lower rank than this are drawn: WHOLE is all of them in full width.
+    """The fraction below which the ranks of drawn strands lie; WHOLE: all of them, in full width.
 
     Args:
-        size_px: of the groom in the picture, the larger of its width and its height.
+        size_px: of the groom in the picture, the larger of its width and height.
     """
     if settings.lod_size <= 0.0 or settings.min_density >= 1.0:
         return WHOLE
@@ -104,16 +104,16 @@ def drawn_fraction(size_px: float, settings: DetailSettings) -> float:
 
 
 def width_factor(rank: Floats, fraction: float, widening: float = 1.0) -> Floats:
-    """Factor of the width of strands (n,); 0 is not drawn.
+    """Factor of the width of strands (n,); 0: not drawn.
 
-    It applies to the width after its lower limit in pixels.
+    Applies to the width after its lower limit in pixels.
     """
     left = 1.0 - rank / max(fraction, SMALLEST_FRACTION)
     return widening * np.clip(FADE * left, 0.0, 1.0)
 
 
 def widening(fraction: float, layers: float, overhang: float) -> float:
-    """The width of thinned strands as a factor: f in c(s, f) = c(1, 1), see above.
+    """The factor of the width of thinned strands: f in c(s, f) = c(1, 1), see above.
 
     Args:
         fraction: as from `drawn_fraction`.
@@ -128,11 +128,11 @@ def widening(fraction: float, layers: float, overhang: float) -> float:
 
 
 def even_ranks(roots: Floats, seed: int = 1) -> Floats:
-    """Ranks in [0, 1), each k / n once, so that low ranks alone are the same groom, but sparser.
+    """Ranks in [0, 1), each k / n once, such that low ranks alone make the same groom, but sparser.
 
-    Roots are sorted along a curve that fills space (Morton 1966). Of each two neighbours on it one
-    has a rank below 1/2, of each four one has a rank below 1/4, and so on (the radical inverse of
-    their place, scrambled after Owen 1995): so each place on the head keeps its share.
+    Roots are sorted along a space-filling curve (Morton 1966). Of every two neighbours on it, one
+    has a rank below 1/2, of every four one has a rank below 1/4, and so on (the radical inverse of
+    their place, scrambled as by Owen 1995): so the head is thinned evenly.
 
     Args:
         roots: (strand_count, 3) [m].
@@ -152,7 +152,7 @@ def even_ranks(roots: Floats, seed: int = 1) -> Floats:
 
 
 def _order(keys: Ints) -> Ints:
-    """Which place each key takes among all, (n,)."""
+    """The place of each key in sorted order, (n,)."""
     place = np.empty(len(keys), np.int64)
     place[np.argsort(keys, kind="stable")] = np.arange(len(keys))
     return place
@@ -166,7 +166,7 @@ def _corners(bounds: tuple[Floats, Floats]) -> Floats:
 
 
 def _extents(bounds: tuple[Floats, Floats], view: PictureView) -> Floats:
-    """Of a box across and up the picture, (2,) [m]."""
+    """The extents of a box across and up the picture, (2,) [m]."""
     extents: Floats = np.ptp(_corners(bounds) @ np.asarray(view.view, np.float64)[:2].T, axis=0)
     return extents
 
