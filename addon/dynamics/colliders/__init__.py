@@ -1,4 +1,4 @@
-"""What hair runs into: balls, capsules, sets of balls and closed meshes, posed by matrices."""
+"""Colliders: balls, capsules, sets of balls and closed meshes, posed by matrices."""
 
 from .distance_field import DistanceField
 from .posed import Collider, Pose, PosedCollider, poses_through, transform_points

@@ -1,12 +1,12 @@
-"""Which balls of many may be the nearest to a point: a grid that narrows them down.
+"""A grid that narrows down which of many balls may be nearest to a point.
 
-As distances change by no more than the way, the nearest ball at any point of a cell with center c
-and half diagonal h is one of those with
+Moving a point changes distances by no more than the point moves. So the nearest ball at any point
+of a cell with center c and half diagonal h is one of those with
 
     d_i(c) <= min_j d_j(c) + 2 h,
 
-and no point of it is nearer than min_j d_j(c) - h. The same narrows down the balls of a block of
-cells first, which saves most of the work.
+and no point of the cell is nearer to a ball than min_j d_j(c) - h. The same criterion narrows down
+the balls of a block of cells first, which saves most of the work.
 """
 
 from __future__ import annotations
@@ -27,10 +27,12 @@ _SLACK = 1.0e-3
 
 @dataclass(frozen=True)
 class BallGrid:
-    """low: (3,) float32 [m], corner of cell (0, 0, 0). cell: edge [m]. shape: (3,) cells.
-    nearest: (cell_count,) float32 [m], least distance that a point of the cell may have.
-    row: (cell_count,) of each cell in `begin`, (cell_count + 1,) into `ball`: the balls that may be
-        nearest to a point of the cell.
+    """The balls that may be nearest to a point of each cell.
+
+    low: (3,) float32 [m], corner of cell (0, 0, 0). cell: edge [m]. shape: (3,) cells.
+    nearest: (cell_count,) float32 [m], lower limit of the distance of the cell's points.
+    row, begin: (cell_count,) and (cell_count + 1,); the balls of cell c are
+        ball[begin[row[c]]:begin[row[c] + 1]].
     """
 
     low: Floats
@@ -94,7 +96,7 @@ def ball_distances(points: Floats, centers: Floats, radii: Floats) -> Floats:
 def _may_be_nearest(
     middle: Floats, centers: Floats, radii: Floats, half: np.float32
 ) -> tuple[Ints, Ints]:
-    """Pairs (block, ball), ascending by block, of what may be the nearest somewhere in a block.
+    """Pairs (block, ball), ascending by block, of balls that may be nearest somewhere in a block.
 
     Args:
         middle: (3, m) of the blocks. half: [m], half the diagonal of a cell.
@@ -106,8 +108,8 @@ def _may_be_nearest(
 
 
 def _pair_distances(corner: Floats, offset: Floats, centers: Floats, radii: Floats) -> Floats:
-    """Signed distance [m] of each pair's ball (n, 3), (n,) to the points at every offset (3, m)
-    from its corner (3, n), (m, n)."""
+    """Signed distance [m] of each pair's ball, (n, 3) and (n,), from the points at all offsets
+    (3, m) from the pair's corner (3, n), (m, n)."""
     squared = np.zeros((offset.shape[1], len(radii)), np.float32)
     for axis in range(3):
         displacement = (corner[axis] - centers[:, axis]) + offset[axis, :, None]

@@ -1,14 +1,14 @@
-"""The field of a mesh that bends: made again, frame by frame, where its surface has moved.
+"""The distance field of a mesh that deforms, updated in each frame where its surface has moved.
 
-Each node near a triangle that has moved takes its distance from the nearest triangle, and its sign
-from the side of that triangle on which it lies. The triangles are written into the nodes around
-them, which needs no search: the cost grows with the number of those that have moved, and of those
-beside them. All other nodes keep what the mesh at rest gave them. Nodes that are farther than BAND
-from every triangle only know the side, and a distance that grows by a third of the ways along the
-axes: too short, never too long.
+Each node near a triangle that has moved gets its distance from the nearest triangle, and its sign
+from the side of that triangle on which it lies. Triangles are rasterised into the nodes around
+them, without a search, so the cost grows with the number of triangles that have moved and their
+neighbours. All other nodes keep the values of the mesh at rest. Nodes farther than BAND from every
+triangle only get the sign, and a distance that grows by 1 / sqrt(3) of the path along the axes: too
+short, never too long.
 
-Error: that of `DistanceField` near the surface, on a mesh whose faces look outwards. Where faces
-look both ways, as on a sheet, the side is a guess.
+Error: that of `DistanceField` near the surface, if the mesh's faces point outwards. Where faces
+point both ways, as on a sheet, the sign is a guess.
 """
 
 from __future__ import annotations
@@ -23,23 +23,23 @@ from ...strands.triangles import area_vectors
 from ...strands.vectors import cross_rows, dot_rows
 from .distance_field import MARGIN, DistanceField, covering, points_on
 
-#: How far from a triangle its distance is written, in cells.
+#: Distance from a triangle up to which nodes get its distance, in cells.
 BAND = 1.5
-#: A vertex has moved when it is farther from its rest than this, in cells.
+#: A vertex counts as moved if it is farther from its place at rest than this, in cells.
 MOVED = 0.05
-#: How much larger than at rest the grid may become to either side, in its longest sides.
+#: How far the grid may be extended at each side, in units of its longest side at rest.
 LARGEST = 1
-#: A triangle is a sliver when its height is less than this fraction of its longest edge.
+#: A triangle is a sliver if its height is less than this fraction of its longest edge.
 SLIVER = 1.0e-3
 #: Pairs of triangles and nodes measured at once.
 _PAIRS = 1 << 18
-#: Of two triangles as near, the one counts that a node faces more: what an angle costs, as a
-#: fraction of the distance.
+#: Of two triangles equally near, a node takes the one whose plane is farther from it, which it
+#: faces more: cost of the angle, as a fraction of the distance.
 _EDGE = 1.0e-3
 
 
 class BentField:
-    """A mesh at rest, and its field in any other shape.
+    """Makes the distance field of a mesh in any deformed shape.
 
     Args:
         field: of the mesh at rest.
@@ -55,8 +55,8 @@ class BentField:
         self._outwards = np.float32(1.0 if volume >= 0.0 else -1.0)
 
     def at(self, positions: Floats) -> DistanceField:
-        """The field with vertices at (vertex_count, 3), space of the mesh at rest; that of the rest
-        where none has moved."""
+        """The field with vertices at (vertex_count, 3), in the space of the mesh at rest; the field
+        at rest if none has moved."""
         cell = self.field.cell
         now = np.asarray(positions, np.float32)
         path = now - self._rest
@@ -67,7 +67,7 @@ class BentField:
         low, values, nearest = self._grid_for(now[has_moved])
         corners = now[self._triangles]
         boxes = self._boxes(corners, low, values.shape)
-        affected = np.append(is_moved, True)[nearest]  # -1, the last, is what nothing is known of
+        affected = np.append(is_moved, True)[nearest]  # -1, the last one, for nodes without any
         _mark(affected, *(side[is_moved] for side in boxes))
         beside = (is_moved | _meets(affected, *boxes)).nonzero()[0]
         first, last = (side[beside] for side in boxes)
@@ -80,7 +80,7 @@ class BentField:
 
     @cached_property
     def _nearest(self) -> Ints:
-        """Of each node of the grid a triangle that is about the nearest at rest."""
+        """Approximately the nearest triangle at rest of each node, in the shape of the grid."""
         field, corners = self.field, self._rest[self._triangles]
         boxes = self._boxes(corners, field.low, field.values.shape)
         every = np.ones(field.values.shape, bool)
@@ -89,8 +89,8 @@ class BentField:
         return triangle.ravel()[source]
 
     def _grid_for(self, points: Floats) -> tuple[Floats, Floats, Ints]:
-        """The grid at rest, and made larger, so that points (n, 3) lie in it: where it begins, its
-        values, infinite where it is new, and `_nearest`, -1 where it is new."""
+        """The grid at rest, extended to contain points (n, 3): its lowest corner, its values,
+        infinite at new nodes, and `_nearest`, -1 at new nodes."""
         field, shape = self.field, np.array(self.field.values.shape)
         place = (points - field.low) / field.cell
         more = np.stack([MARGIN - place.min(axis=0), place.max(axis=0) + MARGIN + 1 - shape])
@@ -100,7 +100,7 @@ class BentField:
         return low, values, np.pad(self._nearest, more.T, constant_values=-1)
 
     def _boxes(self, corners: Floats, begin: Floats, shape: tuple[int, ...]) -> tuple[Ints, Ints]:
-        """First and last node (n, 3) within BAND of each triangle (n, 3, 3), inside of the grid."""
+        """The first and last node (n, 3) within BAND of each triangle (n, 3, 3), in the grid."""
         top = np.array(shape) - 1
         place = (corners - begin) / np.float32(self.field.cell)
         low = np.ceil(place.min(axis=1) - BAND).astype(np.int64)
@@ -110,8 +110,12 @@ class BentField:
     def _written(
         self, corners: Floats, low: Ints, high: Ints, begin: Floats, wanted: Bools
     ) -> tuple[Floats, Ints]:
-        """Signed distance of each wanted node [m], and its triangle; infinite and -1 where none is
-        near."""
+        """Signed distance [m] and nearest triangle of each wanted node; infinite and -1 where none
+        is near.
+
+        Args:
+            corners: (n, 3, 3). low, high: see `_boxes`. begin: (3,) [m], place of node (0, 0, 0).
+        """
         field, shape = self.field, wanted.shape
         key = np.full(wanted.size, np.inf, np.float32)
         signed = np.full(wanted.size, np.inf, np.float32)
@@ -159,7 +163,7 @@ class BentField:
 
 
 class _Triangles:
-    """Triangles (n, 3, 3) made ready to be measured from; everything in rows (3, n) float32."""
+    """Triangles (n, 3, 3) prepared for measuring distances; stored as rows (3, n) float32."""
 
     def __init__(self, corners: Floats) -> None:
         rows = np.ascontiguousarray(corners.transpose(1, 2, 0), np.float32)
@@ -168,7 +172,7 @@ class _Triangles:
         lengths = np.stack([dot_rows(edge, edge) for edge in self._edge])
         normal = cross_rows(self._edge[0], self._edge[1])
         area = np.sqrt(dot_rows(normal, normal))
-        # rounding alone says which way a sliver faces: its neighbours decide
+        # a sliver's direction is only rounding: its neighbours decide instead
         self._has_area = area > np.float32(SLIVER) * lengths.max(axis=0)
         normal *= self._has_area / np.maximum(area, np.float32(1.0e-20))
         self._normal = normal
@@ -176,12 +180,12 @@ class _Triangles:
         self._over_length = np.float32(1.0) / np.maximum(lengths, np.float32(1.0e-20))
 
     def heights(self, points: Floats, triangle: Ints) -> Floats:
-        """How far [m] points (3, n) are from the plane of a triangle each, negative behind."""
+        """Signed distance [m] of points (3, n) from the plane of a triangle each, (n,)."""
         offset = points - chosen(self._corner[0], triangle)
         return dot_rows(offset, chosen(self._normal, triangle))
 
     def distances(self, points: Floats, triangle: Ints, height: Floats) -> Floats:
-        """Distance [m] of points (3, n) to a triangle each."""
+        """Distance [m] of points (3, n) from a triangle each, given their `heights`, (n,)."""
         within = self._has_area.take(triangle)
         squared = np.full(len(triangle), np.inf, np.float32)
         for side in range(3):
@@ -203,7 +207,7 @@ def chosen(rows: Floats, index: Ints) -> Floats:
 
 
 def _mark(nodes: Bools, low: Ints, high: Ints) -> None:
-    """Set all nodes within boxes (n, 3), by differences along each axis."""
+    """Set all nodes within boxes (n, 3), in place, by sums over differences along each axis."""
     ends = np.zeros(np.array(nodes.shape) + 1, np.int32)
     for sides in np.ndindex(2, 2, 2):
         corner = np.where(sides, high + 1, low)
@@ -213,7 +217,7 @@ def _mark(nodes: Bools, low: Ints, high: Ints) -> None:
 
 
 def _meets(nodes: Bools, low: Ints, high: Ints) -> Bools:
-    """Which boxes (n, 3) hold any of the nodes, by sums up to their corners."""
+    """Which boxes (n, 3) contain any of the nodes, (n,), by sums up to their corners."""
     sums = np.zeros(np.array(nodes.shape) + 1, np.int64)
     sums[1:, 1:, 1:] = nodes.cumsum(0).cumsum(1).cumsum(2)
     total = np.zeros(len(low), np.int64)
@@ -225,8 +229,8 @@ def _meets(nodes: Bools, low: Ints, high: Ints) -> Bools:
 
 
 def _filled(values: Floats, cell: float) -> tuple[Floats, Ints]:
-    """Values (nx, ny, nz) with infinite ones after the nearest known along the axes; and the flat
-    index of the node that each is from."""
+    """Values (nx, ny, nz) with infinite ones filled in from the nearest known node along the axes;
+    and the flat index of the node that each is from."""
     source = np.arange(values.size).reshape(values.shape)
     unknown = ~np.isfinite(values)
     if not unknown.any():

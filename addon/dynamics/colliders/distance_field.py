@@ -1,17 +1,18 @@
-"""The signed distance of a closed mesh, sampled once on a grid and looked up trilinearly.
+"""The signed distance from a closed mesh, sampled once on a grid and interpolated trilinearly.
 
 Distance: exact near the surface, from the closest point of the mesh; farther away, where it only
-leads out what started inside, interpolated from fewer nodes, which saves nine tenths of the time.
-Sign: generalised winding number, which holes, doubled faces and slivers do not upset; an opening,
-as at a neck, is closed where it is one half. It is evaluated at nodes nearer to the surface than
-one cell, and at one in STRIDE^3 others, whose neighbours are on its side; what is left follows
-along the rows.
+serves to move out points that start inside, interpolated from fewer nodes, which saves nine tenths
+of the time.
+Sign: generalised winding number, which is robust to holes, doubled faces and slivers; an opening,
+as at a neck, is closed where the number is one half. It is evaluated at nodes nearer to the surface
+than one cell, and at one in STRIDE^3 others, whose neighbours are on the same side; remaining nodes
+take the sign of their predecessor along the rows.
 
-No part of the surface lies outside of what is looked up by more than a twentieth of a cell, see
-`covering`: hair that stays out of the one stays out of the other.
+No part of the surface lies outside of the interpolated one by more than a twentieth of a cell, see
+`covering`: hair that stays out of the field stays out of the mesh.
 
-Error of the look-up: zero where the distance is linear; near edges and corners, and where the cell
-is crossed by the medial axis, below one cell's half diagonal, in practice a tenth of a cell.
+Error of the interpolation: zero where the distance is linear; near edges and corners, and where the
+medial axis crosses the cell, below half a cell's diagonal, in practice a tenth of a cell.
 """
 
 from __future__ import annotations
@@ -28,19 +29,19 @@ from ...strands.vectors import dot_rows
 from ..settings import DynamicsSettings
 from .winding import winding_number
 
-#: Cells around the mesh's box, so that the nearest outside is sampled too.
+#: Cells around the mesh's box, so that the surroundings of the surface are sampled too.
 MARGIN = 2
 #: Distances of up to this many cells are exact; hair touches the surface within one.
 EXACT = 6.0
-#: Farther away one node in this many is exact, and the others are interpolated.
+#: Farther away, one node in this many along each axis is exact, and the others are interpolated.
 STRIDE = 3
-#: So near to one half, the winding number of a block's middle does not tell that of the others.
+#: If the winding number at a block's middle is this close to one half, other nodes are evaluated.
 UNSURE = 0.35
-#: How far a part of the surface may lie outside of what is looked up, in cells.
+#: How far a part of the surface may lie outside of the interpolated one, in cells.
 UNCOVERED = 0.05
-#: How many nodes around it know of the closure of an opening.
+#: Number of nodes around the closure of an opening whose distances take it into account.
 CLOSURE_REACH = 16
-#: Cells between the nodes that tell how sharp the surface is.
+#: Spacing of the nodes that measure the surface's curvature, in cells.
 STEP = 2
 
 
@@ -50,7 +51,7 @@ class DistanceField:
     values: (nx, ny, nz) float32 [m], negative inside.
     low: (3,) float32 [m], place of node (0, 0, 0).
     cell: edge of a cell [m].
-    surface: what it is of, where that is known.
+    surface: the mesh, if known.
     """
 
     def __init__(
@@ -64,9 +65,9 @@ class DistanceField:
         self._strides = tuple(stride // 4 for stride in self.values.strides)
         self._along_x = np.array([[0], [self._strides[0]]], np.int64)
         self._top = np.array(self.values.shape, np.float32)[:, None] - np.float32(1.0)
-        self._below_top = self._top - np.float32(1.0e-3)  # so that there is a cell beyond
-        # of each node the values of itself and its neighbours along z, y and both: what lies near
-        # in space is then read from one place
+        self._below_top = self._top - np.float32(1.0e-3)  # so that there is a next node
+        # the values of each node and its neighbours along z, y and both, so that values that are
+        # near in space are contiguous in memory
         _, along_y, along_z = self._strides
         offsets = (0, along_z, along_y, along_y + along_z)
         self._squares = np.stack([np.roll(self._flat, -offset) for offset in offsets], axis=1)
@@ -105,7 +106,7 @@ class DistanceField:
 
     @cached_property
     def bounds(self) -> tuple[Floats, float]:
-        """Around the nodes that lie inside, and the cells that the surface crosses beside them."""
+        """Bounding sphere of inside nodes and the cells beside them that the surface crosses."""
         inside = np.argwhere(self.values < 0.0).astype(np.float32)
         if not len(inside):
             half = self._top[:, 0] * np.float32(self.cell / 2.0)
@@ -117,7 +118,7 @@ class DistanceField:
 
     @cached_property
     def curve_radius(self) -> float:
-        """By how far the surface bulges between two nodes that are 2 STEP cells apart."""
+        """See `Collider`; from how far the surface bulges between nodes 2 STEP cells apart."""
         values, most = self.values, 0.0
         for axis in range(3):
             along = np.moveaxis(values, axis, 0)
@@ -128,8 +129,8 @@ class DistanceField:
         return (STEP * self.cell) ** 2 / (2.0 * max(most, 1.0e-3 * self.cell))
 
     def near(self, points: Floats, reach: Floats | float) -> Ints:
-        """Points in a half of a cell where a distance within `reach` is looked up; its gradient,
-        which `world_distance` divides by, is no longer than sqrt(3)."""
+        """Points in half cells with interpolated distances within `reach`, times sqrt(3): the
+        largest length of the gradient, by which `world_distance` divides."""
         limit = np.broadcast_to(np.float32(1.7321) * reach, points.shape[1:])
         halves, least = np.float32(2.0 / self.cell), self._least
         held = points * halves
@@ -151,7 +152,7 @@ class DistanceField:
     def distance(self, points: Floats) -> tuple[Floats, Floats]:
         """Trilinear distance [m] (n,) and its exact gradient (3, n).
 
-        Outside of the grid the distance grows by the way to the grid's box.
+        Outside of the grid, the distance from the grid's box is added.
         """
         held, beyond = self._split(self._in_cells(points))
         index = self._index(held)
@@ -159,7 +160,7 @@ class DistanceField:
         # the corners of cells, by y and z, and then by x
         corner = self._squares.take(index + self._along_x, axis=0)
         corner = np.ascontiguousarray(corner.transpose(2, 0, 1)).reshape(2, 2, 2, -1)
-        # along z, then y, then x; what is left over at each turn is a derivative
+        # along z, then y, then x; the difference at each step gives a derivative
         values = np.empty((2, *corner.shape[1:]), np.float32)
         np.subtract(corner[:, 1], corner[:, 0], out=values[1])
         np.multiply(values[1], fz, out=values[0])
@@ -180,28 +181,28 @@ class DistanceField:
         return distance, gradient
 
     def are_outside(self, points: Floats) -> Bools:
-        """Whether points (3, n) are outside of the surface itself, (n,). Slow."""
+        """Whether points (3, n) are outside of the mesh itself, (n,). Slow."""
         if self.surface is None or not points.size:
             return self.distance(points)[0] > 0.0
         return np.abs(winding_number(points.T, self.surface)) <= 0.5
 
     def _in_cells(self, points: Floats) -> Floats:
-        """Points (3, n) in cells from the first node."""
+        """Points (3, n) in cells relative to the first node."""
         place: Floats = points - self.low[:, None]
         place *= np.float32(1.0 / self.cell)
         return place
 
     def _split(self, place: Floats) -> tuple[Floats, Floats]:
-        """Places (3, n) in cells, held inside the grid, and how far outside of it they were;
-        takes `place` for the latter."""
+        """Places (3, n) in cells, clamped to the grid, and their offset from it, which overwrites
+        `place`."""
         held = self._held(place)
         place -= held
         return np.minimum(held, self._below_top, out=held), place
 
     @cached_property
     def _least(self) -> Floats:
-        """The least that is looked up in each half of a cell along x, y and z: in a box of a cell
-        that is at one of its corners."""
+        """The smallest interpolated value in each half cell along x, y and z, that is, in each
+        eighth of a cell."""
         result = self.values
         for axis in range(3):
             low, high = np.moveaxis(result, axis, 0)[:-1], np.moveaxis(result, axis, 0)[1:]
@@ -212,7 +213,7 @@ class DistanceField:
         return np.ascontiguousarray(result)
 
     def _held(self, place: Floats) -> Floats:
-        """Places (3, n) in cells, brought inside of the grid; sooner than by np.clip."""
+        """Places (3, n) in cells, clamped to the grid; faster than np.clip."""
         held: Floats = np.maximum(place, np.float32(0.0))
         return np.minimum(held, self._top, out=held)
 
@@ -232,18 +233,18 @@ def _distances(nodes: Floats, surface: Surface, cell: float) -> Floats:
     for axis in range(3):
         distance = _filled_in(distance, chosen[axis], axis)
     least = EXACT * cell
-    # A line between two nodes of a distance d lies above it by no more than (STRIDE cell)^2 / 8 d,
-    # for each axis; without that no distance is too long, which `near` relies on.
+    # Linear interpolation at a distance d overestimates by no more than (STRIDE cell)^2 / 8 d per
+    # axis; subtract that, as `near` relies on distances that are not too long.
     distance -= 3.0 * (STRIDE * cell) ** 2 / (8.0 * np.maximum(distance, least))
     return np.where(exact <= least, exact, np.maximum(distance, least))
 
 
 def with_closures(values: Floats, cell: float) -> Floats:
-    """Values (nx, ny, nz), no longer than the way to where openings are closed.
+    """Values (nx, ny, nz), limited by the distance from where openings are closed.
 
-    There the sign changes between two nodes that are far from the surface. From them on, a value
-    is at most half a cell, and so much longer with each node that the way on the grid is never
-    longer than the straight one.
+    At a closure the sign changes between two nodes that are far from the surface. There a value is
+    at most half a cell, and with each node from there it may grow by 1 / sqrt(3) cells, so that no
+    value exceeds the straight distance.
     """
     size, most = np.abs(values), np.full(values.shape, np.inf)
     for axis in range(3):
@@ -265,14 +266,15 @@ def with_closures(values: Floats, cell: float) -> Floats:
 
 
 def covering(values: Floats, low: Floats, cell: float, points: Floats) -> Floats:
-    """Values (nx, ny, nz), lowered where the surface would lie outside of what is looked up.
+    """Values (nx, ny, nz), lowered where the surface would lie outside of the interpolated one.
 
-    A look-up cuts edges and corners off, and a sheet thinner than a cell vanishes. Each point of
-    the surface that would be outside by e, beyond what is allowed, lowers the nodes of its cell by
-    the least sum of squares that takes e from it: w e / sum of w^2, with its weights w.
+    Interpolation cuts off edges and corners, and a sheet thinner than a cell vanishes. Each point
+    of the surface that would be outside by e, more than UNCOVERED, lowers the nodes of its cell by
+    w e / sum of w^2, with its interpolation weights w: the smallest change, in least squares, that
+    lowers the value at the point by e.
 
     Args:
-        points: (n, 3) of the surface; those outside of the grid do not count.
+        points: (n, 3) on the surface; those outside of the grid are ignored.
     """
     place = (points - low) / cell
     place = place[((place >= 0.0) & (place <= np.array(values.shape) - 1)).all(axis=1)]
@@ -292,7 +294,7 @@ def covering(values: Floats, low: Floats, cell: float, points: Floats) -> Floats
 
 
 def points_on(surface: Surface, spacing: float) -> Floats:
-    """Points (n, 3) all over the triangles, at most `spacing` [m] apart along edges."""
+    """Points (n, 3) spread over all triangles, at most `spacing` [m] apart along edges."""
     corners = surface.corners.astype(np.float64)
     edges = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
     parts = np.ceil(edges / spacing).astype(int)
@@ -316,9 +318,9 @@ def _filled_in(values: Floats, chosen: Ints, axis: int) -> Floats:
 
 
 def _inside(nodes: Floats, distance: Floats, surface: Surface, cell: float) -> Bools:
-    """Whether each node (nx, ny, nz) lies inside; a mesh turned inside out counts as well."""
+    """Whether each node (nx, ny, nz) lies inside, even if the mesh is turned inside out."""
     is_near = distance <= cell * 1.001
-    # in the middle of a block of three by three by three nodes, with no surface through it
+    # the middles of blocks of STRIDE^3 nodes without surface through them
     is_middle = np.zeros(distance.shape, bool)
     is_middle[1::STRIDE, 1::STRIDE, 1::STRIDE] = True
     is_middle &= distance > cell * 1.7321
@@ -331,8 +333,8 @@ def _inside(nodes: Floats, distance: Floats, surface: Surface, cell: float) -> B
     of_middle = is_middle[middles] & ~is_near
     is_asked = is_near | (of_middle & (np.abs(winding - 0.5) < UNSURE))
     winding[is_asked] = np.abs(winding_number(nodes[is_asked], surface))
-    # each row starts outside, thanks to the margin; what is left is as the last one before it, but
-    # where that one is beside an opening
+    # each row starts outside because of the margin; remaining nodes take the number of the last one
+    # before them, unless that one is beside an opening
     along = np.broadcast_to(np.arange(distance.shape[2]), distance.shape)
     last = np.maximum.accumulate(np.where(is_asked | of_middle, along, 0), axis=2)
     winding = np.take_along_axis(winding, last, axis=2)

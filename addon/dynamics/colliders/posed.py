@@ -1,4 +1,4 @@
-"""A solid that moves: what it is asked for, its way during a frame, and its poses on that way."""
+"""Moving solids: the collider protocol, its path during a frame, and its poses on that path."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from ...strands.vectors import dot_rows
 from ..rigid_path import Rigid, RigidPath
 from ..trajectory import at, curvature
 
-#: A collider that turns around within a frame is flat on its way; then it holds nothing out. A
-#: fraction of the largest scale.
+#: A collider whose smallest scale is below this fraction of the largest is flat, as when it is
+#: mirrored within a frame. Then it does not collide.
 FLAT = 1.0e-3
 #: Lengths below this count as zero [m].
 TINY = np.float32(1.0e-12)
 
 
 class Collider(Protocol):
-    """A solid in its own object space, asked for signed distances (negative inside)."""
+    """A solid in its own object space that provides signed distances (negative inside)."""
 
     @property
     def bounds(self) -> tuple[Floats, float]:
@@ -30,12 +30,12 @@ class Collider(Protocol):
 
     @property
     def curve_radius(self) -> float:
-        """[m] about the smallest radius of its convex parts: a straight way of length c between two
-        points outside of it enters it by no more than about c^2 / (8 curve_radius)."""
+        """Approximately the smallest radius of its convex parts [m]: a straight line of length c
+        between two points outside of it enters it by no more than about c^2 / (8 curve_radius)."""
 
     def near(self, points: Floats, reach: Floats | float) -> Ints:
-        """Indices of the points (3, n) that may be closer than `reach` [m], one or (n,) float32,
-        quickly."""
+        """Indices of the points (3, n) that may be closer than `reach` [m], one or (n,) float32; a
+        fast conservative test."""
 
     def distance(self, points: Floats) -> tuple[Floats, Floats]:
         """Signed distance [m] (n,) at the points (3, n), and its gradient (3, n)."""
@@ -43,14 +43,14 @@ class Collider(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class PosedCollider:
-    """A collider and its way during one frame.
+    """A collider and its path during one frame.
 
     matrix_before, matrix_now: (4, 4) affine, object to world, at the frame's begin and end.
-    matrix_earlier: (4, 4), the same one frame earlier, so that its path is bent, see
+    matrix_earlier: (4, 4), the same one frame earlier, which bends its path, see
         `trajectory.curvature`; None: straight.
-    earlier_ratio: duration of that frame, over that of this one.
-    swelling: how far [m] its surface has moved in the frame by its change of shape, at most: what
-        that has swallowed is led out at once.
+    earlier_ratio: duration of the frame before, over that of this one.
+    swelling: maximum distance [m] that its surface has moved in the frame by a change of shape;
+        points that this has swallowed are moved out at once.
 
     Raises:
         HairloomError: a matrix that is not finite or flattens the collider.
@@ -75,15 +75,15 @@ class PosedCollider:
                 raise _broken("its scale is zero")
 
     def at_begin(self) -> PosedCollider:
-        """Where it stands still at the frame's begin."""
+        """The collider at rest in its place at the frame's begin."""
         return PosedCollider(self.collider, self.matrix_before, self.matrix_before)
 
     def at_end(self) -> PosedCollider:
-        """Where it stands still at the frame's end."""
+        """The collider at rest in its place at the frame's end."""
         return PosedCollider(self.collider, self.matrix_now, self.matrix_now)
 
     def stands_as(self, other: PosedCollider) -> bool:
-        """Whether both are of the same collider, and stand at the same place at the frame's end."""
+        """Whether both are the same collider, at the same place at the frame's end."""
         is_same = self.collider is other.collider
         return is_same and np.array_equal(self.matrix_now, other.matrix_now)
 
@@ -99,7 +99,7 @@ class PosedCollider:
 
     @cached_property
     def _arc(self) -> RigidPath | None:
-        """How it turns as a whole; None where that is too little to matter, or it is mirrored."""
+        """Its rigid path; None if it turns too little for its arc to matter, or is mirrored."""
         others = (self.matrix_now, self.matrix_earlier)
         axes = [each[:3, :3] for each in others if each is not None]
         if all(np.array_equal(each, self.matrix_before[:3, :3]) for each in axes):
@@ -115,7 +115,7 @@ class PosedCollider:
 
     @cached_property
     def _seen(self) -> tuple[Floats, Floats, Floats | None]:
-        """Its matrix at the begin, its change and how that is bent, as what turns sees them."""
+        """Its matrix at the begin, the change to the end, and its curvature, relative to `_arc`."""
         before, now, earlier = self.matrix_before, self.matrix_now, self.matrix_earlier
         if self._arc is not None:
             now = _matrix_of(self._arc.now.inverse) @ now
@@ -125,12 +125,12 @@ class PosedCollider:
         return before, now - before, bent
 
     def poses(self, spans: list[tuple[float, float]]) -> list[Pose | None]:
-        """Where it is after each substep; None where it is flat.
+        """Its pose after each substep; None where it is flat.
 
         Args:
             spans: begin and end of the substeps as fractions of the frame.
         """
-        moments: Any = np.array(spans).T[..., None, None]  # in matrix_at an array does for a number
+        moments: Any = np.array(spans).T[..., None, None]  # matrix_at also broadcasts over arrays
         before, now = self.matrix_at(moments)
         center, radius = self.collider.bounds
         centers = (now[:, :3, :3] @ center + now[:, :3, 3]).astype(np.float32)
@@ -160,9 +160,9 @@ class PosedCollider:
 
 
 def _rigid_between(before: Floats, now: Floats) -> Rigid | None:
-    """The rigid part of the motion from one matrix to another; None where it mirrors.
+    """The rigid part of the motion from one matrix to another; None if it mirrors.
 
-    Its origin goes where both matrices put it: what they put elsewhere is a change of shape.
+    It moves the object's origin exactly; any other difference is a change of shape.
     """
     motion = now[:3, :3] @ np.linalg.inv(before[:3, :3])
     left, _, right = np.linalg.svd(motion)
@@ -173,7 +173,7 @@ def _rigid_between(before: Floats, now: Floats) -> Rigid | None:
 
 
 def _matrix_of(place: Rigid) -> Floats:
-    """(4, 4) of a rigid motion."""
+    """The (4, 4) matrix of a rigid motion."""
     matrix = np.eye(4)
     matrix[:3, :3], matrix[:3, 3] = place.rotation, place.shift
     return matrix
@@ -183,11 +183,11 @@ def _matrix_of(place: Rigid) -> Floats:
 class Pose:
     """A collider at the end of a substep.
 
-    inverse: (4, 4) float32, world to object. displacement: (4, 4) float32, what the substep has
-        added to the matrix from object to world.
-    center: (3,) float32 world [m]. radius: [m], of a sphere around it.
-    scale: the smallest of the matrix along any axis.
-    travel: [m], no point of it goes farther in the substep.
+    inverse: (4, 4) float32, world to object. displacement: (4, 4) float32, change of the matrix
+        from object to world in the substep.
+    center, radius: (3,) float32 world [m], and [m], of a bounding sphere.
+    scale: the smallest scale of the matrix in any direction.
+    travel: [m], upper limit of the distance that any of its points moves in the substep.
     matrix, matrix_before: (4, 4) float64, object to world at the substep's end and begin.
     swelling: see `PosedCollider`.
     is_part: whether it is at the end of a part of the substep, see `part`.
@@ -211,9 +211,9 @@ class Pose:
         return inverse_or(self.matrix_before, self.matrix).astype(np.float32)
 
     def part(self, number: int, count: int) -> Pose:
-        """In one of `count` equal parts of the substep.
+        """The pose at the end of one of `count` equal parts of the substep.
 
-        Its inverse matrix goes straight from begin to end, which is nearly so, as it turns little.
+        Its inverse matrix is interpolated linearly, which is accurate as it turns little.
         """
         begin, end = (self._inverse_at((number + more) / count) for more in (0, 1))
         matrix, before = np.linalg.inv(end), np.linalg.inv(begin)
@@ -235,7 +235,8 @@ class Pose:
 
 
 def travels(displacement: Floats, center: Floats, radius: float) -> Floats:
-    """How far [m] any point of a ball goes at most, by changes of a matrix (n, 4, 4)."""
+    """Upper limit of the distance [m] that any point of a ball moves, (n,), by changes of a matrix
+    (n, 4, 4)."""
     linear = displacement[:, :3, :3]
     shift = linear @ center + displacement[:, :3, 3]
     turn = np.sqrt(np.einsum("nij,nij->n", linear, linear))
@@ -244,8 +245,9 @@ def travels(displacement: Floats, center: Floats, radius: float) -> Floats:
 
 
 def inverse_or(matrix: Floats, other: Floats) -> Floats:
-    """The inverse of a matrix (4, 4), or of the other one, which is not flat, where it is flat or
-    turned against it by a right angle or more: else what lies between both inverses may be flat."""
+    """The inverse of a matrix (4, 4), or of the other one, which is not flat, if the first is flat
+    or turned relative to it by a right angle or more: interpolating both inverses could then give a
+    flat one."""
     turn = np.linalg.eigvals(np.linalg.inv(other)[:3, :3] @ matrix[:3, :3])
     is_near = turn.real.min() > FLAT * np.abs(turn).max()
     result: Floats = np.linalg.inv(matrix if is_near else other)
@@ -255,7 +257,7 @@ def inverse_or(matrix: Floats, other: Floats) -> Floats:
 def poses_through(
     colliders: tuple[PosedCollider, ...], spans: list[tuple[float, float]]
 ) -> list[list[Pose]]:
-    """The poses of all colliders after each substep, but of those that are flat then."""
+    """The poses of all colliders after each substep, without those that are flat then."""
     found = [posed.poses(spans) for posed in colliders]
     return [
         [pose for pose in (poses[number] for poses in found) if pose is not None]
@@ -266,10 +268,12 @@ def poses_through(
 def near_points(
     pose: Pose, position: Floats, reach: Floats, beyond: Floats | float = 0.0
 ) -> tuple[Ints, Floats, Floats]:
-    """Points (3, n) world that may be within their reach, (n,) [m], and `beyond` [m], one or (n,):
-    their indices, where they are in object space (3, m), and their reach [m] (m,).
+    """Points (3, n) world that may be within `reach` (n,) plus `beyond`, one or (n,), [m].
 
-    A bounding sphere first, then the collider's own quick answer.
+    Tests a bounding sphere first, then `Collider.near`.
+
+    Returns:
+        Their indices (m,), their places in object space (3, m), and reach plus beyond (m,) [m].
     """
     offset = position - pose.center[:, None]
     farthest = pose.radius + float(reach.max()) + float(np.max(beyond))
@@ -282,15 +286,15 @@ def near_points(
 
 
 def world_distance(pose: Pose, local: Floats, flattest: float = 0.0) -> tuple[Floats, Floats]:
-    """Signed distance (n,) [m] and unit normal outwards (3, n), world, at points (3, n) of object
-    space.
+    """Signed distance (n,) [m] and unit normal outwards (3, n), in world space, at points (3, n) in
+    object space.
 
-    The gradient transforms by the inverse transposed, and its length says how much the distance is
-    scaled along it.
+    The gradient is transformed by the inverse transposed, and its length is the scale of the
+    distance along it.
 
     Args:
-        flattest: how long a gradient counts at least: a sampled one is short where two sides of the
-            collider are as near, and distances would have no bound there.
+        flattest: minimum length of the gradient in object space: a sampled one is short where two
+            sides of the collider are equally near, and distances would have no bound there.
     """
     distance, gradient = pose.collider.distance(local)
     normal = np.einsum("ji,jn->in", pose.inverse[:3, :3], gradient)

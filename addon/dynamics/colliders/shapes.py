@@ -1,6 +1,7 @@
-"""Solids that hair stays out of and that have a formula: balls, capsules, unions of balls.
+"""Analytic colliders: balls and capsules.
 
-Each is a `colliders.Collider` in its own object space. A mesh is a `distance_field.DistanceField`.
+Each is a `colliders.Collider` in its own object space. A mesh is a `distance_field.DistanceField`,
+a union of balls a `sphere_set.SphereSetCollider`.
 """
 
 from __future__ import annotations
@@ -53,7 +54,7 @@ class SphereCollider:
 
 @dataclass(frozen=True)
 class CapsuleCollider:
-    """A rod with round ends; a ball where both ends are one point.
+    """A rod with round ends; a ball if both ends coincide.
 
     start, end: (3,) float32 object space [m], centers of the two round ends. radius: [m].
 
@@ -108,7 +109,7 @@ def distance_from(outward: Floats, radius: Floats | float) -> tuple[Floats, Floa
     """
     length = np.sqrt(outward[0] ** 2 + outward[1] ** 2 + outward[2] ** 2)
     gradient = outward / np.maximum(length, TINY)
-    gradient[2, length < TINY] = 1.0  # on the very axis any way out is as good
+    gradient[2, length < TINY] = 1.0  # on the axis, all directions are equivalent
     return length - np.asarray(radius, np.float32), gradient
 
 

@@ -1,6 +1,6 @@
-"""How far points are from posed colliders, and which way leads out: for whoever is not the solver.
+"""Distances of points from posed colliders, and the direction out, for users other than the solver.
 
-The twin on the GPU is gpu_shaders/lib_signed_distance.glsl.
+Twin of gpu_shaders/lib_signed_distance.glsl.
 """
 
 from __future__ import annotations
@@ -20,36 +20,36 @@ from .posed import (
     world_distance,
 )
 
-#: How long the gradient of a sampled distance counts at least, see `world_distance`.
+#: Minimum length of the gradient of a sampled distance, see `world_distance`.
 FLATTEST = 0.5
-#: Points that are looked for at once: as many as stay in the processor's cache.
+#: Points tested at once, so that they stay in the processor's cache.
 _CHUNK = 32768
 
 
 def signed_distance(
     points: Floats, colliders: Sequence[PosedCollider], reach: float = np.inf
 ) -> tuple[Floats, Floats]:
-    """Signed distance to the nearest collider, where all stand at the frame's end.
+    """Signed distance from the nearest collider at the frame's end.
 
     Args:
         points: (n, 3) world [m].
-        reach: [m] distances beyond it are not looked for; the smaller, the quicker.
+        reach: [m], distances beyond it are not computed; the smaller, the faster.
 
     Returns:
-        (n,) float32 [m], negative inside, `reach` where nothing is nearer; and the unit direction
-        (n, 3) float32 outwards, in which that distance grows; zero where nothing is nearer.
+        The distance (n,) float32 [m], negative inside, `reach` where nothing is nearer; and the
+        unit direction outwards (n, 3) float32, in which it grows, zero where nothing is nearer.
     """
     return distance_to(points, poses_now(colliders), reach)
 
 
 def poses_now(colliders: Sequence[PosedCollider]) -> list[Pose]:
-    """Where all stand at the frame's end, but for those that are flat then."""
+    """The poses of all colliders at the frame's end, without those that are flat then."""
     (poses,) = poses_through(tuple(colliders), [(0.0, 1.0)])
     return poses
 
 
 def distance_to(points: Floats, poses: Sequence[Pose], reach: float) -> tuple[Floats, Floats]:
-    """`signed_distance` for whoever asks often."""
+    """`signed_distance` with `poses_now` computed once for several queries."""
     distance = np.full(len(points), reach, np.float32)
     outward = np.zeros((len(points), 3), np.float32)
     index, found, normal = nearer_than(points, poses, reach)
@@ -71,14 +71,14 @@ def nearer_than(
     index, distance, outward = (
         np.concatenate(each, axis=-1) for each in zip(none, *found, strict=True)
     )
-    order = np.lexsort((distance, index))  # of each point the nearest collider first
+    order = np.lexsort((distance, index))  # the nearest collider of each point first
     index, chosen = np.unique(index.take(order), return_index=True)
     chosen = order.take(chosen)
     return index, distance.take(chosen), outward.take(chosen, axis=1)
 
 
 def distance_of_few(points: Floats, poses: Sequence[Pose]) -> tuple[Floats, Floats]:
-    """`distance_to` at any distance; sooner than that where points are few, or near anyway."""
+    """`distance_to` with infinite reach; faster if points are few or mostly near."""
     rows = np.ascontiguousarray(points.T, np.float32)
     if len(poses) == 1:
         found, normal = world_distance(poses[0], transform_points(poses[0].inverse, rows), FLATTEST)
@@ -116,8 +116,8 @@ def _local(pose: Pose, points: Floats) -> Floats:
 def are_outside_meshes(points: Floats, colliders: Sequence[PosedCollider]) -> Bools:
     """Whether points (n, 3) world are outside of all colliders, (n,). Slow.
 
-    Of meshes themselves, where `signed_distance` knows only their grids, whose cells make thicker
-    what is thin.
+    Tests meshes themselves, while `signed_distance` uses their fields, whose cells thicken thin
+    parts.
     """
     rows = np.ascontiguousarray(np.asarray(points, np.float32).T)
     result = np.ones(rows.shape[1], bool)
@@ -131,7 +131,7 @@ def are_outside_meshes(points: Floats, colliders: Sequence[PosedCollider]) -> Bo
 
 
 def mesh_distance(points: Floats, colliders: Sequence[PosedCollider]) -> Floats:
-    """The same distances (n,) to meshes themselves, of points (n, 3) world. Slow, so for few."""
+    """Signed distances (n,) of points (n, 3) world from meshes themselves. Slow, for few points."""
     rows = np.ascontiguousarray(np.asarray(points, np.float32).T)
     nearest = np.full(rows.shape[1], np.inf, np.float32)
     for pose in poses_now(colliders) if rows.size else ():

@@ -1,7 +1,7 @@
-"""A union of balls as one collider, a quick replacement for a mesh.
+"""A union of balls as one collider, a fast approximation of a mesh.
 
-The distance is that of the nearest ball, min_i |x - c_i| - r_i. Which ball is the nearest one is
-narrowed down by a grid (see `ball_grid.py`), so that a look-up costs a few balls instead of all.
+The distance is that of the nearest ball, min_i |x - c_i| - r_i. A grid narrows down which ball is
+nearest (see `ball_grid.py`), so that a query tests a few balls instead of all.
 """
 
 from __future__ import annotations
@@ -59,8 +59,10 @@ class SphereSetCollider:
         return float(self.radii.min())
 
     def near(self, points: Floats, reach: Floats | float) -> Ints:
-        """By the cell of each point, or the cell nearest to it: all balls lie within the grid's
-        box, so that no point is nearer to one than the box's own nearest point is."""
+        """See `Collider.near`; tests the cell of each point, or the cell nearest to it.
+
+        All balls lie within the grid's box, so no point is nearer to a ball than to the box.
+        """
         index, outside = self._cells(points)
         kept: Ints = np.flatnonzero(
             (self._grid.nearest.take(index) < reach) & (outside < reach * reach)
@@ -78,11 +80,11 @@ class SphereSetCollider:
 
     @cached_property
     def _grid(self) -> BallGrid:
-        """Made with the first look-up: the GPU needs none."""
+        """Made with the first query: the GPU needs none."""
         return ball_grid(self.centers, self.radii)
 
     def _cells(self, points: Floats) -> tuple[Ints, Floats]:
-        """Flat cell of each point, held inside the grid, and its squared way to the grid [m^2]."""
+        """Flat cell of each point, clamped to the grid, and its squared distance from it [m^2]."""
         grid, size = self._grid, np.float32(1.0 / self._grid.cell)
         index = np.zeros(points.shape[1], np.int32)
         outside = np.zeros(points.shape[1], np.float32)
@@ -97,7 +99,7 @@ class SphereSetCollider:
         return index, outside
 
     def _nearest_in_cells(self, points: Floats, cells: Ints) -> Ints:
-        """The nearest ball (n,) of those that the cells name."""
+        """The nearest ball (n,) among those of the points' cells."""
         row, begin = self._grid.row.take(cells), self._grid.begin
         first = begin.take(row)
         count = begin.take(row + 1) - first

@@ -1,14 +1,14 @@
-"""How often a surface winds around a point, for many points at once.
+"""The winding number of a surface around points, for many points at once.
 
 The generalised winding number (Jacobson et al. 2013, "Robust Inside-Outside Segmentation using
 Generalized Winding Numbers") is the sum of the triangles' solid angles over 4 pi: 1 inside, 0
-outside, and small holes, doubled faces and slivers hardly change it. Triangles that are far from a
-point, measured by the size of their group, are summed as one dipole (Barill et al. 2018, "Fast
-Winding Numbers for Soups and Clouds", the first-order term); near ones exactly. Points of one cell
-have the same groups: those that are far from all of the cell. Cells stand still, so the number of a
-point does not depend on other points.
+outside, and small holes, doubled faces and slivers hardly change it. Groups of triangles that are
+far from a point, relative to their size, are summed as one dipole (Barill et al. 2018, "Fast
+Winding Numbers for Soups and Clouds", the first-order term); near triangles exactly. Points of a
+cell share their groups: those that are far from the whole cell. Cells are fixed in space, so the
+result for a point does not depend on other points.
 
-Error against the exact sum: below 0.05, while 0.5 is what divides inside from outside.
+Error against the exact sum: below 0.05, while the threshold between inside and outside is 0.5.
 """
 
 from __future__ import annotations
@@ -24,22 +24,23 @@ from ...strands.triangle_tree import TriangleTree
 from ...strands.triangles import area_vectors
 from ...strands.vectors import cross_rows, dot_rows
 
-#: A group of triangles is far at this many times its own radius from its centre.
+#: A group of triangles is far beyond this many of its own radii from its centre.
 FAR = 2.5
-#: Cells that walk down the tree together: what is asked of them stays in the cache.
+#: Cells that traverse the tree together, so that their data stay in the cache.
 _CHUNK = 512
-#: Side of a cell, in terms of the root of a triangle's area.
+#: Side of a cell, in units of the square root of the mean area of triangles.
 _CELL = 4.0
-#: Pairs of points and groups or triangles that are looked at at once.
+#: Pairs of points and groups or triangles processed at once.
 _PAIRS = 16_384
 
 
 @dataclass(frozen=True)
 class _Dipoles:
-    """What the triangles below each node of one level come to, seen from afar.
+    """Dipoles of the triangles below each node of one level of the tree.
 
-    center: (3, node_count) [m], weighted by area. moment: (3, node_count) [m^2], the sum of area
-    times normal. reach: (node_count,) [m] around the centre; beyond it they are far.
+    center: (3, node_count) [m], weighted by area.
+    moment: (3, node_count) [m^2], the sum of area times normal.
+    reach: (node_count,) [m], the distance from the centre beyond which they are far.
     """
 
     center: Floats
@@ -48,7 +49,7 @@ class _Dipoles:
 
     @classmethod
     def of_triangles(cls, corners: Floats) -> _Dipoles:
-        """Of each triangle alone; see `_Prepared` for the corners."""
+        """The dipole of each triangle; see `_Prepared` for the corners."""
         center = corners.mean(axis=0)
         away = corners - center
         radius = np.sqrt((away * away).sum(axis=1).max(axis=0))
@@ -58,12 +59,13 @@ class _Dipoles:
 
 @dataclass(frozen=True)
 class _Prepared:
-    """What all points need of a surface.
+    """A surface prepared for winding numbers.
 
-    center: (3,) [m], of its box; all else is from there on.
-    levels: dipoles from the root to the leaves. every: those of all levels, one after the other,
-    and then those of each triangle alone.
-    leaves: (leaf_count, k) triangles. corners: (3, 3, triangle_count) by corner and axis [m].
+    center: (3,) [m], of its box; everything else is relative to it.
+    levels: dipoles from the root to the leaves.
+    every: those of all levels, concatenated, followed by those of single triangles.
+    leaves: (leaf_count, k) triangles, -1 for none.
+    corners: (3, 3, triangle_count) by corner and axis [m].
     cell: side of a cell [m].
     """
 
@@ -76,7 +78,7 @@ class _Prepared:
 
     @classmethod
     def of(cls, surface: Surface) -> _Prepared:
-        search = search_of(surface)  # whoever asks for winding numbers asks for distances, too
+        search = search_of(surface)  # callers need it for distances, too
         corners, tree = search.corners, search.tree
         leaves = _without_repeats(tree.leaf_triangles)
         rows = np.ascontiguousarray(corners.transpose(1, 2, 0))
@@ -92,7 +94,8 @@ class _Prepared:
 
 
 def winding_number(points: Floats, surface: Surface) -> Floats:
-    """(n,) float64: 1 inside of a closed mesh, 0 outside, -1 inside of one turned inside out.
+    """The winding number, (n,) float64: 1 inside a closed mesh, 0 outside, -1 inside a mesh that is
+    turned inside out.
 
     Args:
         points: (n, 3) [m], space of the surface, which has at least one triangle.
@@ -123,8 +126,8 @@ def winding_number(points: Floats, surface: Surface) -> Floats:
 
 
 def _groups(middle: Floats, prepared: _Prepared) -> list[tuple[Ints, Ints]]:
-    """For each cell around these (3, n) the groups that are far from all of it, numbered as
-    `every`, and the triangles that are in none of them."""
+    """For each cell with its middle at (3, n), the groups that are far from the whole cell, indexed
+    as in `every`, and the triangles that are in none of them."""
     margin = 0.5 * 3.0**0.5 * prepared.cell
     count, before = middle.shape[1], 0
     cell, node = np.arange(count), np.zeros(count, np.int64)
@@ -148,7 +151,7 @@ def _groups(middle: Floats, prepared: _Prepared) -> list[tuple[Ints, Ints]]:
 
 
 def _split(cell: Ints, values: Ints, count: int) -> list[Ints]:
-    """The values of each cell."""
+    """The values grouped by cell, `count` arrays."""
     order = np.argsort(cell, kind="stable")
     return np.split(values.take(order), np.cumsum(np.bincount(cell, minlength=count))[:-1])
 
@@ -156,11 +159,12 @@ def _split(cell: Ints, values: Ints, count: int) -> list[Ints]:
 def _from_afar(
     points: Floats, begin: Floats, far: Ints, triangles: Ints, prepared: _Prepared
 ) -> tuple[Floats, Ints, Ints]:
-    """Sum over what is far from each of the points of one cell, (n,); and pairs of points and
-    triangles that are not. See `_groups`.
+    """The sum over everything that is far from each point of one cell, (n,); and pairs of points
+    and triangles that are near each other.
 
     Args:
-        points: (3, n) [m] from `begin` on, (3, 1), so that few digits are enough.
+        points: (3, n) [m] relative to `begin`, (3, 1), so that float32 is enough.
+        far, triangles: of the cell, see `_groups`.
     """
     every, total = prepared.every, np.zeros(points.shape[1])
     group = np.append(far, triangles + (len(every.reach) - prepared.corners.shape[2]))
@@ -196,7 +200,8 @@ def _from_afar(
 
 
 def _near_by(place: Floats, point: Ints, triangle: Ints, prepared: _Prepared) -> Floats:
-    """Sum over triangles, seen from the points (3, n) that they are paired with."""
+    """The sum of exact solid angles of triangles, seen from the points (3, n) that they are paired
+    with, (n,)."""
     total = np.zeros(place.shape[1])
     for start in range(0, len(point), _PAIRS):
         here, seen = point[start : start + _PAIRS], triangle[start : start + _PAIRS]
@@ -219,7 +224,7 @@ def triangle_angle(points: Floats, corners: Floats) -> Floats:
 
 
 def _without_repeats(leaves: Ints) -> Ints:
-    """The leaves with -1 wherever a triangle stands that an earlier leaf has already."""
+    """The leaves with -1 for triangles that have occurred before."""
     flat = leaves.ravel()
     kept = np.full(flat.shape, -1, np.int64)
     triangle, first = np.unique(flat, return_index=True)

@@ -1,4 +1,4 @@
-"""Holes of a mesh closed by fans, so that it has an inside for sure."""
+"""Closing the holes of a mesh by fans, so that it certainly has an inside."""
 
 from __future__ import annotations
 
@@ -9,10 +9,11 @@ from ...strands import Surface
 
 
 def close_holes(surface: Surface) -> tuple[Surface, Ints]:
-    """The surface with a fan over each ring of open edges, and the fans' triangles (n,).
+    """The surface with a fan over each ring of open edges, and the indices of the fans' triangles,
+    (n,).
 
-    Vertices at one place count as one, so that seams of UVs or normals are no holes. A fan goes
-    from a ring's middle to its edges, turned as the faces beside it are.
+    Coincident vertices count as one, so that seams of UVs or normals are no holes. A fan connects a
+    ring's middle with its edges, with the same orientation as the neighbouring faces.
     """
     _, merged = np.unique(surface.positions, axis=0, return_inverse=True)
     merged = merged.reshape(-1)
@@ -39,14 +40,14 @@ def close_holes(surface: Surface) -> tuple[Surface, Ints]:
 
 
 def _rings(edges: Ints, vertex_count: int) -> Ints:
-    """A number for each edge (n, 2), the same for edges that hang together."""
+    """A number for each edge (n, 2), the same for connected edges."""
     label = np.arange(vertex_count)
     while True:
         least = label[edges].min(axis=1)
         before = label[edges].sum()
         np.minimum.at(label, edges[:, 0], least)
         np.minimum.at(label, edges[:, 1], least)
-        label = label[label]  # as far as is known, so that long rings need few turns
+        label = label[label]  # pointer jumping, so that long rings need few rounds
         if label[edges].sum() == before:
             result: Ints = label[edges[:, 0]]
             return result

@@ -9,7 +9,7 @@ from ...params import Settings, integer, number
 
 @dataclass(frozen=True, kw_only=True)
 class SphereFitSettings(Settings):
-    """How a mesh is covered by balls."""
+    """How a mesh is approximated by balls."""
 
     section = "sphere_fit"
     title = "Fitted Spheres"

@@ -1,7 +1,8 @@
-"""Where points have gone as a whole: the best rotation, scale and translation between two sets.
+"""The motion of points as a whole: the best rotation, scale and translation between two sets.
 
 Umeyama 1991, "Least-Squares Estimation of Transformation Parameters Between Two Point Patterns",
-after Kabsch 1976: with H the covariance of the centered sets and H = U S V^T its singular values,
+after Kabsch 1976: with H = U S V^T the singular value decomposition of the centered sets'
+covariance,
 
     R = U D V^T,   scale = tr(S D) / variance,   D = diag(1, 1, det(U) det(V)),
 
@@ -16,13 +17,16 @@ import numpy as np
 
 from ...arrays import Floats
 
-#: Points whose second widest direction is narrower than this fraction of the widest lie on a line.
+#: Points lie on a line if their second largest extent is below this fraction of the largest.
 _LINE = 1.0e-3
 
 
 @dataclass(frozen=True)
 class Similarity:
-    """matrix: (4, 4) float64. error: [m], root mean square of what it leaves between the points."""
+    """A similarity and its error.
+
+    matrix: (4, 4) float64. error: [m], root mean square of the remaining distances.
+    """
 
     matrix: Floats
     error: float
@@ -33,9 +37,9 @@ class Similarity:
 
 
 def fit_similarity(before: Floats, now: Floats) -> Similarity | None:
-    """The similarity that brings points (n, 3) nearest to where they are now, (n, 3) [m].
+    """The similarity that moves points (n, 3) closest to where they are now, (n, 3) [m].
 
-    None where it cannot be found: fewer than three points, points in a line or in one place,
+    None if it cannot be determined: fewer than three points, points on a line or in one place,
     before or now, or points that are not finite.
     """
     before, now = np.asarray(before, np.float64), np.asarray(now, np.float64)

@@ -1,16 +1,16 @@
-"""A mesh as a set of balls: few balls that cover it well and hardly stick out.
+"""Approximating a mesh by a few balls that cover it well and hardly stick out.
 
-Candidates are medial balls, which touch the surface at two places or more from inside; they are
+Candidates are medial balls, which touch the surface from inside at two places or more. They are
 found by shrinking (Ma, Bae and Choi 2012, "3D medial axis point approximation using nearest
-neighbors and the normal field"): a ball tangent to a surface sample gets smaller until it holds no
-other part of the surface. All are then made larger by what may stick out.
+neighbors and the normal field"): a ball tangent to a surface sample shrinks until it contains no
+other part of the surface. All are then enlarged by the allowed overshoot.
 
-Of these the set is chosen that leaves the least gap, the mean over the surface of
+Then the set is chosen that minimizes the gap, the mean over the surface of
 
     min_i max(0, |p - c_i| - r_i)^2,
 
-by greedy choice, which is within 1 - 1/e of the best for such sums (Nemhauser, Wolsey and Fisher
-1978), then each ball in turn is exchanged for a better one, if there is one.
+by greedy choice, which is within 1 - 1/e of the optimum for such sums (Nemhauser, Wolsey and Fisher
+1978). Finally each ball in turn is exchanged for a better one, if there is one.
 
 Nothing is random: the same mesh gives the same balls.
 """
@@ -31,14 +31,16 @@ from ..colliders.winding import winding_number
 from .settings import SphereFitSettings
 from .surface_samples import Boundary, SurfaceSamples, boundary_of, samples_of
 
-#: Places on the mesh, and on the balls, at which the error is measured.
+#: Number of places on the mesh where the error is measured; on the balls up to twice as many.
 _PLACES = 6000
 
 
 @dataclass(frozen=True)
 class SphereError:
-    """gap: [m], how far the mesh lies outside of the balls, mean and max over the mesh.
-    outside: [m], how far the balls' own surface lies outside of the mesh, mean and max over it.
+    """How well balls fit a mesh.
+
+    gap: [m], how far the mesh lies outside of the balls, mean and max over the mesh.
+    outside: [m], how far the surface of the balls lies outside of the mesh, mean and max over it.
     """
 
     gap_mean: float
@@ -50,9 +52,11 @@ class SphereError:
 def measured_error(
     centers: Floats, radii: Floats, boundary: Boundary, search: ClosestPointSearch
 ) -> SphereError:
-    """Args:
-    centers, radii: (n, 3), (n,) [m], in the space of the boundary.
-    search: of the boundary's closed surface.
+    """The error of balls that approximate a mesh.
+
+    Args:
+        centers, radii: (n, 3), (n,) [m], in the space of the boundary.
+        search: of the boundary's closed surface.
     """
     balls = SphereSetCollider(centers, radii)
     samples = samples_of(boundary.mesh, _PLACES).point.T.astype(np.float32)
@@ -66,9 +70,10 @@ def measured_error(
 
 
 def union_places(balls: SphereSetCollider) -> Floats:
-    """Points (n, 3) spread evenly over the outside of a set of balls.
+    """Points (n, 3) spread evenly over the outer surface of a set of balls.
 
-    Each ball has its share by area on a spiral (Fibonacci), without those within another ball.
+    Each ball gets points on a Fibonacci spiral in proportion to its area; points within another
+    ball are removed.
     """
     area = balls.radii.astype(np.float64) ** 2
     places = []
@@ -81,11 +86,11 @@ def union_places(balls: SphereSetCollider) -> Floats:
     return result
 
 
-#: Surface samples for each ball asked for, and the least and most in all.
+#: Surface samples for each requested ball, and their minimum and maximum in all.
 _SAMPLES, _MIN, _MAX = 40, 1200, 3000
-#: Steps at most until a ball no longer shrinks.
+#: Maximum number of shrinking steps.
 _SHRINKS = 40
-#: A ball that shrinks by less than this fraction has found its place.
+#: A ball that would shrink by less than this fraction has converged.
 _SETTLED = 5.0e-3
 #: Balls that differ by less than this fraction of the mesh's longest side are one candidate.
 _ALIKE = 0.006
@@ -101,15 +106,15 @@ class SphereFit:
 
 
 def fit_spheres(surface: Surface, settings: SphereFitSettings, *, place: str = "mesh") -> SphereFit:
-    """Balls that stand for a mesh, in its space; fewer than asked for where no more would help.
+    """Balls that approximate a mesh, in its space; fewer than requested if more would not help.
 
-    Small holes, flipped faces and parts within others do no harm.
+    Small holes, flipped faces and parts inside others do no harm.
 
     Args:
         place: names the mesh in messages.
 
     Raises:
-        HairloomError: no faces, no size, or no inside.
+        HairloomError: no faces, no size, no inside, or too thin for a ball.
     """
     boundary = boundary_of(surface, place)
     count = min(max(_SAMPLES * settings.sphere_count, _MIN), _MAX)
@@ -136,7 +141,7 @@ def medial_balls(
 
     Args:
         search: of the boundary's surface.
-        widest: [m], no ball is larger.
+        widest: [m], upper limit of the radii.
     """
     radius = _first_radii(samples, widest)
     point, inward = samples.point, -samples.normal
@@ -152,14 +157,14 @@ def medial_balls(
         if not len(going):
             break
     center = point + inward * radius[:, None]
-    radius = search.closest(center).distance  # never beyond the surface, whatever was left to do
+    radius = search.closest(center).distance  # not beyond the surface, even without convergence
     kept = (radius > 1.0e-6 * widest) & (winding_number(center, boundary.surface) > 0.5)
     return center[kept], radius[kept]
 
 
 def _first_radii(samples: SurfaceSamples, widest: float) -> Floats:
-    """Radii (n,) of the tangent balls that hold no other sample: nearly those that are looked for,
-    and much sooner found than by closest points."""
+    """Radii (n,) of tangent balls that contain no other sample: close to the final ones, and much
+    faster than closest points."""
     most = np.full(len(samples.point), widest)
     radius = most.copy()
     for one, (point, normal) in enumerate(zip(samples.point, samples.normal, strict=True)):
@@ -168,16 +173,17 @@ def _first_radii(samples: SurfaceSamples, widest: float) -> Floats:
 
 
 def _tangent_radius(displacement: Floats, inward: Floats, widest: Floats) -> Floats:
-    """Radius (n,) of the ball that touches a place, with its center inwards (3,) or (n, 3), and
-    goes through another one, `displacement` (n, 3) from there; `widest` (n,) where none does."""
+    """Radius (n,) of the ball that is tangent at a point, with its center in direction `inward`,
+    (3,) or (n, 3), and passes through the point at `displacement` (n, 3) from there; `widest` (n,)
+    if there is none."""
     along = (displacement * inward).sum(axis=1)
     squared = np.einsum("ij,ij->i", displacement, displacement)
     return np.divide(squared, 2.0 * along, out=widest.copy(), where=along > 0.0)
 
 
 def _distinct(centers: Floats, radii: Floats, alike: float) -> tuple[Floats, Floats]:
-    """Balls, large ones first, without those that differ from an earlier one by less than `alike`
-    [m] everywhere."""
+    """Balls sorted by size, largest first, without those that stick out of an earlier one by no
+    more than `alike` [m] anywhere."""
     order = np.argsort(-radii, kind="stable")
     centers, radii = centers[order], radii[order]
     kept = np.ones(len(radii), bool)
@@ -204,7 +210,7 @@ def _gaps(points: Floats, centers: Floats, radii: Floats) -> Floats:
 
 
 def _greedy(gap: Floats, count: int) -> list[int]:
-    """The balls that leave the least gap, one after the other."""
+    """Balls chosen one after the other, each with the smallest remaining gap."""
     chosen: list[int] = []
     left = np.full(gap.shape[1], np.inf, np.float32)
     for _ in range(min(count, len(gap))):
@@ -218,7 +224,7 @@ def _greedy(gap: Floats, count: int) -> list[int]:
 
 
 def _exchanged(gap: Floats, chosen: list[int]) -> list[int]:
-    """Each ball in turn exchanged for the best one beside the others."""
+    """Each ball in turn exchanged for the best one in combination with the others."""
     for place, ball in enumerate(chosen):
         others = [other for other in chosen if other != ball]
         left = gap[others].min(axis=0) if others else np.inf

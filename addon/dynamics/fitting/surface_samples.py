@@ -1,4 +1,4 @@
-"""Points spread evenly over a mesh, and which of its faces are its outside."""
+"""Points spread evenly over a mesh, and the faces that form its outside."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ...strands.triangles import area_vectors, evenly_within
 from ..colliders.winding import winding_number
 from .holes import close_holes
 
-#: How far beside a face inside and outside are tested, as a fraction of the mesh's longest side.
+#: Distance from a face at which inside and outside are tested, in the mesh's longest sides.
 _BESIDE = 1.0e-4
 #: Steps of the R2 sequence (Roberts 2018), which fills a square evenly: 1 / g and 1 / g^2, where
 #: g^3 = g + 1.
@@ -30,8 +30,10 @@ class SurfaceSamples:
 
 @dataclass(frozen=True)
 class Boundary:
-    """The outside of a mesh. surface: closed, its triangles turned outwards.
-    is_mesh: (triangle_count,) False for those that only close a hole.
+    """The outside of a mesh.
+
+    surface: closed, with all triangles facing outwards.
+    is_mesh: (triangle_count,) False for triangles that only close a hole.
     """
 
     surface: Surface
@@ -39,12 +41,12 @@ class Boundary:
 
     @property
     def mesh(self) -> Surface:
-        """Without what closes holes."""
+        """The surface without the triangles that close holes."""
         return Surface(self.surface.positions, self.surface.triangles[self.is_mesh])
 
 
 def boundary_of(surface: Surface, place: str) -> Boundary:
-    """Those faces that part inside from outside; not what lies within others. Holes are closed.
+    """The faces between inside and outside, without parts that lie inside others; holes are closed.
 
     Args:
         place: names the mesh in messages.
@@ -73,7 +75,7 @@ def boundary_of(surface: Surface, place: str) -> Boundary:
 
 
 def samples_of(surface: Surface, count: int) -> SurfaceSamples:
-    """`count` points spread by area, the same ones each time."""
+    """`count` points spread evenly by area, deterministic."""
     corners = surface.corners.astype(np.float64)
     cross = 2.0 * area_vectors(corners)
     area = np.linalg.norm(cross, axis=1)
