@@ -1,4 +1,4 @@
-"""Where the animation carries cloth within a frame."""
+"""The path on which the animation carries cloth within a frame."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from ..frame import Drive
 from ..rigid_path import CarriedPath, Carrier
 from .state import Fabric, vertex_rows
 
-#: Pinned vertices, about, that tell how cloth turns as a whole.
+#: Approximate number of pinned vertices from which the cloth's rotation is computed.
 TURNED_BY = 256
 
 
 def pinned_path(fabric: Fabric, drive: Drive, origin: Floats) -> CarriedPath:
-    """The way of all vertices (3, n) as the animation carries them, float32 [m] from `origin`.
+    """The path of all vertices (3, n) as the animation carries them, float32 [m] from `origin`.
 
-    They turn as the pinned ones do as a whole, as what these are pinned to.
+    Arcs follow the rotation of the pinned vertices as a whole, as of the body they are pinned to.
     """
     rows = [
         None if target is None else vertex_rows(target) - origin

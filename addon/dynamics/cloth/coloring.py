@@ -1,7 +1,7 @@
-"""The edges of a mesh, in colours: no two edges of a colour share a vertex.
+"""Colouring the edges of a mesh: no two edges of a colour share a vertex.
 
-So all edges of a colour can be moved at once without disturbing each other, and one colour after
-the other is a Gauss-Seidel sweep.
+So all edges of a colour can be moved at once without affecting each other, and one colour after the
+other is a Gauss-Seidel sweep.
 """
 
 from __future__ import annotations
@@ -25,9 +25,10 @@ def unique_edges(triangles: Ints, more: Ints | None = None) -> Ints:
 
 
 def opposite_pairs(triangles: Ints) -> Ints:
-    """The two vertices across each inner edge, (n, 2), each pair once; edges are left out.
+    """The two vertices opposite each inner edge, (n, 2), each pair once; pairs that are edges
+    themselves are left out.
 
-    At an edge of three triangles or more each is paired with the next.
+    At an edge of three triangles or more, each is paired with the next.
     """
     triangles = np.asarray(triangles, np.int64)
     sides = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
@@ -43,7 +44,7 @@ def opposite_pairs(triangles: Ints) -> Ints:
 
 
 def greedy_colors(pairs: Ints) -> Ints:
-    """A colour for each pair (n, 2), the lowest that both vertices have free; (n,)."""
+    """A colour for each pair (n, 2), the lowest that is free at both vertices, (n,)."""
     taken: dict[int, int] = {}  # vertex -> its colours as bits
     colors = np.empty(len(pairs), np.int64)
     for number, (one, other) in enumerate(pairs.tolist()):
@@ -58,10 +59,11 @@ def greedy_colors(pairs: Ints) -> Ints:
 def distances_along_edges(
     edges: Ints, length: Floats, seeds: Ints, vertex_count: int
 ) -> tuple[Floats, Ints]:
-    """The shortest way along edges to the nearest seed (Dijkstra 1959).
+    """The shortest path along edges to the nearest seed (Dijkstra 1959).
 
-    Returns: its length (vertex_count,) float64 [m], infinite where none leads, and that seed
-        (vertex_count,), -1 where none.
+    Returns:
+        Its length (vertex_count,) float64 [m], infinite where there is none, and that seed
+        (vertex_count,), -1 where there is none.
     """
     beside: list[list[tuple[int, float]]] = [[] for _ in range(vertex_count)]
     for (one, other), distance in zip(edges.tolist(), length.tolist(), strict=True):

@@ -1,7 +1,7 @@
-"""What holds cloth together: edges, folds, pins and the way to the nearest pinned vertex.
+"""The constraints of cloth: edges, folds, pins and the distance to the nearest pinned vertex.
 
-Distances are constraints with a compliance [s^2], the inverse of a spring's constant for a unit of
-mass (XPBD, Macklin et al. 2016): how stiff the cloth is does not depend on the step.
+Distances are constraints with a compliance [s^2], the inverse of the spring constant per unit of
+mass (XPBD, Macklin et al. 2016), so that stiffness does not depend on the time step.
 """
 
 from __future__ import annotations
@@ -15,16 +15,17 @@ from ..constraints import TINY
 from .settings import FinSettings
 from .state import Color, Fabric
 
-#: Gravity [m/s^2] and height [m] of the hanging sheet that the `stretch` parameter speaks of.
+#: Gravity [m/s^2] times height [m] of the hanging sheet that defines the `stretch` parameter.
 _HANGING = 9.81 * 1.0
 
 
 def keep_distances(position: Floats, color: Color, fraction: Floats) -> None:
-    """Bring the pairs of one colour to their length, in place; position: (3, n) float32 [m].
+    """Bring the pairs of one colour to their lengths, in place.
 
     Args:
-        fraction: (m,) of the error that each vertex takes: w_i / (w_i + w_j + compliance / dt^2),
-            which is XPBD with one step of the solver in each step of time.
+        position: (3, n) float32 [m].
+        fraction: (m,), the part of the error that each vertex corrects: w_i / (w_i + w_j +
+            compliance / dt^2), which is XPBD with one solver iteration per time step.
     """
     vertices = color.vertices
     here = position if vertices is None else position.take(vertices, axis=1)
@@ -43,7 +44,7 @@ def keep_distances(position: Floats, color: Color, fraction: Floats) -> None:
 
 
 def hold_in_reach(position: Floats, fabric: Fabric) -> None:
-    """No vertex farther from its pinned one than the way there along the edges, in place.
+    """Limit the distance of each vertex from its anchor to that along the edges, in place.
 
     Kim, Chentanez and Mueller 2012, "Long Range Attachments".
     """
@@ -58,10 +59,10 @@ def hold_in_reach(position: Floats, fabric: Fabric) -> None:
 
 
 def pull_of(fabric: Fabric, settings: FinSettings, small: float) -> Floats:
-    """Springs to where the animation carries the vertices, (n,) k / m times the step squared.
+    """Springs to where the animation carries the vertices, (n,), k / m times the step squared.
 
-    The shape's spring, and with it the pin's: w / (1 - w) of the pull that a weight of one half
-    has, so that it grows without bound where the pinned vertices begin.
+    The sum of the shape's spring and the pin's. The frequency of the latter is that of a pin weight
+    of one half times w / (1 - w), which grows without bound towards pinned vertices.
     """
     loose = np.where(fabric.pinned, 0.0, fabric.pin.astype(np.float64))
     swings = settings.pin_pull * loose / (1.0 - loose)
@@ -73,17 +74,23 @@ def pull_of(fabric: Fabric, settings: FinSettings, small: float) -> Floats:
 def edge_fractions(
     fabric: Fabric, mobility: Floats, settings: FinSettings, small: float
 ) -> tuple[Floats, ...]:
-    """See `keep_distances`, for a small step [s]; mobility: (n,) inverse masses.
+    """The fractions of edges for `keep_distances` in a small step [s].
 
     A chain of unit masses at distances l with springs k is as stiff as a string of wave speed
     l sqrt(k), whatever l is: hanging, it stretches by g h / (l^2 k) at its upper end.
+
+    Args:
+        mobility: (n,) inverse masses.
     """
     softness = settings.stretch / _HANGING / small**2
     return tuple(_fractions(edge, mobility, edge.length**2 * softness) for edge in fabric.edges)
 
 
 def fold_fractions(fabric: Fabric, settings: FinSettings, dt: float) -> tuple[Floats, ...]:
-    """Two unit masses that a spring of k brings back swing with w^2 = 2 k."""
+    """The fractions of folds for `keep_distances` in a substep [s].
+
+    Two unit masses that a spring of constant k connects swing with w^2 = 2 k.
+    """
     if not settings.bend:
         return ()
     mobility = np.where(fabric.pinned, 0.0, 1.0).astype(np.float32)
@@ -92,7 +99,7 @@ def fold_fractions(fabric: Fabric, settings: FinSettings, dt: float) -> tuple[Fl
 
 
 def _fractions(color: Color, mobility: Floats, compliance: Floats | float) -> Floats:
-    """Share (m,) of the error that each vertex of a colour takes; see `keep_distances`."""
+    """The part (m,) of the error that each vertex of a colour corrects, see `keep_distances`."""
     own = mobility if color.vertices is None else mobility[color.vertices]
     other = mobility[color.mates]
     total = own + other + compliance

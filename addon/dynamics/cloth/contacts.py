@@ -1,9 +1,9 @@
-"""Contacts of cloth: planes that are found once in a substep, and go along through its small steps.
+"""Contacts of cloth: planes that are found once per substep and move through its small steps.
 
-They are looked for where the substep would lead, and move from where the collider was to where it
-will be, so that edges and contacts are solved in turn in every small step: cloth that is drawn
-tight around a collider lies on it without being stretched. What is drawn into a collider after all,
-by its edges, is pushed out when the substep ends.
+They are found where the substep would lead, and move with the collider from the substep's begin to
+its end, so that edges and contacts are solved alternately in every small step: cloth that is drawn
+tight around a collider lies on it without being stretched. Vertices that edges draw into a collider
+nevertheless are pushed out at the end of the substep.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ from ..contacts import Contacts, find_contacts
 
 @dataclass(frozen=True)
 class MovingPlanes:
-    """Planes of one collider on their way through a substep, m of them.
+    """Planes of one collider that move through a substep, m of them.
 
-    contacts: as they are at the substep's end.
-    begin: (m,) [m], their offsets at its begin: where the collider was, or, for a vertex inside
-        of it, where the vertex was.
-    way: (3, m) [m], of the collider at each vertex.
+    contacts: the planes at the substep's end.
+    begin: (m,) [m], their offsets at its begin: where the collider was or, for a vertex inside it,
+        where the vertex was.
+    displacement: (3, m) [m], of the collider at each vertex.
     """
 
     contacts: Contacts
@@ -34,7 +34,9 @@ class MovingPlanes:
 
     @classmethod
     def of(cls, contacts: Contacts, before: Floats) -> MovingPlanes:
-        """before: (3, n) world [m], vertices at the substep's begin."""
+        """Args:
+        before: (3, n) world [m], vertices at the substep's begin.
+        """
         here = before.take(contacts.index, axis=1)
         displacement = contacts.origin - here
         begin = contacts.offset - dot_rows(contacts.normal, displacement)
@@ -43,7 +45,7 @@ class MovingPlanes:
     def press(
         self, position: Floats, previous: Floats, number: int, steps: int, friction: float
     ) -> None:
-        """Keep vertices out in small step `number` of `steps`, in place, without a bounce."""
+        """Push vertices out in small step `number` of `steps`, in place, without bouncing."""
         known = self.contacts
         fraction = np.float32((number + 1) / steps)
         origin = previous.take(known.index, axis=1)
@@ -72,7 +74,7 @@ def planes_ahead(
 
     Args:
         position, previous: (3, n) world [m], one small step apart.
-        fall: (3, 1) [m] that gravity adds in a small step.
+        fall: (3, 1) [m], displacement by gravity in a small step.
         radius, poses, led_out, size: see `find_contacts`.
     """
     ahead = (position - previous) * np.float32(steps)
@@ -94,8 +96,8 @@ def push_out_at_end(
 
     Args:
         before: (3, n) world [m], vertices at the substep's begin.
-        fraction: of the substep that a small step is. Contacts span a substep, the speed in
-            `previous` only a small step: it gets that fraction of the push.
+        fraction: duration of a small step over that of the substep. Contacts span a substep, the
+            speed in `previous` a small step, so it gets this fraction of the push.
     """
     pushed, unbounced = position.copy(), before.copy()
     for one in contacts:

@@ -1,7 +1,7 @@
-"""The same cloth, one vertex and one edge after the other in float64: to be read and compared.
+"""Scalar reference of cloth, one vertex and one edge at a time in float64: for reading and tests.
 
-Nothing is shared with the fast form but settings, state, drive and how it carries the mesh,
-colliders and the order of edges.
+It shares with the fast form only settings, state, drive and how that carries the mesh, colliders
+and the order of edges.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from .state import PINNED_FROM, ClothState
 def advance_cloth_slowly(
     state: ClothState, drive: Drive, settings: FinSettings, duration: float
 ) -> ClothState:
-    """What `cloth.advance_cloth` does; see there."""
+    """Reference of `cloth.step.advance_cloth`; see there."""
     dt = 1.0 / settings.substep_rate
     duration = min(duration, settings.longest_frame)
     time = state.time_left + duration
@@ -43,7 +43,7 @@ def advance_cloth_slowly(
 
 @dataclass
 class _Plane:
-    """One contact: a vertex shall keep normal . x >= offset, which goes from first to last."""
+    """One contact: a vertex must keep normal . x >= offset, which moves from first to last."""
 
     vertex: int
     normal: Floats
@@ -177,7 +177,7 @@ class _Cloth:
     def _planes(
         self, x: list[Floats], before: list[Floats], begin: float, end: float
     ) -> list[_Plane]:
-        """As in `contacts`, with the offset at the substep's begin of `MovingPlanes`."""
+        """The planes of `contacts`, with the offset at the substep's begin as in `MovingPlanes`."""
         settings, planes, size = self.settings, [], self.fabric.size
         radius = settings.radius * size
         for posed in self.drive.colliders:
@@ -200,7 +200,7 @@ class _Cloth:
         return planes
 
     def _press(self, plane: _Plane, fraction: float) -> None:
-        """In one small step: push out, rub, and do not bounce."""
+        """Push out in one small step, with friction and without bouncing."""
         v, normal = plane.vertex, plane.normal
         offset = plane.first + (plane.last - plane.first) * fraction
         origin = self.previous[v] + plane.displacement * self.small / self.dt
@@ -219,7 +219,7 @@ class _Cloth:
             self.previous[v] = self.previous[v] + pushed - (pushed - bounce[v]) * fraction
 
     def _push(self, plane: _Plane, offset: float, origin: Floats) -> float:
-        """Bring a vertex to its plane, with friction; how far [m] it would bounce."""
+        """Push a vertex to its plane, with friction; returns how far [m] it would bounce."""
         v, normal = plane.vertex, plane.normal
         push = max(offset - normal @ self.x[v], 0.0)
         if not push:
@@ -232,7 +232,7 @@ class _Cloth:
 
 
 def _in_order(pairs: Ints) -> list[tuple[int, int]]:
-    """Pairs by colour, in which the fast form solves them."""
+    """Pairs in the order of colours, in which the fast form solves them."""
     colors = greedy_colors(pairs)
     return [
         tuple(pair)

@@ -11,9 +11,9 @@ from ..settings import DynamicsSettings
 
 @dataclass(frozen=True, kw_only=True)
 class FinSettings(MotionSettings):
-    """How a mesh moves as cloth: what depends on its edges, on the air and on colliders.
+    """How a mesh moves as cloth: its edges, the air and colliders.
 
-    Each vertex weighs the same. What hair has too has the same name and means the same.
+    All vertices have the same mass. Parameters that hair has too have the same names and meanings.
     """
 
     section = "fin"
@@ -150,5 +150,5 @@ class FinSettings(MotionSettings):
     )
 
     def as_dynamics(self) -> DynamicsSettings:
-        """What colliders are made by, as hair has it; all else is as hair's defaults."""
+        """The settings that colliders are made with, as for hair; the rest are hair's defaults."""
         return DynamicsSettings(collider_resolution=self.collider_resolution)

@@ -1,11 +1,13 @@
-"""What a fin is made of, and what its simulation remembers from one frame to the next.
+"""The fabric of a fin, and the state that its simulation keeps from one frame to the next.
 
-Any mesh becomes cloth: the edges of its triangles keep their length (Nguyen and Donnelly 2005),
-and of two faces the outer vertices keep their distance, which resists folding. Flat cloth resists
-a small fold little and a sharp one much, as this distance changes with the fold's square.
+Any mesh becomes cloth: the edges of its triangles keep their length (Nguyen and Donnelly 2005), and
+the vertices opposite a common edge of two faces keep their distance, which resists folding. Flat
+cloth resists small folds little and sharp ones strongly, as this distance changes with the square
+of the fold.
 
-Rows are (3, vertex_count) in world space, in the mesh's own order of vertices: float64, as small
-steps are a few millionths of a metre long, which float32 cannot tell apart far from the origin.
+Rows are (3, vertex_count) in world space, in the order of the mesh's vertices. They are float64, as
+motions in a small step are a few millionths of a metre, which float32 does not resolve far from the
+origin.
 """
 
 from __future__ import annotations
@@ -19,18 +21,18 @@ from ...errors import HairloomError
 from ...strands.vectors import cross_rows, unit_rows
 from .coloring import distances_along_edges, greedy_colors, opposite_pairs, unique_edges
 
-#: From this pin weight on a vertex has infinite mass; Blender's weights are rounded.
+#: From this pin weight on a vertex has infinite mass; not 1, as Blender's weights are rounded.
 PINNED_FROM = 0.9999
 
 
 @dataclass(frozen=True)
 class Color:
-    """Pairs that keep their distance and of which no two share a vertex, so that all move at once.
+    """Pairs that keep their distance, of which no two share a vertex, so that all can move at once.
 
-    Each pair stands in it twice, once from each of its vertices: nothing needs to be scattered.
+    Each pair is stored twice, once for each of its vertices, so that no scatter is needed.
 
-    vertices: (m,) which move; None where that is all of them, with those that are in no pair being
-        their own mates.
+    vertices: (m,) the vertices of the pairs; None: all vertices, with those in no pair being their
+        own mates.
     mates: (m,) the other vertex of each one's pair.
     length: (m,) float32 [m] to keep.
     """
@@ -46,12 +48,12 @@ class Fabric:
 
     position: (3, vertex_count) float64 world [m].
     triangles: (triangle_count, 3) int64.
-    pin: (vertex_count,) float32, how firmly the animation holds a vertex: 1 infinitely, 0 not.
+    pin: (vertex_count,) float32, how firmly the animation holds a vertex: 1 rigidly, 0 not at all.
     pairs, length: the edges that can move (edge_count, 2), and their lengths [m], float64.
-    edges, folds: edges and pairs across them, by colour.
-    anchor, reach: (vertex_count,) the nearest pinned vertex of each, and the way there along the
-        edges [m]; those that no way leads to are their own.
-    size: a quarter of the cloth's extent [m], in which distances are given in the settings.
+    edges, folds: these edges, and pairs of vertices opposite edges, by colour.
+    anchor, reach: (vertex_count,) the nearest pinned vertex of each, and the distance to it along
+        the edges [m]; without a path to a pinned vertex, the vertex itself, and 0.
+    size: a quarter of the cloth's extent [m], the unit of distances in the settings.
     """
 
     position: Floats
@@ -76,8 +78,8 @@ class ClothState:
     """A fin in motion.
 
     position, previous: (3, vertex_count) float64 world [m], one small step apart.
-    small_step: length [s] of the last small step; 0 when there was none.
-    time_left: time [s] that has passed but is shorter than a substep, so not yet simulated.
+    small_step: length [s] of the last small step; 0 if there was none.
+    time_left: time [s] that has passed but is not yet simulated, shorter than a substep.
     time: [s] simulated since the start; gusts depend on it.
     """
 
@@ -106,15 +108,15 @@ class ClothState:
 def start_cloth(
     positions: Floats, triangles: Ints, pin: Floats, edges: Ints | None = None
 ) -> ClothState:
-    """Cloth at rest, as it is now.
+    """Cloth at rest in its present shape.
+
+    A vertex without any edge is pinned, whatever its weight, as it would only fall.
 
     Args:
         positions: (vertex_count, 3) world [m].
         triangles: (triangle_count, 3).
-        pin: (vertex_count,) weights, 0 free to 1 carried by the animation.
+        pin: (vertex_count,) weights, from 0, free, to 1, carried by the animation.
         edges: (n, 2) edges that belong to no triangle, such as those of a string.
-
-    A vertex without any edge is carried, whatever its weight: it would only fall.
 
     Raises:
         HairloomError: no vertices, arrays that do not fit, values that are not finite.
@@ -165,7 +167,7 @@ def vertex_rows(positions: Floats) -> Floats:
 
 
 def distances(position: Floats, pairs: Ints) -> Floats:
-    """[m] between the two vertices of each pair (n, 2), (n,)."""
+    """The distance [m] between the two vertices of each pair (n, 2), (n,)."""
     displacement = position[:, pairs[:, 1]] - position[:, pairs[:, 0]]
     length: Floats = np.sqrt(np.einsum("ij,ij->j", displacement, displacement))
     return length
@@ -174,7 +176,7 @@ def distances(position: Floats, pairs: Ints) -> Floats:
 def vertex_normals(position: Floats, triangles: Ints) -> Floats:
     """Unit normals (3, vertex_count) float32, weighted by angle (Thuermer and Wuethrich 1998).
 
-    The same as `Surface.vertex_normals`, on rows; zero where there is no area.
+    `Surface.vertex_normals` on rows, without merging coincident vertices; zero without area.
     """
     corner = position[:, triangles.T]  # (3, corner, triangle)
     side = unit_rows(corner[:, [1, 2, 0]] - corner)
@@ -185,14 +187,14 @@ def vertex_normals(position: Floats, triangles: Ints) -> Floats:
 
 
 def broadside_normals(position: Floats, triangles: Ints) -> Floats:
-    """Unit normals (3, vertex_count) float32, weighted by the area that faces show to the air."""
+    """Unit normals (3, vertex_count) float32, weighted by the area of faces, for drag."""
     corner = position[:, triangles.T]
     area = cross_rows(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
     return unit_rows(_gathered(np.repeat(area[:, None], 3, axis=1), triangles, position))
 
 
 def _gathered(corners: Floats, triangles: Ints, position: Floats) -> Floats:
-    """The sum at each vertex of what its corners (3, corner, triangle) bring."""
+    """The sum of corner values (3, corner, triangle) at each vertex."""
     index, total = triangles.T.reshape(-1), np.empty_like(position)
     for row, out in zip(corners.reshape(3, -1), total, strict=True):
         out[:] = np.bincount(index, row, minlength=len(out))
@@ -209,7 +211,7 @@ def _colors(position: Floats, pairs: Ints) -> tuple[Color, ...]:
         one, other = pairs[chosen].T
         vertices, mates = np.concatenate([one, other]), np.concatenate([other, one])
         both = np.tile(length[chosen], 2).astype(np.float32)
-        if len(vertices) * 2 > count:  # cheaper for all than for some
+        if len(vertices) * 2 > count:  # moving all is faster than selecting some
             everyone, lengths = np.arange(count), np.zeros(count, np.float32)
             everyone[vertices], lengths[vertices] = mates, both
             result.append(Color(None, everyone, lengths))

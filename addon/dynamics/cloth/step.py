@@ -1,7 +1,7 @@
 """One frame of a fin: cloth in the same fixed substeps as hair.
 
     repeat substep_rate times a second:
-        air          takes the speed against it, broadside more than edgewise
+        air          reduces the speed relative to it, broadside more than edgewise
         fields       the scene's force fields push, slow down and turn
         folds        one implicit step, as a change of speed
         contacts     found where the substep would lead
@@ -9,16 +9,16 @@
             predict  Verlet: inertia, gravity
             pin      the animation carries pinned vertices and pulls at the others
             edges    one sweep over the colours
-            reach    no vertex farther from its pinned one than along the edges
-            contacts keep vertices outside; what was pushed out does not bounce
+            reach    limit the distance of vertices from their pinned one to that along the edges
+            contacts push vertices out, without bouncing
 
-Edges are solved once in many small steps instead of often in a long one, which stretches far less
-for the same work (Macklin et al. 2019, "Small Steps in Physics Simulation"). The sweep goes the
-same way each time: sweeps to and fro in turn were seen to blow up.
+Edges are solved once in each of many small steps instead of often in a long one, which stretches
+far less for the same work (Macklin et al. 2019, "Small Steps in Physics Simulation"). Sweeps always
+go in the same direction: alternating directions became unstable in tests.
 
 References: Jakobsen 2001, "Advanced Character Physics"; Nguyen and Donnelly 2005, GPU Gems 2,
-chapter 23; Macklin et al. 2016, "XPBD". `reference.py` holds the same, one vertex after the
-other.
+chapter 23; Macklin et al. 2016, "XPBD". `reference.py` is a scalar implementation, one vertex at a
+time.
 
 Limitations: only vertices collide, neither edges nor faces; cloth does not collide with itself.
 """
@@ -49,9 +49,10 @@ from .state import ClothState, Fabric, broadside_normals, vertex_rows
 
 @dataclass(frozen=True)
 class _Frame:
-    """A drive made ready: rows (3, n) of where the animation carries vertices, and constants.
+    """A drive prepared for a frame, and constants; rows (3, n).
 
-    origin: (3, 1) float64 world [m]; seen from there everything within the frame is float32.
+    origin: (3, 1) float64 world [m]; relative to it, float32 is enough within the frame.
+    path: on which the animation carries vertices.
     """
 
     origin: Floats
@@ -59,7 +60,7 @@ class _Frame:
     colliders: tuple[PosedCollider, ...]
     gravity: Floats  # (3, 1) [m/s^2]
     air: Air | None
-    force_fields: ForceFields | None  # None where none acts
+    force_fields: ForceFields | None  # None if none acts
     dt: float
     small: float  # [s] of a small step
     pull: Floats  # (n,) of the spring to where a vertex is carried, times small^2; 0 for the pinned
@@ -75,11 +76,10 @@ class _Frame:
 def advance_cloth(
     state: ClothState, drive: Drive, settings: FinSettings, duration: float
 ) -> ClothState:
-    """The state after a frame of `duration` seconds; the state given stays as it is.
+    """The state after a frame of `duration` seconds; `state` itself does not change.
 
     Args:
-        drive: its targets are (vertex_count, 3), where the animation carries
-            the mesh.
+        drive: its targets are (vertex_count, 3), where the animation carries the mesh.
 
     Raises:
         HairloomError: a drive that does not fit the state or is not finite, or a bad duration.
@@ -111,9 +111,10 @@ def advance_cloth(
 
 
 def cloth_at_frame_end(state: ClothState, drive: Drive) -> Floats:
-    """Vertices at the frame's very end, (vertex_count, 3) world [m], for drawing.
+    """Vertices at the very end of the frame, (vertex_count, 3) world [m], for drawing.
 
-    Bridges the time that is left over: each goes on as its pinned vertex does, or else as it flew.
+    Bridges the time left over: each vertex moves along with its pinned vertex or, if it has none,
+    keeps its velocity.
     """
     fabric, position = state.fabric, state.position
     displacement = (vertex_rows(drive.target_now) - position)[:, fabric.anchor]
@@ -132,10 +133,11 @@ def _feel_air(
     settings: FinSettings,
     time: float,
 ) -> None:
-    """Damping and drag on the speed against the air, split by the normal; changes `previous`.
+    """Damping and drag on the velocity relative to the air, split by the normal; changes
+    `previous`.
 
-    A sheet that moves broadside takes air along, one that moves edgewise cuts through it. Both
-    rates are solved implicitly, so that they only ever bring the cloth nearer to the air's speed.
+    A sheet that moves broadside drags air along, one that moves edgewise cuts through it. Both
+    are solved implicitly, so that they only bring the cloth's velocity closer to the air's.
     """
     if not settings.damping and not settings.drag:
         return
@@ -163,7 +165,7 @@ def _feel_air(
 
 
 def _feel_force_fields(position: Floats, previous: Floats, frame: _Frame, size: float) -> None:
-    """What the scene's force fields do in a substep; changes `previous`."""
+    """Apply the scene's force fields in a substep; changes `previous`."""
     if frame.force_fields is None:
         return
     ratio, origin = np.float32(frame.dt / frame.small), frame.origin.astype(np.float32)
@@ -199,7 +201,7 @@ def _substep(
     settings: FinSettings,
     span: tuple[float, float],
 ) -> tuple[Floats, Floats]:
-    """Motion with edges and contacts; returns the new position and that one small step before."""
+    """Motion with edges and contacts; the new position and that one small step earlier."""
     steps, size = settings.small_steps, fabric.size
     led_out = settings.depenetration_speed * size * frame.dt
     fall, radius = frame.gravity * np.float32(frame.small**2), frame.radius
