@@ -1,6 +1,6 @@
-"""Hair among hair without a grid: each CV adds up what each other one does to it, in float64.
+"""Scalar reference of `among` without a grid: each CV sums over all others, in float64.
 
-Shared with the fast form: where its cells are, and the numbers that say how strong all is.
+It shares with the fast form only the places of cells, and the constants.
 """
 
 from __future__ import annotations
@@ -29,9 +29,10 @@ from ..among import (
 
 @dataclass(frozen=True)
 class Beside:
-    """CVs of other grooms, (m, 3) float64 world [m], as far ahead as these count.
+    """CVs of other grooms.
 
-    motion: (m, 3) in a substep. mass: (m,) see `HairGrid`.
+    here: (m, 3) float64 world [m], where they are deposited.
+    motion: (m, 3) [m] in a substep. mass: (m,), see `HairGrid`.
     """
 
     here: Floats
@@ -39,16 +40,18 @@ class Beside:
     mass: Floats
 
 
-#: Cells of a grid that does not begin again.
+#: Number of cells that stands for a grid that does not wrap around.
 NO_END = 1_000_000
 NONE_BESIDE = Beside(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0))
 
 
 @dataclass(frozen=True)
 class Hair:
-    """All CVs at one moment, (n, 3) float64 world [m]. turn: (3, 3) of the groom since rest.
+    """All CVs of a groom at one moment.
 
-    middle: (3,) of its roots. others: of other grooms, none by default.
+    here, motion: (n, 3) float64 world [m], places, and motion in a substep.
+    turn: (3, 3) of the groom since rest. middle: (3,) world [m], of its roots.
+    others: CVs of other grooms, none by default.
     """
 
     here: Floats
@@ -67,10 +70,10 @@ def feel_slowly(
     substeps: int,
     others_at_rest: Beside = NONE_BESIDE,
 ) -> tuple[Floats, Floats]:
-    """What `among.feel` does, as (n, 3) [m].
+    """Reference of `among.feel`, with results (n, 3) [m].
 
     Args:
-        rest: (n, 3) where all CVs were at rest. volume: (n,), the setting at each.
+        rest: (n, 3), all CVs at rest. volume: (n,), the setting at each.
     """
     mass = np.tile(grid.mass.astype(np.float64)[:, None], (1, len(rest) // len(grid.mass))).ravel()
     still = Hair(rest, np.zeros_like(rest), np.eye(3), grid.middle, others_at_rest)
@@ -101,7 +104,7 @@ def _others(
         np.concatenate(both)
         for both in ((hair.motion, hair.others.motion), (mass, hair.others.mass))
     )
-    # beside others a grid has cells enough for the groom wherever it is
+    # with other grooms, a grid has enough cells not to wrap around
     counts = (NO_END,) * 3 if len(hair.others.mass) else grid.counts
     places = (here - hair.middle) @ hair.turn / grid.cell + BEGIN
     steps = motion * MOTION / grid.cell
@@ -123,8 +126,8 @@ def _others(
 
 
 def _along(apart: float, count: int) -> tuple[float, float]:
-    """What a cell whose middle is so far away counts, and the slope of that, along one axis of a
-    grid that begins again after `count` cells."""
+    """The weight of a cell whose middle is `apart` away, and its slope, along one axis of a grid
+    that wraps around after `count` cells."""
     apart = math.remainder(apart, count)
     images = [apart - count, apart, apart + count]
     weight = sum(_tent(d + 1.0) / 4.0 + _tent(d) / 2.0 + _tent(d - 1.0) / 4.0 for d in images)

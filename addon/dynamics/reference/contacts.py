@@ -1,4 +1,4 @@
-"""Contacts of one guide for the scalar reference, CV by CV; see `contacts.py` for the ideas."""
+"""Scalar reference of `contacts`, for one guide and one CV at a time; see there for the method."""
 
 from __future__ import annotations
 
@@ -36,11 +36,11 @@ class Moment:
 
 @dataclass
 class Plane:
-    """One contact: CV `cv`, or a point of the segment that ends there, shall keep
+    """One contact: CV `cv`, or a point of the segment that ends there, must keep
     normal . x >= offset; see `contacts.Contacts`.
 
-    along: fraction of the segment; 1 is the CV itself. weights: of the point's way, what the CV
-        before and the CV go.
+    along: fraction of the segment; 1 is the CV itself. weights: displacement of the previous CV and
+        of the CV, over that of the point.
     """
 
     cv: int
@@ -50,7 +50,7 @@ class Plane:
     is_out: bool
     skin: float  # [m]
     slack: float  # [m]
-    path: float  # [m] that its point has gone, as seen from the collider
+    path: float  # [m] that its point has moved, relative to the collider
     along: float = 1.0
     weights: tuple[float, float] = (0.0, 1.0)
     push: float = 0.0
@@ -63,7 +63,7 @@ class Plane:
         return self.offset - float(self.normal @ self.point(x))
 
     def push_of(self, x: Floats, friction: float) -> tuple[Floats, bool]:
-        """How far its point has to go [m]; and whether it touches."""
+        """The displacement of its point (3,) [m], and whether it touches."""
         here, missing = self.point(x), self.gap(x)
         push = max(missing, 0.0)
         self.push += push
@@ -79,18 +79,18 @@ class Plane:
         x[self.cv] += push * self.weights[1]
 
     def absorb(self, x: Floats, previous: Floats) -> None:
-        """Take away the speed that pushing out has made."""
+        """Remove the speed that pushing out has caused."""
         if self.push > 0.0:
             away = float(self.normal @ (self.point(x) - self.origin))
             self.move(previous, self.normal * max(away, 0.0))
 
 
 def push_out(planes: list[list[Plane]], x: Floats, friction: float) -> dict[int, Floats]:
-    """Bring all CVs back to their planes; the normals of those that touch.
+    """Push all CVs out to their planes, in place; returns the normals of CVs that touch.
 
     Args:
-        planes: those of each collider's CVs, then those of each collider's segments. What is in one
-            list starts from the same x.
+        planes: for each collider those of CVs, then for each collider those of segments. All planes
+            of a list are evaluated at the same x.
     """
     of_cvs: dict[int, Floats] = {}
     of_segments: dict[int, Floats] = {}
@@ -112,7 +112,7 @@ def push_out(planes: list[list[Plane]], x: Floats, friction: float) -> dict[int,
 
 
 def is_deep(planes: list[list[Plane]], x: Floats) -> bool:
-    """Whether any is farther below its plane than it may be."""
+    """Whether any point is farther below its plane than allowed."""
     return any(plane.gap(x) > plane.slack for group in planes for plane in group)
 
 
@@ -127,13 +127,13 @@ class Solid:
     inverse_before: Floats
     scale: float  # the smallest
     seen: float  # [m^2], squared length of paths that need not be followed
-    travel: float  # [m], no point of it goes farther
+    travel: float  # [m], upper limit of the motion of its points
     swelling: float  # [m]
     is_part: bool = False
 
     @classmethod
     def of(cls, posed: PosedCollider, moment: Moment, size: float) -> Solid | None:
-        """None: it is flat."""
+        """The collider in a substep; None if it is flat."""
         before, now = posed.matrix_at(moment.begin), posed.matrix_at(moment.end)
         if np.linalg.cond(now[:3, :3]) >= 1.0 / FLAT:
             return None
@@ -146,7 +146,7 @@ class Solid:
         return cls(posed, change, now, *inverses, scale, seen, travel, posed.swelling)
 
     def part(self, number: int, count: int) -> Solid:
-        """In one of `count` parts of the substep."""
+        """The collider in one of `count` parts of the substep."""
         begin, end = (
             self.inverse_before * (1.0 - fraction) + self.inverse * fraction
             for fraction in (number / count, (number + 1) / count)
@@ -162,7 +162,7 @@ class Solid:
         )
 
     def is_sharp(self, spacing: float) -> bool:
-        """Whether segments of this length [m] collide."""
+        """Whether segments of this length [m] need planes, see `contacts.is_sharp`."""
         return spacing**2 > self.seen
 
     def local(self, x: Floats) -> Floats:
@@ -170,19 +170,20 @@ class Solid:
         return result
 
     def origin(self, x: Floats, previous: Floats) -> Floats:
-        """Where it would be had it stayed with the collider."""
+        """Where a point would be had it moved with the collider."""
         result: Floats = previous + (self.change @ np.append(self.local(x), 1.0))[:3]
         return result
 
     def at(self, local: Floats) -> tuple[float, Floats]:
-        """Distance and normal in the world."""
+        """Signed distance [m] and unit normal, world space."""
         found, gradient = self.posed.collider.distance(local[:, None])
         outward = self.inverse[:3, :3].T @ gradient[:, 0]
         steepness = float(np.linalg.norm(outward))
         return float(found[0]) / steepness, outward / steepness
 
     def followed(self, x: Floats, previous: Floats, radius: float) -> tuple[Floats, float, float]:
-        """Normal and normal . x of the surface that its way meets, and its distance before."""
+        """See `contacts._followed`: normal and normal . x where the point's path meets the surface,
+        and the point's distance before."""
         begin = (self.inverse_before @ np.append(previous, 1.0))[:3]
         path = self.local(x) - begin
         first, _ = self.at(begin)
@@ -193,7 +194,7 @@ class Solid:
         return normal, float(normal @ there) - distance, first
 
     def _met(self, begin: Floats, path: Floats, first: float, target: float) -> float:
-        """Fraction of the way where it is no farther than the target; 1: nowhere."""
+        """The fraction of the path at which the distance falls to `target`; 1 if it does not."""
         length = float(np.linalg.norm(path)) * self.scale
         gone, distance = 0.0, first
         for _ in range(TRACE_STEPS):
@@ -211,7 +212,7 @@ class Solid:
 def is_hurried(
     solid: Solid, planes: list[Plane], x: Floats, previous: Floats, spacing: float
 ) -> bool:
-    """Whether a guide with these planes goes through the substep in parts; see
+    """Whether a guide with these planes is advanced in parts of the substep; see
     `contacts.hurried_guides`."""
     root, farthest = PINNED - 1, FAST * spacing
     is_far = float(np.linalg.norm(x[root] - solid.origin(x[root], previous[root]))) > farthest
@@ -231,8 +232,8 @@ def planes_of(
     """Planes for the CVs of x (cv_count, 3) near a collider, and for segments.
 
     Args:
-        dt: [s], how long the collider goes. size: the hair's [m].
-        clearance: (cv_count, 1 + len(BETWEEN)) [m], what each keeps at most.
+        dt: [s], of the substep or its part. size: the hair's [m].
+        clearance: (cv_count, 1 + len(BETWEEN)) [m], upper limit of the distances to keep.
     """
     free = [cv for cv in range(PINNED, len(x)) if not held[cv]]
     led_out = settings.depenetration_speed * size * dt + solid.swelling
@@ -294,9 +295,11 @@ def _plane_between(
     size: float,
     is_loose: bool,
 ) -> Plane | None:
-    """Of the points of the segment that ends at a CV the deepest one's.
+    """The plane of the deepest of the points of the segment that ends at a CV.
 
-    radius: of that CV. kept: what the points keep. is_loose: whether the CV before is free too.
+    Args:
+        radius: of that CV [m]. kept: distances that the points keep [m].
+        is_loose: whether the previous CV is free too.
     """
     deepest: Plane | None = None
     for along, wanted in zip(BETWEEN, kept, strict=True):

@@ -1,6 +1,6 @@
-"""The scene's force fields at one CV after the other, in float64.
+"""Scalar reference of `force_fields`, one CV at a time in float64.
 
-Nothing is shared with the fast form but the fields and what limits them.
+It shares with the fast form only the fields and their limit.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ def blown_slowly(
     *,
     is_strand: bool = True,
 ) -> Floats:
-    """Where points (n, 3), the CVs of a guide or others, were a substep earlier, for the speed that
-    fields leave them."""
+    """The previous positions (n, 3) that represent the velocity after a substep of the fields, of
+    the CVs of a guide or other points (n, 3)."""
     result = previous.copy()
     for cv, place in enumerate(x):
         velocity = (place - previous[cv]) / dt
@@ -38,7 +38,7 @@ def blown_slowly(
 
 
 def acceleration(place: Floats, velocity: Floats, fields: ForceFields) -> Floats:
-    """What a point of mass 1 feels, (3,) [m/s^2]."""
+    """The acceleration of a point of mass 1, (3,) [m/s^2]."""
     total = np.zeros(3)
     for field in fields.fields:
         push, slowing, spin = _felt(field, place, velocity, fields)
@@ -49,7 +49,7 @@ def acceleration(place: Floats, velocity: Floats, fields: ForceFields) -> Floats
 def _change(
     place: Floats, velocity: Floats, along: Floats, fields: ForceFields, dt: float
 ) -> Floats:
-    """Of the velocity, in a substep."""
+    """The change of the velocity in a substep, (3,) [m/s]."""
     beside = np.eye(3) - np.outer(along, along)
     push, spin = np.zeros(3), np.zeros(3)
     slows, slows_along = 0.0, 0.0
@@ -75,7 +75,7 @@ def _left(slowing: float) -> float:
 def _felt(
     field: ForceField, place: Floats, velocity: Floats, fields: ForceFields
 ) -> tuple[Floats, float, Floats]:
-    """Push, slowing and spin."""
+    """Push, slowing and spin of one field, see `force_fields.Felt`."""
     center, axis = np.array(field.center), np.array(field.axis)
     normal = axis if field.normal is None else np.array(field.normal)
     r = place - center
@@ -152,7 +152,7 @@ def _octaves(permutation: Ints, point: Floats) -> float:
 
 
 def _perlin(permutation: Ints, point: Floats) -> float:
-    """From the noise's eight corners, each by its weight."""
+    """The noise as a weighted sum over the eight corners of the cell."""
     cell = np.floor(point)
     inside = point - cell
     fade = inside**3 * (inside * (inside * 6.0 - 15.0) + 10.0)
@@ -167,7 +167,7 @@ def _perlin(permutation: Ints, point: Floats) -> float:
 
 
 def _gradient(low_bits: int) -> Floats:
-    """An edge of a cube, seen from its middle."""
+    """The vector from the middle of a cube to the middle of one of its edges."""
     edges = [(x, y, 0) for y in (1, -1) for x in (1, -1)]
     edges += [(x, 0, z) for z in (1, -1) for x in (1, -1)]
     edges += [(0, y, z) for z in (1, -1) for y in (1, -1)]

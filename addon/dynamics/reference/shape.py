@@ -1,4 +1,4 @@
-"""Geometry of one guide for the scalar reference: frames, kinks, and how lengths change.
+"""Geometry of one guide for the scalar reference: frames, kinks, and the Jacobian of lengths.
 
 All float64; x is (cv_count, 3) world [m].
 """
@@ -15,13 +15,13 @@ from ..style import GENTLE, SHARP
 
 
 def hold(rest_second: Floats, length: float) -> float:
-    """1 for gentle bends, 0 for sharp kinks, straight in between."""
+    """1 for gentle bends, 0 for sharp kinks, linear in between."""
     sharpness = float(np.linalg.norm(rest_second)) / length if length else 2.0
     return min(max((SHARP - sharpness) / (SHARP - GENTLE), 0.0), 1.0)
 
 
 def jacobian_of(x: Floats) -> Floats:
-    """Of the lengths of all segments beyond the pinned ones, by the free CVs: (n, 3 n)."""
+    """The Jacobian of the lengths of segments beyond the pinned ones by the free CVs, (n, 3 n)."""
     free = len(x) - PINNED
     jacobian = np.zeros((free, 3 * free))
     for row in range(free):
@@ -34,7 +34,8 @@ def jacobian_of(x: Floats) -> Floats:
 
 
 def frames(x: Floats, style: Floats, twist_cv: int) -> list[Floats]:
-    """Rotation of each segment, columns tangent, normal, binormal, carried without twist."""
+    """The rotation of each segment, with tangent, normal and binormal as columns, carried without
+    twist."""
     tangents = [(b - a) / np.linalg.norm(b - a) for a, b in pairwise(x)]
     beside = style[twist_cv] - style[0]
     beside = beside - tangents[0] * (tangents[0] @ beside)

@@ -1,9 +1,8 @@
-"""The same step, one guide and one CV after the other in float64: slow, to be read and compared.
+"""Scalar reference of `step`, one guide and one CV at a time in float64: for reading and tests.
 
-Nothing is shared with the fast form but settings and their curves, state, drive, colliders, the
-air, how the groom turns and its roots go as a whole, and the cells of hair that feels hair. Frames
-are rotation matrices here, and each linear system is written out and solved densely, so the banded
-solves are checked as well.
+It shares with the fast form only settings and their curves, state, drive, colliders, the air, the
+rigid motion of groom and roots, and the cells of the hair grid. Here frames are rotation matrices,
+and each linear system is written out and solved densely, so the banded solvers are tested as well.
 """
 
 from __future__ import annotations
@@ -40,14 +39,14 @@ from .contacts import (
 from .force_fields import blown_slowly
 from .shape import frames, hold, jacobian_of
 
-#: What each guide has a number of its own of.
+#: Painted settings with a single value per guide.
 _PAINTED = ("gravity", "damping", "style_damping", "volume")
 
 
 def advance_slowly(
     state: DynamicsState, drive: Drive, settings: DynamicsSettings, duration: float
 ) -> DynamicsState:
-    """What `step.advance` does; see there."""
+    """Reference of `step.advance`; see there."""
     dt = 1.0 / settings.substep_rate
     duration = min(duration, settings.longest_frame)
     time = state.time_left + duration
@@ -86,7 +85,7 @@ def _carried(carry: Carry, points: Floats) -> Floats:
 
 
 class _Push:
-    """How guides feel other guides, now and then."""
+    """Forces between guides, computed at some substeps, see `among`."""
 
     def __init__(
         self, state: DynamicsState, drive: Drive, settings: DynamicsSettings, dt: float
@@ -99,7 +98,7 @@ class _Push:
         self.middles = (drive.target_before + drive.target_now).transpose(2, 1, 0) / 2.0
 
     def before(self, number: int, guides: list[_Guide]) -> None:
-        """Before a substep of the frame."""
+        """Update the push of guides before a substep of the frame."""
         if not self.is_felt or not guides:
             return
         if self.rows is None or (self.first + number) % self.substeps == 0:
@@ -147,7 +146,7 @@ class _Guide:
         self.twist_cv = int(state.rest.shape.twist_cv[guide])
         self.rest_length = [float(np.linalg.norm(b - a)) for a, b in pairwise(self.rest)]
         self.push = np.zeros_like(self.x)  # by other guides, in each substep
-        self.length = self.rest_length  # those that this substep keeps
+        self.length = self.rest_length  # the lengths to keep in this substep
         room = state.rest.room
         self.room = np.zeros(len(self.length)) if room is None else room[:, guide].astype(float)
         self.size = state.rest.size
@@ -183,9 +182,9 @@ class _Guide:
         self, drive: Drive, moment: Moment, carries: list[Carry], placed: Rigid | None
     ) -> None:
         """Args:
-        carries: how hair goes with the roots without inertia, in the substep before and in this
-            one; none where it does not.
-        placed: where the roots are as a whole at the begin; None: as their path says.
+        carries: the motion that hair takes over from the roots without inertia, in the previous
+            substep and in this one; empty if it takes over none.
+        placed: where the roots as a whole are at the begin; None: according to their path.
         """
         settings, begun = self.settings, self.x.copy()
         air = self._air(settings, moment)
@@ -215,7 +214,8 @@ class _Guide:
     def _keep_outside(
         self, solids: list[Solid], settings: DynamicsSettings, dt: float, passes: int
     ) -> bool:
-        """Contacts and lengths; False if that is not done, but shall be done in parts."""
+        """Solve contacts and lengths; False, without doing so, if the guide needs to be advanced in
+        parts."""
         found = [
             planes_of(
                 solid, self.x, self.previous, self.held, settings, dt, self.size, self.clearance
@@ -328,7 +328,7 @@ class _Guide:
         return [cv for cv, is_held in enumerate(self.held) if is_held]
 
     def _towards_root(self) -> list[int]:
-        """CVs that are not held themselves, but have a held one beyond them, the last first."""
+        """Free CVs with a held one beyond them, the last first."""
         last = max(self._held_cvs(), default=0)
         return [cv for cv in range(last - 1, PINNED - 1, -1) if not self.held[cv]]
 
@@ -338,7 +338,7 @@ class _Guide:
         free = len(self.x) - PINNED
         if free < 1:
             return felt
-        # the part of the combed weight across all length constraints, by projection
+        # the part of the combed weight orthogonal to all length constraints, by projection
         combed = np.tile(turn @ pull, free)
         jacobian = jacobian_of(self.middle)
         tension = self._tension_on_style(turn @ pull)
@@ -348,7 +348,8 @@ class _Guide:
         return felt
 
     def _tension_on_style(self, combed: Floats) -> Floats:
-        """By which each segment beyond the pinned ones holds the gravity of the style [m/s^2]."""
+        """The tension of each segment beyond the pinned ones that holds the style's gravity
+        [m/s^2]."""
         free = len(self.x) - PINNED
         if free < 1:
             return np.zeros(0)
@@ -357,7 +358,7 @@ class _Guide:
         return tension
 
     def _give(self, settings: DynamicsSettings, dt: float) -> None:
-        """One step of the springs along a curl, in tensions; its lengths are those it leaves."""
+        """One step of the springs along a curl, by their tension; sets `length` to the result."""
         room = self.room[PINNED - 1 :] * give(settings)
         if not room.any():
             return
@@ -504,7 +505,7 @@ class _Guide:
             self.x[cv] = self.x[cv - 1] + segment[cv - 1]
 
     def _segments(self) -> Floats:
-        """With their directions and the lengths that they should have."""
+        """The segments with their directions, but the lengths that they should have."""
         displacements = np.diff(self.x, axis=0)
         lengths = zip(displacements, self.length, strict=True)
         return np.array(
